@@ -156,3 +156,24 @@ def test_units_of_movements_without_times_are_read_and_must_agree(tmp_path):
         file["nod"].attrs["units"] = "m"
     with pytest.raises(kineme.KinemeError, match="unit"):
         kineme.read_recordings(path, units=0.1)
+
+
+def test_rates_and_scales_are_those_of_the_attributes_and_records_are_columns(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    u = np.linspace(0, 1, 30)
+    x = np.column_stack([u, u**2])
+    for name in ("rate", "start", "table", "sets"):
+        with h5py.File(tmp_path / f"{name}.h5", "w") as file:
+            if name == "table":
+                file["hand"] = np.rec.fromarrays([u, *x.T], names="t,x,y")
+            elif name == "sets":
+                file["X"], file["y"], file.attrs["fs"] = np.stack([x, x]), [b"wave", b"nod"], 10.0
+            else:
+                hand = file.create_dataset("acquisition/hand/data", data=100 * x)
+                hand.attrs["conversion"] = 0.01
+                stated = hand if name == "rate" else file.create_dataset("acquisition/hand/starting_time", data=0.0)
+                stated.attrs["sampling_rate" if name == "rate" else "rate"] = 10.0
+        found = kineme.read_recordings(tmp_path / f"{name}.h5")
+        np.testing.assert_allclose(found.demonstrations[-1].positions, x, err_msg=name)
+        np.testing.assert_allclose(found.demonstrations.durations, 1.0 if name == "table" else 2.9)
+        assert found.labels.tolist() == (["wave", "nod"] if name == "sets" else ["hand"])

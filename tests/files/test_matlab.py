@@ -133,13 +133,15 @@ CELLS_T = np.arange(12) / 10
 CELLS_X = np.column_stack((np.sin(CELLS_T), CELLS_T**2))
 
 
-def read_mat(tmp_path, **variables):
+def write_mat(tmp_path, **variables):
     from scipy.io import savemat
 
-    import kineme
-
     savemat(tmp_path / "a.mat", variables)
-    return kineme.read_recordings(tmp_path / "a.mat")
+    return tmp_path / "a.mat"
+
+
+def read_mat(tmp_path, **variables):
+    return kineme.read_recordings(write_mat(tmp_path, **variables))
 
 
 def test_cells_structures_and_variables_are_movements_or_columns(tmp_path):
@@ -158,6 +160,8 @@ def test_cells_structures_and_variables_are_movements_or_columns(tmp_path):
     assert read_mat(tmp_path, t=CELLS_T, a=CELLS_T, b=CELLS_T**2).demonstrations.dimensions == ("a", "b")
     rated = read_mat(tmp_path, q=CELLS_X, grip=CELLS_T, fps=50.0)
     np.testing.assert_allclose(np.diff(rated.demonstrations.times), 0.02)
+    alone = kineme.read_recordings(write_mat(tmp_path, gesture=CELLS_X), units=0.02)
+    np.testing.assert_array_equal(alone.demonstrations[0].positions, CELLS_X)
 
 
 def test_matrices_with_their_own_times_win_over_the_longer_axis(tmp_path):

@@ -212,3 +212,50 @@ def test_columns_without_any_number_are_left_aside_in_tables_too():
         assert found.detected[0][0].ignored == ("effort",)
         with pytest.raises(DataError, match=r"expected (a number|finite)"):
             read(data, name, columns=["x", "effort"])
+
+
+def test_a_rate_is_known_by_its_words_and_holds_for_all_below_it():
+    x = X.tolist()
+    for name, value in (("fs", 20), ("sampling_rate_hz", 20.0), ("interval_ms", 50), ("period", 0.05), ("dt", 50)):
+        for tree in ({"values": x, name: value}, {"a": {"values": x}, "b": [x], name: str(value)}):
+            times = read_json(tree).demonstrations[-1].times
+            np.testing.assert_allclose(times, np.arange(len(x)) / 20, err_msg=name)
+    for value in ({"heart_rate": 20}, {}):
+        with pytest.raises(DataError, match="the seconds between two samples"):
+            read_json({"values": x} | value)
+    with pytest.raises(DataError, match=r"expected one rate, got fs \(20 Hz\), fps \(30 Hz\)"):
+        read_json({"values": x, "fs": 20, "fps": 30})
+    assert read_json({"values": x, "fs": 20, "fps": 30}, units=0.05).demonstrations.durations[0] == pytest.approx(0.45)
+    with pytest.raises(DataError, match=r"got shape \(2, 10\), .* save np.moveaxis"):
+        read_json({"values": X.T.tolist(), "fs": 20})
+
+
+@pytest.mark.parametrize("y", [np.array(["a", "b", "a"]), np.array([2, 0, 2]), np.array([2.0, 0.0, 2.0])])
+def test_sets_of_movements_have_the_labels_beside_them(y):
+    sets = np.stack([X, X + 1, X + 2])
+    found = read(npz(X=sets, y=y, fs=20), "a.npz")
+    assert found.labels.tolist() == (["a", "b", "a"] if y.dtype.kind == "U" else ["2", "0", "2"])
+    np.testing.assert_array_equal(found.demonstrations[2].positions, X + 2)
+    np.testing.assert_allclose(found.demonstrations.durations, 9 / 20)
+    parts = read(npz(X_train=sets, y_train=y, X_test=sets[:2], y_test=y[:2]), "a.npz")
+    assert parts.labels.tolist() == [*found.labels.tolist(), *found.labels.tolist()[:2]]
+    assert read(npz(X_train=sets), "a.npz").labels.tolist() == [None] * 3
+
+
+def test_points_of_a_body_in_each_sample_are_columns():
+    hands = [[{"x": x, "y": y, "z": 0}, {"x": y, "y": x, "z": 1}] for x, y in X.tolist()]
+    timed = [{"timestamp": t, "landmarks": hand} for t, hand in zip(T.tolist(), hands, strict=True)]
+    found = read_json(timed)
+    assert found.demonstrations.dimensions == tuple(f"landmarks.{k}.{axis}" for k in (0, 1) for axis in "xyz")
+    np.testing.assert_array_equal(found.demonstrations[0].positions[:, :2], X)
+    numbered = [{"frame": k, "landmarks": [[*one.values()] for one in hand]} for k, hand in enumerate(hands)]
+    np.testing.assert_array_equal(
+        read_json({"fps": 10, "frames": numbered}).demonstrations[0].positions, found.demonstrations[0].positions
+    )
+    names = [{"score": 0.5, "keypoints": [{"name": "nose", "x": x, "score": 1}]} for x, _ in X.tolist()]
+    assert read_json(names, units=0.1).demonstrations.dimensions == ("score", "keypoints.nose.x")
+
+
+def test_tables_of_records_have_their_columns():
+    records = np.rec.fromarrays([T, *X.T], names="t,x,y")
+    np.testing.assert_array_equal(read(npy(records), "a.npy").demonstrations[0].positions, X)

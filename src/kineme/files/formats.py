@@ -103,7 +103,10 @@ def _read_npz(data: bytes, layout: Layout) -> Parsed:
 
 
 def _read_npy(data: bytes, layout: Layout) -> Parsed:
-    return arrays_movements({POSITIONS[0]: array_of_npy(data, Path("it"))}, layout, "NPY")
+    array = array_of_npy(data, Path("it"))
+    if array.dtype.names:  # a table, as of pandas' to_records
+        return tree_movements({name: array[name] for name in array.dtype.names}, layout, "NPY")
+    return arrays_movements({POSITIONS[0]: array}, layout, "NPY")
 
 
 def _read_bvh(data: bytes, layout: Layout) -> Parsed:
@@ -128,6 +131,7 @@ FORMATS: dict[str, Format] = {
     ".npz": Format(_read_npz),
     ".json": Format(json_movements),
     ".jsonl": Format(json_lines_movements),
+    ".ndjson": Format(json_lines_movements),
     ".npy": Format(_read_npy),
     ".parquet": Format(_read_parquet),
     ".mat": Format(mat_movements, label_is_stem=True),

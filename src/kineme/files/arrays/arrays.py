@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+import math
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import DataError
-from kineme.files.arrays.trees import RATE_NAMES, STAMP, STEP_NAMES, rate_of
+from kineme.files.arrays.trees import STAMP, rate_of, seconds_named
 from kineme.movements.tables.columns import column_numbers, is_header_stamp, is_time
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.parsed import Block, Detected, Parsed, distinct, listed
@@ -56,7 +57,8 @@ def arrays_movements(arrays: Mapping[str, Any], layout: Layout, kind: str) -> Pa
     else:
         xs, ts, how = _numbered(arrays)
     if ts is None and not isinstance(layout.units, float | int) and (rate := rate_of(arrays)) is not None:
-        ts, layout = [np.arange(len(x)) / rate.hertz for x in xs], replace(layout, units="s")
+        check_first_axis([x.shape for x in xs])
+        ts, layout = [rate.stamps(len(x)) for x in xs], replace(layout, units="s")
     named = Named(_labels(arrays, len(xs)), _named(arrays, TIMES) or STAMP, None, _column_names(arrays))
     return parsed_arrays(xs, ts, named, layout, (kind, how))
 
@@ -94,13 +96,8 @@ def parsed_arrays(
         stamps = np.concatenate([np.arange(len(x)) * float(units) for x in xs])
     else:
         units, known = "s", "no times: one second each"
-        wide = [x.shape for x in xs if x.shape[0] < x.shape[1]]
-        if wide and detected[1] != ROWS:  # a line says which of its numbers are one sample
-            raise DataError(
-                f"expected samples along the first axis of each movement, got shape {wide[0]}, more dimensions than "
-                "samples; if time runs along the last axis, as in (n, d, T), save np.moveaxis(array, 1, 2), of one "
-                "movement array.T; if it is right, say the step between samples with units=, in the shell --units"
-            )
+        if detected[1] != ROWS:  # a line says which of its numbers are one sample
+            check_first_axis([x.shape for x in xs])
     positions = np.concatenate(xs)
     is_named = columns is not None
     columns = distinct(columns or axis_names(positions.shape[1]))
@@ -114,6 +111,22 @@ def parsed_arrays(
     block = Block(positions, stamps, offsets, list(labels), places)
     how = Detected(detected[0], detected[1], columns, None if ts is None else time, units, known, named=is_named)
     return Parsed(how, block)
+
+
+def check_first_axis(shapes: Iterable[tuple[int, ...]]) -> None:
+    """Refuse movements (T, d) without stamps that have more dimensions than samples: time may run along the last axis.
+
+    Raises
+    ------
+    DataError
+        Such a movement.
+    """
+    if wide := [shape for shape in shapes if shape[0] < math.prod(shape[1:])]:
+        raise DataError(
+            f"expected samples along the first axis of each movement, got shape {wide[0]}, more dimensions than "
+            "samples; if time runs along the last axis, as in (n, d, T), save np.moveaxis(array, 1, 2), of one "
+            "movement array.T; if it is right, say the step between samples with units=, in the shell --units"
+        )
 
 
 def _column_names(arrays: Mapping[str, Any]) -> list[str] | None:
@@ -132,7 +145,8 @@ def has_known_names(names: Collection[str]) -> bool:
     known = any(name in names or f"{name}_0" in names for name in POSITIONS)
     if known and not {*TIMES, "offsets"} & set(names) and any(is_time(name) or is_header_stamp(name) for name in names):
         return False
-    return known or not set(names) - {*TIMES, *LABELS, "offsets", *RATE_NAMES, *STEP_NAMES}
+    others = set(names) - {*TIMES, *LABELS, "offsets"}
+    return known or all(seconds_named(name) is not None for name in others)
 
 
 def _axes_stacked(arrays: Mapping[str, Any]) -> Mapping[str, Any]:

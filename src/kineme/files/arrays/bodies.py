@@ -121,7 +121,7 @@ def _clock(arrays: Mapping[str, Any], body: Body, layout: Layout) -> tuple[dict[
             f"expected the rate of {body.arrays[-1]} beside it, as mocap_framerate, fps or dt, got none; say the "
             "seconds between two samples with units=, in the shell --units"
         )
-    return {STAMP: np.arange(body.n_samples) / rate.hertz}, rate, STAMP
+    return {STAMP: rate.stamps(body.n_samples)}, rate, STAMP
 
 
 def _smpl(arrays: Mapping[str, Any]) -> Body | None:

@@ -12,7 +12,8 @@ import numpy as np
 
 from kineme.errors import DataError
 from kineme.files.arrays.tree_movements import tree_movements
-from kineme.files.arrays.trees import GROUPS, RATE_NAMES, STEP_NAMES
+from kineme.files.arrays.trees import GROUPS, Rate, rate_of, seconds_named
+from kineme.files.limits import check_expanded
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.parsed import Parsed
 
@@ -20,8 +21,9 @@ _SMALL, _CHUNKS = 2**20, 1000  # bytes and chunks that need not be written
 _EXPANDED = 1100  # times as many bytes gzip, which packs best, gives at most
 _LARGE, _PACKED = 2**26, 200  # bytes from which on packing is looked at; times as many as movements pack to at most
 _DEEPEST, _MOST = 12, 1_000_000  # groups within groups; groups and data sets in all
+_LABELS = 100_000  # texts in a data set, at most
 _UNITS = frozenset({"unit", "units"})  # attributes
-_ATTRIBUTES = frozenset({"label", "task"}) | RATE_NAMES | STEP_NAMES
+_NAMES = frozenset({"label", "task"})  # attributes
 
 
 def hdf5_movements(path: Path, layout: Layout) -> Parsed:
@@ -55,9 +57,7 @@ def _tree(group: Any, h5py: Any, counted: list[int], depth: int = 0, unit: Any =
     """
     tree: dict[str, Any] = {}
     unit = _unit_in(group) or unit
-    for name in group.attrs:
-        if name.lower() in _ATTRIBUTES and (value := _single(group.attrs[name])) is not None:
-            tree[name] = value
+    tree |= _said(group)
     for name in group:
         counted[0] += 1
         if counted[0] > _MOST:
@@ -69,11 +69,28 @@ def _tree(group: Any, h5py: Any, counted: list[int], depth: int = 0, unit: Any =
             if depth < _DEEPEST:
                 tree[name] = _tree(one, h5py, counted, depth + 1, unit)
         elif isinstance(one, h5py.Dataset) and not one.external and not one.is_virtual:
+            rate = rate_of(_said(one))
             if one.shape == ():
                 tree[name] = _single(one[()])
+                tree |= {} if rate is None else {"rate": rate.hertz}  # as of NWB's starting_time
             elif one.shape and one.dtype.kind in "biuf":
-                tree[name] = _Stored(one, _unit_in(one) or unit)
+                tree[name] = _Stored(one, _unit_in(one) or unit, rate)
+            elif one.dtype.names and len(one.shape) == 1:
+                check_expanded(one.shape[0] * one.dtype.itemsize)
+                tree[name] = {head: one[head] for head in one.dtype.names if one.dtype[head].kind in "biuf"}
+            elif len(one.shape) == 1 and one.dtype.kind in "SO" and one.shape[0] <= _LABELS:
+                tree[name] = [_single(text) for text in one[()]]  # of labels
     return tree
+
+
+def _said(stored: Any) -> dict[str, Any]:
+    """The label and the rate among the attributes of a group or of a data set."""
+    values = {
+        name: _single(stored.attrs[name])
+        for name in stored.attrs
+        if name.lower() in _NAMES or seconds_named(name) is not None
+    }
+    return {name: value for name, value in values.items() if value is not None}
 
 
 def _unit_in(stored: Any) -> Any:
@@ -98,8 +115,10 @@ class _Stored:
         On reading: samples that were never written, or that expand by more than gzip can, or than movements do.
     """
 
-    def __init__(self, stored: Any, unit: Any) -> None:
-        self._stored, self.shape, self.dtype, self.unit = stored, stored.shape, stored.dtype, unit
+    def __init__(self, stored: Any, unit: Any, rate: Rate | None) -> None:
+        self._stored, self.shape, self.dtype, self.unit, self.rate = stored, stored.shape, stored.dtype, unit, rate
+        scale = {name: _single(stored.attrs[name]) for name in ("conversion", "offset") if name in stored.attrs}
+        self._scale = {name: value for name, value in scale.items() if isinstance(value, float)}  # of NWB
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Any:
         return np.asarray(self[()], dtype)
@@ -121,7 +140,8 @@ class _Stored:
                 f"{n_stored:,} in the file, nearly all of which are alike; write a data set of what was recorded, or a "
                 "shorter one"
             )
-        return self._stored[rows]
+        values = self._stored[rows]
+        return values * self._scale.get("conversion", 1.0) + self._scale.get("offset", 0.0) if self._scale else values
 
 
 def _single(value: Any) -> str | float | None:

@@ -13,11 +13,12 @@ from kineme.files.arrays.arrays import arrays_movements, has_known_names
 from kineme.files.arrays.tree_movements import tree_movements
 from kineme.files.limits import check_expanded
 from kineme.files.tables.dialect import is_number
-from kineme.movements.tables.columns import is_time
+from kineme.movements.tables.columns import counts_samples, is_time
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.parsed import Parsed
 from kineme.movements.tables.time_stamps import is_date, seconds_of_dates
 
+_NAMES = ("name", "part", "bodypart", "joint")  # of a point among those of a body
 _NUMBER, _LIST = 32, 88  # bytes of a Python object
 
 
@@ -139,10 +140,22 @@ def as_tree(value: Any) -> Any:
 def _is_sample(entry: Mapping[str, Any]) -> bool:
     """Whether an object is one sample, not a movement whose entries are lists over time."""
     for name, value in entry.items():
-        if is_time(name):
+        if is_time(name) or counts_samples(name):
             return not isinstance(value, list)
+    if any(_are_parts(value) for value in entry.values()):
+        return True
     lists = [one for one in entry.values() if isinstance(one, list)]
     return len(lists) < len(entry) and not any(isinstance(one, (list, Mapping)) for value in lists for one in value[:1])
+
+
+def _are_parts(value: Any) -> bool:
+    """Whether a value is a list of objects that each have a name: the points of a body at one time."""
+    return isinstance(value, list) and bool(value) and all(isinstance(one, Mapping) and _name(one) for one in value)
+
+
+def _name(part: Mapping[str, Any]) -> str | None:
+    name = next((part[key] for key in _NAMES if key in part), None)
+    return name if isinstance(name, str) else None
 
 
 def _is_matrix(rows: Sequence[list[Any]]) -> bool:
@@ -150,9 +163,10 @@ def _is_matrix(rows: Sequence[list[Any]]) -> bool:
 
 
 def _columns(samples: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Samples with names as one array for each name, NaN where it is missing."""
+    """Samples with names as one array for each name, NaN where it is missing; parts of a sample by name or number."""
     flat = [_flat(one) for one in samples]
     names = dict.fromkeys(name for one in flat for name in one)
+    check_expanded(8 * len(flat) * len(names))
     return _columns_of({name: [one.get(name) for one in flat] for name in names})
 
 
@@ -161,6 +175,11 @@ def _flat(sample: Mapping[str, Any]) -> dict[str, Any]:
     for name, value in sample.items():
         if isinstance(value, Mapping):
             plain |= {f"{name}.{inner}": one for inner, one in _flat(value).items()}
+        elif isinstance(value, list) and value and all(isinstance(one, Mapping) for one in value):
+            for k, one in enumerate(value):
+                part = _name(one) or str(k)
+                cells = {inner: cell for inner, cell in _flat(one).items() if inner not in _NAMES}
+                plain |= {f"{name}.{part}.{inner}": cell for inner, cell in cells.items()}
         else:
             plain[name] = value
     return plain

@@ -111,7 +111,7 @@ def mat_movements(data: bytes, layout: Layout) -> Parsed:
     """The movements in a MATLAB file: those of ``demos``, see `read_demos`, else of all its variables.
 
     Structures with times hold one movement; cells and arrays of structures hold many. Matrices among the variables
-    count only beside times or a rate.
+    count only beside times or a rate, or where the caller gives the step between samples.
 
     Raises
     ------
@@ -127,12 +127,13 @@ def mat_movements(data: bytes, layout: Layout) -> Parsed:
         tree = as_tree(variables, byte_order(data))
     except (ValueError, struct.error) as error:
         raise DataError(f"expected a MATLAB file of arrays, got {error}") from error
-    if not has_times(tree):  # matrices on their own may be anything
+    if not has_times(tree) and not isinstance(layout.units, float | int):  # matrices on their own may be anything
         tree = {name: one for name, one in tree.items() if isinstance(one, (dict, list))}
     if not tree:
         got = listed(variables)
         raise DataError(
-            f"expected a MATLAB file with 'demos', got none of that name, nor cells, structures, times: {got}"
+            f"expected a MATLAB file with 'demos', got none of that name, nor cells, structures, times: {got}; say the "
+            "seconds between two samples with units=, in the shell --units"
         )
     return tree_movements(tree, layout, "MATLAB")
 

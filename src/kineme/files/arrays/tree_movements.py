@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from kineme.errors import DataError
-from kineme.files.arrays.arrays import POSITIONS, TIMES, Named, numbers_of, parsed_arrays
+from kineme.files.arrays.arrays import POSITIONS, TIMES, Named, check_first_axis, numbers_of, parsed_arrays
 from kineme.files.arrays.trees import NAMES, STAMP, Found, Style, listed_shapes, movements_in
 from kineme.files.limits import check_expanded
 from kineme.movements.tables.columns import choose_roles, is_time
@@ -51,6 +51,7 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: Style = NAMES, m
     names = [name for name, entry in first.entries.items() if entry.shape[0] == first.length]
     heads, owners = _heads(first, names)
     if first.rate is not None and not any(map(is_time, names)) and not isinstance(layout.units, float | int):
+        check_first_axis([one.entries[""].shape for one in found if "" in one.entries])
         layout = replace(layout, units=None)  # the rate is in Hz, whatever stamps are in
         heads, owners = (*heads, STAMP), (*owners, STAMP)
     kinds = ["text" if owner != STAMP and _is_text(first.entries[owner]) else "number" for owner in owners]
@@ -70,7 +71,7 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: Style = NAMES, m
 
 def _bare(found: Sequence[Found], layout: Layout, kind: str) -> Parsed:
     """Movements that are arrays alone, without times."""
-    if len(found) == 1 and not found[0].place and not isinstance(layout.units, float | int):
+    if len(found) == 1 and not isinstance(layout.units, float | int):
         raise DataError(
             "expected times beside the positions, got one array alone; say the seconds between two samples with "
             "units=, in the shell --units"
@@ -173,7 +174,8 @@ def _part(one: Found, name: str, length: int, kind: tuple[int, bool, bool]) -> t
     """An array of a movement as columns (T, d), of numbers or of texts, and what is wrong with it."""
     width, of_texts, of_time = kind
     if name == STAMP:
-        return (np.arange(length) / (one.rate or 1.0))[:, None], "" if one.rate else "expected a rate, got none"
+        stamps = np.full(length, np.nan) if one.rate is None else one.rate.stamps(length)
+        return stamps[:, None], "" if one.rate else "expected a rate as others have, got none"
     entry = one.entries.get(name)
     if entry is None:
         return np.full((length, width), np.nan), f"expected an array {name!r} as others have, got none"

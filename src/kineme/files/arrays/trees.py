@@ -6,6 +6,7 @@ and so is one of arrays of one length but of several widths; other arrays are mo
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -13,20 +14,29 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from kineme.errors import DataError
 from kineme.movements.tables.columns import LABEL_WORDS, MOVEMENT_WORDS, is_time
-from kineme.movements.tables.time_stamps import words_of
+from kineme.movements.tables.time_stamps import PER_SECOND, TIME_UNITS, unit_by_size, words_of
+from kineme.units import UNITS
 
-#: Names of the number of samples per second, and of the seconds between two; numbers alone, (1,) or ().
-RATE_NAMES = frozenset(
-    {
-        "fps", "rate", "hz", "frequency", "sampling_rate", "sample_rate", "sampling_frequency", "frame_rate",
-        "framerate", "mocap_framerate", "mocap_frame_rate",
-    }
-)  # fmt: skip
-STEP_NAMES = frozenset({"dt", "timestep", "time_step", "sampling_period", "frame_time"})
+_RATE_WORDS = frozenset(
+    {"fps", "hz", "rate", "frequency", "freq", "fs", "sr", "sfreq", "srate", "framerate", "samplerate", "samplingrate"}
+)
+_STEP_WORDS = frozenset({"dt", "timestep", "interval", "period"})
+_STEPS = frozenset({"time_step", "frame_time"})
+_BESIDE_RATE = frozenset(
+    {"sampling", "sample", "frame", "mocap", "capture", "motion", "video", "camera", "point", "data", "time", "delta"}
+)
 #: Head of the times that follow from a rate.
 STAMP = "time [s]"
 _TIMES_OF = re.compile(r"(.+)[_./-](?:t|times?|time_?stamps?)|(?:t|times?|time_?stamps?)[_./-](.+)", re.IGNORECASE)
+#: Words of names that say how a file is built, not which movement it holds.
+_STRUCTURAL = frozenset(
+    {
+        "data", "movements", "demos", "trials", "values", "samples", "points", "frames", "inputs", "payload", "train",
+        "test", "valid", "validation", "acquisition", "signal", "signals", "recordings", "table",
+    }
+)  # fmt: skip
 _WIDEST = 1000  # numbers in a sample; images have more
 _DEEPEST = 12  # groups within groups
 
@@ -45,7 +55,33 @@ class Rate(NamedTuple):
     """How often a file says that it was sampled, and the name under which it says so."""
 
     name: str
-    hertz: float
+    hertz: float  # NaN where the file says several that differ, which are named
+
+    def stamps(self, n: int) -> Any:
+        """The times [s] of n samples.
+
+        Raises
+        ------
+        DataError
+            The file says several rates.
+        """
+        if math.isnan(self.hertz):
+            raise DataError(
+                f"expected one rate, got {self.name}; say the seconds between two samples with units=, in the shell "
+                "--units"
+            )
+        return np.arange(n) / self.hertz
+
+
+def seconds_named(name: str) -> float | None:
+    """The seconds of a unit of a step by its name, ``dt``, ``interval_ms``; 0 of a rate, None of another name."""
+    words = {*words_of(name)}
+    if words <= _RATE_WORDS | _BESIDE_RATE and words & _RATE_WORDS:
+        return 0.0
+    units = [float(UNITS[word].size) for word in words & TIME_UNITS]
+    plain = words - TIME_UNITS
+    is_step = plain <= _STEP_WORDS | _BESIDE_RATE and (plain & _STEP_WORDS or name.lower() in _STEPS)
+    return (*units, 1.0)[0] if is_step and len(units) < 2 else None
 
 
 class Found(NamedTuple):
@@ -54,7 +90,7 @@ class Found(NamedTuple):
     place: str
     label: str | None
     entries: dict[str, Any]
-    rate: float | None = None
+    rate: Rate | None = None
 
     @property
     def length(self) -> int:
@@ -64,8 +100,10 @@ class Found(NamedTuple):
         return counts.most_common(1)[0][0]
 
 
-def movements_in(tree: Any, style: Style = NAMES, place: str = "", label: str | None = None) -> Iterator[Found]:
-    """The movements in a tree, in its order.
+def movements_in(
+    tree: Any, style: Style = NAMES, place: str = "", label: str | None = None, rate: Rate | None = None
+) -> Iterator[Found]:
+    """The movements in a tree, in its order, at the rate of the group around them where they say none.
 
     Parameters
     ----------
@@ -77,12 +115,13 @@ def movements_in(tree: Any, style: Style = NAMES, place: str = "", label: str | 
     if place.count("/") > _DEEPEST:
         return
     if is_array(tree):
-        yield from _of_array(tree, place, label)
+        for found in _of_array(tree, place, label):
+            yield found._replace(rate=rate)
     elif isinstance(tree, Mapping):
-        yield from _of_group(tree, style, place, label)
+        yield from _of_group(tree, style, place, label, rate)
     elif isinstance(tree, (list, tuple)):
         for k, one in enumerate(tree):
-            yield from movements_in(one, style, f"{place}/{k}" if place else str(k), label)
+            yield from movements_in(one, style, f"{place}/{k}" if place else str(k), label, rate)
 
 
 def is_array(tree: Any) -> bool:
@@ -90,24 +129,31 @@ def is_array(tree: Any) -> bool:
     return hasattr(tree, "dtype") and hasattr(tree, "shape") and len(tree.shape) > 0 and tree.dtype.kind in "biufmMO"
 
 
-def _of_array(array: Any, place: str, label: str | None) -> Iterator[Found]:
+def _of_array(array: Any, place: str, label: str | None, labels: Sequence[str] = ()) -> Iterator[Found]:
     if len(array.shape) == 3:
         for k in range(array.shape[0]):
-            yield Found(f"{place}/{k}" if place else str(k), label, {"": array[k]})
+            yield Found(f"{place}/{k}" if place else str(k), labels[k] if labels else label, {"": array[k]})
     elif len(array.shape) in (1, 2):
         yield Found(place, label, {"": array})
 
 
-def _of_group(tree: Mapping[str, Any], style: Style, place: str, label: str | None) -> Iterator[Found]:
+def _of_group(
+    tree: Mapping[str, Any], style: Style, place: str, label: str | None, rate: Rate | None
+) -> Iterator[Found]:
     label = _own_label(tree) or label
+    labels = _labels_of_sets(tree)
+    of_labels = {name for name, _ in labels.values()}
     arrays = {
-        name: one for name, one in tree.items() if is_array(one) and one.dtype.kind != "O" and not _is_rate(name, tree)
+        name: one
+        for name, one in tree.items()
+        if is_array(one) and one.dtype.kind != "O" and name not in of_labels and not _is_rate(name, tree)
     }
-    groups = {name: one for name, one in tree.items() if isinstance(one, (Mapping, list))}
+    groups = {name: one for name, one in tree.items() if isinstance(one, (Mapping, list)) and name not in of_labels}
+    said = {one.rate for one in arrays.values() if getattr(one, "rate", None) is not None}
+    rate = rate_of(tree) or (said.pop() if len(said) == 1 else rate)
     times = {match[1] or match[2]: one for name, one in arrays.items() if (match := _TIMES_OF.fullmatch(name))}
     own_times = all(name in times or _is_stamp_of(name, arrays) for name in arrays)
-    rate = _rate(tree)
-    if arrays and not own_times and (_are_columns(arrays, style, rate) or _continues(arrays, groups)):
+    if arrays and not own_times and not labels and (_are_columns(arrays, style, rate) or _continues(arrays, groups)):
         entries = {inner: one for inner, one in _flat(tree, style.separator) if _fits(one)}
         yield Found(place, label, {k: one for k, one in entries.items() if not _is_rate(k, entries)}, rate)
         return
@@ -115,11 +161,38 @@ def _of_group(tree: Mapping[str, Any], style: Style, place: str, label: str | No
         if _is_stamp_of(name, arrays):
             continue
         own = f"{place}/{name}" if place else name
-        for found in _of_array(one, own, label or label_of(name)):
+        for found in _of_array(one, own, label or label_of(name), labels.get(name, ("", ()))[1]):
             stamps = {"time": times[name]} if name in times else {}
-            yield found._replace(entries=stamps | found.entries, rate=rate)
+            yield found._replace(entries=stamps | found.entries, rate=getattr(one, "rate", None) or rate)
     for name, one in groups.items():
-        yield from movements_in(one, style, f"{place}/{name}" if place else name, label or label_of(name))
+        yield from movements_in(one, style, f"{place}/{name}" if place else name, label or label_of(name), rate)
+
+
+def _labels_of_sets(tree: Mapping[str, Any]) -> dict[str, tuple[str, list[str]]]:
+    """For arrays of movements (n, T, d) the array that labels them, ``y`` of ``X``, ``y_train`` of ``X_train``."""
+    labels = {}
+    for name, one in tree.items():
+        if not is_array(one) or len(one.shape) != 3:
+            continue
+        ending = words_of(name)[1:]
+        for other, values in tree.items():
+            word, *others = words_of(other) or ("",)
+            shape = np.shape(values)
+            if word not in LABEL_WORDS | {"y"} or (*others,) not in {ending, ()}:
+                continue
+            if math.prod(shape) == one.shape[0] == max(shape, default=0):
+                texts = ["" if text is None else text for text in map(as_label, np.asarray(values).ravel().tolist())]
+                labels[name] = (other, texts)
+    return labels
+
+
+def as_label(value: Any) -> str | None:
+    """A label as text; whole numbers without their fraction, None where there is none."""
+    if isinstance(value, bytes):
+        return value.decode("utf-8", "replace") or None
+    if isinstance(value, float) and value.is_integer():
+        value = int(value)
+    return None if value is None else str(value) or None
 
 
 def _is_stamp_of(name: str, arrays: Mapping[str, Any]) -> bool:
@@ -128,7 +201,7 @@ def _is_stamp_of(name: str, arrays: Mapping[str, Any]) -> bool:
     return match is not None and (match[1] or match[2]) in arrays
 
 
-def _are_columns(arrays: Mapping[str, Any], style: Style, rate: float | None) -> bool:
+def _are_columns(arrays: Mapping[str, Any], style: Style, rate: Rate | None) -> bool:
     """Whether arrays are the columns of one movement: with times, or of one length but not of one width.
 
     Where a rate is given, most of them need to be so: the others do not change over time.
@@ -165,24 +238,33 @@ def _fits(array: Any) -> bool:
 
 
 def rate_of(tree: Mapping[str, Any]) -> Rate | None:
-    """The rate in a group; an array is read only if it has the name of one."""
+    """The rate in a group; an array is read only if it has the name of one. Steps count as `unit_by_size` has it."""
+    rates = []
     for name in tree:
         if not _is_rate(name, tree):
             continue
-        value = np.asarray(tree[name])
-        if value.dtype.kind in "iuf" and 0 < (number := float(value.item())) < np.inf:
-            return Rate(name, 1.0 / number if name.lower() in STEP_NAMES else number)
-    return None
+        number, seconds = _number(tree[name]), seconds_named(name)
+        if number is None or not 0 < number < np.inf:
+            continue
+        if seconds == 1.0 and "s" not in words_of(name):
+            seconds /= PER_SECOND[unit_by_size(number * np.arange(3.0))[0]]
+        rates.append(Rate(name, 1.0 / (number * seconds) if seconds else number))
+    if any(not math.isclose(rates[0].hertz, one.hertz, rel_tol=1e-3) for one in rates):
+        return Rate(", ".join(f"{one.name} ({one.hertz:g} Hz)" for one in rates), math.nan)
+    return rates[0] if rates else None
+
+
+def _number(value: Any) -> float | None:
+    """A number alone, also as a text."""
+    try:
+        return float(np.asarray(value).item())
+    except (TypeError, ValueError):
+        return None
 
 
 def _is_rate(name: str, tree: Mapping[str, Any]) -> bool:
     """Whether an entry is one number with the name of a rate."""
-    return name.lower() in RATE_NAMES | STEP_NAMES and np.shape(tree[name]) in ((), (1,))
-
-
-def _rate(tree: Mapping[str, Any]) -> float | None:
-    rate = rate_of(tree)
-    return None if rate is None else rate.hertz
+    return seconds_named(name) is not None and np.shape(tree[name]) in ((), (1,), (1, 1))
 
 
 def _own_label(tree: Mapping[str, Any]) -> str | None:
@@ -194,16 +276,14 @@ def _own_label(tree: Mapping[str, Any]) -> str | None:
 
 def has_times(names: Iterable[str]) -> bool:
     """Whether any name means times, the times of another array, or a rate."""
-    return any(is_time(name) or name.lower() in RATE_NAMES | STEP_NAMES or _TIMES_OF.fullmatch(name) for name in names)
+    return any(is_time(name) or seconds_named(name) is not None or _TIMES_OF.fullmatch(name) for name in names)
 
 
 def label_of(name: str) -> str | None:
     """The label in the name of a movement; None if it only counts: ``demo_3``, ``wave_2``, ``7``."""
     words = words_of(name)
-    counts = (
-        not words or words[-1].isdecimal() or set(words) <= MOVEMENT_WORDS | {"data", "movements", "demos", "trials"}
-    )
-    return None if counts else name
+    structural = set(words) <= MOVEMENT_WORDS | _STRUCTURAL or (words[:1] == ("x",) and set(words[1:]) <= _STRUCTURAL)
+    return None if not words or words[-1].isdecimal() or (structural and words != ("x",)) else name
 
 
 def listed_shapes(entries: Mapping[str, Any], names: Sequence[str]) -> str:

@@ -359,11 +359,15 @@ def _without(words: tuple[str, ...], others: Collection[str]) -> tuple[str, ...]
     return tuple(word for word in words if word not in others)
 
 
+def counts_samples(head: str) -> bool:
+    """Whether a head names a counter of samples: ``frame``, ``Sample No.``."""
+    words = {word for word in words_of(head) if not word.isdecimal()}
+    return bool(words & _COUNTERS) and words <= _COUNTERS | _BESIDE_COUNTERS
+
+
 def _says_nothing_new(head: str, plain: set[str]) -> bool:
     """Whether a column is redundant: a counter, a stamp beside the times, a marker that nobody named, a turning."""
-    words = {word for word in words_of(head) if not word.isdecimal()}
-    counts = words & _COUNTERS and words <= _COUNTERS | _BESIDE_COUNTERS
-    if counts or not head.strip() or _ROS_HEADER.fullmatch(head) or _UNNAMED.fullmatch(head):
+    if counts_samples(head) or not head.strip() or _ROS_HEADER.fullmatch(head) or _UNNAMED.fullmatch(head):
         return True
     if _plain(head).endswith("/speed") and f"{_plain(head).removesuffix('speed')}value" in plain:  # of OpenSim's states
         return True
