@@ -235,3 +235,23 @@ def test_more_than_255_points_of_c3d_have_their_names(tmp_path):
     content.write(str(tmp_path / "a.c3d"))
     (movement,) = read((tmp_path / "a.c3d").read_bytes(), "a.c3d", columns=["M299", "M254"]).demonstrations
     np.testing.assert_allclose(movement.recorded[:, [0, 3]], np.column_stack([299 + T, 254 + T]), atol=1e-4)
+
+
+def test_what_a_model_computed_in_c3d_is_no_place(tmp_path):
+    """As Vicon's Plug-in Gait writes angles and moments of joints among the points."""
+    ezc3d = pytest.importorskip("ezc3d", reason="ezc3d writes the file")
+    content, names = ezc3d.c3d(), ["A:HAND", "A:LKneeAngles", "A:LKneeMoment"]
+    for name, value in (("RATE", [100.0]), ("LABELS", names), ("UNITS", ["mm"])):
+        content["parameters"]["POINT"][name]["value"] = value
+    for kind, unit, label in (("ANGLE", "deg", names[1]), ("MOMENT", "Nmm", names[2])):
+        content.add_parameter("POINT", f"{kind}S", [label])
+        content.add_parameter("POINT", f"{kind}_UNITS", [unit])
+    content["data"]["points"] = np.ones((4, 3, 20)) + np.arange(60.0).reshape(3, 20)
+    content.write(str(tmp_path / "a.c3d"))
+    places = read((tmp_path / "a.c3d").read_bytes(), "a.c3d")
+    assert places.demonstrations.dimensions == ("HAND.x", "HAND.y", "HAND.z")
+    assert len(places.detected[0][0].ignored) == 6
+    chosen = ["LKneeAngles.x", "LKneeMoment.y"]
+    angle = read((tmp_path / "a.c3d").read_bytes(), "a.c3d", columns=chosen).demonstrations
+    assert [one.unit for one in angle.channels] == ["deg", "Nmm"]
+    np.testing.assert_array_equal(angle[0].recorded[:, 0], 21 + np.arange(20.0))

@@ -10,6 +10,8 @@ import kineme
 from kineme.files.column_order import notes_on_aside
 from kineme.files.inspection.gaps import notes_on_gaps
 from kineme.files.inspection.inspect import inspect
+from kineme.files.recordings import read_recordings_from_bytes
+from kineme.movements.tables.layout import Layout
 
 T = 40
 U = np.linspace(0, 1, T)
@@ -31,6 +33,7 @@ def _written(path, heads, values=None):
         (["nose_x", "nose_y"], ["nose_likelihood"]),
         (["x0", "y0", "Hand.X", "Hand.Y"], ["score0", "Hand.Visibility"]),
         (["x", "y"], ["confidence", "residual"]),
+        (["q[0]", "actual_q_0"], ["dq[0]", "actual_qd_0", "qdot[0]"]),
     ],
 )
 def test_derivatives_and_confidences_are_left_aside_beside_their_positions(tmp_path, positions, others):
@@ -52,6 +55,28 @@ def test_the_same_words_without_such_positions_are_coordinates(tmp_path, heads):
     read = kineme.read_recordings(_written(tmp_path / "a.csv", heads))
     assert read.detected[0][0].columns == heads
     assert notes_on_aside(how for how, _ in read.detected) == []
+
+
+def test_counters_numbers_of_things_and_other_clocks_are_no_coordinates(tmp_path):
+    clocks = ["epoc (ms)", "motionTimestamp_sinceReboot(s)"]
+    others = ["PacketCounter", "loggingSample(N)", "stroke_id", "TrackingId", "__index_level_0__", *clocks]
+    read = kineme.read_recordings(_written(tmp_path / "a.csv", ["x", "low (min)", *others]))
+    assert read.detected[0][0].columns == ("x", "low (min)")
+    assert {*read.detected[0][0].ignored} == {*others}
+    sessions = np.repeat([0.0, 1.0], T // 2)
+    read = kineme.read_recordings(_written(tmp_path / "a.csv", ["x"], {"session": sessions}))
+    assert (read.demonstrations.dimensions, len(read)) == (("x",), 2)
+
+
+def test_dates_that_are_not_understood_are_no_names_before_the_times():
+    for stamp in ("01/05/2024 10:00:01.000", "5.1.2024 9:00", "10:00:01.000 ->"):
+        text = "\n".join(f"{stamp},{u},{np.sin(u)}" for u in U)
+        with pytest.raises(
+            kineme.DataError, match=r"expected times such as .* in the first column, got .* write them so"
+        ):
+            read_recordings_from_bytes(text.encode(), "a.csv", Layout())
+    text = "\n".join(f"arm2,{u},{np.sin(u)}" for u in U)
+    assert read_recordings_from_bytes(text.encode(), "a.csv", Layout()).demonstrations.durations.tolist() == [1.0]
 
 
 @pytest.mark.parametrize("sentinel", [-9999, 999, -99999.0, 1e20, 3.4028234663852886e38, -32768])

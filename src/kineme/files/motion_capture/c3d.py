@@ -23,13 +23,15 @@ from kineme.movements.tables.table import Table
 
 _STAMP = "time [s]"
 _MOST_LABELS = 260  # parameters of labels, of 255 each
+_COMPUTED = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")  # parameters that list such points
 _OFF = 1e-2  # of a matrix that counts as a rotation, from orthonormal
 
 
 def read_c3d_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
     """The positions of all points over time, of a file without points the poses of all segments; what is lost is NaN.
 
-    Poses of segments beside points are left aside unless columns name them.
+    Poses of segments beside points, and what a model computed instead of places, as the angles of joints, are left
+    aside unless columns name them.
 
     Raises
     ------
@@ -48,18 +50,22 @@ def read_c3d_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
             warnings.simplefilter("ignore")  # of frames that are missing, which are counted below
             reader = c3d.Reader(io.BytesIO(data))
             names, values, units, rate = _content(reader, data)
-            n_points = len(names)
+            is_point = [True] * len(names)
+            if int(reader.point_used) > 0:
+                computed = [unit for unit in _computed(reader, len(names) // 3) for _ in "xyz"]
+                is_point = [unit is None for unit in computed]
+                units = [own if unit is None else unit for own, unit in zip(units, computed, strict=True)]
             if int(reader.point_used) > 0 and (segments := _beside(reader, data, rate, len(values), units[0])):
                 names, values = [*names, *segments[0]], np.hstack([values, segments[1]])
                 units = [*units, *segments[2]]
+                is_point += [False] * len(segments[0])
     except DataError:
         raise
     except Exception as error:  # the package raises much on damaged files, even names that it did not assign
         raise DataError(f"expected a C3D file, got a truncated or damaged one ({error})") from error
     heads = (_STAMP, *names)
-    kinds = ("number",) * (n_points + 1) + ("text" if layout.coordinates is None else "number",) * (
-        len(names) - n_points
-    )
+    is_read = is_point if layout.coordinates is None and any(is_point) else [True] * len(names)
+    kinds = ("number", *("number" if one else "text" for one in is_read))
     roles = choose_roles(heads, kinds, layout)
     columns = [np.arange(len(values)) / rate, *values.T]
     return Table(heads, columns, len(values), no_lines, measured_in=("s", *units)), roles
@@ -95,10 +101,24 @@ def _beside(
     return (names, values, units) if same == rate and len(values) == n_frames else None
 
 
-def _labels(reader: Any, group: str) -> list[str]:
+def _computed(reader: Any, count: int) -> list[str | None]:
+    """Of each point the unit of what it holds instead of a place: an angle, a force, a moment, a power; None of places.
+
+    Source: Vicon's Plug-in Gait, which lists the points of each kind in parameters such as POINT:ANGLES.
+    """
+    unit_of: dict[str, str] = {}
+    for kind in _COMPUTED:
+        unit = reader.get(f"POINT:{kind.removesuffix('S')}_UNITS")
+        said = unit.string_value.strip() if unit is not None else ""
+        unit_of |= {label.strip(): said for label in _labels(reader, "POINT", kind)}
+    labels = [label.strip() for label in _labels(reader, "POINT")][:count]
+    return [*(unit_of.get(label) if label else None for label in labels), *[None] * (count - len(labels))]
+
+
+def _labels(reader: Any, group: str, kind: str = "LABELS") -> list[str]:
     """All labels of points or rotations; of more than 255 the others are in LABELS2, LABELS3 and so on."""
     labels: list[str] = []
-    for name in ("LABELS", *(f"LABELS{k}" for k in range(2, _MOST_LABELS))):
+    for name in (kind, *(f"{kind}{k}" for k in range(2, _MOST_LABELS))):
         if (parameter := reader.get(f"{group}:{name}")) is None:
             break
         labels += np.ravel(parameter.string_array).tolist()

@@ -17,7 +17,7 @@ from kineme.files.ros.merge_streams import SECOND, clock_of, merge_streams
 from kineme.files.ros.message_types import TYPES
 from kineme.files.ros.paths import Paths, read_paths
 from kineme.files.ros.streams import Stream, read_streams
-from kineme.movements.tables.columns import Roles, column_numbers
+from kineme.movements.tables.columns import Roles, column_numbers, is_no_coordinate
 from kineme.movements.tables.layout import AS_KNOWN, Layout
 from kineme.movements.tables.parsed import Parsed, no_lines
 from kineme.movements.tables.table import Table, table_movements
@@ -65,7 +65,8 @@ def _streamed(bag: Bag, choice: Choice, layout: Layout) -> Parsed:
     what += [f"topic {topic.name} of {topic.type}" for topic in choice.topics]
     said_what = ", ".join(what) + (AS_KNOWN if choice.as_known else "")
     heads = (*_CLOCKS, *one.heads)
-    roles = _roles(heads, 0 if of_headers else 1, layout)
+    of_joints = any(topic.type.endswith("/JointState") for topic in choice.topics)
+    roles = _roles(heads, 0 if of_headers else 1, layout, of_joints)
     table = Table(heads, columns, len(one.values), no_lines, dates_in="s")
     said = "stamps of headers" if of_headers else f"time of recording: {reason}" if reason else "as asked for"
     return _parsed(table, roles, layout, (bag.kind, said_what, said), [*left_out, *lost])
@@ -88,9 +89,13 @@ def _whole(bag: Bag, paths: Paths, layout: Layout) -> Parsed:
     return parsed._replace(detected=detected, block=replace(parsed.block, times=None))
 
 
-def _roles(heads: tuple[str, ...], time: int, layout: Layout) -> Roles:
-    """All columns but stamps and covariances are coordinates, or those chosen: the names of joints are any words."""
-    measured = tuple(k for k in range(2, len(heads)) if "covariance" not in heads[k])
+def _roles(heads: tuple[str, ...], time: int, layout: Layout, of_joints: bool = True) -> Roles:
+    """All columns but stamps, numbers of things, and covariances are coordinates, or those chosen.
+
+    The names of joints are any words.
+    """
+    aside = {k for k, head in enumerate(heads) if "covariance" in head or (not of_joints and is_no_coordinate(head))}
+    measured = tuple(k for k in range(2, len(heads)) if k not in aside)
     positions = measured or tuple(range(2, len(heads)))
     if layout.time is not None:
         time = column_numbers(heads, [layout.time])[0]

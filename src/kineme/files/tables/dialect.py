@@ -24,6 +24,7 @@ _WIDEST, _SHORT = 100_000, 1000  # columns, at most; characters of a line that i
 _CELL = 32  # memory of a cell in Python, per character [bytes]
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?(nan|inf(inity)?)", re.IGNORECASE)
 _MISSING = frozenset({"", "na", "n/a", "#n/a", "<na>", "null", "none"})  # as R, pandas and others write a gap
+_STAMP = re.compile(r"\d+([:/.-])\d+\1\d+")  # digits of a date or of a time of day
 COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
 _COMMA_NUMBERS = re.compile(rf"\s*{COMMA_NUMBER.pattern}(\s+{COMMA_NUMBER.pattern})+\s*")  # between blanks
 
@@ -140,6 +141,11 @@ def detect_dialect(text: Iterable[str]) -> Dialect:
         units, first = (*units, *[""] * (len(cells[0]) - len(units))), kept[1] + 1
     body = cells[named + bool(units) or numbered :]
     kinds = tuple(_kind([row[k] for row in body if k < len(row)], comma) for k in range(len(cells[0])))
+    if not heads and kinds[0] == "text" and _STAMP.search(body[0][0]):
+        raise DataError(
+            "expected times such as 2024-05-06T07:08:09.25 or 07:08:09.25 in the first column, got "
+            f"{body[0][0]!r:.80}; write them so, or name the columns in a first line"
+        )
     if heads:
         return Dialect(separator, comma, tuple(map(text_in, heads)), True, first, kinds, units)
     return Dialect(separator, comma, tuple(f"column {k}" for k in range(len(kinds))), False, first, kinds)

@@ -40,7 +40,8 @@ DISCRETE_WORDS = frozenset(
 _OTHER_QUANTITIES = frozenset(
     {
         "velocity", "velocities", "vel", "speed", "rate", "acceleration", "accelerations", "acc", "accel", "jerk",
-        "torque", "torques", "effort", "efforts", "force", "forces", "voltage", "power", "temperature", "gyro", "omega",
+        "torque", "torques", "tau", "effort", "efforts", "force", "forces", "voltage", "power", "temperature", "gyro",
+        "omega",
     }
 )  # fmt: skip
 _PER_TIME = frozenset({"s", "sec", "second", "seconds", "per"})

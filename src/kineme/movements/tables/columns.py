@@ -19,15 +19,16 @@ TIME_WORDS = frozenset({"t", "time", "times", "timestamp", "timestamps", "stamp"
 MOVEMENT_WORDS = frozenset(
     {
         "movement", "demonstration", "demo", "trial", "trajectory", "traj", "sequence", "episode", "recording",
-        "segment", "repetition", "rep", "subject", "participant",
+        "segment", "repetition", "rep", "subject", "participant", "session", "user", "take", "attempt",
     }
 )  # fmt: skip
 LABEL_WORDS = frozenset({"label", "labels", "class", "action", "gesture", "activity", "symbol", "category"})
 _STAMPS = TIME_WORDS - {"t", "elapsed"}  # that end the name of a clock
-_BESIDE_TIME = TIME_UNITS | {"unix", "utc", "since", "start", "relative", "system"}
+_BEGINS = frozenset({"since", "start", "boot", "reboot", "begin", "in"})  # beside the name of a clock
+_BESIDE_TIME = TIME_UNITS | _BEGINS | {"unix", "utc", "relative", "system"}
 _BESIDE_NAMES = frozenset({"id", "nr", "no", "number", "index", "idx", "name"})
-_COUNTERS = frozenset({"frame", "index", "idx", "row", "seq", "sample", "unnamed"})  # of samples
-_BESIDE_COUNTERS = frozenset({"sub", "task", "nr", "no", "number", "id", "count", "counter"})
+_COUNTERS = frozenset({"frame", "index", "idx", "row", "seq", "sample", "unnamed", "packet", "counter"})  # of samples
+_BESIDE_COUNTERS = frozenset({"sub", "task", "nr", "no", "number", "n", "id", "count", "level", "logging", "point"})
 _ROS_HEADER = re.compile(r"(.*[./_])?header[./_](seq|stamp|frame_id)(?![^\W_]).*", re.IGNORECASE)  # of a message
 _ROS_STAMP = re.compile(r"(.*[./_])?header[./_]stamp([./_]secs?)?", re.IGNORECASE)
 _WHOLE_SECONDS = re.compile(r"(.*?)(s|sec|secs|seconds)", re.IGNORECASE)
@@ -35,7 +36,7 @@ _BRACKETS = re.compile(r"[\[(].*?[\])]")  # around units
 _UNNAMED = re.compile(r"([^:]*:)?(\*|unlabell?ed|unidentified)[ _-]?\d*(\.position)?\.[xyz]", re.IGNORECASE)  # markers
 # Of a rotation about an axis, see `kineme.movements.channels.channel`.
 _TURNING = re.compile(r"(?:v|vel|velocity|a|acc|acceleration)[_ .](.+)\.r[xyz]", re.IGNORECASE)
-_SHORT = re.compile(r"(?:v|a|d|dd)([xyz])|([xyz])d{1,2}ot")  # words for derivatives of x, y, z
+_SHORT = re.compile(r"(?:v|a|d|dd)([xyz])|d{1,2}(q)|([xyzq])d{1,2}ot|(q)dd?")  # words for derivatives of x, y, z, q
 _POSITION_WORDS = frozenset({"pos", "position", "positions"})
 #: Words of columns that are no coordinates where others of the same name without them are.
 _DERIVATIVE_WORDS = frozenset(
@@ -105,7 +106,12 @@ def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, nam
         clocks = {
             k
             for k in free
-            if time is not None and (_is_clock(heads[k]) or (is_time(heads[time]) and _is_stamp(heads[k])))
+            if time is not None
+            and (
+                _is_clock(heads[k])
+                or (is_time(heads[time]) and _is_stamp(heads[k]))
+                or (split_head(heads[k])[1] or "").lower() in TIME_UNITS
+            )
         }
         derived = beside_positions([heads[k] for k in free]) if named else set()
         positions = tuple(
@@ -289,7 +295,7 @@ def _is_stamp(head: str) -> bool:
 
 def _is_clock(head: str) -> bool:
     """Whether a head names the time of another clock: ``ros_time``, ``sensor_timestamp_ns``."""
-    words = [word for word in words_of(split_head(head)[0]) if word not in TIME_UNITS]
+    words = [word for word in words_of(split_head(head)[0]) if word not in TIME_UNITS | _BEGINS]
     return len(words) > 1 and words[-1] in _STAMPS
 
 
@@ -351,12 +357,23 @@ def _spelled_out(head: str) -> tuple[str, ...]:
     return tuple(
         part
         for word, match in zip(words, short, strict=True)
-        for part in ((match[1] or match[2], "dot") if match else (word,))
+        for part in ((match[match.lastindex or 0], "dot") if match else (word,))
     )
 
 
 def _without(words: tuple[str, ...], others: Collection[str]) -> tuple[str, ...]:
     return tuple(word for word in words if word not in others)
+
+
+def is_no_coordinate(head: str) -> bool:
+    """Whether the last part of a field's path names a stamp or the number of a thing: ``state.timestamp``."""
+    last = head.rpartition(".")[2]
+    return _is_stamp(last) or _is_number_of_thing(last)
+
+
+def _is_number_of_thing(head: str) -> bool:
+    """Whether a head names the number that a thing has, which does not move: ``id``, ``tracking_id``."""
+    return words_of(head)[-1:] == ("id",)
 
 
 def counts_samples(head: str) -> bool:
@@ -367,7 +384,13 @@ def counts_samples(head: str) -> bool:
 
 def _says_nothing_new(head: str, plain: set[str]) -> bool:
     """Whether a column is redundant: a counter, a stamp beside the times, a marker that nobody named, a turning."""
-    if counts_samples(head) or not head.strip() or _ROS_HEADER.fullmatch(head) or _UNNAMED.fullmatch(head):
+    if (
+        counts_samples(head)
+        or _is_number_of_thing(head)
+        or not head.strip()
+        or _ROS_HEADER.fullmatch(head)
+        or _UNNAMED.fullmatch(head)
+    ):
         return True
     if _plain(head).endswith("/speed") and f"{_plain(head).removesuffix('speed')}value" in plain:  # of OpenSim's states
         return True
