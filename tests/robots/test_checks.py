@@ -119,6 +119,13 @@ def test_a_limit_that_is_passed_between_two_samples_only_fails(tmp_path):
     assert failed["position between samples"].where == "j2"
     assert 0.2 < failed["position between samples"].time < 0.4
     assert 0.4 < failed["acceleration between samples"].time < 0.6
+    for beyond, passes in ((5e-7, True), (1e-5, False)):
+        q = np.array([[0.0, 2.0 + beyond - 0.05 * 0.2 / 4]] * 2)  # a parabola from 0.05 rad/s to as much back
+        v, a = np.array([[0.0, 0.05], [0.0, -0.05]]), np.full((2, 2), [0.0, -0.5])
+        report = preflight(robot, JointTrajectory(robot.joints, np.array([0.0, 0.2]), q, v, a, {}))
+        between = {check.what: check for check in report.checks}["position between samples"]
+        assert between.worst == pytest.approx(2.0 + beyond, abs=1e-12)
+        assert between.passed is passes
 
 
 @pytest.mark.parametrize("speeds", [(0.0, 0.4), (0.4, 0.0)])
