@@ -18,6 +18,7 @@ _UNIT = rf"(\b|_({_TIMES})$)"
 _START = re.compile(rf"(start|begin|onset|from){_UNIT}|(start|begin)[ _]?time")
 _END = re.compile(rf"(end|stop|offset|to){_UNIT}|(end|stop)[ _]?time")
 _LAST_WORD = re.compile(rf"(?<![.a-zµμ])({_TIMES})\W*$")  # that of hh:mm:ss.ms says how a clock is written
+_COUNTED = re.compile(r"\b(frame|sample|index|idx|row)s?\b")  # what is no time without a rate
 _LABELS = frozenset(
     {"label", "labels", "symbol", "annotation", "annotations", "value", "text", "name", "class", "action", "gesture"}
 )
@@ -61,9 +62,22 @@ class Heads(NamedTuple):
 
 
 def heads_of(cells: Sequence[str]) -> Heads | None:
-    """The roles of the columns of a table with these heads; None if they are none."""
+    """The roles of the columns of a table with these heads; None if they are none.
+
+    Raises
+    ------
+    DataError
+        No column of labels; or a start and an end in another unit than of time, as frames.
+    """
     names = [cell.strip().strip('"#').strip().lower() for cell in cells]
-    starts, ends = ([k for k, one in enumerate(names) if wanted.match(one)] for wanted in (_START, _END))
+    either = [[k for k, one in enumerate(names) if wanted.match(one)] for wanted in (_START, _END)]
+    starts, ends = ([k for k in some if _is_time(names[k])] for some in either)
+    if all(either) and not (starts and ends):
+        odd = next(k for some in either for k in some if not _is_time(names[k]))
+        raise DataError(
+            f"expected start and end in a unit of time (s, ms, us, ns, min, h), got {cells[odd].strip()!r}; divide "
+            "frames or samples by the rate, and name the unit in brackets"
+        )
     if not starts or not ends:
         return None
     start, end = (min(some, key=lambda k: "hh:mm" in names[k]) for some in (starts, ends))
@@ -81,6 +95,12 @@ def heads_of(cells: Sequence[str]) -> Heads | None:
         (_unit_of(names[start]), _unit_of(names[end])),
         "time - " in names[start],
     )
+
+
+def _is_time(name: str) -> bool:
+    """Whether a head of a start or an end says no other unit than of time."""
+    unit = unit_named(split_head(name)[1] or "")
+    return _COUNTED.search(name) is None if unit is None else unit.quantity == "time"
 
 
 def _unit_of(name: str) -> str:
@@ -109,11 +129,7 @@ def row_of(cells: Sequence[str], heads: Heads, line: int) -> LabelRow:
     """
     if len(cells) <= max(heads.start, heads.end, heads.label):
         raise DataError(f"line {line}: expected start, end and label, got {list(cells)}")
-    times = [seconds_of(cells[k]) for k in (heads.start, heads.end)]
-    start, end = (
-        math.nan if time is None else float(converted(time, UNITS[unit], UNITS["s"]))
-        for time, unit in zip(times, heads.units, strict=True)
-    )
+    start, end = (_time_in(cells[k], unit) for k, unit in zip((heads.start, heads.end), heads.units, strict=True))
     if not end > start:
         raise DataError(
             f"line {line}: expected a start and an end after it, got {cells[heads.start]!r} and {cells[heads.end]!r}"
@@ -123,6 +139,14 @@ def row_of(cells: Sequence[str], heads: Heads, line: int) -> LabelRow:
     )
     label = text_in(cells[heads.label].strip())
     return LabelRow(start, end, None if label.lower() in _NOTHING else label, recording, place, line)
+
+
+def _time_in(cell: str, unit: str) -> float:
+    """Seconds of a cell in a unit of time; of mm:ss.sss whatever the unit is; NaN of what is none."""
+    time = seconds_of(cell)
+    if time is None:
+        return math.nan
+    return time if ":" in cell else float(converted(time, UNITS[unit], UNITS["s"]))
 
 
 def seconds_of(cell: str) -> float | None:
