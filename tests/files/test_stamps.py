@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import kineme
-from kineme.movements.tables.time_stamps import unit_by_size
+from kineme.movements.tables.time_stamps import nanoseconds, seconds_of_dates, unit_by_size
 
 STAMPS = [1_700_000_000 + k // 2 for k in range(20)], [500_000_000 * (k % 2) for k in range(20)]
 
@@ -138,6 +138,21 @@ def test_stamps_since_1970_are_told_in_every_unit_at_every_rate(unit, since, rat
     spread = np.random.default_rng(0).uniform(-jitter, jitter, 50)
     stamps = (since + (np.arange(50) + spread) / rate) * PER_SECOND[unit]
     assert unit_by_size(stamps)[0] == unit
+
+
+@pytest.mark.parametrize(
+    ("step", "unit"), [(4.99, "s"), (5.0, "ms"), (999.0, "ms"), (1e3, "us"), (999e3, "us"), (1e6, "ns")]
+)
+def test_steps_of_stamps_that_count_from_anywhere_say_their_unit(step, unit):
+    assert unit_by_size(step * np.arange(20.0))[0] == unit
+    stamps = PER_SECOND["s"] * (1_700_000_000.0 + 1e-3 * step * np.arange(20))
+    assert unit_by_size(stamps, "unix time") == ("s", "since 1970")  # up to seventeen minutes apart
+
+
+def test_midnight_passes_from_times_of_day_alone_and_missing_dates_are_none():
+    assert seconds_of_dates(["23:59:59", "00:00:01"])[0].tolist() == [86_399.0, 86_401.0]
+    assert seconds_of_dates(["1 days 23:30:00", "0 days 00:00:00"])[0].tolist() == [171_000.0, 0.0]
+    np.testing.assert_array_equal(nanoseconds(np.array(["NaT", "1970-01-01T00:00:01"], "M8[s]")), [np.nan, 1e9])
 
 
 @pytest.mark.parametrize("step", [1, 2, 4.9])

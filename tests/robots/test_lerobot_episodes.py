@@ -58,6 +58,9 @@ def test_every_row_is_what_lerobot_counts(folder):
     last = frames["frame_index"].diff(-1).fillna(1).to_numpy() > 0
     np.testing.assert_array_equal(action[:-1][~last[:-1]], state[1:][~last[:-1]])
     np.testing.assert_array_equal(action[last], state[last])
+    episodes = pd.concat([pd.read_parquet(path) for path in sorted(folder.glob("meta/episodes/*/*.parquet"))])
+    assert episodes["dataset_from_index"].tolist() == [0, 49, 86]
+    assert episodes["dataset_to_index"].tolist() == [49, 86, 129]  # after the last
     info = json.loads((folder / "meta/info.json").read_text())
     assert (info["total_episodes"], info["total_frames"], info["total_tasks"]) == (3, 129, 2)
     assert info["splits"] == {"train": "0:3"}
@@ -104,6 +107,11 @@ def test_data_sets_of_others_are_refused_with_what_differs(tmp_path):
         write_lerobot(write_v2(tmp_path / "two"), trajectory(), "x", 50)
     with pytest.raises(DataError, match=r"they differ in .*observation\.images\.top"):
         write_lerobot(write_v3(tmp_path / "three"), trajectory(), "x", 50)
+    write_lerobot(tmp_path / "elsewhere", trajectory(), "x", 50)
+    path = tmp_path / "elsewhere" / "meta" / "info.json"
+    path.write_text(path.read_text().replace("data/chunk-", "frames/chunk-"))
+    with pytest.raises(DataError, match=r"the data_path data/chunk-.*, got frames/chunk-"):
+        write_lerobot(tmp_path / "elsewhere", trajectory(), "x", 50)
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "note.txt").write_text("mine")
     with pytest.raises(FileExistsError):
