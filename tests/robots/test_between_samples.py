@@ -83,6 +83,7 @@ def test_an_acceleration_that_only_the_middle_of_a_gap_has_is_measured_as_it_is(
         if one.what == "acceleration between samples"
     )
     assert check.worst / check.limit == pytest.approx(share, rel=1e-6)
+    assert check.slower == pytest.approx(np.sqrt(share), rel=1e-6)
     assert check.passed is passes
 
 

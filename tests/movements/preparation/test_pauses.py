@@ -51,6 +51,41 @@ def test_a_pause_takes_little_time_and_no_place(seed, seconds, at_rest, noise, d
     assert (np.diff(times) > 0).sum() == len(times) - len(durations)  # rising in each
 
 
+@pytest.mark.parametrize("choice", ["always", "never"])
+@pytest.mark.parametrize(
+    ("steps", "seconds", "count"),
+    [
+        ([(16, 1.0), (1, 100.0), (15, 1.0)], 31 + 3.4, 33),  # a tenth of 31 and of the gap, as three of 1 s
+        ([(6, 1.0), (1, 3.5), (5, 1.0)], 11 + 3.0, 13),  # three usual steps, which are more
+        ([(32, 1.0), (-20, 1.0), (32, 1.0)], 64 + 6.4, 65 + 7),  # a tenth, of 20 samples as many as fit
+        ([(64, 1.0), (-20, 1.0)], 64 + 16.0, 65 + 16),  # at the end a quarter
+        ([(64, 1.0), (-16, 1.0)], 80.0, None),
+        ([(30, 1.0), (-3, 2.9), (30, 1.0)], 60 + 6.0, 61 + 3),  # seen in windows of four samples
+        ([(20, 1.0), (-2, 2.9), (20, 1.0)], 45.8, None),
+        ([(65, 1.0), (-6, 2.9), (65, 1.0)], 130 + 13.0, 131 + 5),  # and so below 256 samples
+        ([(5, 1.0), (-100, 1.0), (5, 1.0)], 10 + 1.0, 11 + 3),  # three at least
+        ([(30, 1.0), (-200, 1.0), (15, 1.0), (-6, 2.9), (15, 1.0)], 60 + 2 * 6.0, 71),  # one is seen after the other
+    ],
+)
+def test_what_is_left_of_pauses_by_hand(monkeypatch, choice, steps, seconds, count):
+    """Of n steps of 1 to and fro between 0 and 32, or of -n steps at rest, of so many seconds."""
+    monkeypatch.setenv("KINEME_COMPILED", choice)
+    moved, elapsed = ([one for n, by in steps for one in abs(n) * [by if k else float(n > 0)]] for k in (0, 1))
+    demos = kineme.Demonstrations.from_arrays(
+        [np.abs((np.append(0.0, np.cumsum(moved))[:, None] + 32) % 64 - 32)], times=[np.append(0.0, np.cumsum(elapsed))]
+    )
+    parts = cut(demos)
+    assert demos.durations[0] == pytest.approx(seconds) if parts is None else parts[0][-1] == pytest.approx(seconds)
+    assert (None if parts is None else len(parts[0])) == count
+
+
+@pytest.mark.parametrize(("noise", "rests"), [(0.9, True), (1.1, False)])
+def test_a_rest_stays_within_a_share_of_the_reach(noise, rests):
+    x = np.concatenate((np.arange(33.0), np.full(20, 32.0), np.arange(32.0, 65.0)))
+    y = np.where((x == 32) & (np.arange(len(x)) % 2 > 0), 0.015 * 64 * noise, 0.0)
+    assert (cut(kineme.Demonstrations.from_arrays([np.column_stack((x, y))])) is not None) is rests
+
+
 def test_steady_movements_are_as_they_were():
     """At even stamps, with jitter, and slow at a corner."""
     u = np.linspace(0, 1, 200)
