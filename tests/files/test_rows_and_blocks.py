@@ -55,6 +55,19 @@ def test_one_coordinate_has_a_label_where_whole_numbers_stand_beside_fractions()
     assert found.labels.tolist() == ["1", "2"] * 3
     assert found.demonstrations.lengths.tolist() == [32] * 6
     assert read(lines(POINTS), rows=True, columns="x").labels.tolist() == [None] * 6
+    assert read(lines(POINTS, ["1.0000000e+00", "2."] * 3), rows=True, columns="x").labels.tolist() == ["1", "2"] * 3
+    begins_at_0 = read(lines(POINTS, ["0.000"] * 6), rows=True, columns="x")
+    assert (begins_at_0.labels.tolist(), begins_at_0.demonstrations.lengths.tolist()) == ([None] * 6, [33] * 6)
+
+
+def test_a_class_at_the_end_of_lines_is_no_coordinate():
+    found = read(
+        "\n".join(f"{row},{k % 3}" for k, row in enumerate(lines(POINTS).split("\n"))), rows=True, columns=("x", "y")
+    )
+    np.testing.assert_array_equal(np.array(positions(found)), POINTS)
+    assert found.labels.tolist() == ["0", "1", "2"] * 2
+    with pytest.raises(kineme.DataError, match=r"got fractions in both; say which with label=.*--label-column"):
+        read("\n".join(f"{row},0.5" for row in lines(POINTS).split("\n")), rows=True, columns=("x", "y"))
 
 
 def test_lines_may_differ_in_length_and_be_padded():
