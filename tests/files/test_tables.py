@@ -389,6 +389,31 @@ def test_decimal_commas_between_blanks():
     np.testing.assert_array_equal(named.positions, found.positions)
 
 
+@pytest.mark.parametrize("mark", [".", ","])
+def test_marks_between_thousands_are_no_decimal_marks(mark):
+    x = np.linspace(900, 1200, 40).round()
+    grouped = [f"{one:,.0f}".replace(",", mark) for one in x]
+    text = "t;x\n" + "\n".join(f"{k};{cell}" for k, cell in enumerate(grouped))
+    with pytest.raises(kineme.DataError, match=rf"'x' without marks between thousands, got '1\{mark}0.*' beside '900'"):
+        read(text)
+    shortest = [f"{one:g}".replace(".", mark) for one in (x / 1000).round(3)]  # 0.9, 1, 1.008: decimals
+    text = "t;x\n" + "\n".join(f"{k};{cell}" for k, cell in enumerate(shortest))
+    np.testing.assert_allclose(read(text).demonstrations[0].positions[:, 0], (x / 1000).round(3))
+
+
+@pytest.mark.parametrize("mark", [",", ";", "\t"])
+def test_lines_above_the_heads_are_passed_over(mark):
+    rows = "\n".join(mark.join((str(k / 10), str(k * k), "1.5")) for k in range(9))
+    said = {"sep=;": mark == ";", f"Device{mark}A12\nRate{mark}60": True, "Made by me on May 3": True, "ok\n\n\n": True}
+    for above in (key for key, applies in said.items() if applies):
+        found = read(f"{above}\ntime{mark}x{mark}y\n{rows}")
+        assert found.demonstrations.dimensions == ("x", "y"), above
+        np.testing.assert_array_equal(found.demonstrations[0].positions[:, 0], np.arange(9.0) ** 2)
+    for above in (mark.join("12"), mark.join(("time", "x"))):  # another table, or heads that lack one
+        with pytest.raises(kineme.DataError):
+            read(f"{above}\n{rows}")
+
+
 def test_a_line_that_numbers_the_columns_is_no_sample():
     rows = [(k / 10, 1.5 * k, k) for k in range(5)]
     np.testing.assert_array_equal(read(lines(rows, "0,1,2")).demonstrations.times, np.arange(5) / 10)

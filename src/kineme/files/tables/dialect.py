@@ -25,6 +25,7 @@ _CELL = 32  # memory of a cell in Python, per character [bytes]
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?(nan|inf(inity)?)", re.IGNORECASE)
 _MISSING = frozenset({"", "na", "n/a", "#n/a", "<na>", "null", "none"})  # as R, pandas and others write a gap
 _STAMP = re.compile(r"\d+([:/.-])\d+\1\d+")  # digits of a date or of a time of day
+_SEPARATOR_LINE = re.compile(r'"?sep=.{0,2}', re.IGNORECASE)
 COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
 _COMMA_NUMBERS = re.compile(rf"\s*{COMMA_NUMBER.pattern}(\s+{COMMA_NUMBER.pattern})+\s*")  # between blanks
 
@@ -64,9 +65,9 @@ class Dialect(NamedTuple):
 
 
 def is_skipped(line: str) -> bool:
-    """Whether a line is empty or begins as a comment."""
+    """Whether a line is empty, begins as a comment, or says the separator to Excel: ``sep=;``."""
     stripped = line.strip()
-    return not stripped or stripped.startswith(COMMENTS)
+    return not stripped or stripped.startswith(COMMENTS) or _SEPARATOR_LINE.fullmatch(stripped) is not None
 
 
 def check_line(line: str) -> None:
@@ -128,7 +129,7 @@ def detect_dialect(text: Iterable[str]) -> Dialect:
     if not kept:
         more = len(lines) == _HEAD
         raise DataError(f"expected samples, got {f'none in the first {_HEAD:,} lines' if more else 'an empty file'}")
-    kept = _with_names_like_comments(lines, kept)
+    kept = _below_preamble(lines, _with_names_like_comments(lines, kept))
     separator = separator_of([lines[k] for k in kept[:2]])
     cells = [split(lines[k], separator) for k in kept]
     comma = separator != "," and any(COMMA_NUMBER.fullmatch(cell) for row in cells for cell in row)
@@ -158,6 +159,26 @@ def units_in(cells: Sequence[str]) -> tuple[str, ...]:
     known = sum(unit_named(cell) is not None for cell, letter in zip(plain, letters, strict=True) if not letter)
     others = sum(unit_named(cell) is None for cell, letter in zip(plain, letters, strict=True) if cell and not letter)
     return plain if known and not others and 2 * sum(map(bool, plain)) >= len(plain) else ()
+
+
+def _below_preamble(lines: Sequence[str], kept: list[int]) -> list[int]:
+    """The lines from the heads on, where lines of other lengths without rows of numbers stand above them.
+
+    So loggers write the device, the rate and the time. Below the heads all lines have as many cells.
+    """
+    top, separator = (separator_of([lines[k] for k in part]) for part in (kept[:2], kept[-2:]))
+    widths = {len(split(lines[k], top)) for k in kept}
+    if len(widths) == 1 and widths != {1}:
+        return kept
+    rows = [split(lines[k], separator) for k in kept]
+    width, comma = len(rows[-1]), separator != ","
+    first = next(k for k, row in enumerate(rows) if len(row) == width)
+    numbers = [sum(is_number(cell, comma) for cell in row) for row in rows]
+    is_preamble = all(n < max(2, len(row)) for n, row in zip(numbers[:first], rows[:first], strict=True))
+    below = rows[first:]
+    if width < 2 or len(below) < 3 or numbers[first] or not is_preamble or any(len(row) != width for row in below):
+        return kept
+    return kept[first:]
 
 
 def _with_names_like_comments(lines: Sequence[str], kept: list[int]) -> list[int]:
