@@ -169,3 +169,15 @@ def test_a_log_without_heads_and_times_has_no_time_where_all_columns_are_chosen(
     np.testing.assert_allclose(found.demonstrations.durations, 0.11)
     with pytest.raises(kineme.DataError, match="expected a column of times"):
         read(log, every=12, columns=(0, 1, 2))
+
+
+def test_empty_lines_between_samples_without_times_part_movements():
+    blocks = ["\n".join(f"{k},{k * k}" for k in range(n)) for n in (9, 9, 9, 7)]
+    with pytest.raises(
+        kineme.DataError, match=r"got 3 blocks of 9 to 9 samples .* say every=9, in the shell --every 9"
+    ):
+        read("x,y\n" + "\n\n".join(blocks[:3]), units=0.1)
+    assert len(read("x,y\n" + "\n\n".join(blocks[:3]), units=0.1, every=9)) == 3
+    with pytest.raises(kineme.DataError, match=r"got 4 blocks of 7 to 9 samples .* save each in a file of its own"):
+        read("x,y\n" + "\n \n".join(blocks), units=0.1)
+    assert len(read("x,y\n\n" + blocks[0].replace("\n", "\n\n") + "\n\n", units=0.1)) == 1
