@@ -271,6 +271,8 @@ def test_damaged_descriptions_of_episodes_cost_those_alone(tmp_path):
     found = kineme.read_recordings(folder)
     assert [source.place for source in found.sources] == ["episode 0", "episode 2"]
     assert "meta/episodes.jsonl, line 2: expected an object with episode_index, length" in found.problems[0].reason
+    path.write_text("\n".join([lines[0], json.dumps(json.loads(lines[1]) | {"length": 2**70}), lines[2]]))
+    assert "line 2: expected an object with" in kineme.read_recordings(folder).problems[0].reason
     folder = write_v3(tmp_path / "three", lengths=(10,) * 6)
     whole = next(folder.glob("meta/episodes/*/*"))
     pd.read_parquet(whole)[:4].to_parquet(whole)
@@ -383,6 +385,19 @@ def test_episodes_that_take_little_in_the_file_and_much_in_memory_are_refused(ch
     ).to_parquet(path := next(folder.glob("meta/episodes/*/*")))
     assert path.stat().st_size < 100_000
     assert "file-000.parquet that takes at most" in refusal(child, folder)
+
+
+def test_files_of_episodes_count_together(monkeypatch, tmp_path):
+    folder = write_v3(tmp_path / "set")
+    path = next(folder.glob("meta/episodes/*/*"))
+    first = pd.read_parquet(path)
+    rows = pd.DataFrame({name: np.zeros(3000, np.int64) for name in first})
+    for k in (1, 2):
+        rows.to_parquet(path.parent / f"file-00{k}.parquet")
+    monkeypatch.setenv("KINEME_MAX_FILE_BYTES", "1000000")  # 600,000 for 3000 episodes
+    reasons = [one.reason for one in kineme.read_recordings(folder).problems if "takes at most" in one.reason]
+    assert len(reasons) == 1
+    assert "file-002.parquet that takes at most" in reasons[0]
 
 
 @pytest.mark.parametrize("kind", ["object", "category"])

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import chi
 
+import kineme
 from kineme.recognition.confidence import class_probabilities, fit_exponent
-from kineme.recognition.conformal import Calibration, between_classes, least_scale
+from kineme.recognition.conformal import GUESSES, RULES, Calibration, between_classes, least_scale
 from kineme.recognition.left_out import (
     ClassDistances,
     broad_law,
@@ -19,8 +22,16 @@ from kineme.recognition.left_out import (
     typical_distance,
     typical_scale,
 )
+from movement_samples import draw_shapes
 
 NONE = np.inf
+
+
+def test_odds_are_ratios_of_distances_to_the_power_of_the_exponent_down_to_the_least():
+    away = np.array([[0.01, 0.011], [1.0, 1.2], [0.001, 0.004]])
+    odds = class_probabilities(-0.5 * away**2, 7.0)
+    np.testing.assert_allclose(odds[:2, 0] / odds[:2, 1], [1.1**7, 1.2**7])
+    np.testing.assert_allclose(odds[2], 0.5)
 
 
 def test_distances_are_those_of_gaussians_and_copies_have_none():
@@ -91,6 +102,27 @@ def test_scores_count_where_they_suffice_and_each_is_one_of_them():
     np.testing.assert_allclose(p, [[2 / 20, 22 / 40], [1 / 20, 2 / 40], [1.0, 1.0]])
     assert calibration.calibrated(0.05).all()
     assert not calibration.calibrated(0.02).any()
+
+
+def test_answers_that_promise_nothing_say_so():
+    assert {rule for rule, promise in RULES.items() if "a guess" in promise or "any share" in promise} == {*GUESSES}
+
+
+def test_a_p_value_of_the_error_rate_itself_is_unknown_in_every_answer_and_odds_are_of_the_fitted_power():
+    demos = draw_shapes([19, 19], seed=3)
+    recognizer = kineme.Recognizer().fit(demos)
+    far = draw_shapes([1] * 9, seed=40)[8:]
+    (answer,) = recognizer.recognize(far)
+    assert (answer.p_known, answer.label, recognizer.predict_known(far)[0]) == (0.05, None, None)
+    odds = []
+    for exponent in (3.0, 30.0):
+        recognizer._calibration = replace(recognizer.calibration(), exponent=exponent)
+        (answer,) = recognizer.recognize(far)
+        first, second = answer.probabilities.values()
+        odds.append(np.log(first / second))
+        np.testing.assert_allclose(recognizer.predict_proba(far)[0], [first, second])
+    assert odds[1] == pytest.approx(10 * odds[0])
+    assert odds[0] != 0.0
 
 
 def test_a_raised_scale_makes_novelties_ordinary():
