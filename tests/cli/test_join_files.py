@@ -8,9 +8,6 @@ import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
 import kineme
-from kineme.files.name_rule import NameRule
-from kineme.files.recordings import read_paths
-from kineme.movements.tables.layout import Known, Layout
 
 BEGIN = 1_700_000_000.0  # s since 1970
 
@@ -92,6 +89,52 @@ def test_samples_are_those_of_the_densest_file_and_the_others_are_interpolated(f
     np.testing.assert_allclose(np.unwrap(recorded[:, 10], period=360), 170 + 20 * (t - BEGIN), atol=1e-4)
 
 
+def test_what_files_last_together_switch_and_lack_is_that_of_the_recording(tmp_path):
+    t = clock(100, 0, 2)
+    table(tmp_path / "one" / "Arm.csv", ["x"], t, t[:, None].tolist())
+    t = clock(50, 0, 2)
+    values = np.column_stack([np.roll(turned(t).as_quat(), 1, axis=1), (t >= BEGIN + 1).astype(float)]).tolist()
+    values[20][0] = values[98][0] = values[99][0] = float("nan")
+    table(tmp_path / "one" / "Hand.csv", ["qw", "qx", "qy", "qz", "gripper"], t, values)
+    t = clock(25, 0.8, 2)
+    table(tmp_path / "one" / "Head.csv", ["y"], t, t[:, None].tolist())
+    t = clock(1000, 0.5, 0.6)  # more in a second than all others, but short
+    table(tmp_path / "one" / "Burst.csv", ["z"], t, t[:, None].tolist())
+    t = clock(25, 1.2, 2)
+    table(tmp_path / "one" / "Late.csv", ["w"], t, t[:, None].tolist())
+    read = kineme.read_recordings(tmp_path, join_files=True)
+    (one,) = read.demonstrations
+    assert {name.partition(".")[0] for name in read.demonstrations.dimensions} == {"Arm", "Hand", "Head"}
+    assert {problem.file for problem in read.problems if not problem.samples} == {"one/Burst.csv", "one/Late.csv"}
+    np.testing.assert_allclose(np.diff(one.times), 0.01, atol=1e-6)
+    heads = [column for channel in one.channels for column in channel.columns]
+    gripper = one.recorded[:, heads.index("Hand.gripper")]
+    np.testing.assert_array_equal(gripper, one.times >= BEGIN + 1 - 1e-6)  # from that sample on
+    q = one.recorded[:, [heads.index(f"Hand.q{part}") for part in "wxyz"]]
+    got = Rotation.from_quat(q, scalar_first=True)
+    assert np.max((got.inv() * turned(one.times)).magnitude()) < 1e-3
+    source = read.sources[0]
+    assert (source.filled, source.longest_gap, source.cropped) == (1, pytest.approx(0.04), pytest.approx(0.04))
+
+
+@pytest.mark.parametrize(
+    ("starts", "seconds", "heads", "joined"),
+    [
+        ((5, 5, 5), (2, 2, 2), ("x,y", "a,b", "c,d"), True),
+        ((5, 5, 5), (2, 1.6, 1.8), ("x,y", "a,b", "c,d"), False),
+        ((5, 5, 5), (2, 2, 2), ("x,y", "x,y", "x,y"), False),
+        ((BEGIN,) * 3, (2, 1.6, 1.8), ("x,y", "a,b", "c,d"), True),
+    ],
+)
+def test_files_lie_on_one_clock_if_they_begin_and_end_together_or_count_from_1970(
+    tmp_path, starts, seconds, heads, joined
+):
+    for k, (start, duration, names) in enumerate(zip(starts, seconds, heads, strict=True)):
+        rows = [f"{start + i / 50:.2f},{i * k},{i * i}" for i in range(int(50 * duration))]
+        (tmp_path / f"{k}.csv").write_text("\n".join([f"time [s],{names}", *rows]))
+    assert any("lie on one clock" in note for note in kineme.read_recordings(tmp_path).notes) is joined
+
+
 def test_a_quaternion_that_is_no_rotation_stays_none_in_a_joined_recording(tmp_path):
     record(tmp_path / "one")
     (tmp_path / "one" / "Metadata.csv").unlink()
@@ -124,27 +167,6 @@ def test_columns_and_kinds_of_a_joined_recording_are_chosen_by_their_names(folde
     assert read.demonstrations.channels[0].kind == "discrete"
     with pytest.raises(kineme.KinemeError):
         kineme.read_recordings(folder, join_files=True, kinds={"Barometer.z": "discrete"})
-
-
-def test_columns_of_a_joined_recording_are_those_that_are_chosen_or_known(folder, tmp_path):
-    def columns(*paths, **options):
-        read = kineme.read_recordings(*paths, join_files=True, **options)
-        return [column for one in read.demonstrations.channels for column in one.columns]
-
-    both = columns(folder, columns=["Gyroscope.*", "Accelerometer.x"])
-    assert both == ["Gyroscope.z", "Gyroscope.y", "Gyroscope.x", "Accelerometer.x"]
-    assert columns(folder, columns="Gyroscope.y") == ["Gyroscope.y"]
-    assert columns(folder, columns="Orientation.q*") == [f"Orientation.q{part}" for part in "xyzw"]
-    left = columns(folder, exclude=["Orientation.*", "Gyroscope.z"])
-    assert left == ["Accelerometer.z", "Accelerometer.y", "Accelerometer.x", "Gyroscope.y", "Gyroscope.x"]
-    with pytest.raises(kineme.DataError, match=r"expected columns like 'Barometer.\*'"):
-        columns(folder, columns="Barometer.*")
-    alone = tmp_path / "alone" / "nod.csv"
-    table(alone, ["x", "y", "z"], clock(50, 0, 2), spatial(clock(50, 0, 2)).tolist())
-    assert columns(alone, columns=["y", "x"]) == ["y", "x"]
-    layout = Layout(known=Known(columns=("Gyroscope.y", "Accelerometer.x")))
-    (one,) = read_paths([folder / "nod"], layout, NameRule(), join=True).demonstrations
-    assert [channel.name for channel in one.channels] == ["Gyroscope.y", "Accelerometer.x"]
 
 
 def test_inspect_says_how_files_on_one_clock_are_joined(folder, tmp_path):

@@ -47,6 +47,11 @@ def test_poses_are_one_recording_at_the_rate_of_the_file(save, n_joints, model, 
     assert f"{rate} Hz by {name}" in how.layout
     assert {"betas", "dmpls", "gender"} <= set(how.ignored)
     np.testing.assert_array_equal(demos.recorded[:, :3], arrays["trans"])
+    joints = [channel.name for channel in demos.channels[3:]]
+    if n_joints == 55:  # after smplx, the hands of SMPL-X behind the face
+        assert [joints.index(name) for name in ("jaw", "right_eye", "left_index1", "right_thumb3")] == [22, 24, 25, 54]
+    if n_joints == 52:  # after AMASS
+        assert [joints.index(name) for name in ("left_index1", "left_pinky1", "right_index1")] == [22, 28, 37]
 
 
 def test_rotation_vectors_are_those_of_their_joints_beyond_a_half_turn_too(save):
@@ -99,6 +104,14 @@ def test_positions_of_mujoco_begin_with_the_pose_of_a_free_root_and_split_points
     assert kinds["base.orientation"] == "orientation"
     assert [*kinds][-2:] == ["hip", "knee"]
     np.testing.assert_array_equal(read.demonstrations.recorded[:, 7:], qpos[:, 7:])
+    heads = read.detected[0][0].columns
+    assert heads[:7] == tuple(f"base.position.{k}" for k in "xyz") + tuple(f"base.orientation.{k}" for k in "wxyz")
+    np.testing.assert_allclose(np.abs((read.demonstrations.recorded[:, 3:7] * turn).sum(axis=1)), 1.0)
+    arm = np.hstack((walk(3), 0.95 * turn, walk(2)))  # nine joints, by chance nearly a quaternion among them
+    assert kineme.read_recordings(save(qpos=arm, fps=50)).demonstrations.dimensions[:2] == ("qpos.0", "qpos.1")
+    for cuts in ([1, 20, N], [0, 20, N - 1], [0, 30, 20, N]):
+        with pytest.raises(kineme.DataError, match="expected split_points that rise from 0 to 60"):
+            kineme.read_recordings(save(qpos=qpos, frequency=100.0, split_points=cuts))
 
 
 def test_a_quaternion_of_a_root_that_does_not_say_its_order_is_not_guessed(save):

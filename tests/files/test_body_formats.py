@@ -55,6 +55,9 @@ def test_forces_and_controls_of_opensim_have_no_unit_of_angles():
     assert {*forces.detected[0][0].measured_in} == {""}
     controls = read(motion("no", "controls", ("soleus_r", "gasmed_r")), "a.sto")
     assert {*controls.detected[0][0].measured_in} == {""}
+    for in_degrees, title, unit in (("no", "results", ""), ("yes", "results", "deg"), ("yes", "model speeds", "")):
+        some = read(motion(in_degrees, title, ("hip_flexion_r", "knee_angle_r")), "a.sto").detected[0][0]
+        assert {*some.measured_in} == {unit}
 
 
 def test_a_motion_file_of_simm_and_states_with_speeds():
@@ -122,6 +125,8 @@ def test_segments_of_mvnx_are_poses_and_joints_can_be_chosen():
     assert {*how.measured_in} == {"m", ""}
     np.testing.assert_allclose(found.demonstrations.times, T, atol=1e-12)
     assert [one.kind for one in found.demonstrations.channels] == ["position"] * 6 + ["orientation"] * 2
+    assert how.columns[6:10] == tuple(f"Pelvis.orientation.{part}" for part in "wxyz")
+    np.testing.assert_allclose(found.demonstrations.recorded[:, 6:10], quaternions(), atol=1e-8)
     assert "jL5S1.angle.x" in how.ignored
     joints = read(mvnx(), "walk.mvnx", columns="j*")
     assert joints.detected[0][0].measured_in == ("deg", "deg", "deg")
@@ -132,6 +137,8 @@ def test_frames_of_mvnx_without_a_quantity_are_gaps_and_stamps_that_stand_still_
     found = read(mvnx(lost=5), "walk.mvnx")
     assert found.sources[0].filled == 1
     np.testing.assert_allclose(read(mvnx(times=[0] * N), "walk.mvnx").demonstrations.times, T)
+    late = [round(1000 * t) + 5 * (k == N - 1) for k, t in enumerate(T)]  # by more than a millisecond
+    np.testing.assert_allclose(read(mvnx(times=late), "walk.mvnx").demonstrations.times, np.array(late) / 1e3)
     uneven = [100 * k + (k % 3) for k in range(N)]
     np.testing.assert_allclose(read(mvnx(times=uneven), "walk.mvnx").demonstrations.times, np.array(uneven) / 1e3)
 

@@ -97,6 +97,12 @@ def test_a_crop_that_would_cost_half_of_a_movement_names_the_markers_instead(tmp
         read_recordings(tmp_path / "a.c3d")
     kept = read_recordings(tmp_path / "a.c3d", skip="sample")
     assert (kept.demonstrations.lengths.tolist(), kept.problems) == ([85], ())
+    x = points()
+    x[:80, 0] = np.nan
+    x[160:, 1] = np.nan  # less than a quarter: cropped
+    write_c3d(tmp_path / "a.c3d", x)
+    with pytest.raises(DataError, match=r"in 'LASI', got nothing in 50 % of the samples; say --exclude LASI or --skip"):
+        read_recordings(tmp_path / "a.c3d")
 
 
 def test_a_crop_that_begins_within_a_gap_goes_on_to_its_end(tmp_path):

@@ -9,6 +9,7 @@ import pytest
 import kineme
 from bag_files import KINDS, SECOND, START, Maker, pose_rows, stamps, write_bag
 from kineme.files.ros.bag_contents import bag_contents
+from kineme.files.ros.number_fields import NumberFields, Step
 
 pytest.importorskip("rosbags")
 
@@ -132,6 +133,21 @@ def test_bytes_in_the_other_order(tmp_path):
     messages += [("/n", START + SECOND, ("std_msgs/msg/Int32", b"\x00\x01\x00\x00" + struct.pack("<i", 9)))]
     (one,) = kineme.read_recordings(write_bag(tmp_path, "mcap", messages)).demonstrations
     assert one.recorded[:, 0].tolist() == [7] * 5 + [9]
+
+
+def test_a_sequence_of_none_is_not_aligned_and_one_that_is_cut_off_is_damaged():
+    doubles, number = Step(element=(Step("d", ("x",)),)), Step("I", ("n",))
+    first = NumberFields("my_msgs/msg/A", 2, (doubles, number))
+    for count in (0, 1, 3):
+        raw = (
+            struct.pack("<4xI4x", count) + struct.pack(f"<{count}d", *range(count)) if count else struct.pack("<4xI", 0)
+        )
+        assert first.decode(b"\0\1\0\0" + raw[4:] + struct.pack("<I", 7)).row == [7]
+    last = NumberFields("my_msgs/msg/B", 2, (number, doubles))
+    raw = struct.pack("<II2d", 7, 2, 0.0, 0.0)
+    assert last.decode(b"\0\1\0\0" + raw).row == [7]
+    with pytest.raises(ValueError, match="expected 28 bytes, got 27"):
+        last.decode(b"\0\1\0\0" + raw[:-1])
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -9,8 +9,12 @@ import pytest
 from scipy.stats import chi
 
 import kineme
+from kineme.comparison.described import Described
+from kineme.comparison.references import References
+from kineme.comparison.similarity import AveragedSimilarity
+from kineme.kernels.procrustes import Prepared, Procrustes
 from kineme.recognition.confidence import class_probabilities, fit_exponent
-from kineme.recognition.conformal import GUESSES, RULES, Calibration, between_classes, least_scale
+from kineme.recognition.conformal import GUESSES, RULES, Calibration, between_classes, calibrate, least_scale
 from kineme.recognition.left_out import (
     ClassDistances,
     broad_law,
@@ -68,6 +72,25 @@ def test_scales_and_scores_are_left_out_means_shrunk_towards_that_of_all():
     np.testing.assert_allclose(scored.shares[0], 1.0)
     np.testing.assert_allclose(scored.shares[1], 0.5 ** (1 / 8))
     np.testing.assert_allclose(score_classes([single, single], 1, 9.0).scales, 9.0)
+
+
+def test_a_demonstration_counts_as_near_as_it_would_be_with_as_many_others_as_there_are():
+    points = np.random.default_rng(0).normal(size=(8, 2)) + np.repeat([[0.0, 0.0], [3.0, 0.0]], 4, axis=0)
+    labels, same = np.repeat([0, 1], 4), Procrustes(1, 0.0)
+    described = Described((Prepared(points, (points**2).sum(axis=1)),), same)
+    references = References.of(draw_shapes([1]), described, labels)
+    found = calibrate(AveragedSimilarity(same, np.ones(1)), references)
+    away = np.linalg.norm(points[:, None] - points, axis=2)
+    np.fill_diagonal(away, NONE)
+    blocks = [ClassDistances(away[rows, rows], np.arange(4)) for rows in (slice(0, 4), slice(4, 8))]
+    nearer = (3 / 4) ** (1 / 8)
+    scores = np.concatenate(score_classes(blocks, 4, 1.0).scores)
+    to_own, to_others = (np.where((labels[:, None] == labels) == own, away, NONE).min(axis=1) for own in (True, False))
+    novelties = np.minimum(nearer * scores, to_others / found.scales[1 - labels])
+    np.testing.assert_allclose(np.sort(found.pooled_novelties[0]), np.sort(novelties), rtol=1e-5)
+    both = np.where(labels[:, None] == [0, 1], nearer * to_own[:, None], to_others[:, None])
+    assert found.exponent == pytest.approx(fit_exponent(both, labels), rel=1e-3)
+    assert found.between == pytest.approx(np.median(to_others), rel=1e-5)
 
 
 def test_a_demonstration_is_left_out_with_all_of_its_group():

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from kineme.errors import DataError, KinemeError
 from kineme.files.annotations.annotation import Annotation
+from kineme.files.annotations.label_table import seconds_of
 from kineme.files.annotations.labeled_pieces import labeled_pieces
 from kineme.files.annotations.read_labels import read_labels
 from kineme.files.annotations.writers import write_annotations
@@ -210,6 +211,13 @@ def test_a_name_that_two_recordings_have_is_said_and_labels_neither(tmp_path, re
     assert problem.what.startswith("line 2: expected one recording a.csv, got s1/a.csv, s2/a.csv; write its folder")
     labels.write_text("recording,start,end,label\n/home/anna/s1/a.csv,1000.5,1001.75,wave\n")
     assert [one.path for one in labeled_pieces(several, read_labels(labels)).sources] == ["s1/a.csv"]
+    (tmp_path / "a.csv").write_bytes((tmp_path / "s1" / "a.csv").read_bytes())
+    pieces = labeled_pieces(read_recordings(tmp_path), read_labels(labels))
+    assert [one.path for one in pieces.sources] == ["s1/a.csv"]  # and not the shorter a.csv
+
+
+def test_clocks_count_hours():
+    assert [seconds_of(cell) for cell in ("1:02:03.5", "62:03,5", "3.5", "a")] == [3723.5, 3723.5, 3.5, None]
 
 
 FORMULAS = ["=cmd|'/c calc'!A1", "+1+1", "-wave", "@SUM(A1)", "'=quoted", "''-", "=1,2", "plain", "'plain'", "-"]
