@@ -453,3 +453,21 @@ def test_changes_are_told_again_after_the_library_could_not_be_read():
         return heard
 
     assert asyncio.run(told()) == [2]
+
+
+@pytest.mark.parametrize("n_turns", range(6))
+def test_a_change_just_before_the_end_does_not_hold_up_the_end(n_turns):
+    """Of the event loop, between the change and the cancellation."""
+
+    async def ends():
+        changes = Changes(SimpleNamespace(library=SimpleNamespace(version=1), warm_up=None), period=60.0)
+        watching = asyncio.create_task(changes.watch())
+        await asyncio.sleep(0.01)
+        changes.look()
+        for _ in range(n_turns):
+            await asyncio.sleep(0)
+        watching.cancel()
+        done, _ = await asyncio.wait([watching], timeout=5)
+        return bool(done)
+
+    assert asyncio.run(ends())

@@ -53,7 +53,8 @@ class _Body:
         if self.whole:  # what comes after the body is that the client has gone, whenever it does
             return await self.receive()
         try:
-            message = await asyncio.wait_for(self.receive(), self.silence)
+            async with asyncio.timeout(self.silence):
+                message = await self.receive()
         except TimeoutError:
             self.refused = 408, f"expected the rest of the request, got nothing for {self.silence:g} s"
             raise _RefusedError from None

@@ -41,8 +41,10 @@ class Changes:
     async def watch(self) -> None:
         """Look again and again, until cancelled."""
         while True:
+            # Not `asyncio.wait_for`: before Python 3.12 it loses a cancellation that comes just after a change.
             with suppress(TimeoutError):
-                await asyncio.wait_for(self._look.wait(), self.period)
+                async with asyncio.timeout(self.period):
+                    await self._look.wait()
             self._look.clear()
             with suppress(KinemeError, sqlite3.Error):  # what cannot be read now: it is looked at again
                 await self._compare()
