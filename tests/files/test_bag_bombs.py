@@ -15,6 +15,7 @@ from bag_files import SECOND, START, Maker, stamps, store, write_bag, write_mcap
 from kineme.files.limits import VARIABLE
 from kineme.files.recordings import read_recordings
 from limited_child import MIB, LimitedChild
+from soaking import combined
 
 SIZE = 160 * MIB
 MODULES = ("kineme.files.recordings", "kineme.files.ros.read_bag", "rosbags.rosbag1", "rosbags.rosbag2", "lz4.frame")
@@ -135,8 +136,7 @@ def compressed(message):
     return zstd.compress(bytes(store("mcap").serialize_cdr(message, message.__msgtype__)))
 
 
-@pytest.mark.parametrize("is_said", [True, False])
-@pytest.mark.parametrize("kind", ["mcap", "sqlite3"])
+@pytest.mark.parametrize(("kind", "is_said"), combined(["mcap", "sqlite3"], [True, False], together=1))
 def test_a_file_that_is_compressed_as_a_whole(tmp_path, child, kind, is_said):
     from rosbags.rosbag2.storage_mcap import zstd
 

@@ -20,6 +20,7 @@ from kineme.recognition.confidence import EXPONENT, class_probabilities, fit_exp
 from kineme.recognition.conformal import Calibration, calibrate
 from kineme.recognition.left_out import ClassDistances, law
 from movement_samples import draw_shapes
+from soaking import combined
 
 ROOT = Path(__file__).parents[2]
 SHOWN = ("known called unknown", "unknown rejected")
@@ -67,11 +68,10 @@ def _called_unknown(n_classes, n_shown, n_dims, seeds, rate=0.05, n_people=0, by
     return np.mean(shares)
 
 
-@pytest.mark.parametrize("n_dims", [4, 8, 16])
-@pytest.mark.parametrize(("n_classes", "n_shown"), [(20, 2), (10, 4), (10, 8), (5, 20)])
-def test_of_exchangeable_movements_the_error_rate_is_kept_and_used(n_classes, n_shown, n_dims):
+@pytest.mark.parametrize(("shown", "n_dims"), combined([(20, 2), (10, 4), (10, 8), (5, 20)], [4, 8, 16], together=1))
+def test_of_exchangeable_movements_the_error_rate_is_kept_and_used(shown, n_dims):
     """Whether two or twenty calibrate a class; rates of 0.05 that calibrating scores can tell, averaged over draws."""
-    assert 0.02 <= _called_unknown(n_classes, n_shown, n_dims, range(60)) <= 0.07
+    assert 0.02 <= _called_unknown(*shown, n_dims, range(60)) <= 0.07
 
 
 @pytest.mark.parametrize("n_dims", [4, 16])

@@ -16,6 +16,7 @@ from kineme.recognition.early.decision import Decision
 from kineme.recognition.early.early import partial_shares as shares_of
 from kineme.recognition.early.hypotheses import Early, hypotheses
 from kineme.recognition.early.live_state import LiveStatus
+from soaking import SOAK
 
 SHAPES = ("CShape", "GShape", "NShape", "Sshape", "WShape", "Zshape")
 
@@ -36,7 +37,7 @@ def recognizer(lasa):
     return kineme.Recognizer().fit(lasa[[i for i in range(len(lasa)) if i % 7 < 3]])
 
 
-@pytest.fixture(params=range(len(SHAPES)), ids=lambda k: SHAPES[k])
+@pytest.fixture(params=range(0, len(SHAPES), 1 if SOAK else 2), ids=lambda k: SHAPES[k])
 def movement(lasa, request):
     """A movement that the recognizer has not seen, at 200 of its samples."""
     one = lasa[7 * request.param + 5]

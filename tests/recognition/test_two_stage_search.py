@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kineme import Demonstrations, Recognizer
@@ -19,6 +19,7 @@ from kineme.errors import SpecificationError
 from kineme.recognition import two_stage_search
 from kineme.recognition.two_stage_search import TwoStageSearch
 from movement_samples import draw_shapes
+from soaking import examples
 
 
 def _two_stages(recognizer, order=None, n_reduced=12, blocks=2):
@@ -62,6 +63,7 @@ def _same(ours, theirs, places):
 
 
 @pytest.mark.parametrize("d", [1, 2, 3, 4])
+@settings(max_examples=examples(2))
 @given(seed=st.integers(0, 1000), n_reduced=st.integers(1, 20))
 def test_where_everything_is_compared_the_answer_is_the_ordinary_one(d, seed, n_reduced):
     counts = np.random.default_rng(seed).integers(1, 5, 8)

@@ -18,6 +18,7 @@ from kineme.robots.execution.retime import fastest, sampled
 from kineme.robots.kinematics.inverse import InverseKinematics
 from kineme.robots.kinematics.postures import postures
 from kineme.robots.models.table import MODELS
+from soaking import examples
 
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")
 mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed")
@@ -42,7 +43,7 @@ def random_stroke(robot, seed, seconds):
     return kineme.Trajectory(times=seconds * u, positions=InverseKinematics(robot).tip_position + path)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=examples(8), deadline=None)
 @given(
     name=st.sampled_from(list(MODELS)),
     seed=st.integers(0, 2**32 - 1),

@@ -17,7 +17,7 @@ from arm_samples import stroke
 from kineme.orientation import PoseDMP, exp, product
 from kineme.robots import ArmController, ArmStatus, load
 from kineme.robots.live.braking import Braking, brakeable
-from soaking import combined, examples
+from soaking import SOAK, combined, examples
 
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")
 
@@ -146,7 +146,7 @@ def test_what_was_missed_is_caught_up_without_overshooting(name, dt):
     check_limits(robot, np.array([first.joints, *(state.joints for state in states)]), dt)
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", MODELS if SOAK else MODELS[::3])
 def test_an_arm_that_is_stretched_towards_a_goal_out_of_reach_comes_to_rest(name):
     arm = ArmController(robot_of(name), primitive(name).controller(0.005))
     goal = arm.state.movement.position + np.array([1.5, 0.2, 0.3])

@@ -17,6 +17,7 @@ from kineme.robots import load, move
 from kineme.robots.kinematics.descent import kinematics
 from kineme.robots.kinematics.inverse import ORIENTATIONS
 from kineme.robots.models.table import MODELS
+from soaking import combined
 
 pinocchio = pytest.importorskip("pinocchio", reason="the extra robot is not installed")
 
@@ -84,14 +85,12 @@ def tracked(made):
 SEEDS = {"panda": 1, "ur5e": 2, "wam": 1, "so101": 2, "iiwa": 0, "pr2": 0}
 
 
-@pytest.mark.parametrize("name", SEEDS)
-def test_the_path_that_an_arm_recorded_is_followed_whatever_is_left_free(tmp_path, name):
+@pytest.mark.parametrize(("name", "follow"), combined(SEEDS, ORIENTATIONS, together=1))
+def test_the_path_that_an_arm_recorded_is_followed_whatever_is_left_free(tmp_path, name, follow):
     robot = arm(name, tmp_path)
-    movement = recorded(robot, SEEDS[name])
-    for follow in ORIENTATIONS:
-        made = move(movement, robot, follow=follow, timing="slowed")
-        assert tracked(made) < 0.02  # mm
-        assert np.all((made.trajectory.positions >= robot.lower) & (made.trajectory.positions <= robot.upper))
+    made = move(recorded(robot, SEEDS[name]), robot, follow=follow, timing="slowed")
+    assert tracked(made) < 0.02  # mm
+    assert np.all((made.trajectory.positions >= robot.lower) & (made.trajectory.positions <= robot.upper))
 
 
 def test_joints_that_a_pose_leaves_free_keep_off_their_stops_and_do_not_slow_the_movement_down(tmp_path):

@@ -18,7 +18,9 @@ from kineme.experiments.evaluation.results import Results
 from kineme.experiments.evaluation.rows import to_csv
 from kineme.experiments.evaluation.run import Runner, evaluate
 from kineme.experiments.evaluation.trials import Settings, shots_label
+from soaking import SOAK
 
+SMALL = ["few-shot", "robustness"], ["kineme", "euclidean"]
 PLAN = (
     [name for name, one in PROTOCOLS.items() if name != "earliness" and not one.by_person],
     ["kineme", "euclidean", "paper"],
@@ -51,17 +53,17 @@ def done(data, tmp_path_factory):
 
 
 def test_the_same_seed_gives_the_same_bytes_and_another_does_not(data, done, tmp_path):
-    html, numbers = done.files
-    again = run(data, tmp_path / "again")
+    plan = PLAN if SOAK else SMALL
+    html, numbers = done.files if SOAK else run(data, tmp_path / "first", plan).files
+    again = run(data, tmp_path / "again", plan)
     assert again.files[0].read_bytes() == html.read_bytes()
     assert without_times(again.files[1]) == without_times(numbers)
-    other = run(data, tmp_path / "other", seed=1)
+    other = run(data, tmp_path / "other", plan, seed=1)
     assert without_times(other.files[1]) != without_times(numbers)
 
 
 def test_two_processes_give_what_one_gives(data, tmp_path):
-    plan = (["few-shot", "robustness"], ["kineme", "euclidean"])
-    files = [run(data, tmp_path / str(k), plan, processes=k).files for k in (1, 2)]
+    files = [run(data, tmp_path / str(k), SMALL, processes=k).files for k in (1, 2)]
     assert without_times(files[0][1]) == without_times(files[1][1])
 
 

@@ -9,7 +9,6 @@ import json
 import re
 import subprocess
 import sys
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from statistics import fmean
 
@@ -21,9 +20,10 @@ from kineme.cli import main
 from kineme.experiments.reproduction import paper
 from kineme.experiments.reproduction.arm_tables import arm_tables
 from kineme.experiments.reproduction.representations import READINGS, REPRESENTATIONS
-from kineme.experiments.reproduction.run import Reproduction
+from kineme.experiments.reproduction.run import Reproduction, _rounded, _tasks
 from kineme.experiments.reproduction.tables import make_tables
 from kineme.output.table import mean_and_range, to_text
+from soaking import SOAK
 
 ARM = all(map(importlib.util.find_spec, ("pinocchio", "pink")))  # the extra robot is installed
 PAGE = " ".join((Path(__file__).parents[3] / "docs" / "guide" / "the-paper.md").read_text(encoding="utf-8").split())
@@ -36,23 +36,15 @@ def reproduce(*arguments):
 
 
 @pytest.fixture(scope="module")
-def runs(tmp_path_factory):
-    """Of the draws of the page, and of the first one alone."""
-    folders = [tmp_path_factory.mktemp("run") / "new" / "out" for _ in range(2)]
-    with ThreadPoolExecutor() as both:  # side by side: each uses one processor most of the time
-        done = both.map(
-            lambda folder, draws: reproduce("--quick", "--draws", draws, "--out", folder), folders, (DRAWS, 1)
-        )
-        return list(zip(done, folders, strict=True))
-
-
-def results_of(run):
-    return json.loads((run[1] / "results.json").read_text(encoding="utf-8"))
+def run_of_the_page(tmp_path_factory):
+    """How it ended, and its folder."""
+    folder = tmp_path_factory.mktemp("run") / "new" / "out"
+    return reproduce("--quick", "--draws", DRAWS, "--out", folder), folder
 
 
 @pytest.fixture(scope="module")
-def results(runs):
-    return results_of(runs[0])
+def results(run_of_the_page):
+    return json.loads((run_of_the_page[1] / "results.json").read_text(encoding="utf-8"))
 
 
 @pytest.fixture(scope="module")
@@ -66,43 +58,47 @@ def tables(default_draws):
     return [*of_letters, *of_shapes]
 
 
-def test_it_succeeds_and_says_where_to_look(runs):
-    done, folder = runs[0]
+def test_it_succeeds_and_says_where_to_look(run_of_the_page):
+    done, folder = run_of_the_page
     assert done.returncode == 0, done.stderr
     assert str(folder / "report.html") in done.stdout
 
 
-def test_it_prints_all_tables_with_the_papers_numbers(runs):
-    text = runs[0][0].stdout
+def test_it_prints_all_tables_with_the_papers_numbers(run_of_the_page):
+    text = run_of_the_page[0].stdout
     for expected in ("Table 1", "Table 2", "Table 3", "Table 4", "Diagnosis", "26 single shapes", "0.815", "0.926"):
         assert expected in text
 
 
-def test_it_draws_eleven_figures_as_png_and_svg(runs):
-    folder = runs[0][1]
+def test_it_draws_eleven_figures_as_png_and_svg(run_of_the_page):
+    folder = run_of_the_page[1]
     for k in range(1, 12):
         assert (folder / f"figure-{k:02d}.png").read_bytes().startswith(b"\x89PNG")
         assert b"<svg" in (folder / f"figure-{k:02d}.svg").read_bytes()
 
 
-def test_the_report_is_one_self_contained_file(runs):
-    html = (runs[0][1] / "report.html").read_text(encoding="utf-8")
+def test_the_report_is_one_self_contained_file(run_of_the_page):
+    html = (run_of_the_page[1] / "report.html").read_text(encoding="utf-8")
     assert html.count("<img") == 11 + ARM
     assert html.count("<table>") >= 7
     assert not re.search(r'(src|href)="(?!data:)', html)
 
 
-def test_the_same_seed_gives_the_same_bytes_but_for_times(runs, results, tables):
+def test_the_same_seed_gives_the_same_bytes_but_for_times(run_of_the_page, results, tables):
     """Draws do not depend on how many follow, figures depend on the seed alone, and tables on the numbers alone."""
-    other = results_of(runs[1])
+    folder = run_of_the_page[1]
+    tasks = _tasks(1, 0, True)
     for of, several in results["draw_by_draw"].items():
-        assert several[0] == other["draw_by_draw"][of][0]
-    pictures = sorted(path.name for path in runs[0][1].glob("figure-*"))
-    assert len(pictures) == 22 + 2 * ARM
-    for name in pictures:
-        assert (runs[0][1] / name).read_bytes() == (runs[1][1] / name).read_bytes()
+        function, arguments = tasks[of, 0]
+        assert json.loads(json.dumps(_rounded(function(*arguments)))) == several[0]
+    assert len(sorted(folder.glob("figure-*"))) == 22 + 2 * ARM
+    drawn = [key for key in tasks if key[0] == "figure"]
+    for key in drawn if SOAK else drawn[:3]:
+        function, arguments = tasks[key]
+        for form, picture in function(*arguments)[1].items():
+            assert (folder / f"{key[1]}.{form}").read_bytes() == picture
     text = "\n\n".join(map(to_text, [*tables, *arm_tables(results["arm"], results["draw_by_draw"])])) + "\n"
-    assert (runs[0][1] / "tables.txt").read_text(encoding="utf-8") == text
+    assert (folder / "tables.txt").read_text(encoding="utf-8") == text
 
 
 def test_seed_and_draws_are_passed_on(tmp_path, monkeypatch):
@@ -115,8 +111,8 @@ def test_seed_and_draws_are_passed_on(tmp_path, monkeypatch):
     assert [one[1:4] for one in given] == [(2, 5, False), (DRAWS, 0, False), (3, 0, True)]
 
 
-def test_nothing_but_the_results_is_left_in_the_folder(runs):
-    assert not [path.name for path in runs[0][1].iterdir() if path.name.startswith(".")]
+def test_nothing_but_the_results_is_left_in_the_folder(run_of_the_page):
+    assert not [path.name for path in run_of_the_page[1].iterdir() if path.name.startswith(".")]
 
 
 def test_a_folder_that_cannot_be_written_is_one_line(tmp_path):
@@ -134,8 +130,8 @@ def test_impossible_options_are_refused(arguments):
 
 
 @pytest.mark.skipif(not ARM, reason="the extra robot is not installed")
-def test_the_arm_writes_the_letter_and_recognizes_what_it_wrote(runs, results):
-    text, folder = runs[0][0].stdout, runs[0][1]
+def test_the_arm_writes_the_letter_and_recognizes_what_it_wrote(run_of_the_page, results):
+    text, folder = run_of_the_page[0].stdout, run_of_the_page[1]
     assert (folder / "figure-07-arm.png").read_bytes().startswith(b"\x89PNG")
     for expected in ("Figure 7 b, c", "Table 2 on movements of the arm", "Table 4 on movements of the arm"):
         assert expected in text

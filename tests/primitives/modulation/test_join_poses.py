@@ -13,6 +13,7 @@ from kineme.movements.trajectories.channels import of_channels
 from kineme.orientation import PoseDMP, PosePrimitives, conjugate, exp, log, product
 from kineme.primitives.discrete.basis import GATINGS
 from kineme.primitives.discrete.formulations import FORMULATIONS
+from soaking import examples
 
 SPECIFICATIONS = [
     DMP(name, n_basis=25, n_points=120, gating=gating)
@@ -38,7 +39,7 @@ def angle(one, other):
 
 
 @pytest.mark.parametrize("dmp", SPECIFICATIONS, ids=lambda dmp: f"{dmp.formulation}-{dmp.gating}")
-@settings(max_examples=4, deadline=None)
+@settings(max_examples=examples(1, 12), deadline=None)
 @given(seed=st.integers(0, 10**6))
 def test_each_part_follows_the_one_before_it(dmp, seed):
     """With their angular velocities; start, end and the velocities there exact."""
