@@ -8,6 +8,9 @@ import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
 import kineme
+from kineme.files.name_rule import NameRule
+from kineme.files.recordings import read_paths
+from kineme.movements.tables.layout import Known, Layout
 
 BEGIN = 1_700_000_000.0  # s since 1970
 
@@ -167,6 +170,27 @@ def test_columns_and_kinds_of_a_joined_recording_are_chosen_by_their_names(folde
     assert read.demonstrations.channels[0].kind == "discrete"
     with pytest.raises(kineme.KinemeError):
         kineme.read_recordings(folder, join_files=True, kinds={"Barometer.z": "discrete"})
+
+
+def test_columns_of_a_joined_recording_are_those_that_are_chosen_or_known(folder, tmp_path):
+    def columns(*paths, **options):
+        read = kineme.read_recordings(*paths, join_files=True, **options)
+        return [column for one in read.demonstrations.channels for column in one.columns]
+
+    both = columns(folder, columns=["Gyroscope.*", "Accelerometer.x"])
+    assert both == ["Gyroscope.z", "Gyroscope.y", "Gyroscope.x", "Accelerometer.x"]
+    assert columns(folder, columns="Gyroscope.y") == ["Gyroscope.y"]
+    assert columns(folder, columns="Orientation.q*") == [f"Orientation.q{part}" for part in "xyzw"]
+    left = columns(folder, exclude=["Orientation.*", "Gyroscope.z"])
+    assert left == ["Accelerometer.z", "Accelerometer.y", "Accelerometer.x", "Gyroscope.y", "Gyroscope.x"]
+    with pytest.raises(kineme.DataError, match=r"expected columns like 'Barometer.\*'"):
+        columns(folder, columns="Barometer.*")
+    alone = tmp_path / "alone" / "nod.csv"
+    table(alone, ["x", "y", "z"], clock(50, 0, 2), spatial(clock(50, 0, 2)).tolist())
+    assert columns(alone, columns=["y", "x"]) == ["y", "x"]
+    layout = Layout(known=Known(columns=("Gyroscope.y", "Accelerometer.x")))
+    (one,) = read_paths([folder / "nod"], layout, NameRule(), join=True).demonstrations
+    assert [channel.name for channel in one.channels] == ["Gyroscope.y", "Accelerometer.x"]
 
 
 def test_inspect_says_how_files_on_one_clock_are_joined(folder, tmp_path):

@@ -55,6 +55,19 @@ def test_one_coordinate_has_a_label_where_whole_numbers_stand_beside_fractions()
     assert found.labels.tolist() == ["1", "2"] * 3
     assert found.demonstrations.lengths.tolist() == [32] * 6
     assert read(lines(POINTS), rows=True, columns="x").labels.tolist() == [None] * 6
+    assert read(lines(POINTS, ["1.0000000e+00", "2."] * 3), rows=True, columns="x").labels.tolist() == ["1", "2"] * 3
+    begins_at_0 = read(lines(POINTS, ["0.000"] * 6), rows=True, columns="x")
+    assert (begins_at_0.labels.tolist(), begins_at_0.demonstrations.lengths.tolist()) == ([None] * 6, [33] * 6)
+
+
+def test_a_class_at_the_end_of_lines_is_no_coordinate():
+    found = read(
+        "\n".join(f"{row},{k % 3}" for k, row in enumerate(lines(POINTS).split("\n"))), rows=True, columns=("x", "y")
+    )
+    np.testing.assert_array_equal(np.array(positions(found)), POINTS)
+    assert found.labels.tolist() == ["0", "1", "2"] * 2
+    with pytest.raises(kineme.DataError, match=r"got fractions in both; say which with label=.*--label-column"):
+        read("\n".join(f"{row},0.5" for row in lines(POINTS).split("\n")), rows=True, columns=("x", "y"))
 
 
 def test_lines_may_differ_in_length_and_be_padded():
@@ -160,3 +173,15 @@ def test_a_log_without_heads_and_times_has_no_time_where_all_columns_are_chosen(
     np.testing.assert_allclose(found.demonstrations.durations, 0.11)
     with pytest.raises(kineme.DataError, match="expected a column of times"):
         read(log, every=12, columns=(0, 1, 2))
+
+
+def test_empty_lines_between_samples_without_times_part_movements():
+    blocks = ["\n".join(f"{k},{k * k}" for k in range(n)) for n in (9, 9, 9, 7)]
+    with pytest.raises(
+        kineme.DataError, match=r"got 3 blocks of 9 to 9 samples .* say every=9, in the shell --every 9"
+    ):
+        read("x,y\n" + "\n\n".join(blocks[:3]), units=0.1)
+    assert len(read("x,y\n" + "\n\n".join(blocks[:3]), units=0.1, every=9)) == 3
+    with pytest.raises(kineme.DataError, match=r"got 4 blocks of 7 to 9 samples .* save each in a file of its own"):
+        read("x,y\n" + "\n \n".join(blocks), units=0.1)
+    assert len(read("x,y\n\n" + blocks[0].replace("\n", "\n\n") + "\n\n", units=0.1)) == 1

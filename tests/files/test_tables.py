@@ -389,6 +389,52 @@ def test_decimal_commas_between_blanks():
     np.testing.assert_array_equal(named.positions, found.positions)
 
 
+@pytest.mark.parametrize("mark", [".", ","])
+def test_marks_between_thousands_are_no_decimal_marks(mark):
+    x = np.linspace(900, 1200, 40).round()
+    grouped = [f"{one:,.0f}".replace(",", mark) for one in x]
+    text = "t;x\n" + "\n".join(f"{k};{cell}" for k, cell in enumerate(grouped))
+    with pytest.raises(kineme.DataError, match=rf"'x' without marks between thousands, got '1\{mark}0.*' beside '900'"):
+        read(text)
+    shortest = [f"{one:g}".replace(".", mark) for one in (x / 1000).round(3)]  # 0.9, 1, 1.008: decimals
+    text = "t;x\n" + "\n".join(f"{k};{cell}" for k, cell in enumerate(shortest))
+    np.testing.assert_allclose(read(text).demonstrations[0].positions[:, 0], (x / 1000).round(3))
+
+
+@pytest.mark.parametrize("names", [["scorer", "bodyparts", "coords"], [None, None]])
+def test_several_lines_of_heads_are_one(tmp_path, names):
+    """As pandas writes columns of several levels, and DeepLabCut the points of a body."""
+    points = [("net", point, coord) for point in ("nose", "paw") for coord in ("x", "y", "likelihood")]
+    columns = pd.MultiIndex.from_tuples([each[-len(names) :] for each in points], names=names)
+    frame = pd.DataFrame(np.arange(60.0).reshape(10, 6) ** 2, columns=columns)
+    frame.index.name = None if names[0] else "time"
+    frame.to_csv(tmp_path / "a.csv")
+    found = read_recordings(tmp_path / "a.csv", units=0.1).demonstrations
+    assert found.dimensions == ("nose.x", "nose.y", "paw.x", "paw.y")
+    np.testing.assert_array_equal(found[0].positions, frame.to_numpy()[:, [0, 1, 3, 4]])
+
+
+def test_times_that_are_not_understood_are_shown():
+    for stamp in ("01/05/2024 10:00:0{}", "5/1/2024 11:59:5{} PM", "10:00:01:00{}"):
+        with pytest.raises(
+            kineme.DataError, match=r"times such as 2024-05-06T07:08:09.25 .* in 'timestamp', got '.*0.*'"
+        ):
+            read(lines([(stamp.format(k), k, k * k) for k in range(8)], "timestamp,x,y"))
+
+
+@pytest.mark.parametrize("mark", [",", ";", "\t"])
+def test_lines_above_the_heads_are_passed_over(mark):
+    rows = "\n".join(mark.join((str(k / 10), str(k * k), "1.5")) for k in range(9))
+    said = {"sep=;": mark == ";", f"Device{mark}A12\nRate{mark}60": True, "Made by me on May 3": True, "ok\n\n\n": True}
+    for above in (key for key, applies in said.items() if applies):
+        found = read(f"{above}\ntime{mark}x{mark}y\n{rows}")
+        assert found.demonstrations.dimensions == ("x", "y"), above
+        np.testing.assert_array_equal(found.demonstrations[0].positions[:, 0], np.arange(9.0) ** 2)
+    for above in (mark.join("12"), mark.join(("time", "x"))):  # another table, or heads that lack one
+        with pytest.raises(kineme.DataError):
+            read(f"{above}\n{rows}")
+
+
 def test_a_line_that_numbers_the_columns_is_no_sample():
     rows = [(k / 10, 1.5 * k, k) for k in range(5)]
     np.testing.assert_array_equal(read(lines(rows, "0,1,2")).demonstrations.times, np.arange(5) / 10)

@@ -256,6 +256,31 @@ def test_points_of_a_body_in_each_sample_are_columns():
     assert read_json(names, units=0.1).demonstrations.dimensions == ("score", "keypoints.nose.x")
 
 
+def test_parts_of_a_sample_are_told_by_their_names_and_not_by_their_places():
+    def sample(t, x, *sides):
+        return {"t": t, "hands": [{"handedness": side, "x": x + (side == "Left")} for side in sides]}
+
+    pairs = list(zip(T.tolist(), X[:, 0].tolist(), strict=True))
+    sides = [("Left", "Right"), ("Right", "Left")]
+    found = read_json([sample(t, x, *sides[k % 2]) for k, (t, x) in enumerate(pairs)]).demonstrations
+    assert found.dimensions == ("hands.Left.x", "hands.Right.x")
+    np.testing.assert_array_equal(found[0].positions, np.column_stack([X[:, 0] + 1, X[:, 0]]))
+    with pytest.raises(DataError, match=r"expected parts of 'hands' with different names in each sample"):
+        read_json([sample(t, x, "Left", "Left") for t, x in pairs])
+    with pytest.raises(DataError, match=r"expected as many 'points' in each sample, .* got 1 to 2; give each a name"):
+        read_json([{"t": t, "points": [{"x": x}] * (1 + k % 2)} for k, (t, x) in enumerate(pairs)])
+    named = [{"label": label, "samples": SAMPLES} for label in ("wave", "nod")]
+    assert read_json([{"session": 1, "gestures": named}]).labels.tolist() == ["wave", "nod"]
+    assert read_json([{"session": 1, "gestures": [{"samples": SAMPLES}]}]).labels.tolist() == [None]
+
+
+def test_an_axis_that_is_a_list_runs_over_time():
+    rows = [{"label": label, "x": (X[:, 0] + k).tolist(), "y": X[:, 1].tolist()} for k, label in enumerate("ab")]
+    found = read("\n".join(map(json.dumps, rows)), "a.jsonl", units=0.1)
+    assert (found.labels.tolist(), found.demonstrations.dimensions) == (["a", "b"], ("x", "y"))
+    np.testing.assert_array_equal(found.demonstrations[1].positions, X + np.array([1, 0]))
+
+
 def test_tables_of_records_have_their_columns():
     records = np.rec.fromarrays([T, *X.T], names="t,x,y")
     np.testing.assert_array_equal(read(npy(records), "a.npy").demonstrations[0].positions, X)

@@ -72,6 +72,22 @@ def test_links_closer_than_five_millimeters_touch(tmp_path, gap, touches):
     assert contacts[0].passed is not touches
 
 
+def _contacts(robot, posture):
+    return next(check for (what, _), check in checked(robot, posture).items() if what == "self-collision")
+
+
+def test_links_that_are_close_by_design_touch_only_where_they_do(tmp_path):
+    """At rest 3 mm lie between the balls of one arm; of the other up to 3 mm in all postures, near one axis."""
+    simple_arm(tmp_path)
+    path, at_rest = tmp_path / "arm.urdf", 2 * np.arcsin(0.203)
+    robot = load(path, rest=[0.0, at_rest])
+    assert _contacts(robot, [0.0, at_rest]).passed
+    assert not _contacts(robot, [0.0, 2 * np.arcsin(0.199)]).passed
+    text = path.read_text().replace("0 1 0", "0 0 1").replace("0.5 0 0", "0.02 0 0.1985", 1)
+    path.write_text(text.replace("0.5 0 0", "0.02 0 0"))
+    assert _contacts(load(path), [0.1, 0.1]).passed
+
+
 def gantry(folder):
     """Three joints that slide and three that turn half a radian to each side."""
     links = '<link name="l0"/>'

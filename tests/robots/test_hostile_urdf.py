@@ -47,6 +47,11 @@ def urdf(folder, inside="", before="", name="j", axis="0 0 1", velocity="1"):
         ({"inside": f'<inertial><mass value="1"/>{INERTIA.replace("ixy", "xy")}</inertial>'}, "; ixy cannot be read"),
         ({"inside": f'<inertial><origin xyz="a b c"/><mass value="1"/>{INERTIA}</inertial>'}, "'b': expected <origin"),
         ({"axis": '0 0 1"/><origin xyz="0;0;1'}, "joint 'j': expected <origin xyz=/>"),
+        ({"axis": '0 0 1"/><orgin xyz="0 0 1'}, "joint 'j': expected <origin>, got <orgin>, which readers of URDF"),
+        ({"axis": '0 0 1"/><origin pos="0 0 1'}, "joint 'j': expected <origin xyz= rpy=/>, got pos=, which readers"),
+        ({"axis": '0 0 1"/><origin rpy="0 90 0'}, "joint 'j': expected <origin rpy=/> in radians, got '0 90 0'; are"),
+        ({"axis": '1 0 0"/><axes xyz="0 0 1'}, "joint 'j': expected <axis>, got <axes>"),
+        ({"inside": BALL.format('<Origin xyz="0 0 1"/>')}, "link 'b': expected <origin>, got <Origin>"),
         ({"velocity": "1_0"}, "joint 'j': expected a number for velocity, got '1_0'"),
         ({"inside": "<x>" * 50_000 + "</x>" * 50_000}, "elements within one another"),
         ({"before": '<!DOCTYPE r [<!ENTITY e SYSTEM "file:///etc/passwd">]>'}, "declares a document type"),
@@ -60,6 +65,26 @@ def test_what_would_be_left_out_without_a_word_is_refused_by_name(tmp_path, chan
     path = urdf(tmp_path, **changed)
     with pytest.raises(DataError, match=words):
         load(path, tip="b")
+
+
+@pytest.mark.parametrize("axis", ['xzy="0 0 1"', ""])
+def test_an_axis_without_its_numbers_is_refused(tmp_path, axis):
+    path = urdf(tmp_path)
+    path.write_text(path.read_text().replace('xyz="0 0 1"', axis))
+    with pytest.raises(DataError, match="joint 'j': expected <axis xyz=/> as three numbers"):
+        load(path)
+
+
+def test_numbers_that_may_be_in_other_units_and_joints_that_float_are_said(tmp_path):
+    path = urdf(tmp_path, axis='0 0 1"/><origin xyz="0 0 400')
+    base = '<link name="w"/><joint name="base" type="floating"><parent link="w"/><child link="a"/></joint>'
+    text = path.read_text().replace('lower="-1" upper="1"', 'lower="-170" upper="170"')
+    path.write_text(text.replace("</robot>", f"{base}</robot>"))
+    assert load(path).assumed[:3] == (
+        "j may turn from -170 to 170 rad: if the file means degrees, write radians",
+        "the arm is 400 m long: if the file means millimeters, write meters",
+        "base can move freely or in a plane: locked, no part of the arm",
+    )
 
 
 def test_what_a_reader_leaves_out_all_the_same_is_refused(tmp_path, monkeypatch):

@@ -4,21 +4,26 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from kineme.errors import DataError
 from kineme.files.column_order import sensors_of
 from kineme.files.entries import Entry, name_of
 from kineme.files.folders import as_text
 from kineme.files.problem import Problem
 from kineme.files.read_file import FileRead
 from kineme.files.ros.rotations import interpolated
+from kineme.files.select_columns import select_columns
 from kineme.movements.channels.channel import Channels, recorded_names
 from kineme.movements.channels.column_match import Columns
 from kineme.movements.channels.coordinates import canonical, columns_of, in_order, off_norm
 from kineme.movements.channels.detect import Given, find_channels
-from kineme.movements.tables.parsed import Block, Detected, Repair
+from kineme.movements.tables.columns import column_numbers, excluded_numbers, numbers_by_name
+from kineme.movements.tables.layout import Layout
+from kineme.movements.tables.parsed import Block, Detected, Parsed, Repair
 from kineme.output.text import counted
 from kineme.validation import MIN_SAMPLES, Array
 
@@ -31,7 +36,7 @@ _ALIKE = 0.05  # of a duration by which files of one recording may begin or end 
 _NAMED = 4  # files that a note names
 
 
-def join_files(files: Sequence[Placed], given: Given) -> list[Placed]:
+def join_files(files: Sequence[Placed], layout: Layout) -> list[Placed]:
     """One recording of all files of a folder that hold one movement each on one clock; other files as they are.
 
     The samples are those of the file that has most in a second, while all of them last. Others are interpolated:
@@ -42,22 +47,33 @@ def join_files(files: Sequence[Placed], given: Given) -> list[Placed]:
     Parameters
     ----------
     files : sequence of (FileRead, Entry)
-    given : mapping
-        Kinds of channels by the heads of the recording, see `kineme.movements.channels.detect.find_channels`.
+        With all of their columns.
+    layout : Layout
+        The columns of the recordings, by the names that they have there, and their kinds. A file without any of the
+        columns that are chosen is passed over.
     """
     result: list[Placed] = []
     for members in _folders(files).values():
-        timed = [member for member in members if _is_timed(member[0])]
-        together = _together([read for read, _ in timed])
-        if len(together) < 2:
+        timed = [read for read, _ in members if _is_timed(read)]
+        if len(_together(timed)) < 2:
             result += members
             continue
-        joined = [member for member in timed if member[0].path in together]
-        result.append(_joined(joined, together, given))
+        chosen = _with_chosen_columns(timed, layout)
+        together = _together(chosen) or [chosen[0].path]
+        joined = [member for member in members if member[0].path in together]
+        recording, place = _joined(joined, together, layout.kinds or {})
+        aside = tuple(name for read in timed if read not in chosen for name in _heads(read))
+        if recording.detected is not None:
+            recording = recording._replace(
+                detected=recording.detected._replace(ignored=(*recording.detected.ignored, *aside))
+            )
+        result.append((_selected(recording, layout), place))
         for read, entry in members:
-            if (read, entry) in joined:
+            if read.path in together:
                 continue
             if _is_timed(read):
+                if read not in chosen:
+                    continue
                 begin, end = _span(read)
                 reason = (
                     f"expected samples at the time of {together[0]}, got some from {begin:.12g} to {end:.12g} s; move "
@@ -68,6 +84,51 @@ def join_files(files: Sequence[Placed], given: Given) -> list[Placed]:
             else:
                 result.append((read, entry))
     return result
+
+
+def _with_chosen_columns(files: Sequence[FileRead], layout: Layout) -> list[FileRead]:
+    """The files that have columns which are asked for, or those of the movements to compare with; all if none has."""
+    heads = [_heads(read) for read in files]
+    known = layout.known.columns if layout.known is not None else ()
+    of_all = [name for names in heads for name in names]
+    wanted = layout.coordinates or (known if None not in numbers_by_name(of_all, known) else ())
+    kept = [
+        read
+        for read, names in zip(files, heads, strict=True)
+        if (not wanted or excluded_numbers(names, wanted))
+        and len(excluded_numbers(names, layout.excluded)) < len(names)
+    ]
+    return kept or list(files)
+
+
+def _heads(read: FileRead) -> list[str]:
+    assert read.detected is not None
+    return [f"{Path(read.path).stem}.{name}" for name in read.detected.columns]
+
+
+def _selected(read: FileRead, layout: Layout) -> FileRead:
+    """A recording with the columns that are chosen, in their order."""
+    if read.detected is None or read.block is None:
+        return read
+    parsed = Parsed(read.detected, read.block)
+    try:
+        parsed = select_columns(lambda choice: _in_order(parsed, choice), layout)
+    except DataError as error:
+        return read._replace(block=None, problems=[Problem(read.path, None, str(error)), *read.problems])
+    return read._replace(detected=parsed.detected, block=parsed.block)
+
+
+def _in_order(parsed: Parsed, layout: Layout) -> Parsed:
+    detected, block = parsed.detected, parsed.block
+    if layout.coordinates is None:
+        return parsed
+    chosen = column_numbers(detected.columns, layout.coordinates)
+    detected = detected._replace(
+        columns=tuple(detected.columns[k] for k in chosen),
+        measured_in=tuple(detected.measured_in[k] for k in chosen) if detected.measured_in else (),
+        ignored=(*detected.ignored, *(name for k, name in enumerate(detected.columns) if k not in chosen)),
+    )
+    return parsed._replace(detected=detected, block=replace(block, positions=block.positions[:, chosen]))
 
 
 def notes_on_clocks(files: Sequence[Placed]) -> tuple[str, ...]:

@@ -153,22 +153,34 @@ def read_paths(  # noqa: PLR0913 - those of `read_recordings`, in records
     if rule.names_person and layout.person is not None:
         raise SpecificationError("expected person, a column, or {person} in label_pattern, not both")
     entries, problems = entries_of(paths, follow_links)
-    files: list[Placed] = []
     read, where = [], list(paths)
     if standard_input is not None:
         name, data = Path(standard_input[0]), standard_input[1]
         read.append(rule.apply(read_bytes(data, name, layout), name))
         where.append(name)
     by_path = {entry.path: entry for entry in entries}
-    for path in by_path if progress is None else progress(list(by_path)):
+    parts = layout
+    if join:  # their columns are chosen when they are side by side
+        known = layout.known and replace(layout.known, columns=())
+        parts = replace(layout, columns=None, exclude=None, known=known)
+
+    def placed(path: Path, layout: Layout) -> Placed:
         entry = by_path[path]
         relative = Path(entry.relative.name) if rule.label_by == TASK else entry.relative
         one = read_file(path, relative, layout, follow_links)
         one = one._replace(path=entry.name, problems=[each._replace(file=entry.name) for each in one.problems])
-        files.append((one, entry._replace(relative=relative)))
+        return one, entry._replace(relative=relative)
+
+    files = [placed(path, parts) for path in (by_path if progress is None else progress(list(by_path)))]
     notes = () if join else notes_on_clocks(files)
     if join:
-        files = join_files(files, layout.kinds or {})
+        joined = join_files(files, layout)
+        beside = {entry.path for _, entry in joined} - {*by_path}  # folders that are one recording
+        alone = {entry.path for _, entry in joined if entry.path in by_path and entry.path.parent not in beside}
+        files = [
+            placed(entry.path, layout) if parts != layout and entry.path in alone else (one, entry)
+            for one, entry in joined
+        ]
     read += [rule.apply(one, entry.path) for one, entry in files]
     recordings = merge_files(read, in_words(where), problems, layout.kinds, layout.skip, layout.by_number)
     recordings = replace(recordings, notes=notes)

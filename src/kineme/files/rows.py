@@ -25,6 +25,8 @@ _CELL = 100  # bytes of a cell in Python
 _COUNTED = re.compile(r"(.*?)[\W_]*(\d+)")  # x0, wrist.x_12
 _COLON = re.compile(r":(?![^()]*\))")  # between columns, not within a date
 _PAIR = re.compile(r"\(([^,()]*),([^,()]*)\)")  # a time and a value
+_WHOLE = re.compile(r"[-+]?\d+(?:\.0*)?(?:[eE][-+]?0+)?")  # also as programs write classes as floats, 1.0000000e+00
+_FRACTION = re.compile(r"[.eE].*")  # of a whole number
 _PEEK = 20  # lines by which labels are known
 
 
@@ -49,7 +51,8 @@ def row_movements(data: bytes, layout: Layout) -> Parsed:
     """The movements of a table, one in each line: its label, then the coordinates of sample after sample.
 
     The coordinates of a sample are named by `layout.columns`, or by heads such as x0, y0, x1, y1. The label is in the
-    column `layout.label`; by default in the first one if it holds words, or a number beside a whole number of samples.
+    column `layout.label`; by default in the first or the last one if it holds words, or a whole number beside a whole
+    number of samples.
     Cells that are empty or NaN at the end of a line pad it.
 
     Raises
@@ -77,7 +80,7 @@ def row_movements(data: bytes, layout: Layout) -> Parsed:
             )
             continue
         series.lines.append(line.number)
-        series.labels.append(text or None)
+        series.labels.append((_FRACTION.sub("", text) if _WHOLE.fullmatch(text) else text) if text else None)
         series.positions.append(values.reshape(-1, len(names)))
     parsed = _parsed(series, names, layout, "CSV")
     head = () if label is None else (heads[label] if heads else f"column {label}",)
@@ -122,10 +125,27 @@ def _label_column(lines: Sequence[_Line], heads: Sequence[str], width: int, layo
     for k in (0, len(first) - 1):
         if not all(is_number(line.cells[k] if k < len(line.cells) else "0", False) for line in lines[:_PEEK]):
             return k
+    return _class_column(lines, width)
+
+
+def _class_column(lines: Sequence[_Line], width: int) -> int | None:
+    """The column of classes that are whole numbers beside samples of `width` coordinates, or None."""
+    peeked, n_cells = lines[:_PEEK], len(lines[0].cells)
+    last = n_cells - 1 if all(len(line.cells) == n_cells for line in lines) else 0
+    ends = [k for k in (0, last) if all(_WHOLE.fullmatch(line.cells[k]) for line in peeked)]
     if width > 1:
-        return 0 if all(len(line.cells) % width == 1 for line in lines[:_PEEK]) else None
-    wholes = [[cell.lstrip("+-").isdecimal() for cell in line.cells if cell] for line in lines[:_PEEK]]
-    return 0 if all(row[0] for row in wholes) and not all(map(all, wholes)) else None
+        if any(len(line.cells) % width != 1 for line in peeked):
+            return None
+        if not ends:
+            raise DataError(
+                f"expected a label in the first or the last of {n_cells} cells, since one is left beside samples of "
+                f"{width} coordinates, got fractions in both; say which with label=, in the shell --label-column"
+            )
+        return ends[0]
+    if 0 not in ends or all(_WHOLE.fullmatch(cell) for line in peeked for cell in line.cells if cell):
+        return None
+    classes = {line.cells[0].lstrip("+-") for line in peeked}
+    return 0 if len(classes) > 1 or all(map(str.isdecimal, classes)) else None
 
 
 def series_movements(data: bytes, layout: Layout) -> Parsed:

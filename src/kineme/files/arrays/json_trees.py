@@ -18,7 +18,10 @@ from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.parsed import Parsed
 from kineme.movements.tables.time_stamps import is_date, seconds_of_dates
 
-_NAMES = ("name", "part", "bodypart", "joint")  # of a point among those of a body
+_PARTS = ("name", "part", "bodypart", "joint", "handedness", "side")  # names of a part of a sample
+_NAMES = (*_PARTS, "label", "id")  # also of movements and samples
+_COUNT = "\0count"  # of parts without names
+_AXES = frozenset("xyz")
 _NUMBER, _LIST = 32, 88  # bytes of a Python object
 
 
@@ -144,18 +147,25 @@ def _is_sample(entry: Mapping[str, Any]) -> bool:
             return not isinstance(value, list)
     if any(_are_parts(value) for value in entry.values()):
         return True
+    if any(name.lower() in _AXES and isinstance(value, list) for name, value in entry.items()):  # x over time
+        return False
     lists = [one for one in entry.values() if isinstance(one, list)]
     return len(lists) < len(entry) and not any(isinstance(one, (list, Mapping)) for value in lists for one in value[:1])
 
 
 def _are_parts(value: Any) -> bool:
-    """Whether a value is a list of objects that each have a name: the points of a body at one time."""
-    return isinstance(value, list) and bool(value) and all(isinstance(one, Mapping) and _name(one) for one in value)
+    """Whether a value is a list of objects that each have a name and numbers: the points of a body at one time."""
+    return (
+        isinstance(value, list)
+        and bool(value)
+        and all(isinstance(one, Mapping) and _name(one, _PARTS) for one in value)
+        and not any(isinstance(cell, list) or is_time(key) for one in value for key, cell in one.items())
+    )
 
 
-def _name(part: Mapping[str, Any]) -> str | None:
-    name = next((part[key] for key in _NAMES if key in part), None)
-    return name if isinstance(name, str) else None
+def _name(part: Mapping[str, Any], keys: Sequence[str] = _NAMES) -> str | None:
+    name = next((part[key] for key in keys if key in part), None)
+    return str(name) if isinstance(name, (str, int)) else None
 
 
 def _is_matrix(rows: Sequence[list[Any]]) -> bool:
@@ -165,6 +175,12 @@ def _is_matrix(rows: Sequence[list[Any]]) -> bool:
 def _columns(samples: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Samples with names as one array for each name, NaN where it is missing; parts of a sample by name or number."""
     flat = [_flat(one) for one in samples]
+    for name in {name for one in flat for name in one if name.endswith(f".{_COUNT}")}:
+        if len(counts := {one.pop(name) for one in flat if name in one}) > 1:
+            raise DataError(
+                f"expected as many {name.removesuffix(f'.{_COUNT}')!r} in each sample, since nothing names them, got "
+                f"{min(counts)} to {max(counts)}; give each a name"
+            )
     names = dict.fromkeys(name for one in flat for name in one)
     check_expanded(8 * len(flat) * len(names))
     return _columns_of({name: [one.get(name) for one in flat] for name in names})
@@ -176,10 +192,15 @@ def _flat(sample: Mapping[str, Any]) -> dict[str, Any]:
         if isinstance(value, Mapping):
             plain |= {f"{name}.{inner}": one for inner, one in _flat(value).items()}
         elif isinstance(value, list) and value and all(isinstance(one, Mapping) for one in value):
+            parts = [_name(one) for one in value]
+            if None not in parts and len({*parts}) < len(parts):
+                raise DataError(f"expected parts of {name!r} with different names in each sample, got {parts!r:.80}")
+            count = None if len({*parts} - {None}) == len(parts) else len(value)
             for k, one in enumerate(value):
-                part = _name(one) or str(k)
-                cells = {inner: cell for inner, cell in _flat(one).items() if inner not in _NAMES}
-                plain |= {f"{name}.{part}.{inner}": cell for inner, cell in cells.items()}
+                cells = {inner: cell for inner, cell in _flat(one).items() if count or inner not in _NAMES}
+                plain |= {f"{name}.{k if count else parts[k]}.{inner}": cell for inner, cell in cells.items()}
+            if count:
+                plain[f"{name}.{_COUNT}"] = count
         else:
             plain[name] = value
     return plain

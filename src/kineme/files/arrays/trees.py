@@ -10,6 +10,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -35,6 +36,7 @@ _STRUCTURAL = frozenset(
     {
         "data", "movements", "demos", "trials", "values", "samples", "points", "frames", "inputs", "payload", "train",
         "test", "valid", "validation", "acquisition", "signal", "signals", "recordings", "table",
+        "gestures", "actions", "motions", "strokes", "sequences", "episodes", "trajectories", "items", "results",
     }
 )  # fmt: skip
 _WIDEST = 1000  # numbers in a sample; images have more
@@ -73,6 +75,7 @@ class Rate(NamedTuple):
         return np.arange(n) / self.hertz
 
 
+@lru_cache(maxsize=4096)  # thousands of groups have the same names
 def seconds_named(name: str) -> float | None:
     """The seconds of a unit of a step by its name, ``dt``, ``interval_ms``; 0 of a rate, None of another name."""
     words = {*words_of(name)}

@@ -20,11 +20,13 @@ _SEPARATORS = (";", "\t", ",")
 _LETTERS = frozenset("mnwvahg-")  # units that may be names
 _PEEK = 20  # samples from which the dialect is detected
 _HEAD = 100_000  # lines among which they are
+_MOST_HEADS = 5  # lines of heads, at most
 _WIDEST, _SHORT = 100_000, 1000  # columns, at most; characters of a line that is not checked
 _CELL = 32  # memory of a cell in Python, per character [bytes]
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?(nan|inf(inity)?)", re.IGNORECASE)
 _MISSING = frozenset({"", "na", "n/a", "#n/a", "<na>", "null", "none"})  # as R, pandas and others write a gap
 _STAMP = re.compile(r"\d+([:/.-])\d+\1\d+")  # digits of a date or of a time of day
+_SEPARATOR_LINE = re.compile(r'"?sep=.{0,2}', re.IGNORECASE)
 COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
 _COMMA_NUMBERS = re.compile(rf"\s*{COMMA_NUMBER.pattern}(\s+{COMMA_NUMBER.pattern})+\s*")  # between blanks
 
@@ -64,9 +66,9 @@ class Dialect(NamedTuple):
 
 
 def is_skipped(line: str) -> bool:
-    """Whether a line is empty or begins as a comment."""
+    """Whether a line is empty, begins as a comment, or says the separator to Excel: ``sep=;``."""
     stripped = line.strip()
-    return not stripped or stripped.startswith(COMMENTS)
+    return not stripped or stripped.startswith(COMMENTS) or _SEPARATOR_LINE.fullmatch(stripped) is not None
 
 
 def check_line(line: str) -> None:
@@ -128,10 +130,12 @@ def detect_dialect(text: Iterable[str]) -> Dialect:
     if not kept:
         more = len(lines) == _HEAD
         raise DataError(f"expected samples, got {f'none in the first {_HEAD:,} lines' if more else 'an empty file'}")
-    kept = _with_names_like_comments(lines, kept)
+    kept = _below_preamble(lines, _with_names_like_comments(lines, kept))
     separator = separator_of([lines[k] for k in kept[:2]])
     cells = [split(lines[k], separator) for k in kept]
     comma = separator != "," and any(COMMA_NUMBER.fullmatch(cell) for row in cells for cell in row)
+    n_heads = _n_heads(cells, comma)
+    kept, cells = kept[n_heads - 1 :], [_joined(cells[:n_heads]), *cells[n_heads:]]
     named = not _is_sample(cells, comma)
     heads, first = cells[0] if named else _commented_head(lines[: kept[0]], separator, len(cells[0])), kept[0] + named
     numbered = not named and _counts_columns(cells)
@@ -141,14 +145,34 @@ def detect_dialect(text: Iterable[str]) -> Dialect:
         units, first = (*units, *[""] * (len(cells[0]) - len(units))), kept[1] + 1
     body = cells[named + bool(units) or numbered :]
     kinds = tuple(_kind([row[k] for row in body if k < len(row)], comma) for k in range(len(cells[0])))
-    if not heads and kinds[0] == "text" and _STAMP.search(body[0][0]):
-        raise DataError(
-            "expected times such as 2024-05-06T07:08:09.25 or 07:08:09.25 in the first column, got "
-            f"{body[0][0]!r:.80}; write them so, or name the columns in a first line"
-        )
+    for k, (kind, cell) in enumerate(zip(kinds, body[0] if body else (), strict=False)):
+        if kind == "text" and _STAMP.search(cell) and (is_time(heads[k]) if heads else k == 0):
+            where = repr(heads[k]) if heads else "the first column"
+            raise DataError(
+                f"expected times such as 2024-05-06T07:08:09.25 or 07:08:09.25 in {where}, got {cell!r:.80}; write "
+                f"them so{'' if heads else ', or name the columns in a first line'}"
+            )
     if heads:
         return Dialect(separator, comma, tuple(map(text_in, heads)), True, first, kinds, units)
     return Dialect(separator, comma, tuple(f"column {k}" for k in range(len(kinds))), False, first, kinds)
+
+
+def _n_heads(cells: Sequence[list[str]], comma: bool) -> int:
+    """The number of lines of heads: several where a name in the first stands above several columns, as of points."""
+    top = [cell for cell in cells[0] if cell]
+    lines = next((k for k, row in enumerate(cells) if any(is_number(cell, comma) for cell in row)), 1)
+    alike = len({len(row) for row in cells[:lines]}) == 1 and len({*top}) < len(top)
+    return lines if 1 < lines <= _MOST_HEADS and alike and not any(map(units_in, cells[1:lines])) else 1
+
+
+def _joined(rows: Sequence[list[str]]) -> list[str]:
+    """Lines of heads as one: ``nose`` above ``x`` is nose.x. DeepLabCut's line of the scorer is left out."""
+    if len(rows) == 1:
+        return rows[0]
+    names = [row[1:] for row in rows if row[0] != "scorer"]
+    first = next((row[0] for row in reversed(rows) if row[0]), "")
+    heads = (".".join(filter(None, cells)) for cells in zip(*names, strict=True))
+    return ["frame" if first == "coords" else first, *heads]
 
 
 def units_in(cells: Sequence[str]) -> tuple[str, ...]:
@@ -158,6 +182,26 @@ def units_in(cells: Sequence[str]) -> tuple[str, ...]:
     known = sum(unit_named(cell) is not None for cell, letter in zip(plain, letters, strict=True) if not letter)
     others = sum(unit_named(cell) is None for cell, letter in zip(plain, letters, strict=True) if cell and not letter)
     return plain if known and not others and 2 * sum(map(bool, plain)) >= len(plain) else ()
+
+
+def _below_preamble(lines: Sequence[str], kept: list[int]) -> list[int]:
+    """The lines from the heads on, where lines of other lengths without rows of numbers stand above them.
+
+    So loggers write the device, the rate and the time. Below the heads all lines have as many cells.
+    """
+    top, separator = (separator_of([lines[k] for k in part]) for part in (kept[:2], kept[-2:]))
+    widths = {len(split(lines[k], top)) for k in kept}
+    if len(widths) == 1 and widths != {1}:
+        return kept
+    rows = [split(lines[k], separator) for k in kept]
+    width, comma = len(rows[-1]), separator != ","
+    first = next(k for k, row in enumerate(rows) if len(row) == width)
+    numbers = [sum(is_number(cell, comma) for cell in row) for row in rows]
+    is_preamble = all(n < max(2, len(row)) for n, row in zip(numbers[:first], rows[:first], strict=True))
+    below = rows[first:]
+    if width < 2 or len(below) < 3 or numbers[first] or not is_preamble or any(len(row) != width for row in below):
+        return kept
+    return kept[first:]
 
 
 def _with_names_like_comments(lines: Sequence[str], kept: list[int]) -> list[int]:

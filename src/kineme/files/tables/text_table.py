@@ -22,11 +22,14 @@ from kineme.movements.tables.columns import Roles, choose_roles
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.table import Table
 from kineme.movements.tables.time_stamps import seconds_of_dates
-from kineme.validation import ROUNDED
+from kineme.validation import MIN_SAMPLES, ROUNDED, Array
 
 _POSITION = re.compile(r"(.*)position(\d+)")  # of a joint
 _EXACT_TO = 2.0**53
 _INTEGER, _DIGITS = re.compile(r"[-+]?\d{16,}"), 300
+_EMPTY_LINE = re.compile(rb"\n[ \t\r]*\n")
+_SMOOTH = 0.3  # of the range: a step from 999 to 1.002 is less if these are thousands, and more if they are decimals
+_GROUPED = re.compile(r"[-+]?[1-9]\d{0,2}[.,]\d{3}")  # a number that may be thousands
 _NUMBER, _TEXT, _COLUMN = 8, 64, 1000  # bytes of a number, a text and a column
 
 
@@ -54,9 +57,16 @@ def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
     if 0 in {roles.label, *roles.movement}:
         dialect = dialect._replace(names_rows=True)
     rows, faults = _rows(data, encoding, dialect, texts)
+    if roles.time is None and layout.every is None and _EMPTY_LINE.search(data):
+        _check_one_block([line for line, _ in _samples(data, encoding, dialect)])
     columns = [rows[name] for name in rows.dtype.names or ()]
     if long := [k for k in roles.positions if (np.abs(columns[k]) >= _EXACT_TO).any()]:
         faults |= _rounded(_samples(data, encoding, dialect), dialect, long)
+    if dialect.separator != ",":
+        for k in roles.positions:
+            if _may_be_grouped(columns[k]):
+                cells = [split(line, dialect.separator) for _, line in _samples(data, encoding, dialect)]
+                _check_grouped([row[k] for row in cells if k < len(row)], dialect.heads[k])
     if dated and roles.time is not None:
         columns[roles.time], others = seconds_of_dates(columns[roles.time].tolist())
         head = dialect.heads[roles.time]
@@ -67,6 +77,48 @@ def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
     dates_in = "s" if dated else None
     heads = _with_names_of_joints(dialect.heads, columns)
     return Table(heads, columns, len(rows), line_of, faults, dates_in, dialect.measured_in), roles
+
+
+def _check_one_block(numbers: Sequence[int]) -> None:
+    """Refuse samples without times that empty lines part, of which nobody said that they are one movement."""
+    sizes = np.diff([0, *(np.flatnonzero(np.diff(numbers) > 1) + 1), len(numbers)])
+    if len(sizes) > 1 and sizes.min() >= MIN_SAMPLES:
+        every = (
+            f"say every={sizes[0]}, in the shell --every {sizes[0]}"
+            if (sizes == sizes[0]).all()
+            else "save each in a file of its own"
+        )
+        raise DataError(
+            f"expected one movement, got {len(sizes)} blocks of {sizes.min()} to {sizes.max()} samples between lines "
+            f"that are left out; {every}, or remove those lines"
+        )
+
+
+def _may_be_grouped(x: Array) -> bool:
+    """Whether numbers are whole but for some with three digits behind the mark, which may be thousands: 999, 1.002."""
+    x = x[np.isfinite(x)]
+    parts = x[x != np.rint(x)]
+    whole = 0 < len(parts) < len(x) and bool((np.abs(x) < 1000).all())
+    return whole and bool((np.abs(1000 * parts - np.rint(1000 * parts)) < 1e-6).all())
+
+
+def _check_grouped(cells: Sequence[str], head: str) -> None:
+    """Refuse cells in which a mark is between thousands: 999, 1.002, which are one step apart and not one thousand."""
+    marked = np.array([_GROUPED.fullmatch(cell) is not None for cell in cells])
+    if not all(mark or cell.lstrip("+-").isdecimal() for mark, cell in zip(marked, cells, strict=True)):
+        return
+    x = np.array([float(re.sub("[.,]", "", cell)) for cell in cells])
+    between = np.flatnonzero(marked[1:] != marked[:-1])
+    small, large = (
+        float(np.median(np.abs(np.diff(each)[between]))) / float(np.ptp(each)) if len(between) and np.ptp(each) else 0.0
+        for each in (x, np.where(marked, x / 1000, x))
+    )
+    if small < _SMOOTH < large:
+        odd, plain = (cells[int(np.argmax(each))] for each in (marked, ~marked))
+        raise DataError(
+            f"expected numbers in {head!r} without marks between thousands, got {odd!r} beside {plain!r}; write them "
+            "without such marks"
+        )
 
 
 def _rounded(samples: Iterator[tuple[int, str]], dialect: Dialect, columns: Sequence[int]) -> dict[int, str]:

@@ -134,7 +134,7 @@ def conversion(head: str, ours: str | None, wanted: str | None, known_units: boo
     if here is None or there is None or here.quantity != there.quantity:
         raise TrajectoryError(
             f"expected {head!r} in {wanted!r}, as the others have it, got "
-            f"{repr(ours) if ours else 'no unit'}{', which cannot be converted' if ours and wanted else ''}"
+            f"{f'{ours!r}, which cannot be converted' if ours else f'no unit; name the column {head} [{wanted}]'}"
             if wanted
             else f"expected {head!r} without a unit, as the others have it, got {ours!r}; say the unit in all heads"
         )

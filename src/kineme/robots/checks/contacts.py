@@ -27,12 +27,12 @@ def contacts_of(robot: Robot, positions: Array) -> tuple[Contact, ...]:
     """The first contact of each pair of shapes that touch, over joint positions (T, n)."""
     import pinocchio
 
-    geometry = _pair_geometry(robot)
+    geometry, margins = _pair_geometry(robot)
     if len(geometry.collisionPairs) == 0:
         return ()
     data, shapes = robot.model.createData(), geometry.createData()
-    for request in shapes.collisionRequests:
-        request.security_margin = _MARGIN
+    for request, margin in zip(shapes.collisionRequests, margins, strict=True):
+        request.security_margin = margin
     found: dict[int, int] = {}
     for t, q in enumerate(positions):
         if pinocchio.computeCollisions(robot.model, data, geometry, shapes, q, False):
@@ -48,11 +48,11 @@ def contacts_of(robot: Robot, positions: Array) -> tuple[Contact, ...]:
 
 
 @lru_cache(maxsize=8)
-def _pair_geometry(robot: Robot) -> Any:
-    """The arm's shapes with the pairs that can touch.
+def _pair_geometry(robot: Robot) -> tuple[Any, tuple[float, ...]]:
+    """The arm's shapes with the pairs that can touch, and the margin of each pair [m].
 
     None of neighboring links, and none that touch in nearly all postures: those overlap by design, as two links on one
-    axis do.
+    axis do. Links that are within the margin of one another where the arm rests, without touching, have none.
     """
     import pinocchio
 
@@ -65,14 +65,23 @@ def _pair_geometry(robot: Robot) -> Any:
             a, b = first.parentJoint, objects[j].parentJoint
             if a != b and parents[a] != b and parents[b] != a:
                 geometry.addCollisionPair(pinocchio.CollisionPair(i, j))
-    if len(geometry.collisionPairs) == 0:
-        return geometry
-    data, shapes = robot.model.createData(), geometry.createData()
-    counts = np.zeros(len(geometry.collisionPairs))
     postures = np.random.default_rng(0).uniform(robot.lower, robot.upper, (_RANDOM_POSTURES, robot.n_joints))
-    for q in postures:
-        pinocchio.computeCollisions(robot.model, data, geometry, shapes, q, False)
-        counts += [result.isCollision() for result in shapes.collisionResults]
-    for k in np.flatnonzero(counts > _ALWAYS * len(postures))[::-1]:
+    shares = _touching(robot, geometry, postures, _MARGIN).mean(axis=0)
+    for k in np.flatnonzero(shares > _ALWAYS)[::-1]:
         geometry.removeCollisionPair(geometry.collisionPairs[int(k)])
-    return geometry
+    near, touching = (_touching(robot, geometry, robot.rest[None], margin)[0] for margin in (_MARGIN, 0.0))
+    return geometry, tuple(np.where(near & ~touching, 0.0, _MARGIN).tolist())
+
+
+def _touching(robot: Robot, geometry: Any, postures: Array, margin: float) -> Array:
+    """Whether each pair of shapes is closer than the margin [m], in each posture: (T, pairs)."""
+    import pinocchio
+
+    data, shapes = robot.model.createData(), geometry.createData()
+    for request in shapes.collisionRequests:
+        request.security_margin = margin
+    touching = np.zeros((len(postures), len(geometry.collisionPairs)), dtype=bool)
+    for t, q in enumerate(postures):
+        pinocchio.computeCollisions(robot.model, data, geometry, shapes, q, False)
+        touching[t] = [result.isCollision() for result in shapes.collisionResults]
+    return touching

@@ -56,14 +56,21 @@ def pursue(robot: Robot, path: TaskPath, turn_costs: Array) -> tuple[Array, Task
         good = np.flatnonzero(worst <= close)
         if len(good) == 0:
             continue
-        cheapest = good[int(np.argmin(costs_of(robot, path.times, joints[:, good], errors[:, good])))]
+        cheapest = good[int(np.argmin(_costs(robot, path.times, joints[:, good], errors[:, good])))]
         way, errors = _relaxed(robot, path, turn_costs, joints[:, [cheapest]], errors[:, [cheapest]], close)
-        cost = float(costs_of(robot, path.times, way, errors)[0])
+        cost = float(_costs(robot, path.times, way, errors)[0])
         if cost < least:
             least, best = cost, way[:, 0]
         if least < AT_A_STOP:
             break
     return None if best is None else (best, path)
+
+
+def _costs(robot: Robot, times: Array, joints: Array, errors: Array) -> Array:
+    """Costs (m,) of m ways (T, m, n), as `costs_of`, and how many times slower accelerations make them."""
+    steps = np.diff(times)[:, None, None]
+    bends = np.abs(np.diff(np.diff(joints, axis=0) / steps, axis=0)) * 2 / (steps[1:] + steps[:-1])
+    return costs_of(robot, times, joints, errors) + np.sqrt((bends / robot.acceleration).max(axis=(0, 2)))
 
 
 def _relaxed(

@@ -182,8 +182,10 @@ def _assumed_of(chain: Chain, known: Model | None) -> list[str]:
         assumed.append(
             f"{named} {'belong' if several else 'belongs'} to a gripper or a hand: locked, no part of the arm"
         )
+    assumed += chain.doubts
     if chain.without_stops:
-        assumed.append(f"{_have(chain.without_stops)} no stops: it is kept within one turn to each side")
+        are = "they are" if len(chain.without_stops) > 1 else "it is"
+        assumed.append(f"{_have(chain.without_stops)} no stops: {are} kept within one turn to each side")
     if chain.without_shape:
         assumed.append(f"{_have(chain.without_shape)} no shape: its mesh is not there")
     return assumed

@@ -1,9 +1,11 @@
-"""What of a URDF a library for kinematics would leave out or misread without a word."""
+"""What of a URDF a library for kinematics would leave out or misread without a word, and what may mean other units."""
 
 from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
+from difflib import get_close_matches
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -14,6 +16,10 @@ _SIZES = {"box": ("size", 3), "cylinder": ("radius length", 1), "sphere": ("radi
 
 
 _ORIGIN = {"xyz": 3, "rpy": 3, "quat_xyzw": 4}  # attributes of an <origin>, and how many numbers each has
+_ELEMENTS = ("origin", "axis", "limit", "mimic")  # of a joint: one that is misspelt would be left out
+_TURNS = 4 * math.pi  # angles beyond are rather degrees [rad]
+_UNLIMITED = 1e4  # limits of position from which on they stand for none [rad]
+_LONGEST = 20.0  # of an arm: a longer one is rather in millimeters [m]
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)  # Python reads more, as 1_000
 
 
@@ -30,22 +36,63 @@ def finite_numbers(text: str | None, length: int) -> list[float]:
 
 
 def check_origins(robot: ElementTree.Element, path: Path) -> None:
-    """Refuse places of joints, masses and collision shapes that are no numbers: readers leave out what has one.
+    """Refuse places of joints, masses and collision shapes that readers would leave out or misread.
 
     Raises
     ------
     DataError
-        The first such <origin>, with the joint or link.
+        The first <origin> that is misspelt or whose values are no numbers or degrees, with the joint or link.
     """
     for part in robot:
-        origins = [*part.findall("origin"), *part.iterfind("inertial/origin"), *part.iterfind("collision/origin")]
-        for origin in origins if part.tag in ("joint", "link") else ():
-            for name, length in _ORIGIN.items():
-                if name in origin.attrib and not finite_numbers(origin.get(name), length):
-                    raise DataError(
-                        f"{path}: {part.tag} {part.get('name')!r}: expected <origin {name}=/> as {length} numbers with "
-                        f"spaces between them, got {origin.get(name)!r}"
-                    )
+        if part.tag not in ("joint", "link"):
+            continue
+        of = f"{path}: {part.tag} {part.get('name')!r}"
+        for owner in (part, *part.iterfind("inertial"), *part.iterfind("collision")):
+            for element in owner:
+                _check_spelling(element, of)
+            for origin in owner.findall("origin"):
+                _check_origin(origin, of)
+
+
+def _check_spelling(element: ElementTree.Element, of: str) -> None:
+    meant = get_close_matches(str(element.tag), _ELEMENTS, 1, 0.7)
+    if meant and element.tag != meant[0]:
+        raise DataError(f"{of}: expected <{meant[0]}>, got <{element.tag}>, which readers of URDF leave out")
+
+
+def _check_origin(origin: ElementTree.Element, of: str) -> None:
+    unread = sorted(origin.attrib.keys() - _ORIGIN.keys())
+    if unread:
+        raise DataError(f"{of}: expected <origin xyz= rpy=/>, got {unread[0]}=, which readers of URDF leave out")
+    for name, length in _ORIGIN.items():
+        if name in origin.attrib and not finite_numbers(origin.get(name), length):
+            raise DataError(
+                f"{of}: expected <origin {name}=/> as {length} numbers with spaces between them, got "
+                f"{origin.get(name)!r}"
+            )
+    if max(map(abs, finite_numbers(origin.get("rpy"), 3)), default=0.0) > _TURNS:
+        raise DataError(f"{of}: expected <origin rpy=/> in radians, got {origin.get('rpy')!r}; are these degrees?")
+
+
+def doubts_of(joints: Sequence[ElementTree.Element]) -> list[str]:
+    """What the numbers of the joints between root and tip leave in doubt: degrees for radians, millimeters for meters.
+
+    One sentence each.
+    """
+    doubts = []
+    for joint in joints:
+        limits = joint.findall("limit") if joint.get("type") == "revolute" else []
+        values = [finite_number(limit.get(key, "")) or 0.0 for limit in limits for key in ("lower", "upper")]
+        if 2 * _TURNS < max(map(abs, values), default=0.0) < _UNLIMITED:
+            turns = f"{joint.get('name')} may turn from {values[0]:g} to {values[1]:g} rad"
+            doubts.append(f"{turns}: if the file means degrees, write radians")
+            break
+    origins = [joint.find("origin") for joint in joints]
+    length = sum(math.hypot(*finite_numbers(origin.get("xyz"), 3)) for origin in origins if origin is not None)
+    if length > _LONGEST:
+        doubts.append(f"the arm is {length:g} m long: if the file means millimeters, write meters")
+    locked = [str(joint.get("name")) for joint in joints if joint.get("type") in ("floating", "planar")]
+    return doubts + [f"{name} can move freely or in a plane: locked, no part of the arm" for name in locked]
 
 
 def check_masses(robot: ElementTree.Element, path: Path) -> None:
@@ -78,7 +125,7 @@ def check_axis(joint: ElementTree.Element, path: Path) -> None:
         An axis of length 0, or of other than three finite numbers.
     """
     axis = joint.find("axis")
-    values = [1.0, 0.0, 0.0] if axis is None else finite_numbers(axis.get("xyz", "1 0 0"), 3)
+    values = [1.0, 0.0, 0.0] if axis is None else finite_numbers(axis.get("xyz"), 3)
     if not values or not 1e-6 < math.hypot(*values) < 1e6:
         raise DataError(
             f"{path}: joint {joint.get('name')!r}: expected <axis xyz=/> as three numbers that are not all 0, got "

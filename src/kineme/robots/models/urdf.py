@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 from kineme.errors import DataError
 from kineme.robots.models.ends import MOVING, Candidate, Ends, in_words
 from kineme.robots.models.meshes import resolve_meshes
-from kineme.robots.models.numbers import check_axis, check_masses, check_origins, check_shapes, finite_number
+from kineme.robots.models.numbers import check_axis, check_masses, check_origins, check_shapes, doubts_of, finite_number
 from kineme.robots.models.xacro import has_macros, without_macros
 
 _LARGEST = 20_000_000  # bytes
@@ -42,6 +42,7 @@ class Chain(NamedTuple):
     without_shape: tuple[str, ...]  # links whose meshes are not there
     gripper: tuple[str, ...]  # joints of grippers, fingers and hands, which are locked
     others: tuple[Candidate, ...]  # links that might be the tip as well; none if the tip was given
+    doubts: tuple[str, ...]  # sentences about numbers that may be in other units
 
 
 def read_chain(path: Path, tip: str | None) -> Chain:
@@ -62,10 +63,12 @@ def read_chain(path: Path, tip: str | None) -> Chain:
     candidates = ends.candidates()
     others = tuple(candidates[1:]) if tip is None else ()
     tip = _tip(tip, links, candidates, path)
-    moving = [joint for joint in _above(tip, parents) if joint.get("type") in MOVING]
+    above = _above(tip, parents)
+    moving = [joint for joint in above if joint.get("type") in MOVING]
     moving = [joint for joint in moving if joint.get("name") not in ends.gripper]
     if not moving:
         raise DataError(f"{path}: expected at least one joint that moves between the root and {tip!r}, found none")
+    doubts = tuple(doubts_of(above))
     free = tuple(str(joint.get("name")) for joint in moving if joint.get("type") == "continuous")
     limits = tuple(_limits(joint, path) for joint in moving)
     check_masses(robot, path)
@@ -75,7 +78,7 @@ def read_chain(path: Path, tip: str | None) -> Chain:
     joints = tuple(str(joint.get("name")) for joint in moving)
     units = tuple("m" if joint.get("type") == "prismatic" else "rad" for joint in moving)
     gripper = tuple(str(joint.get("name")) for joint in robot.findall("joint") if joint.get("name") in ends.gripper)
-    return Chain(_as_text(robot, path), joints, units, limits, tip, free, missing, gripper, others)
+    return Chain(_as_text(robot, path), joints, units, limits, tip, free, missing, gripper, others, doubts)
 
 
 def _joints_above(robot: ElementTree.Element, path: Path) -> dict[str, ElementTree.Element]:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
@@ -22,6 +23,9 @@ from kineme.robots.planning.robot_movement import RobotMovement
 from kineme.robots.planning.roles import JOINT_UNITS, SPACES
 from kineme.robots.planning.timed_movement import FASTEST_RATE, SLOWEST_RATE, TIMINGS, Untimed, with_timing
 from kineme.validation import Array, as_numbers, check_choice, check_number, check_switch
+
+_HURRIED = 10.0  # times the mean acceleration, from which on another way is sought; a stroke takes three
+_SLOWER = 1.1  # times as slow as demonstrated: other ways are tried
 
 
 def move(  # noqa: PLR0913 - one parameter per option
@@ -133,12 +137,16 @@ def move(  # noqa: PLR0913 - one parameter per option
 def _along(
     ik: InverseKinematics, path: TaskPath, place: str, untimed: Untimed, timing: str, force: bool
 ) -> RobotMovement:
-    """Return the first way along the path that passes its checks; with `force`, the first."""
+    """Return the first way along the path that passes its checks; with `force`, the first.
+
+    Of ways that are slower than what was demonstrated, the fastest.
+    """
     failed: list[tuple[RobotMovement, Untimed]] = []
+    slower: list[RobotMovement] = []
     errors: list[TrajectoryError] = []
+    lost = False
     for way in ways_along(ik, untimed.follow):
-        lost = any(not isinstance(error, OutOfReachError) for error in errors)
-        if way.sought and not (lost or any(loses_its_path(made) for made, _ in failed)):
+        if way.sought and not lost:
             break
         try:
             joints, placed = way.joints(path, place, untimed.start)
@@ -148,14 +156,29 @@ def _along(
             made = _timed(solved, timing)
         except TrajectoryError as error:
             errors.append(error)
+            lost |= not isinstance(error, OutOfReachError)
             continue
-        if force or made.preflight.passed:
+        passed = made.preflight.passed
+        if force or (passed and (timing == "generated" or made.factor <= _SLOWER)):
             return made
-        failed.append((made, solved))
+        lost |= loses_its_path(made) or _hurries(solved)
+        if passed:
+            slower.append(made)
+        else:
+            failed.append((made, solved))
+    if slower:
+        return min(slower, key=lambda made: made.factor)
     if not failed:
         raise errors[0]
-    refuse_failed(*failed[0], timing)
-    return failed[0][0]
+    nearest = min(failed, key=lambda way: way[0].preflight.slower if _hurries(way[1]) else 0.0)
+    refuse_failed(*nearest, timing)
+    return nearest[0]
+
+
+def _hurries(untimed: Untimed) -> bool:
+    """Whether the joints accelerate many times as hard at one place of the path as along it in the mean."""
+    shares = np.abs(untimed.joints(untimed.joints.x, 2) / untimed.robot.acceleration).max(axis=1)
+    return bool(shares.max() > _HURRIED * shares.mean())
 
 
 def _timed(untimed: Untimed, timing: str) -> RobotMovement:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import tau
 from typing import NamedTuple
 
@@ -13,14 +12,13 @@ from kineme.movements.channels.channel import Channel, Channels
 from kineme.movements.channels.coordinates import columns_of
 from kineme.movements.rotations.quaternions import NORM_TOLERANCE
 from kineme.robots.models.robot import Robot
-from kineme.units import split_head, unit_named
+from kineme.robots.planning.joint_names import DRIVERS, check_order, joints_among
+from kineme.units import unit_named
 from kineme.validation import Array
 
 SPACES = ("auto", "tip", "joints")
 #: What a caller may say of joints whose unit the file does not say -> that unit.
 JOINT_UNITS = {"deg": "deg", "rad": "rad", "percent": "-100..100"}
-DRIVERS = ".pos"  # names of LeRobot's drivers end in it: shoulder_pan.pos
-_SIDES = ("left", "right")  # what names of two arms begin with
 _USUAL = {"length": "m, cm, mm, in, ft", "angle": "rad, deg"}
 _KINDS = {"tip": ("position",), "joints": ("angle", "position")}
 
@@ -47,12 +45,12 @@ def roles_of(channels: Channels | None, n_columns: int, space: str, robot: Robot
     """Roles of recorded columns, of which nothing but the number is known if they have no channels.
 
     Columns with the names of the joints of the arm are these joints, in its order; the others, as of a gripper, go
-    along.
+    along. As many columns of other names are the joints one after the other, which a warning says.
 
     Raises
     ------
     TrajectoryError
-        Several orientations of the tip.
+        Several orientations of the tip, or angles beside its position; names of joints at the places of others.
     """
     if channels is None:
         posed = space == "tip" and n_columns == 7
@@ -62,6 +60,13 @@ def roles_of(channels: Channels | None, n_columns: int, space: str, robot: Robot
         return Roles(positions, (), turned, {}, {}, list(range(n_columns)))
     at = list(zip(channels, columns_of(channels), strict=True))
     along = [(one, columns.start) for one, columns in at if one.kind in _KINDS[space]]
+    angles = [one.name for one in channels if one.kind == "angle" and space == "tip"]
+    if angles:
+        raise TrajectoryError(
+            f"expected the tip by its position, and turned by a quaternion, got the angles {', '.join(angles)}; "
+            "convert them to columns qw, qx, qy, qz or leave them out (columns=, in the shell --columns, --exclude); "
+            "of a gripper say --kind gripper=discrete, of joints --joints"
+        )
     orientations = [(one, columns) for one, columns in at if one.kind == "orientation" and space == "tip"]
     if len(orientations) > 1:
         named = ", ".join(one.name for one, _ in orientations)
@@ -73,6 +78,8 @@ def roles_of(channels: Channels | None, n_columns: int, space: str, robot: Robot
     if joints is not None:
         continuous = {one.name: column for k, (one, column) in enumerate(along) if k not in joints}
         along = [along[k] for k in joints]
+    elif robot is not None and space == "joints" and len(along) == robot.n_joints:
+        check_order([one.name for one, _ in along], robot)
     return Roles(
         [column for _, column in along],
         tuple(one for one, _ in along),
@@ -81,35 +88,6 @@ def roles_of(channels: Channels | None, n_columns: int, space: str, robot: Robot
         continuous,
         moving,
     )
-
-
-def joints_among(names: Sequence[str], robot: Robot) -> list[int] | None:
-    """Which of the columns is each joint of an arm, by its name; None unless every joint has exactly one.
-
-    Units, what stands before the name of the joint as that of a feature or a topic, the ``.pos`` of LeRobot's drivers,
-    and the side of one arm of two, as ``left_elbow_flex``, are no part of it.
-
-    Raises
-    ------
-    TrajectoryError
-        Every joint is there for both sides.
-    """
-    plain = [split_head(name)[0].removesuffix(DRIVERS) for name in names]
-    places = [_places(plain, joint) for joint in robot.joints]
-    if all(len(one) == 1 for one in places):
-        return [one[0] for one in places]
-    sides = {side: [_places(plain, f"{side}_{joint}") for joint in robot.joints] for side in _SIDES}
-    sides = {side: columns for side, columns in sides.items() if all(len(one) == 1 for one in columns)}
-    if len(sides) > 1:
-        raise TrajectoryError(
-            f"expected the joints of one arm, got those of two, {' and '.join(sides)}; choose one with columns=, in "
-            f"the shell --columns '{next(iter(sides))}_*'"
-        )
-    return next(([one[0] for one in columns] for columns in sides.values()), None)
-
-
-def _places(names: Sequence[str], joint: str) -> list[int]:
-    return [k for k, name in enumerate(names) if name == joint or name.endswith((f".{joint}", f"/{joint}"))]
 
 
 def scales_of(roles: Roles, robot: Robot | None, joint_units: str | None = None) -> Scales:

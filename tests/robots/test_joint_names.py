@@ -1,0 +1,83 @@
+"""Columns that are the joints of an arm by their names: of two arms, of topics, with words of other programs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kineme import read_recordings
+from kineme.errors import TrajectoryError
+from kineme.movements.channels.channel import Channel
+from kineme.robots import load, move
+from kineme.robots.planning.roles import joints_among, space_of
+
+pytest.importorskip("pinocchio", reason="the extra robot is not installed")
+
+
+def _names(side, end=".pos"):
+    return [f"{side}_{name}{end}" for name in (*load("so101").joints, "gripper")]
+
+
+@pytest.mark.parametrize("before", ["", "observation.state."])
+@pytest.mark.parametrize("end", [".pos", "", " [deg]"])
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_the_columns_of_one_side_are_the_joints(side, end, before):
+    names = [before + name for name in _names(side, end)]
+    assert joints_among(names[::-1], load("so101")) == [5, 4, 3, 2, 1]
+    channels = tuple(Channel(name, "position", (name,)) for name in names)
+    assert space_of(channels, np.zeros((9, 6)), load("so101")) == "joints"
+
+
+def test_of_both_sides_one_is_to_be_chosen():
+    with pytest.raises(TrajectoryError, match=r"those of two, left and right; .*--columns 'left_\*'"):
+        joints_among(_names("left") + _names("right"), load("so101"))
+
+
+def test_joints_without_a_side_come_first_and_a_part_is_no_arm():
+    names = [*load("so101").joints]
+    assert joints_among([*_names("left"), *names], load("so101")) == [6, 7, 8, 9, 10]
+    assert joints_among(_names("left")[1:], load("so101")) is None
+
+
+UR5E = ("elbow", "shoulder_lift", "shoulder_pan", "wrist_1", "wrist_2", "wrist_3")  # as ROS's joint_states sorts them
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        "ur5e_{}_joint [rad]", "{}_joint_position", "/joint_states/{}_joint/position", "position_{}_joint [deg]", "{}",
+        "{}_deg", "actual {} joint", "{}_joint.pos",
+    ],
+)  # fmt: skip
+def test_words_of_programs_beside_the_names_move_no_other_joint(head):
+    names = [head.format(name) for name in UR5E]
+    assert joints_among(names, load("ur5e")) == [2, 1, 0, 3, 4, 5]
+    assert joints_among([*names, "gripper"], load("ur5e")) == (None if "joint" not in head else [2, 1, 0, 3, 4, 5])
+    assert joints_among([name.upper() for name in names[1:]] + names[:1], load("ur5e")) == [1, 0, 5, 2, 3, 4]
+
+
+def test_numbers_are_those_of_the_joints():
+    assert joints_among([f"q{k}" for k in (7, 1, 2, 3, 4, 5, 6)], load("panda")) == [1, 2, 3, 4, 5, 6, 0]
+    assert joints_among([f"q{k}" for k in range(7)], load("panda")) is None
+
+
+def _moved(folder, names, columns):
+    times = np.linspace(0, 3, len(columns))
+    heads = ",".join(["time", *names])
+    np.savetxt(folder / "arm.csv", np.column_stack((times, columns)), delimiter=",", header=heads, comments="")
+    return move(read_recordings(folder / "arm.csv"), load("ur5e")).trajectory.positions[-1]
+
+
+def test_names_of_other_joints_are_refused_and_no_names_are_said(tmp_path):
+    joints = load("ur5e").rest + 0.05 * (1 - np.cos(np.linspace(0, np.pi, 50)))[:, None]
+    for names in ((*UR5E[1:], "forearm"), [f"q{k}" for k in range(6)][::-1], [f"arm 1 joint {k}" for k in "143256"]):
+        with pytest.raises(TrajectoryError, match=r"in any order, or without names in this|order of their numbers"):
+            _moved(tmp_path, [f"{name} [rad]" for name in names], joints)
+    with pytest.warns(UserWarning, match="q0, q1, q2, q3, q4, q5 are taken as shoulder_pan_joint, .* one after"):
+        assert _moved(tmp_path, [f"q{k}" for k in range(6)], joints) == pytest.approx(joints[-1], abs=1e-6)
+
+
+def test_angles_beside_the_position_of_the_tip_are_refused(tmp_path):
+    names = ("x", "y", "z", "roll", "pitch", "yaw")
+    with pytest.raises(TrajectoryError, match="the angles roll, pitch, yaw; convert them to columns qw, qx, qy, qz"):
+        _moved(tmp_path, names, 0.3 + np.linspace(0, 0.1, 50)[:, None] * np.ones(6))
