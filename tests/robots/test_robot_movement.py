@@ -207,6 +207,17 @@ def test_a_tip_in_what_is_no_length_moves_by_the_scale_alone(tmp_path):
     assert np.ptp(generate_at(learned, scale=0.001).movement.positions[:, 0]) == pytest.approx(0.1, rel=0.05)
 
 
+def test_a_goal_beside_the_plane_of_a_movement_is_refused_and_lies_in_its_plane_without_a_start(tmp_path):
+    u = np.linspace(0, 1, 60)[:, None]
+    learned = learn_one(recorded(["time", "x [m]", "y [m]"], np.hstack((3 * u, 0.1 * u, u**2)), tmp_path), kineme.DMP())
+    with pytest.raises(SpecificationError, match=r"in the plane of its start, y = 0 m, got 0\.02; give both the same"):
+        generate_at(learned, [0.4, 0.0, 0.3], [0.5, 0.02, 0.4], plane="xz")
+    goal = [0.5, 0.1, 0.4]
+    for start in ([0.4, 0.1, 0.3], None):
+        made = generate_at(learned, start, goal, plane="xz").movement.positions
+        np.testing.assert_allclose(made[-1], goal, atol=1e-3)
+
+
 def test_positions_in_millimeters_are_meters_for_the_arm(tmp_path):
     robot = load("panda")
     there = stroke(robot)

@@ -12,6 +12,7 @@ from kineme.movements.channels.coordinates import as_wxyz
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.primitives.generation.generate import MovementOptions, generate
 from kineme.primitives.generation.learned import Learned
+from kineme.robots.checks.tracking import TRACKED
 from kineme.robots.kinematics.task_path import PLANES
 from kineme.robots.models.robot import Robot
 from kineme.robots.planning.roles import Roles, Scales, roles_of, scales_of
@@ -82,13 +83,14 @@ def generate_at(  # noqa: PLR0913 - one parameter per option
     TrajectoryError
         A movement of the tip without two or three positions.
     SpecificationError
-        A start or goal of another number of coordinates.
+        A start or goal of another number of coordinates; of a movement of two dimensions, a goal in another plane.
     """
     roles = roles_of(learned.primitive.channels, len(learned.columns), "joints" if joints else "tip", joints)
     _check_tip(roles, learned, joints is not None)
     n = len(roles.positions)
     begin, end = (_point(point, name, n if joints else 3) for point, name in ((at, "at"), (goal, "goal")))
     axes = list(PLANES[plane]) if n == 2 and not joints else list(range(n))
+    _check_plane(begin, end, axes)
     shown = generate(learned, MovementOptions(duration=duration, rate=rate)).columns["positions"]
     start = shown[0, roles.positions]
     scales = Scales(np.full(n, scale), np.zeros(n)) if scale is not None else scales_of(roles, joints, joint_units)
@@ -100,8 +102,9 @@ def generate_at(  # noqa: PLR0913 - one parameter per option
     options = MovementOptions(goal=target, duration=duration, rate=rate, meet_goal=target is not None)
     made = generate(learned, options).columns
     moved = frame.to_robot(made["positions"][:, roles.positions])
-    if begin is not None and len(begin) > n:
-        moved = _in_space(moved, axes, begin)
+    through = end if begin is None else begin
+    if through is not None and len(through) > n:
+        moved = _in_space(moved, axes, through)
     if roles.orientation is not None and moved.shape[1] == 3:
         channel, columns = roles.orientation
         moved = np.column_stack((moved, as_wxyz(made["positions"][:, columns], channel)))
@@ -117,6 +120,18 @@ def _goal_as_recorded(end: Array, roles: Roles, goal: Array) -> Array:
     wanted = end.copy()
     wanted[roles.positions] = goal
     return np.asarray(wanted[roles.moving])
+
+
+def _check_plane(begin: Array | None, end: Array | None, axes: list[int]) -> None:
+    """Refuse a goal that lies beside the plane in which a movement of two dimensions is executed from its start."""
+    if begin is None or end is None or len(axes) == len(end):
+        return
+    across = ({0, 1, 2} - {*axes}).pop()
+    if abs(end[across] - begin[across]) > TRACKED:
+        raise SpecificationError(
+            f"expected the goal of a movement of two dimensions in the plane of its start, {'xyz'[across]} = "
+            f"{begin[across]:g} m, got {end[across]:g}; give both the same, or choose another plane (plane=, --plane)"
+        )
 
 
 def _in_space(flat: Array, axes: list[int], through: Array) -> Array:
