@@ -177,3 +177,12 @@ def test_rates_and_scales_are_those_of_the_attributes_and_records_are_columns(tm
         np.testing.assert_allclose(found.demonstrations[-1].positions, x, err_msg=name)
         np.testing.assert_allclose(found.demonstrations.durations, 1.0 if name == "table" else 2.9)
         assert found.labels.tolist() == (["wave", "nod"] if name == "sets" else ["hand"])
+
+
+def test_labels_that_take_much_more_than_the_file_are_refused(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["X"], file.attrs["fs"] = np.ones((3, 9, 2)), 10.0
+        file.create_dataset("y", (3,), dtype="S100000000", chunks=(1,), compression="gzip")
+    with pytest.raises(DataError, match="expected labels of at most"):
+        kineme.read_recordings(tmp_path / "a.h5")

@@ -12,7 +12,7 @@ import numpy as np
 
 from kineme.errors import DataError
 from kineme.files.arrays.tree_movements import tree_movements
-from kineme.files.arrays.trees import GROUPS, Rate, rate_of, seconds_named
+from kineme.files.arrays.trees import GROUPS, Rate, is_label, rate_of, seconds_named
 from kineme.files.limits import check_expanded
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.parsed import Parsed
@@ -21,7 +21,7 @@ _SMALL, _CHUNKS = 2**20, 1000  # bytes and chunks that need not be written
 _EXPANDED = 1100  # times as many bytes gzip, which packs best, gives at most
 _LARGE, _PACKED = 2**26, 200  # bytes from which on packing is looked at; times as many as movements pack to at most
 _DEEPEST, _MOST = 12, 1_000_000  # groups within groups; groups and data sets in all
-_LABELS = 100_000  # texts in a data set, at most
+_LETTERS = 2**20  # of labels, at most
 _UNITS = frozenset({"unit", "units"})  # attributes
 _NAMES = frozenset({"label", "task"})  # attributes
 
@@ -77,10 +77,22 @@ def _tree(group: Any, h5py: Any, counted: list[int], depth: int = 0, unit: Any =
                 tree[name] = _Stored(one, _unit_in(one) or unit, rate)
             elif one.dtype.names and len(one.shape) == 1:
                 check_expanded(one.shape[0] * one.dtype.itemsize)
-                tree[name] = {head: one[head] for head in one.dtype.names if one.dtype[head].kind in "biuf"}
-            elif len(one.shape) == 1 and one.dtype.kind in "SO" and one.shape[0] <= _LABELS:
-                tree[name] = [_single(text) for text in one[()]]  # of labels
+                records = _Stored(one, None, None)[()]
+                tree[name] = {head: records[head] for head in one.dtype.names if one.dtype[head].kind in "biuf"}
+            elif len(one.shape) == 1 and one.dtype.kind in "SO" and is_label(name):
+                tree[name] = _labels(one)
     return tree
+
+
+def _labels(stored: Any) -> list[str | float | None]:
+    """The texts of a data set that labels movements, one after the other: all may be the same large one in the file."""
+    n_letters, labels = stored.shape[0] * max(1, stored.dtype.itemsize), []
+    for k in range(stored.shape[0]):
+        if n_letters > _LETTERS:
+            raise DataError(f"expected labels of at most {_LETTERS:,} letters in all in {stored.name}, got more")
+        labels.append(_single(stored[k]))
+        n_letters += len(str(labels[-1]))
+    return labels
 
 
 def _said(stored: Any) -> dict[str, Any]:
@@ -118,7 +130,10 @@ class _Stored:
     def __init__(self, stored: Any, unit: Any, rate: Rate | None) -> None:
         self._stored, self.shape, self.dtype, self.unit, self.rate = stored, stored.shape, stored.dtype, unit, rate
         scale = {name: _single(stored.attrs[name]) for name in ("conversion", "offset") if name in stored.attrs}
-        self._scale = {name: value for name, value in scale.items() if isinstance(value, float)}  # of NWB
+        of_numbers = stored.dtype.names is None
+        self._scale = {
+            name: value for name, value in scale.items() if of_numbers and isinstance(value, float)
+        }  # of NWB
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Any:
         return np.asarray(self[()], dtype)

@@ -179,14 +179,18 @@ def _labels_of_sets(tree: Mapping[str, Any]) -> dict[str, tuple[str, list[str]]]
             continue
         ending = words_of(name)[1:]
         for other, values in tree.items():
-            word, *others = words_of(other) or ("",)
             shape = np.shape(values)
-            if word not in LABEL_WORDS | {"y"} or (*others,) not in {ending, ()}:
+            if not is_label(other) or words_of(other)[1:] not in {ending, ()}:
                 continue
             if math.prod(shape) == one.shape[0] == max(shape, default=0):
                 texts = ["" if text is None else text for text in map(as_label, np.asarray(values).ravel().tolist())]
                 labels[name] = (other, texts)
     return labels
+
+
+def is_label(name: str) -> bool:
+    """Whether an array may label movements by its name: ``y``, ``labels``, ``y_train``."""
+    return {*words_of(name)[:1]} <= LABEL_WORDS | {"y"} and bool(words_of(name))
 
 
 def as_label(value: Any) -> str | None:
