@@ -9,7 +9,8 @@ from kineme import read_recordings
 from kineme.errors import TrajectoryError
 from kineme.movements.channels.channel import Channel
 from kineme.robots import load, move
-from kineme.robots.planning.roles import joints_among, space_of
+from kineme.robots.planning.joint_names import check_order, joints_among
+from kineme.robots.planning.roles import space_of
 
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")
 
@@ -59,6 +60,16 @@ def test_words_of_programs_beside_the_names_move_no_other_joint(head):
 def test_numbers_are_those_of_the_joints():
     assert joints_among([f"q{k}" for k in (7, 1, 2, 3, 4, 5, 6)], load("panda")) == [1, 2, 3, 4, 5, 6, 0]
     assert joints_among([f"q{k}" for k in range(7)], load("panda")) is None
+
+
+@pytest.mark.parametrize("head", ["velocity.{}", "{}_vel", "effort/{}"])
+def test_velocities_and_efforts_are_no_joints(head):
+    robot = load("ur5e")
+    rates = [head.format(joint) for joint in robot.joints]
+    assert joints_among(rates, robot) is None
+    assert joints_among([*rates, *robot.joints], robot) == [6, 7, 8, 9, 10, 11]
+    with pytest.raises(TrajectoryError, match=r"expected positions of the joints, got .*shoulder_pan_joint"):
+        check_order(rates, robot)
 
 
 def _moved(folder, names, columns):

@@ -11,6 +11,10 @@ from kineme.robots.models.robot import Robot
 from kineme.units import split_head
 
 DRIVERS = ".pos"  # names of LeRobot's drivers end in it: shoulder_pan.pos
+#: Words of columns that say how joints move, and not where they are.
+_RATES = frozenset(
+    ("velocity", "velocities", "vel", "acceleration", "accelerations", "acc", "effort", "torque", "current")
+)
 _SIDES = ("left", "right")  # what names of two arms begin with
 _Words = tuple[str, ...]
 
@@ -23,11 +27,14 @@ def joints_among(names: Sequence[str], robot: Robot) -> list[int] | None:
     the joints in which all words of their names stand, as ``ur5_elbow_joint_position``; or, of as many columns as
     joints, those that differ from one another by the same words as the joints, as ``elbow`` or ``q1``.
 
+    Columns of velocities, accelerations and efforts are no joints.
+
     Raises
     ------
     TrajectoryError
         Every joint is there for both sides.
     """
+    names = ["" if _is_rate(name) else name for name in names]
     plain = [split_head(name)[0].removesuffix(DRIVERS) for name in names]
     exact = _single([_places(plain, joint) for joint in robot.joints])
     if exact is not None:
@@ -51,8 +58,11 @@ def check_order(names: Sequence[str], robot: Robot) -> None:
     Raises
     ------
     TrajectoryError
-        A column at the place of another joint than its name says, or numbers that do not rise.
+        Velocities; a column at the place of another joint than its name says, or numbers that do not rise.
     """
+    rates = list(filter(_is_rate, names))
+    if rates:
+        raise TrajectoryError(f"expected positions of the joints, got {', '.join(rates)}; choose other columns")
     words, joints = [words_of(name_of(name)) for name in names], _different(list(map(words_of, robot.joints)))
     listed = ", ".join(names)
     for k, holding in enumerate(_holding(words, joints)):
@@ -65,6 +75,10 @@ def check_order(names: Sequence[str], robot: Robot) -> None:
     if len(numbers) == len(words) and numbers != sorted(numbers):
         raise TrajectoryError(f"expected the joints in the order of their numbers, got {listed}; order the columns")
     warn(f"{listed} are taken as {', '.join(robot.joints)}, one after the other", UserWarning, 4)
+
+
+def _is_rate(name: str) -> bool:
+    return not _RATES.isdisjoint(words_of(name))
 
 
 def _places(names: Sequence[str], joint: str) -> list[int]:
