@@ -38,6 +38,7 @@ TABLES = {
     "two units.csv": ("start [s],end [ms],label\n0.5,1750,wave\n2,4000,nod\n", False),
     "minutes.csv": ("start_us,end [min],label\n500000,0.029166666666666667,wave\n2e6,0.06666666666666667,nod\n", False),
     "clocks.csv": ("start [ms],end (min),label\n0:00.5,0:01.75,wave\n0:02,0:04,nod\n", False),
+    "boris.csv": ("Behavior,Behavior type,Start (s),Stop (s)\nwave,STATE,0.5,1.75\nnod,STATE,2,4\n", False),
     "frames.csv": ("start frame,end frame,start,end,label\n15,52,0.5,1.75,wave\n60,120,2,4,nod\n", False),
     "comma.csv": ("Start;Ende;Ende Zeit;end time;label\n0,5;;;1,75;wave\n2,0;;;4,0;nod\n", False),
     "order.tsv": ("label\tstart_time\tend_time\nwave\t0.5\t1.75\nnod\t2\t4\n", False),
@@ -104,6 +105,10 @@ def test_stretches_outside_are_problems_that_name_the_line(tmp_path, recordings)
     assert len(pieces) == 1
     assert [one.line for one in pieces.problems] == [3, 4]
     assert "lasts from 1000 to 1004.99 s" in str(pieces.problems[0])
+    (tmp_path / "l.csv").write_text("start,end,label\n1004,1005.05,wave\n1003.5,1006,nod\n999,1001,nod\n")
+    pieces = labeled_pieces(recordings, read_labels(tmp_path / "l.csv"))
+    assert [one.label for one in pieces.sources] == ["wave"]
+    assert [one.line for one in pieces.problems] == [3, 4]
     (tmp_path / "l.csv").write_text("start,end,label\n2000,2001,wave\n")
     with pytest.raises(DataError, match="found none; the first that is none"):
         labeled_pieces(recordings, read_labels(tmp_path / "l.csv"))
@@ -147,6 +152,7 @@ def test_columns_say_which_recording_a_row_is_of(tmp_path, recordings):
         ("a.csv", "start,end,label\n1,2,wave\n3,2,nod\n", "line 3: expected a start and an end after it"),
         ("a.csv", "start,end,label\n1,oops,wave\n", "line 2"),
         ("a.csv", "start,end,label\n1\n", "line 2"),
+        ("a.csv", "start,end,who,what\n1,2,ann,wave\n", "expected one column of labels .*; call it label"),
         ("a.csv", "x,y\n1,2\n", "expected a table with columns start, end and label"),
         ("a.csv", "start frame,end frame,label\n1,20,wave\n", "unit of time .*, got 'start frame'; divide frames"),
         ("a.csv", "Start,Stop [samples],label\n1,20,wave\n", "unit of time .*, got 'Stop \\[samples\\]'"),

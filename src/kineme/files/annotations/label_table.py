@@ -20,8 +20,11 @@ _END = re.compile(rf"(end|stop|offset|to){_UNIT}|(end|stop)[ _]?time")
 _LAST_WORD = re.compile(rf"(?<![.a-zµμ])({_TIMES})\W*$")  # that of hh:mm:ss.ms says how a clock is written
 _COUNTED = re.compile(r"\b(frame|sample|index|idx|row)s?\b")  # what is no time without a rate
 _LABELS = frozenset(
-    {"label", "labels", "symbol", "annotation", "annotations", "value", "text", "name", "class", "action", "gesture"}
-)
+    {
+        "label", "labels", "symbol", "annotation", "annotations", "value", "text", "name", "class", "action", "gesture",
+        "activity", "category", "behavior", "event",
+    }
+)  # fmt: skip
 _RECORDINGS, _PLACES = frozenset({"recording", "file", "path"}), frozenset({"place"})
 _CLOCK = re.compile(r"(?:(\d+):)?(\d+):(\d+(?:[.,]\d+)?)")
 _NOTHING = frozenset({"", "-", "?", UNKNOWN, "none", "nan", "null"})  # labels that say that there is none
@@ -83,9 +86,10 @@ def heads_of(cells: Sequence[str]) -> Heads | None:
     start, end = (min(some, key=lambda k: "hh:mm" in names[k]) for some in (starts, ends))
     known = [k for k, one in enumerate(names) if one in _LABELS]
     others = [k for k, one in enumerate(names) if k not in {*starts, *ends} and not one.startswith("duration")]
-    labels = known or others[-1:]
-    if not labels:
-        raise DataError(f"expected a column of labels beside start and end, got {list(cells)}; call it label")
+    aside = _RECORDINGS | _PLACES
+    labels = known or [k for k in others if names[k] and names[k] not in aside]
+    if len(labels) != 1 and not known:
+        raise DataError(f"expected one column of labels beside start and end, got {list(cells)}; call it label")
     return Heads(
         start,
         end,

@@ -53,8 +53,10 @@ def labeled_pieces(recordings: Recordings, table: LabelTable) -> Recordings:
         since = table.since_start or _counts_from_start(own, times)
         lines: dict[tuple[int, int], int] = {}  # stretch -> line that labels it
         for row in own:
-            start, stop = _samples(row, times, float(times[0]) if since else 0.0)
-            if stop - start < MIN_SAMPLES:
+            origin = float(times[0]) if since else 0.0
+            start, stop = _samples(row, times, origin)
+            outside = max(times[0] - origin - row.start, 0.0) + max(row.end + origin - times[-1], 0.0)
+            if stop - start < MIN_SAMPLES or outside > _OUTSIDE * (row.end - row.start):
                 problems.append(Problem(table.name, row.line, _too_short(row, source, times, since)))
             elif (line := lines.setdefault((start, stop), row.line)) != row.line:
                 problems.append(
@@ -71,6 +73,10 @@ def labeled_pieces(recordings: Recordings, table: LabelTable) -> Recordings:
     return replace(
         recordings, demonstrations=_cut(demos, stretches, sources), sources=tuple(sources), problems=tuple(problems)
     )
+
+
+#: Share of a stretch that may lie outside its recording: somebody who labels to the end rounds it up.
+_OUTSIDE = 0.1
 
 
 def _of_none(table: LabelTable, sources: Sequence[Source], meant: Mapping[str, Sequence[str]]) -> list[Problem]:
@@ -135,8 +141,8 @@ def _place(source: Source, times: Array, start: int, stop: int) -> str:
 def _too_short(row: LabelRow, source: Source, times: Array, since: bool) -> str:
     origin = float(times[0]) if since else 0.0
     return (
-        f"expected at least {MIN_SAMPLES} samples of {source.path} between {row.start:g} and {row.end:g} s; it lasts "
-        f"from {times[0] - origin:g} to {times[-1] - origin:g} s"
+        f"expected at least {MIN_SAMPLES} samples, and nine tenths, of the time between {row.start:g} and "
+        f"{row.end:g} s in {source.path}; it lasts from {times[0] - origin:g} to {times[-1] - origin:g} s"
     )
 
 
