@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ _EXPANDED = 1100  # times as many bytes gzip, which packs best, gives at most
 _LARGE, _PACKED = 2**26, 200  # bytes from which on packing is looked at; times as many as movements pack to at most
 _DEEPEST, _MOST = 12, 1_000_000  # groups within groups; groups and data sets in all
 _LETTERS = 2**20  # of labels, at most
+_SCALE = frozenset({"conversion", "offset"})  # attributes by which samples are multiplied, and which is added
 _UNITS = frozenset({"unit", "units"})  # attributes
 _NAMES = frozenset({"label", "task"})  # attributes
 
@@ -56,8 +57,8 @@ def _tree(group: Any, h5py: Any, counted: list[int], depth: int = 0, unit: Any =
     `unit` is that of the group around it, for data sets that have none.
     """
     tree: dict[str, Any] = {}
-    unit = _unit_in(group) or unit
-    tree |= _said(group)
+    unit = _unit_in(group, group.attrs) or unit
+    tree |= _said(group, group.attrs)
     for name in group:
         counted[0] += 1
         if counted[0] > _MOST:
@@ -69,12 +70,13 @@ def _tree(group: Any, h5py: Any, counted: list[int], depth: int = 0, unit: Any =
             if depth < _DEEPEST:
                 tree[name] = _tree(one, h5py, counted, depth + 1, unit)
         elif isinstance(one, h5py.Dataset) and not one.external and not one.is_virtual:
-            rate = rate_of(_said(one))
+            names = tuple(one.attrs)
+            rate = rate_of(_said(one, names)) if names else None
             if one.shape == ():
                 tree[name] = _single(one[()])
                 tree |= {} if rate is None else {"rate": rate.hertz}  # as of NWB's starting_time
             elif one.shape and one.dtype.kind in "biuf":
-                tree[name] = _Stored(one, _unit_in(one) or unit, rate)
+                tree[name] = _Stored(one, (_unit_in(one, names) if names else None) or unit, rate, names)
             elif one.dtype.names and len(one.shape) == 1:
                 check_expanded(one.shape[0] * one.dtype.itemsize)
                 records = _Stored(one, None, None)[()]
@@ -95,7 +97,7 @@ def _labels(stored: Any) -> list[str | float | None]:
     return labels
 
 
-def _said(stored: Any) -> dict[str, Any]:
+def _said(stored: Any, names: Iterable[str]) -> dict[str, Any]:
     """The label and the rate among the attributes of a group or of a data set."""
     values = {
         name: _single(stored.attrs[name])
@@ -105,9 +107,9 @@ def _said(stored: Any) -> dict[str, Any]:
     return {name: value for name, value in values.items() if value is not None}
 
 
-def _unit_in(stored: Any) -> Any:
+def _unit_in(stored: Any, names: Iterable[str]) -> Any:
     """The unit in the attributes of a group or of a data set, or one for each of its columns; None without."""
-    for name in stored.attrs:
+    for name in names:
         if name.lower() in _UNITS:
             value = stored.attrs[name]
             units = [_single(one) for one in np.ravel(value)] if np.ndim(value) else [_single(value)]
@@ -127,9 +129,9 @@ class _Stored:
         On reading: samples that were never written, or that expand by more than gzip can, or than movements do.
     """
 
-    def __init__(self, stored: Any, unit: Any, rate: Rate | None) -> None:
+    def __init__(self, stored: Any, unit: Any, rate: Rate | None, names: Iterable[str] = ()) -> None:
         self._stored, self.shape, self.dtype, self.unit, self.rate = stored, stored.shape, stored.dtype, unit, rate
-        scale = {name: _single(stored.attrs[name]) for name in ("conversion", "offset") if name in stored.attrs}
+        scale = {name: _single(stored.attrs[name]) for name in names if name in _SCALE}
         of_numbers = stored.dtype.names is None
         self._scale = {
             name: value for name, value in scale.items() if of_numbers and isinstance(value, float)

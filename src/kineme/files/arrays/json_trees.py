@@ -175,13 +175,14 @@ def _is_matrix(rows: Sequence[list[Any]]) -> bool:
 def _columns(samples: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Samples with names as one array for each name, NaN where it is missing; parts of a sample by name or number."""
     flat = [_flat(one) for one in samples]
-    for name in {name for one in flat for name in one if name.endswith(f".{_COUNT}")}:
-        if len(counts := {one.pop(name) for one in flat if name in one}) > 1:
+    names = dict.fromkeys(name for one in flat for name in one)
+    for name in [name for name in names if name.endswith(f".{_COUNT}")]:
+        del names[name]
+        if len(counts := {one[name] for one in flat if name in one}) > 1:
             raise DataError(
                 f"expected as many {name.removesuffix(f'.{_COUNT}')!r} in each sample, since nothing names them, got "
                 f"{min(counts)} to {max(counts)}; give each a name"
             )
-    names = dict.fromkeys(name for one in flat for name in one)
     check_expanded(8 * len(flat) * len(names))
     return _columns_of({name: [one.get(name) for one in flat] for name in names})
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import re
 from codecs import BOM_UTF8
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache
 from itertools import chain, islice
 from typing import Any
@@ -65,8 +65,8 @@ def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
     if dialect.separator != ",":
         for k in roles.positions:
             if _may_be_grouped(columns[k]):
-                cells = [split(line, dialect.separator) for _, line in _samples(data, encoding, dialect)]
-                _check_grouped([row[k] for row in cells if k < len(row)], dialect.heads[k])
+                split_lines = (split(line, dialect.separator) for _, line in _samples(data, encoding, dialect))
+                _check_grouped((row[k] for row in split_lines if k < len(row)), dialect.heads[k])
     if dated and roles.time is not None:
         columns[roles.time], others = seconds_of_dates(columns[roles.time].tolist())
         head = dialect.heads[roles.time]
@@ -102,11 +102,14 @@ def _may_be_grouped(x: Array) -> bool:
     return whole and bool((np.abs(1000 * parts - np.rint(1000 * parts)) < 1e-6).all())
 
 
-def _check_grouped(cells: Sequence[str], head: str) -> None:
+def _check_grouped(column: Iterable[str], head: str) -> None:
     """Refuse cells in which a mark is between thousands: 999, 1.002, which are one step apart and not one thousand."""
+    cells: list[str] = []
+    for cell in column:
+        if not (cell.lstrip("+-").isdecimal() or _GROUPED.fullmatch(cell)):
+            return
+        cells.append(cell)
     marked = np.array([_GROUPED.fullmatch(cell) is not None for cell in cells])
-    if not all(mark or cell.lstrip("+-").isdecimal() for mark, cell in zip(marked, cells, strict=True)):
-        return
     x = np.array([float(re.sub("[.,]", "", cell)) for cell in cells])
     between = np.flatnonzero(marked[1:] != marked[:-1])
     small, large = (
