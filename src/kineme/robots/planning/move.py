@@ -24,7 +24,7 @@ from kineme.robots.planning.roles import JOINT_UNITS, SPACES
 from kineme.robots.planning.timed_movement import FASTEST_RATE, SLOWEST_RATE, TIMINGS, Untimed, with_timing
 from kineme.validation import Array, as_numbers, check_choice, check_number, check_switch
 
-_HURRIED = 10.0  # times the mean acceleration, from which on another way is sought; a stroke takes three
+_HURRIED = 4.0  # times the mean acceleration, from which on another way is sought; a stroke takes less than three
 _SLOWER = 1.1  # times as slow as demonstrated: other ways are tried
 
 
