@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.interpolate import BPoly, PPoly
+from scipy.interpolate import BPoly, CubicSpline, PPoly
 
 import kineme
 from arm_samples import simple_arm, stroke
@@ -16,6 +16,8 @@ from kineme.errors import TrajectoryError
 from kineme.robots import InfeasibleError, JointTrajectory, load, move, preflight
 from kineme.robots.checks.along import along
 from kineme.robots.execution.between import _bernstein, between, dense_times, extreme
+from kineme.robots.execution.retime import fastest, sampled
+from kineme.robots.execution.timing import as_generated
 from soaking import SOAK, examples
 
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")
@@ -153,6 +155,34 @@ def test_a_learned_movement_begins_and_ends_at_a_stand_at_every_rate():
         assert np.abs(t.velocities[[0, -1]]).max() < 1e-7
         accelerations = np.diff(t.velocities, axis=0) / np.diff(t.times)[:, None]
         assert np.all(np.abs(accelerations) <= robot.acceleration)
+
+
+def test_ramps_take_half_of_the_acceleration_and_half_of_their_time_more(tmp_path):
+    robot = simple_arm(tmp_path)
+    t, speeds = np.linspace(0, 1, 5), np.array([0.2, 0.05]) * robot.acceleration
+    timed = as_generated(robot, CubicSpline(t, np.outer(t, speeds)), 2000.0)
+    ramp = 1.5 * 0.2 / 0.5  # s: the steepest slope of 3 x^2 - 2 x^3 is 1.5
+    shares = timed.trajectory.accelerations / robot.acceleration
+    np.testing.assert_allclose(shares.max(axis=0), [0.5, 0.125], rtol=1e-3)
+    np.testing.assert_allclose(shares.min(axis=0), [-0.5, -0.125], rtol=1e-3)
+    assert timed.trajectory.duration == pytest.approx(1.0 + ramp)
+
+
+def test_the_fastest_timing_of_a_straight_line_says_where_it_is_within_all_limits(tmp_path):
+    pytest.importorskip("toppra")
+    robot = simple_arm(tmp_path)
+    t = np.linspace(0, 1, 5)
+    path = CubicSpline(t, np.outer(t, [1.0, 0.5]))
+    timed = sampled(robot, fastest(robot, path), 10.0)
+    np.testing.assert_allclose(timed.trajectory.positions, path(timed.generated), atol=1e-9)
+    for rates, limits in (
+        (timed.trajectory.velocities, robot.velocity),
+        (timed.trajectory.accelerations, robot.acceleration),
+    ):
+        assert (np.abs(rates) <= limits * (1 + 1e-9)).all()
+    v, a = robot.velocity[0], robot.acceleration[0]
+    least = 2 * np.sqrt(1 / a) if a <= v**2 else 1 / v + v / a
+    assert least <= timed.trajectory.duration <= 1.02 * least + 3 / 10
 
 
 def test_links_that_pass_through_one_another_between_two_samples_are_seen(tmp_path):

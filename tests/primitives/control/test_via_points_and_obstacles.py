@@ -13,6 +13,8 @@ from scipy.interpolate import CubicSpline
 import kineme
 from kineme.errors import heard_warnings
 from kineme.orientation import PoseDMP
+from kineme.primitives.control import controller as controlling
+from kineme.primitives.control.plan import passed
 from kineme.primitives.control.state import Status
 from kineme.primitives.discrete.formulations import FORMULATIONS
 from kineme.primitives.generation.generate import MovementOptions, generate
@@ -113,6 +115,20 @@ def test_undisturbed_a_live_controller_meets_its_via_points_in_steps_of_any_leng
     met, _ = passing(primitive.controller(dt, via=via), int(2.2 / dt))
     assert max(distance for _, distance, _ in met) < 1e-9
     assert not any(Status.VIA_POINT_MISSED in status for *_, status in met)
+
+
+def test_of_several_in_one_step_the_largest_distance_is_said_and_of_a_point_that_of_its_dimensions(monkeypatch):
+    x = curve().positions + np.array([3.0, 4.0])
+    primitive, obstacle = kineme.DMP().learn([kineme.Trajectory(curve().times, x)]), x[[90]] + [0, 0.02]
+    via = [(0.4, x[80] + [0, 0.05]), (0.5, [np.nan, x[100, 1] + 0.1])]
+    distances = []
+    for order in (list, lambda some: [*some][::-1]):
+        monkeypatch.setattr(controlling, "passed", lambda *told, order=order: order(passed(*told)))
+        distances.append(primitive.controller(0.55 * DURATION, via=via).step(obstacles=obstacle).via_missed)
+    assert distances[0] == distances[1] > 0.01
+    ((_, missed, status),), path = passing(primitive.controller(0.01, via=via[1:]), 200, obstacles=obstacle)
+    assert missed == pytest.approx(abs(path(0.5 * DURATION)[1] - via[1][1][1]), rel=1e-3)
+    assert Status.VIA_POINT_MISSED in status
 
 
 def test_of_a_rhythm_they_are_passed_in_every_period_and_missed_at_another_amplitude():
