@@ -183,6 +183,8 @@ def test_columns_of_a_joined_recording_are_those_that_are_chosen_or_known(folder
     assert columns(folder, columns="Orientation.q*") == [f"Orientation.q{part}" for part in "xyzw"]
     left = columns(folder, exclude=["Orientation.*", "Gyroscope.z"])
     assert left == ["Accelerometer.z", "Accelerometer.y", "Accelerometer.x", "Gyroscope.y", "Gyroscope.x"]
+    alone = kineme.read_recordings(folder / "nod", join_files=True, columns="Accelerometer.x").demonstrations
+    assert len(alone.times) == len(clock(100, 0.05, 2))  # no file without chosen columns crops it
     with pytest.raises(kineme.DataError, match=r"expected columns like 'Barometer.\*'"):
         columns(folder, columns="Barometer.*")
     alone = tmp_path / "alone" / "nod.csv"
