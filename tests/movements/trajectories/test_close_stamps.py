@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kineme import DMP, Demonstrations, Resample, RhythmicDMP, Smooth, preprocess
+from kineme.movements.trajectories import _compiled
 from kineme.movements.trajectories.close_stamps import merge_close
 
 N = 200
@@ -149,3 +150,10 @@ def test_smoothing_does_not_notice_how_close_close_stamps_are(monkeypatch, compi
         return preprocess(Demonstrations.from_arrays([path], times=[t]), [Smooth(6.0)]).positions
 
     np.testing.assert_allclose(smoothed(gap), smoothed(1e-5), atol=2e-4 if gap > 1e-5 else 2e-5)
+
+
+@given(values=st.lists(st.integers(-3, 3) | st.floats(-1e9, 1e9), min_size=1, max_size=60), share=st.floats(0, 1))
+def test_the_nth_smallest_is_that_of_a_sorted_array(values, share):
+    values = np.array(values, dtype=float)
+    n = int(share * (len(values) - 1))
+    assert _compiled.nth_smallest(values.copy(), n) == np.sort(values)[n]

@@ -16,6 +16,7 @@ from kineme.movements.preparation.pauses import (
     WHOLE,
     WINDOWS,
 )
+from kineme.movements.trajectories._compiled import nth_smallest
 from kineme.runtime.compiled import jit
 
 
@@ -60,7 +61,7 @@ def _fill_capped(times, steps):  # type: ignore[no-untyped-def]
     steps[last] = 0.0
     if most <= GAP * least:  # the median is no smaller
         return False
-    longest = GAP * np.sort(steps[:last])[last // 2]
+    longest = GAP * nth_smallest(steps[:last].copy(), last // 2)
     motion = 0.0
     for j in range(last):
         motion += min(steps[j], longest)
