@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from functools import cache
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -88,6 +89,14 @@ def test_modules_import_from_their_own_room_and_from_those_below():
         if room and (other := _room_of(names)) and _chapter(room) == _chapter(other) and layers[other] > layers[room]
     ]
     assert not upwards
+
+
+def test_no_files_import_each_other_in_a_circle():
+    """Not even for types, or within functions."""
+    names = {".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts): path for path in _modules()}
+    graph = {name: {one if one in names else one.rpartition(".")[0] for one in _all_imports(path)} - {name}
+             for name, path in names.items()}  # fmt: skip
+    assert len(list(TopologicalSorter(graph).static_order())) >= len(names)  # a CycleError names the files
 
 
 def test_every_chapter_and_room_that_is_listed_exists():
