@@ -7,6 +7,7 @@ import pytest
 
 import kineme
 from kineme import DMP, SpecificationError
+from kineme.primitives.discrete import least_duration
 from kineme.primitives.discrete.formulations import FORMULATIONS
 
 
@@ -49,6 +50,14 @@ def test_a_limit_is_kept_between_samples_too():
     assert sparse.min() < 199.0
     few = primitive.rollout(n_samples=50).least_duration(acceleration=200.0)
     np.testing.assert_allclose(few, least, rtol=1e-12)
+
+
+def test_each_movement_of_many_has_its_own(learned, monkeypatch):
+    rollout = learned.rollout()
+    together = rollout.least_duration(velocity=30.0, acceleration=200.0)
+    monkeypatch.setattr(least_duration, "_TILE_SAMPLES", 1)  # one movement at a time
+    np.testing.assert_allclose(rollout.least_duration(velocity=30.0, acceleration=200.0), together, rtol=1e-9)
+    assert np.ptp(together) > 0.01
 
 
 def test_a_rhythm_keeps_its_limit_between_samples_too():
