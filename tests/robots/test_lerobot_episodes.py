@@ -159,3 +159,12 @@ def test_joints_have_the_names_and_units_that_drivers_take(tmp_path):
         write_lerobot(tmp_path / "percent", one, "x", 30, joint_units="percent")
     with pytest.raises(DataError, match=r"they differ in action, observation\.state"):
         write_lerobot(tmp_path / "deg", one, "x", 30, joint_units="rad")
+
+
+def test_the_only_joint_of_an_arm_keeps_its_name_and_unit(tmp_path):
+    steps, still = np.linspace(0, 0.1, 20)[:, None], np.zeros((20, 1))
+    made = JointTrajectory(("j",), np.linspace(0, 2, 20), steps, still, still, {}, ("rad",))
+    write_lerobot(tmp_path / "set", made, "turn", 30)
+    read = kineme.read_recordings(tmp_path / "set").demonstrations
+    assert [(channel.name, channel.unit) for channel in read.channels] == [("j.pos [deg]", "deg")]
+    assert read.recorded[-1] == pytest.approx(np.degrees(0.1))

@@ -107,7 +107,7 @@ def _entries(name: str, feature: Any) -> tuple[str, ...]:
     names, units = _names(feature.get("names")), feature.get("units")
     if width > _WIDEST:
         return ()
-    if len(names) == width and len(set(names)) == width and width > 1:
+    if len(names) == width and len(set(names)) == width and (width > 1 or isinstance(units, list)):
         if isinstance(units, list) and len(units) == width:
             return tuple(
                 f"{name} [{unit}]" if isinstance(unit, str) else name for name, unit in zip(names, units, strict=True)
