@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import kineme
-from kineme.movements.tables.time_stamps import nanoseconds, seconds_of_dates, unit_by_size
+from kineme.movements.tables.time_stamps import nanoseconds, same_clock, seconds_of_dates, unit_by_size
 
 STAMPS = [1_700_000_000 + k // 2 for k in range(20)], [500_000_000 * (k % 2) for k in range(20)]
 
@@ -147,6 +147,12 @@ def test_steps_of_stamps_that_count_from_anywhere_say_their_unit(step, unit):
     assert unit_by_size(step * np.arange(20.0))[0] == unit
     stamps = PER_SECOND["s"] * (1_700_000_000.0 + 1e-3 * step * np.arange(20))
     assert unit_by_size(stamps, "unix time") == ("s", "since 1970")  # up to seventeen minutes apart
+
+
+def test_clocks_of_one_device_drift_a_little():
+    times = np.arange(0.0, 1000.0, 0.1)
+    assert same_clock(times, 5.0 + times * (1 + 9e-5))
+    assert not same_clock(times, 5.0 + times * (1 + 2e-4))
 
 
 def test_midnight_passes_from_times_of_day_alone_and_missing_dates_are_none():

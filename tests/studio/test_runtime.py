@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
 import subprocess
 from dataclasses import replace
 from functools import cache
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,6 +18,7 @@ import pytest
 from node_runtime import NODE, REASON, RUNTIME, ask, question
 
 import kineme
+from kineme.recognition.certainty import LEAST_CONFIDENCE, certainty
 from kineme.studio.snapshot.make import snapshot_of_recognizer
 from kineme.studio.snapshot.snapshot import Snapshot
 from movement_samples import draw_shapes, turn
@@ -416,6 +418,26 @@ def test_a_wrong_constant_is_seen(file, right, wrong, worst, tmp_path):
     except AssertionError:  # node refused
         return
     assert found > 1
+
+
+def test_words_are_those_of_python_at_every_confidence():
+    asked = [
+        (confidence, {"isNew": is_new, "isGuess": is_guess, "isOver": is_over})
+        for confidence in (0.5, 0.98999, 0.99, 0.995, 0.99899, 0.999, 1.0)
+        for is_new, is_guess, is_over in product((False, True), repeat=3)
+    ]
+    script = (
+        f"import {{ certainty }} from {json.dumps((FOLDER / 'certainty.js').as_uri())}; const [least, asked] = "
+        f"{json.dumps([dict(LEAST_CONFIDENCE), asked])}; "
+        "console.log(JSON.stringify(asked.map(([confidence, what]) => certainty(least, confidence, what))))"
+    )
+    done = subprocess.run(
+        [NODE, "--input-type=module", "-e", script], capture_output=True, text=True, timeout=300, check=True
+    )
+    assert json.loads(done.stdout) == [
+        certainty(confidence, is_new=what["isNew"], is_guess=what["isGuess"], is_over=what["isOver"])
+        for confidence, what in asked
+    ]
 
 
 def test_the_runtime_is_small_and_every_file_is_correct_javascript():
