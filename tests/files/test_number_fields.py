@@ -2,6 +2,7 @@
 
 import struct
 from contextlib import suppress
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ import pytest
 import kineme
 from bag_files import KINDS, SECOND, START, Maker, pose_rows, stamps, write_bag
 from kineme.files.ros.bag_contents import bag_contents
-from kineme.files.ros.number_fields import NumberFields, Step
+from kineme.files.ros.number_fields import NumberFields, Step, number_fields
 
 pytest.importorskip("rosbags")
 
@@ -198,6 +199,16 @@ def test_definitions_that_say_no_numbers_are_refused(tmp_path, text, words):
     with pytest.raises(kineme.DataError, match=words):
         kineme.read_recordings(tmp_path / "run", topic="/odd")
     assert bag_contents(tmp_path / "run")[0].rows[0][3] == "nothing: no numbers"
+
+
+def test_definitions_that_differ_are_refused():
+    said = SimpleNamespace(name="MSG")
+    kinds = [SimpleNamespace(msgdef=SimpleNamespace(data=f"{kind} x", format=said)) for kind in ("float64", "float32")]
+    topic = SimpleNamespace(name="/a", type="my_msgs/msg/A", connections=kinds)
+    with pytest.raises(kineme.DataError, match="got several that differ; convert the topic to CSV"):
+        number_fields(SimpleNamespace(version=2), topic)
+    topic.connections = kinds[:1]
+    assert number_fields(SimpleNamespace(version=2), topic).heads == ("x",)
 
 
 def test_no_program_is_made_of_a_definition(tmp_path, monkeypatch):
