@@ -19,7 +19,7 @@ _READ = {
     ".ts": ("series of time-series archives, one on a line", ""),
     ".parquet": ("tables of Apache Parquet, of lists too", "parquet"),
     ".npz .npy": ("arrays of NumPy: ragged movements, equal ones, trees by name", ""),
-    ".json .jsonl": ("objects with positions, or one on a line; trees by name", ""),
+    ".json .jsonl .ndjson": ("objects with positions, or one on a line; trees by name", ""),
     ".mat": ("MATLAB up to version 7.2; the name of the file is the label", ""),
     ".h5 .hdf5": ("HDF5, a data set or group for each movement; MATLAB from 7.3", "hdf5"),
     ".bvh": ("skeletons in motion: positions and rotations of joints", ""),
