@@ -6,8 +6,8 @@ import numpy as np
 
 import kineme
 from bench.by_person import FOLDER
+from bench.people import recorded
 from bench.rows import Row
-from kineme.experiments.evaluation.data import load_data
 
 PAUSES = ((1.0, False), (10.0, False), (30.0, False), (1.0, True), (10.0, True), (30.0, True))  # seconds; with samples
 NOISE = 0.002  # of the largest extent, at rest
@@ -20,8 +20,9 @@ def measure(quick: bool) -> list[Row]:
     files = sorted(FOLDER.glob("*.npz")) if FOLDER.is_dir() and not quick else []
     sets = [("LASA", kineme.load_lasa(), None)]
     for file in files:
-        data = load_data(str(file))
-        sets.append((file.stem, data.demonstrations, None if data.people is None else np.asarray(data.people)))
+        data = recorded(file.name)
+        if data is not None:
+            sets.append((file.stem, data.demos, data.people))
     rows = []
     for name, demos, people in sets:
         labels = np.asarray(demos.labels).astype(str)
