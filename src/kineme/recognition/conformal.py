@@ -18,7 +18,6 @@ from kineme.comparison.similarity import AveragedSimilarity
 from kineme.errors import SpecificationError
 from kineme.recognition.confidence import EXPONENT, fit_exponent
 from kineme.recognition.left_out import (
-    DIMENSIONS,
     LEAST,
     REACH,
     REACH_OF_OTHERS,
@@ -314,7 +313,7 @@ def _exponent(blocks: Sequence[ClassDistances], others: Sequence[Array]) -> floa
 def _own(block: ClassDistances) -> Array:
     """Distances to the nearest other one of the class, if as many were left as the class has."""
     size = block.distances.shape[1]
-    return np.asarray(block.nearest(size)[0] * (np.maximum(block.counted(size), 1) / size) ** (1 / DIMENSIONS))
+    return np.asarray(block.nearest(size)[0] * block.shares(size))
 
 
 def between_classes(to_others: Array, blocks: Sequence[ClassDistances], groups: NDArray[np.intp] | None) -> float:

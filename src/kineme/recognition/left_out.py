@@ -13,8 +13,7 @@ from kineme.errors import TrajectoryError
 from kineme.validation import Array
 
 _PRIOR = 4.0  # demonstrations that the common scale counts for beside those of the class
-#: In which members of a class vary, about: even, for the closed form of the law of distances.
-DIMENSIONS = 8
+_DIMENSIONS = 8  # in which members of a class vary, about: even, for the closed form of the law of distances
 #: Smallest scale, in kernel widths: rounding of single precision puts copies up to 0.002 apart.
 LEAST = 5e-3
 _ROUNDING = 1e-5  # of log similarities, in single precision
@@ -50,9 +49,9 @@ def law(scores: Array) -> Array:
     ``P(chi_8 >= x) = exp(-y) (1 + y + y^2 / 2 + y^3 / 6)`` with ``y = x^2 / 2``; x is the score times the mean of
     chi_8, 2.74. It is 0.05 at 1.44 times the mean; measured were 1.36 to 1.47 times, of people's movements.
     """
-    mean = math.sqrt(2.0) * math.gamma((DIMENSIONS + 1) / 2) / math.gamma(DIMENSIONS / 2)
+    mean = math.sqrt(2.0) * math.gamma((_DIMENSIONS + 1) / 2) / math.gamma(_DIMENSIONS / 2)
     y = 0.5 * (mean * scores) ** 2
-    terms = sum(y**k / math.factorial(k) for k in range(DIMENSIONS // 2))
+    terms = sum(y**k / math.factorial(k) for k in range(_DIMENSIONS // 2))
     return np.asarray(np.exp(-y) * terms)
 
 
@@ -132,6 +131,10 @@ class ClassDistances:
         """Number of others that `nearest` compares each with, at most `size`."""
         return np.minimum(np.isfinite(self.distances).sum(axis=1), size)
 
+    def shares(self, size: int) -> Array:
+        """By which each distance to the nearest shrinks, about, with `size` others instead of those `counted`."""
+        return np.asarray((np.maximum(self.counted(size), 1) / size) ** (1 / _DIMENSIONS))
+
     def left_out(self, size: int) -> Array:
         """Distances (k, k) to the nearest, row i as if i and its group did not exist; NaN where there is none."""
         if self.groups is None:
@@ -191,8 +194,7 @@ def score_classes(blocks: list[ClassDistances], size: int, typical: float) -> Sc
         among = np.where(np.isfinite(own), own, np.nan)[None]
         scales.append(max(_shrunk(among, common)[0], LEAST))
         scores.append(own / np.maximum(_shrunk(block.left_out(size), common), LEAST))
-    shares = tuple((np.maximum(block.counted(size), 1) / size) ** (1 / DIMENSIONS) for block in blocks)
-    return Scored(np.array(scales), tuple(scores), shares)
+    return Scored(np.array(scales), tuple(scores), tuple(block.shares(size) for block in blocks))
 
 
 def finite(scores: Array) -> Array:
