@@ -28,6 +28,10 @@ class Influences(NamedTuple):
     obstacle_velocities: Array  # (m, n_positions); with these the obstacles go on during the step
 
 
+#: Of the extent of a movement: farther from a via point is said.
+MISSED = 1e-2
+
+
 class ViaPlaces(NamedTuple):
     """Where a movement is to be at k times, relative to the origin."""
 

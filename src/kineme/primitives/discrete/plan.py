@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.primitives.control.options import check_one, one_vector
-from kineme.primitives.control.plan import Plan, ViaPlaces
+from kineme.primitives.control.plan import MISSED, Plan, ViaPlaces
 from kineme.primitives.discrete.learned import Learned
 from kineme.primitives.discrete.modulate import modulated
 from kineme.primitives.discrete.own_primitives import own_primitives
@@ -15,7 +15,6 @@ from kineme.primitives.discrete.via_points import ViaLike, ViaPoints, via_points
 from kineme.validation import Array, check_number
 
 _SETTLED = 1e-3  # of the demonstration's largest extent
-_MISSED = 1e-2  # the same: farther from a via point is said
 
 
 def plan_of(  # noqa: PLR0913, PLR0917 - one parameter per option
@@ -69,7 +68,7 @@ def plan_along(movement: Rollout, n_positions: int, via: ViaPoints | None) -> Pl
         duration=tau,
         settle=_SETTLED * float(extents.max()),
         n_positions=n_positions,
-        via=None if via is None else _places(via, x0, n_positions, _MISSED * float(extents.max())),
+        via=None if via is None else _places(via, x0, n_positions, MISSED * float(extents.max())),
     )
 
 

@@ -6,14 +6,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.primitives.control.options import check_one, one_vector
-from kineme.primitives.control.plan import Plan, ViaPlaces
+from kineme.primitives.control.plan import MISSED, Plan, ViaPlaces
 from kineme.primitives.discrete.via_points import ViaLike, via_points
 from kineme.primitives.rhythmic.learned import RhythmicLearned
 from kineme.primitives.rhythmic.modulate import PHASES, modulated
 from kineme.primitives.rhythmic.rollout import rollout
 from kineme.validation import Array
 
-_MISSED = 1e-2  # of the extent: farther from a via point is said
 _LONGEST_STEP = 1000.0  # periods in one step: the forcing is followed all the way
 
 
@@ -55,6 +54,6 @@ def plan_of(
         begin=float(movement.phases[0] / (2 * np.pi) % 1.0),
         periodic=True,
         longest_step=_LONGEST_STEP,
-        via=None if asked is None else ViaPlaces(asked.times, asked.points[0] - origin, _MISSED * size),
+        via=None if asked is None else ViaPlaces(asked.times, asked.points[0] - origin, MISSED * size),
     )
     return plan, gain

@@ -10,6 +10,7 @@ const NO_DISTANCE = 1e-5; // of a log similarity: rounding
 const REACH_OF_STRANGERS = 0.9; // of the typical distance between classes: how far people differ at the most
 const REACH_TO_NEXT = 2 / 3; // of the distance to the next class
 const SCALE_OF_REACH = Math.sqrt(Math.PI / 4 / Math.log(20)); // by which the broad law is 0.05 at a reach of 1
+const GUESSES = ["strangers", "guess"]; // rules that promise nothing
 const SHOWN = 3; // movements named in an answer
 const MEAN_IN_EIGHT = (Math.SQRT2 * 11.631728396567448) / 6; // of chi with 8 degrees of freedom: gamma(4.5) / gamma(4)
 
@@ -242,7 +243,7 @@ export function recognize(known, one, errorRate = 0.05) {
     pValues: Object.fromEntries(classes.map((name, c) => [name, p.each[c]])),
     probabilities: Object.fromEntries(classes.map((name, c) => [name, odds[c]])),
     rule: p.rule,
-    certainty: certainty(known.header.certainty, odds[shown], { isNew: !isKnown, isGuess: p.rule === "guess" || p.rule === "strangers" }),
+    certainty: certainty(known.header.certainty, odds[shown], { isNew: !isKnown, isGuess: GUESSES.includes(p.rule) }),
     calibrated: p.calibrated,
     ranked: ranked.map((c) => classes[c]),
     nearest,
