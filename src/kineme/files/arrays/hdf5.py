@@ -100,9 +100,7 @@ def _labels(stored: Any) -> list[str | float | None]:
 def _said(stored: Any, names: Iterable[str]) -> dict[str, Any]:
     """The label and the rate among the attributes of a group or of a data set."""
     values = {
-        name: _single(stored.attrs[name])
-        for name in stored.attrs
-        if name.lower() in _NAMES or seconds_named(name) is not None
+        name: _single(stored.attrs[name]) for name in names if name.lower() in _NAMES or seconds_named(name) is not None
     }
     return {name: value for name, value in values.items() if value is not None}
 
@@ -133,9 +131,8 @@ class _Stored:
         self._stored, self.shape, self.dtype, self.unit, self.rate = stored, stored.shape, stored.dtype, unit, rate
         scale = {name: _single(stored.attrs[name]) for name in names if name in _SCALE}
         of_numbers = stored.dtype.names is None
-        self._scale = {
-            name: value for name, value in scale.items() if of_numbers and isinstance(value, float)
-        }  # of NWB
+        # Of NWB.
+        self._scale = {name: value for name, value in scale.items() if of_numbers and isinstance(value, float)}
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Any:
         return np.asarray(self[()], dtype)
