@@ -45,23 +45,24 @@ def test_names_and_units_that_differ_are_said(folder, command):
     assert unsaid == "The recordings do not say the unit of x, which is taken for that of the library"
 
 
+def _refusal(command, folder, heads):
+    """What the command says of a recording with these heads, on one line."""
+    _table(folder / "asked.csv", heads, 1.5)
+    _, out, err = run(command, folder / "asked.csv", "--library", folder / "actions")
+    return " ".join((out + err).split())
+
+
 @pytest.mark.parametrize("command", ["recognize", "annotate"])
 def test_other_kinds_are_refused(folder, command):
-    asked = folder / "asked.csv"
-    _table(asked, ("joint1", "joint2", "joint3"), 1.5)
-    _, out, err = run(command, asked, "--library", folder / "actions")
-    said = " ".join((out + err).split())
+    said = _refusal(command, folder, ("joint1", "joint2", "joint3"))
     assert "recorded as x [m] (position), y [m] (position), z [m] (position)" in said
     assert "got joint1 (angle)" in said
 
 
 @pytest.mark.parametrize("command", ["recognize", "annotate"])
 def test_other_names_are_refused_unless_columns_are_chosen_by_their_numbers(folder, command):
-    asked = folder / "asked.csv"
-    _table(asked, ("elbow [mm]", "wrist [mm]", "hip [mm]"), 1.5)
-    _, out, err = run(command, asked, "--library", folder / "actions")
-    said = " ".join((out + err).split())
+    said = _refusal(command, folder, ("elbow [mm]", "wrist [mm]", "hip [mm]"))
     assert " of the columns ['x [m]', 'y [m]', 'z [m]']" in said
     assert "got ['elbow [mm]', 'wrist [mm]', 'hip [mm]']" in said
-    told = answer(command, asked, "--library", folder / "actions", "--columns", "1,2,3")
+    told = answer(command, folder / "asked.csv", "--library", folder / "actions", "--columns", "1,2,3")
     assert "in mm in the recordings, x [m] in m" in told["notes"][0]

@@ -16,6 +16,7 @@ from kineme.movements.channels.detect import unit_of
 from kineme.movements.tables.columns import beside_positions
 from kineme.movements.tables.parsed import Detected, listed
 from kineme.movements.tables.time_stamps import words_of
+from kineme.output.text import first_names
 from kineme.units import unit_named
 
 #: Words in names of files that say which sensor of a device wrote x, y and z.
@@ -104,9 +105,8 @@ def notes_on_aside(detected: Iterable[Detected]) -> list[str]:
     named = [*dict.fromkeys(aside)]
     if not named:
         return []
-    more = f" and {len(named) - _NAMED} more" if len(named) > _NAMED else ""
     return [
-        f"left aside {', '.join(named[:_NAMED])}{more}, which are no positions but of positions that are read; say "
+        f"left aside {first_names(named, _NAMED)}, which are no positions but of positions that are read; say "
         "--columns with all that count to read them too"
     ]
 

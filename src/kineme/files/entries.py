@@ -12,6 +12,7 @@ from kineme.files.folders import as_text, files_under
 from kineme.files.formats import data_set_of
 from kineme.files.merge_files import Recordings
 from kineme.files.problem import Problem
+from kineme.output.text import first_names
 
 _NAMED = 3  # paths that a message names
 
@@ -96,8 +97,7 @@ def name_of(path: Path) -> Path:
 
 def in_words(paths: Sequence[Path]) -> str:
     """The paths for a message."""
-    more = f" and {len(paths) - _NAMED} more" if len(paths) > _NAMED else ""
-    return ", ".join(map(str, paths[:_NAMED])) + more
+    return first_names(paths, _NAMED)
 
 
 def _is_folder_of_files(path: Path) -> bool:

@@ -24,7 +24,7 @@ from kineme.movements.channels.detect import Given, find_channels
 from kineme.movements.tables.columns import column_numbers, excluded_numbers, numbers_by_name
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.parsed import Block, Detected, Parsed, Repair
-from kineme.output.text import counted
+from kineme.output.text import counted, first_names
 from kineme.validation import MIN_SAMPLES, Array
 
 #: A file, and where it was found.
@@ -141,12 +141,9 @@ def notes_on_clocks(files: Sequence[Placed]) -> tuple[str, ...]:
             folders.append(together)
     if not folders:
         return ()
-    more = f" and {len(folders[0]) - _NAMED} more" if len(folders[0]) > _NAMED else ""
     others = f", and so do files in {counted(len(folders) - 1, 'other folder')}" if len(folders) > 1 else ""
-    names = ", ".join(sorted(folders[0])[:_NAMED])
-    return (
-        f"{names}{more} lie on one clock{others}; --join-files, in Python join_files=True, makes one recording of them",
-    )
+    names = first_names(sorted(folders[0]), _NAMED)
+    return (f"{names} lie on one clock{others}; --join-files, in Python join_files=True, makes one recording of them",)
 
 
 def _folders(files: Sequence[Placed]) -> Mapping[Path, list[Placed]]:
@@ -283,9 +280,8 @@ def _values_at(at: Array, times: Array, columns: Array, channels: Channels) -> A
     for channel, where in zip(channels, columns_of(channels), strict=True):
         if channel.kind == "orientation":
             norms = np.interp(at, times, np.linalg.norm(columns[:, where], axis=1))  # what is no rotation stays none
-            values[:, where] = norms[:, None] * interpolated(
-                at, times, columns[:, where]
-            )  # great circles, of any order
+            turned = interpolated(at, times, columns[:, where])  # on great circles, whatever the order
+            values[:, where] = norms[:, None] * turned
         elif channel.kind == "discrete":
             values[:, where] = columns[before, where]
         else:

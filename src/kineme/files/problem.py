@@ -8,6 +8,7 @@ from shlex import quote
 from typing import NamedTuple
 
 from kineme.errors import DataError, KinemeError
+from kineme.output.text import first_names
 
 _SHOWN = 20  # columns that a sentence names
 
@@ -43,10 +44,9 @@ def note_on_missing(problems: Sequence[Problem]) -> list[str]:
         return []
     counts = Counter(name for one in lacking for name in one.missing)
     names = [name for name, _ in counts.most_common()]
-    shown = ", ".join(f"{name} in {counts[name]}" for name in names[:_SHOWN])
-    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+    shown = first_names([f"{name} in {counts[name]}" for name in names], _SHOWN)
     return [
-        f"{len(lacking)} movements were not read, since columns have no values for too long: {shown}{more}; leave them "
+        f"{len(lacking)} movements were not read, since columns have no values for too long: {shown}; leave them "
         f"out with --exclude {in_shell(names)}, say --columns, or fill longer gaps with --fill-gaps"
     ]
 

@@ -7,6 +7,7 @@ characters at all. All of them are escaped, as ``\x1b`` or ``\u202e``. Very long
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from html import escape
 from typing import Any
 
@@ -67,6 +68,11 @@ def in_markup(text: Any) -> str:
 def counted(number: int, noun: str, plural: str | None = None) -> str:
     """A number and its noun: ``1 movement``, ``2 movements``."""
     return f"{number:,} {noun if number == 1 else plural or noun + 's'}"
+
+
+def first_names(names: Sequence[Any], most: int) -> str:
+    """The first names of many, and how many more there are: ``a, b and 3 more``."""
+    return ", ".join(map(str, names[:most])) + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
 def _escape_character(mark: str) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 
 from kineme.movements.channels.channel import Channel
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.output.text import first_names
 from kineme.validation import Array
 
 _MORE = 10.0  # times the extent of all others
@@ -71,9 +72,8 @@ def _group(one: Channel) -> str:
 
 
 def _note(names: Sequence[str], here: float, there: float) -> str:
-    what = ", ".join(names[:_NAMED]) + (f" and {len(names) - _NAMED} more" if len(names) > _NAMED else "")
     spans, steps = ("spans", f", or say --kind {names[0]}=discrete") if len(names) == 1 else ("span", "")
     return (
-        f"{what} {spans} up to {here:.3g}, the other columns up to {there:.3g}, which hardly count in what is learned: "
-        f"bring all to similar sizes, or choose some with --columns{steps}"
+        f"{first_names(names, _NAMED)} {spans} up to {here:.3g}, the other columns up to {there:.3g}, which hardly "
+        f"count in what is learned: bring all to similar sizes, or choose some with --columns{steps}"
     )

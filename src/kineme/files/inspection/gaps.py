@@ -7,7 +7,7 @@ import numpy as np
 from kineme.files.inspection.sampling import sampling_of
 from kineme.files.merge_files import Recordings
 from kineme.files.problem import note_on_missing
-from kineme.output.text import counted
+from kineme.output.text import counted, first_names
 
 _NAMED = 6  # numbers that stand for no value in a note
 _RATES = (2.0, 20_000.0)  # usual sampling rates of people and robots [Hz]
@@ -18,8 +18,7 @@ def notes_on_gaps(recordings: Recordings) -> list[str]:
     """Say in one sentence each which numbers count as no value, what was filled and cropped, and which columns lack."""
     sources, notes = recordings.sources, []
     if sentinels := [*dict.fromkeys(one for how, _ in recordings.detected for one in how.sentinels)]:
-        more = f" and {len(sentinels) - _NAMED} more" if len(sentinels) > _NAMED else ""
-        notes.append(f"{', '.join(sentinels[:_NAMED])}{more} counts as no value, far from all others")
+        notes.append(f"{first_names(sentinels, _NAMED)} counts as no value, far from all others")
     if filled := [one for one in sources if one.filled]:
         samples, longest = sum(one.filled for one in filled), max(one.longest_gap for one in filled)
         notes.append(

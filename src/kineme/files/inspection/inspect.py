@@ -20,6 +20,7 @@ from kineme.movements.channels.coordinates import columns_of
 from kineme.movements.tables.parsed import Detected
 from kineme.movements.tables.time_stamps import GUESSED
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.output.text import first_names
 from kineme.validation import Array
 
 _MANY, _NAMED = 7, 12  # columns from which on still ones are counted; channels that a note names
@@ -185,6 +186,5 @@ def _notes_on_still_columns(demos: Demonstrations) -> list[str]:
     ]
     if not quiet:
         return []
-    more = f" and {len(quiet) - _NAMED} more" if len(quiet) > _NAMED else ""
-    named = f"{', '.join(quiet[:_NAMED])}{more}"
+    named = first_names(quiet, _NAMED)
     return [f"{len(quiet)} of {len(demos.channels or ())} channels never move: {named}; --exclude leaves them out"]

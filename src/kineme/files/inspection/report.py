@@ -11,7 +11,7 @@ from kineme.movements.channels.channel import Channel, Channels
 from kineme.movements.channels.coordinates import lever_of
 from kineme.movements.tables.parsed import Detected
 from kineme.output.table import Table, to_text
-from kineme.output.text import counted, printable
+from kineme.output.text import counted, first_names, printable
 
 _SHOWN = 20  # lines of a list; the rest is counted
 _COLUMNS, _CHANNELS, _FILES = 24, 12, 3  # names in a line
@@ -67,13 +67,9 @@ def _once(problems: Sequence[Problem]) -> list[str]:
     for problem in problems:
         files.setdefault(problem.what, {})[problem.file] = None
     return [
-        f"{_names([*names], _FILES)}{', ' if what.startswith('line ') else ': '}{what}" for what, names in files.items()
+        f"{first_names([*names], _FILES)}{', ' if what.startswith('line ') else ': '}{what}"
+        for what, names in files.items()
     ]
-
-
-def _names(names: Sequence[str], most: int) -> str:
-    """The first names of many."""
-    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
 def _row(one: LabelSummary) -> tuple[str, ...]:
@@ -99,7 +95,7 @@ def _kinds(channels: Channels) -> list[str]:
     names: dict[str, list[str]] = {}
     for one, kind in others:
         names.setdefault(kind, []).append(one.name)
-    return [f"{_names(alike, _CHANNELS)}: {kind}" for kind, alike in names.items()]
+    return [f"{first_names(alike, _CHANNELS)}: {kind}" for kind, alike in names.items()]
 
 
 def _kind(channel: Channel, lever: float) -> str:
@@ -122,7 +118,7 @@ def _understood(how: Detected) -> str:
         ("left aside", how.ignored),
     ):
         if named := [column for column in columns if column]:
-            parts.append(f"{what} {_names(named, _COLUMNS)}")
+            parts.append(f"{what} {first_names(named, _COLUMNS)}")
     return "; ".join(parts)
 
 
@@ -130,6 +126,6 @@ def _coordinates(how: Detected) -> str:
     """The coordinates with their units, once if they have the same."""
     known = set(how.measured_in)
     if len(known) == 1:
-        return f"{_names(how.columns, _COLUMNS)} in {known.pop()}"
+        return f"{first_names(how.columns, _COLUMNS)} in {known.pop()}"
     named = zip(how.columns, how.measured_in or [""] * len(how.columns), strict=True)
-    return _names([f"{name} [{unit}]" if unit else name for name, unit in named], _COLUMNS)
+    return first_names([f"{name} [{unit}]" if unit else name for name, unit in named], _COLUMNS)

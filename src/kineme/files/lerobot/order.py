@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from kineme.files.lerobot.episodes import Episodes
 from kineme.files.lerobot.shards import Frames
-from kineme.output.text import counted
+from kineme.output.text import counted, first_names
 
 _SHOWN = 5  # numbers of episodes in one message
 
@@ -48,8 +48,7 @@ def episode_names(numbers: Sequence[int]) -> str:
     """Numbers of episodes for a message; the first and the last of many in a row."""
     if len(numbers) > 2 and numbers[-1] - numbers[0] == len(numbers) - 1:
         return f"episodes {numbers[0]} to {numbers[-1]}"
-    more = f" and {len(numbers) - _SHOWN} more" if len(numbers) > _SHOWN else ""
-    return f"{'episode' if len(numbers) == 1 else 'episodes'} {', '.join(map(str, numbers[:_SHOWN]))}{more}"
+    return f"{'episode' if len(numbers) == 1 else 'episodes'} {first_names(numbers, _SHOWN)}"
 
 
 def _divided(numbers: NDArray[np.int64]) -> dict[int, str]:

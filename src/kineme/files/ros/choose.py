@@ -14,7 +14,7 @@ from kineme.files.ros.message_types import TRANSFORMS, TYPES
 from kineme.files.ros.number_fields import number_fields
 from kineme.files.ros.topic_columns import fitting_topics
 from kineme.movements.tables.layout import Known, Layout
-from kineme.output.text import counted
+from kineme.output.text import counted, first_names
 from kineme.validation import MIN_SAMPLES
 
 _SHOWN = 20  # topics in a message
@@ -112,9 +112,8 @@ def listed_topics(topics: Sequence[Topic]) -> str:
     """Topics with their types and numbers of messages, for a message."""
     if not topics:
         return "none"
-    shown = [f"{one.name} ({one.type}, {counted(one.n_messages, 'message')})" for one in topics[:_SHOWN]]
-    more = f" and {len(topics) - _SHOWN} more" if len(topics) > _SHOWN else ""
-    return f"{', '.join(shown)}{more}"
+    shown = [f"{one.name} ({one.type}, {counted(one.n_messages, 'message')})" for one in topics]
+    return first_names(shown, _SHOWN)
 
 
 def pair_of(text: str) -> Edge:
@@ -149,9 +148,8 @@ def _only_frames(bag: Bag, transforms: Sequence[Topic]) -> Edge:
     edges = connected_graph(bag, transforms, (), FRAMES_LOOKED_AT).edges
     if len(edges) == 1:
         return edges[0]
-    pairs = ", ".join(f"{parent}:{child}" for parent, child in edges[:_SHOWN])
-    more = f" and {len(edges) - _SHOWN} more" if len(edges) > _SHOWN else ""
+    pairs = first_names([f"{parent}:{child}" for parent, child in edges], _SHOWN)
     raise DataError(
-        f"expected two frames, got the transforms {pairs or 'of none'}{more}; say which with frame=, in the shell "
+        f"expected two frames, got the transforms {pairs or 'of none'}; say which with frame=, in the shell "
         "--frame parent:child, for any two frames that are connected"
     )
