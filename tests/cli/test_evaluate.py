@@ -58,6 +58,29 @@ def test_protocols_splits_shots_and_seed_are_heard(folder, tmp_path):
     assert len(content["protocols"]["few-shot"]["euclidean"]["2 shots"]["accuracy"]["by_split"]) == 3
 
 
+def test_recordings_without_times_are_evaluated_with_the_step_between_samples(tmp_path, make_movement):
+    table = ["label,frame,x,y"]
+    for k, label in enumerate(("wave", "point")):
+        (tmp_path / "read" / label).mkdir(parents=True)
+        for i in range(3):
+            _, x = make_movement([k, i], n_samples=30)
+            rows = [f"{frame},{a},{b}" for frame, (a, b) in enumerate(x.tolist())]
+            (tmp_path / "read" / label / f"{i}.csv").write_text("\n".join(["frame,x,y", *rows]))
+            table += [f"{label},{row}" for row in rows]
+    (tmp_path / "one.csv").write_text("\n".join(table))
+    how = ("--protocol", "few-shot", "--method", "euclidean", "--jobs", 1, "--quick", "--out", tmp_path / "out")
+    refused = run(tmp_path / "read", *how)
+    assert refused.returncode == 1
+    assert "--units" in refused.stderr
+    done = run(tmp_path / "read", *how, "--units", 0.01)
+    assert done.returncode == 0, done.stderr
+    one = run(tmp_path / "one.csv", *how, "--units", 0.01, "--every", 30)
+    assert one.returncode == 0, one.stderr
+    alone = run("lasa", *how, "--units", "ms")
+    assert alone.returncode == 2
+    assert "expected --units with recordings, got it with lasa alone" in alone.stderr
+
+
 def test_data_that_are_not_there_are_one_line_and_exit_status_1(tmp_path):
     done = run(tmp_path / "nothing", "--out", tmp_path / "out", by=commands.start)
     assert done.returncode == 1

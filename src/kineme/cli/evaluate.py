@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
-from kineme.cli.options import whole
+from kineme.cli.options import GroupedCommand, whole
 from kineme.cli.output import write
+from kineme.cli.reading import LAYOUT_OPTIONS, layout_options, read
 
 # The names of the tables in kineme.experiments.evaluation, written out so that --help loads nothing; a test compares
 # them.
@@ -23,7 +26,7 @@ METHOD_NAMES = (
 _QUICK_SPLITS, _QUICK_SHOTS, _SLOW = 2, (1, 3), {"gak-svm", "hmm", "dtw-path"}
 
 
-@click.command(short_help="Compare recognizers on data sets.")
+@click.command(cls=GroupedCommand, short_help="Compare recognizers on data sets.")
 @click.argument("data", nargs=-1, required=True)
 @click.option("--protocol", "protocols", multiple=True, type=click.Choice(PROTOCOL_NAMES),
               help="Protocol; may be repeated.  [default: from user-dependent on where people are known; else those "
@@ -46,6 +49,7 @@ _QUICK_SPLITS, _QUICK_SHOTS, _SLOW = 2, (1, 3), {"gak-svm", "hmm", "dtw-path"}
 @click.option(
     "--quick", is_flag=True, help="At most two splits, one and three shots, without gak-svm, hmm and dtw-path."
 )
+@layout_options
 def evaluate(data: tuple[str, ...], protocols: tuple[str, ...], methods: tuple[str, ...], **options: Any) -> None:
     """Evaluate recognition on DATA: lasa, lasa-letters, a folder of recordings, or a file.
 
@@ -67,7 +71,9 @@ def evaluate(data: tuple[str, ...], protocols: tuple[str, ...], methods: tuple[s
     contenders = methods or tuple(name for name in METHODS if not (quick and name in _SLOW))
     splits = min(options["splits"], _QUICK_SPLITS) if quick else options["splits"]
     settings = Settings(splits, options["seed"], tuple(options["shots"]) or (_QUICK_SHOTS if quick else ()))
-    sets = _numbered([load_data(one) for one in data])
+    _check_read(data)
+    reading = partial(read, options={name: options[name] for name in LAYOUT_OPTIONS})
+    sets = _numbered([load_data(one, reading) for one in data])
     for name, reason in ((name, reason) for one in sets for name, reason in one.left_out.items()):
         write(f"left out {name}: {reason}", err=True)
     runner = Runner(options["jobs"] or n_threads(), _progress)
@@ -77,6 +83,17 @@ def evaluate(data: tuple[str, ...], protocols: tuple[str, ...], methods: tuple[s
         evaluations.append(run(one, (asked, contenders), settings, out / one.name if len(sets) > 1 else out, runner))
         _print(one.name if len(sets) > 1 else "", evaluations[-1])
     _print_summary(summarize([one.name for one in sets], evaluations, out), evaluations[0].files[0])
+
+
+def _check_read(data: tuple[str, ...]) -> None:
+    """Refuse options that say how recordings are read where all data are packaged."""
+    from kineme.experiments.evaluation.data import PACKAGED
+
+    context = click.get_current_context()
+    for option in context.command.params:
+        is_given = context.get_parameter_source(option.name or "") == ParameterSource.COMMANDLINE
+        if is_given and option.name in LAYOUT_OPTIONS and {*data} <= {*PACKAGED}:
+            raise click.UsageError(f"expected {option.opts[0]} with recordings, got it with {', '.join(data)} alone")
 
 
 def _numbered(sets: list[Any]) -> list[Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from kineme.datasets.lasa import LASA_26, PAPER_LETTERS, load_lasa
 from kineme.errors import DataError
+from kineme.files.merge_files import Recordings
 from kineme.files.people import people_of
 from kineme.files.recordings import read_recordings
 from kineme.movements.trajectories.demonstrations import Demonstrations
@@ -40,11 +42,12 @@ class DataSet(NamedTuple):
     people: NDArray[Any] | None = None
 
 
-def load_data(data: str) -> DataSet:
+def load_data(data: str, read_path: Callable[[Path], Recordings] = read_recordings) -> DataSet:
     """A packaged data set by its name, or recordings with labels: a folder per label, a column, or an array of labels.
 
     People are read as `kineme.files.people` says. What cannot be read, a movement of other dimensions
     than most, a movement without a label, and the only movement of a class are left out, and the reason is kept.
+    `read_path` reads the recordings.
 
     Raises
     ------
@@ -56,7 +59,7 @@ def load_data(data: str) -> DataSet:
     path = Path(data)
     if not path.exists():
         raise DataError(f"expected {', '.join(PACKAGED)}, a folder or a file, found nothing at {data!r}")
-    read = read_recordings(data)
+    read = read_path(path)
     left_out: dict[str, str] = {}
     for problem in read.problems:
         before = left_out.get(problem.file)
