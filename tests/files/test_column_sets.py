@@ -5,10 +5,17 @@ from __future__ import annotations
 import json
 
 import numpy as np
+import pandas
 import pytest
+import scipy.io
 
 import kineme
 from kineme.files.inspection.inspect import inspect
+from kineme.files.name_rule import NameRule
+from kineme.files.recordings import read_paths
+from kineme.library.recognition.known_sources import known_sources
+from kineme.movements.channels.detect import name_of
+from kineme.movements.tables.layout import Layout
 
 N = 30
 T = np.linspace(0.0, 1.0, N)
@@ -99,6 +106,93 @@ def test_files_of_other_columns_are_left_out_and_said(tmp_path, heads, reason):
     (problem,) = recordings.problems
     assert problem.file == "other.csv"
     assert reason in problem.reason
+
+
+def _frame(heads):
+    columns = PATH * [1000.0, 1.0, 1000.0]  # x and z in mm, y in m
+    return dict(zip(["t", *heads], [T, *columns.T], strict=True))
+
+
+def _write_units_row(path):
+    rows = ["t,x,y,z", "s,mm,m,mm", *(",".join(map(repr, row)) for row in zip(*_frame("xyz").values(), strict=True))]
+    path.write_text("\n".join(rows).replace("np.float64(", "").replace(")", ""))
+
+
+def _write_attributes(path):
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        for name, values in _frame("xyz").items():
+            file[name] = values
+            file[name].attrs["units"] = {"t": "s", "y": "m"}.get(name, "mm")
+
+
+def _write_parquet(path):
+    pytest.importorskip("pyarrow")
+    pandas.DataFrame(_frame(["x [mm]", "y [m]", "z [mm]"])).to_parquet(path)
+
+
+IN_WORDS = ["x_mm", "y_m", "z_mm"]
+SEVERAL_UNITS = {
+    "a.csv": lambda path: pandas.DataFrame(_frame(IN_WORDS)).to_csv(path, index=False),
+    "b.csv": lambda path: pandas.DataFrame(_frame(["x [mm]", "y (Meters)", "z [mm]"])).to_csv(path, index=False),
+    "c.csv": _write_units_row,
+    "d.json": lambda path: pandas.DataFrame(_frame(IN_WORDS)).to_json(path, double_precision=15),
+    "e.npz": lambda path: np.savez(path, **_frame(IN_WORDS)),
+    "f.mat": lambda path: scipy.io.savemat(path, _frame(IN_WORDS)),
+    "g.h5": _write_attributes,
+    "h.parquet": _write_parquet,
+}
+
+
+@pytest.mark.parametrize("name", SEVERAL_UNITS)
+def test_columns_of_one_file_in_several_units_are_in_that_of_most(tmp_path, name):
+    SEVERAL_UNITS[name](tmp_path / name)
+    recordings = kineme.read_recordings(tmp_path)
+    demos = recordings.demonstrations
+    np.testing.assert_allclose(demos[0].positions, 1000 * PATH, rtol=1e-12)
+    assert {one.unit for one in demos.channels} == {"mm"}
+    assert [name_of(one.name) for one in demos.channels] == ["x", "y", "z"]
+    (note,) = (note for note in inspect(recordings).notes if "converted" in note)
+    assert note.startswith("units are converted to those of most columns: y")
+
+
+def test_angles_and_speeds_of_one_file_have_one_unit_and_ranges_keep_theirs(tmp_path):
+    heads = ["j1 [deg]", "j2 [rad]", "j3 [deg]", "u [m/s]", "w [mm/s]", "gripper [%]", "thumb [-100..100]"]
+    table(tmp_path / "a.csv", heads, np.column_stack([T] * 7))
+    demos = kineme.read_recordings(tmp_path).demonstrations
+    np.testing.assert_allclose(demos[0].positions[-1], [1, 180 / np.pi, 1, 1, 0.001, 1, 1])
+    assert demos.dimensions == (heads[0], "j2 [deg]", *heads[2:4], "w [m/s]", *heads[5:])
+
+
+def test_data_frames_of_several_units_are_converted_with_a_warning():
+    with pytest.warns(UserWarning, match=r"units are converted to those of most columns: y_m as y \[mm\]"):
+        demos = kineme.Demonstrations.from_dataframe(pandas.DataFrame(_frame(IN_WORDS)))
+    np.testing.assert_allclose(demos[0].positions, 1000 * PATH, rtol=1e-12)
+
+
+def test_one_column_in_two_units_is_refused_and_kinds_are_said_by_the_heads_of_the_file(tmp_path):
+    table(tmp_path / "twice.csv", ["x_mm", "y_mm", "x_m"], PATH)
+    with pytest.raises(kineme.DataError, match=r"got \['x_mm', 'x_m'\], which are one in several units.*--exclude"):
+        kineme.read_recordings(tmp_path)
+    recordings = kineme.read_recordings(tmp_path, exclude="x_mm")
+    assert recordings.demonstrations.dimensions == ("y_mm", "x [mm]")
+    table(tmp_path / "twice.csv", IN_WORDS, PATH)
+    recordings = kineme.read_recordings(tmp_path, kinds={"y_m": "discrete"})
+    assert recordings.demonstrations.channels[1][:2] == ("y [mm]", "discrete")
+
+
+def test_a_library_of_converted_columns_recognizes_files_that_have_more(tmp_path):
+    for k, label in enumerate("ab"):
+        table(tmp_path / label / "0.csv", IN_WORDS, (1 + k) * PATH[:, [0, 1, 2][:: 1 - 2 * k]])
+    with kineme.ActionLibrary(tmp_path / "actions", create=True) as library:
+        library.learn(kineme.read_recordings([tmp_path / "a", tmp_path / "b"]).demonstrations)
+        known = known_sources(library.store)
+    assert known.columns == ("x_mm", "y [mm]", "z_mm")
+    table(tmp_path / "asked.csv", [*IN_WORDS, "volt"], np.column_stack([PATH, T]))
+    recordings = read_paths([tmp_path / "asked.csv"], Layout(known=known), NameRule())
+    assert recordings.demonstrations.dimensions == known.columns
+    assert recordings.demonstrations[0].positions[-1, 1] == pytest.approx(1000.0)
 
 
 def test_an_unknown_unit_that_all_files_have_is_kept_as_text(tmp_path):

@@ -99,7 +99,7 @@ def test_quaternions_in_two_orders_are_read_in_that_of_most_files(tmp_path):
 
 def test_plain_columns_in_two_orders_are_told_apart_by_their_names(tmp_path):
     u = np.linspace(0, 1, N)
-    for k, heads in enumerate(("x [m],y [mm]", "y [mm],x [m]")):
+    for k, heads in enumerate(("x [m],y [m]", "y [m],x [m]")):
         columns = np.column_stack([u, 5 * u**2])[:, [0, 1] if k == 0 else [1, 0]]
         np.savetxt(
             tmp_path / f"{k}.csv", np.column_stack([u, columns]), delimiter=",", header=f"t,{heads}", comments=""
@@ -107,7 +107,7 @@ def test_plain_columns_in_two_orders_are_told_apart_by_their_names(tmp_path):
     recordings = kineme.read_recordings(tmp_path)
     demos = recordings.demonstrations
     np.testing.assert_allclose(demos[0].positions, demos[1].positions)
-    assert [(one.name, one.unit) for one in demos.channels] == [("x [m]", "m"), ("y [mm]", "mm")]
+    assert [(one.name, one.unit) for one in demos.channels] == [("x [m]", "m"), ("y [m]", "m")]
 
 
 @pytest.mark.parametrize("first", ["continuous", "switched"])

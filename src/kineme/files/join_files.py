@@ -18,10 +18,11 @@ from kineme.files.read_file import FileRead
 from kineme.files.ros.rotations import interpolated
 from kineme.files.select_columns import select_columns
 from kineme.movements.channels.channel import Channels, recorded_names
-from kineme.movements.channels.column_match import Columns
+from kineme.movements.channels.column_match import Columns, numbers_by_name
 from kineme.movements.channels.coordinates import canonical, columns_of, in_order, off_norm
 from kineme.movements.channels.detect import Given, find_channels
-from kineme.movements.tables.columns import column_numbers, excluded_numbers, numbers_by_name
+from kineme.movements.channels.one_unit import in_one_unit
+from kineme.movements.tables.columns import column_numbers, excluded_numbers
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.parsed import Block, Detected, Parsed, Repair
 from kineme.output.text import counted, first_names
@@ -231,6 +232,7 @@ def _joined(members: Sequence[Placed], together: Sequence[str], given: Given) ->
         " and ".join(dict.fromkeys(read.detected.format for read in reads if read.detected)),
         f"{len(reads)} files on one clock", heads, detected.time, detected.units, detected.units_from,
         ignored=ignored, measured_in=units if any(units) else (),
+        converted=tuple(text for read in reads if read.detected for text in read.detected.converted),
     )  # fmt: skip
     repairs = [repair for read in reads for repair in (read.block and read.block.repairs) or ()]
     repair = Repair(
@@ -240,6 +242,7 @@ def _joined(members: Sequence[Placed], together: Sequence[str], given: Given) ->
     labels = {read.block.labels[0] for read in reads if read.block} - {as_text(entry.relative.parent.name), None}
     label = labels.pop() if len(labels) == 1 else as_text(place.relative.parent.name) or None
     block = Block(np.hstack([part[3] for part in parts]), at, np.array([0, len(at)]), [label], [""], repairs=[repair])
+    how, block = in_one_unit(how, block)
     return common._replace(detected=how, block=block), place
 
 

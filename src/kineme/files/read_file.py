@@ -22,6 +22,7 @@ from kineme.files.gaps import sentinels_as_missing
 from kineme.files.limits import check_expanded
 from kineme.files.problem import Problem
 from kineme.files.select_columns import select_columns
+from kineme.movements.channels.one_unit import in_one_unit
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.parsed import Block, Detected, Parsed
 
@@ -118,7 +119,7 @@ def _parsed(parse: Callable[[Layout], Parsed], form: Format, relative: Path, lay
             parsed = select_columns(parse, layout)
             detected, block, left_out = parsed if layout.every is None else in_blocks(parsed, layout.every)
             block, sentinels = sentinels_as_missing(block, detected.columns)
-            detected = detected._replace(sentinels=sentinels)
+            detected, block = in_one_unit(detected._replace(sentinels=sentinels), block)
             block, problems = check_block(block, name, layout, detected.columns)
     except _UNREADABLE as error:
         return FileRead(name, "", 0, 0.0, None, None, [Problem(name, None, _plainly(error))])

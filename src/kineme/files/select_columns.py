@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from kineme.errors import DataError, KinemeError
+from kineme.movements.channels.column_match import numbers_by_name
 from kineme.movements.channels.detect import unit_of
-from kineme.movements.tables.columns import excluded_numbers, numbers_by_name
+from kineme.movements.tables.columns import excluded_numbers
 from kineme.movements.tables.layout import Known, Layout
 from kineme.movements.tables.parsed import Parsed, listed
 
@@ -38,6 +39,9 @@ def select_columns(parse: Callable[[Layout], Parsed], layout: Layout) -> Parsed:
     heads = parsed.detected.columns
     places = numbers_by_name(heads, names)
     lost = [name for name, place in zip(names, places, strict=True) if place is None]
+    if names and not lost and len(names) < len(heads):  # in other units, which their heads end in
+        chosen = tuple(heads[place] for place in places if place is not None)
+        return _kept(parse(replace(layout, columns=chosen)), layout)
     if 0 < len(lost) < len(names) != len(heads):
         raise DataError(
             f"expected the columns of the library, got none of {listed(lost)} but {listed(heads)}; record them too, or "

@@ -15,10 +15,12 @@ _PAUSE = 1.0  # s without samples from which on a movement may be several
 
 
 def notes_on_gaps(recordings: Recordings) -> list[str]:
-    """Say in one sentence each which numbers count as no value, what was filled and cropped, and which columns lack."""
+    """Say which numbers count as no value, what is converted, what was filled and cropped, what lacks values."""
     sources, notes = recordings.sources, []
     if sentinels := [*dict.fromkeys(one for how, _ in recordings.detected for one in how.sentinels)]:
         notes.append(f"{first_names(sentinels, _NAMED)} counts as no value, far from all others")
+    if converted := [*dict.fromkeys(one for how, _ in recordings.detected for one in how.converted)]:
+        notes.append(f"units are converted to those of most columns: {first_names(converted, _NAMED)}")
     if filled := [one for one in sources if one.filled]:
         samples, longest = sum(one.filled for one in filled), max(one.longest_gap for one in filled)
         notes.append(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -118,6 +119,17 @@ def columns_like(positions: Array, ours: Columns, wanted: Columns, known_units: 
             result = np.array(result) if result is positions else result
             result[:, k] = converted(result[:, k], *sizes)
     return result
+
+
+def numbers_by_name(heads: Sequence[str], names: Sequence[str]) -> list[int | None]:
+    """The column of each name, with or without its unit, whatever that is; None where none or several have it."""
+    exact: dict[str, list[int]] = {}
+    bare: dict[str, list[int]] = {}
+    for k, head in enumerate(heads):
+        exact.setdefault(head, []).append(k)
+        bare.setdefault(name_of(head).lower(), []).append(k)
+    same = [exact.get(name) or bare.get(name_of(name).lower(), []) for name in names]
+    return [several[0] if len(several) == 1 else None for several in same]
 
 
 def conversion(head: str, ours: str | None, wanted: str | None, known_units: bool) -> tuple[Unit, Unit] | None:

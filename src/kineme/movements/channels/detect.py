@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +56,8 @@ _UNIT_WORDS = {
 }
 
 
+#: A coordinate in meters, ``hand_x_m``; an m elsewhere is too often something else.
+_IN_METERS = re.compile(r"(?:.*[\W_])?[xyz][_ ]m", re.IGNORECASE)
 _UNIT_WORD = re.compile(rf"[\W_]*(?<![a-z])({'|'.join(_UNIT_WORDS)})(?![a-z])", re.IGNORECASE)
 
 
@@ -111,6 +114,8 @@ def unit_of(head: str) -> str | None:
     if bracketed is not None:
         return bracketed
     words = words_of(head)
+    if _IN_METERS.fullmatch(head):
+        return "m"
     return None if _PER_TIME & {*words} else next((_UNIT_WORDS[one] for one in words if one in _UNIT_WORDS), None)
 
 
@@ -119,6 +124,8 @@ def name_of(head: str) -> str:
     stem, bracketed = split_head(head)
     if bracketed is not None or unit_of(head) is None:
         return stem.strip()
+    if _IN_METERS.fullmatch(head):
+        return head[:-2]
     return _UNIT_WORD.sub("", head).strip("_. -") or head
 
 
@@ -149,12 +156,12 @@ def _columns_named(heads: Sequence[str], key: str) -> list[int]:
     """The columns that a key names: a head, several separated by commas, or what several begin with before a dot."""
     if key in heads:
         return [list(heads).index(key)]
-    try:
-        return [*column_numbers(heads, [name.strip() for name in key.split(",")])]
-    except DataError as error:
-        raise SpecificationError(
-            f"expected the kind of a column that is read, got {key!r}; read are {listed(heads)}"
-        ) from error
+    names = [name.strip() for name in key.split(",")]
+    bare = [*map(name_of, heads)], [*map(name_of, names)]  # a converted column ends in another unit
+    for ours, theirs in ((heads, names), bare):
+        with suppress(DataError):
+            return [*column_numbers(ours, theirs)]
+    raise SpecificationError(f"expected the kind of a column that is read, got {key!r}; read are {listed(heads)}")
 
 
 def _kind(head: str, unit: str | None, values: Array, offsets: NDArray[np.intp], is_joint: bool) -> str:

@@ -173,13 +173,6 @@ def excluded_numbers(heads: Sequence[str], columns: Sequence[Column]) -> set[int
     return numbers
 
 
-def numbers_by_name(heads: Sequence[str], names: Sequence[str]) -> list[int | None]:
-    """The column of each name, with or without its unit; None where none or several have it."""
-    exact, plain = _places(heads), _places(map(_plain, heads))
-    same = [exact.get(name) or plain.get(_plain(name), []) for name in names]
-    return [places[0] if len(places) == 1 else None for places in same]
-
-
 def _matching(heads: Sequence[str], pattern: str) -> list[int]:
     """The columns whose heads match, with or without their units; brackets stand for themselves."""
     literal = pattern.replace("[", "[[]")

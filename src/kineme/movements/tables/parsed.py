@@ -42,6 +42,8 @@ class Detected(NamedTuple):
         Whether the file names the coordinates.
     sentinels : tuple of str
         Numbers that stand for no value, each with its column: ``-9999 in x``.
+    converted : tuple of str
+        Columns that are in another unit than in the file: ``y_m as y [mm]``.
     """
 
     format: str
@@ -57,6 +59,7 @@ class Detected(NamedTuple):
     person: tuple[str, ...] = ()
     named: bool = True
     sentinels: tuple[str, ...] = ()
+    converted: tuple[str, ...] = ()
 
 
 class Repair(NamedTuple):

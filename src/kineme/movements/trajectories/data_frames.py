@@ -6,16 +6,17 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from kineme.errors import DataError, TrajectoryError
+from kineme.errors import DataError, TrajectoryError, warn
 from kineme.movements.channels.coordinates import in_order
 from kineme.movements.channels.detect import find_channels
+from kineme.movements.channels.one_unit import in_one_unit
+from kineme.movements.tables.parsed import Parsed
 from kineme.movements.trajectories.channels import of_channels
 from kineme.movements.trajectories.collect import collect_arrays
 from kineme.movements.trajectories.movements import Movements
 
 if TYPE_CHECKING:
     from kineme.movements.tables.layout import Layout
-    from kineme.movements.tables.parsed import Parsed
 
 
 def is_data_frame(value: Any) -> bool:
@@ -69,6 +70,11 @@ def _parse(frame: Any, i: int, layout: Layout) -> Parsed:
     if not is_data_frame(frame):
         raise TrajectoryError(f"expected data frames, got {type(frame).__name__} at index {i}; pass them one by one")
     try:
-        return parse_data_frame(frame, layout)
+        detected, block, left_out = parse_data_frame(frame, layout)
+        detected, block = in_one_unit(detected, block)
     except DataError as error:
         raise TrajectoryError(f"data frame {i}: {error} (of Demonstrations.from_dataframe)") from error
+    if detected.converted:
+        said = f"units are converted to those of most columns: {', '.join(detected.converted)}"
+        warn(f"data frame {i}: {said}", UserWarning, 2)
+    return Parsed(detected, block, left_out)
