@@ -401,6 +401,34 @@ def test_marks_between_thousands_are_no_decimal_marks(mark):
     np.testing.assert_allclose(read(text).demonstrations[0].positions[:, 0], (x / 1000).round(3))
 
 
+@pytest.mark.parametrize(
+    ("separator", "cells", "got"),
+    [
+        (",", ["0.5", '"1,{}.25"', "7.25"], "'1,000.25'"),
+        (",", ["0.5", '"1,{}"', "7.25"], "'1,000'"),
+        (",", ["0.5", "1'{}.25", "7.25"], '"1\'000.25"'),
+        (",", ["0.5", "1_{}.25", "7.25"], "'1_000.25'"),
+        (";", ["0.5", "1,{}.25", "7.25"], "'1,000.25'"),
+        (";", ["0,5", "1.{},25", "7,25"], "'1.000,25'"),
+        (";", ["0,5", "1 {},25", "7,25"], "'1 000,25'"),
+        (";", ["0,5", "1\u202f{},25", "7,25"], r"'1\\u202f000,25'"),
+        (";", ["0,5", "1.{}", "7,25"], "'1.000' beside"),
+        ("\t", ["0.5", "1,{}", "7.25"], "'1,000' beside"),
+        (";", ["0.5", "1,000,{}", "7.25"], "'1,000,000'"),
+    ],
+)
+def test_columns_of_thousands_alone_are_refused_and_never_left_aside(separator, cells, got):
+    """The other column could be read alone: nothing would say that x was lost."""
+    rows = [
+        separator.join([f"{k}{cells[0][1:]}", cells[1].format(f"{k * 37:03d}"), f"{k}{cells[2][1:]}"])
+        for k in range(20)
+    ]
+    text = "\n".join([separator.join(["t", "x", "y"]), *rows])
+    with pytest.raises(kineme.DataError, match=rf"'x'.* without marks between thousands, got {got}"):
+        read(text)
+    assert read(text, exclude="x").demonstrations.dimensions == ("y",)
+
+
 @pytest.mark.parametrize("names", [["scorer", "bodyparts", "coords"], [None, None]])
 def test_several_lines_of_heads_are_one(tmp_path, names):
     """As pandas writes columns of several levels, and DeepLabCut the points of a body."""

@@ -28,6 +28,11 @@ _MISSING = frozenset({"", "na", "n/a", "#n/a", "<na>", "null", "none"})  # as R,
 _STAMP = re.compile(r"\d+([:/.-])\d+\1\d+")  # digits of a date or of a time of day
 _SEPARATOR_LINE = re.compile(r'"?sep=.{0,2}', re.IGNORECASE)
 COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
+#: A number whose marks lie between thousands for certain: 1,234.5 and 1.234,5 and 1 234,5 and 1'234 and 1,234,567.
+_THOUSANDS = re.compile(
+    r"[-+]?[1-9]\d{0,2}((,\d{3})+\.\d*|(\.\d{3})+,\d*|(,\d{3}){2,}|(\.\d{3}){2,}"
+    r"|([ '\u2019\xa0\u202f_]\d{3})+([.,]\d*)?)"
+)
 _COMMA_NUMBERS = re.compile(rf"\s*{COMMA_NUMBER.pattern}(\s+{COMMA_NUMBER.pattern})+\s*")  # between blanks
 
 
@@ -242,6 +247,16 @@ def is_number(cell: str, comma: bool) -> bool:
     return bool(_NUMBER.fullmatch(cell) or (comma and COMMA_NUMBER.fullmatch(cell)))
 
 
+def marks_within(cell: str) -> str:
+    """How a number is to be written that nobody can read for its marks; empty where a cell is no such number.
+
+    Those between thousands would have to be told from decimal marks anew in each column.
+    """
+    if _THOUSANDS.fullmatch(cell):
+        return " without marks between thousands"
+    return " with a decimal point, without marks between thousands" if COMMA_NUMBER.fullmatch(cell) else ""
+
+
 def _is_sample(cells: Sequence[list[str]], comma: bool) -> bool:
     """Whether the first line holds a sample, not heads: it has as many numbers as the next, and at least one."""
     counts = [sum(is_number(cell, comma) for cell in row) for row in cells[:2]]
@@ -266,4 +281,5 @@ def _kind(cells: Sequence[str], comma: bool) -> str:
     filled = [cell for cell in cells if not is_missing(cell)] or [cell for cell in cells if cell.lower() == "none"]
     if filled and all(map(is_date, filled)):
         return "date"
-    return "number" if 2 * sum(is_number(cell, comma) for cell in filled) >= len(filled) else "text"
+    n_numbers = sum(is_number(cell, comma) or bool(marks_within(cell)) for cell in filled)
+    return "number" if 2 * n_numbers >= len(filled) else "text"

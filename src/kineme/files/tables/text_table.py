@@ -15,7 +15,7 @@ import numpy as np
 from kineme.errors import DataError
 from kineme.files.limits import check_expanded
 from kineme.files.motion_capture.export_heads import ExportHead
-from kineme.files.tables.dialect import COMMENTS, LONGEST, Dialect, detect_dialect, split
+from kineme.files.tables.dialect import COMMENTS, LONGEST, Dialect, detect_dialect, is_missing, marks_within, split
 from kineme.files.tables.exports import export_head, export_table, with_times
 from kineme.files.tables.tolerant_table import quotes_are_plain, read_slowly, try_rows
 from kineme.movements.tables.columns import Roles, choose_roles
@@ -62,7 +62,11 @@ def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
     columns = [rows[name] for name in rows.dtype.names or ()]
     if long := [k for k in roles.positions if (np.abs(columns[k]) >= _EXACT_TO).any()]:
         faults |= _rounded(_samples(data, encoding, dialect), dialect, long)
+    if unread := [k for k in roles.positions if np.isnan(columns[k]).all()]:
+        _check_written(_samples(data, encoding, dialect), dialect, unread)
     if dialect.separator != ",":
+        if b"." in data and b"," in data and (grouped := [k for k in roles.positions if _may_be_thousands(columns[k])]):
+            _check_marks(_samples(data, encoding, dialect), dialect, grouped)
         for k in roles.positions:
             if _may_be_grouped(columns[k]):
                 split_lines = (split(line, dialect.separator) for _, line in _samples(data, encoding, dialect))
@@ -77,6 +81,18 @@ def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
     dates_in = "s" if dated else None
     heads = _with_names_of_joints(dialect.heads, columns)
     return Table(heads, columns, len(rows), line_of, faults, dates_in, dialect.measured_in), roles
+
+
+def _check_written(samples: Iterator[tuple[int, str]], dialect: Dialect, columns: Sequence[int]) -> None:
+    """Refuse columns that hold nothing that reads as a number, unless they hold nothing at all."""
+    for _, line in samples:
+        cells = split(line, dialect.separator)
+        for k in columns if len(cells) == len(dialect.heads) else ():
+            if not is_missing(cells[k]):
+                raise DataError(
+                    f"expected numbers in {dialect.heads[k]!r}{marks_within(cells[k])}, got {cells[k]!r}; write them "
+                    "so, or leave the column aside with exclude=, in the shell --exclude"
+                )
 
 
 def _check_one_block(numbers: Sequence[int]) -> None:
@@ -94,12 +110,42 @@ def _check_one_block(numbers: Sequence[int]) -> None:
         )
 
 
-def _may_be_grouped(x: Array) -> bool:
-    """Whether numbers are whole but for some with three digits behind the mark, which may be thousands: 999, 1.002."""
+def _may_be_thousands(x: Array) -> bool:
+    """Whether all numbers have at most three digits before the mark and three behind it, which may be thousands."""
     x = x[np.isfinite(x)]
-    parts = x[x != np.rint(x)]
-    whole = 0 < len(parts) < len(x) and bool((np.abs(x) < 1000).all())
-    return whole and bool((np.abs(1000 * parts - np.rint(1000 * parts)) < 1e-6).all())
+    return len(x) > 0 and bool((np.abs(x) < 1000).all() and (np.abs(1000 * x - np.rint(1000 * x)) < 1e-6).all())
+
+
+def _may_be_grouped(x: Array) -> bool:
+    """Whether some of such numbers are whole: 999, 1.002."""
+    n_whole = int((x[np.isfinite(x)] == np.rint(x[np.isfinite(x)])).sum())
+    return 0 < n_whole < np.isfinite(x).sum() and _may_be_thousands(x)
+
+
+def _check_marks(samples: Iterator[tuple[int, str]], dialect: Dialect, columns: Sequence[int]) -> None:
+    """Refuse columns of thousands alone, 1,002 or 1.002, beside others that have the other mark before decimals."""
+    numbers = [k for k, kind in enumerate(dialect.kinds) if kind == "number"]
+    marked: dict[int, dict[str, str]] = {k: {} for k in numbers}  # column -> mark -> the first cell with it
+    for _, line in samples:
+        cells = split(line, dialect.separator)
+        if len(cells) == len(dialect.heads):
+            columns = [
+                k
+                for k in columns
+                if is_missing(cells[k]) or cells[k].lstrip("+-").isdecimal() or _GROUPED.fullmatch(cells[k])
+            ]
+            if not columns:
+                return
+            for k in numbers:
+                for mark in {".", ","} & {*cells[k]}:
+                    marked[k].setdefault(mark, cells[k])
+    for k in columns:
+        other = [cell for several in marked.values() for mark, cell in several.items() if mark not in marked[k]]
+        if len(marked[k]) == 1 and other:
+            raise DataError(
+                f"expected numbers in {dialect.heads[k]!r} without marks between thousands, got "
+                f"{next(iter(marked[k].values()))!r} beside {other[0]!r}; write them without such marks"
+            )
 
 
 def _check_grouped(column: Iterable[str], head: str) -> None:

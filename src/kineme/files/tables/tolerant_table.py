@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from kineme.errors import DataError
-from kineme.files.tables.dialect import Dialect, check_line, is_missing, split
+from kineme.files.tables.dialect import Dialect, check_line, is_missing, marks_within, split
 
 _STRETCH = 1000  # lines that are parsed at a time
 _FAULTS = 2_000_000  # lines with faults, at most: each takes a while and some memory
@@ -106,7 +106,8 @@ def _read_line(line: str, dialect: Dialect, texts: list[bool]) -> tuple[tuple[An
         row.append(cell if text else _number(cell, dialect.decimal_comma))
         if row[-1] is None:
             row[-1] = np.nan
-            wrong = wrong or (f"expected a number in {head!r}, got {cell!r}" if not is_missing(cell) else "")
+            expected = f"expected a number in {head!r}{marks_within(cell)}"
+            wrong = wrong or ("" if is_missing(cell) else f"{expected}, got {cell!r}")
     return tuple(row), wrong
 
 
