@@ -31,6 +31,7 @@ FACTS = {
         (1.0, ["s", "sec", "secs", "second", "Seconds"]),
         (1e-3, ["ms", "msec", "millis", "milliseconds"]),
         (1e-6, ["us", "µs", "μs", "usecs", "micros", "microseconds"]),
+        (1e-7, ["100ns", "[100 ns]"]),
         (1e-9, ["ns", "nsecs", "nanos", "nanosec", "nanoseconds"]),
         (60.0, ["min", "minutes"]),
         (3600.0, ["h", "hours"]),

@@ -51,6 +51,7 @@ _TABLE = (
     (Unit("s", "time", Fraction(1)), "s sec(s) second(s)"),
     (Unit("ms", "time", Fraction("1e-3")), "ms msec(s) millis millisecond(s)"),
     (Unit("us", "time", Fraction("1e-6")), "us µs μs usec(s) micros microsecond(s)"),
+    (Unit("100ns", "time", Fraction("1e-7")), "100ns"),  # of Windows and .NET
     (Unit("ns", "time", Fraction("1e-9")), "ns nsec(s) nanos nanosec(s) nanosecond(s)"),
     (Unit("min", "time", Fraction(60)), "min minute(s)"),
     (Unit("h", "time", Fraction(3600)), "h hour(s)"),
@@ -84,6 +85,7 @@ def _spellings(names: str) -> Iterator[str]:
 UNITS = {name: unit for unit, names in _TABLE for name in _spellings(names)}
 
 _BRACKETS = re.compile(r"[\[(]([^\[\]()]*)[\])]\s*$")
+_AFTER_NUMBER = re.compile(r"(?<=^100) (?=ns$)")
 _QUOTIENT = re.compile(r"(.+?)\s*(?:/|\bper\b)\s*([^/]+?)\s*(?:\^|\*\*)?([2²])?")
 
 
@@ -93,7 +95,7 @@ def unit_named(text: str) -> Unit | None:
 
     None of what is no unit of the table, nor a quotient of two of them.
     """
-    plain = text.strip().strip("[]()").strip().lower()
+    plain = _AFTER_NUMBER.sub("", text.strip().strip("[]()").strip().lower())
     if (unit := UNITS.get(plain)) is not None or (parts := _QUOTIENT.fullmatch(plain)) is None:
         return unit
     above, below = UNITS.get(parts[1]), UNITS.get(parts[2])

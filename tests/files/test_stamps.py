@@ -213,3 +213,29 @@ def test_the_time_of_another_clock_is_no_coordinate(tmp_path, clock):
     assert read.demonstrations.dimensions == ("x", "y")
     assert read.detected[0][0].ignored == (clock,)
     assert kineme.read_recordings(tmp_path / "a.csv", columns=("x", clock)).demonstrations.n_dims == 2
+
+
+@pytest.mark.parametrize(
+    ("head", "first", "step", "seconds"),
+    [
+        ("clock", 133_000_000_000_000_000, 100_000, 0.01),  # FILETIME of Windows
+        ("Timestamp", 638_000_000_000_000_000, 166_667, 1 / 60),  # DateTime.Ticks of .NET
+        ("Time [100 ns]", 0, 333_333, 1 / 30),
+        ("t_100ns", 5_000_000, 333_333, 1 / 30),
+    ],
+)
+def test_ticks_of_100_ns_are_known_by_their_year_or_by_the_head(tmp_path, head, first, step, seconds):
+    rows = [f"{first + k * step},{k},{k * k}" for k in range(30)]
+    (tmp_path / "a.csv").write_text("\n".join([f"{head},x,y", *rows]))
+    recordings = kineme.read_recordings(tmp_path / "a.csv", time=head)
+    np.testing.assert_allclose(np.diff(recordings.demonstrations[0].times), seconds, rtol=2e-3)
+    assert recordings.detected[0][0].units == "100ns"
+
+
+def test_ticks_of_unknown_length_are_refused_until_it_is_said(tmp_path):
+    rows = [f"{k * 333_333},{k},{k * k}" for k in range(30)]
+    (tmp_path / "a.csv").write_text("\n".join(["ticks,x,y", *rows]))
+    with pytest.raises(kineme.DataError, match=r"got 'ticks' in steps of 333333; .* units='100ns' .* --units"):
+        kineme.read_recordings(tmp_path / "a.csv", time="ticks")
+    recordings = kineme.read_recordings(tmp_path / "a.csv", time="ticks", units="100ns")
+    np.testing.assert_allclose(np.diff(recordings.demonstrations[0].times), 1 / 30, rtol=1e-5)

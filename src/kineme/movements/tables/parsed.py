@@ -30,8 +30,9 @@ class Detected(NamedTuple):
     units : str or float
         Their unit.
     units_from : str
-        Source of the unit: ``"given"``, ``"head"``, ``"dates"``; or a guess: ``"since 1970"``, ``"by its steps"``, see
-        `kineme.movements.tables.time_stamps.unit_by_size`, or ``"assumed"``.
+        Source of the unit: ``"given"``, ``"head"``, ``"dates"``; or a guess: ``"since 1970"``, ``"since 1601"``,
+        ``"since the year 1"``, ``"by its steps"`` or ``"assumed"``, see
+        `kineme.movements.tables.time_stamps.unit_by_size`.
     movement, label, ignored : tuple of str
         Columns that tell movements apart, that name the action, and that are ignored.
     measured_in : tuple of str

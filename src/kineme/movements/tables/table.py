@@ -137,7 +137,7 @@ def _unit_by_clocks(table: Table, roles: Roles) -> tuple[str, str] | None:
     assert roles.time is not None
     for k in roles.clocks:
         named = _unit_of_times(table, k)
-        for units in PER_SECOND if named else ():
+        for units in (*PER_SECOND, "100ns") if named else ():
             if same_clock(in_seconds(table.columns[roles.time], units), in_seconds(table.columns[k], named or "s")):
                 return units, f"as {table.heads[k]!r}"
     return None

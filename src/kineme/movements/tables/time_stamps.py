@@ -29,6 +29,10 @@ _UNIX = (946_684_800.0, 4_102_444_800.0)  # the years 2000 to 2100, in seconds s
 #: sampled every 5 s or more slowly; steps of 5 ms to 1 s, 1 ms to 1 s, and from 1 ms on are usual.
 _STEPS = (("ns", 1e6), ("us", 1e3), ("ms", 5.0))
 _LONGEST = 5.0  # s between samples
+#: Days to the year 2000 from where Windows and .NET begin to count 100 ns.
+_TICKS_SINCE = {"since 1601": 145_731, "since the year 1": 730_119}
+_CENTURY, _TICKS_A_DAY, _TICKS_A_SECOND = 36_525, 864e9, 1e7
+_TICK_WORDS = frozenset({"tick", "ticks"})
 _DATE_WORDS = frozenset({"unix", "epoch", "utc"})
 _DRIFT = 1e-4  # of the time that passed, between two clocks of one device
 
@@ -43,7 +47,7 @@ _DURATIONS = (
 _HOUR, _DAY = 3600.0, 86400.0
 
 #: Sources of a unit that are guesses.
-GUESSED = ("since 1970", "by its steps", "assumed")
+GUESSED = ("since 1970", *_TICKS_SINCE, "by its steps", "assumed")
 
 
 @lru_cache(maxsize=256)  # thousands of files have the same heads
@@ -57,6 +61,8 @@ def unit_in_head(head: str) -> str | None:
     (_, bracketed), words = split_head(head), words_of(head)
     if (unit := unit_named(bracketed or "")) is not None and unit.quantity == "time":
         return unit.symbol
+    if words[-2:] == ("100", "ns"):
+        return "100ns"
     return UNITS[words[-1]].symbol if words and words[-1] in TIME_UNITS else None
 
 
@@ -65,13 +71,14 @@ def unit_by_size(stamps: Array, head: str = "") -> tuple[str, str]:
 
     The median step decides, because people and robots are sampled between once and some thousand times a second.
     Stamps between the years 2000 and 2100 are seconds since 1970 in the unit of which that is so, unless it makes the
-    step longer than 5 s: then they count from elsewhere, as a machine that was switched on weeks ago counts.
+    step longer than 5 s: then they count from elsewhere, as a machine that was switched on weeks ago counts. So are
+    those that are such years in 100 ns since 1601 or since the year 1, as Windows and .NET count.
 
     Raises
     ------
     DataError
         Such stamps with a step of 1 to 5 s, which may as well be 1 to 5 thousandths of it; a head with a word as unix
-        decides.
+        decides. Ticks that count from elsewhere: of what, nothing says.
     """
     finite = stamps[np.isfinite(stamps)]
     if len(finite) == 0:
@@ -90,6 +97,14 @@ def unit_by_size(stamps: Array, head: str = "") -> tuple[str, str]:
                 "in the shell --units"
             )
         return unit, "since 1970"
+    for since, days in _TICKS_SINCE.items():
+        if days <= finite[0] / _TICKS_A_DAY <= days + _CENTURY and step / _TICKS_A_SECOND < _LONGEST:
+            return "100ns", since
+    if {*words_of(head)} & _TICK_WORDS:
+        raise DataError(
+            f"expected times whose unit can be told, got {head!r} in steps of {step:.6g}; say how long one is, as "
+            "units='100ns' or a number of seconds, in the shell --units"
+        )
     by_step = next((unit for unit, least in _STEPS if step >= least), None)
     return (by_step, "by its steps") if by_step else ("s", "assumed")
 
