@@ -46,6 +46,62 @@ def test_natural_layouts(arrays, places, layout):
         np.testing.assert_array_equal(one.positions, X)
 
 
+SKELETON = np.sin(np.linspace(0, 3, 40))[:, None, None] + np.random.default_rng(0).normal(size=(7, 3))  # (40, 7, 3)
+
+
+def _saved(folder, kind):
+    path = folder / f"a.{kind.partition(' ')[0]}"
+    match kind:
+        case "npy":
+            np.save(path, SKELETON)
+        case "npz":
+            np.savez(path, positions=SKELETON)
+        case "npz other":
+            np.savez(path, skeleton=SKELETON)
+        case "npz rate":
+            np.savez(path, skeleton=SKELETON, fps=30)
+        case "json":
+            path.write_text(json.dumps({"positions": SKELETON.tolist()}))
+        case "json list":
+            path.write_text(json.dumps(SKELETON.tolist()))
+        case "h5":
+            with pytest.importorskip("h5py").File(path, "w") as file:
+                file["positions"] = SKELETON
+        case "mat":
+            savemat(path, {"skeleton": SKELETON})
+    return path
+
+
+@pytest.mark.parametrize("kind", ["npy", "npz", "npz other", "npz rate", "json", "json list", "h5", "mat"])
+def test_joints_over_time_are_no_movements_of_joints(tmp_path, kind):
+    path = _saved(tmp_path, kind)
+    with pytest.raises(
+        kineme.DataError, match=r"shape \(40, 7, 3\), which may be one .* say every=40 if it is, every=7 if"
+    ):
+        read_recordings(path, units=0.02)
+    (one,) = read_recordings(path, units=0.02, every=40).demonstrations
+    np.testing.assert_array_equal(one.positions, SKELETON.reshape(40, 21))
+    assert one.duration == pytest.approx(39 * 0.02)
+    many = read_recordings(path, units=0.02, every=7).demonstrations
+    np.testing.assert_array_equal([one.positions for one in many], SKELETON)
+
+
+@pytest.mark.parametrize("name", ["positions", "skeleton"])
+@pytest.mark.parametrize("kind", ["npz", "json"])
+def test_times_say_which_axis_of_three_is_time(tmp_path, kind, name):
+    path, times = tmp_path / f"a.{kind}", np.arange(40) / 50
+    if kind == "npz":
+        np.savez(path, **{name: SKELETON, "times": times})
+    else:
+        path.write_text(json.dumps({name: SKELETON.tolist(), "times": times.tolist()}))
+    (one,) = read_recordings(path).demonstrations
+    np.testing.assert_array_equal(one.positions, SKELETON.reshape(40, 21))
+    np.testing.assert_array_equal(one.times, times)
+    if name == "positions":
+        np.savez(path.with_suffix(".npz"), positions=np.moveaxis(SKELETON, 1, 0), times=times)
+        assert len(read_recordings(path.with_suffix(".npz"))) == 7
+
+
 @pytest.mark.parametrize(
     ("labels", "expected"), [([b"a", b"b"], ("a", "b")), (["a", "b"], ("a", "b")), ([1, 2], ("1", "2"))]
 )

@@ -138,5 +138,5 @@ def test_a_rate_beside_arrays_of_any_name_is_their_clock_and_what_is_static_is_l
     assert read.demonstrations.durations == pytest.approx([(N - 1) * 0.02])
     assert "shape" in read.detected[0][0].ignored
     assert kineme.read_recordings(save(positions=walk(2), fps=20)).demonstrations.durations == pytest.approx([59 / 20])
-    many = kineme.read_recordings(save(positions=walk(40).reshape(4, N, 10), fps=20)).demonstrations
+    many = kineme.read_recordings(save(positions=np.moveaxis(walk(40).reshape(N, 4, 10), 1, 0), fps=20)).demonstrations
     np.testing.assert_allclose(many.durations, 59 / 20)

@@ -17,7 +17,7 @@ from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.parsed import Block, Detected, Parsed, distinct, listed
 from kineme.movements.tables.time_stamps import in_seconds, nanoseconds, unit_by_size, unit_in_head
 from kineme.movements.trajectories.movements import axis_names
-from kineme.validation import ROUNDED, Array, too_long_integer
+from kineme.validation import MIN_SAMPLES, ROUNDED, Array, too_long_integer
 
 #: The layout of texts of which each line is a movement.
 ROWS = "rows"
@@ -25,6 +25,7 @@ ROWS = "rows"
 COLUMNS, RATES = "columns", "rates"
 POSITIONS, TIMES, LABELS = ("positions", "x", "pos"), ("times", "t", "time"), ("labels", "label", "y")
 
+_COMPARED = 1000  # movements of an array whose steps are compared
 _RAGGED = (
     "expected times and positions with rows of one length, got rows that differ in length or depth; "
     "name movements of unequal length positions_0, times_0, positions_1, ..."
@@ -129,6 +130,33 @@ def check_first_axis(shapes: Iterable[tuple[int, ...]]) -> None:
         )
 
 
+def sets_or_points(xs: list[Array], every: int | None) -> list[Array]:
+    """Tell n movements (T, d) that are one array (n, T, d) from the T points of one movement, (n, T d).
+
+    Nobody says which axis is time, but places change less from sample to sample than from point to point, and less than
+    between movements that are not all but equal. As many samples as `every` says are a movement.
+
+    Raises
+    ------
+    DataError
+        The first axis may be time.
+    """
+    if len(xs) < MIN_SAMPLES or len({x.shape for x in xs}) > 1 or not 0 < math.prod(xs[0].shape[1:]) <= len(xs[0]):
+        return xs
+    n, length = len(xs), len(xs[0])
+    if every is not None:
+        return [np.stack(xs).reshape(n, -1)] if every == n != length else xs
+    compared = np.stack(xs[:_COMPARED])
+    steps = [float(np.nan_to_num(np.abs(np.diff(compared, axis=axis))).mean()) for axis in (0, 1)]
+    if length < MIN_SAMPLES or steps[0] < steps[1]:
+        raise DataError(
+            f"expected movements (n, T, d), got an array of shape {(n, *xs[0].shape)}, which may be one movement of "
+            f"{n} samples of {length} points: it changes less along the first axis than along the second; say every="
+            f"{n} if it is, every={length} if these are {n} movements of {length} samples, in the shell --every"
+        )
+    return xs
+
+
 def _column_names(arrays: Mapping[str, Any]) -> list[str] | None:
     """The names of the coordinates, if there are such."""
     names = np.asarray(arrays[COLUMNS]) if COLUMNS in arrays else None
@@ -214,6 +242,11 @@ def _named(arrays: Mapping[str, Any], names: Sequence[str]) -> str | None:
 def _of_one(arrays: Mapping[str, Any], x: Array, layout: Layout) -> tuple[list[Array], list[Array] | None, str]:
     key = _named(arrays, TIMES)
     t = None if key is None else numbers_of(arrays[key], of_time=True)
+    if x.ndim == 3 and t is None and _named(arrays, LABELS) is None:
+        xs = sets_or_points(list(x), layout.every)
+        x = x if len(xs) == len(x) else xs[0]
+    elif x.ndim == 3 and t is not None and t.shape == x.shape[:1] != x.shape[1:2]:  # points at each of these times
+        x = x.reshape(len(x), -1)
     if x.ndim == 3:
         if t is not None and t.shape not in (x.shape[1:2], x.shape[:2]):
             raise DataError(f"expected times of shape {x.shape[1:2]} or {x.shape[:2]}, got {t.shape}")

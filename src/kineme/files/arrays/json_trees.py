@@ -128,7 +128,11 @@ def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 def as_tree(value: Any) -> Any:
     """Parsed JSON as a tree of arrays."""
     if isinstance(value, Mapping):
-        return {name: as_tree(one) for name, one in value.items()}
+        stamped = {len(one) for name, one in value.items() if is_time(name) and isinstance(one, list)}
+        tree = {name: as_tree(one) for name, one in value.items()}
+        return {
+            name: _stacked(one) if isinstance(one, list) and len(one) in stamped else one for name, one in tree.items()
+        }
     if not isinstance(value, list) or not value:
         return value
     if all(isinstance(one, Mapping) for one in value):
@@ -138,6 +142,12 @@ def as_tree(value: Any) -> Any:
     if all(isinstance(one, list) for one in value) and not _is_matrix(value):
         return [as_tree(one) for one in value]
     return _array(value)
+
+
+def _stacked(rows: list[Any]) -> Any:
+    """Points (T, J, d) over time as one array, of a list of arrays (J, d)."""
+    alike = all(isinstance(one, np.ndarray) and one.ndim == 2 and one.shape == rows[0].shape for one in rows)
+    return np.stack(rows) if alike and rows[0].dtype.kind == "f" else rows
 
 
 def _is_sample(entry: Mapping[str, Any]) -> bool:

@@ -11,7 +11,15 @@ from typing import Any
 import numpy as np
 
 from kineme.errors import DataError
-from kineme.files.arrays.arrays import POSITIONS, TIMES, Named, check_first_axis, numbers_of, parsed_arrays
+from kineme.files.arrays.arrays import (
+    POSITIONS,
+    TIMES,
+    Named,
+    check_first_axis,
+    numbers_of,
+    parsed_arrays,
+    sets_or_points,
+)
 from kineme.files.arrays.trees import NAMES, STAMP, Found, Style, listed_shapes, movements_in
 from kineme.files.limits import check_expanded
 from kineme.movements.tables.columns import choose_roles, is_time
@@ -42,6 +50,7 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: Style = NAMES, m
     if not found:
         got = f"no entry 'positions' but {listed(tree)}" if isinstance(tree, Mapping) else "none of numbers"
         raise DataError(f"expected arrays times and positions, got {got}")
+    found = _of_one_array(found, layout)
     stamped = any(len(one.entries) > 1 or one.rate is not None for one in found)
     if not stamped:
         return _bare(found, layout, kind)
@@ -67,6 +76,16 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: Style = NAMES, m
     parsed = table_movements(_table(found, first, (heads, owners), needed), roles, layout, kind)
     static = tuple(name for name in first.entries if name not in names)
     return parsed._replace(detected=parsed.detected._replace(ignored=(*parsed.detected.ignored, *static)))
+
+
+def _of_one_array(found: list[Found], layout: Layout) -> list[Found]:
+    """Movements that may be one array (n, T, d), as `sets_or_points` tells them; others as they are."""
+    numbered = [one.place.rpartition("/")[2] for one in found] == [str(k) for k in range(len(found))]
+    if not numbered or len({one.label for one in found}) > 1 or any([*one.entries] != [""] for one in found):
+        return found
+    check_expanded(8 * sum(int(np.prod(one.entries[""].shape)) for one in found))
+    together = sets_or_points([numbers_of(np.asarray(one.entries[""])) for one in found], layout.every)
+    return found if len(together) == len(found) else [found[0]._replace(place="", entries={"": together[0]})]
 
 
 def _bare(found: Sequence[Found], layout: Layout, kind: str) -> Parsed:
