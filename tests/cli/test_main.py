@@ -32,6 +32,16 @@ def test_version():
     assert kineme.__version__ in run("--version").stdout
 
 
+def test_a_reader_that_has_gone_ends_the_command_without_a_word():
+    read, write = os.pipe()
+    os.close(read)
+    done = subprocess.run(
+        [sys.executable, "-m", "kineme", "inspect", "--help"], stdout=write, stderr=subprocess.PIPE, check=False
+    )
+    os.close(write)
+    assert (done.returncode, done.stderr) == (141, b"")
+
+
 def test_an_unknown_command_is_refused():
     done = run("dance")
     assert done.returncode == 2

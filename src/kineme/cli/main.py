@@ -31,8 +31,14 @@ from kineme.output.text import printable, printable_lines
 from kineme.runtime.compiled import tell_when_compiling
 
 
+_BROKEN_PIPE = 128 + 13  # as a shell says it of a tool that the signal ends
+
+
 class _OneLineErrors(click.Group):
-    """Turn errors that users can act on into one line and exit status 1; bugs keep their traceback."""
+    """Turn errors that users can act on into one line and exit status 1; bugs keep their traceback.
+
+    A reader that has gone is no error to speak of: the command ends without a word.
+    """
 
     def invoke(self, ctx: click.Context) -> Any:
         if isinstance(sys.stdout, io.TextIOWrapper):
@@ -47,6 +53,9 @@ class _OneLineErrors(click.Group):
         except click.ClickException as error:
             error.message = printable_lines(error.message)  # type: ignore[misc] # click prints it
             raise
+        except BrokenPipeError:  # whoever reads the output has read enough, as head: end as other tools do
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            sys.exit(_BROKEN_PIPE)
         except (KinemeError, OSError) as error:
             write(f"kineme: {printable(_in_words(error))}", err=True)
             sys.exit(1)
