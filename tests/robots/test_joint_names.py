@@ -34,6 +34,16 @@ def test_of_both_sides_one_is_to_be_chosen():
         joints_among(_names("left") + _names("right"), load("so101"))
 
 
+def test_of_commands_beside_states_one_is_to_be_chosen():
+    """Of an arm of one joint they would be two coordinates of the tip."""
+    joints = load("so101").joints
+    names = [f"{before}.{joint} [deg]" for before in ("action", "observation.state") for joint in joints]
+    with pytest.raises(TrajectoryError, match=r"one column for each joint, got action\..*--columns 'action\.\*'"):
+        joints_among(names, load("so101"))
+    assert joints_among(names[len(joints) :], load("so101")) == [*range(len(joints))]
+    assert joints_among([*names, "x", "y", "z"], load("so101")) is None
+
+
 def test_joints_without_a_side_come_first_and_a_part_is_no_arm():
     names = [*load("so101").joints]
     assert joints_among([*_names("left"), *names], load("so101")) == [6, 7, 8, 9, 10]

@@ -30,7 +30,6 @@ from kineme.errors import KinemeError
 from kineme.output.text import printable, printable_lines
 from kineme.runtime.compiled import tell_when_compiling
 
-
 _BROKEN_PIPE = 128 + 13  # as a shell says it of a tool that the signal ends
 
 

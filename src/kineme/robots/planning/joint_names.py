@@ -32,13 +32,19 @@ def joints_among(names: Sequence[str], robot: Robot) -> list[int] | None:
     Raises
     ------
     TrajectoryError
-        Every joint is there for both sides.
+        Every joint is there for both sides, or several times and nothing else.
     """
     names = ["" if _is_rate(name) else name for name in names]
     plain = [split_head(name)[0].removesuffix(DRIVERS) for name in names]
-    exact = _single([_places(plain, joint) for joint in robot.joints])
-    if exact is not None:
+    places = [_places(plain, joint) for joint in robot.joints]
+    if (exact := _single(places)) is not None:
         return exact
+    if all(places) and {*names} == {names[k] for each in places for k in each}:
+        joint, several = max(zip(robot.joints, places, strict=True), key=lambda one: len(one[1]))
+        raise TrajectoryError(
+            f"expected one column for each joint, got {', '.join(names[k] for k in several)} for {joint}; choose with "
+            f"columns=, in the shell --columns '{plain[several[0]].removesuffix(joint)}*'"
+        )
     sides = {side: _single([_places(plain, f"{side}_{joint}") for joint in robot.joints]) for side in _SIDES}
     sides = {side: columns for side, columns in sides.items() if columns is not None}
     if len(sides) > 1:
