@@ -284,3 +284,92 @@ def test_an_axis_that_is_a_list_runs_over_time():
 def test_tables_of_records_have_their_columns():
     records = np.rec.fromarrays([T, *X.T], names="t,x,y")
     np.testing.assert_array_equal(read(npy(records), "a.npy").demonstrations[0].positions, X)
+
+
+def _points(rise, upper=True, first=0, last=30):
+    points = [{"X": float(k), "Y": rise * k * k, "T": 1000 + 16 * k} for k in range(first, last)]
+    return points if upper else [{key.lower(): value for key, value in one.items()} for one in points]
+
+
+@pytest.mark.parametrize(
+    ("content", "labels"),
+    [
+        ({"Name": "circle", "Points": _points(1.0)}, ["circle"]),
+        ({"name": "circle", "points": _points(1.0, upper=False)}, ["circle"]),
+        ({"gestures": [{"name": one, "points": _points(k + 1.0, False)} for k, one in enumerate("ab")]}, ["a", "b"]),
+        ([{"Name": one, "Points": _points(k + 1.0)} for k, one in enumerate("ab")], ["a", "b"]),
+        ({"Name": "x", "Strokes": [_points(1.0, last=12), _points(1.0, first=12)]}, ["x"]),
+        ({"Name": "circle_07", "Points": _points(1.0)}, [None]),
+    ],
+)
+def test_drawn_gestures_are_labeled_by_their_names(tmp_path, content, labels):
+    """As the $1 and $N recognizers keep them; a name that ends in a number only counts."""
+    (tmp_path / "a.json").write_text(json.dumps(content))
+    recordings = read_recordings(tmp_path / "a.json")
+    assert recordings.labels.tolist() == labels
+    for k, one in enumerate(recordings.demonstrations):
+        np.testing.assert_array_equal(one.positions, [[j, (k + 1.0) * j * j] for j in range(30)])
+        np.testing.assert_allclose(np.diff(one.times), 0.016, atol=1e-9)
+
+
+def _landmarks(k, n=5):
+    return [{"x": np.sin(k / 9) + 0.1 * i, "y": 0.2 * i, "z": 0.01 * k, "visibility": 1.0} for i in range(n)]
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        [{"landmark": _landmarks(k)} for k in range(20)],
+        [_landmarks(k) for k in range(20)],
+        {"fps": 30, "frames": [{"landmarks": _landmarks(k)} for k in range(20)]},
+    ],
+)
+def test_landmarks_of_frames_are_no_movements(tmp_path, content):
+    (tmp_path / "a.json").write_text(json.dumps(content))
+    with pytest.raises(DataError, match=r"one movement of 20 samples of 5 points.* every=20 .*--every"):
+        read_recordings(tmp_path / "a.json", units=0.03)
+    (one,) = read_recordings(tmp_path / "a.json", units=0.03, every=20).demonstrations
+    expected = [[[mark[axis] for axis in "xyz"] for mark in _landmarks(k)] for k in range(20)]
+    np.testing.assert_array_equal(one.positions, np.reshape(expected, (20, 15)))
+
+
+def test_hands_of_a_frame_are_numbered_and_what_they_are_held_for_is_left_aside(tmp_path):
+    """As MediaPipe's tasks answer: of each frame a list of hands, each a list of points."""
+    held = [[{"index": 0, "score": 0.9, "categoryName": "Left"}], [{"index": 1, "score": 0.8, "categoryName": "Right"}]]
+    frames = [
+        {"timestamp": 33 * k, "landmarks": [_landmarks(k), _landmarks(k + 1)], "handedness": held} for k in range(20)
+    ]
+    (tmp_path / "a.json").write_text(json.dumps(frames))
+    demos = read_recordings(tmp_path / "a.json").demonstrations
+    assert demos.dimensions == tuple(
+        f"landmarks.{hand}.{k}.{axis}" for hand in (0, 1) for k in range(5) for axis in "xyz"
+    )
+    del frames[3]["landmarks"][1]
+    (tmp_path / "a.json").write_text(json.dumps(frames))
+    with pytest.raises(DataError, match="as many 'landmarks' in each sample"):
+        read_recordings(tmp_path / "a.json")
+
+
+def test_bodies_of_frames_are_read_beside_the_bones_between_their_joints(tmp_path):
+    """As Azure Kinect's offline processor writes them."""
+    frames = [
+        {
+            "frame_id": k,
+            "timestamp_usec": 33_333 * k,
+            "bodies": [{"body_id": 1, "joint_positions": [[k, i, k * i]] * 4}],
+        }
+        for k, i in zip(range(20), range(20), strict=True)
+    ]
+    content = {"bone_list": [["HIP", "KNEE"]], "joint_names": ["HIP", "KNEE", "HEAD", "HAND"], "frames": frames}
+    (tmp_path / "a.json").write_text(json.dumps(content))
+    demos = read_recordings(tmp_path / "a.json").demonstrations
+    assert demos.dimensions == tuple(f"bodies.0.joint_positions.{k}" for k in range(12))
+    assert demos.durations == pytest.approx([19 * 0.033333])
+
+
+@pytest.mark.parametrize("several", [False, True])
+def test_frames_of_openpose_are_refused_by_name(tmp_path, several):
+    frame = {"version": 1.3, "people": [{"person_id": [-1], "pose_keypoints_2d": [float(k) for k in range(75)]}]}
+    (tmp_path / "a.json").write_text(json.dumps([frame] * 9 if several else frame))
+    with pytest.raises(DataError, match=r"as OpenPose writes it.*a table with a line for each frame"):
+        read_recordings(tmp_path / "a.json", units=0.03)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -20,6 +21,7 @@ from kineme.movements.tables.time_stamps import is_date, seconds_of_dates
 
 _PARTS = ("name", "part", "bodypart", "joint", "handedness", "side")  # names of a part of a sample
 _NAMES = (*_PARTS, "label", "id")  # also of movements and samples
+_OPENPOSE = re.compile(r"\w+_keypoints_[23]d")
 _COUNT = "\0count"  # of parts without names
 _AXES = frozenset("xyz")
 _NUMBER, _LIST = 32, 88  # bytes of a Python object
@@ -128,6 +130,15 @@ def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 def as_tree(value: Any) -> Any:
     """Parsed JSON as a tree of arrays."""
     if isinstance(value, Mapping):
+        if any(_OPENPOSE.fullmatch(name) for name in value):
+            raise DataError(
+                "expected movements, got the people of one frame, as OpenPose writes it: which of them moves nothing "
+                "says; write a table with a line for each frame, its number or time and the points of one person"
+            )
+        if any(
+            name.lower() == "name" for name in value
+        ):  # strokes of what has one name are one, as of the $N recognizer
+            value = {name: _drawn(one) if name.lower() == "strokes" else one for name, one in value.items()}
         stamped = {len(one) for name, one in value.items() if is_time(name) and isinstance(one, list)}
         tree = {name: as_tree(one) for name, one in value.items()}
         return {
@@ -139,15 +150,28 @@ def as_tree(value: Any) -> Any:
         return _columns(value) if all(map(_is_sample, value[:2])) else [as_tree(one) for one in value]
     if any(isinstance(one, Mapping) for one in value):
         raise DataError("expected a list of samples or of movements, got objects beside other values")
+    if all(isinstance(one, list) and one and all(isinstance(cell, str) for cell in one) for one in value):
+        return None  # pairs of names, as of the bones between joints
     if all(isinstance(one, list) for one in value) and not _is_matrix(value):
         return [as_tree(one) for one in value]
     return _array(value)
+
+
+def _drawn(strokes: Any) -> Any:
+    """The points of several strokes, one after the other; of anything else that."""
+    if not isinstance(strokes, list) or not all(map(_are_objects, strokes)):
+        return strokes
+    return [point for stroke in strokes for point in stroke]
 
 
 def _stacked(rows: list[Any]) -> Any:
     """Points (T, J, d) over time as one array, of a list of arrays (J, d)."""
     alike = all(isinstance(one, np.ndarray) and one.ndim == 2 and one.shape == rows[0].shape for one in rows)
     return np.stack(rows) if alike and rows[0].dtype.kind == "f" else rows
+
+
+def _are_objects(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(one, Mapping) for one in value)
 
 
 def _is_sample(entry: Mapping[str, Any]) -> bool:
@@ -200,9 +224,13 @@ def _columns(samples: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 def _flat(sample: Mapping[str, Any]) -> dict[str, Any]:
     plain: dict[str, Any] = {}
     for name, value in sample.items():
-        if isinstance(value, Mapping):
+        if isinstance(value, list) and value and all(map(_are_objects, value)):  # hands, each of many points
+            if not any("categoryName" in one for hand in value for one in hand):  # what MediaPipe holds them for
+                hands = _flat({str(k): hand for k, hand in enumerate(value)})
+                plain |= {f"{name}.{inner}": one for inner, one in hands.items()} | {f"{name}.{_COUNT}": len(value)}
+        elif isinstance(value, Mapping):
             plain |= {f"{name}.{inner}": one for inner, one in _flat(value).items()}
-        elif isinstance(value, list) and value and all(isinstance(one, Mapping) for one in value):
+        elif _are_objects(value):
             parts = [_name(one) for one in value]
             if None not in parts and len({*parts}) < len(parts):
                 raise DataError(f"expected parts of {name!r} with different names in each sample, got {parts!r:.80}")

@@ -79,13 +79,34 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: Style = NAMES, m
 
 
 def _of_one_array(found: list[Found], layout: Layout) -> list[Found]:
-    """Movements that may be one array (n, T, d), as `sets_or_points` tells them; others as they are."""
-    numbered = [one.place.rpartition("/")[2] for one in found] == [str(k) for k in range(len(found))]
-    if not numbered or len({one.label for one in found}) > 1 or any([*one.entries] != [""] for one in found):
+    """Movements that may be the points of one, as `sets_or_points` tells them; others as they are.
+
+    They are one array (n, T, d), or n lists of points with names for their coordinates, and have no times.
+    """
+    names = [*found[0].entries]
+    if any([*one.entries] != names for one in found) or any(map(is_time, names)):
         return found
-    check_expanded(8 * sum(int(np.prod(one.entries[""].shape)) for one in found))
-    together = sets_or_points([numbers_of(np.asarray(one.entries[""])) for one in found], layout.every)
-    return found if len(together) == len(found) else [found[0]._replace(place="", entries={"": together[0]})]
+    if not _are_numbered([one.place for one in found]) or len({one.label for one in found}) > 1:
+        return found
+    if any(_is_text(entry) or (names != [""] and len(entry.shape) > 1) for entry in found[0].entries.values()):
+        return found
+    check_expanded(8 * sum(int(np.prod(entry.shape)) for one in found for entry in one.entries.values()))
+    several = [[numbers_of(np.asarray(entry)) for entry in one.entries.values()] for one in found]
+    if any(len({len(x) for x in xs}) > 1 for xs in several):
+        return found
+    x = sets_or_points([xs[0] if names == [""] else np.column_stack(xs) for xs in several], layout.every)
+    if len(x) == len(found):
+        return found
+    heads = [f"{k}.{name}" for k in range(found[0].length) for name in names]
+    entries = {"": x[0]} if names == [""] else dict(zip(heads, x[0].T, strict=True))
+    return [found[0]._replace(place="", entries=entries)]
+
+
+def _are_numbered(places: Sequence[str]) -> bool:
+    """Whether places differ in one number alone, that counts them: frames/0/landmarks, frames/1/landmarks."""
+    parts = [place.split("/") for place in places]
+    differing = [[*column] for column in zip(*parts, strict=False) if len({*column}) > 1]
+    return len({len(one) for one in parts}) == 1 and differing == [[str(k) for k in range(len(places))]]
 
 
 def _bare(found: Sequence[Found], layout: Layout, kind: str) -> Parsed:

@@ -37,8 +37,10 @@ _STRUCTURAL = frozenset(
         "data", "movements", "demos", "trials", "values", "samples", "points", "frames", "inputs", "payload", "train",
         "test", "valid", "validation", "acquisition", "signal", "signals", "recordings", "table",
         "gestures", "actions", "motions", "strokes", "sequences", "episodes", "trajectories", "items", "results",
+        "point", "landmark", "landmarks", "keypoints", "people", "bodies", "templates",
     }
 )  # fmt: skip
+_DRAWN = frozenset({"points", "point", "strokes"})
 _WIDEST = 1000  # numbers in a sample; images have more
 _DEEPEST = 12  # groups within groups
 
@@ -275,9 +277,15 @@ def _is_rate(name: str, tree: Mapping[str, Any]) -> bool:
 
 
 def _own_label(tree: Mapping[str, Any]) -> str | None:
+    """The label that a group says; beside points or strokes its name is one, as of the $1 recognizer."""
+    drawn = any(name.lower() in _DRAWN and isinstance(one, (Mapping, list)) for name, one in tree.items())
     for name, one in tree.items():
-        if name.lower() in LABEL_WORDS | {"task"} and isinstance(one, str) and one:
+        if not isinstance(one, str) or not one:
+            continue
+        if name.lower() in LABEL_WORDS | {"task"}:
             return one
+        if drawn and name.lower() == "name":
+            return label_of(one)
     return None
 
 
