@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import kineme
-from kineme.movements.tables.time_stamps import nanoseconds, same_clock, seconds_of_dates, unit_by_size
+from kineme.movements.tables.time_stamps import is_date, nanoseconds, same_clock, seconds_of_dates, unit_by_size
 
 STAMPS = [1_700_000_000 + k // 2 for k in range(20)], [500_000_000 * (k % 2) for k in range(20)]
 
@@ -239,3 +239,27 @@ def test_ticks_of_unknown_length_are_refused_until_it_is_said(tmp_path):
         kineme.read_recordings(tmp_path / "a.csv", time="ticks")
     recordings = kineme.read_recordings(tmp_path / "a.csv", time="ticks", units="100ns")
     np.testing.assert_allclose(np.diff(recordings.demonstrations[0].times), 1 / 30, rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("cells", "seconds"),
+    [
+        (["11:59:59.500 AM", "12:00:00.000 PM", "1:00:00 pm"], [43_199.5, 43_200, 46_800]),
+        (["12:00:00.250AM", "01:00:00.000AM", "10:15:03,250 PM"], [0.25, 3600, 80_103.25]),
+        (["11:59:59 PM", "12:00:00 AM", "12:00:01 AM"], [86_399, 86_400, 86_401]),
+        (["2024-05-06 12:00:01 PM", "2024/05/06 13:00:00", "2024/05/07 12:00:01 AM"], [0, 3599, 43_200]),
+    ],
+)
+def test_halves_of_days_and_dates_that_begin_with_the_year(cells, seconds):
+    assert all(map(is_date, cells))
+    values, others = seconds_of_dates(cells)
+    assert others == {}
+    begin = values[0] - seconds[0] if cells[0].startswith("2024") else 0.0
+    np.testing.assert_allclose(values - begin, seconds)
+
+
+@pytest.mark.parametrize(
+    "cell", ["13:00:00 PM", "0:10:00 AM", "05/06/2024 10:00:00 AM", "2024-05/06 10:00:00", "10:00 AM"]
+)
+def test_what_is_no_time_of_day_or_no_certain_date_is_none(cell):
+    assert not is_date(cell)

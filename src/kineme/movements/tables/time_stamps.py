@@ -36,13 +36,18 @@ _TICK_WORDS = frozenset({"tick", "ticks"})
 _DATE_WORDS = frozenset({"unix", "epoch", "utc"})
 _DRIFT = 1e-4  # of the time that passed, between two clocks of one device
 
-_DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?\s?(Z|[-+]\d\d:?\d\d)?")
+_DATE = re.compile(r"\d{4}([-/])\d\d\1\d\d[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?\s?(Z|[-+]\d\d:?\d\d)?")
 _CLOCK = r"(?P<h>\d{1,3}):(?P<m>[0-5]\d):(?P<s>[0-5]\d([.,]\d+)?)"
 #: A time of day, a duration as pandas writes it, and one after ISO 8601.
 _DURATIONS = (
     re.compile(rf"((?P<d>-?\d+) days? ?\+?)?{_CLOCK}"),
     re.compile(r"P(?P<d>-?\d+)DT(?P<h>\d+)H(?P<m>\d+)M(?P<s>\d+([.,]\d+)?)S"),
     re.compile(r"(?P<d>-?\d+) days?"),
+)
+#: A time of day in halves, alone or after a date that begins with the year: 10:15:03.250 PM.
+_HALF_DAYS = re.compile(
+    r"(?P<date>\d{4}([-/])\d\d\2\d\d[T ])?(?P<h>0?[1-9]|1[0-2])(?P<rest>:[0-5]\d:[0-5]\d([.,]\d+)?)\s?(?P<half>[AP])M",
+    re.I,
 )
 _HOUR, _DAY = 3600.0, 86400.0
 
@@ -126,6 +131,7 @@ def in_seconds(stamps: Array, units: str | float) -> Array:
 
 def is_date(cell: str) -> bool:
     """Whether a cell reads as a date with a time of day, after ISO 8601, as a time of day, or as a duration."""
+    cell = _in_whole_days(cell)
     return _DATE.fullmatch(cell) is not None or _duration(cell) is not None
 
 
@@ -133,14 +139,16 @@ def seconds_of_dates(cells: Sequence[str]) -> tuple[Array, dict[int, str]]:
     """Seconds, NaN where a cell is no date, time of day or duration; and row -> that cell.
 
     Of dates they count from 1970, to the microsecond; no zone is UTC. Where times of day pass midnight, they go on.
+    Times with AM and PM are understood. Dates begin with the year: of others nobody knows which number is the month.
     """
     seconds, others = np.full(len(cells), np.nan), {}
     for row, cell in enumerate(cells):
-        if (duration := _duration(cell.strip())) is not None:
+        text = _in_whole_days(cell.strip())
+        if (duration := _duration(text)) is not None:
             seconds[row] = duration
             continue
         try:
-            date = datetime.fromisoformat(cell.strip())
+            date = datetime.fromisoformat(text.replace("/", "-"))
             seconds[row] = (date if date.tzinfo else date.replace(tzinfo=UTC)).timestamp()
         except (ValueError, OverflowError):
             others[row] = cell
@@ -148,6 +156,15 @@ def seconds_of_dates(cells: Sequence[str]) -> tuple[Array, dict[int, str]]:
     if (midnights := late & early & (seconds[:-1] < _DAY)).any():
         seconds[1:] += _DAY * np.cumsum(midnights)
     return seconds, others
+
+
+def _in_whole_days(cell: str) -> str:
+    """A time of day in halves, 10:15:03 PM, as 22:15:03; anything else as it is."""
+    match = _HALF_DAYS.fullmatch(cell)
+    if match is None:
+        return cell
+    hour = int(match["h"]) % 12 + 12 * (match["half"] in "Pp")
+    return f"{match['date'] or ''}{hour:02d}{match['rest']}"
 
 
 def _duration(cell: str) -> float | None:
