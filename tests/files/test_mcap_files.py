@@ -57,9 +57,10 @@ def test_an_mcap_whose_messages_are_not_in_order(tmp_path):
 
 
 def test_an_mcap_of_another_robot_system_is_named(tmp_path):
-    path = write_mcap(tmp_path / "a.mcap", poses(), profile="", encoding="protobuf")
-    with pytest.raises(kineme.DataError, match=r"a\.mcap: expected a bag of ROS .* got: Profile is not ros2"):
-        read_recordings(path)
+    for profile, named in (("", "no profile"), ("px4", "the b'px4' profile")):
+        path = write_mcap(tmp_path / "a.mcap", poses(), profile=profile, encoding="protobuf")
+        with pytest.raises(kineme.DataError, match=rf"a\.mcap: expected an MCAP file of ROS 2, got .*{named}.*as CSV"):
+            read_recordings(path)
 
 
 def test_an_mcap_with_an_encoding_that_rosbags_does_not_know_names_it(tmp_path):

@@ -545,3 +545,10 @@ def test_stamps_of_nanoseconds_may_be_rounded(tmp_path):
     for ending in ("csv", "parquet", "npz", "json"):
         times = kineme.read_recordings(tmp_path / f"a.{ending}").demonstrations.times
         np.testing.assert_allclose(np.diff(times), 0.01, atol=1e-6)
+
+
+@pytest.mark.parametrize("ending", [".xlsx", ".XLS", ".ods"])
+def test_spreadsheets_are_to_be_saved_as_text(tmp_path, ending):
+    (tmp_path / f"a{ending}").write_bytes(b"PK")
+    with pytest.raises(kineme.DataError, match=rf"the spreadsheet a{ending}; save its sheet as \.csv"):
+        read_recordings(tmp_path / f"a{ending}")

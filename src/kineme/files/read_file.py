@@ -39,6 +39,7 @@ _UNREADABLE = (
     MemoryError,
 )
 
+_SPREADSHEETS = frozenset({".xlsx", ".xlsm", ".xls", ".ods", ".numbers"})
 _NOWHERE = "expected a file, got a link that leads nowhere; delete it, or restore what it leads to"
 
 
@@ -166,6 +167,8 @@ def format_of(path: Path) -> Format:
         No format has that extension; the message lists those that exist.
     """
     form = FORMATS.get(path.suffix.lower())
+    if path.suffix.lower() in _SPREADSHEETS:
+        raise DataError(f"expected a table of text, got the spreadsheet {path.name}; save its sheet as .csv")
     if form is None:
         raise DataError(f"expected a file ending in one of {', '.join(FORMATS)}, got {path.suffix or 'no ending'!r}")
     return form

@@ -15,7 +15,8 @@ from kineme.files.ros.damage import REMEDIES
 _MAGIC = {".bag": b"#ROSBAG V2.0\n", ".mcap": b"\x89MCAP0\r\n", ".db3": b"SQLite format 3\0"}
 
 _HEAD = struct.Struct("<BQ")  # kind and length of a record of MCAP
-_CHUNK, _ATTACHMENT = 6, 9  # kinds
+_HEADER, _CHUNK, _ATTACHMENT = 1, 6, 9  # kinds
+_PROFILES, _LONGEST = (b"ros2",), 64  # names of what messages are, and how many bytes of one are shown
 _SIZE_AT = 16  # where a chunk says to how many bytes it expands
 
 
@@ -55,6 +56,14 @@ def _check_mcap(file: BinaryIO, at: int) -> None:
             raise DataError(f"expected a record of MCAP at byte {at:,}, got zeros; {REMEDIES['.mcap']}")
         if kind != _ATTACHMENT and at + length < end:
             check_in_passing(length, f"a record of MCAP at byte {at:,}")
+        if kind == _HEADER and len(profile := file.read(4)) == 4:
+            profile = file.read(min(int.from_bytes(profile, "little"), _LONGEST))
+            if profile not in _PROFILES:
+                which = f"the {profile!r}" if profile else "no"
+                raise DataError(
+                    f"expected an MCAP file of ROS 2, got one of {which} profile, whose "
+                    " messages are JSON, Protobuf or the like; write a topic as CSV or JSON lines"
+                )
         if kind == _CHUNK and len(size := file.read(_SIZE_AT + 8)) == _SIZE_AT + 8:
             check_in_passing(int.from_bytes(size[_SIZE_AT:], "little"), f"a chunk of MCAP at byte {at:,}")
         at += _HEAD.size + length
