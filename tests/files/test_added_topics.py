@@ -70,6 +70,16 @@ def test_all_other_messages_are_the_same_bytes(tmp_path, kind, compress):
     assert times == sorted(times)
 
 
+def test_texts_are_asked_for_with_the_times_of_the_first_and_the_last_message(tmp_path):
+    known = [*stamps(), *(ns + 5 for ns in stamps(20)), *(ns + 7 for ns in stamps(3))]
+    asked = []
+    for kind in KINDS:
+        source = recorded(tmp_path, kind, name=kind)
+        target = tmp_path / f"named_{kind}{source.suffix}"
+        copy_with_topic(source, target, TOPIC, lambda *span: asked.append(span) or TEXTS)
+    assert asked == [(min(known), max(known))] * len(KINDS)
+
+
 def test_messages_outside_of_the_recording_extend_it(tmp_path):
     for kind in KINDS:
         source = recorded(tmp_path, kind, name=kind)

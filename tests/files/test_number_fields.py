@@ -211,6 +211,16 @@ def test_definitions_that_differ_are_refused():
     assert number_fields(SimpleNamespace(version=2), topic).heads == ("x",)
 
 
+def test_arrays_of_fixed_size_are_columns_up_to_a_thousand():
+    text = "float64[1000] short\nfloat64[1001] long\nfloat64 last"
+    said = SimpleNamespace(msgdef=SimpleNamespace(data=text, format=SimpleNamespace(name="MSG")))
+    topic = SimpleNamespace(name="/a", type="my_msgs/msg/A", connections=[said])
+    fields = number_fields(SimpleNamespace(version=2), topic)
+    assert fields.heads == (*(f"short.{k}" for k in range(1000)), "last")
+    raw = b"\x00\x01\x00\x00" + struct.pack("<2002d", *range(2002))
+    assert fields.decode(raw).row == [*range(1000), 2001]
+
+
 def test_no_program_is_made_of_a_definition(tmp_path, monkeypatch):
     path = recorded(tmp_path, "ros1")
     from rosbags.typesys import store as module

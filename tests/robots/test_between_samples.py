@@ -16,8 +16,10 @@ from kineme.errors import TrajectoryError
 from kineme.robots import InfeasibleError, JointTrajectory, load, move, preflight
 from kineme.robots.checks.along import along
 from kineme.robots.execution.between import _bernstein, between, dense_times, extreme
+from kineme.robots.execution.retime import _by_length as by_length
 from kineme.robots.execution.retime import fastest, sampled
 from kineme.robots.execution.timing import as_generated
+from kineme.robots.execution.torques import Torques
 from soaking import SOAK, examples
 
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")
@@ -166,6 +168,26 @@ def test_ramps_take_half_of_the_acceleration_and_half_of_their_time_more(tmp_pat
     np.testing.assert_allclose(shares.max(axis=0), [0.5, 0.125], rtol=1e-3)
     np.testing.assert_allclose(shares.min(axis=0), [-0.5, -0.125], rtol=1e-3)
     assert timed.trajectory.duration == pytest.approx(1.0 + ramp)
+
+
+def test_the_path_by_its_length_is_the_path_however_long_it_is(tmp_path):
+    """More than ten times as far as the joints pass in a second."""
+    t = np.linspace(0, 4, 800)
+    path = CubicSpline(t, np.column_stack((0.8 * np.sin(3 * np.pi * t), 0.4 * np.cos(2.5 * np.pi * t))))
+    curve, generated, lengths = by_length(simple_arm(tmp_path), path)
+    assert lengths[-1] > 10
+    np.testing.assert_allclose(curve(lengths), path(generated), atol=1e-4)
+
+
+def test_the_fastest_timing_takes_the_whole_of_a_torque_and_no_more(tmp_path):
+    pytest.importorskip("toppra")
+    robot, t = simple_arm(tmp_path, effort=0.15, mass=0.5), np.linspace(0, 1, 5)
+    turning = fastest(robot, CubicSpline(t, np.column_stack((t, np.full(5, -1.7)))))
+    sent, torques = sampled(robot, turning, 500.0).trajectory, Torques(robot)
+    needed = [torques.of(*one) for one in zip(sent.positions, sent.velocities, sent.accelerations, strict=True)]
+    assert np.abs(needed).max() == pytest.approx(0.15, rel=3e-3)
+    assert torques.exceeded(np.array([0.0, -0.151]))
+    assert not torques.exceeded(np.array([0.149, -0.149]))
 
 
 def test_the_fastest_timing_of_a_straight_line_says_where_it_is_within_all_limits(tmp_path):

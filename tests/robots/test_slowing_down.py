@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ import kineme
 from arm_samples import simple_arm, stroke
 from kineme.errors import KinemeError
 from kineme.robots import InfeasibleError, load, move
+from kineme.robots.planning import timed_movement
 from soaking import SOAK, combined
 
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")
@@ -33,6 +35,29 @@ def test_however_short_it_was_it_is_slowed_down_to_the_same_duration(seconds):
     known = move(stroke(robot, 1.2), robot, timing="slowed")
     assert made.preflight.passed
     assert made.trajectory.duration == pytest.approx(known.trajectory.duration, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("along_path", "as_shown", "chosen"),
+    [
+        ((False, 1.0), (True, 2.0), "as shown"),
+        ((True, 2.0), (False, 1.0), "along path"),
+        ((True, 2.0), (True, 1.0), "as shown"),
+        ((False, 1.0), (False, 2.0), "along path"),
+    ],
+)
+def test_of_the_two_timings_the_shorter_that_passes_is_taken(monkeypatch, along_path, as_shown, chosen):
+    def made(name, passed, duration):
+        preflight, trajectory = SimpleNamespace(passed=passed, slower=1.5), SimpleNamespace(duration=duration)
+        return SimpleNamespace(name=name, factor=1.1, preflight=preflight, trajectory=trajectory)
+
+    def slowed(untimed, course, most, follows=False):
+        return made("along path", *along_path) if follows else made("as shown", *as_shown)
+
+    monkeypatch.setattr(timed_movement, "fastest", lambda robot, joints: "a parameterization")
+    monkeypatch.setattr(timed_movement, "_slowed", slowed)
+    untimed = SimpleNamespace(robot=None, joints=None, rate=100.0)
+    assert timed_movement.with_timing(untimed, "fastest").name == chosen
 
 
 def test_what_a_refusal_promises_holds():

@@ -65,6 +65,17 @@ def test_a_path_that_leaves_the_limits_only_between_its_samples_is_kept_inside(l
     assert made.min() >= limit * (1 + 1e-6)
 
 
+def test_a_path_that_passes_a_limit_above_only_between_its_samples_is_kept_inside(learned):
+    path = learned[0].rollout(via=[]).positions[0]
+    dense = learned[0].rollout(via=[], n_samples=10_000).positions[0]
+    k = int(np.argmax(dense.max(axis=0) - path.max(axis=0)))
+    limit = (path[:, k].max() + dense[:, k].max()) / 2
+    assert path[:, k].max() < limit - 1e-5 < dense[:, k].max() - 1e-5
+    high = np.where(np.arange(2) == k, limit, np.inf)
+    made = learned[0].rollout(position_limits=(-np.inf, high), n_samples=10_000).positions[0, :, k]
+    assert made.max() <= limit + 1e-5
+
+
 def test_a_stretch_of_more_points_than_can_be_met_stays(learned):
     plain = learned[0].rollout().positions[0]
     via = [((160 / 199, 189 / 199), plain[160:190])]

@@ -61,8 +61,8 @@ def _check_mcap(file: BinaryIO, at: int) -> None:
             if profile not in _PROFILES:
                 which = f"the {profile!r}" if profile else "no"
                 raise DataError(
-                    f"expected an MCAP file of ROS 2, got one of {which} profile, whose "
-                    " messages are JSON, Protobuf or the like; write a topic as CSV or JSON lines"
+                    f"expected an MCAP file of ROS 2, got one of {which} profile, whose messages "
+                    "are JSON, Protobuf or the like; write a topic as CSV or JSON lines"
                 )
         if kind == _CHUNK and len(size := file.read(_SIZE_AT + 8)) == _SIZE_AT + 8:
             check_in_passing(int.from_bytes(size[_SIZE_AT:], "little"), f"a chunk of MCAP at byte {at:,}")
