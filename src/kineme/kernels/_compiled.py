@@ -37,6 +37,13 @@ def _pack(rows, panel):  # type: ignore[no-untyped-def]
             panel[k, j] = rows[j, k]
 
 
+@jit
+def _unload(strips, n_rows, width, sums, i, start):  # type: ignore[no-untyped-def]
+    for r in range(n_rows):
+        for j in range(width):
+            sums[i + r, start + j] = strips[r, j]
+
+
 def _sum_over_coordinates(term: Callable[..., Any], A: Rows, B: Rows, c: Any, sums: Rows) -> None:
     """``sums[i, j] = sum_k term(A[i, k], B[j, k], c)`` for C-contiguous arrays.
 
@@ -68,7 +75,7 @@ def _sum_over_coordinates(term: Callable[..., Any], A: Rows, B: Rows, c: Any, su
                 for r in range(_ROWS):
                     for j in range(width):
                         strips[r, j] += term(A[i + r, k], panel[k, j], c)
-            sums[i : i + _ROWS, start : start + width] = strips[:, :width]
+            _unload(strips, _ROWS, width, sums, i, start)
         for i in range(by_four, len(A)):
             s0[:] = 0
             for k in range(0, p - 1, 2):
@@ -78,7 +85,7 @@ def _sum_over_coordinates(term: Callable[..., Any], A: Rows, B: Rows, c: Any, su
             for k in range(p - p % 2, p):
                 for j in range(width):
                     s0[j] += term(A[i, k], panel[k, j], c)
-            sums[i, start : start + width] = s0[:width]
+            _unload(strips, 1, width, sums, i, start)
 
 
 # Not cached on disk, since its key would contain functions; the loops below, which inline it, are cached. Each of the
