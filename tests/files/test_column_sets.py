@@ -182,6 +182,15 @@ def test_one_column_in_two_units_is_refused_and_kinds_are_said_by_the_heads_of_t
     assert recordings.demonstrations.channels[1][:2] == ("y [mm]", "discrete")
 
 
+def test_files_that_are_joined_have_one_unit(tmp_path):
+    table(tmp_path / "elbow.csv", ["x [mm]", "y [mm]"], 1000 * PATH[:, :2])
+    table(tmp_path / "wrist.csv", ["x [m]"], PATH[:, 2:])
+    recordings = kineme.read_recordings(tmp_path, join_files=True)
+    assert recordings.demonstrations.dimensions == ("elbow.x [mm]", "elbow.y [mm]", "wrist.x [mm]")
+    np.testing.assert_allclose(recordings.demonstrations[0].positions, 1000 * PATH, rtol=1e-12)
+    assert "wrist.x [m] as wrist.x [mm]" in " ".join(inspect(recordings).notes)
+
+
 def test_a_library_of_converted_columns_recognizes_files_that_have_more(tmp_path):
     for k, label in enumerate("ab"):
         table(tmp_path / label / "0.csv", IN_WORDS, (1 + k) * PATH[:, [0, 1, 2][:: 1 - 2 * k]])

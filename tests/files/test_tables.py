@@ -427,6 +427,8 @@ def test_columns_of_thousands_alone_are_refused_and_never_left_aside(separator, 
     with pytest.raises(kineme.DataError, match=rf"'x'.* without marks between thousands, got {got}"):
         read(text)
     assert read(text, exclude="x").demonstrations.dimensions == ("y",)
+    with pytest.raises(kineme.DataError, match=rf"'x'.* without marks between thousands, got {got}"):
+        read(text, exclude="y")
 
 
 @pytest.mark.parametrize("names", [["scorer", "bodyparts", "coords"], [None, None]])
