@@ -86,6 +86,12 @@ def test_joints_over_time_are_no_movements_of_joints(tmp_path, kind):
     np.testing.assert_array_equal([one.positions for one in many], SKELETON)
 
 
+def test_movements_of_one_coordinate_are_no_points(tmp_path):
+    alike = np.random.default_rng(0).normal(size=20) + np.linspace(0, 0.1, 9)[:, None]
+    np.save(tmp_path / "a.npy", alike[:, :, None])
+    assert len(read_recordings(tmp_path / "a.npy")) == 9
+
+
 @pytest.mark.parametrize("name", ["positions", "skeleton"])
 @pytest.mark.parametrize("kind", ["npz", "json"])
 def test_times_say_which_axis_of_three_is_time(tmp_path, kind, name):

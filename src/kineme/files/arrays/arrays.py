@@ -134,14 +134,15 @@ def sets_or_points(xs: list[Array], every: int | None) -> list[Array]:
     """Tell n movements (T, d) that are one array (n, T, d) from the T points of one movement, (n, T d).
 
     Nobody says which axis is time, but places change less from sample to sample than from point to point, and less than
-    between movements that are not all but equal. As many samples as `every` says are a movement.
+    between movements that are not all but equal. As many samples as `every` says are a movement. Points have several
+    coordinates: of one there are movements.
 
     Raises
     ------
     DataError
         The first axis may be time.
     """
-    if len(xs) < MIN_SAMPLES or len({x.shape for x in xs}) > 1 or not 0 < math.prod(xs[0].shape[1:]) <= len(xs[0]):
+    if len(xs) < MIN_SAMPLES or len({x.shape for x in xs}) > 1 or not 1 < math.prod(xs[0].shape[1:]) <= len(xs[0]):
         return xs
     n, length = len(xs), len(xs[0])
     if every is not None:
