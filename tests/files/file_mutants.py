@@ -216,6 +216,14 @@ _SAVED = {"primitives.kineme": kineme.Primitives, "rhythm.kineme": RhythmicPrimi
 
 
 @functools.cache
+def _messages():
+    from bag_files import write_json_mcap
+
+    with tempfile.TemporaryDirectory() as folder:
+        topics = {"/hand": [{"timestamp": {"sec": k, "nsec": 0}, "x": k / 3} for k in range(N_SAMPLES)]}
+        return write_json_mcap(Path(folder) / "a.mcap", topics).read_bytes()
+
+
 def _bag(kind, compress=False):
     """One file with joints, poses and transforms, of which the joints and the transforms are not read by themselves."""
     from bag_files import Maker, stamps, write_bag
@@ -322,6 +330,7 @@ def samples():
         "run.db3": _bag("sqlite3"),
         "run.mcap": _bag("mcap"),
         "compressed.mcap": _bag("mcap", compress=True),
+        "messages.mcap": _messages(),
         "v2.lerobot": _lerobot(write_v2),
         "v3.lerobot": _lerobot(write_v3),
         **_label_tables(),

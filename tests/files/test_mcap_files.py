@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import kineme
-from bag_files import Maker, pose_rows, stamps, store, write_mcap
+from bag_files import START, Maker, pose_rows, stamps, store, write_json_mcap, write_mcap
 from kineme.files.recordings import read_recordings
 
 
@@ -57,10 +57,53 @@ def test_an_mcap_whose_messages_are_not_in_order(tmp_path):
 
 
 def test_an_mcap_of_another_robot_system_is_named(tmp_path):
-    for profile, named in (("", "no profile"), ("px4", "the b'px4' profile")):
+    for profile in ("", "px4"):
         path = write_mcap(tmp_path / "a.mcap", poses(), profile=profile, encoding="protobuf")
-        with pytest.raises(kineme.DataError, match=rf"a\.mcap: expected an MCAP file of ROS 2, got .*{named}.*as CSV"):
+        with pytest.raises(kineme.DataError, match=r"an MCAP file of ROS 2, or .* in JSON, got messages in .*as CSV"):
             read_recordings(path)
+
+
+PLACES = [{"x": k / 7, "y": k * k / 9, "pose": {"yaw": k / 3}} for k in range(30)]
+
+
+@pytest.mark.parametrize("compression", ["NONE", "LZ4", "ZSTD"])
+def test_messages_in_json_are_samples(tmp_path, compression):
+    from mcap.writer import CompressionType
+
+    stamped = [{"timestamp": {"sec": k // 10, "nsec": k % 10 * 100_000_000}} | one for k, one in enumerate(PLACES)]
+    path = write_json_mcap(
+        tmp_path / "a.mcap", {"/hand": PLACES, "/stamped": stamped}, compression=CompressionType[compression]
+    )
+    with pytest.raises(kineme.DataError, match=r"got the topics \['/hand', '/stamped'\]; say which .*--topic"):
+        read_recordings(path)
+    for topic, step in (("/hand", 0.05), ("/stamped", 0.1)):
+        (one,) = read_recordings(path, topic=topic).demonstrations
+        np.testing.assert_array_equal(one.recorded, [[k / 7, k * k / 9, k / 3] for k in range(30)])
+        np.testing.assert_allclose(np.diff(one.times), step, atol=1e-6)
+    with pytest.raises(kineme.DataError, match="messages that are objects, got b'3'"):
+        read_recordings(write_json_mcap(tmp_path / "b.mcap", {"/n": [3] * 9}))
+
+
+def test_messages_in_json_take_no_more_memory_than_a_file_may(tmp_path, monkeypatch):
+    path = write_json_mcap(tmp_path / "a.mcap", {"/hand": [{"x": 0.0, "t": k, "note": "a" * 5000} for k in range(99)]})
+    assert path.stat().st_size < 50_000
+    monkeypatch.setenv("KINEME_MAX_FILE_BYTES", "100000")
+    with pytest.raises(kineme.DataError, match="messages in JSON that takes at most 100,000 bytes"):
+        read_recordings(path)
+
+
+def test_a_chunk_of_messages_in_json_expands_no_further_than_it_says(tmp_path):
+    from mcap.writer import CompressionType
+
+    path = write_json_mcap(tmp_path / "a.mcap", {"/hand": PLACES}, compression=CompressionType.LZ4)
+    data = bytearray(path.read_bytes())
+    chunk = next(
+        at for at in range(8, len(data)) if data[at] == 6 and data[at + 9 : at + 13] == START.to_bytes(8, "little")[:4]
+    )
+    data[chunk + 25 : chunk + 33] = (100).to_bytes(8, "little")
+    path.write_bytes(data)
+    with pytest.raises(kineme.DataError, match="a chunk that expands to 100 bytes, got one that expands to more"):
+        read_recordings(path)
 
 
 def test_an_mcap_with_an_encoding_that_rosbags_does_not_know_names_it(tmp_path):

@@ -9,6 +9,7 @@ from typing import NamedTuple
 from kineme.files.arrays.arrays import POSITIONS, arrays_movements, has_known_names
 from kineme.files.arrays.bodies import body_movements
 from kineme.files.arrays.hdf5 import hdf5_movements
+from kineme.files.arrays.json_messages import json_messages
 from kineme.files.arrays.json_trees import json_lines_movements, json_movements
 from kineme.files.arrays.matlab import mat_movements
 from kineme.files.arrays.npz import Npz, array_of_npy
@@ -20,6 +21,7 @@ from kineme.files.motion_capture.bvh import read_bvh_table
 from kineme.files.motion_capture.c3d import read_c3d_table
 from kineme.files.motion_capture.mvnx import read_mvnx_table
 from kineme.files.ros.bag_contents import bag_contents
+from kineme.files.ros.check_records import check_records
 from kineme.files.ros.read_bag import read_bag
 from kineme.files.rows import row_movements, series_movements
 from kineme.files.tables.parquet import read_parquet_table
@@ -121,6 +123,10 @@ def _read_mvnx(data: bytes, layout: Layout) -> Parsed:
     return table_movements(*read_mvnx_table(data, layout), layout, "MVNX")
 
 
+def _read_mcap(path: Path, layout: Layout) -> Parsed:
+    return read_bag(path, layout) if check_records(path) == b"ros2" else json_messages(path, layout)
+
+
 _BAG = Format(read_path=read_bag, contents=bag_contents)
 
 #: File ending -> format. A reader raises a `DataError` or any `ValueError`, `KeyError` or `TypeError`.
@@ -146,7 +152,7 @@ FORMATS: dict[str, Format] = {
     ".mvnx": Format(_read_mvnx),
     ".bag": _BAG,
     ".db3": _BAG,
-    ".mcap": _BAG,
+    ".mcap": Format(read_path=_read_mcap, contents=bag_contents),
 }
 
 _HEAD = 4096  # bytes of a marker that are read to know it

@@ -115,8 +115,13 @@ def _columns_of(frame: Mapping[str, list[Any]]) -> dict[str, Any]:
 
 def check_objects(data: bytes) -> None:
     """Refuse JSON that would take more memory than the limit once it is Python objects."""
+    check_expanded(size_of_objects(data))
+
+
+def size_of_objects(data: bytes) -> int:
+    """The memory [bytes] that JSON takes with the Python objects that it becomes."""
     lists = data.count(b"[") + data.count(b"{")
-    check_expanded(len(data) + _NUMBER * data.count(b",") + _LIST * lists)
+    return len(data) + _NUMBER * data.count(b",") + _LIST * lists
 
 
 def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -16,12 +16,14 @@ _MAGIC = {".bag": b"#ROSBAG V2.0\n", ".mcap": b"\x89MCAP0\r\n", ".db3": b"SQLite
 
 _HEAD = struct.Struct("<BQ")  # kind and length of a record of MCAP
 _HEADER, _CHUNK, _ATTACHMENT = 1, 6, 9  # kinds
-_PROFILES, _LONGEST = (b"ros2",), 64  # names of what messages are, and how many bytes of one are shown
+_LONGEST = 64  # bytes of a profile
 _SIZE_AT = 16  # where a chunk says to how many bytes it expands
 
 
-def check_records(path: Path) -> None:
+def check_records(path: Path) -> bytes:
     """Refuse a file that is none of ROS by its first bytes, and an MCAP file whose records are none or too large.
+
+    Returns the profile of an MCAP file, ``b"ros2"`` of one of ROS 2; nothing of other files.
 
     Records are passed over by their lengths. Other damage is left to rosbags, which may find its way by the index.
 
@@ -38,13 +40,12 @@ def check_records(path: Path) -> None:
                 f"expected a {path.suffix.lower()} file of ROS, which begins with {magic!r}, got "
                 f"{'an empty file' if not first else repr(first)}"
             )
-        if path.suffix.lower() == ".mcap":
-            _check_mcap(file, len(magic))
+        return _check_mcap(file, len(magic)) if path.suffix.lower() == ".mcap" else b""
 
 
-def _check_mcap(file: BinaryIO, at: int) -> None:
+def _check_mcap(file: BinaryIO, at: int) -> bytes:
     """Rosbags takes each nine zeros for a record, of which there may be billions, and reads records whole."""
-    magic = _MAGIC[".mcap"]
+    magic, profile = _MAGIC[".mcap"], b""
     end = file.seek(0, os.SEEK_END)
     file.seek(max(end - len(magic), 0))
     if file.read() != magic:
@@ -56,14 +57,9 @@ def _check_mcap(file: BinaryIO, at: int) -> None:
             raise DataError(f"expected a record of MCAP at byte {at:,}, got zeros; {REMEDIES['.mcap']}")
         if kind != _ATTACHMENT and at + length < end:
             check_in_passing(length, f"a record of MCAP at byte {at:,}")
-        if kind == _HEADER and len(profile := file.read(4)) == 4:
-            profile = file.read(min(int.from_bytes(profile, "little"), _LONGEST))
-            if profile not in _PROFILES:
-                which = f"the {profile!r}" if profile else "no"
-                raise DataError(
-                    f"expected an MCAP file of ROS 2, got one of {which} profile, whose messages "
-                    "are JSON, Protobuf or the like; write a topic as CSV or JSON lines"
-                )
+        if kind == _HEADER and len(size := file.read(4)) == 4:
+            profile = file.read(min(int.from_bytes(size, "little"), _LONGEST))
         if kind == _CHUNK and len(size := file.read(_SIZE_AT + 8)) == _SIZE_AT + 8:
             check_in_passing(int.from_bytes(size[_SIZE_AT:], "little"), f"a chunk of MCAP at byte {at:,}")
         at += _HEAD.size + length
+    return profile
