@@ -298,6 +298,7 @@ OTHER_UNITS = {
 }
 
 
+@pytest.mark.filterwarnings("ignore:units are converted")
 @pytest.mark.parametrize("other", OTHER_UNITS)
 def test_columns_are_learned_and_recognized_by_name_in_the_unit_of_the_library(tmp_path, other):
     shown, asked = frames(("x [m]", "y [m]", "z [m]"), lambda x: x), frames(*OTHER_UNITS[other])

@@ -41,6 +41,8 @@ def collect_data_frames(frames: Sequence[Any], layout: Layout) -> Movements:
     if not frames:
         raise TrajectoryError("expected at least one data frame, got none")
     parsed = [_parse(frame, i, layout) for i, frame in enumerate(frames)]
+    if converted := [*dict.fromkeys(said for one in parsed for said in one.detected.converted)]:
+        warn(f"units are converted to those of most columns: {', '.join(converted)}", UserWarning, 3)
     dimensions = parsed[0].detected.columns
     for i, one in enumerate(parsed):
         if one.detected.columns != dimensions:
@@ -74,7 +76,4 @@ def _parse(frame: Any, i: int, layout: Layout) -> Parsed:
         detected, block = in_one_unit(detected, block)
     except DataError as error:
         raise TrajectoryError(f"data frame {i}: {error} (of Demonstrations.from_dataframe)") from error
-    if detected.converted:
-        said = f"units are converted to those of most columns: {', '.join(detected.converted)}"
-        warn(f"data frame {i}: {said}", UserWarning, 2)
     return Parsed(detected, block, left_out)
