@@ -81,6 +81,9 @@ def test_joints_over_time_are_no_movements_of_joints(tmp_path, kind):
         read_recordings(path, units=0.02)
     (one,) = read_recordings(path, units=0.02, every=40).demonstrations
     np.testing.assert_array_equal(one.positions, SKELETON.reshape(40, 21))
+    assert [(channel.name, channel.kind) for channel in one.channels] == [
+        (f"{k}.{axis}", "position") for k in range(7) for axis in "xyz"
+    ]
     assert one.duration == pytest.approx(39 * 0.02)
     many = read_recordings(path, units=0.02, every=7).demonstrations
     np.testing.assert_array_equal([one.positions for one in many], SKELETON)

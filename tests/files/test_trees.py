@@ -363,7 +363,7 @@ def test_bodies_of_frames_are_read_beside_the_bones_between_their_joints(tmp_pat
     content = {"bone_list": [["HIP", "KNEE"]], "joint_names": ["HIP", "KNEE", "HEAD", "HAND"], "frames": frames}
     (tmp_path / "a.json").write_text(json.dumps(content))
     demos = read_recordings(tmp_path / "a.json").demonstrations
-    assert demos.dimensions == tuple(f"bodies.0.joint_positions.{k}" for k in range(12))
+    assert demos.dimensions == tuple(f"bodies.0.joint_positions.{k}.{axis}" for k in range(4) for axis in "xyz")
     assert demos.durations == pytest.approx([19 * 0.033333])
 
 

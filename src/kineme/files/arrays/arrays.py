@@ -60,7 +60,9 @@ def arrays_movements(arrays: Mapping[str, Any], layout: Layout, kind: str) -> Pa
     if ts is None and not isinstance(layout.units, float | int) and (rate := rate_of(arrays)) is not None:
         check_first_axis([x.shape for x in xs])
         ts, layout = [rate.stamps(len(x)) for x in xs], replace(layout, units="s")
-    named = Named(_labels(arrays, len(xs)), _named(arrays, TIMES) or STAMP, None, _column_names(arrays))
+    shape: tuple[int, ...] = () if key is None else np.shape(arrays[key])
+    points = point_names(*shape[1:]) if len(shape) == 3 and len(xs) < shape[0] else None
+    named = Named(_labels(arrays, len(xs)), _named(arrays, TIMES) or STAMP, None, _column_names(arrays) or points)
     return parsed_arrays(xs, ts, named, layout, (kind, how))
 
 
@@ -156,6 +158,12 @@ def sets_or_points(xs: list[Array], every: int | None) -> list[Array]:
             f"{n} if it is, every={length} if these are {n} movements of {length} samples, in the shell --every"
         )
     return xs
+
+
+def point_names(n_points: int, width: int) -> list[str]:
+    """Names of the coordinates of points without names: 0.x, 0.y, 0.z, 1.x, ..."""
+    ends = "xyz"[:width] if width in (2, 3) else range(width)
+    return [f"{k}.{end}" for k in range(n_points) for end in ends]
 
 
 def _column_names(arrays: Mapping[str, Any]) -> list[str] | None:

@@ -18,6 +18,7 @@ from kineme.files.arrays.arrays import (
     check_first_axis,
     numbers_of,
     parsed_arrays,
+    point_names,
     sets_or_points,
 )
 from kineme.files.arrays.trees import NAMES, STAMP, Found, Style, listed_shapes, movements_in
@@ -97,9 +98,11 @@ def _of_one_array(found: list[Found], layout: Layout) -> list[Found]:
     x = sets_or_points([xs[0] if names == [""] else np.column_stack(xs) for xs in several], layout.every)
     if len(x) == len(found):
         return found
-    heads = [f"{k}.{name}" for k in range(found[0].length) for name in names]
-    entries = {"": x[0]} if names == [""] else dict(zip(heads, x[0].T, strict=True))
-    return [found[0]._replace(place="", entries=entries)]
+    n_points, *width = np.shape(several[0][0])
+    heads = (
+        point_names(n_points, *width) if names == [""] else [f"{k}.{name}" for k in range(n_points) for name in names]
+    )
+    return [found[0]._replace(place="", entries=dict(zip(heads, x[0].T, strict=True)))]
 
 
 def _are_numbered(places: Sequence[str]) -> bool:
@@ -151,7 +154,9 @@ def _heads(one: Found, names: Sequence[str]) -> tuple[tuple[str, ...], tuple[str
         shape = one.entries[name].shape
         width = int(np.prod(shape[1:]))
         ends: Sequence[Any] = range(width)
-        if not name:
+        if len(shape) == 3:
+            heads += [f"{name}.{end}" if name else end for end in point_names(*shape[1:])]
+        elif not name:
             heads += axis_names(width)
         elif len(shape) == 1:
             heads.append(name)
