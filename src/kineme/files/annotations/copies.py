@@ -15,7 +15,7 @@ from kineme.files.lerobot.copy import copy_with_motions
 from kineme.files.lerobot.info import MARKER, read_info
 from kineme.files.lerobot.motions import OWN, Motion
 from kineme.files.ros.add_topic import copy_with_topic
-from kineme.files.ros.read_bag import read_bag
+from kineme.files.ros.bag_contents import bag_contents
 from kineme.output.atomic import whole_file, whole_folder
 
 TOPIC = "/kineme/annotations"
@@ -28,9 +28,9 @@ def is_bag(source: Path) -> bool:
     """Whether it is a bag of ROS, a file or a folder."""
     if source.is_dir():
         known = data_set_of(source)
-        return known is not None and known.format.read_path is read_bag
+        return known is not None and known.format.contents is bag_contents
     known_ending = FORMATS.get(source.suffix.lower())
-    return known_ending is not None and known_ending.read_path is read_bag
+    return known_ending is not None and known_ending.contents is bag_contents
 
 
 def is_lerobot(source: Path) -> bool:
