@@ -45,7 +45,7 @@ def check_records(path: Path) -> bytes:
 
 def _check_mcap(file: BinaryIO, at: int) -> bytes:
     """Rosbags takes each nine zeros for a record, of which there may be billions, and reads records whole."""
-    magic, profile = _MAGIC[".mcap"], b""
+    magic, profile = _MAGIC[".mcap"], b"ros2"  # what has no header is left to rosbags
     end = file.seek(0, os.SEEK_END)
     file.seek(max(end - len(magic), 0))
     if file.read() != magic:
