@@ -22,8 +22,7 @@ def pages() -> Iterator[tuple[str, str]]:
 
 def description() -> dict[str, Any]:
     """The interface as OpenAPI; no library is opened."""
-    from kineme.studio.server.app import ROUTERS
-    from kineme.studio.server.description import ABOUT, REFUSALS, Described
+    from kineme.studio.server.app import ABOUT, REFUSALS, ROUTERS, Described
 
     app = Described(title="kineme studio", description=ABOUT, responses=REFUSALS)
     for router in ROUTERS:

@@ -11,9 +11,8 @@ from sklearn.metrics import adjusted_rand_score
 from kineme import Demonstrations, TrajectoryError
 from kineme.anchoring.clustering import fusion
 from kineme.anchoring.clustering.fusion import components, fuse, set_apart
-from kineme.anchoring.clustering.people import link_people
 from kineme.anchoring.clustering.spectral import count_by_eigengap, spectral
-from kineme.anchoring.proposals.propose import by_shape, propose
+from kineme.anchoring.proposals.propose import by_shape, link_people, propose
 from kineme.comparison.describe import describe
 from kineme.comparison.distances import squared_distances
 from kineme.comparison.representation import ROW_REPRESENTATIONS

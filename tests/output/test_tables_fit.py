@@ -10,8 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kineme.output.display_width import fitted, padded, width_of, wrapped
-from kineme.output.table import Table, to_text
+from kineme.output.table import Table, fitted, padded, to_text, width_of, wrapped
 
 CELLS = st.text(st.sampled_from("ab 1.名é" + "e\u0301"), max_size=60)
 

@@ -63,7 +63,7 @@ from kineme.orientation import PoseDMP, continuous, from_tangent, normalized, to
 from kineme.primitives.discrete.basis import GATINGS
 from kineme.primitives.discrete.fits import FITS
 from kineme.primitives.discrete.formulations import FORMULATIONS
-from kineme.primitives.modulation.laid_out import laid_out, laid_out_poses
+from kineme.primitives.modulation.join import laid_out, laid_out_poses
 from kineme.recognition.answer import Answer
 from kineme.recognition.early.early import cut
 

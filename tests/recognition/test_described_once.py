@@ -72,7 +72,7 @@ def test_a_candidate_in_a_recording_is_described_once(monkeypatch):
     recognizer = Recognizer().fit(demos)
     recognizer.calibration()
     asked = []
-    from kineme.recognition import compared_windows, cut_movements, spotting
+    from kineme.recognition import compared_windows, spotting
 
     inner = spotting.score
 
@@ -80,7 +80,7 @@ def test_a_candidate_in_a_recording_is_described_once(monkeypatch):
         asked.append(len(movements))
         return inner(comparison, references, movements, *scores)
 
-    for module in (spotting, compared_windows, cut_movements):
+    for module in (spotting, compared_windows):
         monkeypatch.setattr(module, "score", noted)
     counts = _Counts(monkeypatch)
     pieces = [demos[0].positions, np.repeat(demos[0].positions[-1:], 40, axis=0), demos[3].positions]

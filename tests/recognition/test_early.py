@@ -17,8 +17,7 @@ from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.recognition.early import evidence
 from kineme.recognition.early.early import cut, earliness
 from kineme.recognition.early.early import partial_shares as shares_of
-from kineme.recognition.early.ending import ending
-from kineme.recognition.early.hypotheses import Early, beginning_procrustes, hypotheses
+from kineme.recognition.early.hypotheses import Early, beginning_procrustes, ending, hypotheses
 from kineme.recognition.early.prefixes import N_PREFIX, beginnings, describe_prefixes, smooth_paths, smoother
 
 

@@ -13,8 +13,7 @@ from kineme.comparison.widths import SHARE
 from kineme.experiments.evaluation.splits import one_person_out
 from kineme.recognition.early import evidence
 from kineme.recognition.early.early import cut, partial_shares
-from kineme.recognition.early.ending import Ending
-from kineme.recognition.early.hypotheses import Early, Hypotheses, hypotheses
+from kineme.recognition.early.hypotheses import Early, Ending, Hypotheses, hypotheses
 from kineme.recognition.early.prefixes import smooth_paths
 
 

@@ -24,7 +24,7 @@ from kineme.recognition.early.evidence import _log_priors, describe_begun
 from kineme.recognition.early.hypotheses import Early, hypotheses
 from kineme.recognition.early.prefixes import smooth_paths
 from kineme.recognition.left_out import typical_scale
-from kineme.recognition.window_scores import Manner, expected, score_windows
+from kineme.recognition.spotting import Manner, expected, score_windows
 from movement_samples import draw_shapes
 
 

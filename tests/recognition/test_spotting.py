@@ -27,8 +27,16 @@ from kineme.recognition.compared_windows import (
     rarity_weights,
     size_and_slowness,
 )
-from kineme.recognition.spotting import Spotted, _complete_scores, _left_over, best_chain
-from kineme.recognition.window_scores import Expected, Manner, closest_classes, far
+from kineme.recognition.spotting import (
+    Expected,
+    Manner,
+    Spotted,
+    _complete_scores,
+    _left_over,
+    best_chain,
+    closest_classes,
+    far,
+)
 from movement_samples import draw_shapes
 from soaking import SOAK
 

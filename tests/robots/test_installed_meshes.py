@@ -6,7 +6,7 @@ import pytest
 from view_samples import write_stl
 
 from kineme.robots import load
-from kineme.robots.view import installed_meshes
+from kineme.robots.view import shapes as module
 from kineme.robots.view.shapes import shapes_of
 
 _VISUAL = (
@@ -25,7 +25,7 @@ def robots(tmp_path, monkeypatch):
     drawn = "".join(f'<link name="{name}">{_VISUAL.format(mesh)}</link>' for name, mesh in links)
     color = '<material name="snow"><color rgba="1 0.5 0.25 1"/></material>'
     (home / "urdf" / "panda.urdf").write_text(f'<robot name="panda">{color}{drawn}</robot>')
-    monkeypatch.setattr(installed_meshes, "robots_folder", lambda: tmp_path)
+    monkeypatch.setattr(module, "robots_folder", lambda: tmp_path)
     return tmp_path
 
 

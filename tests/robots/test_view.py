@@ -24,7 +24,7 @@ from kineme.robots import load, move, write_view
 from kineme.robots.checks.along import along
 from kineme.robots.kinematics.inverse import InverseKinematics
 from kineme.robots.models.table import MODELS
-from kineme.robots.view import installed_meshes, link_shapes
+from kineme.robots.view import shapes as module
 from kineme.robots.view.scene_data import MOST_SAMPLES, as_script_data
 from kineme.robots.view.shapes import shapes_of
 from kineme.robots.view.write_view import view_page
@@ -116,7 +116,7 @@ def test_the_policy_allows_the_scripts_of_the_page_and_nothing_else(page):
 
 @pytest.mark.parametrize("name", MODELS)
 def test_pages_of_the_own_arms_are_small(name, page, monkeypatch):
-    monkeypatch.setattr(installed_meshes, "robots_folder", lambda: None)
+    monkeypatch.setattr(module, "robots_folder", lambda: None)
     if name == "panda":
         assert len(page.encode()) < 1_000_000
     shapes = shapes_of(load(name))
@@ -218,7 +218,7 @@ def test_meshes_are_in_the_page_and_those_that_are_not_there_become_cylinders(tm
 
 def test_meshes_beyond_the_largest_size_are_left_out(tmp_path, monkeypatch):
     write_stl(tmp_path / "shapes" / "link.stl")
-    monkeypatch.setattr(link_shapes, "_LARGEST", 100)
+    monkeypatch.setattr(module, "_LARGEST", 100)
     shapes = shapes_of(load(arm(tmp_path, [mesh_visual("link.stl")] * 3 + [""])))
     assert not shapes.meshes
     assert shapes.stand_ins == ("base", "upper", "lower")

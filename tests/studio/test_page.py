@@ -14,8 +14,7 @@ from click.testing import CliRunner
 import kineme
 from kineme.cli import main
 from kineme.errors import KinemeError, SpecificationError
-from kineme.studio.page.bundle import bundled
-from kineme.studio.page.write_page import library_page
+from kineme.studio.page.write_page import bundled, library_page
 from movement_samples import draw_shapes
 
 HOSTILE = "<img src=x onerror=alert(1)>"

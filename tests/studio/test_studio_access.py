@@ -10,7 +10,7 @@ from starlette.websockets import WebSocketDisconnect
 from studio_samples import BEARER, LIVE, TOKEN, asked
 
 from kineme.cli import main
-from kineme.studio.server import access, bodies
+from kineme.studio.server import access, app
 from kineme.studio.server.studio import Studio
 
 READS = ["/api/library", "/api/library/history", "/", "/index.html", "/api/openapi.json", "/nothing"]
@@ -236,7 +236,7 @@ def _chunks(n):
 
 @pytest.mark.parametrize("announced", [True, False])
 def test_bodies_that_are_too_large_are_refused_before_they_are_held(client, announced):
-    body = b" " * (bodies.JSON_BYTES + 1) if announced else _chunks(20)
+    body = b" " * (app.JSON_BYTES + 1) if announced else _chunks(20)
     answer = client.post("/api/recognize", content=body, headers={"Content-Type": "application/json"})
     assert answer.status_code == 413
     assert "expected at most 8 MB" in answer.json()["error"]

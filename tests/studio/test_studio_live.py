@@ -17,8 +17,7 @@ from kineme import ActionLibrary
 from kineme.errors import DataError, TrajectoryError
 from kineme.studio.page.write_page import library_page
 from kineme.studio.server.changes import Changes
-from kineme.studio.server.live_session import parsed_samples
-from kineme.studio.server.live_socket import _Client
+from kineme.studio.server.live_socket import _Client, parsed_samples
 from kineme.studio.server.live_sources import MOST, Follower, Sources
 from kineme.studio.server.studio import Studio
 from kineme.studio.snapshot.early import DRAWN

@@ -21,7 +21,7 @@ from studio_samples import BEARER, drawing
 from kineme import ActionLibrary
 from kineme.errors import DataError
 from kineme.files.recordings import read_recordings
-from kineme.studio.server import bodies, own_folder, read_upload, recording_routes, uploads
+from kineme.studio.server import app, read_upload, recording_routes, uploads
 from kineme.studio.server import work as work_module
 from kineme.studio.server.refusals import MissingError
 
@@ -260,7 +260,7 @@ def test_the_last_eight_are_kept():
 
 def test_folders_of_studios_that_were_killed_are_deleted_and_those_of_others_are_not(tmp_path, monkeypatch):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    running = own_folder.OwnFolder()
+    running = uploads.OwnFolder()
     left, new, other = (tmp_path / name for name in ("kineme-studio-left", "kineme-studio-new", "else"))
     for one in (left, new, other):
         one.mkdir()
@@ -268,7 +268,7 @@ def test_folders_of_studios_that_were_killed_are_deleted_and_those_of_others_are
     (tmp_path / "kineme-studio-link").symlink_to(other)
     for one in (left, other, running.path):
         os.utime(one, (1, 1))
-    second = own_folder.OwnFolder()
+    second = uploads.OwnFolder()
     assert {one.name for one in tmp_path.iterdir()} == {
         *("kineme-studio-new", "kineme-studio-link", "else"),
         *(running.path.name, second.path.name),
@@ -384,7 +384,7 @@ def test_recordings_of_others_are_not_there(client):
 
 
 def test_a_recording_that_is_too_large_is_refused(client, monkeypatch):
-    monkeypatch.setattr(bodies, "FILE_BYTES", 1000)
+    monkeypatch.setattr(app, "FILE_BYTES", 1000)
 
     def parts():
         for _ in range(10):

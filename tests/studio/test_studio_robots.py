@@ -9,7 +9,7 @@ from studio_samples import drawing
 from kineme import ActionLibrary, Trajectory
 from kineme.errors import DataError
 from kineme.robots.kinematics import reach
-from kineme.robots.planning import remedy
+from kineme.robots.planning import refusal
 from kineme.studio.server import robot_routes
 from kineme.studio.server.studio_words import in_studio_words
 
@@ -61,7 +61,7 @@ def test_what_an_arm_must_not_do_is_refused_with_the_checks_that_failed(client, 
 def test_what_to_do_about_a_refusal_is_there_in_the_studio(client, symbol, arms):
     large = _move(client, symbol, size=3.0).json()["error"]
     assert large.endswith("m away; make the movement smaller")
-    for text in (reach._REMEDY, remedy._ELSEWHERE, remedy.OTHER_JOINTS):
+    for text in (reach._REMEDY, refusal._ELSEWHERE, refusal.OTHER_JOINTS):
         assert "--" not in in_studio_words(text)
 
 

@@ -1,9 +1,9 @@
 # Kernels
 from kineme.kernels.base import Kernel as Kernel
-from kineme.kernels.rbf import RBF as RBF
-from kineme.kernels.truncated import TruncatedEuclidean as TruncatedEuclidean
-from kineme.kernels.laplacian import Laplacian as Laplacian
-from kineme.kernels.canberra import Canberra as Canberra
+from kineme.kernels.table import RBF as RBF
+from kineme.kernels.table import TruncatedEuclidean as TruncatedEuclidean
+from kineme.kernels.table import Laplacian as Laplacian
+from kineme.kernels.table import Canberra as Canberra
 from kineme.kernels.distance import DistanceKernel as DistanceKernel
 from kineme.kernels.average import averaged as averaged
 from kineme.kernels.average import Averaged as Averaged

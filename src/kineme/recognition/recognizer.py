@@ -328,7 +328,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
             Unlabeled. An array counts as one second and is refused where the demonstrations have time stamps.
         error_rate : float, default 0.05
             The smaller, the more a movement may differ from the demonstrations. Not the share of movements that are
-            missed: a movement in a recording is cut by the search itself, see `kineme.recognition.window_scores`.
+            missed: a movement in a recording is cut by the search itself, see `kineme.recognition.spotting`.
         max_pieces : int, default 8
             Most stretches between rests that one movement may consist of.
 

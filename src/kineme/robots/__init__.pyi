@@ -22,5 +22,5 @@ from kineme.robots.view.write_view import write_view as write_view
 
 # Live
 from kineme.robots.live.arm_controller import ArmController as ArmController
-from kineme.robots.live.arm_state import ArmState as ArmState
-from kineme.robots.live.arm_state import ArmStatus as ArmStatus
+from kineme.robots.live.arm_controller import ArmState as ArmState
+from kineme.robots.live.arm_controller import ArmStatus as ArmStatus

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from kineme.experiments.evaluation import clouds as module
-from kineme.experiments.evaluation.clouds import (
+from kineme.experiments.evaluation import methods as module
+from kineme.experiments.evaluation.methods import (
     PlusCloud,
     PointCloud,
     QuickCloud,

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kineme.experiments.evaluation.data import DataSet
-from kineme.experiments.evaluation.measures import clustered
 from kineme.experiments.evaluation.protocols import PROTOCOLS
+from kineme.experiments.evaluation.score_split import clustered
 from kineme.experiments.evaluation.splits import one_person_out, within_person
 from kineme.experiments.evaluation.trials import Settings
 

@@ -10,13 +10,12 @@ from kineme.experiments.evaluation import methods
 from kineme.experiments.evaluation.conclusions import conclusion, verdict
 from kineme.experiments.evaluation.conditions import UNTOUCHED
 from kineme.experiments.evaluation.data import DataSet
-from kineme.experiments.evaluation.figures import draw_protocol
 from kineme.experiments.evaluation.methods import METHODS
 from kineme.experiments.evaluation.optional import optional_module, why_missing
 from kineme.experiments.evaluation.protocols import PROTOCOLS
 from kineme.experiments.evaluation.results import Results
 from kineme.experiments.evaluation.rows import to_csv
-from kineme.experiments.evaluation.run import Runner, evaluate
+from kineme.experiments.evaluation.run import Runner, draw_protocol, evaluate
 from kineme.experiments.evaluation.trials import Settings, shots_label
 from soaking import SOAK
 

@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 
 from kineme.datasets.lasa import load_lasa
-from kineme.experiments.reproduction.arm import run_arm
 from kineme.experiments.reproduction.arm_letter import letter_table, read_letter, write_letter
 from kineme.experiments.reproduction.arm_recordings import SCALE, executed
-from kineme.experiments.reproduction.arm_tables import arm_tables, read_nearest, read_svm
 from kineme.experiments.reproduction.columns import CLOSEST
 from kineme.experiments.reproduction.figures import one_c
 from kineme.experiments.reproduction.representations import READINGS
+from kineme.experiments.reproduction.run import arm_tables, read_nearest, read_svm, run_arm
 
 NUMBERS = {
     "learned_rms": 1e-3, "tracking_rms": 1e-8, "tracking_max": 2e-8, "duration": 4.0, "approach": 1.0, "factor": 1.0,

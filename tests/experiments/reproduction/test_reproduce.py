@@ -18,9 +18,8 @@ from click.testing import CliRunner
 
 from kineme.cli import main
 from kineme.experiments.reproduction import paper
-from kineme.experiments.reproduction.arm_tables import arm_tables
 from kineme.experiments.reproduction.representations import READINGS, REPRESENTATIONS
-from kineme.experiments.reproduction.run import Reproduction, _rounded, _tasks
+from kineme.experiments.reproduction.run import Reproduction, _rounded, _tasks, arm_tables
 from kineme.experiments.reproduction.tables import make_tables
 from kineme.output.table import mean_and_range, to_text
 from soaking import SOAK

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kineme.experiments.reproduction import experiments
-from kineme.experiments.reproduction.split_widths import fit_by_split
+from kineme.experiments.reproduction.experiments import fit_by_split
 from kineme.kernels import RBF, TruncatedEuclidean
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kineme import Demonstrations
-from kineme.files.inspection.duplicates import duplicates_among
+from kineme.files.inspection.inspect import duplicates_among
 from kineme.files.recordings import read_recordings
 
 

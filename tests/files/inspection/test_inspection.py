@@ -5,9 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from kineme.files.inspection.duplicates import duplicates_among
 from kineme.files.inspection.figure import draw_recordings
-from kineme.files.inspection.inspect import inspect
+from kineme.files.inspection.inspect import duplicates_among, inspect
 from kineme.files.inspection.report import as_data, as_words
 from kineme.files.inspection.sampling import GAP, sampling_of
 from kineme.files.recordings import read_recordings, read_recordings_from_bytes

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from kineme import DMP, Demonstrations, Resample, RhythmicDMP, Smooth, preprocess
 from kineme.movements.trajectories import _compiled
-from kineme.movements.trajectories.close_stamps import merge_close
+from kineme.movements.trajectories.movements import merge_close
 
 N = 200
 WHOLE = np.array([0, N])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kineme import Demonstrations, TrajectoryError
-from kineme.movements.trajectories.plain_arrays import plain_block, plain_stamps
+from kineme.movements.trajectories.collect import plain_block, plain_stamps
 
 
 def _ragged(n_dims=2):

@@ -7,7 +7,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from kineme.primitives.control.clock import RunningSum
+from kineme.primitives.control.controller import RunningSum
 
 
 @pytest.mark.parametrize("step", [0.001, 0.002, 1 / 3, 1e-9])

@@ -7,7 +7,7 @@ import pytest
 
 from kineme import DMP
 from kineme.primitives.control import _compiled
-from kineme.primitives.control.shape_table import shape_table
+from kineme.primitives.control.stepping import shape_table
 from kineme.primitives.discrete.plan import plan_of
 
 

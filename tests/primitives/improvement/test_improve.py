@@ -8,7 +8,7 @@ import pytest
 import kineme
 from kineme import DMP, SpecificationError, improve
 from kineme.primitives.discrete.operators import decoder
-from kineme.primitives.improvement.exploration import exploration_factor
+from kineme.primitives.improvement.improve import exploration_factor
 from kineme.primitives.improvement.methods import METHODS, Search
 
 U = np.linspace(0.0, 1.0, 100)

@@ -8,7 +8,6 @@ from numpy.typing import ArrayLike, NDArray
 from kineme.anchoring.clustering.clustering import METHODS, Clusters
 from kineme.anchoring.clustering.fusion import components, fuse, local_similarities, set_apart
 from kineme.anchoring.clustering.number_of_clusters import count_clusters
-from kineme.anchoring.clustering.people import link_people
 from kineme.anchoring.clustering.spectral import count_by_eigengap, spectral
 from kineme.anchoring.clustering.stability import stabilities
 from kineme.anchoring.proposals.proposals import Proposals, describe_clusters
@@ -22,6 +21,9 @@ from kineme.errors import SpecificationError
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.recognition.left_out import check_groups, comparable_groups
 from kineme.validation import Array, check_choice, check_count
+
+_SHARE = 0.5  # sum of all links by that of the similarities; with 1, classes that few people made are merged
+_NEAREST = 5  # movements of a person, of which each counts less than the one before it
 
 _SPECTRAL = "spectral"
 #: Of `propose` and of whatever clusters by it.
@@ -63,7 +65,7 @@ def propose(  # noqa: PLR0913 - what is asked, and how it is compared
     groups : array_like of shape (n,), optional
         Who made each movement; the other methods ignore it. Movements of two people are linked if they are among each
         other's nearest: classes that each draws in an own way are found together, and classes that are alike apart. See
-        `kineme.anchoring.clustering.people.link_people`.
+        `kineme.anchoring.proposals.propose.link_people`.
     min_members : int, default 3
         Movements of a proposal, at least; smaller clusters are left over.
     like : Recognizer, Comparison or ComparisonSpecification, optional
@@ -183,3 +185,35 @@ def _by_distances(distances: Array, method: str, n_clusters: int | None, min_mem
 def own_order(K: Array) -> NDArray[np.intp]:
     """An order of the movements by their similarities, so that the result does not depend on that of the input."""
     return np.argsort(K.sum(axis=1), kind="stable")
+
+
+def link_people(similar: Array, near: Array, people: NDArray[np.intp]) -> Array:
+    """Similarities W (n, n) with links added between people, half as strong in total.
+
+    Among the movements of j's person, j is the p-th nearest to i, and among those of i's person i the q-th nearest to
+    j. If both are among the five nearest and the people differ, the link of i and j is ``1 / (p q)``, up to a factor:
+    one link suffices where each class was made once, and several connect repetitions. If one of the two people never
+    made the class of i, its nearest movement by that person is, as a rule, nearer to others, and there is no link.
+
+    Source: L. Haghverdi et al., "Batch effects in single-cell RNA-sequencing data are corrected by matching mutual
+    nearest neighbors", Nature Biotechnology 36, 2018. A person's repetitions are each other's nearest neighbors; among
+    the nearest of all movements there may be none by another person, so neighbors are taken from each person in turn.
+
+    Parameters
+    ----------
+    similar : ndarray of shape (n, n)
+        W, as `kineme.anchoring.clustering.fusion.fuse` gives it.
+    near : ndarray of shape (n, n)
+        By which the nearest are found; greater is nearer.
+    people : ndarray of shape (n,)
+        Who made each movement, as numbers.
+    """
+    n = len(similar)
+    share = np.zeros((n, n))  # 1 / p
+    for one in np.unique(people):
+        own = np.flatnonzero(people == one)
+        nearest = own[np.argsort(-near[:, own], axis=1, kind="stable")[:, :_NEAREST]]
+        share[np.arange(n)[:, None], nearest] = 1.0 / np.arange(1, nearest.shape[1] + 1)
+    links = np.where(people[:, None] != people, share * share.T, 0.0)
+    total = float(links.sum())
+    return np.asarray(similar + (_SHARE * float(similar.sum()) / total if total > 0 else 0.0) * links)

@@ -1,4 +1,4 @@
-"""Compiled distances of point clouds; their plain twins are in `kineme.experiments.evaluation.clouds`."""
+"""Compiled distances of point clouds; their plain twins are in `kineme.experiments.evaluation.methods`."""
 
 from __future__ import annotations
 

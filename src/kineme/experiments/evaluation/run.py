@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import multiprocessing
 import os
 import platform
@@ -14,16 +15,45 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any, NamedTuple
 
+from kineme.experiments.evaluation.conclusions import MEASURES, columns, conclusion, verdict
+from kineme.experiments.evaluation.conditions import Condition
 from kineme.experiments.evaluation.data import DataSet
-from kineme.experiments.evaluation.methods import METHODS
+from kineme.experiments.evaluation.methods import METHODS, OURS
 from kineme.experiments.evaluation.protocols import PROTOCOLS
-from kineme.experiments.evaluation.ranks import rank_rows
+from kineme.experiments.evaluation.rank_figure import draw_ranks
+from kineme.experiments.evaluation.ranks import Ranks, rank_rows, rank_sentence
 from kineme.experiments.evaluation.results import Results, collect
 from kineme.experiments.evaluation.rows import Row, make_rows
 from kineme.experiments.evaluation.score_split import Scores, does, score_split
 from kineme.experiments.evaluation.trials import TASKS, Settings
+from kineme.movements.trajectories.demonstrations import require_labels
 from kineme.output.atomic import write_atomically
-from kineme.output.table import Table
+from kineme.output.figures import BLUE, GRAY, GREEN, ORANGE, PURPLE, encode_figure, new_figure
+from kineme.output.page import page, picture
+from kineme.output.table import Table, mean_and_range, to_html
+from kineme.output.text import in_markup
+
+_BLACK = "#222222"
+_AXES = {
+    "shots": "movements per class",
+    "shift": "shift [extents]",
+    "scale": "scale [doublings]",
+    "rotation": "rotation within ± [°]",
+    "warp": "warp [std of log speed]",
+    "noise": "noise [% of extent]",
+    "together": "all together [level]",
+    "path": "path seen [%]",
+}
+_STYLES = dict(
+    zip(
+        METHODS,
+        [(BLUE, "-"), (PURPLE, "-"), (PURPLE, "--"), (GRAY, "-"), (ORANGE, "-"), (ORANGE, ":"), (ORANGE, "--"),
+         (GREEN, "-"), (GREEN, "--"), (_BLACK, "-"), (_BLACK, "--"), (GRAY, "--")],
+        strict=True,
+    )
+)  # fmt: skip
+
+_MOST_COLUMNS, _WIDEST = 6, 120  # of a table with a method per row; characters of its heads
 
 _FORMAT = 1  # of evaluation.json
 _PACKAGES = ("kineme", "numpy", "scipy", "scikit-learn", "dtaidistance", "tslearn", "aeon", "dollarpy", "hmmlearn")
@@ -140,7 +170,6 @@ def _run_job(job: Job, settings: Settings) -> list[Scores]:
 def _write(
     data: DataSet, found: tuple[Results, list[Row]], facts: dict[str, Any], out: Path, seconds: float
 ) -> Evaluation:
-    from kineme.experiments.evaluation.report import make_tables, write_report
 
     results, rows = found
     tables = make_tables(results)
@@ -163,3 +192,104 @@ def _versions() -> dict[str, str]:
         except PackageNotFoundError:
             found[name] = "not installed"
     return found
+
+
+def make_tables(results: Results) -> dict[str, Table]:
+    """Protocol -> table: a method per row, a condition and measure per column."""
+    return {name: _table(name, results) for name in results.outcomes if results.conditions(name)}
+
+
+def _table(protocol: str, results: Results) -> Table:
+    outcomes = results.outcomes[protocol]
+    shown = columns(protocol, results)
+    several = len({measure for _, measure in shown}) > 1
+    heads = [f"{one.label}: {MEASURES[measure]}" if several else one.label for one, measure in shown]
+    rows = [
+        (
+            METHODS[method].title,
+            *(_cell(outcome.get(condition, {}).get(measure), len(shown)) for condition, measure in shown),
+        )
+        for method, outcome in outcomes.items()
+    ]
+    # With many conditions, one row per condition is easier to read.
+    cells = [("", *heads), *rows]
+    if len(heads) > min(len(rows), _MOST_COLUMNS) or sum(map(len, heads)) > _WIDEST:
+        cells = list(zip(*cells, strict=True))
+    head = ("method" if cells[0][1:] == tuple(heads) else "condition", *cells[0][1:])
+    chosen = PROTOCOLS[protocol]
+    return Table(chosen.title, head, cells[1:], f"{chosen.description} {conclusion(protocol, results)}")
+
+
+def _cell(values: list[float] | None, n_columns: int) -> str:
+    if not values:
+        return "-"
+    return mean_and_range(values) if n_columns <= 6 else f"{sum(values) / len(values):.3f}"
+
+
+def write_report(
+    data: DataSet, results: Results, tables: dict[str, Table], ranks: Ranks | str, facts: dict[str, Any]
+) -> str:
+    """HTML with tables and figures; `ranks` is a text that says why where there are none."""
+    parts = [f'<p class="lead">{in_markup(_lead(data))}</p>', f"<p>{in_markup(verdict(results))}</p>"]
+    if isinstance(ranks, str):
+        parts.append(f"<p>{in_markup(ranks)}</p>")
+    else:
+        parts.append(picture(encode_figure(draw_ranks(ranks), "svg"), rank_sentence(ranks)))
+    for name, table in tables.items():
+        drawn = draw_protocol(name, results)
+        shown = "" if drawn is None else picture(drawn, f"{PROTOCOLS[name].title}: mean over splits.")
+        parts.append(f"<h2>{in_markup(PROTOCOLS[name].title)}</h2>{to_html(table)}{shown}")
+    missing = {METHODS[name].title: why for name, why in results.absent.items()}
+    missing |= {PROTOCOLS[name].title: why for name, why in results.skipped.items()} | data.left_out
+    if missing:
+        rows: list[tuple[str, ...]] = list(missing.items())
+        parts.append(f"<h2>Left out</h2>{to_html(Table('Methods, protocols, files', ('what', 'why'), rows))}")
+    versions = facts["versions"]
+    listed = {key: value for key, value in facts.items() if key != "versions"} | versions
+    return page(f"kineme: evaluation on {data.name}", f"Recognition on {data.name}", "\n".join(parts), listed)
+
+
+def _lead(data: DataSet) -> str:
+    labels = set(require_labels(data.demonstrations).tolist())
+    return (
+        f"{len(data.demonstrations)} movements of {len(labels)} classes in {data.demonstrations.n_dims} dimensions. "
+        "All methods see the same splits and the same perturbed movements. Numbers are means over splits, with their "
+        "range where there is room. Rivals get positions that are centered, scaled, smoothed and even along the path; "
+        "plain DTW gets them even in time."
+    )
+
+
+def draw_protocol(protocol: str, results: Results) -> bytes | None:
+    """SVG of accuracy over strength; None for protocols without several strengths."""
+    panels: dict[str, list[Condition]] = {}
+    for condition in results.conditions(protocol):
+        panels.setdefault(condition.varied, []).append(condition)
+    panels = {name: conditions for name, conditions in panels.items() if name in _AXES and len(conditions) > 1}
+    if not panels or protocol.startswith("open-set"):
+        return None
+    columns = min(3, len(panels))
+    rows = math.ceil(len(panels) / columns)
+    figure = new_figure(2.6 * columns + 1.8, 2.1 * rows)
+    axes = figure.subplots(rows, columns, squeeze=False, sharey=True)
+    for k, (name, conditions) in enumerate(panels.items()):
+        _draw_panel(axes.flat[k], protocol, results, conditions)
+        axes.flat[k].set(xlabel=_AXES[name], ylim=(0, 1.03))
+        if name == "shots":  # no half movements
+            axes.flat[k].set_xticks([one.strength for one in conditions])
+    for row in axes:
+        row[0].set_ylabel("accuracy")
+    for empty in axes.flat[len(panels) :]:
+        empty.set_visible(False)
+    figure.legend(*axes.flat[0].get_legend_handles_labels(), loc="outside right upper")
+    return encode_figure(figure, "svg")
+
+
+def _draw_panel(axes, protocol: str, results: Results, conditions: list[Condition]) -> None:  # type: ignore[no-untyped-def]
+    for method in results.outcomes[protocol]:
+        points = [(one.strength, results.mean(protocol, method, one, "accuracy")) for one in conditions]
+        measured = [(x, y) for x, y in points if y is not None]
+        color, line = _STYLES[method]
+        label = METHODS[method].title
+        width, front = (2.2, 3) if method == OURS else (1.1, 2)
+        x, y = [x for x, _ in measured], [y for _, y in measured]
+        axes.plot(x, y, line, color=color, label=label, linewidth=width, marker="o", markersize=2.5, zorder=front)

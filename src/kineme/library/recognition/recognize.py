@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 from threading import Lock
@@ -12,7 +13,6 @@ from numpy.typing import NDArray
 
 from kineme.comparison.stored_references import StoredReferences
 from kineme.library.recognition.calibration_cache import calibrated, calibrated_once, sample_comparison
-from kineme.library.recognition.live import Begun, begun, live
 from kineme.library.recognition.members import Members, described_references, members_of, some_members
 from kineme.library.recognition.reduced_features_cache import ReducedMovements, open_cache, updated
 from kineme.library.storage import read
@@ -22,7 +22,8 @@ from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.recognition.answer import Answer, Neighbor, is_one
 from kineme.recognition.conformal import calibrate
-from kineme.recognition.early.hypotheses import Early, as_early
+from kineme.recognition.early.decision import Decision
+from kineme.recognition.early.hypotheses import Early, Hypotheses, as_early, hypotheses
 from kineme.recognition.early.stream import Live
 from kineme.recognition.known_classes import Calibrates, KnownClasses, fit_known_classes
 from kineme.recognition.two_stage_search import TwoStageSearch
@@ -148,3 +149,23 @@ def two_stages(store: Store, reduced: ReducedMovements, members: Members) -> Two
     )
     calibration = calibrated(store, members, comparison.similarity, stored)
     return TwoStageSearch(comparison, calibration, members.names, stored)
+
+
+class Begun(NamedTuple):
+    """The beginnings of the movements of one version; any number of streams share them."""
+
+    version: int
+    early: Early
+    known: KnownClasses
+    hypotheses: Hypotheses
+
+
+def begun(version: int, known: KnownClasses, early: Early) -> Begun:
+    """Prepare the beginnings of known movements."""
+    return Begun(version, early, known, hypotheses(known.comparison, known.references, early))
+
+
+def live(shared: Begun, confidence: float, patience: float, recognize: Callable[[Trajectory], Answer]) -> Live:
+    """A stream; `recognize` answers to the whole movement at its end."""
+    known = shared.known
+    return Live(known.comparison, known.references, shared.hypotheses, Decision(confidence, patience), recognize)

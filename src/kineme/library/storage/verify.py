@@ -1,4 +1,8 @@
-"""Verify a library: every page, checksum, value, reference and size."""
+"""Verify a library: every page, checksum, value, reference and size.
+
+Checks of contents, which SQLite cannot do, take rows with right checksums whose columns fulfill `column_checks.CHECKS`.
+They yield the keys of invalid rows with a description of what is wrong.
+"""
 
 from __future__ import annotations
 
@@ -9,16 +13,127 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from kineme.errors import DataError, KinemeError
 from kineme.library.storage.channels import other_columns
-from kineme.library.storage.column_checks import ALL_GOOD, CHECKS
+from kineme.library.storage.column_checks import ALL_GOOD, CHECKS, GOOD
 from kineme.library.storage.connection import connect
-from kineme.library.storage.content_checks import CONTENTS, samples
 from kineme.library.storage.defense import limited
-from kineme.library.storage.lifetimes import lives
-from kineme.library.storage.rows import Row, has_table, row_name, sealed
-from kineme.library.storage.schema import BLOBS, COLUMNS, LATER_META, META
+from kineme.library.storage.rows import Row, has_table, parsed, row_name, sealed
+from kineme.library.storage.schema import BLOBS, COLUMNS, COUNTED, LARGEST_ID, LATER_META, META, RETURNS
 from kineme.library.storage.store import Store
+from kineme.validation import Array
+
+Strange = Iterator[tuple[Any, str]]
+
+_SLACK = 1e-5  # of the duration: tolerance of the last stamp, in single precision
+
+_FINITE = "numbers that are not finite"
+
+
+def _version(rows: Sequence[Row]) -> Strange:
+    for key, _, action, text, *_ in rows:
+        detail = _json(text)
+        if not isinstance(detail, dict):
+            yield key, "a detail that is no JSON object"
+        elif action == "reject" and not _are(int, detail.get("movements")):
+            yield key, "a rejection without its list of movements"
+        elif action in RETURNS and not (type(detail.get("to")) is int and 0 <= detail["to"] < key):
+            yield key, f"an action {action} without the earlier version that it returned to"
+
+
+def _source(rows: Sequence[Row]) -> Strange:
+    yield from ((row[0], "options that are no JSON object") for row in rows if not isinstance(_json(row[6]), dict))
+
+
+def _symbol_state(rows: Sequence[Row]) -> Strange:
+    yield from ((row[0], "parents that are no JSON list of ids") for row in rows if not _are(str, _json(row[6])))
+
+
+def _json(text: str) -> Any:
+    try:
+        return parsed(text)
+    except ValueError:
+        return None
+
+
+def _are(kind: type, values: Any) -> bool:
+    return isinstance(values, list) and all(type(value) is kind for value in values)
+
+
+def _primitive(rows: Sequence[Row]) -> Strange:
+    yield from _not_finite(rows, 1, np.float64)
+    yield from _not_finite(rows, 2, np.float32)
+
+
+def _feature(rows: Sequence[Row]) -> Strange:
+    yield from _not_finite(rows, 1, np.float32)
+
+
+def _not_finite(rows: Sequence[Row], column: int, kind: Any) -> Strange:
+    size = np.dtype(kind).itemsize
+    if all(len(row[column]) % size == 0 for row in rows) and _finite([row[column] for row in rows], kind):
+        return
+    for row in rows:
+        if len(row[column]) % size or not _finite([row[column]], kind):
+            yield row[0], _FINITE
+
+
+def _finite(blobs: Sequence[bytes], kind: Any) -> bool:
+    return bool(np.isfinite(np.frombuffer(b"".join(blobs), kind)).all())
+
+
+#: Table -> the check of its contents.
+CONTENTS: dict[str, Callable[[Sequence[Row]], Strange]] = {
+    "version": _version,
+    "source": _source,
+    "symbol_state": _symbol_state,
+    "primitive": _primitive,
+    "feature": _feature,
+    "recorded": _feature,
+}
+
+
+def samples(connection: sqlite3.Connection, rows: Sequence[Row], n_dims: int) -> Strange:
+    """Like the functions of `CONTENTS`, for ascending rows of the table `raw`, compared with the rows of movements."""
+    yield from _not_finite(rows, 1, np.float64)
+    yield from _not_finite(rows, 2, np.float32)
+    query = f"SELECT id, n_samples, t0, duration FROM movement WHERE id BETWEEN ? AND ? AND {GOOD['movement']}"
+    about = {row[0]: row[1:] for row in connection.execute(query, (rows[0][0], rows[-1][0]))}
+    fitting = [row for row in rows if row[0] in about and len(row[2]) == 4 * n_dims * about[row[0]][0]]
+    if not fitting:
+        return
+    keys = np.array([row[0] for row in fitting])
+    lengths = np.array([about[row[0]][0] for row in fitting])
+    moved = np.abs(np.frombuffer(b"".join(row[2] for row in fitting), np.float32)).reshape(-1, n_dims).max(axis=1)
+    still = np.maximum.reduceat(moved, np.cumsum(lengths) - lengths) == 0
+    yield from ((int(key), "a movement that does not move") for key in keys[still])
+    for kind in (np.float32, np.float64):
+        size = np.dtype(kind).itemsize
+        some = [row for row in fitting if row[3] is not None and len(row[3]) == size * about[row[0]][0]]
+        if some:
+            yield from _stamps(some, [about[row[0]] for row in some], kind)
+
+
+def _stamps(rows: Sequence[Row], about: Sequence[tuple[Any, ...]], kind: Any) -> Strange:
+    """Check that stamps (total,) begin at zero, increase strictly, also with t0 added, and end at the duration."""
+    relative: Array = np.frombuffer(b"".join(row[3] for row in rows), kind).astype(np.float64)
+    lengths, t0, durations = (np.array([one[k] for one in about]) for k in range(3))
+    ends = np.cumsum(lengths)
+    times = relative + np.repeat(t0, lengths)
+    steps: NDArray[np.bool_] = np.append(times[1:] > times[:-1], True)
+    steps[ends - 1] = True  # from one movement to the next
+    good = np.logical_and.reduceat(steps, ends - lengths) & (relative[ends - lengths] == 0)
+    good &= np.abs(relative[ends - 1] - durations) <= _SLACK * durations
+    yield from (
+        (row[0], "time stamps that do not lead from zero to the duration") for row in np.array(rows, object)[~good]
+    )
+
+
+Whole = NDArray[np.int64]
+Found = Iterator[tuple[str, int, str]]  # table, key, what is wrong
 
 _SHOWN = 100  # messages per check
 _BATCH_BYTES = 1 << 24  # of rows whose contents are checked together
@@ -228,3 +343,90 @@ def _sizes(store: Store) -> Check:
                 yield Problem(table, key, f"{row_name(table, key)}: of the wrong size")
 
     return check
+
+
+def lives(connection: sqlite3.Connection) -> Found:
+    """Find contradictions between the lifetimes of rows. Expects a library whose rows are valid one by one."""
+    yield from _counted(connection)
+    movement = _columns(connection, "movement", "id")
+    state = _columns(connection, "symbol_state", "symbol")
+    member = _columns(connection, "member", "movement")
+    symbol = _columns(connection, "member", "symbol")
+    yield from _apart("member", member, "the movement shows two symbols at a time")
+    returned = [key for (key,) in connection.execute("SELECT id FROM version WHERE action IN (?, ?)", RETURNS)]
+    gaps = "is not there for a while"  # none but those of symbols that were deleted, until they were there again
+    yield from _apart("symbol_state", state, "the symbol has two states at a time", gaps, returned)
+    yield from _apart("symbol_state", _named(connection), "two symbols have its name at a time")
+    yield from _within("member", member, movement, "its movement")
+    yield from _within("member", symbol, _whole_lives(state), "its symbol")
+    yield from _within("symbol_state", _columns(connection, "symbol_state", "prototype"), movement, "its prototype")
+
+
+def _counted(connection: sqlite3.Connection) -> Found:
+    """Check the number of rows that are alive, which each version states."""
+    names = list(COUNTED.values())
+    said = _table(connection, f"SELECT id, {', '.join(names)} FROM version ORDER BY id", 1 + len(names))
+    n = len(said)
+    for table, name in COUNTED.items():
+        alive = np.zeros(n + 1, dtype=np.int64)
+        for column, sign in (("added", 1), ("removed", -1)):
+            query = f"SELECT {column}, count(*) FROM {table} WHERE {column} IS NOT NULL GROUP BY {column}"
+            at = _table(connection, query, 2)
+            alive[at[:, 0]] += sign * at[:, 1]
+        wrong = np.flatnonzero(np.cumsum(alive)[1:] != said[:, 1 + names.index(name)])
+        yield from (("version", int(said[k, 0]), f"counts other {name} than there are") for k in wrong)
+
+
+def _table(connection: sqlite3.Connection, query: str, width: int) -> Whole:
+    return np.array(connection.execute(query).fetchall(), dtype=np.int64).reshape(-1, width)
+
+
+def _columns(connection: sqlite3.Connection, table: str, whose: str) -> Whole:
+    """Rows (key, owner, added, removed), ordered by owner, then by time."""
+    query = f"SELECT id, {whose}, added, coalesce(removed, {LARGEST_ID}) FROM {table} WHERE {whose} IS NOT NULL"
+    rows = _table(connection, query, 4)
+    return rows[np.lexsort((rows[:, 3], rows[:, 2], rows[:, 1]))]
+
+
+def _named(connection: sqlite3.Connection) -> Whole:
+    """As `_columns`, with the names numbered."""
+    rows = connection.execute(f"SELECT id, name, added, coalesce(removed, {LARGEST_ID}) FROM symbol_state").fetchall()
+    numbers: dict[str, int] = {}
+    lives = [(key, numbers.setdefault(name, len(numbers)), *life) for key, name, *life in rows]
+    table = np.array(lives, dtype=np.int64).reshape(-1, 4)
+    return table[np.lexsort((table[:, 3], table[:, 2], table[:, 1]))]
+
+
+def _apart(table: str, rows: Whole, words: str, gaps: str = "", returned: Sequence[int] = ()) -> Found:
+    """Check that lifetimes of one owner do not overlap; and have no gaps, if `gaps` says what one would mean.
+
+    At the versions of `returned` a gap may end.
+    """
+    same = rows[1:, 1] == rows[:-1, 1]
+    yield from ((table, int(key), words) for key in rows[1:][same & (rows[1:, 2] < rows[:-1, 3]), 0])
+    if gaps:
+        later = same & (rows[1:, 2] > rows[:-1, 3]) & ~np.isin(rows[1:, 2], returned)
+        yield from ((table, int(key), f"the symbol {gaps}") for key in rows[1:][later, 0])
+
+
+def _whole_lives(rows: Whole) -> Whole:
+    """One row per owner, from its first to its last version."""
+    owners, first = np.unique(rows[:, 1], return_index=True)
+    last = np.append(first[1:], len(rows)) - 1
+    return np.stack([owners, owners, rows[first, 2], rows[last, 3]], axis=1) if len(rows) else rows
+
+
+def _within(table: str, rows: Whole, owners: Whole, whose: str) -> Found:
+    """Check that a row is alive only while the row that it refers to is."""
+    if not len(rows):
+        return
+    place = np.searchsorted(owners[:, 1], rows[:, 1])
+    there: Any = np.zeros(len(rows), dtype=bool)
+    known = place < len(owners)
+    referred = owners[place[known]]
+    part = rows[known]
+    never = part[:, 2] == part[:, 3]
+    there[known] = (referred[:, 1] == part[:, 1]) & (
+        never | ((referred[:, 2] <= part[:, 2]) & (part[:, 3] <= referred[:, 3]))
+    )
+    yield from ((table, int(key), f"is there when {whose} is not") for key in rows[~there, 0])

@@ -12,14 +12,17 @@ from numpy.typing import NDArray
 from kineme.errors import DataError, SpecificationError
 from kineme.movements.channels.channel import KINDS, ORDERS, Channel, Channels
 from kineme.movements.channels.coordinates import in_order, with_periods
-from kineme.movements.channels.joint_columns import find_numbered_joints
 from kineme.movements.channels.quaternion_columns import Quaternion, find_quaternions, quaternion_of, shared_name
-from kineme.movements.channels.wraps import wrap_period
+from kineme.movements.channels.wraps import period_of, wrap_period
 from kineme.movements.tables.columns import column_numbers
 from kineme.movements.tables.parsed import listed
 from kineme.movements.tables.time_stamps import words_of
 from kineme.units import UNITS, split_head, unit_named
 from kineme.validation import Array
+
+_LETTERS = ("j", "q")  # robots count their joints so; textbooks write q for a joint's angle
+_DIGITS = 3  # of a number, at most
+_UNIT = re.compile(r"[\[(][^\[\]()\d]*[\])]\s*$")  # that of q[1] is a number
 
 #: What the caller says of columns: heads separated by commas -> their kind; four of a quaternion -> its order.
 Given = Mapping[str, str]
@@ -175,3 +178,23 @@ def _kind(head: str, unit: str | None, values: Array, offsets: NDArray[np.intp],
     if is_joint or words & ANGLE_WORDS or measure is not None or wrap_period(values, offsets) is not None:
         return "angle"
     return "position"
+
+
+def find_numbered_joints(heads: Sequence[str], free: Sequence[int], columns: Array) -> set[int]:
+    """Those of the columns `free` whose numbers say that they are joints.
+
+    One alone, as q1, could be anything. Several that count from 0 or 1, each within a turn, are joints.
+    """
+    groups: dict[tuple[str, ...], dict[int, int]] = {}
+    for k in free:
+        *stem, number = words_of(_UNIT.sub("", heads[k])) or ("",)
+        if number.isdecimal() and len(number) <= _DIGITS and stem and stem[-1] in _LETTERS:
+            groups.setdefault(tuple(stem), {})[int(number)] = k
+    return {k for group in groups.values() if _count_joints(group, columns) for k in group.values()}
+
+
+def _count_joints(group: dict[int, int], columns: Array) -> bool:
+    """Whether the numbers of a group, and the values in its columns, are those of joints."""
+    numbers = sorted(group)
+    counts = len(numbers) > 1 and numbers[0] in (0, 1) and numbers[-1] - numbers[0] == len(numbers) - 1
+    return counts and all(np.isfinite(period_of(columns[:, k], None)) for k in group.values())

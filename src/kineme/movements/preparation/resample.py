@@ -28,7 +28,7 @@ class Resample:
     -----
     Cubic splines on the true time stamps, so irregular sampling costs accuracy, not correctness. Samples less than a
     tenth of the usual step apart are averaged first: a spline would magnify the noise between them (see
-    `kineme.movements.trajectories.close_stamps`). Resampling far below the recorded rate causes aliasing: `Smooth`
+    `kineme.movements.trajectories.movements`). Resampling far below the recorded rate causes aliasing: `Smooth`
     first.
     """
 

@@ -80,7 +80,7 @@ def nth_smallest(values, n):  # type: ignore[no-untyped-def]
 
 @jit
 def fill_usual_steps(times, offsets, share, quantile, steps):  # type: ignore[no-untyped-def]
-    """Quantile of the gaps of each movement, 0 where no gap is close; see `close_stamps.merge_close`."""
+    """Quantile of the gaps of each movement, 0 where no gap is close; see `movements.merge_close`."""
     longest = 0
     for i in range(len(steps)):
         longest = max(longest, offsets[i + 1] - offsets[i])

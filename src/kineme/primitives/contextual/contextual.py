@@ -1,18 +1,30 @@
-"""Movements as a function of the task's parameters, as a scikit-learn estimator."""
+"""Movements as a function of the task's parameters, as a scikit-learn estimator.
+
+Regression of many numbers on few parameters, as weighted sums of what was demonstrated.
+
+Every smoother here is linear in the demonstrated values y (n,): ``y(c) = w(c) y``, with the same weights for all that a
+primitive consists of. With K the covariance of the demonstrations and P their trend, [1, c],
+
+    Q = K^-1 - K^-1 P (P' K^-1 P)^-1 P' K^-1,    w(c) = k(c)' Q + p(c)' (P' K^-1 P)^-1 P' K^-1,
+
+and what the others say about demonstration i is off by ``(Q y)_i / Q_ii`` (O. Dubrule, "Cross Validation of Kriging in
+a Unique Neighborhood", Mathematical Geology 15(6), 1983). Least squares is K = I with k(c) = 0.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from itertools import product
 from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.linalg import cho_factor, cho_solve
 from sklearn.base import BaseEstimator
 from sklearn.utils.validation import check_is_fitted
 
-from kineme.errors import SpecificationError
+from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.trajectories.movements_like import MovementsLike
-from kineme.primitives.contextual.smoothers import Smoother, candidates, solve
-from kineme.primitives.contextual.task_parameters import check_range, demonstrated_parameters, task_parameters
 from kineme.primitives.discrete.dmp import DMP, Primitives
 from kineme.primitives.styles.parameters import (
     as_primitives,
@@ -23,7 +35,14 @@ from kineme.primitives.styles.parameters import (
     shared_recording,
     to_numbers,
 )
-from kineme.validation import Array, check_choice, check_number
+from kineme.validation import LARGEST, Array, as_numbers, check_choice, check_number
+
+_SLACK = 1e-9  # of the range: a demonstrated parameter is inside, whatever the rounding
+_ALONE = 1e-9  # of the leverage: a demonstration that differs from all others alone
+
+
+LENGTH_SCALES = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
+NOISES = (1e-8, 1e-6, 1e-4, 1e-2, 1e-1)
 
 _AS_GOOD, _EXACT = 1.05, 1e-6  # times the least error; times that of ignoring the parameters
 REGRESSIONS = ("auto", "linear", "gaussian-process")
@@ -198,3 +217,166 @@ def _rms(errors: Array) -> float:
 
 def _standardized(C: Array, center: Array, scale: Array) -> Array:
     return (C - center) / scale
+
+
+@dataclass(frozen=True)
+class Smoother:
+    """How numbers follow from parameters.
+
+    Attributes
+    ----------
+    name : {"average", "linear", "gaussian-process"}
+        No dependence; least squares of [1, c]; the same trend and a Gaussian process around it with the covariance
+        ``exp(-|c - c'|^2 / (2 l^2))`` of parameters in units of their standard deviation.
+    length_scale : float, optional
+        l.
+    noise : float, optional
+        Variance of a demonstration that the parameters do not explain, as a share of the process's.
+    """
+
+    name: str
+    length_scale: float | None = None
+    noise: float | None = None
+
+    def __str__(self) -> str:
+        if self.length_scale is None:
+            return self.name
+        return f"{self.name}, length scale {self.length_scale:g}, noise {self.noise:g}"
+
+
+def candidates(length_scale: float | None, noise: float | None) -> dict[str, list[Smoother]]:
+    """Name -> the smoothers of that name."""
+    lengths = LENGTH_SCALES if length_scale is None else (float(length_scale),)
+    noises = NOISES if noise is None else (float(noise),)
+    processes = [Smoother("gaussian-process", *one) for one in product(lengths, noises)]
+    return {"linear": [Smoother("linear")], "gaussian-process": processes}
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """A smoother for n demonstrations of tasks (n, k), parameters in standard deviations."""
+
+    smoother: Smoother
+    tasks: Array
+    Q: Array  # (n, n)
+    trend: Array  # (k + 1 or 1, n), from y to the coefficients of the trend
+
+    def weights(self, tasks: Array) -> Array:
+        """w(c), shape (m, n), for tasks (m, k)."""
+        return _covariance(self.smoother, tasks, self.tasks) @ self.Q + _trend(self.smoother, tasks) @ self.trend
+
+    def left_out(self, Y: Array) -> Array:
+        """How far each row of Y (n, p) is from what the others say, shape (n,)."""
+        return np.asarray(np.linalg.norm(self.Q @ Y, axis=1) / np.diag(self.Q))
+
+
+def solve(smoother: Smoother, tasks: Array) -> Solved:
+    """The matrices of a smoother for tasks (n, k), more than [1, c] has columns."""
+    P = _trend(smoother, tasks)
+    K = _covariance(smoother, tasks, tasks) + (1.0 if smoother.noise is None else smoother.noise) * np.eye(len(tasks))
+    factor = cho_factor(K)
+    KP = cho_solve(factor, P)
+    trend = np.linalg.solve(P.T @ KP, KP.T)
+    return Solved(smoother, tasks, cho_solve(factor, np.eye(len(tasks))) - KP @ trend, trend)
+
+
+def _trend(smoother: Smoother, tasks: Array) -> Array:
+    ones = np.ones((len(tasks), 1))
+    return ones if smoother.name == "average" else np.hstack((ones, tasks))
+
+
+def _covariance(smoother: Smoother, A: Array, B: Array) -> Array:
+    if smoother.length_scale is None:
+        return np.zeros((len(A), len(B)))
+    squares = np.sum((A[:, None] - B[None]) ** 2, axis=2)
+    return np.exp(-squares / (2.0 * smoother.length_scale**2))
+
+
+def demonstrated_parameters(parameters: ArrayLike, n: int) -> Array:
+    """The parameters (n, k) of n demonstrations, as a copy.
+
+    Raises
+    ------
+    TrajectoryError
+        Another number or shape, not finite, equal in all demonstrations or in all but one, or depending on each other;
+        fewer than k + 2 demonstrations.
+    """
+    C = as_numbers(parameters, "parameters")
+    C = C[:, None] if C.ndim == 1 else C
+    if C.ndim != 2 or len(C) != n or not C.shape[1]:
+        raise TrajectoryError(
+            f"expected parameters of shape ({n},) or ({n}, k), those of each demonstration, got shape "
+            f"{np.shape(parameters)}"
+        )
+    C, k = _finite(C), C.shape[1]
+    if n < k + 2:
+        raise TrajectoryError(
+            f"expected at least {k + 2} demonstrations for {k} parameters, so that one can be left out, got {n}"
+        )
+    deviations = C - C.mean(axis=0)
+    lengths = np.linalg.norm(deviations, axis=0)
+    still = lengths <= 1e-12 * np.linalg.norm(C, axis=0)
+    if still.any():
+        j = int(np.argmax(still))
+        raise TrajectoryError(
+            f"expected parameter {j} to differ between demonstrations, got {C[0, j]:g} in all; leave it out"
+        )
+    if np.linalg.matrix_rank(deviations / lengths, tol=1e-9) < k:
+        raise TrajectoryError(f"expected {k} parameters of which none follows from the others; leave out those that do")
+    _check_alone(deviations / lengths)
+    return C.copy()
+
+
+def _check_alone(deviations: Array) -> None:
+    """Refuse a demonstration without which the others say nothing about a parameter: it cannot be left out."""
+    leverage = 1.0 / len(deviations) + np.sum(np.linalg.qr(deviations)[0] ** 2, axis=1)
+    if leverage.max() > 1.0 - _ALONE:
+        raise TrajectoryError(
+            f"expected parameters that differ independently in all demonstrations but one, too, so that it can be left "
+            f"out, got demonstration {np.argmax(leverage)} alone with its own; demonstrate another one like it"
+        )
+
+
+def task_parameters(parameters: ArrayLike, k: int) -> Array:
+    """Parameters (m, k) of m tasks to generate for.
+
+    Raises
+    ------
+    TrajectoryError
+        Another number than the k demonstrated ones, or not finite.
+    """
+    C = as_numbers(parameters, "parameters")
+    C = C.reshape(-1, 1) if k == 1 and C.ndim < 2 else np.atleast_2d(C)
+    if C.ndim != 2 or C.shape[1] != k or not len(C):
+        raise TrajectoryError(f"expected parameters of shape ({k},) or (m, {k}), got shape {np.shape(parameters)}")
+    return _finite(C)
+
+
+def check_range(C: Array, shown: Array) -> None:
+    """Refuse parameters (m, k) outside the box around the demonstrated ones (n, k).
+
+    Raises
+    ------
+    SpecificationError
+        The first such parameter, and how far beyond the range it is.
+    """
+    lowest, highest = shown.min(axis=0), shown.max(axis=0)
+    beyond = np.maximum(np.maximum(lowest - C, C - highest), 0.0)
+    outside = beyond > _SLACK * (highest - lowest)
+    if outside.any():
+        i = int(np.argmax(outside.any(axis=1)))
+        j = int(np.argmax(outside[i]))
+        share = 100.0 * beyond[i, j] / (highest[j] - lowest[j])
+        raise SpecificationError(
+            f"parameters {i}: expected parameter {j} within the demonstrated range [{lowest[j]:.6g}, "
+            f"{highest[j]:.6g}], got {C[i, j]:.6g}, {beyond[i, j]:.3g} or {share:.3g} % of the range beyond it; "
+            "demonstrate it, or pass extrapolate=True"
+        )
+
+
+def _finite(C: Array) -> Array:
+    usable = np.abs(C) <= LARGEST
+    if not usable.all():
+        i = int(np.argmin(usable.all(axis=1)))
+        raise TrajectoryError(f"parameters {i}: expected finite numbers up to {LARGEST:g}, got {C[i].tolist()}")
+    return C

@@ -1,22 +1,28 @@
-"""One movement under live control, whatever kind of primitive it comes from."""
+"""One movement under live control, whatever kind of primitive it comes from.
+
+Limits of velocity and acceleration are reported where they are exceeded, never enforced.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+import math
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kineme.errors import SpecificationError
 from kineme.primitives.control import inputs
-from kineme.primitives.control.clock import Clock
-from kineme.primitives.control.limits import limits_from
 from kineme.primitives.control.moving_goal import MovingGoal
 from kineme.primitives.control.obstacles import ObstacleAvoidance
-from kineme.primitives.control.options import Options
+from kineme.primitives.control.options import Options, numbers
 from kineme.primitives.control.plan import SHORTEST, Influences, Plan, ViaPlaces, check_controlled, passed
 from kineme.primitives.control.state import State, Status
 from kineme.primitives.control.stepping import stepper
 from kineme.validation import Array
+
+_NONE = Status(0)
+
 
 _NOTHING = Status(0)
 _STANDSTILL = 1e-30  # durations; a step as short as this is none
@@ -308,3 +314,115 @@ class Controller:
     def _rests(self) -> bool:
         distance, slope = self._motion[0] - self._goal.target, self._motion[1]
         return bool(max(np.abs(distance).max(), np.abs(slope).max()) <= self._settle)
+
+
+class RunningSum:
+    """Neumaier's compensated sum: what rounding loses is kept and added back.
+
+    A. Neumaier, "Rundungsfehleranalyse einiger Verfahren zur Summation endlicher Summen", ZAMM 54, 1974.
+    """
+
+    __slots__ = ("_lost", "_sum")
+
+    def __init__(self, start: float = 0.0) -> None:
+        self._sum, self._lost = start, 0.0
+
+    def add(self, step: float) -> None:
+        """Add a step of 0 or more."""
+        total = self._sum + step
+        self._lost += (self._sum - total) + step if self._sum >= step else (step - total) + self._sum
+        self._sum = total
+
+    def take_whole(self) -> int:
+        """Subtract the whole part, which rounds nothing, and return it."""
+        whole = math.floor(self.value)
+        self._sum -= whole
+        return whole
+
+    @property
+    def value(self) -> float:
+        """The sum."""
+        return self._sum + self._lost
+
+
+class Clock:
+    """Seconds and phase since the start.
+
+    The phase is normalized time u; that of a rhythm counts from `begin` and stays below 1, so that it is as exact after
+    a million periods as in the first.
+
+    Attributes
+    ----------
+    time : float
+        Seconds since the start.
+    u : float
+        The phase, of a rhythm within its period.
+    progress : float
+        The phase since the start.
+    """
+
+    __slots__ = ("_begin", "_periodic", "_phase", "_seconds", "_turns", "progress", "time", "u")
+
+    def __init__(self, begin: float, periodic: bool) -> None:
+        self._seconds, self._phase = RunningSum(), RunningSum(begin)
+        self._begin, self._periodic, self._turns = begin, periodic, 0
+        self.time, self.u, self.progress = 0.0, begin, 0.0
+
+    def add_time(self, dt: float) -> None:
+        """Let dt [s] pass."""
+        self._seconds.add(dt)
+        self.time = self._seconds.value
+
+    def add_phase(self, du: float) -> None:
+        """Let the phase go on by du."""
+        self._phase.add(du)
+        self.u = self.progress = self._phase.value
+        if self._periodic:
+            if self.u >= 1.0:
+                self._turns += self._phase.take_whole()
+                self.u = self._phase.value
+            self.progress = self._turns + self.u - self._begin
+
+
+class Limits(NamedTuple):
+    """Largest velocity and acceleration (d,) of each component, or None where there is no limit."""
+
+    velocity: Array | None
+    acceleration: Array | None
+
+    @property
+    def exist(self) -> bool:
+        """Whether there is any."""
+        return self.velocity is not None or self.acceleration is not None
+
+    def exceeded(self, before: Array, velocity: Array, acceleration: Array, dt: float) -> Status:
+        """Which are exceeded after a step of dt from the velocity `before` it, as members of `Status`.
+
+        The acceleration is the larger of that at the end of the step and the mean change of velocity over it.
+        """
+        events = _NONE
+        if self.velocity is not None and (np.abs(velocity) > self.velocity).any():
+            events |= Status.VELOCITY_LIMIT
+        if self.acceleration is not None:
+            largest = np.maximum(np.abs(acceleration), np.abs(velocity - before) / dt)
+            if (largest > self.acceleration).any():
+                events |= Status.ACCELERATION_LIMIT
+        return events
+
+
+def limits_from(options: Options, n_dims: int) -> Limits:
+    """The limits of the options for d components."""
+    return Limits(
+        _limit("velocity_limit", options.velocity_limit, n_dims),
+        _limit("acceleration_limit", options.acceleration_limit, n_dims),
+    )
+
+
+def _limit(name: str, value: ArrayLike | None, n_dims: int) -> Array | None:
+    """A limit as positive (d,), from a number or one per dimension."""
+    if value is None:
+        return None
+    array = numbers(name, value)
+    if array.shape not in ((), (n_dims,)) or not (array > 0).all():
+        raise SpecificationError(f"expected {name} to be a number above 0, or {n_dims} of them, got {value!r}")
+    return np.broadcast_to(array, n_dims)

@@ -1,25 +1,36 @@
-"""Policy improvement of a primitive by trying variants of it in batches."""
+"""Policy improvement of a primitive by trying variants of it in batches.
+
+Variants of a primitive that are smooth in acceleration and keep start, goal and how they are reached.
+
+The weights of one dimension are changed with the covariance ``(L'L)^-1``, L being second differences with zeros beyond
+both ends, as in E. Theodorou, J. Buchli and S. Schaal, "A Generalized Path Integral Control Approach to Reinforcement
+Learning", JMLR 11, 2010, and M. Kalakrishnan et al., "STOMP", ICRA 2011. Theirs are differences of the
+path; weights are accelerations, so here the acceleration itself has no kinks. That covariance is conditioned on no
+change of position and velocity at the end.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.errors import SpecificationError
+from kineme.primitives.condition import condition
 from kineme.primitives.discrete.dmp import Primitives
 from kineme.primitives.discrete.operators import decoder
 from kineme.primitives.discrete.rollout import Rollout
-from kineme.primitives.improvement.costs import checked_costs
-from kineme.primitives.improvement.exploration import exploration_factor
+from kineme.primitives.discrete.specification import Specification
 from kineme.primitives.improvement.methods import METHODS, Search
-from kineme.primitives.improvement.variants import largest_deviation, variants
 from kineme.primitives.styles.parameters import check_primitives
-from kineme.validation import Array, check_choice, check_count, check_number, check_seed, check_switch
+from kineme.validation import Array, as_numbers, check_choice, check_count, check_number, check_seed, check_switch
+
+_NEGLIGIBLE = 1e-2  # of the largest: directions that change the path less are not explored
+
 
 _FEWEST_BASIS = 4
 _MOST = 100_000  # rollouts, and updates
@@ -191,3 +202,61 @@ def _bar(updates: int, progress: bool) -> AbstractContextManager[Any]:
     from tqdm import tqdm
 
     return tqdm(total=updates, desc="improving", leave=False, disable=not progress)
+
+
+def checked_costs(costs: ArrayLike, n: int, update: int) -> Array:
+    """The costs (n,) of the movements of an update, as a copy.
+
+    Raises
+    ------
+    SpecificationError
+        Another number of costs, or costs that are NaN or infinite; with the number of the movement.
+    """
+    found = as_numbers(costs, "cost", f"{n} numbers, the cost of each movement")
+    if found.shape != (n,):
+        raise SpecificationError(
+            f"expected the cost to return {n} numbers, one for each movement of the rollout, got shape {found.shape}; "
+            "reduce over samples and dimensions, axis=(1, 2)"
+        )
+    if not np.isfinite(found).all():
+        i = int(np.argmin(np.isfinite(found)))
+        raise SpecificationError(
+            f"expected finite costs, got {found[i]:g} for movement {i} of update {update}; "
+            "give a movement that fails a large cost"
+        )
+    return found.copy()
+
+
+def exploration_factor(dmp: Specification) -> Array:
+    """F of shape (r, N), ``F.T @ F`` being the covariance of one dimension's change of W.
+
+    The standard deviation of the path is 1 where it is largest; rows are in the order of how much they change the path.
+    """
+    n_basis = dmp.n_basis
+    L = np.diff(np.eye(n_basis + 4, n_basis, -2), n=2, axis=0)
+    smooth = np.linalg.inv(np.linalg.qr(L, mode="r")).T  # F0' F0 = (L'L)^-1
+    response = decoder(dmp, dmp.n_points)
+    kept = condition(smooth, response.Phi[:2, -1]).factor
+    U, S, paths = np.linalg.svd(kept @ response.Phi[0].T, full_matrices=False)
+    chosen = _NEGLIGIBLE * S[0] < S
+    largest = np.linalg.norm(S[chosen, None] * paths[chosen], axis=0).max()
+    return np.asarray(U[:, chosen].T @ kept / largest)
+
+
+def variants(primitive: Primitives, factor: Array, z: Array) -> Primitives:
+    """One primitive n times, its weights changed by z (n, d r) times the factor (r, N) of one dimension."""
+    n, d = len(z), primitive.n_dims
+    changes = (z.reshape(n * d, -1) @ factor).reshape(n, d, -1)
+    repeated = primitive[np.zeros(n, dtype=int)]
+    return replace(repeated, scaled_weights=repeated.scaled_weights + changes)
+
+
+def largest_deviation(search: Search, responses: Array) -> float:
+    """Standard deviation of the paths where it is largest, over dimensions and time; 1 at the start.
+
+    `responses` (r, T) are what each of the r numbers of a dimension adds to its path.
+    """
+    r = len(responses)
+    blocks = search.covariance.reshape(-1, r, search.covariance.shape[0] // r, r)
+    variances = [np.einsum("ru,rs,su->u", responses, blocks[k, :, k], responses).max() for k in range(len(blocks))]
+    return float(search.size * np.sqrt(max(variances)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,13 +15,14 @@ from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.primitives.discrete.encode import check_movement
 from kineme.primitives.recorded_as import RecordedAs
-from kineme.primitives.rhythmic.cycle import fold
-from kineme.primitives.rhythmic.harmonics import as_real, waves
+from kineme.primitives.rhythmic.harmonics import Complex, as_real, fit_harmonics, waves
 from kineme.primitives.rhythmic.operators import encoder, even_phases
 from kineme.primitives.rhythmic.periods import FEWEST_CYCLES, SAMPLES_PER_PERIOD, Periodicity, find_cycles
 from kineme.primitives.rhythmic.specification import RhythmicSpecification
 from kineme.runtime.parallel import for_tiles
 from kineme.validation import Array, describe
+
+_RESOLVED = 0.45  # harmonics per sample of a period; one half would be the Nyquist limit
 
 _TILE_SAMPLES = 10_000  # numbers of recording in one tile; the exponentials of the period search are fifty times more
 _LEAST_EXPLAINED = 0.5  # share of the variance that a found period must explain
@@ -131,3 +132,56 @@ def _check_samples(demos: Demonstrations, period: float) -> None:
             f"{describe(i, demos.names)}: expected at least {SAMPLES_PER_PERIOD} samples per period of {period:g} s, "
             f"got {per_period[i]:.3g}; record faster, or correct the period (times are in seconds)"
         )
+
+
+class Cycles(NamedTuple):
+    """One cycle of each of n recordings."""
+
+    coefficients: Complex  # (n, d, H + 1), Fourier series in the phase
+    phases: Array  # (n,), where the recording started, in [0, 2 pi)
+    aligned_on: NDArray[np.intp]  # (n,), dimension that set the phase
+    explained: Array  # (n,), share of the recording's variance that its cycle explains
+
+
+def fold(rows: Array, cycles: Array, lengths: NDArray[np.intp], most: int, dimension: int | None) -> Cycles:
+    """Average over periods by the least-squares Fourier series, then set the phase.
+
+    For a whole number of periods the series is the Fourier series of the average period. For a fractional number it
+    still uses every sample, has no jump where the recording begins and ends, and its mean is that of whole periods.
+
+    Parameters
+    ----------
+    rows : ndarray of shape (n, d, R)
+        Even samples.
+    cycles : ndarray of shape (n,)
+        Periods per recording.
+    lengths : ndarray of shape (n,)
+        Recorded samples; no harmonic above the sampling of a period is used.
+    most : int
+        Largest number of harmonics H.
+    dimension : int or None
+        Dimension whose first harmonic defines the phase; None for the one with the largest.
+    """
+    n_harmonics = np.clip(_RESOLVED * (lengths - 1) / cycles, 1, most).astype(np.intp)
+    mean = rows.mean(axis=2, keepdims=True)
+    fit = fit_harmonics(rows - mean, cycles, n_harmonics)
+    total = ((rows - mean) ** 2).sum(axis=(1, 2))
+    explained = 1 - ((rows - mean - fit.fitted) ** 2).sum(axis=(1, 2)) / total
+    missing = most + 1 - fit.coefficients.shape[2]
+    coefficients = np.pad(fit.coefficients, ((0, 0), (0, 0), (0, missing)))
+    coefficients[:, :, 0] += mean[:, :, 0]
+    first = coefficients[:, :, 1]
+    aligned_on = np.abs(first).argmax(axis=1) if dimension is None else np.full(len(rows), dimension)
+    phases = start_phases(first[np.arange(len(rows)), aligned_on])
+    turn = np.exp(-1j * phases[:, None] * np.arange(most + 1))
+    return Cycles(coefficients * turn[:, None], phases, aligned_on, explained)
+
+
+def start_phases(first: Complex) -> Array:
+    """Phase of the first sample, from one first harmonic (n,): phase 0 is where it is largest.
+
+    Unlike a principal axis, a maximum has a sign, so the phase is not ambiguous by half a turn. A dimension without a
+    first harmonic defines no phase.
+    """
+    phases = np.angle(first) % (2 * np.pi)
+    return np.where(phases == 2 * np.pi, 0.0, phases)  # the remainder of a tiny negative angle rounds up to 2 pi

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Never
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.movements_like import MovementsLike
-from kineme.primitives.discrete.via_points import ViaLike
+from kineme.primitives.control.options import check_one, one_vector
+from kineme.primitives.control.plan import MISSED, Plan, ViaPlaces
+from kineme.primitives.discrete.via_points import ViaLike, via_points
 from kineme.primitives.rhythmic.encode import encode
 from kineme.primitives.rhythmic.learned import RhythmicLearned
-from kineme.primitives.rhythmic.modulate import modulated
+from kineme.primitives.rhythmic.modulate import PHASES, modulated
 from kineme.primitives.rhythmic.operators import forcing_matrix
-from kineme.primitives.rhythmic.refused import refuse_others
 from kineme.primitives.rhythmic.rollout import RhythmicRollout, rollout
 from kineme.primitives.rhythmic.specification import RhythmicSpecification
 from kineme.validation import Array, check_count, check_samples
@@ -22,6 +25,19 @@ from kineme.validation import Array, check_count, check_samples
 if TYPE_CHECKING:
     from kineme.primitives.control.obstacles import ObstacleAvoidance
     from kineme.primitives.rhythmic.controller import RhythmicController
+
+
+_INSTEAD = {
+    "goal": "a rhythm goes around its baseline: give baseline=",
+    "duration": "a rhythm has no end: give period=, of one cycle, and n_periods=",
+    "end_velocity": "a rhythm has no end: on its cycle give via= points, off it the initial velocity=",
+    "goal_velocity": "a rollout goes around a baseline at rest: give goal_velocity= to controller.step",
+    "position_limits": "a rhythm is not kept within limits: a smaller amplitude=, another baseline= or via= points are",
+    "settle": "a rhythm never settles: give n_periods=",
+}
+
+
+_LONGEST_STEP = 1000.0  # periods in one step: the forcing is followed all the way
 
 
 @dataclass(frozen=True)
@@ -267,7 +283,6 @@ class RhythmicPrimitives(RhythmicLearned):
         """
         from kineme.primitives.control.options import Options  # these load where a robot moves, not to learn
         from kineme.primitives.rhythmic.controller import RhythmicController
-        from kineme.primitives.rhythmic.plan import plan_of
 
         refuse_others("controller", others)
         if goal is not None and baseline is not None:
@@ -277,3 +292,63 @@ class RhythmicPrimitives(RhythmicLearned):
         changed: dict[str, ArrayLike | None] = {"period": period, "amplitude": amplitude, "phase": phase}
         plan, gain = plan_of(self, changed | {"baseline": baseline, "start": start, "velocity": velocity}, via)
         return RhythmicController(plan, dt, options, float(self.amplitudes[0]), gain)
+
+
+def plan_of(
+    primitive: RhythmicLearned, options: dict[str, ArrayLike | None], via: ViaLike | None = None
+) -> tuple[Plan, float]:
+    """The plan of one limit cycle and its amplitude, with the options of `rollout` checked for one movement.
+
+    A rhythm is a discrete movement whose shape repeats, without coupling, and whose goal is the baseline.
+    """
+    check_one(len(primitive))
+    d, dmp = primitive.n_dims, primitive.dmp
+    vectors = {name: one_vector(name, options[name], d) for name in ("baseline", "start", "velocity")}
+    asked = None if via is None else via_points(via, d, span=PHASES)
+    movement = modulated(rollout(primitive, options | vectors, 1.0, None, n_samples=2), asked)
+    check_one(len(movement))
+    origin, tau = movement.baselines[0].copy(), float(movement.periods[0])
+    gain, ones, weights = float(movement.ratio[0]), np.ones(d), primitive.scaled_weights[0]
+    size = 2.0 * abs(gain) * float(primitive.amplitudes[0])
+    if movement.change is not None:
+        weights = weights + movement.change[0] / gain  # a new amplitude scales the whole cycle
+
+    def shape(u: Array) -> Array:
+        forcing = dmp.basis.design(2 * np.pi * u) @ weights.T
+        return np.column_stack((forcing, np.zeros(len(u))))
+
+    plan = Plan(
+        dmp.K,
+        dmp.D,
+        shape,
+        n_gaps=dmp.n_basis,
+        ratio=lambda goal: ones,
+        origin=origin,
+        goal=np.zeros(d),
+        state=np.vstack((movement.positions[0, 0] - origin, movement.velocities[0, 0] * tau)),
+        duration=tau,
+        settle=0.0,
+        n_positions=d,
+        begin=float(movement.phases[0] / (2 * np.pi) % 1.0),
+        periodic=True,
+        longest_step=_LONGEST_STEP,
+        via=None if asked is None else ViaPlaces(asked.times, asked.points[0] - origin, MISSED * size),
+    )
+    return plan, gain
+
+
+def refuse_others(what: str, asked: Mapping[str, object]) -> None:
+    """Refuse options that a rhythm does not have.
+
+    Raises
+    ------
+    SpecificationError
+        An option of discrete movements.
+    TypeError
+        Another name, as of any function.
+    """
+    for name, value in asked.items():
+        if name not in _INSTEAD:
+            raise TypeError(f"{what}() got an unexpected keyword argument {name!r}")
+        if value is not None:
+            raise SpecificationError(f"expected no {name}= for a rhythm; {_INSTEAD[name]}")

@@ -1,9 +1,21 @@
-"""One primitive from several demonstrations, with their spread."""
+"""One primitive from several demonstrations, with their spread.
+
+Two averages blended into one: at each time the product of their Gaussians, each to the power of its activation.
+
+A. Paraschos, C. Daniel, J. Peters and G. Neumann, "Probabilistic Movement Primitives", NIPS 2013, Section 2.2: with the
+activations a and b of two primitives at a time and their means and covariances of the position there,
+
+    Sigma = (a Sigma_1^-1 + b Sigma_2^-1)^-1,    mean = Sigma (a Sigma_1^-1 mean_1 + b Sigma_2^-1 mean_2).
+
+Positions at one time say nothing about how they vary together over time. Our choice is ``sqrt(a) Sigma Sigma_1^-1``
+times the deviations of the one and ``sqrt(b) Sigma Sigma_2^-1`` times those of the other, which has this Sigma at each
+time and the deviations of one primitive where it is alone.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,13 +25,13 @@ from kineme.movements.channels.alike import check_alike
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.primitives.discrete.dmp import Primitives
 from kineme.primitives.discrete.modulate import modulated
+from kineme.primitives.discrete.operators import encoder
 from kineme.primitives.discrete.rollout import Rollout, rollout
 from kineme.primitives.discrete.samples import sampled
+from kineme.primitives.discrete.specification import Specification
 from kineme.primitives.discrete.via_points import ViaLike
 from kineme.primitives.recorded_as import merged
-from kineme.primitives.styles.blending import as_activation, blended
 from kineme.primitives.styles.conditioning import updated
-from kineme.primitives.styles.likelihood import log_likelihoods, unexplained_noise
 from kineme.primitives.styles.observations import as_observation_times, as_observations
 from kineme.primitives.styles.parameters import (
     as_primitives,
@@ -31,6 +43,8 @@ from kineme.primitives.styles.parameters import (
     to_numbers,
 )
 from kineme.validation import Array, as_numbers, check_choice, check_count, check_number
+
+_FLOOR = 1e-3  # of the typical deviation, added to all: where nobody varies the activations alone decide
 
 _CERTAIN = 1e-6  # of the extent: smaller deviations count as equal when averages are blended
 _DERIVATIVES = {"position": 0, "velocity": 1, "acceleration": 2}
@@ -350,3 +364,89 @@ def _shares(weights: ArrayLike | None, n: int) -> Array:
     if not w.any():
         raise TrajectoryError(f"expected at least one weight above 0, got {n} zeros")
     return w / w.sum()
+
+
+class Blended(NamedTuple):
+    """Numbers of the mean, and the factor of their covariance."""
+
+    theta: Array  # (1, d, N + 3)
+    factor: Array  # (r1 + r2, d, N + 3)
+
+
+def as_activation(activation: ArrayLike, n_points: int) -> Array:
+    """A number or numbers at even times as (T,) numbers from 0 to 1."""
+    a = np.atleast_1d(as_numbers(activation, "activation"))
+    if a.ndim != 1 or not len(a) or not ((a >= 0.0) & (a <= 1.0)).all():
+        raise SpecificationError(f"expected activation to be numbers from 0 to 1, of shape (S,), got {activation!r}")
+    return np.interp(np.linspace(0.0, 1.0, n_points), np.linspace(0.0, 1.0, len(a)), a)
+
+
+def blended(
+    dmp: Specification, one: tuple[Array, Array], other: tuple[Array, Array], activation: Array, floor: float
+) -> Blended:
+    """Blend two averages, each (theta (1, d, N + 3), factor (r, d, N + 3)), with `activation` (T,) of the other.
+
+    `floor` is the deviation below which all positions count as equally certain, in the unit of the movements.
+    """
+    matrix = path_matrix(dmp, len(activation))
+    means = [map_rows(theta, matrix)[0].T for theta, _ in (one, other)]  # (T, d)
+    deviations = [map_rows(factor, matrix).transpose(2, 0, 1) for _, factor in (one, other)]  # (T, r, d)
+    a = np.stack((1.0 - activation, activation))[:, :, None, None]
+    size = np.sqrt(sum(float(np.mean(np.sum(x**2, axis=1))) for x in deviations) / 2.0)
+    least = max(_FLOOR * size, floor) ** 2 * np.eye(means[0].shape[1])
+    precisions = np.stack([np.linalg.inv(x.transpose(0, 2, 1) @ x + least) for x in deviations])  # (2, T, d, d)
+    gains = np.linalg.inv(np.sum(a * precisions, axis=0)) @ precisions  # Sigma Sigma_i^-1
+    mean = sum((a[i] * gains[i] @ means[i][:, :, None])[:, :, 0] for i in (0, 1))
+    paths = [deviations[i] @ (np.sqrt(a[i]) * gains[i]).transpose(0, 2, 1) for i in (0, 1)]
+    return Blended(
+        encoded(dmp, np.asarray(mean)[None].transpose(0, 2, 1)),
+        encoded(dmp, np.concatenate(paths, axis=1).transpose(1, 2, 0)),
+    )
+
+
+def encoded(dmp: Specification, paths: Array) -> Array:
+    """Theta (n, d, N + 3) of paths (n, d, T) at even times: learning is linear."""
+    relative = paths - paths[:, :, :1]
+    operator = encoder(dmp, paths.shape[2])
+    weights, velocity = relative @ operator.weights, relative @ operator.velocity
+    return np.concatenate((weights, np.stack((paths[:, :, 0], paths[:, :, -1], velocity), axis=2)), axis=2)
+
+
+def log_likelihoods(dmp: Specification, deviations: Array, factor: Array, noise: float) -> Array:
+    """Log density (n,) of the paths of theta, deviations (n, d, N + 3) from the mean, at T even times.
+
+    With B (r, d T) the path of the factor, ``ln N(e; 0, B' B + noise^2 I)`` from ``B = U diag(s) V'``:
+
+        -1/2 [sum ln(s^2 + noise^2) + (d T - r) ln noise^2 + sum c^2 / (s^2 + noise^2) + (e'e - c'c) / noise^2
+              + d T ln 2 pi],    c = V' e,
+
+    so nothing of the size (d T)^2 is formed.
+    """
+    paths = map_rows(deviations, path_matrix(dmp, dmp.n_points)).reshape(len(deviations), -1)
+    spread = map_rows(factor, path_matrix(dmp, dmp.n_points)).reshape(len(factor), paths.shape[1])
+    _, s, Vt = np.linalg.svd(spread, full_matrices=False)
+    along = paths @ Vt.T
+    beside = np.sum((paths - along @ Vt) ** 2, axis=1)
+    variances, n_numbers = s**2 + noise**2, paths.shape[1]
+    determinant = np.sum(np.log(variances)) + 2.0 * (n_numbers - len(s)) * np.log(noise)
+    distances = along**2 @ (1.0 / variances) + beside / noise**2
+    return np.asarray(-0.5 * (determinant + distances + n_numbers * np.log(2.0 * np.pi)))
+
+
+def unexplained_noise(dmp: Specification, deviations: Array) -> float | None:
+    """What other demonstrations do not explain, as a standard deviation, from theta (n, d, N + 3) minus their mean.
+
+    Each demonstration is compared with the nearest weighted mean of the others, of any weights with the sum 1. With G
+    the products of the centered paths its squared distance is ``1 / (G^+)_ii``, in d T - (n - 2) directions. None where
+    there are too few demonstrations, or so many that they explain every path, or where nothing is left.
+    """
+    n, d, n_numbers = deviations.shape
+    if n < 3 or n - 2 >= d * n_numbers:
+        return None
+    paths = map_rows(deviations, path_matrix(dmp, dmp.n_points)).reshape(n, -1)
+    values, vectors = np.linalg.eigh(paths @ paths.T)
+    values, vectors = values[1:], vectors[:, 1:]  # without the direction in which all are shifted
+    if not values[0] > n * np.finfo(float).eps * values[-1]:
+        return None
+    squares = 1.0 / np.sum(vectors**2 / values, axis=1)
+    return float(np.sqrt(squares.mean() / (paths.shape[1] - (n - 2))))

@@ -5,29 +5,31 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from kineme.comparison.comparison import Comparison
 from kineme.comparison.describe import N_POINTS
 from kineme.comparison.references import References
-from kineme.movements.channels.channel import Channels, is_plain
+from kineme.movements.channels.channel import Channels, is_plain, recorded_names
+from kineme.movements.channels.incremental import IncrementalCoordinates
 from kineme.movements.preparation.pauses import cut_pauses
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.recognition.answer import Answer
-from kineme.recognition.early.bounded_path import BoundedPath
 from kineme.recognition.early.decision import Decision
 from kineme.recognition.early.evidence import describe_begun, log_evidence
-from kineme.recognition.early.forecast import forecast
 from kineme.recognition.early.hypotheses import Hypotheses
 from kineme.recognition.early.live_state import Guess, LiveState, LiveStatus
-from kineme.recognition.early.prefixes import smoother
-from kineme.recognition.early.samples import Samples
+from kineme.recognition.early.prefixes import Prefixes, smoother
 from kineme.runtime.compiled import load_compiled
 from kineme.runtime.parallel import single_threaded_blas
 from kineme.validation import MIN_SAMPLES, Array
+
+N_REMAINING = 20  # samples of the predicted path
+
 
 CAPACITY = 4096  # samples that are kept one by one
 
@@ -174,3 +176,167 @@ def _without_pauses(kept: Array) -> tuple[Array, Array]:
     times, positions = np.ascontiguousarray(kept[:, 0]), np.ascontiguousarray(kept[:, 1:])
     cut = cut_pauses(times, positions, np.array([0, len(kept)]))
     return (times, positions) if cut is None else cut[:2]
+
+
+class BoundedPath:
+    """Every sample while there is room; then averages of 2, 4, 8, ... consecutive samples, over the whole stream.
+
+    Averages, because they keep the noise down that leaving samples out would fold into the path. The last sample is
+    always kept as it came.
+    """
+
+    def __init__(self, capacity: int, n_dims: int) -> None:
+        self._rows = np.empty((capacity + 1, n_dims + 1))  # time, position; one more for the last sample
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget everything."""
+        self._count, self.per_row, self._pending = 0, 1, 0
+        self._sum = np.zeros(self._rows.shape[1])
+        self.last: Array | None = None
+
+    def append(self, time: float, position: Array) -> None:
+        """Add one sample."""
+        row = np.concatenate(([time], position))
+        self.last = row
+        self._sum += row
+        self._pending += 1
+        if self._pending < self.per_row:
+            return
+        if self._count == len(self._rows) - 1:
+            self._halve()
+            if self._pending < self.per_row:
+                return
+        self._rows[self._count] = self._sum / self._pending
+        self._count += 1
+        self._sum[:] = 0.0
+        self._pending = 0
+
+    def _halve(self) -> None:
+        even = self._count // 2 * 2
+        self._rows[: even // 2] = 0.5 * (self._rows[0:even:2] + self._rows[1:even:2])
+        self._count, self.per_row = even // 2, 2 * self.per_row
+
+    def kept(self) -> Array:
+        """Times and positions (k, 1 + d); they share memory, and are valid until the next sample."""
+        if self.last is None or self.per_row == 1:
+            return self._rows[: self._count]
+        if self._count and self._rows[self._count - 1, 0] >= self.last[0]:
+            return self._rows[: self._count]
+        self._rows[self._count] = self.last
+        return self._rows[: self._count + 1]
+
+
+class Forecast(NamedTuple):
+    """Progress, seconds left, and the remaining path relative to the present position, (20, d)."""
+
+    progress: float
+    seconds: float
+    path: Array
+
+
+def forecast(stored: Hypotheses, evidence: Array, label: int, begun: Prefixes, duration: float) -> Forecast:
+    """Progress and time left on average over a class's hypotheses, the path from its best one.
+
+    Parameters
+    ----------
+    evidence : ndarray of shape (m * G,)
+        Logarithms, see `log_evidence`.
+    label : int
+        Index of the class.
+    duration : float
+        Time since the start [s].
+
+    Notes
+    -----
+    If `duration` is the share e of the demonstrated time, ``duration (1 - e) / e`` is left. The remaining part of the
+    stored path is turned and sized as the beginning was, and put to where the movement is now.
+    """
+    G = len(stored.progress)
+    end = int(stored.first[label + 1]) if label + 1 < len(stored.first) else len(stored.durations)
+    own = np.arange(int(stored.first[label]) * G, end * G)
+    logs = evidence[own]
+    weights = np.exp(logs - logs.max())
+    weights /= weights.sum()
+    elapsed = np.maximum(stored.prefixes.elapsed[own], 1e-3)
+    best = int(own[logs.argmax()])
+    movement = best // G
+    path = stored.paths[movement]
+    times = np.linspace(0.0, 1.0, path.shape[1])
+    remaining_times = np.linspace(stored.prefixes.elapsed[best], 1.0, N_REMAINING)
+    remaining = np.stack([np.interp(remaining_times, times, row) for row in path])
+    remaining = remaining - remaining[:, :1]
+    R = stored.procrustes.rotations(begun.positions, stored.prefixes.positions[best : best + 1])[0]
+    size = begun.sizes[0] / stored.prefixes.sizes[best] if stored.prefixes.sizes[best] > 0 else 1.0
+    return Forecast(
+        float(weights @ np.tile(stored.progress, len(own) // G)),
+        float(weights @ ((1.0 - elapsed) / elapsed)) * duration,
+        size * (R @ remaining).T,
+    )
+
+
+class Samples:
+    """Checks times and positions that arrive, and converts recorded columns as `as_learned` does whole movements.
+
+    The first sample of a movement tells whether its rows are recorded columns or coordinates; the others are as wide.
+    """
+
+    def __init__(self, channels: Channels | None, n_dims: int) -> None:
+        self._n_dims = n_dims
+        self._n_columns = n_dims if channels is None else len(recorded_names(channels))
+        plain = channels is None or all(one.kind == "position" for one in channels)
+        self._coordinates = None if channels is None or plain else IncrementalCoordinates(channels)
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget the movement; the next sample begins a new one."""
+        self._width: int | None = None
+        self._last = -np.inf
+        if self._coordinates is not None:
+            self._coordinates.clear()
+
+    def take(self, t: ArrayLike, x: ArrayLike) -> tuple[Array, Array, LiveStatus, int]:
+        """Times (k,) and coordinates (k, d) that can be used, what is wrong with others, and how many those are.
+
+        Of a call in a wrong shape one is counted.
+        """
+        try:
+            times, rows = np.atleast_1d(np.asarray(t, dtype=float)), np.asarray(x, dtype=float)
+            rows = rows.reshape(len(times), -1) if np.ndim(t) == 0 else rows
+        except (TypeError, ValueError, OverflowError):
+            times, rows = np.empty(0), np.empty((0, 0))
+        widths = (self._n_dims, self._n_columns) if self._width is None else (self._width,)
+        if times.ndim != 1 or rows.ndim != 2 or len(rows) != len(times) or rows.shape[1] not in widths:
+            return np.empty(0), np.empty((0, self._n_dims)), LiveStatus.WRONG_SHAPE, 1
+        kept, status = self._usable(times, rows)
+        if kept.any():
+            self._width, self._last = rows.shape[1], float(times[kept][-1])
+        return times[kept], self._converted(rows[kept]), status, int((~kept).sum())
+
+    def _usable(self, times: Array, rows: Array) -> tuple[NDArray[np.bool_], LiveStatus]:
+        """Which samples are finite, later than those before, and have quaternions of norm 1."""
+        status = LiveStatus(0)
+        finite = np.isfinite(times) & np.isfinite(rows).all(axis=1)
+        unit = self._are_unit(rows)
+        kept, last = np.zeros(len(times), dtype=bool), self._last
+        for k, time in enumerate(times.tolist()):
+            if not finite[k]:
+                status |= LiveStatus.NOT_FINITE
+            elif time <= last:
+                status |= LiveStatus.TIME_NOT_INCREASING
+            elif not unit[k]:
+                status |= LiveStatus.NOT_UNIT
+            else:
+                kept[k], last = True, time
+        return kept, status
+
+    def _converts(self, rows: Array) -> IncrementalCoordinates | None:
+        return self._coordinates if rows.shape[1] == self._n_columns else None
+
+    def _are_unit(self, rows: Array) -> NDArray[np.bool_]:
+        made = self._converts(rows)
+        return np.ones(len(rows), dtype=bool) if made is None else made.usable(rows)
+
+    def _converted(self, rows: Array) -> Array:
+        made = self._converts(rows)
+        return rows if made is None or not len(rows) else made.take(rows)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from enum import Flag, auto
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,10 +17,68 @@ from kineme.primitives.control.state import State
 from kineme.robots.checks.tracking import TRACKED, TURNED
 from kineme.robots.execution.torques import Torques
 from kineme.robots.kinematics.reach import point_in_words, reaching_postures
-from kineme.robots.live.arm_state import ArmState, ArmStatus
 from kineme.robots.live.live_kinematics import LiveKinematics
 from kineme.robots.models.robot import Robot, check_robot
 from kineme.validation import Array, as_numbers
+
+
+class ArmStatus(Flag):
+    """Whether an arm follows its movement, and what holds it back; members combine. ``ArmStatus(0)``: it follows.
+
+    The limits are those that bound some joint in this step, named while the arm lags. Limits of position, velocity and
+    acceleration are kept; a torque is reported and not changed.
+    """
+
+    LAGS = auto()
+    POSITION_LIMIT = auto()
+    VELOCITY_LIMIT = auto()
+    ACCELERATION_LIMIT = auto()
+    TORQUE_LIMIT = auto()
+
+    @property
+    def messages(self) -> tuple[str, ...]:
+        """One sentence for each member that is set."""
+        return tuple(MESSAGES[member] for member in self)
+
+
+MESSAGES = {
+    ArmStatus.LAGS: "the tip is more than 1 mm or 1 degree from where the movement is",
+    ArmStatus.POSITION_LIMIT: "a joint brakes before its stop, or stands at it",
+    ArmStatus.VELOCITY_LIMIT: "a joint moves as fast as it may",
+    ArmStatus.ACCELERATION_LIMIT: "a joint accelerates or brakes as hard as it may",
+    ArmStatus.TORQUE_LIMIT: "a joint would need more torque than it has; the step was not changed",
+}
+
+
+class ArmState(NamedTuple):
+    """An arm after one step of live control.
+
+    Attributes
+    ----------
+    joints : ndarray of shape (n,)
+        What to send now [rad, m].
+    velocities : ndarray of shape (n,)
+        Of the joints during this step, per second: constant in it.
+    accelerations : ndarray of shape (n,)
+        Change of the velocities since the last step, per second squared.
+    torques : ndarray of shape (n,)
+        What that takes by the model [Nm, N], without friction and load; nan where it knows no masses.
+    distance : float
+        Of the tip from where the movement is [m]: above 0 where limits of the joints hold it back.
+    status : ArmStatus
+        Whether the arm follows, and which limits hold it back.
+    movement : State
+        Of the movement; see `kineme.control.State`.
+    """
+
+    joints: Array
+    velocities: Array
+    accelerations: Array
+    torques: Array
+    distance: float
+    status: ArmStatus
+    movement: State
+
 
 _TURNED = math.radians(TURNED)
 _FOLLOWS = ArmStatus(0)

@@ -11,7 +11,8 @@ from kineme.errors import DataError
 from kineme.robots.models.ends import MOVING, Candidate, Ends, in_words
 from kineme.robots.models.meshes import resolve_meshes
 from kineme.robots.models.numbers import check_axis, check_masses, check_origins, check_shapes, doubts_of, finite_number
-from kineme.robots.models.xacro import has_macros, without_macros
+
+_NAMES = ("http://www.ros.org/wiki/xacro", "http://wiki.ros.org/xacro", "http://ros.org/wiki/xacro")
 
 _LARGEST = 20_000_000  # bytes
 _TWIN = " link"  # is added to the name of a link that a joint has too
@@ -219,3 +220,33 @@ def _number(limit: ElementTree.Element, key: str, joint: ElementTree.Element, pa
     if value is None:
         raise DataError(f"{path}: joint {joint.get('name')!r}: expected a number for {key}, got {text!r}")
     return value
+
+
+def has_macros(robot: ElementTree.Element) -> bool:
+    """Whether the tree has elements of xacro, which a URDF has no more."""
+    return any(element.tag.startswith(tuple(f"{{{name}}}" for name in _NAMES)) for element in robot.iter())
+
+
+def without_macros(path: Path) -> ElementTree.Element:
+    """The root of the URDF that a xacro file is converted to, with the defaults of its arguments.
+
+    Raises
+    ------
+    DataError
+        The package ``xacro`` is not installed, or it cannot convert the file.
+    """
+    remedy = f"xacro {path.name} > {path.name.split('.')[0]}_converted.urdf"
+    try:
+        import xacro
+    except ImportError as error:
+        raise DataError(
+            f"{path}: expected a URDF file, got xacro, a template of one; pip install xacro, or convert it where its "
+            f"packages are: {remedy}"
+        ) from error
+    try:
+        return ElementTree.fromstring(xacro.process_file(str(path)).toxml())
+    except Exception as error:  # of any kind: expressions and files of a template, and packages that are not here
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise DataError(
+            f"{path}: xacro cannot convert this file: {reason:.300}; convert it where its packages are: {remedy}"
+        ) from error

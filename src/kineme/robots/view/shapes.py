@@ -4,14 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from importlib.metadata import PackageNotFoundError, distribution
+from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
 
+from kineme.errors import DataError
+from kineme.robots.models.meshes import find_mesh
 from kineme.robots.models.numbers import finite_numbers
 from kineme.robots.models.robot import Robot
+from kineme.robots.models.table import FOLDER, MODELS
+from kineme.robots.models.urdf import read_root
 from kineme.robots.view.elements import Element, as_text, origin_of, set_color
-from kineme.robots.view.installed_meshes import root_with_shapes
-from kineme.robots.view.link_shapes import LinkShapes, Mesh
+
+_PACKAGE = "example-robot-data"
+_ROBOTS = "cmeel.prefix/share/example-robot-data/robots"  # within what its wheel installs
+
+
+_LARGEST = 16_000_000  # bytes of all meshes of one page
+_MESHES = {".stl": "stl", ".dae": "collada"}
+_SHAPES = {"box": ("size", 3), "cylinder": ("radius length", 1), "sphere": ("radius", 1)}
 
 _GRAYS = ((0.80, 0.82, 0.85, 1.0), (0.58, 0.61, 0.66, 1.0))  # of links one after the other that have no color
 _THICKNESS = 0.12  # of the cylinder between two joints: its radius for each meter of its length
@@ -91,3 +103,117 @@ def _cylinders(root: Element, link: str) -> Iterator[Element]:
         shape = ElementTree.Element("cylinder", radius=as_text([radius]), length=as_text([length]))
         ElementTree.SubElement(made, "geometry").append(shape)
         yield made
+
+
+class Mesh(NamedTuple):
+    """A mesh as the page holds it."""
+
+    kind: str  # "stl" or "collada"
+    content: bytes
+
+
+class LinkShapes:
+    """The shapes of one link after the other, and the meshes that they need."""
+
+    def __init__(self, root: Element, path: Path) -> None:
+        self.colors = {
+            material.get("name"): color
+            for material in root.findall("material")
+            if (color := material.find("color")) is not None
+        }
+        self.path = path
+        self.meshes: list[Mesh] = []
+        self.without: list[str] = []  # links with shapes, none of which can be drawn
+        self._numbers: dict[Path, int] = {}
+        self._bytes = 0
+
+    def of(self, link: Element) -> list[Element]:
+        """The visual shapes of a link, or else its collision shapes; none where they cannot be drawn."""
+        for tag in ("visual", "collision"):
+            found = [shape for one in link.findall(tag) if (shape := self._shape(one)) is not None]
+            if found:
+                return found
+        if link.find("visual") is not None or link.find("collision") is not None:
+            self.without.append(str(link.get("name")))
+        return []
+
+    def _shape(self, given: Element) -> Element | None:
+        geometry = given.find("geometry")
+        shape = None if geometry is None or len(geometry) == 0 else self._geometry(geometry[0])
+        if shape is None:
+            return None
+        made = ElementTree.Element("visual")
+        made.append(origin_of(given))
+        ElementTree.SubElement(made, "geometry").append(shape)
+        color = given.find("material/color")
+        if color is None and (material := given.find("material")) is not None:
+            color = self.colors.get(material.get("name"))
+        values = [] if color is None else finite_numbers(color.get("rgba"), 4)
+        if values:
+            set_color(made, tuple(min(max(value, 0.0), 1.0) for value in values))
+        return made
+
+    def _geometry(self, given: Element) -> Element | None:
+        if given.tag == "mesh":
+            number = self._mesh(given.get("filename", ""))
+            if number is None:
+                return None
+            scale = finite_numbers(given.get("scale"), 3) or [1.0, 1.0, 1.0]
+            return ElementTree.Element("mesh", filename=str(number), scale=as_text(scale))
+        if given.tag not in _SHAPES:
+            return None
+        names, length = _SHAPES[given.tag]
+        sizes = {name: finite_numbers(given.get(name), length) for name in names.split()}
+        if not all(values and min(values) > 0 for values in sizes.values()):
+            return None
+        return ElementTree.Element(given.tag, {name: as_text(values) for name, values in sizes.items()})
+
+    def _mesh(self, name: str) -> int | None:
+        path = find_mesh(name, self.path)
+        if path is None or path.suffix.lower() not in _MESHES:
+            return None
+        if path not in self._numbers:
+            self._bytes += path.stat().st_size
+            if self._bytes > _LARGEST:
+                return None
+            self._numbers[path] = len(self.meshes)
+            self.meshes.append(Mesh(_MESHES[path.suffix.lower()], path.read_bytes()))
+        return self._numbers[path]
+
+
+def root_with_shapes(robot: Robot) -> Element:
+    """The URDF of an arm; of an arm by name, with the shapes of its links in the package instead of ours.
+
+    Its frames of links are those of the models here.
+    """
+    root = read_root(robot.source)
+    model = MODELS.get(robot.name) if robot.source.parent == FOLDER else None
+    folder = robots_folder() if model is not None and model.meshes else None
+    if model is None or folder is None:
+        return root
+    path = folder / model.meshes
+    try:
+        shown = read_root(path)
+    except DataError:  # of another release, without this arm
+        return root
+    links = {link.get("name"): link for link in shown.findall("link")}
+    for mesh in shown.iterfind("link/visual/geometry/mesh"):
+        found = find_mesh(mesh.get("filename", ""), path)
+        mesh.set("filename", "" if found is None else str(found))
+    for link in root.findall("link"):
+        like = links.get(link.get("name"))
+        if like is not None and like.find("visual") is not None:
+            for visual in link.findall("visual"):
+                link.remove(visual)
+            link.extend(like.findall("visual"))
+    root.extend(shown.findall("material"))
+    return root
+
+
+def robots_folder() -> Path | None:
+    """Where the package has its robots; None where it is not installed."""
+    try:
+        folder = Path(str(distribution(_PACKAGE).locate_file(_ROBOTS)))
+    except PackageNotFoundError:
+        return None
+    return folder if folder.is_dir() else None

@@ -7,13 +7,20 @@ from base64 import b64encode
 from hashlib import sha256
 from pathlib import Path
 
+import numpy as np
+
 from kineme.output.atomic import write_atomically
 from kineme.output.text import counted, in_markup, printable
 from kineme.robots.checks.report import preflight_table
 from kineme.robots.planning.robot_movement import RobotMovement, duration_in_words
-from kineme.robots.view.charts import charts
 from kineme.robots.view.scene_data import MOST_SAMPLES, as_script_data, scene_data
 from kineme.robots.view.shapes import shapes_of
+from kineme.sampling import evenly_spaced
+from kineme.validation import Array
+
+WIDTH, HEIGHT = 320.0, 84.0  # of a drawing, in its own units
+_EDGE = 4.0  # above the upper limit and below the lower one
+_POINTS = 400
 
 _FOLDER = Path(__file__).parent
 _SCENE = "vendor/scene.min.js"
@@ -115,3 +122,45 @@ def _row(cells: tuple[str, ...], passed: bool) -> str:
     opened = "<tr>" if passed else '<tr class="failed">'
     values = "".join(f"<td>{in_markup(cell)}</td>" for cell in cells[1:])
     return f'{opened}<th scope="row">{in_markup(cells[0])}</th>{values}</tr>\n'
+
+
+def charts(made: RobotMovement) -> str:
+    """A figure for each joint, from its lower limit to its upper one, and for each discrete channel."""
+    trajectory, robot = made.trajectory, made.robot
+    columns = zip(trajectory.joints, trajectory.positions.T, robot.lower, robot.upper, robot.units, strict=True)
+    figures = [_chart(made, name, values, (low, high), unit) for name, values, low, high, unit in columns]
+    return "\n".join(figures + [_chart(made, name, values, None, "") for name, values in trajectory.steps.items()])
+
+
+def _chart(made: RobotMovement, name: str, values: Array, limits: tuple[float, float] | None, unit: str) -> str:
+    times = made.trajectory.times
+    kept = evenly_spaced(len(times), _POINTS)
+    low, high = (float(values.min()), float(values.max()))
+    if limits is not None:
+        low, high = min(low, limits[0]), max(high, limits[1])
+    scale = (HEIGHT - 2 * _EDGE) / max(high - low, 1e-9)
+    across = WIDTH / max(float(times[-1]), 1e-9)
+
+    def y(value: Array) -> Array:
+        return np.asarray(HEIGHT - _EDGE - scale * (value - low))
+
+    x, drawn = times[kept] * across, y(values[kept])
+    if limits is None:  # a value holds until the next one
+        x, drawn = np.repeat(x, 2)[1:], np.repeat(drawn, 2)[:-1]
+    line = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, drawn, strict=True))
+    lines = "" if limits is None else "".join(_level(float(y(np.asarray(limit)))) for limit in limits)
+    shown = "" if limits is None else f"limits {limits[0]:.3g} to {limits[1]:.3g} {unit}"
+    extent = f"from {values.min():.3g} to {values.max():.3g} {unit}".strip()
+    words = in_markup(f"{name} over time: {extent}{'; ' + shown if shown else ''}")
+    return (
+        f'<figure class="chart"><figcaption><span class="name">{in_markup(name)}</span> '
+        f'<output data-unit="{unit}"></output></figcaption>'
+        f'<svg viewBox="0 0 {WIDTH:g} {HEIGHT:g}" preserveAspectRatio="none" role="img" aria-label="{words}">'
+        f'<rect class="approach" width="{made.begins * across:.1f}" height="{HEIGHT:g}"/>{lines}'
+        f'<polyline class="joint" points="{line}"/><line class="cursor" y2="{HEIGHT:g}"/></svg>'
+        f'<p class="limits">{shown or "a discrete channel"}</p></figure>'
+    )
+
+
+def _level(y: float) -> str:
+    return f'<line class="limit" x2="{WIDTH:g}" y1="{y:.1f}" y2="{y:.1f}"/>'

@@ -10,14 +10,17 @@ from pathlib import Path
 import numpy as np
 
 from kineme.comparison.describe import N_POINTS
-from kineme.errors import SpecificationError
+from kineme.errors import KinemeError, SpecificationError
 from kineme.library.library import ActionLibrary
 from kineme.output.atomic import whole_file
 from kineme.output.text import counted, in_markup
-from kineme.studio.page.bundle import bundled
 from kineme.studio.snapshot.early import DRAWN
 from kineme.studio.snapshot.make import snapshot_of_library
 from kineme.studio.snapshot.snapshot import Snapshot
+
+_IMPORT = re.compile(r'^import \{([^}]*)\} from "(\.[^"]+)";\n', re.MULTILINE)
+_EXPORT = re.compile(r"^export (?=(?:async )?(?:function|const|class) (\w+))", re.MULTILINE)
+_LEFT = re.compile(r"^(?:import|export)\b", re.MULTILINE)
 
 _FOLDER = Path(__file__).parent
 _TOKENS = _FOLDER.parent / "web" / "tokens.css"
@@ -105,3 +108,29 @@ def summary_of(snapshot: Snapshot) -> str:
 
 def _hash(text: str) -> str:
     return f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'"
+
+
+def bundled(entry: Path) -> str:
+    """The module and those that it imports, each in a function of its own, in the order in which they need each other.
+
+    Understood are ``import { a, b } from "./file.js";`` and ``export`` before a function, class or constant.
+    """
+    done: dict[Path, str] = {}
+    parts = ['"use strict";']
+    _add(entry.resolve(), done, parts)
+    return "\n".join(parts) + "\n"
+
+
+def _add(path: Path, done: dict[Path, str], parts: list[str]) -> str:
+    """Append a module, after those that it imports; its name."""
+    if path in done:
+        return done[path]
+    done[path] = f"module{len(done)}"
+    text = path.read_text(encoding="utf-8")
+    needed = {source: _add((path.parent / source).resolve(), done, parts) for _, source in _IMPORT.findall(text)}
+    names = _EXPORT.findall(text)
+    body = _IMPORT.sub(lambda found: f"const {{{found[1]}}} = {needed[found[2]]};\n", _EXPORT.sub("", text))
+    if _LEFT.search(body):
+        raise KinemeError(f"expected only plain imports and exports in {path.name}")
+    parts.append(f"// {path.name}\nconst {done[path]} = (() => {{\n{body}return {{ {', '.join(names)} }};\n}})();")
+    return done[path]

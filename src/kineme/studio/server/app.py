@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import asyncio
+import hashlib
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from importlib.metadata import version
+from importlib.resources import files
+from importlib.resources.abc import Traversable
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import anyio.to_thread
 from fastapi import FastAPI
+from pydantic import BaseModel, Field
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from kineme.studio.server import (
     change_routes,
@@ -22,13 +28,76 @@ from kineme.studio.server import (
     rollout_routes,
 )
 from kineme.studio.server.access import Guard
-from kineme.studio.server.bodies import LimitedBodies
 from kineme.studio.server.changes import Changes, LooksAfterChanges
-from kineme.studio.server.description import ABOUT, REFUSALS, Described
 from kineme.studio.server.live_sources import Sources
-from kineme.studio.server.refusals import AnswersFailures, answer_errors
-from kineme.studio.server.static_files import StaticFiles
+from kineme.studio.server.refusals import AnswersFailures, answer_errors, refuse
 from kineme.studio.server.studio import Studio
+
+_KINDS = {
+    ".html": "text/html; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".svg": "image/svg+xml",
+    ".png": "image/png",
+    ".json": "application/json",
+    ".webmanifest": "application/manifest+json",
+    ".txt": "text/plain; charset=utf-8",
+}
+#: Folders of the package whose files are served, and under which path.
+_FOLDERS = {"": ("studio", "web"), "runtime/": ("studio", "javascript")}
+#: Files of other rooms: what draws an arm.
+_VENDORED = {
+    "vendor/scene.min.js": ("robots", "view", "vendor", "scene.min.js"),
+    "vendor/viewer.js": ("robots", "view", "page", "viewer.js"),
+}
+
+
+ABOUT = """An action library: what movements are, what they are called, and how they go on.
+
+Times are in seconds, positions in the unit of the library. Numbers that are not finite are null. The websocket
+`/api/live` takes movements while they happen, and tells of every change of the library.
+"""
+
+_STATUSES = (
+    "400: what is asked for makes no sense, 401: without the token, 403: for reading only, or from the page of another "
+    "site, 404: not there, 408: the request stopped arriving, 409: the library was changed meanwhile, 413: too large, "
+    "422: a field is wrong."
+)
+
+
+class Refusal(BaseModel):
+    """Why nothing was done."""
+
+    error: str = Field(description="What was expected, what came, and what to do.")
+
+
+#: Of every route.
+REFUSALS: dict[int | str, dict[str, Any]] = {
+    "4XX": {"model": Refusal, "description": _STATUSES},
+    "5XX": {"model": Refusal, "description": "503: another process writes; try again. 500: the server failed."},
+}
+
+_TOKENS = {
+    "bearer": {"type": "http", "scheme": "bearer", "description": "The token in the address that the studio prints."},
+    "cookie": {"type": "apiKey", "in": "cookie", "name": "kineme_...", "description": "Set by `/?token=...`."},
+}
+
+
+class Described(FastAPI):
+    """An application whose description says that it wants a token."""
+
+    def openapi(self) -> dict[str, Any]:
+        """The description, made once."""
+        described = super().openapi()
+        described["components"]["securitySchemes"] = _TOKENS
+        described["security"] = [{name: []} for name in _TOKENS]
+        return described
+
+
+JSON_BYTES = 8 * 2**20
+FILE_BYTES = 256 * 2**20
+FILES = "/api/recordings"  # where files are sent to; anything else is JSON
+SILENCE = 20.0  # seconds without a byte
 
 _THREADS = 8  # requests that are worked on at once, beside movements under way
 
@@ -104,3 +173,127 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         with suppress(asyncio.CancelledError):
             await watching
         app.state.studio.close()
+
+
+class LimitedBodies:
+    """Refuse requests that are too large or stop arriving: 413 and 408, whatever their head says."""
+
+    def __init__(self, app: ASGIApp, silence: float = SILENCE) -> None:
+        self.app, self.silence = app, silence
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass a request on with a limited `receive`; what is refused there is answered here."""
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        body = _Body(receive, FILE_BYTES if scope["path"] == FILES else JSON_BYTES, self.silence)
+
+        async def unless_refused(message: Message) -> None:
+            if body.refused is None:
+                await send(message)
+
+        if not body.is_announced_too_large(scope):
+            with suppress(_RefusedError):
+                await self.app(scope, body, unless_refused)
+        if body.refused is not None:
+            await refuse(scope, send, *body.refused)
+
+
+class _RefusedError(Exception):
+    """Ends the work on a request, unless that catches everything."""
+
+
+class _Body:
+    def __init__(self, receive: Receive, most: int, silence: float) -> None:
+        self.receive, self.most, self.silence = receive, most, silence
+        self.got, self.whole = 0, False
+        self.refused: tuple[int, str] | None = None
+
+    async def __call__(self) -> Message:
+        if self.whole:  # what comes after the body is that the client has gone, whenever it does
+            return await self.receive()
+        try:
+            async with asyncio.timeout(self.silence):
+                message = await self.receive()
+        except TimeoutError:
+            self.refused = 408, f"expected the rest of the request, got nothing for {self.silence:g} s"
+            raise _RefusedError from None
+        self.got += len(message.get("body", b""))
+        self.whole = not message.get("more_body", False)
+        if self.got > self.most:
+            self._refuse_size()
+            raise _RefusedError
+        return message
+
+    def is_announced_too_large(self, scope: Scope) -> bool:
+        """Whether the head of the request says so."""
+        length = dict(scope["headers"]).get(b"content-length", b"0")
+        if length.isdigit() and int(length[:20]) > self.most:
+            self._refuse_size()
+        return self.refused is not None
+
+    def _refuse_size(self) -> None:
+        self.refused = 413, f"expected at most {self.most // 2**20} MB, got more; send less at once"
+
+
+class StaticFile(NamedTuple):
+    """What is sent of a file: its bytes, its kind, and a tag that is another one when they are."""
+
+    body: bytes
+    kind: bytes
+    tag: bytes
+
+
+class StaticFiles:
+    """Answer for the files of the page at once, and pass everything else on.
+
+    The page is made of some fifty modules. Answering for them before routes are searched, and without a thread for
+    each, is a large part of a short first view.
+    """
+
+    def __init__(self, app: ASGIApp) -> None:
+        self.app, self.files = app, static_files()
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Send a file, or only that it is the one that the browser has."""
+        file = self.files.get(scope["path"]) if scope["type"] == "http" else None
+        if file is None or scope["method"] not in {"GET", "HEAD"}:
+            await self.app(scope, receive, send)
+            return
+        same = dict(scope["headers"]).get(b"if-none-match") == file.tag
+        headers = [(b"etag", file.tag)]
+        if not same:
+            headers += [(b"content-type", file.kind), (b"content-length", b"%d" % len(file.body))]
+        await send({"type": "http.response.start", "status": 304 if same else 200, "headers": headers})
+        await send({"type": "http.response.body", "body": b"" if same or scope["method"] == "HEAD" else file.body})
+
+
+def static_files() -> dict[str, StaticFile]:
+    """All files by their path; ``/`` is the page."""
+    package = files("kineme")
+    found: dict[str, Traversable] = {}
+    for path, folder in _FOLDERS.items():
+        found |= _below(package.joinpath(*folder), path)
+    found |= {path: package.joinpath(*where) for path, where in _VENDORED.items()}
+    found[""] = found["index.html"]
+    return {f"/{path}": _read(file) for path, file in found.items()}
+
+
+def _below(folder: Traversable, path: str) -> dict[str, Traversable]:
+    found: dict[str, Traversable] = {}
+    for one in folder.iterdir():
+        if one.is_dir():
+            found |= _below(one, f"{path}{one.name}/")
+        elif _ending(one.name) in _KINDS:
+            found[path + one.name] = one
+    return found
+
+
+def _ending(name: str) -> str:
+    return f".{name.rpartition('.')[2]}"
+
+
+def _read(file: Traversable) -> StaticFile:
+    body = file.read_bytes()
+    tag = f'"{hashlib.sha256(body).hexdigest()[:20]}"'
+    return StaticFile(body, _KINDS[_ending(file.name)].encode(), tag.encode())

@@ -5,12 +5,24 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query
+from pydantic import Field
 
 from kineme.errors import SpecificationError
 from kineme.library.storage import changes
-from kineme.studio.server.change_records import Assign, Back, Chosen, Describe, Merge, NewMovement, Rename, Split
 from kineme.studio.server.plain import trajectory
-from kineme.studio.server.records import VERSION, Learned, SymbolKey, Version
+from kineme.studio.server.records import (
+    VERSION,
+    Change,
+    Description,
+    Ids,
+    Learned,
+    Name,
+    Point,
+    SymbolKey,
+    Text,
+    Times,
+    Version,
+)
 from kineme.studio.server.refusals import ConflictError
 from kineme.studio.server.studio import Writes
 
@@ -89,3 +101,57 @@ def undo(studio: Writes, asked: Back | None = None) -> dict[str, Any]:
         if expected is not None and studio.library.version != expected:
             raise ConflictError(str(error)) from None
         raise
+
+
+class NewMovement(Change):
+    """A movement to be stored."""
+
+    times: Times
+    positions: list[Point]
+    label: Name | None = Field(None, description="Name of its symbol, which is made if needed.")
+    group: Name | None = Field(None, description="Who showed it.")
+
+
+class Back(Change):
+    """Which version's state is wanted again; by default that before the last change."""
+
+    to: int | None = Field(None, ge=0)
+
+
+class Rename(Change):
+    """A new name of a symbol."""
+
+    name: Name
+
+
+class Describe(Change):
+    """A description of a symbol."""
+
+    text: Description
+
+
+class Split(Change):
+    """Members of a symbol that become a new one."""
+
+    ids: Ids
+    name: Name
+
+
+class Merge(Change):
+    """Symbols that become one."""
+
+    ids: list[Text] = Field(min_length=1, max_length=10_000)
+    into: Name
+
+
+class Assign(Change):
+    """Movements, and the symbol that they belong to from now on; none if null."""
+
+    ids: Ids
+    symbol: Name | None
+
+
+class Chosen(Change):
+    """Movements."""
+
+    ids: Ids

@@ -7,15 +7,41 @@ from typing import Any
 
 import numpy as np
 from fastapi import APIRouter
+from pydantic import BaseModel
 
 from kineme.anchoring.proposals.proposals import Proposal
 from kineme.library.storage import read
 from kineme.library.symbols import proposals as stored
 from kineme.studio.server.plain import numbers, thumbnail
-from kineme.studio.server.proposal_records import Named, ProposalsOut
-from kineme.studio.server.records import AsOf, ProposalKey, Version
+from kineme.studio.server.records import AsOf, Change, Description, Name, Points, ProposalKey, Version
 from kineme.studio.server.refusals import ConflictError
 from kineme.studio.server.studio import Reads, Studio, Writes
+
+
+class Named(Change):
+    """A name for a proposal."""
+
+    name: Name
+    description: Description | None = None
+
+
+class ProposalOut(BaseModel):
+    """Alike movements without a name."""
+
+    id: str
+    members: list[int]
+    medoid: int
+    cohesion: float
+    stability: float | None
+    path: Points
+
+
+class ProposalsOut(BaseModel):
+    """The largest first."""
+
+    proposals: list[ProposalOut]
+    left_over: int
+
 
 router = APIRouter(prefix="/api/proposals", tags=["proposals"])
 

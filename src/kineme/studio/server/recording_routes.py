@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import numpy as np
 from fastapi import APIRouter, Header, Request
+from pydantic import BaseModel, Field
 
 from kineme.errors import SpecificationError
 from kineme.files.annotations.label_table import LabelRow
@@ -20,20 +21,102 @@ from kineme.movements.channels.channel import recorded_names
 from kineme.movements.trajectories.movements import axis_names
 from kineme.sampling import evenly_spaced
 from kineme.studio.server.plain import numbers
-from kineme.studio.server.recording_records import (
-    ChannelsAsked,
-    LearnSpans,
-    SearchedOut,
-    Span,
-    SpottedOut,
-    Spotting,
-    UploadOut,
-)
-from kineme.studio.server.records import Learned, RecordingKey
+from kineme.studio.server.records import Change, ChannelOut, Learned, Name, Number, RecordingKey, Sent, Text
 from kineme.studio.server.studio import Reads, Studio, Writes
 from kineme.studio.server.studio_words import in_studio_words
 from kineme.studio.server.uploads import go_on
 from kineme.studio.server.work import Work, while_wanted
+
+
+class ChannelsAsked(Change):
+    """Which table of a recording, and which of its columns; by default the first, and those that are found."""
+
+    table: Text | None = None
+    channels: list[Text] | None = Field(None, max_length=1000)
+
+
+class Spotting(ChannelsAsked):
+    """What to look for."""
+
+    error_rate: Number = Field(0.05, gt=0, lt=1)
+
+
+class Span(Sent):
+    """A stretch of a recording, in seconds since its first sample, and what it shows."""
+
+    begin: Number
+    end: Number
+    label: Name | None = None
+
+
+class LearnSpans(ChannelsAsked):
+    """Stretches of one table to be learned; without them all tables of the file, by the labels that it gives them."""
+
+    spans: list[Span] | None = Field(None, min_length=1, max_length=100_000)
+
+
+class ColumnOut(BaseModel):
+    """Values of one column."""
+
+    name: str
+    values: list[float | None]
+
+
+class PlotOut(BaseModel):
+    """Columns over time, at most 1,000 samples of each."""
+
+    times: list[float]
+    columns: list[ColumnOut]
+
+
+class TableOut(BaseModel):
+    """One recording of a file."""
+
+    name: str
+    channels: list[ChannelOut]
+    duration: float
+    rate: float | None
+    n_samples: int
+    label: str | None = Field(description="What the file says that it shows.")
+
+
+class UploadOut(BaseModel):
+    """What a file holds."""
+
+    recording: str
+    tables: list[TableOut]
+    problems: list[str]
+    plots: list[PlotOut] = Field(description="One of each table.")
+
+
+class SpannedOut(BaseModel):
+    """A stretch of motion, and what it shows; null is unknown."""
+
+    begin: float
+    end: float
+    label: str | None
+    p: float | None
+
+
+class RestOut(BaseModel):
+    """A stretch without motion."""
+
+    begin: float
+    end: float
+
+
+class SpottedOut(BaseModel):
+    """What happens when."""
+
+    spans: list[SpannedOut]
+    rests: list[RestOut]
+
+
+class SearchedOut(BaseModel):
+    """How much of a recording is searched, from 0 to 1; null where nothing is searched."""
+
+    share: float | None
+
 
 router = APIRouter(prefix="/api/recordings", tags=["recordings"])
 

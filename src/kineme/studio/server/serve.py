@@ -1,4 +1,8 @@
-"""Run the studio until it is stopped."""
+"""Run the studio until it is stopped.
+
+Whoever opens a connection needs no token before the head of a request is there. Without limits a few hundred heads that
+never end take every file descriptor, and each connection that then cannot be accepted is logged.
+"""
 
 from __future__ import annotations
 
@@ -10,16 +14,27 @@ import os
 import secrets
 import signal
 import socket
+import time
 from collections.abc import Callable
 from contextlib import closing, suppress
 from pathlib import Path
 from threading import Timer
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
 from kineme.errors import DataError, SpecificationError
 
 if TYPE_CHECKING:
     from kineme.studio.server.studio import Studio
+
+
+HEAD_SECONDS = 10.0  # that the head of a request may take
+BACKLOG = 64  # connections that wait to be accepted: as many are accepted at once
+_MOST, _LEAST = 512, 8  # connections that are open at once
+_SHARE = 4  # a connection for so many file descriptors: the library, uploads and new connections take some
+_AGAIN = 60.0  # seconds after which the same error is logged again
+_KEPT = 100  # errors that are known as logged
 
 LOOPBACK = "127.0.0.1"
 PORT = 8420  # unless it is taken
@@ -60,7 +75,6 @@ def serve(options: Options, ready: Callable[[str, str], object]) -> None:
             f"expected the packages of the studio ({error}); install them with: pip install 'kineme[studio]'"
         ) from error
     from kineme.studio.server.access import own_names
-    from kineme.studio.server.connections import log_errors_once
 
     log_errors_once()
     token, once = _token(), secrets.token_urlsafe(24)
@@ -78,8 +92,6 @@ def serve(options: Options, ready: Callable[[str, str], object]) -> None:
 def config_of(app: Any) -> Any:
     """How uvicorn serves the application: quietly, with limits, without trust in headers of proxies."""
     import uvicorn
-
-    from kineme.studio.server.connections import BACKLOG, LimitedConnection
 
     return uvicorn.Config(
         app,
@@ -183,3 +195,86 @@ def _name(host: str) -> str:
     if host in {"0.0.0.0", "::"}:
         return socket.gethostname()
     return f"[{host}]" if ":" in host else host
+
+
+def most_connections() -> int:
+    """Return how many connections may be open at once, by the limit on file descriptors of this process."""
+    with suppress(ImportError, OSError):  # Windows has no such limit
+        import resource
+
+        descriptors = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
+        if descriptors != resource.RLIM_INFINITY:
+            return max(_LEAST, min(_MOST, descriptors // _SHARE))
+    return _MOST
+
+
+class LimitedConnection(H11Protocol):
+    """A connection that is closed if the head of a request takes too long, or if others need its place.
+
+    Where there are too many, the one that has waited longest for a request is closed, so that whoever sends one at once
+    is answered, whatever others keep open. Requests under way and websockets are never closed.
+    """
+
+    _timer: asyncio.TimerHandle | None = None
+    _since = 0.0
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether no request is under way: its head is not there, or it has been answered."""
+        return self.cycle is None or self.cycle.response_complete
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """Take the place of the connection that has waited longest where there are too many."""
+        super().connection_made(transport)
+        self._await_head()
+        connections: Any = self.connections
+        alive = [one for one in connections if not one.transport.is_closing()]
+        if len(alive) > most_connections():
+            waiting = [one for one in alive if isinstance(one, LimitedConnection) and one.is_waiting]
+            min(waiting, key=lambda one: one._since).transport.abort()  # itself where all others work
+
+    def data_received(self, data: bytes) -> None:
+        """Limit the time from the first byte of a head to its last."""
+        if self._timer is None and self.is_waiting:
+            self._await_head()
+        super().data_received(data)
+        if not self.is_waiting or self not in self.connections:  # a websocket has taken over
+            self._forget_head()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """End the limit."""
+        self._forget_head()
+        super().connection_lost(exc)
+
+    def _await_head(self) -> None:
+        self._since = self.loop.time()
+        self._timer = self.loop.call_later(HEAD_SECONDS, self.transport.abort)
+
+    def _forget_head(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+
+class OncePerInterval(logging.Filter):
+    """A filter that logs the same error once a minute, however often it occurs."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._logged: dict[str, float] = {}
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """Whether the first line of a message has not been logged lately."""
+        now, line = time.monotonic(), record.getMessage().partition("\n")[0]
+        if now - self._logged.get(line, -_AGAIN) < _AGAIN:
+            return False
+        if len(self._logged) >= _KEPT:
+            self._logged.clear()
+        self._logged[line] = now
+        return True
+
+
+def log_errors_once() -> None:
+    """Limit what the event loop and the server log."""
+    for name in ("asyncio", "uvicorn.error"):
+        logging.getLogger(name).addFilter(OncePerInterval())
