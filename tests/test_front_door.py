@@ -13,7 +13,7 @@ from types import ModuleType
 import pytest
 
 import kineme
-from kineme._lazy import lazy_names, names_in
+from kineme._lazy import names_in
 
 STUBS = sorted(Path(kineme.__file__).parent.rglob("*.pyi"))
 MODULES = [
@@ -73,13 +73,6 @@ def test_an_unknown_name_is_refused_with_the_known_ones():
         _ = kineme.kernels.rfb
     assert not hasattr(kineme, "__wrapped__")
     assert not hasattr(kineme, "no.such")
-
-
-def test_a_former_name_warns_and_leads_to_the_name_of_today(monkeypatch):
-    load, listed, names = lazy_names("kineme.datasets", {"load_handwriting": "load_lasa"})
-    with pytest.warns(DeprecationWarning, match=r"kineme.datasets.load_handwriting is now kineme.datasets.load_lasa"):
-        assert load("load_handwriting") is kineme.load_lasa
-    assert "load_handwriting" not in {*listed(), *names}
 
 
 def _loaded_by(statement):

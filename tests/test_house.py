@@ -103,9 +103,9 @@ _BRITISH = re.compile(  # each alternative begins with a letter: such a search i
 
 
 def test_warnings_are_given_in_one_way():
-    """By `kineme.errors.warn`, which `heard_warnings` hears; `_lazy` lies below it."""
+    """By `kineme.errors.warn`, which `heard_warnings` hears."""
     given = {path.name for path in SOURCES if re.search(r"\bwarnings(\.| import )warn\b", path.read_text())}
-    assert given == {"errors.py", "_lazy.py"}
+    assert given == {"errors.py"}
 
 
 def test_spelling_is_american():

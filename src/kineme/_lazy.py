@@ -7,7 +7,7 @@ order of the flow. Type checkers and editors read it; so do `lazy_names` and `do
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from importlib import import_module
 
 
@@ -17,17 +17,13 @@ def names_in(stub: str) -> dict[str, tuple[str, str]]:
     return {words[5]: (words[1], words[3]) for words in lines}
 
 
-def lazy_names(
-    module: str, renamed: Mapping[str, str] | None = None
-) -> tuple[Callable[[str], object], Callable[[], list[str]], list[str]]:
+def lazy_names(module: str) -> tuple[Callable[[str], object], Callable[[], list[str]], list[str]]:
     """What a module assigns to ``__getattr__, __dir__, __all__`` so that it has the names of its stub.
 
     Parameters
     ----------
     module : str
         Its ``__name__``.
-    renamed : dict, optional
-        Former name -> name of today, which former one stands for with a `DeprecationWarning`.
 
     Raises
     ------
@@ -35,14 +31,8 @@ def lazy_names(
         There is no stub beside the module: whoever packaged the installed files left it out.
     """
     names = names_in(_stub_of(module))
-    former = dict(renamed or {})
 
     def load(name: str) -> object:
-        if name in former:
-            from warnings import warn
-
-            warn(f"{module}.{name} is now {module}.{former[name]}", DeprecationWarning, stacklevel=2)
-            return getattr(sys.modules[module], former[name])
         if name in names:
             home, there = names[name]
             value = import_module(f"{home}.{there}") if home == module else getattr(import_module(home), there)

@@ -69,13 +69,6 @@ def test_any_name_is_data(folder):
     assert sorted(path.name for path in folder.parent.iterdir()) == [folder.name]
 
 
-def test_the_former_command_works_and_is_not_listed(folder):
-    done = start("library", "describe", "NShape", "like an N", "-l", folder, "--json")
-    assert json.loads(done.stdout)["description"] == "like an N"
-    assert "deprecated" in done.stderr
-    assert "  describe " not in start("library", "--help").stdout
-
-
 def test_annotate_merge_delete_and_history(folder):
     assert answer("library", "annotate", "CShape", "open, like a C", "-l", folder)["description"] == "open, like a C"
     merged = answer("library", "merge", "CShape", "GShape", "--into", "round", "-l", folder)

@@ -73,16 +73,6 @@ def test_every_field_of_the_specification_is_a_parameter(demos):
     }  # fmt: skip
 
 
-def test_keywords_of_earlier_versions_are_understood(demos):
-    old = {"fit_to" if name == "fit" else name: value for name, value in CHOICES.items()}
-    with pytest.warns(DeprecationWarning, match=r"fit_to.* of DMPFeatures .*write DMPFeatures\(dmp=kineme.DMP\(.*fit="):
-        assert DMPFeatures(**old).fit(demos).dmp_ == DMP(**CHOICES)
-    with pytest.warns(DeprecationWarning, match="dmp__n_basis in set_params and searches"):
-        assert DMPFeatures(dmp=DMP("original")).set_params(n_basis=7).dmp == DMP("original", 7)
-    with pytest.warns(DeprecationWarning, match="formulation of DMPFeatures"):
-        assert DMPFeatures("weights", "original").dmp == DMP("original")
-
-
 def test_setting_a_field_leaves_the_specification_that_was_given():
     dmp = DMP("original")
     first, second = DMPFeatures(dmp=dmp), DMPFeatures(dmp=dmp)

@@ -56,9 +56,8 @@ def test_parameters_are_passed_on_and_cloned(demos):
     assert clone(RhythmicFeatures(dmp=RhythmicDMP(**choices))).fit(demos).dmp_ == RhythmicDMP(**choices)
     nested = {f"dmp__{name}": value for name, value in choices.items()}
     assert clone(RhythmicFeatures().set_params(**nested)).fit(demos).dmp_ == RhythmicDMP(**choices)
-    choices["fit_to"] = choices.pop("fit")  # as in earlier versions
-    with pytest.warns(DeprecationWarning, match=r"RhythmicFeatures\(dmp=kineme.RhythmicDMP"):
-        assert RhythmicFeatures(**choices).fit(demos).dmp_.fit == "forcing"
+    with pytest.raises(TypeError, match="no parameter 'period'; those of the primitive are set by"):
+        RhythmicFeatures(period=0.4)
 
 
 def test_other_dimensions_and_types(demos):

@@ -68,28 +68,6 @@ def test_a_good_cache_is_believed(tmp_path, monkeypatch, labels):
         assert _answers(library) == expected
 
 
-def test_a_cache_of_an_earlier_version_is_used_under_its_new_name(tmp_path, monkeypatch):
-    with ActionLibrary(tmp_path, create=True) as library:
-        library.learn(draw_movements(12, n_samples=12, labels=LABELS[0]))
-        expected = _expected(library)
-    former = (tmp_path / CODES).rename(tmp_path / "codes.cache")
-    stale = former.read_bytes()
-    with monkeypatch.context() as patch:
-        patch.setattr(features_cache, "_write", None)
-        with ActionLibrary(tmp_path, read_only=True) as library:
-            assert features_cache._load(library.store, features_cache._path(library.store)) is not None
-            assert _answers(library) == expected
-        assert former.exists()
-        with ActionLibrary(tmp_path) as library:
-            assert _answers(library) == expected
-    assert not former.exists()
-    assert (tmp_path / CODES).read_bytes() == stale
-    former.write_bytes(stale[:100])
-    with ActionLibrary(tmp_path) as library:
-        assert _answers(library) == expected
-    assert not former.exists(), "beside a newer one it is of no use"
-
-
 def test_a_cache_of_other_members_is_not_believed_however_many_they_are(tmp_path):
     """Two movements change places: names and sizes of symbols stay."""
     with ActionLibrary(tmp_path, create=True) as library:

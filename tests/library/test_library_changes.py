@@ -178,18 +178,6 @@ def test_merging_and_splitting_record_where_symbols_come_from(library):
     assert len(library["bow"]) == 7
 
 
-def test_annotations_were_called_descriptions(library):
-    with pytest.warns(DeprecationWarning, match=r"ActionLibrary\.describe is now ActionLibrary\.annotate"):
-        library.describe("wave", "with the hand", threshold=0.5)
-    assert (library["wave"].description, library["wave"].threshold) == ("with the hand", 0.5)
-
-
-def test_proposals_by_position_were_called_found(library):
-    proposals = library.propose(ids=library.ids())
-    with pytest.warns(DeprecationWarning, match=r"LibraryProposals\.found is now LibraryProposals\.by_position"):
-        assert proposals.found is proposals.by_position
-
-
 def test_a_prototype_that_leaves_is_no_prototype_any_more(library):
     first = int(library["wave"].members[0])
     library.annotate("wave", "with the hand", prototype=first, threshold=0.5)

@@ -195,13 +195,6 @@ def test_a_batch_shows_itself_in_one_line(kind):
 
 
 @every_kind
-def test_the_former_name_join_still_works(kind):
-    whole = KINDS[kind]()
-    with pytest.warns(DeprecationWarning, match="join is deprecated: use concatenate"):
-        assert len(type(whole).join([whole, whole])) == 6
-
-
-@every_kind
 def test_a_primitive_is_a_batch_of_one(kind):
     whole = KINDS[kind]()
     assert [len(one) for one in whole] == [1, 1, 1]

@@ -98,15 +98,6 @@ def test_a_search_over_parameters_finds_the_rotation():
     assert search.fit(demos, demos.labels).best_score_ > 0.9
 
 
-def test_old_names_still_work_and_name_the_new_ones():
-    demos = draw_shapes([2, 2])
-    recognizer = Recognizer().fit(demos)
-    with pytest.warns(DeprecationWarning, match=r"looks\(\) is now Recognizer\.representations_"):
-        assert recognizer.looks() == recognizer.representations_
-    with pytest.warns(DeprecationWarning, match=r"look_at is now Recognizer\.describe"):
-        assert len(recognizer.look_at(demos)) == len(recognizer.describe(demos)) == 4
-
-
 def test_a_fit_that_is_refused_leaves_the_last_one_whole():
     demos = draw_shapes([4, 4])
     recognizer = Recognizer(classifier="svm").fit(demos)

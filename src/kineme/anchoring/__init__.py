@@ -2,6 +2,4 @@
 
 from kineme._lazy import lazy_names as _lazy_names
 
-_RENAMED = {"Placement": "Assignment", "place": "assign", "see": "describe", "see_rows": "describe_rows"}
-
-__getattr__, __dir__, __all__ = _lazy_names(__name__, _RENAMED)
+__getattr__, __dir__, __all__ = _lazy_names(__name__)

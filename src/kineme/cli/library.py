@@ -103,12 +103,6 @@ def annotate(symbol: str, text: str, folder: Path, as_json: bool) -> None:
     say(as_json, data, lambda: f"{printable(data['name'])}: {printable(text)}")
 
 
-library.add_command(
-    click.Command("describe", params=annotate.params, callback=annotate.callback, help="Use annotate.", hidden=True,
-                  deprecated=True)
-)  # fmt: skip
-
-
 @library.command(short_help="Delete a symbol or movements; earlier versions keep them.")
 @click.argument("symbol", type=SymbolName(), required=False)
 @click.option("--movement", "movements", type=ID, multiple=True, help="Delete this movement; may be repeated.")

@@ -36,8 +36,8 @@ class ComparisonSpecification:
     mean : {"arithmetic", "geometric", "harmonic", "quadratic", "min"}, default "arithmetic"
         The A-average over representations.
     prior : RotationPrior or None
-        How rare rotations are, in two and three dimensions, if there is no `max_angle`. None is the default of earlier
-        versions, a limit of pi/3.
+        How rare rotations are, in two and three dimensions, if there is no `max_angle`. None is a limit
+        of pi/3.
 
     Raises
     ------

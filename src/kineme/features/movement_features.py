@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.utils.validation import check_is_fitted
 
-from kineme.errors import SpecificationError, TrajectoryError, warn
+from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import axis_names
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.primitives.discrete.dmp import DMP, Primitives
-from kineme.primitives.discrete.formulations import FORMULATIONS
 from kineme.primitives.rhythmic.rhythmic_dmp import RhythmicDMP, RhythmicPrimitives
 from kineme.validation import check_choice, check_count
 
@@ -27,8 +26,6 @@ FEATURES: dict[str, Callable[[Primitives | RhythmicPrimitives, int], NDArray[Any
     "weights": lambda primitives, _: primitives.weights,
 }
 _NESTED = "dmp__"
-#: Keywords of earlier versions that have another name in the specification; all other fields kept theirs.
-_RENAMED = {"fit_to": "fit"}
 
 Specification = TypeVar("Specification", DMP, RhythmicDMP)
 
@@ -63,12 +60,13 @@ class MovementFeatures(TransformerMixin, BaseEstimator, Generic[Specification]):
         self.dmp: Specification | None = dmp
         self.n_samples = n_samples
         self.dtype = dtype
-        if isinstance(dmp, str) and dmp in FORMULATIONS:  # the second parameter of earlier versions
-            self.dmp, fields_of_dmp = None, {"formulation": dmp} | fields_of_dmp
         if fields_of_dmp:
             nested, unknown = self._nested(fields_of_dmp)
             if unknown:
-                raise TypeError(f"{type(self).__name__} has no parameter {', '.join(map(repr, unknown))}")
+                raise TypeError(
+                    f"{type(self).__name__} has no parameter {', '.join(map(repr, unknown))}; those of the primitive "
+                    f"are set by dmp=kineme.{self._specification_type.__name__}(...), or as {_NESTED}n_basis"
+                )
             self.dmp = replace(self._specification(), **nested)
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:
@@ -140,30 +138,11 @@ class MovementFeatures(TransformerMixin, BaseEstimator, Generic[Specification]):
     def _nested(self, parameters: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
         """Split into fields of the specification, by their names there, and all other parameters."""
         names = [field.name for field in fields(self._specification_type)]
-        nested: dict[str, Any] = {}
-        others: dict[str, Any] = {}
-        old: list[str] = []
-        for name, value in parameters.items():
-            field_name = _RENAMED.get(name, name)
-            if name.startswith(_NESTED):
-                nested[name.removeprefix(_NESTED)] = value
-            elif field_name in names and name != "fit":
-                nested[field_name] = value
-                old.append(name)
-            else:
-                others[name] = value
+        nested = {key.removeprefix(_NESTED): value for key, value in parameters.items() if key.startswith(_NESTED)}
+        others = {key: value for key, value in parameters.items() if not key.startswith(_NESTED)}
         if unknown := [name for name in nested if name not in names]:
             raise ValueError(
                 f"{self._specification_type.__name__} has no parameter {', '.join(map(repr, unknown))}; it has {names}"
-            )
-        if old:
-            this, fields_of_dmp = type(self).__name__, [_RENAMED.get(name, name) for name in old]
-            made = f"kineme.{self._specification_type.__name__}({', '.join(f'{name}=...' for name in fields_of_dmp)})"
-            warn(
-                f"{', '.join(old)} of {this} moved to its dmp: write {this}(dmp={made}), and "
-                f"{_NESTED}{fields_of_dmp[0]} in set_params and searches",
-                DeprecationWarning,
-                stacklevel=3,
             )
         return nested, others
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Self, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kineme.errors import SpecificationError, warn
+from kineme.errors import SpecificationError
 from kineme.library.storage import changes, export_import, read, symbols, undo, verify
 from kineme.library.storage.folder import FILE, as_folder
 from kineme.library.storage.read import Ids
@@ -383,11 +383,6 @@ class ActionLibrary:
     def annotate(self, who: str, text: str | None = None, **values: Any) -> None:
         """Set the description of a symbol, its ``prototype`` (id of a movement) or ``threshold``; None clears these."""
         changes.annotate(self.store, who, **({} if text is None else {"description": text}), **values)
-
-    def describe(self, who: str, text: str | None = None, **values: Any) -> None:
-        """Deprecated name of `annotate`."""
-        warn("ActionLibrary.describe is now ActionLibrary.annotate", DeprecationWarning, stacklevel=2)
-        self.annotate(who, text, **values)
 
     def delete(self, what: str | ArrayLike) -> None:
         """Delete a symbol, given by name or id, whose movements stay; or movements, given by their ids.

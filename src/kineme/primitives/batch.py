@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.errors import SpecificationError, TrajectoryError, warn
+from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.channels.alike import check_alike
 from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.indexing import as_indices
@@ -171,12 +171,6 @@ class Batch:
         from kineme.primitives.persistence import load_as
 
         return load_as(cls.KIND, path, cls._from_file)
-
-    @classmethod
-    def join(cls, batches: Iterable[Self]) -> Self:
-        """Deprecated name of `concatenate`."""
-        warn("join is deprecated: use concatenate", DeprecationWarning, stacklevel=2)
-        return cls.concatenate(batches)
 
     def _row(self, name: str) -> NDArray[Any]:
         """The array of that name in `ROWS`."""

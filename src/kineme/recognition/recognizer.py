@@ -20,7 +20,6 @@ from kineme.comparison.references import References
 from kineme.comparison.representation import Representation, default_representations
 from kineme.comparison.scores import Compared, Score, best_classes, nearest, score
 from kineme.comparison.specification import ComparisonSpecification
-from kineme.errors import warn
 from kineme.kernels.soft_rotation import RotationPrior
 from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
@@ -73,7 +72,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         `max_angle`: one or the other can be given. By default a rotation by a right angle costs 0.06 of the inner
         product of two equal paths in the plane and 0.2 in space, and none is forbidden. Pass
         ``RotationPrior(vertical=(0, 0, 1))`` for movements that are turned about the vertical, and rarely tilted. None
-        is the default of earlier versions, ``max_angle=pi/3``.
+        forbids rotations beyond pi/3 and costs nothing below.
 
     Attributes
     ----------
@@ -124,9 +123,6 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         self.classifier = classifier
         self.weights = weights
         self.rotation_prior = rotation_prior
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        super().__setstate__({"rotation_prior": None, **state})  # earlier versions had a limit alone
 
     @property
     def specification(self) -> ComparisonSpecification:
@@ -308,7 +304,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         """The calibration of the p-values; computed on first use, since it compares all demonstrations."""
         comparison, references = self._fitted
         made = self._calibration
-        if made is None or "exponent" not in vars(made):  # by an earlier version
+        if made is None:
             self._calibration = made = calibrate(comparison.similarity, references, vars(self).get("_groups"))
         return made
 
@@ -375,16 +371,6 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         beginnings = self._beginnings(early)
         # A copy: the answer at the end is that of this fit, also if the recognizer is fitted again meanwhile.
         return Live(comparison, references, beginnings, Decision(confidence, patience), copy(self).recognize)
-
-    def look_at(self, X: MovementsLike) -> Described:
-        """Deprecated name of `describe`."""
-        warn("Recognizer.look_at is now Recognizer.describe", DeprecationWarning, stacklevel=2)
-        return self.describe(X)
-
-    def looks(self) -> tuple[Representation, ...]:
-        """Deprecated name of `representations_`."""
-        warn("Recognizer.looks() is now Recognizer.representations_", DeprecationWarning, stacklevel=2)
-        return self.representations_
 
     @property
     def _fitted(self) -> tuple[Comparison, References]:

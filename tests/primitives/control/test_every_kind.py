@@ -314,14 +314,6 @@ def test_a_pose_says_where_it_is_and_how_it_is_turned():
     assert angle_between(state.orientation, TURN[0]) < 0.1
 
 
-def test_the_old_name_of_a_measured_pose_still_works():
-    one, other = pose().controller(0.01), pose().controller(0.01)
-    measured = one.state.position + np.eye(7)[0]
-    with pytest.warns(DeprecationWarning, match=r"pose= is deprecated: write step\(position=\.\.\.\)"):
-        state = one.step(pose=measured)
-    np.testing.assert_array_equal(state.position, other.step(measured).position)
-
-
 def test_a_controller_is_made_from_a_plan():
     with pytest.raises(SpecificationError, match=r"expected the plan of one movement, got Primitives; write prim"):
         Controller(discrete(), 0.01, Options())

@@ -203,22 +203,6 @@ def test_one_rhythm_at_a_time(learned):
         learned.controller(0.01)
 
 
-@pytest.mark.parametrize(
-    ("name", "told", "value"),
-    [("amplitude", "amplitude", 0.4), ("period", "period", 2.0), ("baseline", "goal", [3, -8])],
-)
-def test_what_was_set_between_steps_still_can_be(learned, name, told, value):
-    one, other = learned[0].controller(0.01), learned[0].controller(0.01)
-    one.step(), other.step()
-    with pytest.warns(DeprecationWarning, match=rf"setting it is deprecated: write step\({told}=\.\.\.\)"):
-        setattr(one, name, value)
-    np.testing.assert_array_equal(one.step().position, other.step(**{told: value}).position)
-    np.testing.assert_allclose(getattr(one, name), value)
-    wrong = pytest.raises(SpecificationError, match=r"expected .* got 'wide'")
-    with pytest.warns(DeprecationWarning, match="setting it is deprecated"), wrong:
-        setattr(one, name, "wide")
-
-
 def test_goal_is_another_name_of_the_baseline(learned):
     goal = learned[0].controller(0.01, goal=[3.0, -8.0]).step()
     np.testing.assert_array_equal(goal.position, learned[0].controller(0.01, baseline=[3.0, -8.0]).step().position)

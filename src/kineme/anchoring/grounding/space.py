@@ -19,7 +19,7 @@ from kineme.comparison.described import Described
 from kineme.comparison.similarity import averaged
 from kineme.comparison.specification import Compares
 from kineme.comparison.widths import median_distances
-from kineme.errors import SpecificationError, warn
+from kineme.errors import SpecificationError
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.validation import Array, check_count, check_number
 
@@ -96,11 +96,6 @@ class ConceptualSpace:
         if symbol not in self.symbols:
             raise SpecificationError(f"expected one of the symbols {list(self.symbols)}, got {symbol!r}")
         return self.symbols.index(symbol)
-
-    def place(self, symbol: Any) -> int:
-        """Deprecated name of `index`."""
-        warn("ConceptualSpace.place is now ConceptualSpace.index", DeprecationWarning, stacklevel=2)
-        return self.index(symbol)
 
 
 def conceptual_space(

@@ -27,7 +27,6 @@ from kineme.sampling import evenly_spaced
 from kineme.validation import Array
 
 FILE = "reduced_features.cache"
-_FORMER = "codes.cache"  # what earlier versions call it
 
 _FORMAT = 1
 _HEADER = 4096  # bytes; the arrays begin on a new page
@@ -54,7 +53,7 @@ class ReducedMovements:
 
 def open_cache(store: Store) -> ReducedMovements:
     """Reduced features of all movements that the library ever had: from the cache, and computed for those not in it."""
-    path = _path(store)
+    path = store.folder / FILE
     reduced = _load(store, path)
     known = int(reduced.ids[-1]) if reduced is not None else -1
     later = _ids_after(store, known)
@@ -69,21 +68,6 @@ def open_cache(store: Store) -> ReducedMovements:
     buffer = np.zeros(_HEADER + _layout(store, len(everything))[1], dtype=np.uint8)
     _fill(store, buffer, everything)
     return _arrays_in(store, buffer, len(everything))
-
-
-def _path(store: Store) -> Path:
-    """Where the cache is; one that an earlier version wrote is renamed, or removed beside a newer one."""
-    path, former = store.folder / FILE, store.folder / _FORMER
-    if not former.is_file() or former.is_symlink():
-        return path
-    if store.read_only:
-        return path if path.exists() else former
-    with suppress(OSError):  # no permission: it stays, and is written anew under its name of today
-        if path.exists():
-            former.unlink()
-        else:
-            former.rename(path)
-    return path
 
 
 def extended(store: Store, reduced: ReducedMovements, later: Ids) -> ReducedMovements:

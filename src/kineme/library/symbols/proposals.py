@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,13 +12,12 @@ from kineme.anchoring.proposals.assign import assign_described
 from kineme.anchoring.proposals.proposals import Proposal, Proposals
 from kineme.anchoring.proposals.propose import DEFAULT_METHOD
 from kineme.anchoring.proposals.propose import propose as propose_clusters
-from kineme.errors import SpecificationError, warn
+from kineme.errors import SpecificationError
 from kineme.library.recognition.members import described, groups_of
 from kineme.library.storage import changes, read
 from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store, history
 from kineme.library.symbols.recognized import Recognized, known_symbols
-from kineme.movements.trajectories.demonstrations import Demonstrations
 
 _SAME = 0.8  # share of members in a rejected proposal from which on a proposal counts as the same
 
@@ -55,18 +53,6 @@ class LibraryProposals:
     def left_over(self) -> Ids:
         """Movements in no proposal."""
         return self.ids[self.by_position.left_over]
-
-    def movements(self, library: Any) -> Demonstrations:
-        """Deprecated: ``library.movements(ids=proposals.ids)``."""
-        warn("LibraryProposals.movements is now library.movements(ids=proposals.ids)", DeprecationWarning, stacklevel=2)
-        movements: Demonstrations = library.movements(ids=self.ids)
-        return movements
-
-    @property
-    def found(self) -> Proposals:
-        """Deprecated name of `by_position`."""
-        warn("LibraryProposals.found is now LibraryProposals.by_position", DeprecationWarning, stacklevel=2)
-        return self.by_position
 
     def __repr__(self) -> str:
         clusters = "1 cluster" if len(self) == 1 else f"{len(self)} clusters"

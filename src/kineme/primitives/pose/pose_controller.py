@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kineme.errors import warn
 from kineme.movements.rotations.one_rotation import exp_one, log_one
 from kineme.movements.rotations.quaternions import conjugate, product_components
 from kineme.primitives.control import inputs
@@ -83,7 +82,6 @@ class PoseController(Controller):
         goal_velocity: ArrayLike | None = None,
         obstacle_velocities: ArrayLike | None = None,
         dt: float | None = None,
-        pose: ArrayLike | None = None,
     ) -> PoseState:
         """Move on by dt. Never raises: what cannot be used is left out, and the status says so.
 
@@ -101,16 +99,11 @@ class PoseController(Controller):
             Points that the position steers around; orientations without a position have none.
         tempo, dt : float, optional
             See `Controller.step`.
-        pose : optional
-            Deprecated name of `position`.
 
         Returns
         -------
         PoseState
         """
-        if pose is not None:
-            warn("pose= is deprecated: write step(position=...)", DeprecationWarning, stacklevel=2)
-            position = pose
         self._events = Status(0)
         self._step(position, velocity, (goal, goal_velocity), tempo, coupling, (obstacles, obstacle_velocities), dt)
         return self.state

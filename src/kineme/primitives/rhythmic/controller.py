@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kineme.errors import SpecificationError, warn
 from kineme.primitives.control import inputs
 from kineme.primitives.control.controller import Controller
 from kineme.primitives.control.moving_goal import FilteredValue
@@ -102,38 +100,18 @@ class RhythmicController(Controller):
 
     @property
     def amplitude(self) -> float:
-        """The amplitude in force; setting it is deprecated, pass it to `step`."""
+        """The amplitude in force; `step` changes it."""
         return self.state.amplitude
-
-    @amplitude.setter
-    def amplitude(self, value: float) -> None:
-        self._set_now("amplitude", self._set_amplitude, value)
 
     @property
     def period(self) -> float:
-        """The period in force [s]; setting it is deprecated, pass it to `step`."""
+        """The period in force [s]; `step` changes it."""
         return self.state.period
-
-    @period.setter
-    def period(self, value: float) -> None:
-        self._set_now("period", self._set_period, value)
 
     @property
     def baseline(self) -> Array:
-        """The baseline in force; setting it is deprecated, pass it to `step` as the goal."""
+        """The baseline in force; `step` changes it, as the goal."""
         return self.state.goal.copy()
-
-    @baseline.setter
-    def baseline(self, value: ArrayLike) -> None:
-        self._set_now("goal", self._aim, value)
-
-    def _set_now(self, name: str, change: Callable[[Any], None], value: Any) -> None:
-        """Change something between two steps, as a former version allowed it."""
-        warn(f"setting it is deprecated: write step({name}=...)", DeprecationWarning, stacklevel=3)
-        self._events = Status(0)
-        change(value)
-        if self._events:
-            raise SpecificationError(f"{' '.join(self._events.messages)}; got {value!r}")
 
     def _set_amplitude(self, amplitude: Any) -> None:
         gain = np.array([inputs.number(amplitude) / self._learned_amplitude])
