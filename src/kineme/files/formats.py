@@ -21,7 +21,7 @@ from kineme.files.motion_capture.bvh import read_bvh_table
 from kineme.files.motion_capture.c3d import read_c3d_table
 from kineme.files.motion_capture.mvnx import read_mvnx_table
 from kineme.files.ros.bag_contents import bag_contents
-from kineme.files.ros.check_records import check_records
+from kineme.files.ros.bags import check_records
 from kineme.files.ros.read_bag import read_bag
 from kineme.files.rows import row_movements, series_movements
 from kineme.files.tables.parquet import read_parquet_table

@@ -14,7 +14,6 @@ from typing import NamedTuple
 import numpy as np
 
 from kineme.errors import DataError, KinemeError
-from kineme.files.blocks import in_blocks
 from kineme.files.check_block import check_block
 from kineme.files.folders import OUTSIDE, as_text, leads_out
 from kineme.files.formats import FORMATS, Format, data_set_of
@@ -195,3 +194,35 @@ def _reason(error: BaseException) -> str:
         return "expected times and positions, got lists within lists within lists, too many to be arrays"
     reason = f"no entry {error}" if isinstance(error, KeyError) else str(error) or type(error).__name__
     return f"expected times and positions, got {reason}"
+
+
+def in_blocks(parsed: Parsed, every: int) -> Parsed:
+    """Cut each movement of a file into movements of `every` samples.
+
+    Raises
+    ------
+    DataError
+        A movement whose number of samples is not divisible by it: nobody knows where the others begin.
+    """
+    block = parsed.block
+    lengths = np.diff(block.offsets)
+    if (odd := np.flatnonzero(lengths % every)).size:
+        i = int(odd[0])
+        where = f" in movement {block.places[i]}" if block.places[i] else ""
+        raise DataError(
+            f"expected blocks of {every} samples, got {lengths[i]} samples{where}: {lengths[i] // every} blocks and "
+            f"{lengths[i] % every} more; give the right number, or repair the file"
+        )
+    counts = lengths // every
+    owners = np.repeat(np.arange(len(lengths)), counts).tolist()
+    numbers = (np.arange(len(owners)) - np.repeat(np.cumsum(counts) - counts, counts)).tolist()
+    places = [f"{block.places[i]}/{k}" if block.places[i] else str(k) for i, k in zip(owners, numbers, strict=True)]
+    cut = replace(
+        block,
+        offsets=np.arange(len(owners) + 1) * every,
+        labels=[block.labels[i] for i in owners],
+        places=places,
+        people=block.people and [block.people[i] for i in owners],
+    )
+    detected = parsed.detected._replace(layout=f"{parsed.detected.layout}, blocks of {every} samples")
+    return parsed._replace(detected=detected, block=cut)

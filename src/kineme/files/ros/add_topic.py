@@ -3,15 +3,26 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Sequence
+import sqlite3
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import replace
+from heapq import merge
+from math import inf
 from pathlib import Path, PurePath
-from typing import Any
+from shutil import copyfile
+from typing import Any, BinaryIO, NamedTuple
 
 from kineme.errors import DataError
-from kineme.files.ros.added_topic import TEXT, AddedTopic, added_topic, copy_bag, copy_mcap, copy_sqlite
 from kineme.files.ros.bags import Bag, open_bag, storages_of
+from kineme.files.ros.bound_chunks import compression_of_ros_1
 from kineme.files.ros.damage import refused
+from kineme.files.ros.decode import standard_types
+from kineme.files.ros.expand import expand
 from kineme.files.ros.expanded_folder import INFORMATION, METADATA
+
+TEXT = "std_msgs/msg/String"  # every version of ROS knows it
 
 Texts = Sequence[tuple[int, str]]  # time of recording [ns] and text of each message
 
@@ -125,3 +136,174 @@ def _compressed(raw: bytes) -> bytes:
     from rosbags.rosbag2.storage_mcap import zstd
 
     return bytes(zstd.compress(raw))
+
+
+class AddedTopic(NamedTuple):
+    """Messages of the type std_msgs/String.
+
+    Attributes
+    ----------
+    name : str
+    definition, digest : str
+        Of the type: its text, and its checksum in this version of ROS.
+    messages : tuple of (int, bytes)
+        Time of recording [ns] and bytes of each, in the order of time.
+    """
+
+    name: str
+    definition: str
+    digest: str
+    messages: tuple[tuple[int, bytes], ...]
+
+
+def added_topic(bag: Bag, name: str, texts: Sequence[tuple[int, str]]) -> AddedTopic:
+    """Texts with their times of recording [ns] as messages of that bag's version of ROS.
+
+    Raises
+    ------
+    DataError
+        The bag has a topic of that name.
+    """
+    if any(topic.name == name for topic in bag.topics):
+        raise DataError(f"expected a bag without the topic {name}, got one that has it; annotate the recording itself")
+    store: Any = standard_types(bag.version)
+    cls = store.types[TEXT]
+    serialize = store.serialize_ros1 if bag.version == 1 else store.serialize_cdr
+    messages = tuple((stamp, bytes(serialize(cls(data=text), TEXT))) for stamp, text in sorted(texts))
+    if bag.version == 1:
+        definition, digest = store.generate_msgdef(TEXT)
+    else:
+        definition, digest = store.generate_msgdef(TEXT, ros_version=2)[0], store.hash_rihs01(TEXT)
+    return AddedTopic(name, str(definition), str(digest), messages)
+
+
+def copy_bag(bag: Bag, target: Path, added: AddedTopic) -> None:
+    """Write a copy of an open bag of ROS 1 with a topic more, in the order of time.
+
+    It is written anew, by rosbags: roscpp, rospy and the mode "append" of rosbag order the fields of their records each
+    in another way, and a bag whose records are of several orders is damaged to most readers.
+    """
+    from rosbags.rosbag1 import Writer
+
+    writer = Writer(target)
+    compression = compression_of_ros_1(bag.reader.bio, min(bag.reader.chunks))[0] if bag.reader.chunks else "none"
+    if compression != "none":
+        writer.set_compression(Writer.CompressionFormat[compression.upper()])
+    if compression == "lz4":  # rosbags writes frames that roslz4, with which ROS 1 reads, takes for damaged
+        writer.compressor = _compressed_by_lz4
+    copies: dict[tuple[Any, ...], Any] = {}  # a node that began anew has connections that are equal
+    with writer:
+        for one in bag.reader.connections:
+            about = (one.topic, one.msgtype, one.msgdef.data, one.digest, one.ext.callerid, one.ext.latching)
+            if about not in copies:
+                extra = {"callerid": one.ext.callerid, "latching": one.ext.latching}
+                copies[about] = writer.add_connection(*about[:2], msgdef=about[2], md5sum=about[3], **extra)
+            copies[one.id,] = copies[about]
+        copies[()] = writer.add_connection(added.name, TEXT, msgdef=added.definition, md5sum=added.digest)
+        recorded = ((stamp, (one.id,), raw) for one, stamp, raw in bag.reader.messages())
+        texts = ((stamp, (), raw) for stamp, raw in added.messages)
+        for stamp, connection, raw in merge(recorded, texts, key=lambda message: message[0]):
+            writer.write(copies[connection], stamp, raw)
+
+
+def _compressed_by_lz4(data: bytes) -> bytes:
+    from lz4.frame import compress
+
+    return bytes(compress(data, store_size=False, block_linked=False, content_checksum=True))
+
+
+def copy_mcap(source: Path, target: Path, added: AddedTopic, compression: str) -> None:
+    """Write a copy of an MCAP file with a topic more: messages, attachments and metadata in their order.
+
+    Raises
+    ------
+    DataError
+        The package mcap is not installed, or the file is damaged.
+    """
+    try:
+        from mcap import records
+        from mcap.writer import CompressionType, Writer
+    except ImportError as error:
+        raise DataError("expected the package mcap to copy MCAP files; pip install 'kineme[ros]'") from error
+    schemas, channels, texts = {0: 0}, dict[int, int](), deque(added.messages)
+    with source.open("rb") as old, target.open("wb") as new:
+        parts = _records_of_mcap(old)
+        header = next(parts)
+        writer: Any = Writer(new, compression=CompressionType[compression.upper() or "NONE"])
+        writer.start(header.profile, header.library)
+        schema = writer.register_schema(TEXT, "ros2msg", added.definition.encode())
+        topic = writer.register_channel(added.name, "cdr", schema, {"offered_qos_profiles": ""})
+
+        def write_texts(before: float) -> None:
+            while texts and texts[0][0] < before:
+                stamp, raw = texts.popleft()
+                writer.add_message(topic, stamp, raw, stamp, len(added.messages) - len(texts) - 1)
+
+        for one in parts:
+            if isinstance(one, records.Schema) and one.id not in schemas:
+                schemas[one.id] = writer.register_schema(one.name, one.encoding, one.data)
+            elif isinstance(one, records.Channel) and one.id not in channels:
+                schema = schemas[one.schema_id]
+                channels[one.id] = writer.register_channel(one.topic, one.message_encoding, schema, one.metadata)
+            elif isinstance(one, records.Message):
+                write_texts(one.log_time)
+                writer.add_message(channels[one.channel_id], one.log_time, one.data, one.publish_time, one.sequence)
+            elif isinstance(one, records.Attachment):
+                writer.add_attachment(**vars(one))
+            elif isinstance(one, records.Metadata):
+                writer.add_metadata(one.name, one.metadata)
+        write_texts(inf)
+        writer.finish()
+
+
+def _records_of_mcap(file: BinaryIO) -> Iterator[Any]:
+    """The records of an MCAP file up to its summary; chunks are expanded up to the size that they declare."""
+    from mcap.records import Chunk, DataEnd
+    from mcap.stream_reader import StreamReader, breakup_chunk
+
+    for one in StreamReader(file, emit_chunks=True, validate_crcs=True).records:
+        if isinstance(one, DataEnd):
+            return
+        if not isinstance(one, Chunk):
+            yield one
+            continue
+        data = expand(one.compression, one.data, one.uncompressed_size) if one.compression else one.data
+        yield from breakup_chunk(replace(one, data=data, compression=""), validate_crc=True)
+
+
+def copy_sqlite(source: Path, target: Path, added: AddedTopic) -> None:
+    """Write a copy of a database of ROS 2 with a topic more, in the columns that its version has.
+
+    Raises
+    ------
+    DataError
+        The database refuses it.
+    """
+    copyfile(source, target)
+    about = {"name": added.name, "type": TEXT, "serialization_format": "cdr", "offered_qos_profiles": ""}
+    meaning = {"topic_type": TEXT, "encoding": "ros2msg", "encoded_message_definition": added.definition}
+    digest = {"type_description_hash": added.digest}
+    try:
+        with closing(sqlite3.connect(target)) as database, database:
+            (last,) = database.execute("SELECT max(id) FROM topics").fetchone()
+            topic = (last or 0) + 1
+            _insert(database, "topics", {"id": topic, **about, **digest})
+            if _columns(database, "message_definitions"):
+                defined = "SELECT 1 FROM message_definitions WHERE topic_type = ?"
+                if not database.execute(defined, (TEXT,)).fetchone():
+                    _insert(database, "message_definitions", meaning | digest)
+            rows = ((topic, stamp, raw) for stamp, raw in added.messages)
+            database.executemany("INSERT INTO messages (topic_id, timestamp, data) VALUES (?, ?, ?)", rows)
+    except sqlite3.Error as error:
+        raise DataError(f"expected a database of ROS 2 that takes another topic, got: {error}") from error
+
+
+def _insert(database: sqlite3.Connection, table: str, values: Mapping[str, Any]) -> None:
+    columns = _columns(database, table)
+    taken = {name: value for name, value in values.items() if name in columns}
+    marks = ", ".join("?" * len(taken))
+    database.execute(f"INSERT INTO {table} ({', '.join(taken)}) VALUES ({marks})", tuple(taken.values()))
+
+
+def _columns(database: sqlite3.Connection, table: str) -> set[str]:
+    return {str(row[1]) for row in database.execute(f"PRAGMA table_info({table})")}
