@@ -50,7 +50,8 @@ def table(rows: list[Row]) -> str:
     for row in rows:
         target = "" if row.target is None else f"{row.target[0]} {row.target[1]:g}"
         met = {None: "", True: "yes", False: "NO"}[row.met]
-        ours = f"{_short(row.ours)} {row.unit}"
+        error = f" ± {row.details['standard_error']:.2g}" if "standard_error" in row.details else ""
+        ours = f"{_short(row.ours)}{error} {row.unit}"
         lines.append((row.what, ours, _short(row.peer), row.peer_name, _short(row.ratio), target, met))
     widths = [max(len(line[i]) for line in lines) for i in range(len(lines[0]))]
     return "\n".join("  ".join(cell.ljust(w) for cell, w in zip(line, widths, strict=True)).rstrip() for line in lines)

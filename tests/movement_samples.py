@@ -47,3 +47,11 @@ def interrupted(demos, seconds, at_rest, noise=0.0, seed=0):
         times.append(np.concatenate((t[:at], rest, t[at:] + seconds)))
         arrays.append(np.concatenate((x[:at], still, x[at:])))
     return Demonstrations.from_arrays(arrays, demos.labels, times)
+
+
+def stepped(steps):
+    """A movement to and fro between 0 and 32: n steps of 1, or of another length, or -n at rest, of so many seconds."""
+    moved = [length for n, _, *own in steps for length in abs(n) * (own or [float(n > 0)])]
+    elapsed = [seconds for n, seconds, *_ in steps for _ in range(abs(n))]
+    x, times = (np.append(0.0, np.cumsum(one)) for one in (moved, elapsed))
+    return Demonstrations.from_arrays([np.abs((x[:, None] + 32) % 64 - 32)], times=[times])

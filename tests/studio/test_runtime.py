@@ -18,10 +18,11 @@ import pytest
 from node_runtime import NODE, REASON, RUNTIME, ask, question
 
 import kineme
+from kineme.movements.preparation.pauses import cut_pauses
 from kineme.recognition.certainty import LEAST_CONFIDENCE, certainty
 from kineme.studio.snapshot.make import snapshot_of_recognizer
 from kineme.studio.snapshot.snapshot import Snapshot
-from movement_samples import draw_shapes, turn
+from movement_samples import draw_shapes, stepped, turn
 from soaking import SOAK
 
 pytestmark = pytest.mark.skipif(NODE is None, reason=REASON)
@@ -203,6 +204,36 @@ def test_pauses_are_cut_short_as_in_python():
     paused = interrupted(kineme.Demonstrations(every_tenth(demos[one_in(2, demos, 2)])))
     assert compare_answers(answers_of(recognizer, paused)) <= SIMILAR
     assert compare_states(states_of(recognizer, paused)) <= 2 * SIMILAR
+
+
+CUTS = """const { withoutPauses } = await import(process.argv[1]);
+const cuts = JSON.parse(process.argv[2]).map((one) => withoutPauses(one));
+console.log(JSON.stringify(cuts.map((one) => [[...one.times], [...one.positions]])));"""
+PAUSED = [
+    [(16, 1.0), (1, 100.0, 2.0), (14, 1.0)],  # a gap of 2
+    [(16, 1.0), (1, 100.0, 1.2), (15, 1.0)],
+    [(64, 1.0), (-20, 1.0)],  # a rest at the end
+    [(5, 1.0), (-100, 1.0), (5, 1.0)],  # of a rest three steps are left
+    [(30, 1.0), (-3, 2.9), (30, 1.0)],
+    [(130, 1.0), (-6, 2.9), (130, 1.0)],
+]
+
+
+def test_pauses_are_cut_to_the_same_samples_as_in_python():
+    shapes = draw_shapes([2, 1], 3, n_samples=40)
+    cases = [*interrupted(shapes), *shapes, *(stepped(steps)[0] for steps in PAUSED)]
+    asked = [
+        {"times": one.times.tolist(), "positions": one.positions.ravel().tolist(), "d": one.n_dims} for one in cases
+    ]
+    done = subprocess.run(
+        [NODE, "--input-type=module", "-e", CUTS, FOLDER / "pauses.js", json.dumps(asked)],
+        capture_output=True, text=True, timeout=300, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    for (times, positions), one in zip(json.loads(done.stdout), cases, strict=True):
+        cut = cut_pauses(one.times, one.positions, np.array([0, len(one.times)])) or (one.times, one.positions)
+        np.testing.assert_allclose(times, cut[0], rtol=0, atol=1e-9)
+        np.testing.assert_allclose(positions, cut[1].ravel(), rtol=0, atol=1e-9)
 
 
 ENDS = [3, 6, 12, 30, 50, 70, 90, 100]  # samples of a movement after which it is asked what it is

@@ -48,6 +48,8 @@ def test_steps_below_three_quarters_of_a_period_are_motion():
         ([350.0, 260.0, 220.0, 125.0, 85.0, 10.0, 345.0], None),  # so sparse that it may as well turn the other way
         ([100.0, 60.0, 50.0, 20.0, 340.0, 330.0], None),  # not through the whole range
         ([40.0, 30.0, 18.0, 8.0, 346.0, 336.0], None),  # by 22 degrees, where others are of 10 to 12
+        ([10.0, 3.0, 10.0, 350.0], 360.0),  # by 20 degrees, less than three times as many as before, to and fro
+        ([10.0, 3.0, 10.0, 348.0], None),  # by 22
     ],
 )
 def test_only_a_jump_through_the_whole_range_shows_a_period(angles, period):

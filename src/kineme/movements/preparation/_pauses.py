@@ -9,8 +9,9 @@ from kineme.movements.preparation.pauses import (
     FEWEST,
     GAP,
     LAST_REST,
-    PAUSE,
+    LONGEST_GAP,
     RADIUS,
+    REST,
     ROUNDS,
     SHORTEST,
     WHOLE,
@@ -35,8 +36,7 @@ def fill_cut(samples, offsets, cut, ends):  # type: ignore[no-untyped-def]
             for k in range(positions.shape[1]):
                 own[j, k] = positions[offsets[i] + j, k]
         for _ in range(ROUNDS):
-            is_capped = _fill_capped(own_times[:n], steps)
-            if not (_fill_rests(own[:n], steps, kept) or is_capped):
+            if not _fill_shortened(own_times[:n], own[:n], steps[:n], kept[:n]):
                 break
             changes, elapsed, left = True, 0.0, 0
             for j in range(n):
@@ -52,54 +52,73 @@ def fill_cut(samples, offsets, cut, ends):  # type: ignore[no-untyped-def]
 
 
 @jit
-def _fill_capped(times, steps):  # type: ignore[no-untyped-def]
-    """Steps of one movement, as far as they count; whether any is a gap."""
+def _fill_shortened(times, positions, steps, kept):  # type: ignore[no-untyped-def]
+    """Steps of one movement, as far as they count, and which samples are left; whether anything changes."""
+    last = len(times) - 1
+    usual = _fill_steps(times, steps)
+    reach, rests = _fill_resting(positions, kept)
+    if not rests and usual == np.inf:
+        return False
+    motion, path = 0.0, 0.0
+    for j in range(last):
+        if kept[j]:
+            motion += min(steps[j], usual)
+            path += np.sqrt(_squared_distance(positions, j, j + 1))
+    pace = motion / path if path > 0 else 0.0  # seconds for a unit of length
+    changes = False
+    before = 0.0
+    for j in range(last):
+        step = steps[j]
+        if step > usual:
+            length = np.sqrt(_squared_distance(positions, j, j + 1))
+            most = min(GAP * max(before, steps[j + 1], length * pace), LONGEST_GAP * motion)
+            changes |= step > EQUAL * max(usual, most)
+            steps[j] = min(step, max(usual, most))
+        before = step
+    return _shorten_rests(steps, kept, REST * reach * pace, LAST_REST * motion) or changes
+
+
+@jit
+def _fill_steps(times, steps):  # type: ignore[no-untyped-def]
+    """Steps of one movement, 0 after its last sample; above which they may be gaps, infinite where none is."""
     last, least, most = len(times) - 1, np.inf, 0.0
     for j in range(last):
         steps[j] = times[j + 1] - times[j]
         least, most = min(least, steps[j]), max(most, steps[j])
     steps[last] = 0.0
     if most <= GAP * least:  # the median is no smaller
-        return False
-    longest = GAP * nth_smallest(steps[:last].copy(), last // 2)
-    motion = 0.0
-    for j in range(last):
-        motion += min(steps[j], longest)
-    longest = max(longest, PAUSE * motion)
-    for j in range(last):
-        steps[j] = min(steps[j], longest)
-    return most > longest
+        return np.inf
+    return GAP * nth_smallest(steps[:last].copy(), last // 2)
 
 
 @jit
-def _fill_rests(positions, steps, kept):  # type: ignore[no-untyped-def]
-    """Shorten the rests of one movement, and tell which samples are left; whether there are long rests."""
+def _fill_resting(positions, kept):  # type: ignore[no-untyped-def]
+    """Mark the samples of one movement after which it rests as not kept, for now; its reach; whether it rests."""
     n, window, size = len(positions), SHORTEST, 0.0
     while 2 * WINDOWS * window <= n:
         window *= 2
     for j in range(1, n):
         size = max(size, _squared_distance(positions, 0, j))
     most_apart = RADIUS * RADIUS * size
-    until, motion, count = 0, 0.0, 0
+    until, rests = 0, False
     for j in range(n):
-        kept[j] = True
         if j + window <= n and _is_still(positions, j, window, most_apart):
-            until = j + window - 1
-        if j < until:
-            kept[j] = False  # for now: it rests
-            count += 1
-        else:
-            motion += steps[j]
-    if count == 0:
-        return False
-    most, changes, j = PAUSE * motion, False, 0
+            until, rests = j + window - 1, True
+        kept[j] = j >= until
+    return np.sqrt(size), rests
+
+
+@jit
+def _shorten_rests(steps, kept, most, most_at_end):  # type: ignore[no-untyped-def]
+    """Shorten the rests of one movement, and tell which samples are left; whether there are long rests."""
+    n, changes, j = len(steps), False, 0
     while j < n:
         begin, total = j, 0.0
         while not kept[j]:  # the last sample is kept
             total += steps[j]
             kept[j] = True
             j += 1
-        limit = most * (LAST_REST / PAUSE) if j == n - 1 else most
+        limit = most_at_end if j == n - 1 else most
         if total > EQUAL * limit and limit > 0:
             changes, count, share = True, j - begin, limit / total
             left = max(FEWEST, int(np.ceil(share * count - WHOLE)))

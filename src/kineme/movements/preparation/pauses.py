@@ -13,19 +13,23 @@ from kineme.validation import Array
 #: A rest stays within this share of the movement's reach, which is its largest distance from its first sample. Of
 #: hands the noise at rest is below, and corners are above.
 RADIUS = 0.015
-#: Longer steps than so many median ones are gaps.
+#: Steps are gaps if they are longer than so many median ones, than so many times their neighbors, and than so many
+#: times what their length takes at the mean speed: who lifts a pen, or whose samples are lost, moves meanwhile.
 GAP = 3.0
-#: A gap or a rest counts as at most this share of the time in motion: as long as people take at a start, a corner, an
-#: end. Of long movements it is more than they take: with pauses of 30 s, words lose 0.07 of their one-shot accuracy.
-PAUSE = 0.1
+#: By neighbors and length, a gap counts as at most this share of the time in motion. It was chosen by symbols of
+#: several strokes, which have most gaps: of shares from 0.03 to 0.4 it is the best one.
+LONGEST_GAP = 0.15
+#: A rest counts as at most the time that this share of the movement's reach takes at the mean speed: as long as people
+#: take at a start or a corner. It is a share of the reach since long movements have more corners, not slower ones.
+REST = 0.2
 #: A rest at the end counts as at most this share: that a movement comes to rest tells that it is over.
 LAST_REST = 0.25
 #: Samples of a window: at least so many, and the largest power of two with so many windows in the movement.
 SHORTEST, WINDOWS = 4, 32
 FEWEST = 3  # steps that a rest is left, at least
 EQUAL, WHOLE = 1 + 1e-9, 1e-6  # of times, and of numbers of samples: differences that are rounding
-ROUNDS = 3  # what is cut makes windows narrower, so that a shorter rest is seen
-_OPERATIONS_PER_SAMPLE = 10
+ROUNDS = 2  # what is cut makes windows narrower, so that a shorter rest is seen
+_OPERATIONS, _PER_NUMBER = 60_000, 100  # of NumPy, of which many calls are needed
 
 Parts = tuple[Array, Array, NDArray[np.intp]]
 
@@ -46,11 +50,14 @@ def cut_pauses(times: Array, positions: Array, offsets: NDArray[np.intp]) -> Par
     """Cut short the time in which a movement does not move, or in which nothing was recorded of it.
 
     So that a drawing during which somebody stopped to think is the drawing that it would have been: smoothing by cycles
-    of a movement and representations over time divide by its duration. A gap is a step longer than three median ones. A
-    rest is a run of windows, of about a 32nd of the samples each, that stay near the sample in which they begin: within
-    0.015 of the movement's reach, its largest distance from its first sample, whatever its direction. Each counts as at
-    most a tenth of the time in motion, a rest at the end as a quarter. A rest keeps as many samples as fit into that,
-    evenly spaced.
+    of a movement and representations over time divide by its duration.
+
+    A gap is a step that is longer than three median ones, than three times its neighbors, and than three times what its
+    length takes at the mean speed in motion. It counts as the longest of these, by the latter two as at most 0.15 of
+    the time in motion. A rest is a run of windows, of about a 32nd of the samples each, that stay near the sample in
+    which they begin: within 0.015 of the movement's reach, its largest distance from its first sample, whatever its
+    direction. It counts as at most the time that 0.2 of the reach takes at the mean speed, a rest at the end as a
+    quarter of the time in motion, and keeps as many samples as fit into that, evenly spaced, at least three.
 
     Parameters
     ----------
@@ -64,7 +71,7 @@ def cut_pauses(times: Array, positions: Array, offsets: NDArray[np.intp]) -> Par
     times, positions, offsets
         Times from 0 in each movement; first and last samples stay. None if there is no pause.
     """
-    if use_compiled(_OPERATIONS_PER_SAMPLE * positions.size):
+    if use_compiled(_OPERATIONS + _PER_NUMBER * positions.size):
         cut_times, cut_positions, ends = np.empty(len(times)), np.empty(positions.shape), np.empty_like(offsets)
         fill = compiled_module("kineme.movements.preparation._pauses").fill_cut
         if not fill((times, positions), offsets, (cut_times, cut_positions), ends):
@@ -91,20 +98,27 @@ def _fill_shortened(
     steps[:] = np.diff(times, append=times[-1])
     steps[last] = np.inf
     ordered = np.lexsort((steps, owner))
-    longest = GAP * steps[ordered[first + (lengths - 1) // 2]]
+    usual = GAP * steps[ordered[first + (lengths - 1) // 2]]
     steps[last] = 0.0
-    longest = np.maximum(longest, PAUSE * np.add.reduceat(np.minimum(steps, longest[owner]), first))
-    changes = bool((steps > longest[owner]).any())
-    np.minimum(steps, longest[owner], out=steps)
-    resting = _resting(positions, offsets, owner)
-    most = PAUSE * np.add.reduceat(np.where(resting, 0.0, steps), first)
+    apart = np.append(np.linalg.norm(np.diff(positions, axis=0), axis=1), 0.0)
+    apart[last] = 0.0
+    reach = np.maximum.reduceat(np.linalg.norm(positions - positions[first][owner], axis=1), first)
+    resting = _resting(positions, offsets, RADIUS * reach[owner])
+    motion = np.add.reduceat(np.where(resting, 0.0, np.minimum(steps, usual[owner])), first)
+    path = np.add.reduceat(np.where(resting, 0.0, apart), first)
+    pace = np.divide(motion, path, out=np.zeros(len(path)), where=path > 0)  # seconds for a unit of length
+    neighbors = np.maximum(np.append(0.0, steps[:-1]), np.append(steps[1:], 0.0))  # 0 beyond an end
+    most = np.minimum(GAP * np.maximum(neighbors, apart * pace[owner]), LONGEST_GAP * motion[owner])
+    longest = np.maximum(usual[owner], most)
+    changes = bool((steps > EQUAL * longest).any())
+    np.minimum(steps, longest, out=steps)
     begins = np.flatnonzero(resting & ~np.append(False, resting[:-1]))
     n_steps = np.flatnonzero(resting & ~np.append(resting[1:], False)) + 1 - begins
     if not len(begins):
         return changes
     total = np.add.reduceat(np.where(resting, steps, 0.0), begins)  # until the next rest begins
-    limit = most[owner[begins]]
-    limit[begins + n_steps == last[owner[begins]]] *= LAST_REST / PAUSE
+    own = owner[begins]
+    limit = np.where(begins + n_steps == last[own], LAST_REST * motion[own], REST * reach[own] * pace[own])
     long = (total > EQUAL * limit) & (limit > 0)
     begins, n_steps, shares = begins[long], n_steps[long], limit[long] / total[long]
     run, place = np.repeat(np.arange(len(begins)), n_steps), np.arange(n_steps.sum())
@@ -116,11 +130,10 @@ def _fill_shortened(
     return changes or bool(long.any())
 
 
-def _resting(positions: Array, offsets: NDArray[np.intp], owner: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """Whether the step after each sample belongs to a window of samples that stays in its place."""
+def _resting(positions: Array, offsets: NDArray[np.intp], radius: Array) -> NDArray[np.bool_]:
+    """Whether the step after each sample belongs to a window of samples that stays within a radius of its first."""
     first, last, total = offsets[:-1], offsets[1:] - 1, len(positions)
-    from_first = np.linalg.norm(positions - positions[first][owner], axis=1)
-    radius = (RADIUS * np.maximum.reduceat(from_first, first))[owner]
+    owner = np.repeat(np.arange(len(first)), np.diff(offsets))
     windows = np.full(len(first), SHORTEST)
     while (wider := 2 * WINDOWS * windows <= np.diff(offsets)).any():
         windows[wider] *= 2
