@@ -211,7 +211,9 @@ const cuts = JSON.parse(process.argv[2]).map((one) => withoutPauses(one));
 console.log(JSON.stringify(cuts.map((one) => [[...one.times], [...one.positions]])));"""
 PAUSED = [
     [(16, 1.0), (1, 100.0, 2.0), (14, 1.0)],  # a gap of 2
-    [(16, 1.0), (1, 100.0, 1.2), (15, 1.0)],
+    [(16, 1.0), (1, 100.0, 1.0), (15, 1.0)],
+    [(20, 1.0), (1, 1.2), (1, 5.0), (20, 1.0)],
+    [(65, 1.0), (-20, 1.0), (65, 1.0)],
     [(64, 1.0), (-20, 1.0)],  # a rest at the end
     [(5, 1.0), (-100, 1.0), (5, 1.0)],  # of a rest three steps are left
     [(30, 1.0), (-3, 2.9), (30, 1.0)],

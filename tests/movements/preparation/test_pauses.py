@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import kineme
-from kineme.movements.preparation.pauses import LAST_REST, LONGEST_GAP, REST, cut_pauses, without_pauses
+from kineme.movements.preparation.pauses import LAST_REST, PAUSE, cut_pauses, without_pauses
 from movement_samples import draw_shapes, interrupted, stepped
 
 pauses = given(
@@ -43,7 +43,7 @@ def test_a_pause_takes_little_time_and_no_place(seed, seconds, at_rest, noise, d
     paused = interrupted(plain, seconds, at_rest, noise, seed)
     times, positions, ends = cut(paused)
     durations = times[ends[1:] - 1]
-    most = 1 + max(LONGEST_GAP, REST) + LAST_REST
+    most = 1 + PAUSE + LAST_REST
     assert (durations <= 1e-9 + most).all()
     for k in (0, -1):
         rows = ends[:-1] if k == 0 else ends[1:] - 1
@@ -56,21 +56,21 @@ def test_a_pause_takes_little_time_and_no_place(seed, seconds, at_rest, noise, d
     ("steps", "seconds", "count"),
     [
         ([(16, 1.0), (1, 100.0), (15, 1.0)], 31 + 3 * 34 / 32, 33),  # thrice what 1 takes, with 3 s for the gap
-        ([(16, 1.0), (1, 100.0, 2.0), (14, 1.0)], 30 + 0.15 * 33, 32),  # 0.15 of 30 and of the gap: less than for 2
+        ([(16, 1.0), (1, 100.0, 2.0), (14, 1.0)], 30 + 3.3, 32),  # a tenth of 30 and of the gap: less than for 2
         ([(16, 1.0), (1, 100.0, 0.5), (15, 1.0)], 31 + 3.0, 33),  # three usual steps, which are more
-        ([(6, 1.0), (1, 3.5), (5, 1.0)], 11 + 3.0, 13),  # and so where 0.15 is less
-        ([(20, 1.0), (1, 2.0), (1, 5.0), (20, 1.0)], 47.0, None),  # slower from step to step
-        ([(20, 1.0), (1, 5.0), (1, 2.0), (20, 1.0)], 47.0, None),
-        ([(20, 1.0), (1, 1.5), (1, 5.0), (20, 1.0)], 41.5 + 4.5, 43),
+        ([(6, 1.0), (1, 3.5), (5, 1.0)], 11 + 3.0, 13),  # and so where a tenth is less
+        ([(20, 1.0), (1, 2.0), (1, 4.2), (20, 1.0)], 46.2, None),  # slower from step to step
+        ([(20, 1.0), (1, 4.2), (1, 2.0), (20, 1.0)], 46.2, None),
+        ([(20, 1.0), (1, 1.2), (1, 5.0), (20, 1.0)], 41.2 + 3.6, 43),
         ([(64, 1.0), (-20, 1.0), (64, 1.0)], 128 + 6.4, 129 + 7),  # 0.2 of 32, of 20 samples as many as fit
         ([(64, 1.0), (-20, 1.0)], 64 + 16.0, 65 + 16),  # at the end a quarter
         ([(64, 1.0), (-16, 1.0)], 80.0, None),
-        ([(30, 1.0), (-3, 2.9), (30, 1.0)], 60 + 6.4, 61 + 3),  # seen in windows of four samples
+        ([(30, 1.0), (-3, 2.9), (30, 1.0)], 60 + 6.0, 61 + 3),  # seen in windows of four samples
         ([(20, 1.0), (-2, 2.9), (20, 1.0)], 45.8, None),
         ([(65, 1.0), (-6, 2.9), (65, 1.0)], 130 + 6.4, 131 + 3),  # and so below 256 samples
         ([(130, 1.0), (-6, 2.9), (130, 1.0)], 277.4, None),
-        ([(5, 1.0), (-100, 1.0), (5, 1.0)], 10 + 2.0, 11 + 3),  # three at least
-        ([(30, 1.0), (-200, 1.0), (15, 1.0), (-6, 2.9), (15, 1.0)], 60 + 2 * 6.4, 71),  # one is seen after the other
+        ([(5, 1.0), (-100, 1.0), (5, 1.0)], 10 + 1.0, 11 + 3),  # three at least
+        ([(30, 1.0), (-200, 1.0), (15, 1.0), (-6, 2.9), (15, 1.0)], 60 + 2 * 6.0, 71),  # one is seen after the other
     ],
 )
 def test_what_is_left_of_pauses_by_hand(monkeypatch, choice, steps, seconds, count):

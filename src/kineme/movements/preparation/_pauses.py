@@ -9,7 +9,7 @@ from kineme.movements.preparation.pauses import (
     FEWEST,
     GAP,
     LAST_REST,
-    LONGEST_GAP,
+    PAUSE,
     RADIUS,
     REST,
     ROUNDS,
@@ -71,11 +71,11 @@ def _fill_shortened(times, positions, steps, kept):  # type: ignore[no-untyped-d
         step = steps[j]
         if step > usual:
             length = np.sqrt(_squared_distance(positions, j, j + 1))
-            most = min(GAP * max(before, steps[j + 1], length * pace), LONGEST_GAP * motion)
+            most = min(GAP * max(before, steps[j + 1], length * pace), PAUSE * motion)
             changes |= step > EQUAL * max(usual, most)
             steps[j] = min(step, max(usual, most))
         before = step
-    return _shorten_rests(steps, kept, REST * reach * pace, LAST_REST * motion) or changes
+    return _shorten_rests(steps, kept, min(PAUSE * motion, REST * reach * pace), LAST_REST * motion) or changes
 
 
 @jit

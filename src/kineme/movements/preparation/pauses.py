@@ -16,11 +16,10 @@ RADIUS = 0.015
 #: Steps are gaps if they are longer than so many median ones, than so many times their neighbors, and than so many
 #: times what their length takes at the mean speed: who lifts a pen, or whose samples are lost, moves meanwhile.
 GAP = 3.0
-#: By neighbors and length, a gap counts as at most this share of the time in motion. It was chosen by symbols of
-#: several strokes, which have most gaps: of shares from 0.03 to 0.4 it is the best one.
-LONGEST_GAP = 0.15
-#: A rest counts as at most the time that this share of the movement's reach takes at the mean speed: as long as people
-#: take at a start or a corner. It is a share of the reach since long movements have more corners, not slower ones.
+#: A gap or a rest counts as at most this share of the time in motion, but three median steps always do.
+PAUSE = 0.1
+#: A rest counts as at most the time that this share of the movement's reach takes at the mean speed, too: as long as
+#: people take at a corner. Long movements have more corners, not slower ones: a tenth of its time costs a word 0.04.
 REST = 0.2
 #: A rest at the end counts as at most this share: that a movement comes to rest tells that it is over.
 LAST_REST = 0.25
@@ -53,11 +52,12 @@ def cut_pauses(times: Array, positions: Array, offsets: NDArray[np.intp]) -> Par
     of a movement and representations over time divide by its duration.
 
     A gap is a step that is longer than three median ones, than three times its neighbors, and than three times what its
-    length takes at the mean speed in motion. It counts as the longest of these, by the latter two as at most 0.15 of
+    length takes at the mean speed in motion. It counts as the longest of these, by the latter two as at most a tenth of
     the time in motion. A rest is a run of windows, of about a 32nd of the samples each, that stay near the sample in
     which they begin: within 0.015 of the movement's reach, its largest distance from its first sample, whatever its
-    direction. It counts as at most the time that 0.2 of the reach takes at the mean speed, a rest at the end as a
-    quarter of the time in motion, and keeps as many samples as fit into that, evenly spaced, at least three.
+    direction. It counts as at most a tenth of the time in motion and as the time that 0.2 of the reach takes at the
+    mean speed, a rest at the end as a quarter of the time in motion. It keeps as many samples as fit into that, evenly
+    spaced, at least three.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def _fill_shortened(
     path = np.add.reduceat(np.where(resting, 0.0, apart), first)
     pace = np.divide(motion, path, out=np.zeros(len(path)), where=path > 0)  # seconds for a unit of length
     neighbors = np.maximum(np.append(0.0, steps[:-1]), np.append(steps[1:], 0.0))  # 0 beyond an end
-    most = np.minimum(GAP * np.maximum(neighbors, apart * pace[owner]), LONGEST_GAP * motion[owner])
+    most = np.minimum(GAP * np.maximum(neighbors, apart * pace[owner]), PAUSE * motion[owner])
     longest = np.maximum(usual[owner], most)
     changes = bool((steps > EQUAL * longest).any())
     np.minimum(steps, longest, out=steps)
@@ -118,7 +118,8 @@ def _fill_shortened(
         return changes
     total = np.add.reduceat(np.where(resting, steps, 0.0), begins)  # until the next rest begins
     own = owner[begins]
-    limit = np.where(begins + n_steps == last[own], LAST_REST * motion[own], REST * reach[own] * pace[own])
+    within = np.minimum(PAUSE * motion, REST * reach * pace)
+    limit = np.where(begins + n_steps == last[own], LAST_REST * motion[own], within[own])
     long = (total > EQUAL * limit) & (limit > 0)
     begins, n_steps, shares = begins[long], n_steps[long], limit[long] / total[long]
     run, place = np.repeat(np.arange(len(begins)), n_steps), np.arange(n_steps.sum())

@@ -1,7 +1,7 @@
 // Pauses within a movement, cut short: stamps far apart, and rests. The same as kineme.movements.preparation.pauses.
 
 const GAP = 3; // median steps, and as many times neighbors and what the length of a step takes: longer ones are gaps
-const LONGEST_GAP = 0.15; // of the time in motion: a gap counts at most as much, by neighbors and length
+const PAUSE = 0.1; // of the time in motion: a gap, by neighbors and length, or a rest counts at most as much
 const REST = 0.2; // of the reach: a rest counts as at most the time that this takes at the mean speed
 const LAST_REST = 0.25; // of the time in motion: a rest at the end counts at most as much
 const RADIUS = 0.015; // of the reach from the first sample: so near to where a window begins a rest stays
@@ -54,11 +54,12 @@ function shortened({ times, positions, d }) {
   const longest = steps.map((_, j) => {
     const neighbor = Math.max(j > 0 ? steps[j - 1] : 0, j < n - 1 ? steps[j + 1] : 0);
     const length = j < n - 1 ? apart(j, j + 1) : 0;
-    return Math.max(usual, Math.min(GAP * Math.max(neighbor, length * pace), LONGEST_GAP * motion));
+    return Math.max(usual, Math.min(GAP * Math.max(neighbor, length * pace), PAUSE * motion));
   });
   const changes = steps.some((step, j) => step > EQUAL * longest[j]);
   const counted = steps.map((step, j) => Math.min(step, longest[j]));
-  const { kept, shorter } = shortenRests(counted, resting, REST * reach * pace, LAST_REST * motion);
+  const most = Math.min(PAUSE * motion, REST * reach * pace);
+  const { kept, shorter } = shortenRests(counted, resting, most, LAST_REST * motion);
   return { steps: counted, kept, changes: changes || shorter };
 }
 
