@@ -63,6 +63,7 @@ def test_a_pause_takes_little_time_and_no_place(seed, seconds, at_rest, noise, d
         ([(20, 1.0), (1, 4.2), (1, 2.0), (20, 1.0)], 46.2, None),
         ([(20, 1.0), (1, 1.2), (1, 5.0), (20, 1.0)], 41.2 + 3.6, 43),
         ([(64, 1.0), (-20, 1.0), (64, 1.0)], 128 + 6.4, 129 + 7),  # 0.2 of 32, of 20 samples as many as fit
+        ([(-20, 1.0), (128, 1.0)], 128 + 12.8, 129 + 13),  # at the start a tenth
         ([(64, 1.0), (-20, 1.0)], 64 + 16.0, 65 + 16),  # at the end a quarter
         ([(64, 1.0), (-16, 1.0)], 80.0, None),
         ([(30, 1.0), (-3, 2.9), (30, 1.0)], 60 + 6.0, 61 + 3),  # seen in windows of four samples

@@ -75,7 +75,7 @@ def _fill_shortened(times, positions, steps, kept):  # type: ignore[no-untyped-d
             changes |= step > EQUAL * max(usual, most)
             steps[j] = min(step, max(usual, most))
         before = step
-    return _shorten_rests(steps, kept, min(PAUSE * motion, REST * reach * pace), LAST_REST * motion) or changes
+    return _shorten_rests(steps, kept, motion, REST * reach * pace) or changes
 
 
 @jit
@@ -109,7 +109,7 @@ def _fill_resting(positions, kept):  # type: ignore[no-untyped-def]
 
 
 @jit
-def _shorten_rests(steps, kept, most, most_at_end):  # type: ignore[no-untyped-def]
+def _shorten_rests(steps, kept, motion, most):  # type: ignore[no-untyped-def]
     """Shorten the rests of one movement, and tell which samples are left; whether there are long rests."""
     n, changes, j = len(steps), False, 0
     while j < n:
@@ -118,7 +118,9 @@ def _shorten_rests(steps, kept, most, most_at_end):  # type: ignore[no-untyped-d
             total += steps[j]
             kept[j] = True
             j += 1
-        limit = most_at_end if j == n - 1 else most
+        limit = PAUSE * motion if begin == 0 else min(PAUSE * motion, most)
+        if j == n - 1:
+            limit = LAST_REST * motion
         if total > EQUAL * limit and limit > 0:
             changes, count, share = True, j - begin, limit / total
             left = max(FEWEST, int(np.ceil(share * count - WHOLE)))

@@ -18,8 +18,8 @@ RADIUS = 0.015
 GAP = 3.0
 #: A gap or a rest counts as at most this share of the time in motion, but three median steps always do.
 PAUSE = 0.1
-#: A rest counts as at most the time that this share of the movement's reach takes at the mean speed, too: as long as
-#: people take at a corner. Long movements have more corners, not slower ones: a tenth of its time costs a word 0.04.
+#: A rest after the start counts as at most the time that this share of the movement's reach takes at the mean speed: as
+#: long as people take at a corner. Long movements have more corners, not slower ones: with a tenth, words lose 0.03.
 REST = 0.2
 #: A rest at the end counts as at most this share: that a movement comes to rest tells that it is over.
 LAST_REST = 0.25
@@ -55,9 +55,9 @@ def cut_pauses(times: Array, positions: Array, offsets: NDArray[np.intp]) -> Par
     length takes at the mean speed in motion. It counts as the longest of these, by the latter two as at most a tenth of
     the time in motion. A rest is a run of windows, of about a 32nd of the samples each, that stay near the sample in
     which they begin: within 0.015 of the movement's reach, its largest distance from its first sample, whatever its
-    direction. It counts as at most a tenth of the time in motion and as the time that 0.2 of the reach takes at the
-    mean speed, a rest at the end as a quarter of the time in motion. It keeps as many samples as fit into that, evenly
-    spaced, at least three.
+    direction. It counts as at most a tenth of the time in motion, after the start as at most the time that 0.2 of the
+    reach takes at the mean speed, too, and at the end as at most a quarter of the time in motion. It keeps as many
+    samples as fit into that, evenly spaced, at least three.
 
     Parameters
     ----------
@@ -118,8 +118,9 @@ def _fill_shortened(
         return changes
     total = np.add.reduceat(np.where(resting, steps, 0.0), begins)  # until the next rest begins
     own = owner[begins]
-    within = np.minimum(PAUSE * motion, REST * reach * pace)
-    limit = np.where(begins + n_steps == last[own], LAST_REST * motion[own], within[own])
+    most, within = PAUSE * motion[own], REST * reach[own] * pace[own]
+    limit = np.where(begins == first[own], most, np.minimum(most, within))
+    limit = np.where(begins + n_steps == last[own], LAST_REST * motion[own], limit)
     long = (total > EQUAL * limit) & (limit > 0)
     begins, n_steps, shares = begins[long], n_steps[long], limit[long] / total[long]
     run, place = np.repeat(np.arange(len(begins)), n_steps), np.arange(n_steps.sum())

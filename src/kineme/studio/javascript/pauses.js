@@ -2,7 +2,7 @@
 
 const GAP = 3; // median steps, and as many times neighbors and what the length of a step takes: longer ones are gaps
 const PAUSE = 0.1; // of the time in motion: a gap, by neighbors and length, or a rest counts at most as much
-const REST = 0.2; // of the reach: a rest counts as at most the time that this takes at the mean speed
+const REST = 0.2; // of the reach: a rest after the start counts as at most the time that this takes at the mean speed
 const LAST_REST = 0.25; // of the time in motion: a rest at the end counts at most as much
 const RADIUS = 0.015; // of the reach from the first sample: so near to where a window begins a rest stays
 const [SHORTEST, WINDOWS] = [4, 32]; // samples of a window, at least; windows in a movement
@@ -58,13 +58,12 @@ function shortened({ times, positions, d }) {
   });
   const changes = steps.some((step, j) => step > EQUAL * longest[j]);
   const counted = steps.map((step, j) => Math.min(step, longest[j]));
-  const most = Math.min(PAUSE * motion, REST * reach * pace);
-  const { kept, shorter } = shortenRests(counted, resting, most, LAST_REST * motion);
+  const { kept, shorter } = shortenRests(counted, resting, motion, REST * reach * pace);
   return { steps: counted, kept, changes: changes || shorter };
 }
 
 /** Shorten the steps of long rests; which samples are left, and whether there are such rests. */
-function shortenRests(steps, resting, most, mostAtEnd) {
+function shortenRests(steps, resting, motion, most) {
   const n = steps.length;
   const kept = new Uint8Array(n).fill(1);
   let shorter = false;
@@ -72,7 +71,8 @@ function shortenRests(steps, resting, most, mostAtEnd) {
     const begin = j;
     let total = 0;
     for (; resting[j]; j++) total += steps[j];
-    const limit = j === n - 1 ? mostAtEnd : most;
+    const first = begin === 0 ? PAUSE * motion : Math.min(PAUSE * motion, most);
+    const limit = j === n - 1 ? LAST_REST * motion : first;
     if (!(total > EQUAL * limit && limit > 0)) continue;
     shorter = true;
     const share = limit / total;
