@@ -213,6 +213,35 @@ def test_damaged_machine_code_is_compiled_again(doubled, tmp_path, ending, left)
     assert doubles(doubled("one"), np.float64).cache_hits
 
 
+def test_machine_code_holds_the_constants_and_functions_of_other_files_as_they_are(tmp_path, monkeypatch):
+    """An update that changes another file alone would go on with the machine code of before."""
+    from numba import config
+
+    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path / "code"))
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    monkeypatch.syspath_prepend(tmp_path)
+
+    def scale(factor, shift):
+        imports = "from kineme.runtime.compiled import jit\n"
+        texts = {
+            "scale_factor": f"FACTOR = {factor}\n",
+            "scale_shift": f"{imports}@jit\ndef shift(x):\n    return x + {shift}\n",
+            "scale_loop": f"{imports}from scale_factor import FACTOR\nfrom scale_shift import shift\n"
+            "@jit\ndef scale(x):\n    return shift(FACTOR * x)\n",
+        }
+        for name, text in texts.items():
+            tmp_path.joinpath(f"{name}.py").write_text(text)
+            monkeypatch.delitem(sys.modules, name, raising=False)
+        invalidate_caches()
+        function = import_module("scale_loop").scale
+        return function(1.0), sum(function.stats.cache_hits.values())
+
+    assert scale(2, 1) == (3.0, 0)
+    assert scale(2, 1) == (3.0, 1)
+    assert scale(3, 1) == (4.0, 0)
+    assert scale(3, 2) == (5.0, 0)
+
+
 def test_machine_code_that_cannot_be_kept_works(doubled, tmp_path, monkeypatch):
     def full(*_):
         raise OSError(28, "No space left on device")

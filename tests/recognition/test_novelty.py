@@ -17,7 +17,7 @@ from kineme.comparison.references import References
 from kineme.comparison.similarity import AveragedSimilarity
 from kineme.kernels.procrustes import Prepared, Procrustes
 from kineme.recognition.confidence import EXPONENT, class_probabilities, fit_exponent
-from kineme.recognition.conformal import Calibration, calibrate
+from kineme.recognition.conformal import calibrate
 from kineme.recognition.left_out import ClassDistances, law
 from movement_samples import draw_shapes
 from soaking import combined
@@ -223,19 +223,6 @@ def test_every_movement_has_a_group():
 def test_groups_have_an_order():
     with pytest.raises(TrajectoryError, match="expected groups to be all texts or all numbers"):
         Recognizer().fit(draw_shapes([2, 2]), groups=np.array(["ann", 1, None, "bob"], dtype=object))
-
-
-def test_a_recognizer_of_an_earlier_version_is_calibrated_again():
-    demos = draw_shapes([5] * 5, seed=1)
-    recognizer, asked = Recognizer().fit(demos), draw_shapes([1] * 5, seed=1, spread=0.3)
-    expected = recognizer.predict_known(asked)
-    old = recognizer.calibration()
-    bare = object.__new__(Calibration)
-    vars(bare).update(scales=old.scales, own=old.own, pooled=old.pooled)
-    del recognizer._groups
-    recognizer._calibration = bare
-    np.testing.assert_array_equal(recognizer.predict_known(asked), expected)
-    assert recognizer.calibration().own_novelties is not None
 
 
 def test_probabilities_are_right_where_neighbors_are_drawn_evenly():

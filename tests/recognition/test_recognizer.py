@@ -299,14 +299,3 @@ def test_the_phase_increases_through_pauses_whatever_the_direction(d, share, see
     ends = [arc_length_phase(paused, one) for one in (0.0, 1.0)]
     np.testing.assert_allclose(phase, (1 - share) * ends[0] + share * ends[1], atol=1e-12)
     assert phase[0, 69] - phase[0, 30] == pytest.approx((1 - 0.999 * share) * 39 / 119, abs=1e-9)
-
-
-def test_a_recognizer_of_a_version_without_a_rotation_prior_opens():
-    demos = draw_shapes([2] * 3)
-    fitted = Recognizer(max_angle=1.0).fit(demos)
-    state = fitted.__getstate__()
-    del state["rotation_prior"]
-    opened = object.__new__(Recognizer)
-    opened.__setstate__(state)
-    assert opened.get_params()["rotation_prior"] is None
-    assert (clone(opened).fit(demos).predict(demos) == opened.predict(demos)).all()

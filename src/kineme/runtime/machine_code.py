@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Mapping
 from contextlib import suppress
+from hashlib import sha256
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 
@@ -20,6 +24,33 @@ def keep(dispatcher: Callable[..., Any], compiling: Callable[[], object]) -> Non
             dispatcher._cache = _Cache(function, compiling)  # type: ignore[attr-defined]
 
 
+def _inlined(names: Mapping[str, Any]) -> str:
+    """Digest of what machine code holds besides its own file: constants of a module, and compiled functions of others.
+
+    Numba looks at the file of the function alone. After an update that changes a constant elsewhere it would go on with
+    the machine code of before.
+    """
+    digest, modules, waiting = sha256(), {names["__name__"]}, [names]
+    while waiting:
+        own = waiting.pop()
+        for name, value in own.items():
+            if _is_constant(value) and not name.startswith("__"):
+                digest.update(f"{name} = {value!r};".encode())
+            elif hasattr(value, "py_func") or type(value).__module__.startswith("numba."):
+                module = sys.modules.get(str(getattr(value, "__module__", "")))
+                if module is not None and module.__name__ not in modules and module.__file__ is not None:
+                    modules.add(module.__name__)
+                    digest.update(Path(module.__file__).read_bytes())
+                    waiting.append(vars(module))
+    return digest.hexdigest()
+
+
+def _is_constant(value: Any) -> bool:
+    if isinstance(value, tuple):
+        return all(map(_is_constant, value))
+    return isinstance(value, (int, float, str, np.generic))
+
+
 class _Cache(FunctionCache):
     def __init__(self, function: Callable[..., Any], compiling: Callable[[], object]) -> None:
         super().__init__(function)
@@ -28,7 +59,7 @@ class _Cache(FunctionCache):
         self._cache_file = _Files(
             cache_path=self._cache_path,
             filename_base=implementation.filename_base,
-            source_stamp=implementation.locator.get_source_stamp(),
+            source_stamp=(implementation.locator.get_source_stamp(), _inlined(function.__globals__)),
         )
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
