@@ -45,12 +45,11 @@ CHECKED = $(FIRST:%=tests/test_%.py) tests/properties tests/primitives/discrete 
 
 check: $(DEV)/ready
 	$(lint)
-	$(DEV)/bin/pytest -n 3 --dist loadscope $(CHECKED)
+	$(DEV)/bin/pytest -n 2 --dist loadscope $(CHECKED)
 
-# Three workers on two cores: tests wait for the processes that they start.
 test: $(DEV)/ready
 	$(lint)
-	$(DEV)/bin/pytest -n 3 --dist loadscope -rs
+	$(DEV)/bin/pytest -n 2 --dist loadscope -rs
 
 # Each Python with an environment of its own; all are tried, though one fails.
 test-pythons:
@@ -64,7 +63,7 @@ test-pythons:
 	test -n "$$found" && test -z "$$failed"
 
 test-lowest: .venv-lowest/ready
-	.venv-lowest/bin/pytest -n 3 --dist loadscope -p no:cacheprovider
+	.venv-lowest/bin/pytest -n 2 --dist loadscope -p no:cacheprovider
 
 package: .venv-package/ready
 	.venv-package/bin/python -m release $(PYTHONS)
@@ -85,7 +84,7 @@ ros2: .venv-ros2/ready
 	touch $@
 
 soak: $(DEV)/ready
-	KINEME_SOAK=1 $(DEV)/bin/pytest -n 3 --dist loadscope soak $$(grep -rlE 'soaking|KINEME_SOAK' tests --include='test_*.py') -p no:cacheprovider
+	KINEME_SOAK=1 $(DEV)/bin/pytest -n 2 --dist loadscope soak $$(grep -rlE 'soaking|KINEME_SOAK' tests --include='test_*.py') -p no:cacheprovider
 
 fuzz: $(DEV)/ready
 	$(DEV)/bin/pytest fuzz -p no:cacheprovider
