@@ -233,7 +233,7 @@ def arm_tables(arm: dict[str, Any], draws: dict[str, Draws]) -> list[Table]:
     Parameters
     ----------
     arm : dict
-        See `arm.run_arm`.
+        See `run_arm`.
     draws : dict
         The draws of the recordings in the plane, for comparison.
     """

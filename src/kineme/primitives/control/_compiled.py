@@ -1,4 +1,4 @@
-"""Compiled twin of `advance.advance`: the shape comes from a table, everything else is the same."""
+"""Compiled twin of `stepping.advance`: the shape comes from a table, everything else is the same."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _transition = jit(transition)
 
 @jit
 def advance(spring, table, avoidance, state, u, du, influences, motion):  # type: ignore[no-untyped-def]
-    """Write position, dx/du and x'' at u + du into `motion` (3, d); see `advance.advance`.
+    """Write position, dx/du and x'' at u + du into `motion` (3, d); see `stepping.advance`.
 
     `spring` is (K, D, intervals per unit of u), `table` a `ShapeTable`, `avoidance` (gamma, beta, fading, rounding).
     """
