@@ -38,10 +38,10 @@ endef
 
 # A table of what takes batches, and one of wrong values, go through most of the package.
 FIRST = house layering front_door wrong_values
-CHECKED = $(FIRST:%=tests/test_%.py) tests/properties tests/primitives/discrete tests/primitives/pose tests/movements/trajectories \
-  tests/recognition/test_recognition_numbers.py tests/recognition/test_recognizer.py tests/comparison/test_similarity.py \
+CHECKED = $(FIRST:%=tests/test_%.py) tests/properties tests/dmp/discrete tests/dmp/pose tests/movements/trajectories \
+  tests/recognition/test_recognition_numbers.py tests/recognition/test_recognizer.py tests/similarity/test_similarity.py \
   $(patsubst %,tests/library/test_library_%.py,learning recognition changes exchange) \
-  tests/files/test_read_recordings.py tests/cli/test_learn.py tests/cli/test_recognize_command.py tests/kernels/test_gram_formulas.py
+  tests/io/test_read_recordings.py tests/cli/test_learn.py tests/cli/test_recognize_command.py tests/kernels/test_gram_formulas.py
 
 check: $(DEV)/ready
 	$(lint)

@@ -12,7 +12,7 @@ from bench.peers import movement_primitive
 from bench.rows import Row
 from bench.timing import medians
 from kineme import DMP
-from kineme.primitives.discrete.dmp import Primitives
+from kineme.dmp.discrete.dmp import Primitives
 
 N_SAMPLES, N_BASIS, DT = 200, 80, 0.002
 MOST = 20e-6  # seconds

@@ -15,15 +15,15 @@ import numpy as np
 import kineme
 from bench.by_person import FOLDER
 from bench.rows import Row
-from kineme.comparison import widths
-from kineme.comparison.representation import DEFAULT_REPRESENTATIONS as FIVE
-from kineme.comparison.representation import POSITIONS, Representation
 from kineme.experiments.evaluation.conditions import TOGETHER
 from kineme.experiments.evaluation.data import load_data
 from kineme.experiments.evaluation.splits import few_shot
 from kineme.kernels.soft_rotation import RotationPrior
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.recognition import classifiers
+from kineme.similarity import widths
+from kineme.similarity.representation import DEFAULT_REPRESENTATIONS as FIVE
+from kineme.similarity.representation import POSITIONS, Representation
 
 SPLITS, SEED = 5, 0
 LEVELS = {"moderately": TOGETHER[1], "strongly": TOGETHER[2]}

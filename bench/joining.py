@@ -12,8 +12,8 @@ from bench.movements import Array
 from bench.rows import Row
 from kineme import DMP, Primitives, Rollout, couple, join, load_lasa
 from kineme.datasets.lasa import LASA_30
-from kineme.primitives.condition import condition
-from kineme.primitives.discrete.operators import decoder, smoothness_factor
+from kineme.dmp.condition import condition
+from kineme.dmp.discrete.operators import decoder, smoothness_factor
 
 STEPS = 500  # of each part
 DURING, OFFSET = (0.3, 0.7), (10.0, 0.0)  # of two that carry one thing: shares of the duration, millimeters

@@ -18,14 +18,14 @@ from numpy.typing import NDArray
 from bench.by_person import FOLDER
 from bench.nested_sets import Movements, movement_sets
 from bench.rows import Row
-from kineme.comparison.describe import describe
-from kineme.comparison.described import Described
-from kineme.comparison.distances import squared_distances
-from kineme.comparison.representation import DEFAULT_REPRESENTATIONS
-from kineme.comparison.specification import ComparisonSpecification
-from kineme.comparison.widths import SHARE
 from kineme.kernels.shapes import ElasticSpec
 from kineme.kernels.soft_rotation import CONCENTRATION, RotationPrior
+from kineme.similarity.describe import describe
+from kineme.similarity.described import Described
+from kineme.similarity.distances import squared_distances
+from kineme.similarity.representation import DEFAULT_REPRESENTATIONS
+from kineme.similarity.specification import ComparisonSpecification
+from kineme.similarity.widths import SHARE
 
 OWN = tuple(one.weight for one in DEFAULT_REPRESENTATIONS)
 WEIGHTS = (OWN, (1.0,) * 5, (1.0, 1.0, 2.0, 1.0, 2.0), (2.0, 1.0, 1.0, 1.0, 1.0))

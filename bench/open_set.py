@@ -23,16 +23,16 @@ import kineme
 from bench.by_person import FOLDER
 from bench.people import recorded
 from bench.rows import Row
-from kineme.comparison.describe import feature_rows, prepare
-from kineme.comparison.described import Described
-from kineme.comparison.references import References
-from kineme.comparison.scores import nearest, nearest_each, score
-from kineme.comparison.specification import ComparisonSpecification
 from kineme.experiments.evaluation.conditions import TOGETHER
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.recognition.confidence import EXPONENT, class_probabilities
 from kineme.recognition.known_classes import fit_known_classes
 from kineme.recognition.left_out import LEAST, distances
+from kineme.similarity.describe import feature_rows, prepare
+from kineme.similarity.described import Described
+from kineme.similarity.references import References
+from kineme.similarity.scores import nearest, nearest_each, score
+from kineme.similarity.specification import ComparisonSpecification
 
 ERROR_RATE = 0.05
 SHOWN = (1, 2, 4, 8)

@@ -13,8 +13,8 @@ from bench.peers import dtw_nearest
 from bench.rows import Row
 from bench.space import lifted
 from bench.timing import medians
-from kineme.comparison.scores import Compared
 from kineme.movements.preparation.perturbations import Perturbation
+from kineme.similarity.scores import Compared
 
 SHORTEST, LONGEST = 120, 200
 N_POINTS = 200

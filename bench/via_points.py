@@ -21,10 +21,10 @@ from bench.movements import Array
 from bench.rows import Row
 from kineme import DMP, ExtrapolationWarning, Primitives, Rollout, load_lasa
 from kineme.datasets.lasa import LASA_30
-from kineme.primitives.condition import condition
-from kineme.primitives.discrete.changes import SLACK, changes
-from kineme.primitives.discrete.fits import trajectory_columns
-from kineme.primitives.discrete.operators import decoder, decoder_at, smoothness_factor
+from kineme.dmp.condition import condition
+from kineme.dmp.discrete.changes import SLACK, changes
+from kineme.dmp.discrete.fits import trajectory_columns
+from kineme.dmp.discrete.operators import decoder, decoder_at, smoothness_factor
 
 DEMONSTRATIONS = 7  # of each set
 STEPS = 480  # of a path, so that even times of 1, 3 and 5 points are among its samples

@@ -16,7 +16,7 @@ def reset(gallery_conf: dict[str, Any], fname: str) -> None:
     import matplotlib as mpl
     from cycler import cycler
 
-    from kineme.output.figures import new_figure
+    from kineme.reporting.figures import new_figure
 
     mpl.rcdefaults()
     mpl.use("agg")

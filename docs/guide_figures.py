@@ -15,8 +15,8 @@ from walk_through import walk
 
 import kineme
 from kineme.control import ObstacleAvoidance
-from kineme.output.figures import BLUE, GRAY, GREEN, ORANGE, new_figure
-from kineme.primitives.styles.figure import draw_morph
+from kineme.dmp.styles.figure import draw_morph
+from kineme.reporting.figures import BLUE, GRAY, GREEN, ORANGE, new_figure
 
 _FEWEST = 20  # answers that a point of the reliability diagram stands for
 COLORS = {"original": BLUE, "bio-inspired": ORANGE, "amplitude-scaled": GREEN}

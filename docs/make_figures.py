@@ -26,7 +26,7 @@ from PIL import Image
 from tutorial_figures import gestures, place
 from walk_through import walk
 
-from kineme.output.figures import render
+from kineme.reporting.figures import render
 
 _COLORS = 128  # of a picture of a tutorial
 #: Pages that draw their own pictures as they are walked -> what the names of these begin with.

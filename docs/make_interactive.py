@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 import kineme
-from kineme.primitives.discrete.operators import decoder, encoder
+from kineme.dmp.discrete.operators import decoder, encoder
 
 FOLDER = Path(__file__).parent / "concepts" / "interactive"
 N_BASIS, N_POINTS = 10, 81

@@ -5,7 +5,7 @@ from __future__ import annotations
 from matplotlib.figure import Figure
 from million_tables import by_part
 
-from kineme.output.figures import new_figure
+from kineme.reporting.figures import new_figure
 
 _COLORS = ("tab:gray", "tab:blue", "tab:green", "tab:orange", "tab:red", "tab:purple")
 

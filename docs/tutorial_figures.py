@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from walk_through import walk
 
 import kineme
-from kineme.output.figures import BLUE, GRAY, GREEN, ORANGE, new_figure
+from kineme.reporting.figures import BLUE, GRAY, GREEN, ORANGE, new_figure
 
 _TUTORIALS = Path(__file__).parent / "tutorials"
 _COLORS = {"Sine": BLUE, "GShape": ORANGE, "WShape": GREEN}

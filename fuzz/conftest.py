@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 TESTS = Path(__file__).parents[1] / "tests"
-sys.path[:0] = [str(TESTS), *(str(TESTS / part) for part in ("files", "library"))]
+sys.path[:0] = [str(TESTS), *(str(TESTS / part) for part in ("io", "library"))]
 
 SEED = int(os.environ.get("FUZZ_SEED") or time.time_ns() % 2**32)
 ROUNDS = int(os.environ.get("FUZZ_ROUNDS") or 400)

@@ -132,7 +132,7 @@ def test_numba_and_compiled_modules_are_loaded_in_one_place_only():
 
 
 def test_the_modules_that_are_asked_for_have_compiled_functions():
-    assert {"kernels", "primitives", "movements"} <= {name.split(".")[1] for name in _compiled_modules()}
+    assert {"kernels", "dmp", "movements"} <= {name.split(".")[1] for name in _compiled_modules()}
     for path in _modules():
         for name in re.findall(r"compiled_module\(\"(.*?)\"\)", path.read_text()):
             assert name in _compiled_modules(), path

@@ -126,7 +126,7 @@ def test_every_format_is_on_its_page():
 
 
 def test_public_names_are_found_under_what_users_write():
-    assert public.PUBLIC["DMP"] == public.PUBLIC["kineme.primitives.discrete.dmp.DMP"] == "kineme.DMP"
+    assert public.PUBLIC["DMP"] == public.PUBLIC["kineme.dmp.discrete.dmp.DMP"] == "kineme.DMP"
     assert public.PUBLIC["kernels.RBF"] == "kineme.kernels.RBF"
 
 

@@ -23,10 +23,10 @@ from kineme.anchoring.figures.symbol_map import draw_map
 from kineme.anchoring.grounding.space import ConceptualSpace
 from kineme.cli.main import main
 from kineme.cli.output import say, write
-from kineme.output.figures import FORMATS, encode_figure, new_figure
-from kineme.output.page import page
-from kineme.output.table import Table, to_html, to_text
-from kineme.output.text import drawable, in_markup, printable, printable_lines
+from kineme.reporting.figures import FORMATS, encode_figure, new_figure
+from kineme.reporting.page import page
+from kineme.reporting.table import Table, to_html, to_text
+from kineme.reporting.text import drawable, in_markup, printable, printable_lines
 
 PACKAGE = Path(__file__).parents[1] / "src" / "kineme"
 
@@ -202,8 +202,11 @@ PRINTING = {"print", "click.echo", "click.secho", "click.style", "click.prompt",
     ("door", "is_passage"),
     [
         ("cli/output.py", lambda call: call in PRINTING or call.startswith(("sys.stdout.write", "sys.stderr.write"))),
-        ("output/figures.py", lambda call: call.endswith((".savefig", ".print_figure", ".print_svg", ".tight_layout"))),
-        ("output/text.py", lambda call: call.split(".")[-1] == "escape" and not call.startswith("re.")),
+        (
+            "reporting/figures.py",
+            lambda call: call.endswith((".savefig", ".print_figure", ".print_svg", "tight_layout")),
+        ),
+        ("reporting/text.py", lambda call: call.split(".")[-1] == "escape" and not call.startswith("re.")),
     ],
 )
 def test_there_is_one_door_through_which_texts_leave(door, is_passage):

@@ -31,11 +31,11 @@ from kineme import (
     TrimRest,
     kernels,
 )
-from kineme.comparison.representation import Representation
+from kineme.dmp.control.obstacles import ObstacleAvoidance
 from kineme.features.random_binning import RandomBinning
 from kineme.movements.preparation.perturbations import Perturbation
-from kineme.primitives.control.obstacles import ObstacleAvoidance
 from kineme.recognition.early.hypotheses import Early
+from kineme.similarity.representation import Representation
 from kineme.styles import AveragePrimitive, average
 
 WRONG = (

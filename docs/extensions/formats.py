@@ -8,10 +8,10 @@ from importlib.resources import files
 from typing import Any
 
 from extensions.tables import kind, table
-from kineme.files.annotations import writers as annotations
-from kineme.files.formats import DATA_SETS, FORMATS
-from kineme.files.write_movement import WRITERS
-from kineme.output.figures import FORMATS as FIGURES
+from kineme.io.annotations import writers as annotations
+from kineme.io.formats import DATA_SETS, FORMATS
+from kineme.io.write_movement import WRITERS
+from kineme.reporting.figures import FORMATS as FIGURES
 
 #: Endings that are read together -> what they are, and the extra that reading them takes.
 _READ = {

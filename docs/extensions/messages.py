@@ -15,12 +15,12 @@ _SHORTEST = 12  # characters of text; less does not tell one message from anothe
 
 #: Folder of the code -> title of the section, and the pages to read.
 _SECTIONS = {
-    "files": ("Reading and writing files", "how-to/file-not-read.md", "guide/recordings.md"),
+    "io": ("Reading and writing files", "how-to/file-not-read.md", "guide/recordings.md"),
     "movements": ("Movements and their columns", "guide/columns.md"),
-    "primitives": ("Learning and generating", "how-to/which-fit.md", "guide/moving-again.md", "guide/modulation.md"),
+    "dmp": ("Learning and generating", "how-to/which-fit.md", "guide/moving-again.md", "guide/modulation.md"),
     "features": ("Features", "guide/recognition.md#features-and-kernels-in-scikit-learn"),
     "kernels": ("Kernels", "concepts/kernels.md"),
-    "comparison": ("Comparing movements", "concepts/invariance.md", "guide/recognition.md"),
+    "similarity": ("Comparing movements", "concepts/invariance.md", "guide/recognition.md"),
     "recognition": ("Recognizing", "how-to/everything-is-unknown.md", "guide/recognition.md"),
     "anchoring": ("Symbols", "concepts/anchoring.md"),
     "library": ("The action library", "tutorials/action-library.md"),

@@ -10,7 +10,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import kineme
-from kineme.primitives.discrete.operators import decoder, encoder
+from kineme.dmp.discrete.operators import decoder, encoder
 
 dmp = kineme.DMP(n_basis=30)
 E, Phi = encoder(dmp, 200).weights, decoder(dmp, 200).Phi[0]

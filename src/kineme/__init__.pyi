@@ -15,29 +15,29 @@ from kineme.movements.segmentation.segment import segment as segment
 from kineme.movements.segmentation.segmentation import Segmentation as Segmentation
 
 # Recordings in files, and data sets
-from kineme.files.recordings import read_recordings as read_recordings
-from kineme.files.recordings import read_recording as read_recording
-from kineme.files.merge_files import Recordings as Recordings
-from kineme.files.write_movement import write_movement as write_movement
+from kineme.io.recordings import read_recordings as read_recordings
+from kineme.io.recordings import read_recording as read_recording
+from kineme.io.merge_files import Recordings as Recordings
+from kineme.io.write_movement import write_movement as write_movement
 from kineme import datasets as datasets
 from kineme.datasets.lasa import load_lasa as load_lasa
 
 # Primitives
-from kineme.primitives.discrete.dmp import DMP as DMP
-from kineme.primitives.discrete.dmp import Primitives as Primitives
-from kineme.primitives.discrete.rollout import Rollout as Rollout
+from kineme.dmp.discrete.dmp import DMP as DMP
+from kineme.dmp.discrete.dmp import Primitives as Primitives
+from kineme.dmp.discrete.rollout import Rollout as Rollout
 from kineme import control as control
-from kineme.primitives.rhythmic.rhythmic_dmp import RhythmicDMP as RhythmicDMP
-from kineme.primitives.rhythmic.rhythmic_dmp import RhythmicPrimitives as RhythmicPrimitives
+from kineme.dmp.rhythmic.rhythmic_dmp import RhythmicDMP as RhythmicDMP
+from kineme.dmp.rhythmic.rhythmic_dmp import RhythmicPrimitives as RhythmicPrimitives
 from kineme import orientation as orientation
 from kineme import styles as styles
-from kineme.primitives.discrete.choose import BasisSelection as BasisSelection
-from kineme.primitives.modulation.couple import couple as couple
-from kineme.primitives.modulation.join import join as join
-from kineme.primitives.modulation.blend import blend as blend
-from kineme.primitives.contextual.contextual import Contextual as Contextual
-from kineme.primitives.improvement.improve import improve as improve
-from kineme.primitives.improvement.improve import Improvement as Improvement
+from kineme.dmp.discrete.choose import BasisSelection as BasisSelection
+from kineme.dmp.modulation.couple import couple as couple
+from kineme.dmp.modulation.join import join as join
+from kineme.dmp.modulation.blend import blend as blend
+from kineme.dmp.contextual.contextual import Contextual as Contextual
+from kineme.dmp.improvement.improve import improve as improve
+from kineme.dmp.improvement.improve import Improvement as Improvement
 
 # Features and kernels
 from kineme.features.dmp_features import DMPFeatures as DMPFeatures
@@ -47,7 +47,7 @@ from kineme import kernels as kernels
 
 # Recognition
 from kineme.recognition.recognizer import Recognizer as Recognizer
-from kineme.comparison.representation import Representation as Representation
+from kineme.similarity.representation import Representation as Representation
 from kineme.kernels.soft_rotation import RotationPrior as RotationPrior
 from kineme.recognition.answer import Answer as Answer
 from kineme.recognition.early.hypotheses import Early as Early

@@ -1,12 +1,12 @@
 # Poses
-from kineme.primitives.pose.pose_dmp import PoseDMP as PoseDMP
-from kineme.primitives.pose.pose_primitives import PosePrimitives as PosePrimitives
-from kineme.primitives.pose.pose_rollout import PoseRollout as PoseRollout
-from kineme.primitives.pose.pose_controller import PoseController as PoseController
-from kineme.primitives.pose.pose_controller import PoseState as PoseState
+from kineme.dmp.pose.pose_dmp import PoseDMP as PoseDMP
+from kineme.dmp.pose.pose_primitives import PosePrimitives as PosePrimitives
+from kineme.dmp.pose.pose_rollout import PoseRollout as PoseRollout
+from kineme.dmp.pose.pose_controller import PoseController as PoseController
+from kineme.dmp.pose.pose_controller import PoseState as PoseState
 from kineme.features.pose_features import PoseFeatures as PoseFeatures
-from kineme.primitives.pose.tangent import to_tangent as to_tangent
-from kineme.primitives.pose.tangent import from_tangent as from_tangent
+from kineme.dmp.pose.tangent import to_tangent as to_tangent
+from kineme.dmp.pose.tangent import from_tangent as from_tangent
 
 # Quaternions (w, x, y, z)
 from kineme.movements.rotations.quaternions import normalized as normalized
@@ -17,6 +17,6 @@ from kineme.movements.rotations.quaternions import angle_between as angle_betwee
 from kineme.movements.rotations.rotation_vectors import exp as exp
 from kineme.movements.rotations.rotation_vectors import log as log
 from kineme.movements.rotations.rotation_vectors import slerp as slerp
-from kineme.primitives.pose.rates import angular_velocity as angular_velocity
-from kineme.primitives.pose.rates import angular_acceleration as angular_acceleration
-from kineme.primitives.pose.rates import rotation_vector_rate as rotation_vector_rate
+from kineme.dmp.pose.rates import angular_velocity as angular_velocity
+from kineme.dmp.pose.rates import angular_acceleration as angular_acceleration
+from kineme.dmp.pose.rates import rotation_vector_rate as rotation_vector_rate

@@ -1,9 +1,9 @@
 # Many demonstrations
-from kineme.primitives.styles.average import average as average
-from kineme.primitives.styles.average import average_by_label as average_by_label
-from kineme.primitives.styles.average import AveragePrimitive as AveragePrimitive
+from kineme.dmp.styles.average import average as average
+from kineme.dmp.styles.average import average_by_label as average_by_label
+from kineme.dmp.styles.average import AveragePrimitive as AveragePrimitive
 
 # Styles
-from kineme.primitives.styles.learn import learn_styles as learn_styles
-from kineme.primitives.styles.model import StyleModel as StyleModel
-from kineme.primitives.styles.model import StyleEstimate as StyleEstimate
+from kineme.dmp.styles.learn import learn_styles as learn_styles
+from kineme.dmp.styles.model import StyleModel as StyleModel
+from kineme.dmp.styles.model import StyleEstimate as StyleEstimate

@@ -16,7 +16,7 @@ from kineme.anchoring.proposals import merge_split
 from kineme.anchoring.proposals.assign import agreement
 from kineme.anchoring.proposals.merge_split import Split, suggest_merges, suggest_splits
 from kineme.anchoring.proposals.subsample import largest_clustered, radii, subsample
-from kineme.comparison.describe import describe
+from kineme.similarity.describe import describe
 from unlabeled_samples import draw_kinds
 
 

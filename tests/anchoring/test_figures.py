@@ -14,9 +14,9 @@ from kineme.anchoring.figures.proposal import draw_proposal
 from kineme.anchoring.figures.symbol_map import draw_map
 from kineme.anchoring.grounding.space import ConceptualSpace, conceptual_space
 from kineme.anchoring.proposals.propose import propose
-from kineme.comparison.alignment import paths_of
 from kineme.movements.preparation.perturbations import Perturbation
-from kineme.output.figures import save_figure
+from kineme.reporting.figures import save_figure
+from kineme.similarity.alignment import paths_of
 from unlabeled_samples import draw_kinds
 
 

@@ -13,10 +13,10 @@ from kineme.anchoring.clustering import fusion
 from kineme.anchoring.clustering.fusion import components, fuse, set_apart
 from kineme.anchoring.clustering.spectral import count_by_eigengap, spectral
 from kineme.anchoring.proposals.propose import by_shape, link_people, propose
-from kineme.comparison.describe import describe
-from kineme.comparison.distances import squared_distances
-from kineme.comparison.representation import ROW_REPRESENTATIONS
-from kineme.comparison.specification import ComparisonSpecification
+from kineme.similarity.describe import describe
+from kineme.similarity.distances import squared_distances
+from kineme.similarity.representation import ROW_REPRESENTATIONS
+from kineme.similarity.specification import ComparisonSpecification
 from soaking import SOAK
 from unlabeled_samples import draw_kinds, recovered
 

@@ -15,7 +15,7 @@ import kineme
 from kineme.anchoring.grounding.ground import SymbolName, ground
 from kineme.anchoring.grounding.grounding_io import grounding_schema, primitive_from
 from kineme.anchoring.grounding.prototypes import medoid_of
-from kineme.primitives.discrete.formulations import FORMULATIONS
+from kineme.dmp.discrete.formulations import FORMULATIONS
 from unlabeled_samples import draw_kinds
 
 quick = settings(max_examples=8, deadline=None, derandomize=True)

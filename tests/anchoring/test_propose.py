@@ -14,12 +14,12 @@ import kineme
 from kineme.anchoring.proposals.proposals import describe_clusters
 from kineme.anchoring.proposals.propose import propose
 from kineme.anchoring.proposals.subsample import extend
-from kineme.comparison.describe import describe, describe_rows, feature_rows
-from kineme.comparison.similarity import averaged, similarities
-from kineme.comparison.specification import ComparisonSpecification
 from kineme.errors import SpecificationError
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.recognition.recognizer import Recognizer
+from kineme.similarity.describe import describe, describe_rows, feature_rows
+from kineme.similarity.similarity import averaged, similarities
+from kineme.similarity.specification import ComparisonSpecification
 from movement_samples import draw_shapes
 from unlabeled_samples import ALL_TOGETHER, draw_kinds, partition, recovered
 

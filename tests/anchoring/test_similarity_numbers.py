@@ -8,11 +8,11 @@ from sklearn.utils import Bunch
 
 from kineme.anchoring.proposals.assign import agreement
 from kineme.anchoring.proposals.merge_split import suggest_merges
-from kineme.comparison.described import Described
-from kineme.comparison.references import References
-from kineme.comparison.similarity import AveragedSimilarity
-from kineme.comparison.widths import SHARE, gap_widths
 from kineme.kernels.procrustes import Procrustes
+from kineme.similarity.described import Described
+from kineme.similarity.references import References
+from kineme.similarity.similarity import AveragedSimilarity
+from kineme.similarity.widths import SHARE, gap_widths
 
 
 def on_a_line(points):

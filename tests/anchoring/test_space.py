@@ -12,8 +12,8 @@ import kineme
 from kineme.anchoring.figures.symbol_map import apart, classical_scaling
 from kineme.anchoring.grounding.morph import morph
 from kineme.anchoring.grounding.space import ConceptualSpace, conceptual_space
-from kineme.comparison.specification import ComparisonSpecification
 from kineme.recognition.recognizer import Recognizer
+from kineme.similarity.specification import ComparisonSpecification
 from unlabeled_samples import draw_kinds
 
 quick = settings(max_examples=8, deadline=None, derandomize=True)

@@ -9,7 +9,7 @@ import pytest
 from kineme.cli.evaluate import METHOD_NAMES, PROTOCOL_NAMES
 from kineme.experiments.evaluation.methods import METHODS
 from kineme.experiments.evaluation.protocols import PROTOCOLS
-from kineme.files.write_movement import write_movement
+from kineme.io.write_movement import write_movement
 
 
 def run(*arguments, by=commands.run):

@@ -6,9 +6,9 @@ import pytest
 from matplotlib.image import imread
 
 import kineme
-from kineme.files.write_movement import write_movement
+from kineme.dmp.generation.figure import short_names
+from kineme.io.write_movement import write_movement
 from kineme.orientation import exp, log, product
-from kineme.primitives.generation.figure import short_names
 
 HEADS = "t,tool.x,tool.y,tool.z,tool.qx,tool.qy,tool.qz,tool.qw,gripper"
 N = 80

@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme.files.write_movement import write_movement
+from kineme.dmp.discrete.dmp import DMP
+from kineme.dmp.generation.deviation import largest_deviation
+from kineme.dmp.generation.figure import draw_movement, path_columns
+from kineme.dmp.generation.generate import MovementOptions, generate
+from kineme.dmp.generation.learned import learn_one
+from kineme.io.write_movement import write_movement
 from kineme.orientation import exp, log, product
-from kineme.primitives.discrete.dmp import DMP
-from kineme.primitives.generation.deviation import largest_deviation
-from kineme.primitives.generation.figure import draw_movement, path_columns
-from kineme.primitives.generation.generate import MovementOptions, generate
-from kineme.primitives.generation.learned import learn_one
 from soaking import combined
 
 U = np.linspace(0, 1, 80)

@@ -13,6 +13,7 @@ import pytest
 
 import kineme
 from kineme import ActionLibrary, Demonstrations
+from kineme.dmp.generation.generate import MovementOptions, generate
 from kineme.errors import DataError, TrajectoryError
 from kineme.library.recognition.recognize import LibraryRecognizer
 from kineme.library.storage.channels import channels_of_text, other_columns
@@ -22,7 +23,6 @@ from kineme.library.symbols.grounding import learned_of
 from kineme.movements.channels.channel import Channel
 from kineme.movements.trajectories.channels import of_channels
 from kineme.orientation import PoseDMP, exp, product
-from kineme.primitives.generation.generate import MovementOptions, generate
 
 CHANNELS = (
     Channel("gripper", "discrete", ("gripper",)),

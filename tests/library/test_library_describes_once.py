@@ -8,8 +8,8 @@ from library_samples import draw_movements
 
 import kineme.anchoring
 from kineme import ActionLibrary, Recognizer
-from kineme.comparison import describe
 from kineme.library.recognition.recognize import LibraryRecognizer
+from kineme.similarity import describe
 
 
 @pytest.fixture

@@ -12,9 +12,9 @@ from library_samples import draw_movements
 
 import kineme
 from kineme import ActionLibrary, Demonstrations, SpecificationError, Trajectory, TrajectoryError
-from kineme.comparison.describe import feature_rows
 from kineme.library.learning import learn as learning
 from kineme.library.storage.source import Source
+from kineme.similarity.describe import feature_rows
 
 SINGLE = 2.0**-24  # relative error of a rounding to single precision
 

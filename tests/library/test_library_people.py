@@ -15,7 +15,7 @@ import kineme
 from kineme import ActionLibrary, Recognizer
 from kineme.anchoring.proposals.propose import propose as propose_clusters
 from kineme.errors import TrajectoryError
-from kineme.files.people import each_person
+from kineme.io.people import each_person
 from kineme.library.recognition.recognize import LibraryRecognizer
 from kineme.library.storage.folder import FILE
 from kineme.library.symbols import proposals

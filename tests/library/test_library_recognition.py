@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 from library_samples import draw_movements
 
 from kineme import ActionLibrary, Demonstrations, Recognizer
-from kineme.comparison.stored_references import StoredReferences
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.library.recognition import calibration_cache
 from kineme.library.recognition import reduced_features_cache as features_cache
 from kineme.library.recognition.recognize import LibraryRecognizer
 from kineme.recognition import sampled_calibration
 from kineme.recognition.left_out import distances
+from kineme.similarity.stored_references import StoredReferences
 
 
 def _kinds(counts, d=2, seed=0, spread=0.05):

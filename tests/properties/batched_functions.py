@@ -38,14 +38,10 @@ from kineme import (
     preprocess,
     styles,
 )
-from kineme.comparison.alignment import maps_onto, paths_of
-from kineme.comparison.alignment import moved as laid_onto
-from kineme.comparison.bounds import fit_bases, reduce_features
-from kineme.comparison.describe import describe_rows, feature_rows
-from kineme.comparison.normalization import SCALES, Normalization
-from kineme.comparison.representation import ROW_REPRESENTATIONS
-from kineme.comparison.similarity import compare
-from kineme.comparison.specification import ComparisonSpecification
+from kineme.dmp.discrete.basis import GATINGS
+from kineme.dmp.discrete.fits import FITS
+from kineme.dmp.discrete.formulations import FORMULATIONS
+from kineme.dmp.modulation.join import laid_out, laid_out_poses
 from kineme.features.movement_features import FEATURES
 from kineme.features.pose_features import PoseFeatures
 from kineme.features.random_binning import RandomBinning
@@ -60,12 +56,16 @@ from kineme.movements.rotations.quaternions import rotated
 from kineme.movements.trajectories.as_learned import as_learned
 from kineme.movements.trajectories.channels import of_channels
 from kineme.orientation import PoseDMP, continuous, from_tangent, normalized, to_tangent
-from kineme.primitives.discrete.basis import GATINGS
-from kineme.primitives.discrete.fits import FITS
-from kineme.primitives.discrete.formulations import FORMULATIONS
-from kineme.primitives.modulation.join import laid_out, laid_out_poses
 from kineme.recognition.answer import Answer
 from kineme.recognition.early.early import cut
+from kineme.similarity.alignment import maps_onto, paths_of
+from kineme.similarity.alignment import moved as laid_onto
+from kineme.similarity.bounds import fit_bases, reduce_features
+from kineme.similarity.describe import describe_rows, feature_rows
+from kineme.similarity.normalization import SCALES, Normalization
+from kineme.similarity.representation import ROW_REPRESENTATIONS
+from kineme.similarity.similarity import compare
+from kineme.similarity.specification import ComparisonSpecification
 
 
 @dataclass(frozen=True)

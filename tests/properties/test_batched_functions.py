@@ -16,17 +16,17 @@ from soaking import SOAK, examples
 
 #: Numbers of one tile of work, set so small that every batch is many tiles, none of which begins where the batch does.
 TILES = {
-    "kineme.primitives.discrete.encode._TILE_SAMPLES": 700,
-    "kineme.primitives.discrete.rollout._TILE_SAMPLES": 700,
+    "kineme.dmp.discrete.encode._TILE_SAMPLES": 700,
+    "kineme.dmp.discrete.rollout._TILE_SAMPLES": 700,
     "kineme.movements.preparation.smooth._TILE_MOVEMENTS": 7,
-    "kineme.comparison.describe._TILE_SAMPLES": 3000,
-    "kineme.comparison.scores._TILE_PAIRS": 100,
+    "kineme.similarity.describe._TILE_SAMPLES": 3000,
+    "kineme.similarity.scores._TILE_PAIRS": 100,
     "kineme.recognition.early.early._TILE": 5000,
     "kineme.kernels.procrustes._PAIRS": 300,
     "kineme.kernels.pair_distances._TILE_PAIRS": 500,
     "kineme.kernels.pair_distances._TILE_BOUNDS": 500,
-    "kineme.primitives.pose.tangent._TILE_SAMPLES": 400,
-    "kineme.primitives.rhythmic.encode._TILE_SAMPLES": 700,
+    "kineme.dmp.pose.tangent._TILE_SAMPLES": 400,
+    "kineme.dmp.rhythmic.encode._TILE_SAMPLES": 700,
 }
 
 

@@ -9,9 +9,6 @@ import pytest
 from scipy.stats import chi
 
 import kineme
-from kineme.comparison.described import Described
-from kineme.comparison.references import References
-from kineme.comparison.similarity import AveragedSimilarity
 from kineme.kernels.procrustes import Prepared, Procrustes
 from kineme.recognition.confidence import class_probabilities, fit_exponent
 from kineme.recognition.conformal import GUESSES, RULES, Calibration, between_classes, calibrate, least_scale
@@ -26,6 +23,9 @@ from kineme.recognition.left_out import (
     typical_distance,
     typical_scale,
 )
+from kineme.similarity.described import Described
+from kineme.similarity.references import References
+from kineme.similarity.similarity import AveragedSimilarity
 from movement_samples import draw_shapes
 
 NONE = np.inf

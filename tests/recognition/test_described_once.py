@@ -7,7 +7,7 @@ import pytest
 
 from kineme import Recognizer, Trajectory
 from kineme.anchoring.proposals.assign import assign
-from kineme.comparison import describe
+from kineme.similarity import describe
 from movement_samples import draw_shapes
 
 QUESTIONS = ["predict", "predict_proba", "decision_function", "p_values", "predict_known", "novelty", "describe"]

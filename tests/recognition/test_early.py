@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme.comparison.describe import N_POINTS
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.kernels.procrustes import Procrustes
 from kineme.kernels.soft_rotation import RotationPrior
@@ -19,6 +18,7 @@ from kineme.recognition.early.early import cut, earliness
 from kineme.recognition.early.early import partial_shares as shares_of
 from kineme.recognition.early.hypotheses import Early, beginning_procrustes, ending, hypotheses
 from kineme.recognition.early.prefixes import N_PREFIX, beginnings, describe_prefixes, smooth_paths, smoother
+from kineme.similarity.describe import N_POINTS
 
 
 def partial_shares(recognizer, movements):

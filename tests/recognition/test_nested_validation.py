@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from kineme import Recognizer, RotationPrior
-from kineme.comparison import widths
+from kineme.similarity import widths
 from movement_samples import draw_shapes
 
 ROOT = str(Path(__file__).parents[2])

@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 from scipy.stats import chi
 
 from kineme import Recognizer, TrajectoryError
-from kineme.comparison.described import Described
-from kineme.comparison.references import References
-from kineme.comparison.similarity import AveragedSimilarity
 from kineme.kernels.procrustes import Prepared, Procrustes
 from kineme.recognition.confidence import EXPONENT, class_probabilities, fit_exponent
 from kineme.recognition.conformal import calibrate
 from kineme.recognition.left_out import ClassDistances, law
+from kineme.similarity.described import Described
+from kineme.similarity.references import References
+from kineme.similarity.similarity import AveragedSimilarity
 from movement_samples import draw_shapes
 from soaking import combined
 

@@ -11,9 +11,9 @@ from sklearn.metrics import roc_auc_score
 
 import kineme
 from kineme import Recognizer, SpecificationError
-from kineme.comparison.scores import nearest as nearest_of_each
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.recognition.conformal import calibrate
+from kineme.similarity.scores import nearest as nearest_of_each
 from movement_samples import draw_shapes
 
 ALL = Perturbation(shift=1, scale=1, rotation=np.deg2rad(20), warp=0.35, noise=0.01)

@@ -9,9 +9,6 @@ import pytest
 
 import kineme
 from kineme import Demonstrations, Recognizer, Trajectory
-from kineme.comparison.described import Described
-from kineme.comparison.representation import DEFAULT_REPRESENTATIONS, ROW_REPRESENTATIONS
-from kineme.comparison.weights import aligned_weights
 from kineme.kernels.procrustes import Prepared, Procrustes
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.movements.segmentation.motion import observe
@@ -25,6 +22,9 @@ from kineme.recognition.early.hypotheses import Early, hypotheses
 from kineme.recognition.early.prefixes import smooth_paths
 from kineme.recognition.left_out import typical_scale
 from kineme.recognition.spotting import Manner, expected, score_windows
+from kineme.similarity.described import Described
+from kineme.similarity.representation import DEFAULT_REPRESENTATIONS, ROW_REPRESENTATIONS
+from kineme.similarity.weights import aligned_weights
 from movement_samples import draw_shapes
 
 

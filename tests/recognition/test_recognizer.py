@@ -15,11 +15,11 @@ from sklearn.svm import SVC
 
 import kineme
 from kineme import Demonstrations, Recognizer, SpecificationError, Trajectory, TrajectoryError
-from kineme.comparison import scores as module
 from kineme.datasets.lasa import PAPER_LETTERS
 from kineme.kernels.soft_rotation import RotationPrior
 from kineme.movements.preparation.arc_length import arc_length_phase
 from kineme.movements.preparation.perturbations import Perturbation
+from kineme.similarity import scores as module
 from movement_samples import draw_shapes, turn
 
 any_seed = given(seed=st.integers(0, 10**6))

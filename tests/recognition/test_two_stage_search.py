@@ -10,14 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kineme import Demonstrations, Recognizer
-from kineme.comparison import stored_references
-from kineme.comparison.bounds import fit_bases, reduce_features
-from kineme.comparison.describe import feature_rows
-from kineme.comparison.representation import ROW_REPRESENTATIONS
-from kineme.comparison.stored_references import StoredReferences
 from kineme.errors import SpecificationError
 from kineme.recognition import two_stage_search
 from kineme.recognition.two_stage_search import TwoStageSearch
+from kineme.similarity import stored_references
+from kineme.similarity.bounds import fit_bases, reduce_features
+from kineme.similarity.describe import feature_rows
+from kineme.similarity.representation import ROW_REPRESENTATIONS
+from kineme.similarity.stored_references import StoredReferences
 from movement_samples import draw_shapes
 from soaking import examples
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kineme import Recognizer, SpecificationError, TrajectoryError
-from kineme.comparison.representation import DEFAULT_REPRESENTATIONS, Representation
+from kineme.similarity.representation import DEFAULT_REPRESENTATIONS, Representation
 from movement_samples import draw_shapes
 
 DEMOS = draw_shapes([2, 2])

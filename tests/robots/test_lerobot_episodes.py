@@ -10,8 +10,8 @@ import pytest
 
 import kineme
 from kineme.errors import DataError, SpecificationError
-from kineme.files.lerobot import write_episode as module
-from kineme.files.lerobot.write_episode import merged_statistics, statistics_of
+from kineme.io.lerobot import write_episode as module
+from kineme.io.lerobot.write_episode import merged_statistics, statistics_of
 from kineme.robots.execution.joint_trajectory import JointTrajectory
 from kineme.robots.export.lerobot import states_at, write_lerobot
 from lerobot_sets import write_v2, write_v3

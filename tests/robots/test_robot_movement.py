@@ -8,9 +8,9 @@ from scipy.spatial.transform import Rotation
 
 import kineme
 from arm_samples import stroke
+from kineme.dmp.generation.learned import learn_one
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.orientation import PoseDMP
-from kineme.primitives.generation.learned import learn_one
 from kineme.robots import InfeasibleError, load, move
 from kineme.robots.checks.along import along
 from kineme.robots.kinematics.inverse import InverseKinematics

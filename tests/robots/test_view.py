@@ -19,7 +19,7 @@ from kineme.robots import view
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")
 
 from kineme.movements.trajectories.trajectory import Trajectory
-from kineme.output import figures
+from kineme.reporting import figures
 from kineme.robots import load, move, write_view
 from kineme.robots.checks.along import along
 from kineme.robots.kinematics.inverse import InverseKinematics

@@ -14,10 +14,10 @@ from node_runtime import NODE, REASON, ask
 from studio_samples import drawing, make_library
 
 from kineme import ActionLibrary, Demonstrations, Trajectory
+from kineme.dmp.discrete.formulations import FORMULATIONS
+from kineme.dmp.styles.learn import learn_styles
 from kineme.movements.channels.channel import Channel
 from kineme.movements.trajectories.channels import of_channels
-from kineme.primitives.discrete.formulations import FORMULATIONS
-from kineme.primitives.styles.learn import learn_styles
 from kineme.studio.server import rollouts
 
 

@@ -445,7 +445,7 @@ def test_the_dark_scheme_is_other_tokens_and_nothing_else():
 
 
 def test_colors_of_the_figures_are_those_of_the_page():
-    figures = pytest.importorskip("kineme.output.figures")
+    figures = pytest.importorskip("kineme.reporting.figures")
     tokens = (WEB / "tokens.css").read_text()
     for name in ("BLUE", "ORANGE", "GREEN", "PURPLE", "GRAY"):
         assert f"--{name.lower()}: {getattr(figures, name).lower()};" in tokens

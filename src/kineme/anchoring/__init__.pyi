@@ -1,7 +1,7 @@
 # How alike movements are
-from kineme.comparison.describe import describe as describe
-from kineme.comparison.describe import describe_rows as describe_rows
-from kineme.comparison.similarity import similarities as similarities
+from kineme.similarity.describe import describe as describe
+from kineme.similarity.describe import describe_rows as describe_rows
+from kineme.similarity.similarity import similarities as similarities
 
 # New symbols, and changed ones
 from kineme.anchoring.proposals.propose import propose as propose

@@ -13,7 +13,7 @@ import click
 from kineme.cli.options import json_option, library_option, whole
 from kineme.cli.output import ask, confirm, say, write
 from kineme.errors import KinemeError
-from kineme.output.text import counted, printable
+from kineme.reporting.text import counted, printable
 
 HELP = """\
   a name         makes it a symbol, or joins the symbol of that name
@@ -138,7 +138,7 @@ def _draw(library: Any, proposals: Any, folder: Path) -> list[Path]:
     """Draw an overview of all proposals, then a picture of each."""
     from kineme.anchoring.figures.all_proposals import draw_proposals
     from kineme.anchoring.figures.proposal import draw_proposal
-    from kineme.output.figures import save_figure
+    from kineme.reporting.figures import save_figure
 
     if not len(proposals):
         return []
@@ -206,7 +206,7 @@ def _as_data(proposals: Any) -> dict[str, Any]:
 
 
 def _text(data: dict[str, Any], alone: str) -> str:
-    from kineme.output.table import Table, to_text
+    from kineme.reporting.table import Table, to_text
 
     lines = [f"{counted(n, 'movement')} joined {printable(name)}" for name, n in data["joined"].items()]
     lines += [f"{counted(n, 'movement')} would join {printable(name)}" for name, n in data["would_join"].items()]

@@ -14,17 +14,17 @@ from kineme.cli.channels import differences
 from kineme.cli.options import Finite, GroupedCommand, force_option, heading, json_option, library_option
 from kineme.cli.output import check_new, say, write
 from kineme.cli.reading import known_choices, layout_options, problem_lines, read, recordings_argument
-from kineme.output.text import counted, printable
+from kineme.reporting.text import counted, printable
 
 
 class Format(click.ParamType):  # type: ignore[type-arg]
-    """A key of `kineme.files.annotations.writers.WRITERS`, which --help does not load."""
+    """A key of `kineme.io.annotations.writers.WRITERS`, which --help does not load."""
 
     name = "NAME"
 
     def convert(self, value: Any, param: Any, ctx: Any) -> str:
         """The name, if there is such a format."""
-        from kineme.files.annotations.writers import WRITERS
+        from kineme.io.annotations.writers import WRITERS
 
         if value not in WRITERS:
             self.fail(f"expected one of {', '.join(WRITERS)}, got {value!r}", param, ctx)
@@ -59,10 +59,10 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
 
     Example: kineme annotate long.csv --library actions/ -o long-labels.csv
     """
-    from kineme.files.annotations.tables import as_row, to_csv
-    from kineme.files.annotations.writers import targets_of, write_annotations
-    from kineme.files.entries import expanded, paths_of
-    from kineme.files.inspection.gaps import notes_on_gaps
+    from kineme.io.annotations.tables import as_row, to_csv
+    from kineme.io.annotations.writers import targets_of, write_annotations
+    from kineme.io.entries import expanded, paths_of
+    from kineme.io.inspection.gaps import notes_on_gaps
     from kineme.library.library import ActionLibrary
     from kineme.library.recognition.annotate import annotate as find
 
@@ -130,7 +130,7 @@ def _progress(parsed: Any) -> Iterator[Callable[[float], None]]:
 
 
 def _text(data: dict[str, Any], problems: list[str]) -> str:
-    from kineme.output.table import to_text
+    from kineme.reporting.table import to_text
 
     rows, written = data["annotations"], data["written"]
     known = [one for one in rows if not one["unknown"]]
@@ -151,7 +151,7 @@ def _remarks(data: dict[str, Any], problems: list[str]) -> list[str]:
 
 
 def _each(rows: list[dict[str, Any]]) -> Any:
-    from kineme.output.table import Table
+    from kineme.reporting.table import Table
 
     heads = ("recording", "start [s]", "end [s]", "symbol", "how sure")
     return Table(
@@ -171,7 +171,7 @@ def _each(rows: list[dict[str, Any]]) -> Any:
 
 
 def _totals(rows: list[dict[str, Any]]) -> Any:
-    from kineme.output.table import Table
+    from kineme.reporting.table import Table
 
     names = ["unknown" if one["unknown"] else printable(one["symbol"]) for one in rows]
     seconds: Counter[str] = Counter()

@@ -107,7 +107,7 @@ def _numbered(sets: list[Any]) -> list[Any]:
 
 def _print(name: str, evaluation: Any) -> None:
     from kineme.experiments.evaluation.conclusions import verdict
-    from kineme.output.table import to_text
+    from kineme.reporting.table import to_text
 
     write("\n\n".join([name] * bool(name) + list(map(to_text, evaluation.tables))))
     for what, reason in (evaluation.results.absent | evaluation.results.skipped).items():
@@ -116,7 +116,7 @@ def _print(name: str, evaluation: Any) -> None:
 
 
 def _print_summary(summary: Any, page: Path) -> None:
-    from kineme.output.table import to_text
+    from kineme.reporting.table import to_text
 
     write(summary.ranks if isinstance(summary.ranks, str) else to_text(summary.ranks))
     write(f"\nopen {page}")

@@ -22,7 +22,7 @@ from kineme.cli.options import (
 from kineme.cli.output import check_new, write, write_bytes
 from kineme.cli.reading import layout_options
 from kineme.cli.source import read_source
-from kineme.output.text import printable
+from kineme.reporting.text import printable
 
 _BAD_FIT = 0.05  # of the extent of the recording
 _MISSED = 0.01  # of the extent of a column
@@ -66,8 +66,8 @@ def generate(**options: Any) -> None:
     kineme generate wave --library actions/ --goal 0.4,0.2 --duration 2 -o wave.csv
     kineme generate wave.csv --goal 0.4,0.2 --duration 2 -o new.csv --plot new.png
     """  # noqa: D301 - a backspace tells click to keep the lines
-    from kineme.primitives.generation.generate import checked_point
-    from kineme.primitives.generation.generate import generate as make
+    from kineme.dmp.generation.generate import checked_point
+    from kineme.dmp.generation.generate import generate as make
 
     for name in ("output", "save", "plot"):
         check_new(options[name], options["force"], options["source"])
@@ -86,7 +86,7 @@ def generate(**options: Any) -> None:
 
 
 def _warn_of_bad_fit(learned: Any) -> None:
-    from kineme.primitives.generation.deviation import largest_deviation
+    from kineme.dmp.generation.deviation import largest_deviation
 
     off = largest_deviation(learned)
     if off is not None and off.share > _BAD_FIT:
@@ -122,7 +122,7 @@ def _warn_of_missed_goal(learned: Any, made: Any, wanted: Any) -> None:
 def _movement_options(options: dict[str, Any]) -> Any:
     import numpy as np
 
-    from kineme.primitives.generation.generate import MovementOptions
+    from kineme.dmp.generation.generate import MovementOptions
 
     obstacles = options["obstacles"]
     if len({len(point) for point in obstacles}) > 1:
@@ -138,14 +138,14 @@ def _movement_options(options: dict[str, Any]) -> Any:
 
 
 def _plot(path: Path, learned: Any, made: Any, obstacles: Any) -> None:
-    from kineme.output.figures import save_figure
-    from kineme.primitives.generation.figure import draw_movement
+    from kineme.dmp.generation.figure import draw_movement
+    from kineme.reporting.figures import save_figure
 
     save_figure(draw_movement(learned, made.columns, obstacles), path)
 
 
 def _write(output: Path, made: Any, ending: str) -> None:
-    from kineme.files.write_movement import encode_movement, write_movement
+    from kineme.io.write_movement import encode_movement, write_movement
 
     if str(output) == "-":
         write_bytes(encode_movement(made.columns, ending, made.names))

@@ -40,11 +40,11 @@ def inspect(
     Example: kineme inspect recordings/ --plot recordings.png
     """
     from kineme.errors import DataError
-    from kineme.files.entries import in_words
-    from kineme.files.inspection.contents import contents_as_data, contents_as_words, contents_of_all
-    from kineme.files.inspection.inspect import inspect as summarize
-    from kineme.files.inspection.inspect import nothing_read
-    from kineme.files.inspection.report import as_data, as_words
+    from kineme.io.entries import in_words
+    from kineme.io.inspection.contents import contents_as_data, contents_as_words, contents_of_all
+    from kineme.io.inspection.inspect import inspect as summarize
+    from kineme.io.inspection.inspect import nothing_read
+    from kineme.io.inspection.report import as_data, as_words
 
     files = [one for one in recordings if str(one) != "-"]
     contents = contents_of_all(files, options["follow_links"])
@@ -94,7 +94,7 @@ def _outliers(recorded: Any, error_rate: float) -> tuple[tuple[int, ...], dict[s
 
 
 def _draw(recorded: Any, unlike: tuple[int, ...], path: Path) -> None:
-    from kineme.files.inspection.figure import draw_recordings
-    from kineme.output.figures import save_figure
+    from kineme.io.inspection.figure import draw_recordings
+    from kineme.reporting.figures import save_figure
 
     save_figure(draw_recordings(recorded, unlike), path)

@@ -13,7 +13,7 @@ import click
 from kineme.cli.options import GroupedCommand, json_option, library_option
 from kineme.cli.output import say
 from kineme.cli.reading import layout_options, problem_lines, read, recordings_argument
-from kineme.output.text import counted, printable
+from kineme.reporting.text import counted, printable
 
 _SHOWN = 10  # problems that are listed
 
@@ -51,7 +51,7 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
 
     Example: kineme learn recordings/ --library actions/
     """
-    from kineme.files.entries import root_of
+    from kineme.io.entries import root_of
     from kineme.library.library import ActionLibrary
 
     as_json, label, no_labels = options.pop("as_json"), options.pop("label"), options.pop("no_labels")
@@ -85,9 +85,9 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
 
 def _notes(recordings: Any) -> list[str]:
     """What a person should know of how recordings were read, before they rely on what is learned."""
-    from kineme.files.column_order import notes_on_aside, notes_on_order
-    from kineme.files.inspection.extents import notes_on_extents, notes_on_sizes
-    from kineme.files.inspection.gaps import notes_on_gaps, notes_on_sampling
+    from kineme.io.column_order import notes_on_aside, notes_on_order
+    from kineme.io.inspection.extents import notes_on_extents, notes_on_sizes
+    from kineme.io.inspection.gaps import notes_on_gaps, notes_on_sampling
     from kineme.movements.channels.column_match import columns_recorded
 
     demos = recordings.demonstrations
@@ -101,8 +101,8 @@ def _labeled(recordings: Any, table: Path | None) -> Any:
     """The stretches that a table labels, where there is one."""
     if table is None:
         return recordings
-    from kineme.files.annotations.labeled_pieces import labeled_pieces
-    from kineme.files.annotations.read_labels import read_labels
+    from kineme.io.annotations.labeled_pieces import labeled_pieces
+    from kineme.io.annotations.read_labels import read_labels
 
     return labeled_pieces(recordings, read_labels(table))
 
@@ -110,7 +110,7 @@ def _labeled(recordings: Any, table: Path | None) -> Any:
 def _people(root: Path, recordings: Any, person: str | None, by_person: bool) -> list[str | None] | None:
     """Who showed each movement, as far as the options and the recordings say."""
     from kineme.errors import DataError
-    from kineme.files.people import each_person
+    from kineme.io.people import each_person
 
     if recordings.people is not None and person is not None:
         raise click.UsageError("expected --person, or people from --person-column or --label-pattern, not both")

@@ -10,7 +10,7 @@ import click
 
 from kineme.cli.options import ID, SymbolName, json_option, library_option, whole
 from kineme.cli.output import confirm, in_words, say
-from kineme.output.text import counted, printable
+from kineme.reporting.text import counted, printable
 
 
 @click.group()
@@ -45,7 +45,7 @@ def list_symbols(folder: Path, version: int | None, as_json: bool) -> None:
         }
 
     def text() -> str:
-        from kineme.output.table import Table, to_text
+        from kineme.reporting.table import Table, to_text
 
         rows = [(printable(s.name), f"{len(s)}", s.id, printable(s.description)) for s in symbols]
         by = f", {sum(people.values()):,} by {counted(len(people), 'person', 'people')}" if people else ""
@@ -143,7 +143,7 @@ def history(folder: Path, limit: int, as_json: bool) -> None:
     data = [{"version": one.id, "at": one.at, "action": one.action, **one.detail} for one in versions[-limit:]]
 
     def text() -> str:
-        from kineme.output.table import Table, to_text
+        from kineme.reporting.table import Table, to_text
 
         rows = [
             (str(one.id), one.at[:19].replace("T", " "), one.action, printable(in_words(one.detail)))
@@ -229,7 +229,7 @@ def brief(symbol: Any) -> dict[str, Any]:
 
 
 def _report_text(data: dict[str, Any]) -> str:
-    from kineme.output.table import Table, to_text
+    from kineme.reporting.table import Table, to_text
 
     told = any(one["person"] for one in data["members"])
     rows = [

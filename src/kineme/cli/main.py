@@ -27,7 +27,7 @@ from kineme.cli.segment import segment
 from kineme.cli.studio import studio
 from kineme.cli.symbols import COMMANDS as MEANING
 from kineme.errors import KinemeError
-from kineme.output.text import printable, printable_lines
+from kineme.reporting.text import printable, printable_lines
 from kineme.runtime.compiled import tell_when_compiling
 
 _BROKEN_PIPE = 128 + 13  # as a shell says it of a tool that the signal ends

@@ -10,7 +10,7 @@ import click
 from kineme.cli.library import brief, opened
 from kineme.cli.options import ID, SymbolName, json_option, library_option
 from kineme.cli.output import say
-from kineme.output.text import counted, printable
+from kineme.reporting.text import counted, printable
 
 
 @click.command()

@@ -22,7 +22,7 @@ from kineme.cli.options import (
 from kineme.cli.output import check_new, say, write, write_bytes
 from kineme.cli.reading import layout_options
 from kineme.cli.source import name_of_source, read_source
-from kineme.output.text import printable
+from kineme.reporting.text import printable
 
 _NEW_FILE = click.Path(path_type=Path)
 
@@ -101,7 +101,7 @@ def write_files(made: Any, options: dict[str, Any]) -> None:
         else:
             writer(path, trajectory)
     if options["plot"]:
-        from kineme.output.figures import save_figure
+        from kineme.reporting.figures import save_figure
         from kineme.robots.view.figure import draw_robot_movement
 
         save_figure(draw_robot_movement(made), options["plot"])
@@ -173,7 +173,7 @@ def move(**options: Any) -> None:
     kineme move wave --library actions/ --robot my_robot.urdf --tip tool0 --slow-down --ros2 wave.mcap
     """  # noqa: D301 - a backspace tells click to keep the lines
     from kineme.errors import heard_warnings
-    from kineme.output.table import to_text
+    from kineme.reporting.table import to_text
     from kineme.robots.checks.report import preflight_table
     from kineme.robots.models.load import load
 
@@ -227,7 +227,7 @@ def _moved(robot: Any, options: dict[str, Any]) -> Any:
             force=options["force"],
         )
     except InfeasibleError as error:
-        from kineme.output.table import to_text
+        from kineme.reporting.table import to_text
         from kineme.robots.checks.report import preflight_table
 
         if error.preflight is not None:

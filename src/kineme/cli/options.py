@@ -162,7 +162,7 @@ class SpecificationOption(click.Option):
         """The default of the field."""
         from dataclasses import fields
 
-        from kineme.primitives.discrete.dmp import DMP
+        from kineme.dmp.discrete.dmp import DMP
 
         return next(field.default for field in fields(DMP) if field.name == self.name)
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from kineme.output.text import printable, printable_lines
+from kineme.reporting.text import printable, printable_lines
 
 _LISTED = 12  # items of a list that are printed; more are counted
 

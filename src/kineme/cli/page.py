@@ -9,7 +9,7 @@ import click
 from kineme.cli.library import opened
 from kineme.cli.options import force_option, json_option, library_option, whole
 from kineme.cli.output import check_new, say
-from kineme.output.text import printable
+from kineme.reporting.text import printable
 
 
 @click.command(short_help="A library as one HTML page: draw, recognize, drag.")

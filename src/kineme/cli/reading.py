@@ -11,7 +11,7 @@ from typing import Any
 import click
 
 from kineme.cli.options import READING, Finite, under
-from kineme.output.text import printable
+from kineme.reporting.text import printable
 
 _NAMED = 6  # columns that a sentence names
 STANDARD_INPUT = "standard input.csv"
@@ -157,9 +157,9 @@ def read(paths: Path | Sequence[Path], options: dict[str, Any], library: Any = N
     Where a bag has several topics and none is asked for, it is read as the movements of `library` were; and where no
     columns are asked for, a file that has the columns of `library` is read without others.
     """
-    from kineme.files.limits import read_limited
-    from kineme.files.name_rule import NameRule
-    from kineme.files.recordings import read_paths
+    from kineme.io.limits import read_limited
+    from kineme.io.name_rule import NameRule
+    from kineme.io.recordings import read_paths
     from kineme.movements.tables.layout import Layout
 
     known = {name.removesuffix("_column"): value for name, value in options.items()}

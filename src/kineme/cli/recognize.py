@@ -12,7 +12,7 @@ from kineme.cli.channels import differences
 from kineme.cli.options import Finite, GroupedCommand, json_option, library_option, whole
 from kineme.cli.output import say
 from kineme.cli.reading import known_choices, layout_options, problem_lines, read, recordings_argument
-from kineme.output.text import printable
+from kineme.reporting.text import printable
 
 _AT_ONCE = 250  # movements recognized between two steps of the progress bar: fewer cost more each
 
@@ -44,7 +44,7 @@ def recognize(
 
     Example: kineme recognize *.csv --library actions/
     """
-    from kineme.files.inspection.gaps import notes_on_gaps
+    from kineme.io.inspection.gaps import notes_on_gaps
     from kineme.library.library import ActionLibrary
 
     with ActionLibrary(folder, read_only=True) as library:
@@ -100,7 +100,7 @@ def _as_data(source: Any, answer: Any, ids: dict[str, str], top: int) -> dict[st
 
 
 def _text(data: dict[str, Any], error_rate: float, problems: list[str]) -> str:
-    from kineme.output.table import Table, to_text
+    from kineme.reporting.table import Table, to_text
 
     rows = []
     for one in data["movements"]:

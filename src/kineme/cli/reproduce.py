@@ -31,7 +31,7 @@ def reproduce(out: Path, draws: int | None, seed: int, quick: bool) -> None:
         return tqdm(items, total=total, desc="reproducing", unit="part", leave=False, disable=None)
 
     result = run(out, draws or (3 if quick else 12), seed, quick, progress)
-    from kineme.output.table import to_text
+    from kineme.reporting.table import to_text
 
     write("\n\n".join(map(to_text, result.tables)))
     write(f"\n{len(result.files)} files in {out}; open {out / 'report.html'}")

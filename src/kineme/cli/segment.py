@@ -11,7 +11,7 @@ import click
 from kineme.cli.options import Finite, GroupedCommand, force_option, heading, json_option, whole
 from kineme.cli.output import check_new, say
 from kineme.cli.reading import layout_options, read, recordings_argument
-from kineme.output.text import counted, printable
+from kineme.reporting.text import counted, printable
 
 #: Parameters of the methods: type, help.
 _PARAMETERS: dict[str, tuple[Any, str]] = {
@@ -57,7 +57,7 @@ def segment(
 
     Example: kineme segment long.csv -o pieces/ --plot pieces.png
     """
-    from kineme.files.entries import paths_of
+    from kineme.io.entries import paths_of
 
     as_json, force = options.pop("as_json"), options.pop("force")
     chosen = {name: value for name in _PARAMETERS if (value := options.pop(name)) is not None}
@@ -106,7 +106,7 @@ def _cut(parsed: Any, by: str, chosen: dict[str, Any], problems: list[str]) -> t
 
 def _files(cut: list[Any], movements: list[Any], output: Path | None, form: str) -> list[Path]:
     """A file for each piece; none without a folder for them."""
-    from kineme.files.file_names import distinct_stems
+    from kineme.io.file_names import distinct_stems
 
     if output is None:
         return []
@@ -117,7 +117,7 @@ def _files(cut: list[Any], movements: list[Any], output: Path | None, form: str)
 
 
 def _write(cut: list[Any], files: list[Path], output: Path) -> None:
-    from kineme.files.write_movement import write_movement
+    from kineme.io.write_movement import write_movement
 
     output.mkdir(parents=True, exist_ok=True)
     pieces = (piece for one in cut for piece in one)
@@ -128,7 +128,7 @@ def _write(cut: list[Any], files: list[Path], output: Path) -> None:
 def _draw(cut: list[Any], path: Path) -> None:
     from kineme.errors import DataError
     from kineme.movements.segmentation.figure import draw_segmentations
-    from kineme.output.figures import save_figure
+    from kineme.reporting.figures import save_figure
 
     if not cut:
         raise DataError("expected recordings that can be cut, to draw them, got none")
@@ -145,7 +145,7 @@ def _as_data(cut: list[Any], movements: list[Any], files: list[Path]) -> list[di
 
 
 def _text(pieces: list[dict[str, Any]], problems: list[str], output: Path | None) -> str:
-    from kineme.output.table import Table, to_text
+    from kineme.reporting.table import Table, to_text
 
     heads = ("recording", "piece", "start [s]", "end [s]", "duration [s]")
     rows = [

@@ -10,7 +10,7 @@ from click.core import ParameterSource
 
 from kineme.cli.options import SPECIFICATION
 from kineme.cli.reading import LAYOUT_OPTIONS, read
-from kineme.output.text import printable
+from kineme.reporting.text import printable
 
 
 def read_source(options: dict[str, Any]) -> Any:
@@ -23,8 +23,8 @@ def read_source(options: dict[str, Any]) -> Any:
 
         with ActionLibrary(options["folder"], read_only=True) as library:
             return learned_of(library.store, source)
-    from kineme.primitives.discrete.dmp import DMP
-    from kineme.primitives.generation.learned import SAVED, Learned, learn_one, load_saved
+    from kineme.dmp.discrete.dmp import DMP
+    from kineme.dmp.generation.learned import SAVED, Learned, learn_one, load_saved
 
     if source != "-" and not Path(source).exists():
         raise FileNotFoundError(

@@ -11,7 +11,7 @@ import click
 
 from kineme.cli.options import library_option_of
 from kineme.cli.output import write
-from kineme.output.text import printable
+from kineme.reporting.text import printable
 
 _PORTS = click.IntRange(1, 65535)
 

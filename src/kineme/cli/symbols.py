@@ -12,7 +12,7 @@ import click
 from kineme.cli.library import opened
 from kineme.cli.options import SymbolName, json_option, library_option, whole
 from kineme.cli.output import say, to_json
-from kineme.output.text import counted, printable
+from kineme.reporting.text import counted, printable
 
 
 @click.command(short_help="Write a symbol for a planner, as JSON.")
@@ -76,7 +76,7 @@ def draw(path: Path, folder: Path, as_json: bool) -> None:
     """Draw a map of the symbols, similar ones near each other: a .png, .svg or .pdf file."""
     from kineme.anchoring.figures.symbol_map import draw_map
     from kineme.library.symbols.grounding import prototype_of, space_of
-    from kineme.output.figures import save_figure
+    from kineme.reporting.figures import save_figure
 
     with opened(folder) as actions:
         space = space_of(actions.store)
@@ -91,7 +91,7 @@ def _lies(one: dict[str, Any]) -> str:
 
 
 def _write(data: dict[str, Any], output: Path) -> None:
-    from kineme.output.atomic import write_atomically
+    from kineme.reporting.atomic import write_atomically
 
     if str(output) == "-":
         say(True, data, str)

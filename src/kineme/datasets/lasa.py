@@ -12,7 +12,7 @@ from importlib.metadata import PackageNotFoundError, files
 from pathlib import Path
 
 from kineme.errors import DataError, SpecificationError
-from kineme.files.arrays.matlab import Demos, read_demos
+from kineme.io.arrays.matlab import Demos, read_demos
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.validation import Array, check_choice
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any, ClassVar, Self
 
+from kineme.dmp.discrete.dmp import DMP
 from kineme.features.movement_features import MovementFeatures
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements_like import MovementsLike
-from kineme.primitives.discrete.dmp import DMP
 
 
 class DMPFeatures(MovementFeatures[DMP]):

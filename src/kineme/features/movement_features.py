@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.utils.validation import check_is_fitted
 
+from kineme.dmp.discrete.dmp import DMP, Primitives
+from kineme.dmp.rhythmic.rhythmic_dmp import RhythmicDMP, RhythmicPrimitives
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import axis_names
 from kineme.movements.trajectories.movements_like import MovementsLike
-from kineme.primitives.discrete.dmp import DMP, Primitives
-from kineme.primitives.rhythmic.rhythmic_dmp import RhythmicDMP, RhythmicPrimitives
 from kineme.validation import check_choice, check_count
 
 #: Feature name -> (primitives, S) -> array (n, size, d).

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, TransformerMixin, clone
 from sklearn.utils.validation import check_is_fitted
 
+from kineme.dmp.pose.tangent import as_poses, to_tangent
 from kineme.errors import TrajectoryError
 from kineme.features.dmp_features import DMPFeatures
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements_like import MovementsLike
-from kineme.primitives.pose.tangent import as_poses, to_tangent
 from kineme.validation import check_number
 
 

@@ -22,6 +22,7 @@ from kineme.movements.trajectories.movements_like import MovementsLike
 if TYPE_CHECKING:
     from kineme.anchoring.grounding.space import Between, Near
     from kineme.anchoring.proposals.proposals import Proposal
+    from kineme.dmp.discrete.dmp import DMP, Primitives
     from kineme.library.learning.learn import LearnReport
     from kineme.library.recognition.recognize import LibraryRecognizer
     from kineme.library.storage.source import Source
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
     from kineme.movements.trajectories.demonstrations import Demonstrations
     from kineme.movements.trajectories.movements_like import HasDemonstrations
     from kineme.movements.trajectories.trajectory import Trajectory
-    from kineme.primitives.discrete.dmp import DMP, Primitives
     from kineme.recognition.answer import Answer
     from kineme.recognition.early.hypotheses import Early
     from kineme.recognition.early.stream import Live

@@ -9,20 +9,20 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.comparison import Comparison
-from kineme.comparison.describe import Tile, recorded_paths
-from kineme.comparison.references import IndexedMovements, References
-from kineme.comparison.scores import Compared, for_compared
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import Label
 from kineme.movements.trajectories.movements_like import MovementLike, MovementsLike
 from kineme.movements.trajectories.trajectory import Trajectory
-from kineme.output.table import Table, data_frame, to_html
 from kineme.recognition.certainty import Certainty, certainty, in_words
 from kineme.recognition.classifiers import Classifier, NearestEach
 from kineme.recognition.confidence import class_probabilities
 from kineme.recognition.conformal import GUESSES, RULES, Calibration
 from kineme.recognition.transform import Transform, map_onto
+from kineme.reporting.table import Table, data_frame, to_html
+from kineme.similarity.comparison import Comparison
+from kineme.similarity.describe import Tile, recorded_paths
+from kineme.similarity.references import IndexedMovements, References
+from kineme.similarity.scores import Compared, for_compared
 from kineme.validation import Array
 
 if TYPE_CHECKING:

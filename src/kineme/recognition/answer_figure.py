@@ -14,9 +14,9 @@ from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.figure import Paths, draw_movements_beside
 from kineme.movements.trajectories.labels import Label
 from kineme.movements.trajectories.movements_like import MovementLike, MovementsLike
-from kineme.output.figures import BLUE, GRAY, figure_to_show
-from kineme.output.text import drawable, shortened
 from kineme.recognition.transform import Transform
+from kineme.reporting.figures import BLUE, GRAY, figure_to_show
+from kineme.reporting.text import drawable, shortened
 
 _CLASSES = 10  # that are drawn, best first
 _NAME = 28  # letters of a name beside its bar

@@ -9,14 +9,14 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.comparison import Comparison
-from kineme.comparison.described import Described
-from kineme.comparison.log_averages import LOG_MEANS
-from kineme.comparison.most_similar import most_similar
-from kineme.comparison.references import References
-from kineme.comparison.scores import Compared
-from kineme.comparison.similarity import AveragedSimilarity
 from kineme.errors import SpecificationError
+from kineme.similarity.comparison import Comparison
+from kineme.similarity.described import Described
+from kineme.similarity.log_averages import LOG_MEANS
+from kineme.similarity.most_similar import most_similar
+from kineme.similarity.references import References
+from kineme.similarity.scores import Compared
+from kineme.similarity.similarity import AveragedSimilarity
 from kineme.validation import Array
 
 _WIDER = 2.0  # times the width: an impostor then has a similarity of exp(-0.8)

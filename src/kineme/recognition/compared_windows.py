@@ -14,10 +14,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.comparison import Comparison
-from kineme.comparison.most_similar import nearest_above
-from kineme.comparison.references import References
-from kineme.comparison.scores import Compared, Score, nearest, score
 from kineme.movements.segmentation.bouts import Rows
 from kineme.movements.segmentation.motion import Motion
 from kineme.movements.trajectories.demonstrations import Demonstrations
@@ -27,6 +23,10 @@ from kineme.recognition.left_out import LEAST
 from kineme.runtime.compiled import compiled_module, use_compiled
 from kineme.runtime.parallel import for_tiles
 from kineme.sampling import evenly_spaced
+from kineme.similarity.comparison import Comparison
+from kineme.similarity.most_similar import nearest_above
+from kineme.similarity.references import References
+from kineme.similarity.scores import Compared, Score, nearest, score
 from kineme.validation import Array
 
 _TILE, _AT_ONCE = 4096, 256  # windows between two calls of `progress`, and those that a thread describes at a time

@@ -13,8 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.references import References
-from kineme.comparison.similarity import AveragedSimilarity
 from kineme.errors import SpecificationError
 from kineme.recognition.confidence import EXPONENT, fit_exponent
 from kineme.recognition.left_out import (
@@ -36,6 +34,8 @@ from kineme.recognition.left_out import (
     typical_scale,
 )
 from kineme.sampling import evenly_spaced
+from kineme.similarity.references import References
+from kineme.similarity.similarity import AveragedSimilarity
 from kineme.validation import Array, check_number
 
 _REPEATED = 0.1  # of the median distance to other classes: the least scale

@@ -9,13 +9,6 @@ from typing import Protocol, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.comparison import Comparison
-from kineme.comparison.described import Described
-from kineme.comparison.fit import fit_comparison, fit_to_references
-from kineme.comparison.references import References
-from kineme.comparison.scores import nearest, score
-from kineme.comparison.similarity import AveragedSimilarity
-from kineme.comparison.specification import ComparisonSpecification
 from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
 from kineme.movements.trajectories.movements_like import MovementsLike
@@ -23,6 +16,13 @@ from kineme.recognition.answer import Answer, answers, known_labels
 from kineme.recognition.classifiers import Classifier, fit_classifier
 from kineme.recognition.conformal import Calibration, calibrate, check_error_rate
 from kineme.runtime.parallel import single_threaded_blas
+from kineme.similarity.comparison import Comparison
+from kineme.similarity.described import Described
+from kineme.similarity.fit import fit_comparison, fit_to_references
+from kineme.similarity.references import References
+from kineme.similarity.scores import nearest, score
+from kineme.similarity.similarity import AveragedSimilarity
+from kineme.similarity.specification import ComparisonSpecification
 from kineme.validation import Array
 
 #: What calibrates references, as `calibrate` does.
@@ -95,7 +95,7 @@ def fit_known_classes(  # noqa: PLR0913, PLR0917 - what a recognizer is made of
     channels: Channels | None = None,
     calibrated: Calibrates = calibrate,
 ) -> KnownClasses:
-    """Fit to references that are described already, see `kineme.comparison.fit.fit_to_references`.
+    """Fit to references that are described already, see `kineme.similarity.fit.fit_to_references`.
 
     With `groups`, such as people, each a number, the calibration compares no reference with another of its group.
     `channels` are what was recorded of the movements, where that is known. `calibrated` may keep calibrations.

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from kineme.output.table import Table, to_text
-from kineme.output.text import counted, printable
 from kineme.recognition.outliers import Outliers
+from kineme.reporting.table import Table, to_text
+from kineme.reporting.text import counted, printable
 
 _SHOWN = 50  # rows of the table; the rest is counted
 

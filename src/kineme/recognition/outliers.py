@@ -10,12 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.comparison import Comparison
-from kineme.comparison.describe import Tile, feature_rows, for_described
-from kineme.comparison.described import Described
-from kineme.comparison.fit import fit_comparison
-from kineme.comparison.references import References
-from kineme.comparison.specification import ComparisonSpecification
 from kineme.errors import TrajectoryError
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import Label
@@ -23,6 +17,12 @@ from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.recognition.conformal import check_error_rate
 from kineme.recognition.left_out import LEAST, distances
 from kineme.sampling import evenly_spaced
+from kineme.similarity.comparison import Comparison
+from kineme.similarity.describe import Tile, feature_rows, for_described
+from kineme.similarity.described import Described
+from kineme.similarity.fit import fit_comparison
+from kineme.similarity.references import References
+from kineme.similarity.specification import ComparisonSpecification
 from kineme.validation import Array
 
 FEWEST, FEWEST_OF_LABEL = 20, 5  # movements: with fewer, nobody can tell what is usual

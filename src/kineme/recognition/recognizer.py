@@ -11,15 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, ClassifierMixin
 from sklearn.utils.validation import check_is_fitted
 
-from kineme.comparison.comparison import Comparison
-from kineme.comparison.describe import describe
-from kineme.comparison.described import Described
-from kineme.comparison.fit import fit_comparison
-from kineme.comparison.normalization import Normalization
-from kineme.comparison.references import References
-from kineme.comparison.representation import Representation, default_representations
-from kineme.comparison.scores import Compared, Score, best_classes, nearest, score
-from kineme.comparison.specification import ComparisonSpecification
 from kineme.kernels.soft_rotation import RotationPrior
 from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
@@ -30,6 +21,15 @@ from kineme.recognition.classifiers import CLASSIFIERS, SupportVectors, fit_clas
 from kineme.recognition.confidence import class_probabilities
 from kineme.recognition.conformal import Calibration, calibrate, check_error_rate
 from kineme.recognition.left_out import check_groups
+from kineme.similarity.comparison import Comparison
+from kineme.similarity.describe import describe
+from kineme.similarity.described import Described
+from kineme.similarity.fit import fit_comparison
+from kineme.similarity.normalization import Normalization
+from kineme.similarity.references import References
+from kineme.similarity.representation import Representation, default_representations
+from kineme.similarity.scores import Compared, Score, best_classes, nearest, score
+from kineme.similarity.specification import ComparisonSpecification
 from kineme.validation import Array, check_choice
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         The A-average over representations.
     weights : {"auto", "equal", "fitted"} or sequence of R numbers, default "auto"
         Of the representations in the arithmetic mean. "auto": their own; "fitted": half their own, half fitted to the
-        training movements, see `kineme.comparison.weights.fitted_weights`.
+        training movements, see `kineme.similarity.weights.fitted_weights`.
     classifier : {"auto", "nearest", "nearest-each", "prototype", "svm"}, default "auto"
         "nearest" stored movement, "nearest-each", where each representation has its own nearest stored movement of a
         class, nearest class "prototype" (its medoid), or an "svm" on the averaged kernel. "auto" is "nearest-each".

@@ -6,10 +6,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from kineme.comparison.bounds import log_bounds
-from kineme.comparison.described import Described
-from kineme.comparison.similarity import AveragedSimilarity
-from kineme.comparison.stored_references import Rows, StoredReferences
 from kineme.recognition.conformal import Calibration, between_classes, least_scale
 from kineme.recognition.left_out import (
     REACH,
@@ -22,6 +18,10 @@ from kineme.recognition.left_out import (
     typical_scale,
 )
 from kineme.sampling import evenly_spaced
+from kineme.similarity.bounds import log_bounds
+from kineme.similarity.described import Described
+from kineme.similarity.similarity import AveragedSimilarity
+from kineme.similarity.stored_references import Rows, StoredReferences
 from kineme.validation import Array
 
 _CLASSES = 1000  # classes sampled, at most, evenly spaced

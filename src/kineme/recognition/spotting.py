@@ -9,8 +9,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.references import References
-from kineme.comparison.scores import nearest, nearest_each, score
 from kineme.errors import TrajectoryError
 from kineme.movements.preparation.resample import relative_rows
 from kineme.movements.segmentation.bouts import Rows
@@ -45,6 +43,8 @@ from kineme.recognition.confidence import class_probabilities
 from kineme.recognition.conformal import Calibration, check_error_rate
 from kineme.recognition.left_out import distances
 from kineme.sampling import evenly_spaced
+from kineme.similarity.references import References
+from kineme.similarity.scores import nearest, nearest_each, score
 from kineme.validation import Array, check_count
 
 _REACH = 0.975  # nonconformity at which a window counts as far, in that which members exceed at the error rate

@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.alignment import fit_maps
-from kineme.comparison.comparison import Comparison
-from kineme.comparison.describe import even_paths, recorded_paths
-from kineme.comparison.references import IndexedMovements
-from kineme.comparison.representation import POSITIONS
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.similarity.alignment import fit_maps
+from kineme.similarity.comparison import Comparison
+from kineme.similarity.describe import even_paths, recorded_paths
+from kineme.similarity.references import IndexedMovements
+from kineme.similarity.representation import POSITIONS
 from kineme.validation import Array
 
 

@@ -8,20 +8,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.bounds import ReducedFeatures, Single, reduce_features
-from kineme.comparison.comparison import Comparison
-from kineme.comparison.describe import describe_tile, recorded_paths
-from kineme.comparison.described import Described
-from kineme.comparison.log_averages import LOG_MEANS
-from kineme.comparison.references import References
-from kineme.comparison.scores import Compared
-from kineme.comparison.stored_references import HeldReferences, OnDemand, Rows, StoredReferences
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.recognition.answer import Answer, Verdict, verdicts_of, with_transforms
 from kineme.recognition.classifiers import Nearest
 from kineme.recognition.conformal import Calibration, check_error_rate
 from kineme.recognition.left_out import distances
 from kineme.runtime.parallel import single_threaded_blas
+from kineme.similarity.bounds import ReducedFeatures, Single, reduce_features
+from kineme.similarity.comparison import Comparison
+from kineme.similarity.describe import describe_tile, recorded_paths
+from kineme.similarity.described import Described
+from kineme.similarity.log_averages import LOG_MEANS
+from kineme.similarity.references import References
+from kineme.similarity.scores import Compared
+from kineme.similarity.stored_references import HeldReferences, OnDemand, Rows, StoredReferences
 from kineme.validation import Array
 
 _LEADING, _BEST = 3, 16  # classes, and movements of each, compared first

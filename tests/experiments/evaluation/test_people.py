@@ -5,7 +5,7 @@ import pytest
 
 import kineme
 from kineme.experiments.evaluation.data import load_data
-from kineme.files.write_movement import write_movement
+from kineme.io.write_movement import write_movement
 
 
 @pytest.fixture

@@ -21,7 +21,7 @@ from kineme.experiments.reproduction import paper
 from kineme.experiments.reproduction.representations import READINGS, REPRESENTATIONS
 from kineme.experiments.reproduction.run import Reproduction, _rounded, _tasks, arm_tables
 from kineme.experiments.reproduction.tables import make_tables
-from kineme.output.table import mean_and_range, to_text
+from kineme.reporting.table import mean_and_range, to_text
 from soaking import SOAK
 
 ARM = all(map(importlib.util.find_spec, ("pinocchio", "pink")))  # the extra robot is installed

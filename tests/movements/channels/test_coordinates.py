@@ -8,14 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import kineme
+from kineme.dmp.pose.tangent import as_poses
+from kineme.dmp.recorded_as import RecordedAs
 from kineme.movements.channels.channel import Channel
 from kineme.movements.channels.coordinates import as_wxyz, canonical, from_wxyz, learned
 from kineme.movements.preparation.trim import TrimRest
 from kineme.movements.trajectories.channels import of_channels
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.orientation import PoseDMP, exp, product
-from kineme.primitives.pose.tangent import as_poses
-from kineme.primitives.recorded_as import RecordedAs
 
 Q = Channel("q", "orientation", ("qx", "qy", "qz", "qw"), None, "xyzw")
 XYZ = tuple(Channel(axis, "position", (axis,)) for axis in "xyz")

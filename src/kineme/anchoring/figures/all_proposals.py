@@ -10,12 +10,12 @@ from matplotlib.figure import Figure
 from kineme.anchoring.figures.drawing import bare, flat, mark_start, plot_paths
 from kineme.anchoring.figures.proposal import overlay, shown_paths
 from kineme.anchoring.proposals.proposals import Proposals, check_members
-from kineme.comparison.alignment import paths_of
-from kineme.comparison.specification import Compares
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements_like import MovementsLike
-from kineme.output.figures import GRAY, ORANGE, new_figure
+from kineme.reporting.figures import GRAY, ORANGE, new_figure
+from kineme.similarity.alignment import paths_of
+from kineme.similarity.specification import Compares
 from kineme.validation import Array
 
 _CELL = 1.35  # inches

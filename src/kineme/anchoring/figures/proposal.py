@@ -8,12 +8,12 @@ from matplotlib.figure import Figure
 
 from kineme.anchoring.figures.drawing import bare, flat, mark_start, plot_paths
 from kineme.anchoring.proposals.proposals import Proposal, check_members
-from kineme.comparison.alignment import maps_onto, paths_of
-from kineme.comparison.specification import Compares
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements_like import MovementsLike
-from kineme.output.figures import BLUE, GRAY, ORANGE, new_figure
-from kineme.output.text import drawable
+from kineme.reporting.figures import BLUE, GRAY, ORANGE, new_figure
+from kineme.reporting.text import drawable
+from kineme.similarity.alignment import maps_onto, paths_of
+from kineme.similarity.specification import Compares
 from kineme.validation import Array
 
 _SHOWN = 60  # members drawn at most, evenly spread; more would hide each other

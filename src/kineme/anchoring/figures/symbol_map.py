@@ -7,13 +7,13 @@ from matplotlib.figure import Figure
 
 from kineme.anchoring.figures.drawing import bare, flat, mark_start, plot_paths
 from kineme.anchoring.grounding.space import ConceptualSpace
-from kineme.comparison.alignment import paths_of
+from kineme.dmp.discrete.dmp import Primitives
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements_like import MovementsLike
-from kineme.output.figures import BLUE, GRAY, ORANGE, new_figure
-from kineme.output.text import drawable
-from kineme.primitives.discrete.dmp import Primitives
+from kineme.reporting.figures import BLUE, GRAY, ORANGE, new_figure
+from kineme.reporting.text import drawable
+from kineme.similarity.alignment import paths_of
 from kineme.validation import Array
 
 _INCHES = 6.9  # width of a map

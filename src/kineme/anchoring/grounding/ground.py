@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.anchoring.grounding.prototypes import Prototype, prototype
-from kineme.comparison.alignment import moved
-from kineme.comparison.specification import Compares
+from kineme.dmp.discrete.dmp import Primitives
+from kineme.dmp.persistence import specification_to_dict
+from kineme.dmp.styles.learn import learn_styles
+from kineme.dmp.styles.metrics import compared
+from kineme.dmp.styles.model import StyleModel
 from kineme.errors import TrajectoryError
-from kineme.primitives.discrete.dmp import Primitives
-from kineme.primitives.persistence import specification_to_dict
-from kineme.primitives.styles.learn import learn_styles
-from kineme.primitives.styles.metrics import compared
-from kineme.primitives.styles.model import StyleModel
+from kineme.similarity.alignment import moved
+from kineme.similarity.specification import Compares
 from kineme.validation import Array, check_choice
 
 FORMAT = "kineme-grounding"

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.anchoring.grounding.ground import FORMAT, VERSION, style_model
+from kineme.dmp.discrete.dmp import DMP, Primitives
+from kineme.dmp.persistence import check_array, specification_from_dict
 from kineme.errors import DataError, SpecificationError
-from kineme.primitives.discrete.dmp import DMP, Primitives
-from kineme.primitives.persistence import check_array, specification_from_dict
 
 
 def grounding_schema() -> dict[str, Any]:

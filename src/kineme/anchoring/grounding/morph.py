@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kineme.comparison.alignment import Maps, maps_onto, paths_of
-from kineme.comparison.specification import Compares
+from kineme.dmp.discrete.dmp import Primitives
+from kineme.dmp.styles.parameters import check_primitives, from_numbers, to_numbers
 from kineme.errors import SpecificationError, TrajectoryError
-from kineme.primitives.discrete.dmp import Primitives
-from kineme.primitives.styles.parameters import check_primitives, from_numbers, to_numbers
+from kineme.similarity.alignment import Maps, maps_onto, paths_of
+from kineme.similarity.specification import Compares
 from kineme.validation import Array
 
 
@@ -17,7 +17,7 @@ def morph(a: Primitives, b: Primitives, shares: ArrayLike, like: Compares | None
     """Movements on the way from `a` to `b`, one for each share of the way: 0 is a, 1 is b.
 
     b is laid onto a, and ``theta = (1 - s) theta_a + s theta_b`` is the mean of their paths at equal phase (see
-    `kineme.primitives.styles.parameters`); then position, size (geometrically) and direction (about one axis) go the
+    `kineme.dmp.styles.parameters`); then position, size (geometrically) and direction (about one axis) go the
     same share of the way back to b's own. So no movement shrinks half way because the two face different ways, as a
     plain mean of paths does.
 

@@ -6,17 +6,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kineme.comparison.alignment import Maps, maps_onto, moved, paths_of
-from kineme.comparison.describe import describe
-from kineme.comparison.described import Described
-from kineme.comparison.similarity import similarities
-from kineme.comparison.specification import Compares
-from kineme.comparison.widths import median_distances
+from kineme.dmp.discrete.dmp import Primitives
+from kineme.dmp.styles.average import AveragePrimitive, average
+from kineme.dmp.styles.parameters import check_primitives
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.movements_like import MovementsLike
-from kineme.primitives.discrete.dmp import Primitives
-from kineme.primitives.styles.average import AveragePrimitive, average
-from kineme.primitives.styles.parameters import check_primitives
+from kineme.similarity.alignment import Maps, maps_onto, moved, paths_of
+from kineme.similarity.describe import describe
+from kineme.similarity.described import Described
+from kineme.similarity.similarity import similarities
+from kineme.similarity.specification import Compares
+from kineme.similarity.widths import median_distances
 
 
 @dataclass(frozen=True, eq=False)

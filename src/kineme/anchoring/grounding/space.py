@@ -14,13 +14,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kineme.comparison.describe import describe
-from kineme.comparison.described import Described
-from kineme.comparison.similarity import averaged
-from kineme.comparison.specification import Compares
-from kineme.comparison.widths import median_distances
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.similarity.describe import describe
+from kineme.similarity.described import Described
+from kineme.similarity.similarity import averaged
+from kineme.similarity.specification import Compares
+from kineme.similarity.widths import median_distances
 from kineme.validation import Array, check_count, check_number
 
 

@@ -12,15 +12,15 @@ from kineme.anchoring.clustering.stability import stabilities
 from kineme.anchoring.proposals.proposals import Proposals, describe_clusters
 from kineme.anchoring.proposals.propose import own_order
 from kineme.anchoring.proposals.subsample import extend, largest_clustered, subsample
-from kineme.comparison.comparison import Comparison
-from kineme.comparison.describe import describe
-from kineme.comparison.described import Described
-from kineme.comparison.references import References
-from kineme.comparison.similarity import compare
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.recognition.known_classes import FittedRecognizer, KnownClasses, known_classes, open_set_labels
 from kineme.recognition.left_out import distances as in_widths
 from kineme.sampling import evenly_spaced
+from kineme.similarity.comparison import Comparison
+from kineme.similarity.describe import describe
+from kineme.similarity.described import Described
+from kineme.similarity.references import References
+from kineme.similarity.similarity import compare
 from kineme.validation import Array, check_count
 
 _REPEATS = 20

@@ -10,14 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 from kineme.anchoring.clustering.clustering import Clusters, average_linkage, cuts
 from kineme.anchoring.clustering.stability import stabilities
 from kineme.anchoring.proposals.propose import own_order
-from kineme.comparison.describe import describe
-from kineme.comparison.described import Described
-from kineme.comparison.similarity import averaged, compare, similarities
-from kineme.comparison.specification import Compares
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.labels import label_array
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.sampling import evenly_spaced
+from kineme.similarity.describe import describe
+from kineme.similarity.described import Described
+from kineme.similarity.similarity import averaged, compare, similarities
+from kineme.similarity.specification import Compares
 from kineme.validation import Array, check_count, check_number
 
 _LARGEST = 5000  # movements compared at once

@@ -12,14 +12,14 @@ from kineme.anchoring.clustering.spectral import count_by_eigengap, spectral
 from kineme.anchoring.clustering.stability import stabilities
 from kineme.anchoring.proposals.proposals import Proposals, describe_clusters
 from kineme.anchoring.proposals.subsample import extend, largest_clustered, subsample
-from kineme.comparison.describe import describe
-from kineme.comparison.described import Described
-from kineme.comparison.distances import squared_distances
-from kineme.comparison.similarity import AveragedSimilarity, averaged, similarities
-from kineme.comparison.specification import Compares
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.recognition.left_out import check_groups, comparable_groups
+from kineme.similarity.describe import describe
+from kineme.similarity.described import Described
+from kineme.similarity.distances import squared_distances
+from kineme.similarity.similarity import AveragedSimilarity, averaged, similarities
+from kineme.similarity.specification import Compares
 from kineme.validation import Array, check_choice, check_count
 
 _SHARE = 0.5  # sum of all links by that of the similarities; with 1, classes that few people made are merged

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.anchoring.proposals.proposals import Proposals
-from kineme.comparison.described import Described
-from kineme.comparison.similarity import AveragedSimilarity, averaged, compare
+from kineme.similarity.described import Described
+from kineme.similarity.similarity import AveragedSimilarity, averaged, compare
 from kineme.validation import Array
 
 _WITHIN = 0.95  # of the sampled members of all clusters are within the common radius of their nearest neighbor

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from scipy.cluster.hierarchy import fcluster, linkage
 from scipy.spatial.distance import cdist, squareform
 
+from kineme.dmp.discrete.dmp import DMP
 from kineme.errors import DegenerateMovementWarning
 from kineme.experiments.evaluation.optional import optional_module
 from kineme.experiments.evaluation.paths import paths_over_length, paths_over_time
 from kineme.features.dmp_features import DMPFeatures
 from kineme.movements.trajectories.demonstrations import Demonstrations, require_labels
-from kineme.primitives.discrete.dmp import DMP
 from kineme.validation import Array
 
 _N_POINTS = 100

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from kineme.comparison.normalization import Normalization
 from kineme.movements.preparation.arc_length import resample_by_arc_length
 from kineme.movements.preparation.resample import relative_rows
 from kineme.movements.preparation.smooth import Smooth
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.similarity.normalization import Normalization
 from kineme.validation import Array
 
 _N_SAMPLES = 200  # even in time, before arc length is taken

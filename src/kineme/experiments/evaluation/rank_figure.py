@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from kineme.experiments.evaluation.methods import METHODS, OURS
 from kineme.experiments.evaluation.ranks import Ranks
-from kineme.output.figures import BLUE, new_figure
+from kineme.reporting.figures import BLUE, new_figure
 
 _LINE, _TOP, _BAR = 0.22, 0.55, 0.11  # heights [inch]: of a line of text, above the axis, of a bar
 _SIDE, _AXIS = 2.1, 4.0  # widths [inch]: of the names on either side, of the axis

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from kineme.experiments.evaluation.data import DataSet
 from kineme.experiments.evaluation.protocols import PROTOCOLS
 from kineme.experiments.evaluation.score_split import Scores
-from kineme.output.text import as_cell
+from kineme.reporting.text import as_cell
 
 
 class Row(NamedTuple):

@@ -27,11 +27,11 @@ from kineme.experiments.evaluation.rows import Row, make_rows
 from kineme.experiments.evaluation.score_split import Scores, does, score_split
 from kineme.experiments.evaluation.trials import TASKS, Settings
 from kineme.movements.trajectories.demonstrations import require_labels
-from kineme.output.atomic import write_atomically
-from kineme.output.figures import BLUE, GRAY, GREEN, ORANGE, PURPLE, encode_figure, new_figure
-from kineme.output.page import page, picture
-from kineme.output.table import Table, mean_and_range, to_html
-from kineme.output.text import in_markup
+from kineme.reporting.atomic import write_atomically
+from kineme.reporting.figures import BLUE, GRAY, GREEN, ORANGE, PURPLE, encode_figure, new_figure
+from kineme.reporting.page import page, picture
+from kineme.reporting.table import Table, mean_and_range, to_html
+from kineme.reporting.text import in_markup
 
 _BLACK = "#222222"
 _AXES = {

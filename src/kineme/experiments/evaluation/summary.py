@@ -12,8 +12,8 @@ from kineme.experiments.evaluation.methods import METHODS
 from kineme.experiments.evaluation.ranks import Ranks, rank_rows, rank_sentence
 from kineme.experiments.evaluation.rows import Row, to_csv
 from kineme.experiments.evaluation.run import Evaluation
-from kineme.output.atomic import write_atomically
-from kineme.output.table import Table
+from kineme.reporting.atomic import write_atomically
+from kineme.reporting.table import Table
 
 _FORMAT = 1  # of results.json
 
@@ -53,7 +53,7 @@ def summarize(names: Sequence[str], evaluations: Sequence[Evaluation], out: Path
         (out / "ranks.png").unlink(missing_ok=True)  # of an earlier run
         return Summary(ranks, files)
     from kineme.experiments.evaluation.rank_figure import draw_ranks
-    from kineme.output.figures import encode_figure
+    from kineme.reporting.figures import encode_figure
 
     files.append(write_atomically(out / "ranks.png", encode_figure(draw_ranks(ranks), "png", dpi=200)))
     return Summary(_table(ranks), files)

@@ -11,8 +11,8 @@ from kineme.experiments.reproduction.arm_recordings import PLANE, ROBOT, SCALE, 
 from kineme.experiments.reproduction.representations import specification
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.trajectory import Trajectory
-from kineme.output.figures import BLUE, GRAY, GREEN, LINES, ORANGE, PURPLE, new_figure
-from kineme.output.table import Table
+from kineme.reporting.figures import BLUE, GRAY, GREEN, LINES, ORANGE, PURPLE, new_figure
+from kineme.reporting.table import Table
 from kineme.robots.kinematics.inverse import InverseKinematics
 from kineme.robots.kinematics.task_path import PLANES
 from kineme.robots.models.load import load

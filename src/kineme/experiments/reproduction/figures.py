@@ -10,12 +10,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from kineme.datasets.lasa import PAPER_LETTERS, load_lasa
+from kineme.dmp.discrete.dmp import Primitives
 from kineme.experiments.reproduction import paper
 from kineme.experiments.reproduction.protocol import draw
 from kineme.experiments.reproduction.representations import READINGS, REPRESENTATIONS, specification
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.output.figures import GRAY, LINES, SEQUENCE, new_figure
-from kineme.primitives.discrete.dmp import Primitives
+from kineme.reporting.figures import GRAY, LINES, SEQUENCE, new_figure
 from kineme.validation import Array
 
 

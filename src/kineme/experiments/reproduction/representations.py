@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kineme.dmp.discrete.dmp import DMP
+from kineme.dmp.discrete.fits import forcing_target, local_regression
 from kineme.experiments.reproduction.paper import N_BASIS, N_POINTS, N_SAMPLES, STIFFNESS
 from kineme.features.movement_features import features_of
 from kineme.movements.preparation.resample import relative_rows
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.primitives.discrete.dmp import DMP
-from kineme.primitives.discrete.fits import forcing_target, local_regression
 from kineme.validation import Array
 
 

@@ -26,10 +26,10 @@ from kineme.experiments.reproduction.conclusions import read_ahead, read_left_ou
 from kineme.experiments.reproduction.experiments import features_and_labels, run_nearest, run_svm, usable
 from kineme.experiments.reproduction.protocol import draw
 from kineme.experiments.reproduction.representations import READINGS
-from kineme.output.atomic import write_atomically
-from kineme.output.page import page, picture
-from kineme.output.table import Table, mean_and_range, to_html
-from kineme.output.text import in_markup
+from kineme.reporting.atomic import write_atomically
+from kineme.reporting.page import page, picture
+from kineme.reporting.table import Table, mean_and_range, to_html
+from kineme.reporting.text import in_markup
 from kineme.runtime.parallel import n_threads
 
 _PLANE, _ARM = "the plane", "the arm"
@@ -127,7 +127,7 @@ def _arm(*arguments: Any) -> Any:
 
 def _figure(name: str, seed: int, dpi: int) -> tuple[str, dict[str, bytes]]:
     from kineme.experiments.reproduction.figures import DRAWINGS
-    from kineme.output.figures import render
+    from kineme.reporting.figures import render
 
     return DRAWINGS[name].caption, render(DRAWINGS[name].draw(seed), dpi)
 
@@ -158,7 +158,7 @@ def _write_figures(out: Path, figures: dict[str, tuple[str, dict[str, bytes]]]) 
 def _write_tables(
     out: Path, tables: dict[str, list[Table]], figures: dict[str, Any], facts: dict[str, Any]
 ) -> list[Path]:
-    from kineme.output.table import to_text
+    from kineme.reporting.table import to_text
 
     html = write_report(tables, {name: (caption, made["svg"]) for name, (caption, made) in figures.items()}, facts)
     text = "\n\n".join(to_text(table) for some in tables.values() for table in some) + "\n"
@@ -193,7 +193,7 @@ def run_arm(draws: int, seed: int, dpi: int) -> dict[str, Any]:
         return {"missing": missing}
     from kineme.experiments.reproduction.arm_letter import CAPTION, draw_letter, write_letter
     from kineme.experiments.reproduction.figures import one_c
-    from kineme.output.figures import render
+    from kineme.reporting.figures import render
 
     demos, left_out = usable("lasa-26")
     started = time.perf_counter()

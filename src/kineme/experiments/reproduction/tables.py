@@ -33,7 +33,7 @@ from kineme.experiments.reproduction.conclusions import (
     read_widths,
 )
 from kineme.experiments.reproduction.representations import READINGS, REPRESENTATIONS
-from kineme.output.table import Table, mean_and_range
+from kineme.reporting.table import Table, mean_and_range
 
 _PAPER_SAYS = (
     'The paper says "f(t)" for what Eqs. (1) and (4) call f and for the shape-attractor, and prints neither gating nor '

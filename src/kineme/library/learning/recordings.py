@@ -7,8 +7,8 @@ from datetime import UTC, datetime
 from pathlib import PurePath
 from typing import Any
 
-from kineme.files.merge_files import Recordings
-from kineme.files.merge_files import Source as File
+from kineme.io.merge_files import Recordings
+from kineme.io.merge_files import Source as File
 from kineme.library.learning.learn import LearnReport, Progress, learn
 from kineme.library.storage.source import Source
 from kineme.library.storage.store import Store
@@ -23,7 +23,7 @@ def learn_recordings(  # noqa: PLR0913, PLR0917 - those of `ActionLibrary.learn`
     root: str | PurePath = "",
     groups: Sequence[str | None] | None = None,
 ) -> LearnReport:
-    """Store the recordings of `kineme.files.recordings.read_recordings`.
+    """Store the recordings of `kineme.io.recordings.read_recordings`.
 
     Parameters
     ----------

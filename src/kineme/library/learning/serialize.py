@@ -13,12 +13,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.describe import feature_rows
+from kineme.dmp.discrete.encode import check_movement
 from kineme.errors import TrajectoryError
 from kineme.library.storage.channels import to_bytes
 from kineme.library.storage.specification import Specification
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.primitives.discrete.encode import check_movement
+from kineme.similarity.describe import feature_rows
 from kineme.validation import Array, describe
 
 _EVEN = 1e-9  # of a step: stamps closer to an even grid are not stored

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from kineme.errors import KinemeError
-from kineme.files.annotations.annotation import Annotation
-from kineme.files.merge_files import Recordings, Source
-from kineme.files.problem import Problem
+from kineme.io.annotations.annotation import Annotation
+from kineme.io.merge_files import Recordings, Source
+from kineme.io.problem import Problem
 from kineme.library.recognition.recognize import some_of_each_symbol
 from kineme.library.storage.store import Store
 from kineme.movements.trajectories.trajectory import Trajectory

@@ -14,18 +14,18 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.comparison import Comparison
-from kineme.comparison.fit import fit_to_references
-from kineme.comparison.references import References
-from kineme.comparison.similarity import AveragedSimilarity
-from kineme.comparison.stored_references import StoredReferences
 from kineme.library.recognition.members import Members, described_references
 from kineme.library.storage.rows import among, listed
 from kineme.library.storage.store import Store
-from kineme.output.atomic import write_atomically
 from kineme.recognition.conformal import Calibration, calibrate
 from kineme.recognition.sampled_calibration import calibrate_sample
+from kineme.reporting.atomic import write_atomically
 from kineme.sampling import evenly_spaced
+from kineme.similarity.comparison import Comparison
+from kineme.similarity.fit import fit_to_references
+from kineme.similarity.references import References
+from kineme.similarity.similarity import AveragedSimilarity
+from kineme.similarity.stored_references import StoredReferences
 from kineme.validation import Array
 
 FILE = "calibration.cache"  # of a large library, by a sample

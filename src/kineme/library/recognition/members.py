@@ -10,11 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kineme.comparison.comparison import Comparison
-from kineme.comparison.describe import describe_rows
-from kineme.comparison.described import Described
-from kineme.comparison.references import References
-from kineme.comparison.stored_references import OnDemand
 from kineme.errors import SpecificationError
 from kineme.library.storage import read
 from kineme.library.storage.read import Ids
@@ -22,6 +17,11 @@ from kineme.library.storage.rows import ALIVE, among, damage, damaged, listed
 from kineme.library.storage.store import Store
 from kineme.movements.trajectories.labels import label_array
 from kineme.sampling import evenly_spaced
+from kineme.similarity.comparison import Comparison
+from kineme.similarity.describe import describe_rows
+from kineme.similarity.described import Described
+from kineme.similarity.references import References
+from kineme.similarity.stored_references import OnDemand
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.stored_references import StoredReferences
 from kineme.library.recognition.calibration_cache import calibrated, calibrated_once, sample_comparison
 from kineme.library.recognition.members import Members, described_references, members_of, some_members
 from kineme.library.recognition.reduced_features_cache import ReducedMovements, open_cache, updated
@@ -27,6 +26,7 @@ from kineme.recognition.early.hypotheses import Early, Hypotheses, as_early, hyp
 from kineme.recognition.early.stream import Live
 from kineme.recognition.known_classes import Calibrates, KnownClasses, fit_known_classes
 from kineme.recognition.two_stage_search import TwoStageSearch
+from kineme.similarity.stored_references import StoredReferences
 
 #: Movements up to which every one is compared: the answer is then the recognizer's own. Processor time of 2000
 #: movements of 26 classes in space: 2.2 s until the first answer and 1.4 ms for each (two stages: 1.0 s, 3.4 ms).

@@ -18,12 +18,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.bounds import N_REDUCED, ReducedFeatures, fit_bases, reduce_features
 from kineme.library.storage import read
 from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store
-from kineme.output.atomic import whole_file
+from kineme.reporting.atomic import whole_file
 from kineme.sampling import evenly_spaced
+from kineme.similarity.bounds import N_REDUCED, ReducedFeatures, fit_bases, reduce_features
 from kineme.validation import Array
 
 FILE = "reduced_features.cache"

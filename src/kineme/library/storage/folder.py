@@ -12,7 +12,7 @@ from typing import Any
 
 from kineme.errors import SpecificationError
 from kineme.library.storage.schema import APPLICATION_ID
-from kineme.output.atomic import whole_file
+from kineme.reporting.atomic import whole_file
 
 FILE = "library.sqlite"
 LOGS = ("-wal", "-journal")  # suffixes of the files beside a database from which SQLite may change it
@@ -53,8 +53,8 @@ def new_database(path: Path) -> Iterator[Path]:
 def _remove_old_leftovers(folder: Path) -> None:
     """Delete the files of processes that were killed here more than a day ago.
 
-    Unlike `kineme.output.atomic.remove_leftovers`, for libraries of any name: an export often has a name that is never
-    used again.
+    Unlike `kineme.reporting.atomic.remove_leftovers`, for libraries of any name: an export often has a name that is
+    never used again.
     """
     for path in folder.glob(".*"):
         with suppress(OSError):  # another process was faster, or no permission

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kineme.dmp.discrete.dmp import Primitives
+from kineme.dmp.recorded_as import RecordedAs
 from kineme.errors import SpecificationError
 from kineme.library.storage.channels import with_channels
 from kineme.library.storage.rows import ALIVE, Row, among, damage, damaged, has_table, listed, select, strange
@@ -19,8 +21,6 @@ from kineme.movements.channels.channel import is_plain
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import label_array
 from kineme.movements.trajectories.movements import Movements
-from kineme.primitives.discrete.dmp import Primitives
-from kineme.primitives.recorded_as import RecordedAs
 from kineme.validation import Array
 
 Ids = NDArray[np.int64]

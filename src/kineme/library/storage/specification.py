@@ -8,15 +8,15 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from kineme.comparison.normalization import Normalization
-from kineme.comparison.representation import ROW_REPRESENTATIONS, Representation
-from kineme.comparison.specification import Compares, ComparisonSpecification
-from kineme.comparison.weights import WEIGHTS
+from kineme.dmp.discrete.dmp import DMP
+from kineme.dmp.persistence import specification_from_dict, specification_to_dict
 from kineme.errors import DataError, KinemeError, SpecificationError
 from kineme.kernels.soft_rotation import RotationPrior
 from kineme.library.storage.rows import parsed
-from kineme.primitives.discrete.dmp import DMP
-from kineme.primitives.persistence import specification_from_dict, specification_to_dict
+from kineme.similarity.normalization import Normalization
+from kineme.similarity.representation import ROW_REPRESENTATIONS, Representation
+from kineme.similarity.specification import Compares, ComparisonSpecification
+from kineme.similarity.weights import WEIGHTS
 from kineme.validation import check_choice, check_number
 
 if TYPE_CHECKING:

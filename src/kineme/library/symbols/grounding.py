@@ -13,6 +13,9 @@ from kineme.anchoring.grounding.ground import SymbolName, ground
 from kineme.anchoring.grounding.morph import morph
 from kineme.anchoring.grounding.prototypes import medoid_of
 from kineme.anchoring.grounding.space import ConceptualSpace, conceptual_space
+from kineme.dmp.discrete.dmp import Primitives
+from kineme.dmp.generation.learned import Learned, has_orientation, learn_one
+from kineme.dmp.recorded_as import recorded_as
 from kineme.errors import SpecificationError
 from kineme.library.recognition.members import described
 from kineme.library.storage import read
@@ -20,9 +23,6 @@ from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store
 from kineme.library.storage.symbols import Symbol, symbol, symbols
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.primitives.discrete.dmp import Primitives
-from kineme.primitives.generation.learned import Learned, has_orientation, learn_one
-from kineme.primitives.recorded_as import recorded_as
 from kineme.sampling import evenly_spaced
 
 _MEMBERS = 500  # members that a medoid is chosen from, at most, evenly spaced

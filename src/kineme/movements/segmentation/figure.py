@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from kineme.movements.segmentation.motion import observe
 from kineme.movements.segmentation.segmentation import Segmentation
 from kineme.movements.trajectories.movements import axis_names
-from kineme.output.figures import BLUE, GRAY, ORANGE, new_figure
-from kineme.output.text import drawable, shortened
+from kineme.reporting.figures import BLUE, GRAY, ORANGE, new_figure
+from kineme.reporting.text import drawable, shortened
 from kineme.sampling import evenly_spaced
 from kineme.validation import Array
 

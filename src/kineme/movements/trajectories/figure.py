@@ -14,8 +14,8 @@ from matplotlib.figure import Figure, SubFigure
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
-from kineme.output.figures import BLUE, GRAY, GREEN, ORANGE, PURPLE, figure_to_show
-from kineme.output.text import drawable
+from kineme.reporting.figures import BLUE, GRAY, GREEN, ORANGE, PURPLE, figure_to_show
+from kineme.reporting.text import drawable
 from kineme.validation import Array
 
 _MOST = 50  # movements in one figure; more would be illegible

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from kineme.movements.channels.channel import Channels
 from kineme.movements.channels.detect import unit_of
-from kineme.output.table import Table, data_frame, to_html
+from kineme.reporting.table import Table, data_frame, to_html
 from kineme.validation import Array
 
 if TYPE_CHECKING:

@@ -8,8 +8,6 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kineme.comparison.comparison import Comparison
-from kineme.comparison.describe import even_paths
 from kineme.errors import SpecificationError
 from kineme.movements.preparation.arc_length import arc_length_phase
 from kineme.movements.preparation.pauses import without_pauses
@@ -18,6 +16,8 @@ from kineme.movements.trajectories.demonstrations import Demonstrations, check_l
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.recognition.early.evidence import describe_begun, log_evidence
 from kineme.recognition.early.hypotheses import Hypotheses
+from kineme.similarity.comparison import Comparison
+from kineme.similarity.describe import even_paths
 from kineme.validation import MIN_SAMPLES, Array
 
 _TILE = 2_000_000  # hypotheses compared at a time

@@ -8,13 +8,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.describe import describe_paths
-from kineme.comparison.described import Described
-from kineme.comparison.log_averages import LOG_MEANS
 from kineme.kernels.pair_distances import pair_distances
 from kineme.kernels.procrustes import Procrustes
 from kineme.recognition.early.hypotheses import EXPLAINING, Hypotheses, positive
 from kineme.recognition.early.prefixes import Prefixes, beginnings, describe_prefixes
+from kineme.similarity.describe import describe_paths
+from kineme.similarity.described import Described
+from kineme.similarity.log_averages import LOG_MEANS
 from kineme.validation import Array
 
 _COMPARED = 200  # hypotheses compared pair by pair, and the best one of each class

@@ -9,14 +9,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.comparison import Comparison
-from kineme.comparison.described import Described
-from kineme.comparison.references import References
-from kineme.comparison.widths import SHARE, beginning_widths
 from kineme.errors import SpecificationError
 from kineme.kernels.procrustes import Procrustes
 from kineme.movements.preparation.pauses import without_pauses
 from kineme.recognition.early.prefixes import Prefixes, beginnings, describe_prefixes, smooth_paths
+from kineme.similarity.comparison import Comparison
+from kineme.similarity.described import Described
+from kineme.similarity.references import References
+from kineme.similarity.widths import SHARE, beginning_widths
 from kineme.validation import Array, check_count, check_number
 
 _LEAST_SPREAD = 0.4  # of the logarithm of the speed, where there are few movements

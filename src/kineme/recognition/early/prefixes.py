@@ -8,14 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kineme.comparison.describe import N_POINTS, even_paths
-from kineme.comparison.described import Described, Pairs
-from kineme.comparison.representation import PAIR_QUANTITIES
 from kineme.kernels.procrustes import Procrustes
 from kineme.kernels.shapes import ElasticSpec, shapes_of
 from kineme.movements.preparation.arc_length import arc_length_phase
 from kineme.movements.preparation.smooth import Smooth
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.similarity.describe import N_POINTS, even_paths
+from kineme.similarity.described import Described, Pairs
+from kineme.similarity.representation import PAIR_QUANTITIES
 from kineme.validation import Array
 
 N_PREFIX = ElasticSpec().n_segments + 1  # samples along the arc length of a beginning: the ends of segments

@@ -10,9 +10,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kineme.comparison.comparison import Comparison
-from kineme.comparison.describe import N_POINTS
-from kineme.comparison.references import References
 from kineme.movements.channels.channel import Channels, is_plain, recorded_names
 from kineme.movements.channels.incremental import IncrementalCoordinates
 from kineme.movements.preparation.pauses import cut_pauses
@@ -26,6 +23,9 @@ from kineme.recognition.early.live_state import Guess, LiveState, LiveStatus
 from kineme.recognition.early.prefixes import Prefixes, smoother
 from kineme.runtime.compiled import load_compiled
 from kineme.runtime.parallel import single_threaded_blas
+from kineme.similarity.comparison import Comparison
+from kineme.similarity.describe import N_POINTS
+from kineme.similarity.references import References
 from kineme.validation import MIN_SAMPLES, Array
 
 N_REMAINING = 20  # samples of the predicted path

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from kineme.output.table import Table
+from kineme.reporting.table import Table
 from kineme.robots.checks.check import Check, Preflight
 
 

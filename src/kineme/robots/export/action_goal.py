@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from kineme.output.atomic import write_atomically
+from kineme.reporting.atomic import write_atomically
 from kineme.robots.execution.joint_trajectory import JointTrajectory
 from kineme.robots.export.ros_messages import nanoseconds, seconds_and_nanoseconds
 

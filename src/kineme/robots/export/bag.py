@@ -7,7 +7,7 @@ from shutil import rmtree
 from typing import Any
 
 from kineme.errors import DataError
-from kineme.output.atomic import whole_file, whole_folder
+from kineme.reporting.atomic import whole_file, whole_folder
 from kineme.robots.execution.joint_trajectory import JointTrajectory
 from kineme.robots.export.ros_messages import STATE, TRAJECTORY, state_messages, trajectory_message
 

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
 from kineme.errors import SpecificationError
-from kineme.files.lerobot.write_episode import write_episode
+from kineme.io.lerobot.write_episode import write_episode
 from kineme.robots.execution.joint_trajectory import JointTrajectory
 from kineme.robots.models.robot import Robot
 from kineme.robots.planning.joint_names import DRIVERS

@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kineme.dmp.generation.generate import MovementOptions, generate
+from kineme.dmp.generation.learned import Learned
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.channels.coordinates import as_wxyz
 from kineme.movements.trajectories.trajectory import Trajectory
-from kineme.primitives.generation.generate import MovementOptions, generate
-from kineme.primitives.generation.learned import Learned
 from kineme.robots.checks.tracking import TRACKED
 from kineme.robots.kinematics.task_path import PLANES
 from kineme.robots.models.robot import Robot

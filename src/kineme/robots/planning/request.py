@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from kineme.dmp.discrete.dmp import Primitives
+from kineme.dmp.pose.pose_primitives import PosePrimitives
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.channels.coordinates import as_wxyz
 from kineme.movements.segmentation.segment import as_recording
-from kineme.primitives.discrete.dmp import Primitives
-from kineme.primitives.pose.pose_primitives import PosePrimitives
 from kineme.robots.models.robot import Robot
 from kineme.robots.planning.roles import check_plausible, roles_of, scales_of, space_of
 from kineme.validation import Array, as_numbers

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from kineme.output.figures import BLUE, GRAY, GREEN, ORANGE
+from kineme.reporting.figures import BLUE, GRAY, GREEN, ORANGE
 from kineme.robots.kinematics.descent import kinematics
 from kineme.robots.planning.robot_movement import RobotMovement
 from kineme.robots.view.shapes import Shapes

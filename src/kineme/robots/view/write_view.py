@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from kineme.output.atomic import write_atomically
-from kineme.output.text import counted, in_markup, printable
+from kineme.reporting.atomic import write_atomically
+from kineme.reporting.text import counted, in_markup, printable
 from kineme.robots.checks.report import preflight_table
 from kineme.robots.planning.robot_movement import RobotMovement, duration_in_words
 from kineme.robots.view.scene_data import MOST_SAMPLES, as_script_data, scene_data

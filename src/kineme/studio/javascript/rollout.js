@@ -263,7 +263,7 @@ function passThrough(how, smooth, formulation, via, goal, numbers, map, faster) 
   numbers.forEach((own, k) => gain.forEach((row, j) => row.forEach((value, i) => (own[i] += missing[j][k] * value))));
 }
 
-/** Rows by which what is missing changes the weights: F' Q R'^-1 with F A' = Q R, see kineme.primitives.condition. */
+/** Rows by which what is missing changes the weights: F' Q R'^-1 with F A' = Q R, see kineme.dmp.condition. */
 function gains(smooth, states, N) {
   const Q = states.map((state) => Float64Array.from({ length: N }, (_, i) => product(smooth, i * N, state, 0, N)));
   const found = [];

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from kineme.comparison.describe import N_POINTS
 from kineme.errors import KinemeError, SpecificationError
 from kineme.library.library import ActionLibrary
-from kineme.output.atomic import whole_file
-from kineme.output.text import counted, in_markup
+from kineme.reporting.atomic import whole_file
+from kineme.reporting.text import counted, in_markup
+from kineme.similarity.describe import N_POINTS
 from kineme.studio.snapshot.early import DRAWN
 from kineme.studio.snapshot.make import snapshot_of_library
 from kineme.studio.snapshot.snapshot import Snapshot

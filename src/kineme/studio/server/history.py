@@ -9,7 +9,7 @@ from typing import Any
 from kineme.library.storage.rows import Row, among, listed, select
 from kineme.library.storage.schema import COLUMNS, RETURNS, UNDO
 from kineme.library.storage.versions import Version
-from kineme.output.text import counted, printable, shortened
+from kineme.reporting.text import counted, printable, shortened
 from kineme.studio.server.studio import Studio
 
 _VERSIONS = 200  # that are listed, the last ones

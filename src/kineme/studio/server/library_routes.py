@@ -11,12 +11,12 @@ from pydantic import BaseModel
 
 from kineme.anchoring.figures.symbol_map import classical_scaling
 from kineme.anchoring.grounding.space import conceptual_space
-from kineme.files.write_movement import WRITERS
+from kineme.dmp.discrete.formulations import FORMULATIONS
+from kineme.io.write_movement import WRITERS
 from kineme.library.recognition.members import described
 from kineme.library.storage import read
 from kineme.library.storage.undo import can_undo
-from kineme.output.text import printable
-from kineme.primitives.discrete.formulations import FORMULATIONS
+from kineme.reporting.text import printable
 from kineme.runtime.collector import collector_paused
 from kineme.sampling import evenly_spaced
 from kineme.studio.server.history import listed_history

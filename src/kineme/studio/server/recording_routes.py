@@ -11,10 +11,10 @@ from fastapi import APIRouter, Header, Request
 from pydantic import BaseModel, Field
 
 from kineme.errors import SpecificationError
-from kineme.files.annotations.label_table import LabelRow
-from kineme.files.annotations.labeled_pieces import labeled_pieces
-from kineme.files.annotations.read_labels import LabelTable
-from kineme.files.merge_files import Recordings
+from kineme.io.annotations.label_table import LabelRow
+from kineme.io.annotations.labeled_pieces import labeled_pieces
+from kineme.io.annotations.read_labels import LabelTable
+from kineme.io.merge_files import Recordings
 from kineme.library.learning.recordings import learn_recordings
 from kineme.library.recognition.annotate import annotate
 from kineme.movements.channels.channel import recorded_names

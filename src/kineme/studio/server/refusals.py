@@ -15,7 +15,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from kineme.errors import KinemeError
 from kineme.library.storage.sqlite_errors import BusyError
-from kineme.output.text import in_markup
+from kineme.reporting.text import in_markup
 from kineme.studio.server.studio_words import in_studio_words
 from kineme.studio.server.work import StoppedError
 

@@ -8,8 +8,8 @@ import numpy as np
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
+from kineme.dmp.generation.learned import Learned
 from kineme.errors import KinemeError, SpecificationError
-from kineme.primitives.generation.learned import Learned
 from kineme.robots.checks.check import Preflight
 from kineme.robots.models.load import load
 from kineme.robots.models.robot import Robot

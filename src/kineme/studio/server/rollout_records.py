@@ -6,7 +6,7 @@ from typing import Any, Self
 
 from pydantic import BaseModel, Field, model_validator
 
-from kineme.files.write_movement import WRITERS
+from kineme.io.write_movement import WRITERS
 from kineme.studio.server.records import Number, Point, Points, Sent, Text
 
 

@@ -8,7 +8,7 @@ from urllib.parse import quote
 from fastapi import APIRouter
 from fastapi.responses import Response
 
-from kineme.files.write_movement import encode_movement
+from kineme.io.write_movement import encode_movement
 from kineme.studio.server.plain import numbers, thumbnail
 from kineme.studio.server.records import SymbolKey
 from kineme.studio.server.rollout_records import Exported, Moved, Operated, PrimitiveOut, StylesOut, Wanted

@@ -7,14 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kineme.dmp.control.obstacles import ObstacleAvoidance
+from kineme.dmp.generation.generate import Generated, MovementOptions, generate
+from kineme.dmp.generation.learned import Learned, learn_one
+from kineme.dmp.styles.learn import learn_styles
+from kineme.dmp.styles.model import StyleModel
 from kineme.errors import SpecificationError, heard_warnings
 from kineme.library.storage import read
 from kineme.library.symbols.grounding import prototype_of
-from kineme.primitives.control.obstacles import ObstacleAvoidance
-from kineme.primitives.generation.generate import Generated, MovementOptions, generate
-from kineme.primitives.generation.learned import Learned, learn_one
-from kineme.primitives.styles.learn import learn_styles
-from kineme.primitives.styles.model import StyleModel
 from kineme.studio.server.rollout_records import Obstacle, Operated, Wanted, What
 from kineme.studio.server.studio import Studio
 from kineme.studio.snapshot.primitive import snapshot_of_primitive
@@ -49,7 +49,7 @@ def make(studio: Studio, asked: Wanted) -> Made:
     Raises
     ------
     SpecificationError, TrajectoryError
-        See `kineme.primitives.generation.generate.generate`.
+        See `kineme.dmp.generation.generate.generate`.
     """
     learned = learned_as(studio, asked)
     duration = asked.duration or float(learned.primitive.durations[0])

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from kineme.comparison.describe import N_POINTS
+from kineme.dmp.discrete.dmp import DMP, Primitives
 from kineme.errors import SpecificationError
 from kineme.library.library import ActionLibrary
 from kineme.library.recognition.members import Members, members_of
@@ -14,11 +14,11 @@ from kineme.library.recognition.recognize import known_members
 from kineme.library.storage import read
 from kineme.library.storage.symbols import symbol
 from kineme.library.symbols.grounding import prototype_of
-from kineme.primitives.discrete.dmp import DMP, Primitives
 from kineme.recognition.classifiers import fit_prototype
 from kineme.recognition.early.hypotheses import Early
 from kineme.recognition.known_classes import FittedRecognizer, KnownClasses, known_classes
 from kineme.sampling import evenly_spaced
+from kineme.similarity.describe import N_POINTS
 from kineme.studio.snapshot.early import early_part
 from kineme.studio.snapshot.movements import movement_parts
 from kineme.studio.snapshot.recognition import recognition_parts

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.primitives.discrete.dmp import DMP, Primitives
-from kineme.primitives.discrete.fits import trajectory_regression
-from kineme.primitives.discrete.operators import decoder, smoothness_factor
+from kineme.dmp.discrete.dmp import DMP, Primitives
+from kineme.dmp.discrete.fits import trajectory_regression
+from kineme.dmp.discrete.operators import decoder, smoothness_factor
 from kineme.studio.snapshot.snapshot import Snapshot
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from kineme.primitives.discrete.dmp import Primitives
-from kineme.primitives.pose.pose_primitives import PosePrimitives
+from kineme.dmp.discrete.dmp import Primitives
+from kineme.dmp.pose.pose_primitives import PosePrimitives
 from kineme.studio.snapshot.movements import movement_parts
 from kineme.studio.snapshot.snapshot import Snapshot
 

@@ -7,9 +7,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.comparison import Comparison
-from kineme.comparison.describe import N_POINTS, even_paths
-from kineme.comparison.representation import PAIR_QUANTITIES, Representation, forcing_operator, rotating
 from kineme.errors import SpecificationError
 from kineme.kernels.procrustes import Procrustes
 from kineme.kernels.shapes import Shapes
@@ -20,6 +17,9 @@ from kineme.recognition.certainty import LEAST_CONFIDENCE
 from kineme.recognition.classifiers import Classifier, Nearest, NearestEach, Prototype
 from kineme.recognition.conformal import Calibration
 from kineme.recognition.known_classes import KnownClasses
+from kineme.similarity.comparison import Comparison
+from kineme.similarity.describe import N_POINTS, even_paths
+from kineme.similarity.representation import PAIR_QUANTITIES, Representation, forcing_operator, rotating
 from kineme.studio.snapshot.snapshot import Snapshot
 from kineme.validation import Array
 

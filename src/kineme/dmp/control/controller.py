@@ -1,0 +1,428 @@
+"""One movement under live control, whatever kind of primitive it comes from.
+
+Limits of velocity and acceleration are reported where they are exceeded, never enforced.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kineme.dmp.control import inputs
+from kineme.dmp.control.moving_goal import MovingGoal
+from kineme.dmp.control.obstacles import ObstacleAvoidance
+from kineme.dmp.control.options import Options, numbers
+from kineme.dmp.control.plan import SHORTEST, Influences, Plan, ViaPlaces, check_controlled, passed
+from kineme.dmp.control.state import State, Status
+from kineme.dmp.control.stepping import stepper
+from kineme.errors import SpecificationError
+from kineme.validation import Array
+
+_NONE = Status(0)
+
+
+_NOTHING = Status(0)
+_STANDSTILL = 1e-30  # durations; a step as short as this is none
+
+
+class Controller:
+    """Moves one primitive step by step, and bends to what happens meanwhile.
+
+    Made by ``controller`` of `Primitives`, `RhythmicPrimitives` and `PosePrimitives`. A step carries the equation of
+    the movement over ``du = tempo dt / tau`` exactly: undisturbed, positions, velocities and accelerations are those of
+    its rollout, at any dt. What is passed to a step is held over it: goal and coupling as they are, obstacles at rest
+    or with their velocities (second order in dt).
+
+    Parameters
+    ----------
+    plan : Plan
+        The movement: equation, start and goal.
+    dt : float
+        Time of a step [s], at most the duration.
+    options : Options
+        Feedback, limits, goal filter, obstacle avoidance.
+
+    Attributes
+    ----------
+    state : State
+        After the last step; at first the start.
+
+    Raises
+    ------
+    SpecificationError
+        A step or a limit out of its range.
+
+    Notes
+    -----
+    The twin, compiled unless `KINEME_COMPILED=never`, is chosen and warmed up when the controller is made. A controller
+    belongs to one thread.
+    """
+
+    state: State
+
+    def __init__(self, plan: Plan, dt: float, options: Options) -> None:
+        check_controlled(plan, dt)
+        self.dt, self.options = float(dt), options
+        self._plan, self._n_dims, self._origin = plan, plan.n_dims, plan.origin
+        self._set_tau(plan.duration)
+        self._limits = limits_from(options, self._n_dims)
+        self._limited = self._limits.exist
+        self._settle = float(options.settle or plan.settle)
+        self._advance = stepper(plan, options.avoidance or ObstacleAvoidance())
+        self._zeros, self._nowhere = np.zeros(self._n_dims), np.zeros((0, plan.n_positions))
+        self.reset()
+
+    def reset(self) -> State:
+        """Back to the start, with the first goal; returns the state there."""
+        plan = self._plan
+        self._goal = MovingGoal(plan, plan.goal, self.options.goal_filter)
+        self._clock = Clock(plan.begin, plan.periodic)
+        self._set_tau(plan.duration)
+        self._tempo, self._rate, self._slowing = 1.0, 1.0 / self._tau, 0.0
+        self._obstacles = self._obstacle_velocities = self._nowhere
+        self._events, self._via_missed = _NOTHING, 0.0
+        influences = Influences(*self._follow(0.0), self._zeros, self._zeros, self._nowhere, self._nowhere)
+        self._motion = self._advance(plan.state, plan.begin, 0.0, influences)  # x - origin, dx/du, x''
+        self.state = self._report(*self._derivatives())
+        return self.state
+
+    def step(  # noqa: PLR0913 - what can happen, a parameter each
+        self,
+        position: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        goal: ArrayLike | None = None,
+        tempo: float = 1.0,
+        coupling: ArrayLike | None = None,
+        obstacles: ArrayLike | None = None,
+        *,
+        goal_velocity: ArrayLike | None = None,
+        obstacle_velocities: ArrayLike | None = None,
+        dt: float | None = None,
+    ) -> State:
+        """Move on by dt. Never raises: what cannot be used is left out, and the status says so.
+
+        Parameters
+        ----------
+        position, velocity : array_like of shape (d,), optional
+            Measured now, at the time of `state`; see `feedback`. A velocity is read at the tempo of the last step. With
+            feedback="phase", no position does not slow the phase, and one that cannot be used slows it like the last.
+        goal : array_like of shape (d,), optional
+            A new goal, for this step and all later ones: where it is now.
+        goal_velocity : array_like of shape (d,), optional
+            Velocity of the goal, per second, which then moves on by itself, until the next goal. It is followed without
+            a lag; without a velocity, what moves at v is trailed by ``(D / K) tau v``, that is 0.2 tau v.
+        tempo : float, default 1.0
+            Speed of the phase during this step. The path does not depend on it; velocities are in proportion to it, so
+            change it gradually. 0 is a pause.
+        coupling : array_like of shape (d,), optional
+            External acceleration during this step, per second squared.
+        obstacles, obstacle_velocities : array_like of shape (m, d), optional
+            Where obstacles are now, and their velocities per second; by default at rest. Without, there are none.
+        dt : float, optional
+            Time of this step [s].
+
+        Returns
+        -------
+        State
+        """
+        self._events = _NOTHING
+        self._step(position, velocity, (goal, goal_velocity), tempo, coupling, (obstacles, obstacle_velocities), dt)
+        return self.state
+
+    def _step(  # noqa: PLR0913, PLR0917 - as `step`
+        self,
+        position: Any,
+        velocity: Any,
+        goal: tuple[Any, Any],
+        tempo: Any,
+        coupling: Any,
+        obstacles: tuple[Any, Any],
+        dt: Any,
+    ) -> None:
+        """`step`, after the events of the last one are forgotten; goal and obstacles with their velocities."""
+        dt, tempo = self._pace(dt, tempo)
+        last = self._motion
+        if position is not None or velocity is not None:
+            self._measure(position, velocity)
+        else:
+            self._slowing = 0.0
+        if goal[0] is not None or goal[1] is not None:
+            self._aim(*goal)
+        self._sense(*obstacles)
+        push = self._zeros if coupling is None else self._couple(coupling)
+        velocity_before = self._derivatives()[0] if self._limited else self._zeros
+        self._rate = tempo / (self._tau * (1.0 + self._slowing))
+        self._move(dt, push, last)
+        derivatives = self._derivatives()
+        if self._limited:
+            self._events |= self._limits.exceeded(velocity_before, *derivatives, dt)
+        self.state = self._report(*derivatives)
+
+    def _pace(self, dt: Any, tempo: Any) -> tuple[float, float]:
+        """The time and tempo of this step."""
+        wanted = inputs.number(tempo)
+        if wanted >= 0.0 and wanted * self.dt <= self._longest:
+            self._tempo = wanted
+        else:
+            self._events |= Status.TEMPO_REJECTED
+        if dt is None:
+            return self.dt, self._tempo
+        dt = inputs.number(dt)
+        if self._fits(dt) and dt * self._tempo <= self._longest:
+            return dt, self._tempo
+        self._events |= Status.DT_REJECTED
+        return self.dt, self._tempo
+
+    def _fits(self, dt: float) -> bool:
+        return SHORTEST * self._tau <= dt <= self._longest
+
+    def _set_tau(self, tau: float) -> None:
+        """The duration of u = 1, and with it the longest step."""
+        self._tau, self._longest = tau, tau * self._plan.longest_step
+
+    def _measure(self, position: Any, velocity: Any) -> None:
+        """Go on from what was measured, or let its distance slow the phase."""
+        x = None if position is None else self._read_position(position)
+        v = None if velocity is None else self._read_velocity(velocity, x)
+        if (x is None and position is not None) or (v is None and velocity is not None):
+            self._events |= Status.MEASUREMENT_REJECTED
+        if self.options.phase_stopping is not None:
+            if x is not None:
+                error = x - self._origin - self._motion[0]
+                self._slowing = float(self.options.phase_stopping * error.dot(error))
+            elif position is None:
+                self._slowing = 0.0
+            return
+        motion = self._motion.copy()
+        if x is not None:
+            motion[0] = x - self._origin
+        if v is not None and self._rate > 0:
+            motion[1] = v / self._rate
+        self._motion = motion
+
+    def _read_position(self, value: Any) -> Array | None:
+        """A measured position (d,), or None where it cannot be used."""
+        return inputs.vector(value, self._n_dims)
+
+    def _read_velocity(self, value: Any, position: Array | None) -> Array | None:
+        """A measured velocity (d,), at a measured position if there is one."""
+        return inputs.vector(value, self._n_dims)
+
+    def _read_goal(self, value: Any) -> Array | None:
+        return inputs.vector(value, self._n_dims)
+
+    def _read_goal_velocity(self, value: Any) -> Array | None:
+        return inputs.vector(value, self._n_dims)
+
+    def _read_coupling(self, value: Any) -> Array | None:
+        return inputs.vector(value, self._n_dims)
+
+    def _aim(self, goal: Any, velocity: Any = None) -> None:
+        """Set a goal, or let the one in force move; what cannot be used of one of them spoils both."""
+        target = self._goal.target + self._origin if goal is None else self._read_goal(goal)
+        moving = None if velocity is None else self._read_goal_velocity(velocity)
+        unread = moving is None and velocity is not None
+        remaining = (1.0 - self._clock.u) / (self._rate or 1.0 / self._tau)  # below 0 after the end
+        if unread or target is None or not self._goal.aim(target - self._origin, moving, remaining):
+            self._events |= Status.GOAL_REJECTED
+
+    def _sense(self, obstacles: Any, velocities: Any) -> None:
+        """Take over the obstacles, relative to the origin; without any there are none."""
+        if obstacles is None and velocities is None:
+            self._obstacles = self._obstacle_velocities = self._nowhere
+            return
+        n = self._plan.n_positions
+        read = inputs.moving_points(obstacles, velocities, n)
+        if read is None:
+            self._events |= Status.OBSTACLES_REJECTED
+        else:
+            self._obstacles, self._obstacle_velocities = read[0] - self._origin[:n], read[1]
+
+    def _couple(self, coupling: Any) -> Array:
+        push = self._read_coupling(coupling)
+        if push is not None:
+            return push
+        self._events |= Status.COUPLING_REJECTED
+        return self._zeros
+
+    def _move(self, dt: float, push: Array, last: Array) -> None:
+        """Advance by one step; if that leads out of the range of numbers, stay with `last`."""
+        goal, ratio = self._follow(dt)
+        self._via_missed = 0.0
+        goal_velocity = self._goal.velocity
+        self._clock.add_time(dt)
+        du = self._rate * dt
+        if du <= _STANDSTILL:
+            self._rate = 0.0
+            return
+        if push is not self._zeros:
+            push = push / (self._rate * self._rate)
+        velocities = self._obstacle_velocities
+        if len(velocities):
+            velocities = velocities / self._rate
+        goal_rate = self._zeros if goal_velocity is None else goal_velocity / self._rate
+        goal = goal if goal_velocity is None else self._goal.ahead(goal, goal_rate)
+        influences = Influences(goal, ratio, goal_rate, push, self._obstacles, velocities)
+        begin = self._clock.u
+        motion = self._advance(self._motion[:2], begin, du, influences)
+        if self._usable(motion):
+            self._clock.add_phase(du)
+            if self._plan.via is not None:
+                self._pass(self._plan.via, begin, du, influences)
+            self._motion = motion
+        else:
+            self._motion = last
+            self._events |= Status.STATE_KEPT
+
+    def _pass(self, via: ViaPlaces, begin: float, du: float, influences: Influences) -> None:
+        """Measure how far from the via points, whose times lie in a step of du from `begin`, the movement passes."""
+        for ahead, point in passed(via, begin, self._clock.u, du, self._plan.periodic):
+            at = self._advance(self._motion[:2], begin, ahead, influences)[0, : len(point)]
+            self._via_missed = max(self._via_missed, float(np.sqrt(np.nansum((at - point) ** 2))))
+        if not self._via_missed <= via.tolerance:
+            self._events |= Status.VIA_POINT_MISSED
+
+    def _usable(self, motion: Array) -> bool:
+        """Whether the movement can go on from there."""
+        return inputs.usable(motion)
+
+    def _follow(self, dt: float) -> tuple[Array, Array]:
+        """Goal and ratio that act during dt."""
+        return self._goal.follow(dt)
+
+    def _derivatives(self) -> tuple[Array, Array]:
+        """Velocity and acceleration in time, as the state reports them."""
+        return self._motion[1] * self._rate, self._motion[2] * (self._rate * self._rate)
+
+    def _report(self, velocity: Array, acceleration: Array) -> State:
+        x, clock = self._motion[0], self._clock
+        origin, goal = self._origin, self._goal.now
+        place, aim = origin + x, origin + goal
+        return State(clock.time, clock.progress, place, velocity, acceleration, aim, self._via_missed, self._status())
+
+    def _status(self) -> Status:
+        status = Status.MOVING
+        if self._rate == 0.0:
+            status = Status.PAUSED
+        elif not self._plan.periodic and self._clock.u >= 1.0 and self._rests():
+            status = Status.SETTLED
+        return status if self._events is _NOTHING else status | self._events
+
+    def _rests(self) -> bool:
+        distance, slope = self._motion[0] - self._goal.target, self._motion[1]
+        return bool(max(np.abs(distance).max(), np.abs(slope).max()) <= self._settle)
+
+
+class RunningSum:
+    """Neumaier's compensated sum: what rounding loses is kept and added back.
+
+    A. Neumaier, "Rundungsfehleranalyse einiger Verfahren zur Summation endlicher Summen", ZAMM 54, 1974.
+    """
+
+    __slots__ = ("_lost", "_sum")
+
+    def __init__(self, start: float = 0.0) -> None:
+        self._sum, self._lost = start, 0.0
+
+    def add(self, step: float) -> None:
+        """Add a step of 0 or more."""
+        total = self._sum + step
+        self._lost += (self._sum - total) + step if self._sum >= step else (step - total) + self._sum
+        self._sum = total
+
+    def take_whole(self) -> int:
+        """Subtract the whole part, which rounds nothing, and return it."""
+        whole = math.floor(self.value)
+        self._sum -= whole
+        return whole
+
+    @property
+    def value(self) -> float:
+        """The sum."""
+        return self._sum + self._lost
+
+
+class Clock:
+    """Seconds and phase since the start.
+
+    The phase is normalized time u; that of a rhythm counts from `begin` and stays below 1, so that it is as exact after
+    a million periods as in the first.
+
+    Attributes
+    ----------
+    time : float
+        Seconds since the start.
+    u : float
+        The phase, of a rhythm within its period.
+    progress : float
+        The phase since the start.
+    """
+
+    __slots__ = ("_begin", "_periodic", "_phase", "_seconds", "_turns", "progress", "time", "u")
+
+    def __init__(self, begin: float, periodic: bool) -> None:
+        self._seconds, self._phase = RunningSum(), RunningSum(begin)
+        self._begin, self._periodic, self._turns = begin, periodic, 0
+        self.time, self.u, self.progress = 0.0, begin, 0.0
+
+    def add_time(self, dt: float) -> None:
+        """Let dt [s] pass."""
+        self._seconds.add(dt)
+        self.time = self._seconds.value
+
+    def add_phase(self, du: float) -> None:
+        """Let the phase go on by du."""
+        self._phase.add(du)
+        self.u = self.progress = self._phase.value
+        if self._periodic:
+            if self.u >= 1.0:
+                self._turns += self._phase.take_whole()
+                self.u = self._phase.value
+            self.progress = self._turns + self.u - self._begin
+
+
+class Limits(NamedTuple):
+    """Largest velocity and acceleration (d,) of each component, or None where there is no limit."""
+
+    velocity: Array | None
+    acceleration: Array | None
+
+    @property
+    def exist(self) -> bool:
+        """Whether there is any."""
+        return self.velocity is not None or self.acceleration is not None
+
+    def exceeded(self, before: Array, velocity: Array, acceleration: Array, dt: float) -> Status:
+        """Which are exceeded after a step of dt from the velocity `before` it, as members of `Status`.
+
+        The acceleration is the larger of that at the end of the step and the mean change of velocity over it.
+        """
+        events = _NONE
+        if self.velocity is not None and (np.abs(velocity) > self.velocity).any():
+            events |= Status.VELOCITY_LIMIT
+        if self.acceleration is not None:
+            largest = np.maximum(np.abs(acceleration), np.abs(velocity - before) / dt)
+            if (largest > self.acceleration).any():
+                events |= Status.ACCELERATION_LIMIT
+        return events
+
+
+def limits_from(options: Options, n_dims: int) -> Limits:
+    """The limits of the options for d components."""
+    return Limits(
+        _limit("velocity_limit", options.velocity_limit, n_dims),
+        _limit("acceleration_limit", options.acceleration_limit, n_dims),
+    )
+
+
+def _limit(name: str, value: ArrayLike | None, n_dims: int) -> Array | None:
+    """A limit as positive (d,), from a number or one per dimension."""
+    if value is None:
+        return None
+    array = numbers(name, value)
+    if array.shape not in ((), (n_dims,)) or not (array > 0).all():
+        raise SpecificationError(f"expected {name} to be a number above 0, or {n_dims} of them, got {value!r}")
+    return np.broadcast_to(array, n_dims)

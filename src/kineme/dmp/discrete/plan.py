@@ -1,0 +1,77 @@
+"""A discrete movement as the plan that a controller steps through."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kineme.dmp.control.options import check_one, one_vector
+from kineme.dmp.control.plan import MISSED, Plan, ViaPlaces
+from kineme.dmp.discrete.learned import Learned
+from kineme.dmp.discrete.modulate import modulated
+from kineme.dmp.discrete.own_primitives import own_primitives
+from kineme.dmp.discrete.rollout import Rollout, rollout
+from kineme.dmp.discrete.via_points import ViaLike, ViaPoints, via_points
+from kineme.validation import Array, check_number
+
+_SETTLED = 1e-3  # of the demonstration's largest extent
+
+
+def plan_of(  # noqa: PLR0913, PLR0917 - one parameter per option
+    primitive: Learned,
+    start: ArrayLike | None = None,
+    goal: ArrayLike | None = None,
+    duration: float | None = None,
+    velocity: ArrayLike | None = None,
+    via: ViaLike | None = None,
+    end_velocity: ArrayLike | None = None,
+    position_limits: tuple[ArrayLike, ArrayLike] | None = None,
+) -> Plan:
+    """The plan of one primitive, with the options of `Primitives.rollout` checked for one movement."""
+    check_one(len(primitive))
+    if duration is not None:
+        check_number("duration", duration, above=0.0)
+    d = primitive.n_dims
+    movement = rollout(
+        primitive,
+        one_vector("start", start, d),
+        one_vector("goal", goal, d),
+        duration,
+        one_vector("velocity", velocity, d),
+    )
+    asked = None if via is None else via_points(via, d)
+    movement = modulated(movement, asked, one_vector("end_velocity", end_velocity, d), position_limits)
+    return plan_along(movement, d, asked)
+
+
+def plan_along(movement: Rollout, n_positions: int, via: ViaPoints | None) -> Plan:
+    """The plan of one generated movement through via points, with that many positions, others behind them."""
+    check_one(len(movement))
+    primitive = movement.primitives if movement.change is None else own_primitives(movement)
+    dmp, d = primitive.dmp, primitive.n_dims
+    x0, tau = movement.starts[0].copy(), float(movement.durations[0])
+    learned, extents = primitive.goals - primitive.starts, primitive.extents
+
+    def shape(u: Array) -> Array:
+        forcing = dmp.basis.design(u) @ primitive.scaled_weights[0].T
+        return np.column_stack((forcing, dmp.system.coupling(dmp.K, dmp.basis.phase(u))))
+
+    return Plan(
+        dmp.K,
+        dmp.D,
+        shape,
+        n_gaps=dmp.n_basis - 1,
+        ratio=lambda goal: np.array(dmp.system.ratio(goal[None], learned, extents)[0]),
+        origin=x0,
+        goal=movement.goals[0] - x0,
+        state=np.vstack((np.zeros(d), movement.velocities_at_start[0] * tau)),
+        duration=tau,
+        settle=_SETTLED * float(extents.max()),
+        n_positions=n_positions,
+        via=None if via is None else _places(via, x0, n_positions, MISSED * float(extents.max())),
+    )
+
+
+def _places(via: ViaPoints, origin: Array, n_positions: int, tolerance: float) -> ViaPlaces:
+    columns = slice(0, n_positions or None)
+    return ViaPlaces(via.times, via.points[0, :, columns] - origin[columns], tolerance)

@@ -1,0 +1,233 @@
+"""Generated movements in a batch: any start, goal, duration and rate, as one matrix product."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kineme.dmp.base_rollout import BaseRollout
+from kineme.dmp.batch import Batch
+from kineme.dmp.discrete.learned import Learned
+from kineme.dmp.discrete.operators import decoder
+from kineme.dmp.discrete.per_movement import broadcast_length, check_durations, per_movement
+from kineme.errors import DegenerateMovementError
+from kineme.runtime.parallel import for_tiles
+from kineme.validation import (
+    Array,
+    describe,
+)
+
+_TILE_SAMPLES = 100_000  # numbers in one tile of the result
+
+
+class Change(NamedTuple):
+    """A change of the weights of n movements: ``W + coefficients @ directions``."""
+
+    coefficients: Array  # (n, d, k)
+    directions: Array  # (k, N)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Rollout(BaseRollout):
+    """n generated movements of T samples each; positions and derivatives are computed when asked for.
+
+    A sequence of `Trajectory`, taken wherever movements are expected; see `BaseRollout`. Each of `positions`,
+    `velocities` and `accelerations` is one product of the movements' numbers, ``[W, g - x0, v0, x0]``, with the decode
+    matrix of the specification.
+
+    Attributes
+    ----------
+    times : ndarray of shape (n, T)
+        From 0 [s].
+    """
+
+    primitives: Learned
+    ratio: Array  # (n, d), what scale f is multiplied by
+    starts: Array  # (n, d)
+    goals: Array  # (n, d)
+    velocities_at_start: Array  # (n, d), per second
+    durations: Array  # (n,), tau
+    n_samples: int
+    end: float = 1.0  # of the last sample, in durations
+    change: Change | None = None  # of the weights in force: via points, end velocity
+    goal_velocities: Array | None = None  # (n, d), per second, of goals that move
+    fixed_velocity: bool = False  # whether a velocity was asked for that does not scale with the tempo
+
+    def __len__(self) -> int:
+        return len(self.starts)
+
+    def __repr__(self) -> str:
+        return f"Rollout({len(self)} movements of {self.n_samples} samples from {self.primitives!r})"
+
+    @property
+    def arrivals(self) -> Array:
+        """Where the goals are at the end of the duration (n, d)."""
+        return self.goals if self.goal_velocities is None else self.goals + self.goal_steps
+
+    @property
+    def goal_steps(self) -> Array:
+        """How far the goals move in one duration (n, d)."""
+        if self.goal_velocities is None:
+            return np.zeros_like(self.goals)
+        return self.goal_velocities * self.durations[:, None]
+
+    @property
+    def times(self) -> Array:
+        """Times of the samples (n, T) [s]."""
+        return self.durations[:, None] * self._shares
+
+    @cached_property
+    def positions(self) -> Array:
+        """Positions (n, T, d), in the unit of the demonstrations."""
+        return self._derivative(0)
+
+    @cached_property
+    def velocities(self) -> Array:
+        """Velocities (n, T, d), per second."""
+        return self._derivative(1)
+
+    @cached_property
+    def accelerations(self) -> Array:
+        """Accelerations (n, T, d), per second squared."""
+        return self._derivative(2)
+
+    def least_duration(self, velocity: ArrayLike | None = None, acceleration: ArrayLike | None = None) -> Array:
+        """The least duration of each movement (n,) [s] in which the same path stays within limits.
+
+        Of one path, velocities are in proportion to ``1 / tau`` and accelerations to ``1 / tau^2``, so it is
+        ``tau max(|v_k| / velocity_k, sqrt(|a_k| / acceleration_k))``, the maximum over time and dimensions k. It holds
+        between samples too, whatever their number, to 1e-5 of a limit.
+        ``rollout(duration=...)`` moves so; initial velocities scale with the rest.
+
+        Parameters
+        ----------
+        velocity, acceleration : float or array_like of shape (d,), optional
+            Largest absolute value, per second and per second squared: of all dimensions, or one each.
+
+        Raises
+        ------
+        SpecificationError
+            No limit, or one that is not above 0; a rollout that was given a velocity other than 0, initial, at the end
+            or of the goal, for its path depends on the duration.
+        """
+        from kineme.dmp.discrete.least_duration import least_durations
+
+        finely = self.end * self.primitives.dmp.n_basis, lambda one, n: replace(one, n_samples=n)
+        return least_durations(self, self.durations, finely, self.fixed_velocity, (velocity, acceleration))
+
+    @property
+    def _shares(self) -> Array:
+        return np.linspace(0.0, self.end, self.n_samples)
+
+    @property
+    def _batch(self) -> Batch:
+        return self.primitives
+
+    def _take(self, chosen: NDArray[np.intp]) -> Rollout:
+        rows = ("ratio", "starts", "goals", "velocities_at_start", "durations")
+        change, moving = self.change, self.goal_velocities
+        return replace(
+            self,
+            goal_velocities=None if moving is None else moving[chosen],
+            change=None if change is None else change._replace(coefficients=change.coefficients[chosen]),
+            primitives=self.primitives if len(self.primitives) == 1 else self.primitives[chosen],
+            **{name: getattr(self, name)[chosen] for name in rows},
+        )
+
+    def _derivative(self, order: int) -> Array:
+        response = decoder(self.primitives.dmp, self.n_samples, self.end)
+        constant = np.full(self.n_samples, 1.0 if order == 0 else 0.0)
+        rows = [response.Phi[order].T, response.goal[order], response.velocity[order], constant]
+        goal_steps = self.goal_steps[:, :, None] if self.goal_velocities is not None else np.zeros((len(self), 1, 0))
+        rows += [response.moving_goal[order]] * goal_steps.shape[2]
+        change = self.change or Change(np.zeros((len(self), 1, 0)), np.zeros((0, len(response.Phi[order].T))))
+        matrix, n_basis = np.vstack([*rows, change.directions @ rows[0]]), self.primitives.dmp.n_basis
+        n_others = len(matrix) - len(change.directions)
+        per_tau = (1.0 / self.durations**order)[:, None, None]
+        shared = len(self.primitives) == 1
+        weights, d = self.primitives.scaled_weights, self.starts.shape[1]
+        result = np.empty((len(self), d, self.n_samples))
+
+        def tile(start: int, stop: int) -> None:
+            chosen = slice(start, stop)
+            numbers = np.empty((stop - start, d, len(matrix)))
+            np.multiply(
+                weights if shared else weights[chosen], self.ratio[chosen, :, None], out=numbers[:, :, :n_basis]
+            )
+            numbers[:, :, n_basis] = self.goals[chosen] - self.starts[chosen]
+            numbers[:, :, n_basis + 1] = self.velocities_at_start[chosen] * self.durations[chosen, None]
+            numbers[:, :, n_basis + 2] = self.starts[chosen]
+            numbers[:, :, n_basis + 3 : n_others] = goal_steps[chosen]
+            numbers[:, :, n_others:] = change.coefficients[chosen]
+            # Two-dimensional on purpose: a stack of matrices would become as many small products.
+            rows = numbers.reshape(-1, len(matrix))
+            np.matmul(rows, matrix, out=result[chosen].reshape(len(rows), -1))
+            if order:
+                result[chosen] *= per_tau[chosen]
+
+        for_tiles(tile, len(self), max(1, _TILE_SAMPLES // (d * self.n_samples)))
+        return result.transpose(0, 2, 1)
+
+
+def rollout(
+    primitives: Learned,
+    start: ArrayLike | None,
+    goal: ArrayLike | None,
+    duration: ArrayLike | None,
+    velocity: ArrayLike | None,
+    goal_velocity: ArrayLike | None = None,
+) -> Rollout:
+    """Check the options and broadcast them over the primitives; see `Primitives.rollout`."""
+    d = primitives.n_dims
+    options = {
+        "start": per_movement(start, "start", d),
+        "goal": per_movement(goal, "goal", d),
+        "velocity": per_movement(velocity, "velocity", d),
+        "goal_velocity": per_movement(goal_velocity, "goal_velocity", d),
+        "duration": per_movement(duration, "duration", None),
+    }
+    n = broadcast_length(len(primitives), options)
+
+    def fill(name: str, default: Array) -> Array:
+        option = options[name]
+        value = default if option is None else option
+        return np.broadcast_to(value, (n, *value.shape[1:]))
+
+    durations = fill("duration", primitives.durations)
+    check_durations("duration", durations)
+    starts, goals = fill("start", primitives.starts), fill("goal", primitives.goals)
+    # The demonstrated velocity scales with the tempo; a given velocity does not.
+    tempo = primitives.durations / durations
+    velocities = fill("velocity", primitives.velocities) * (tempo[:, None] if options["velocity"] is None else 1.0)
+    moving = None if options["goal_velocity"] is None else fill("goal_velocity", np.zeros((1, d)))
+    arrivals = goals if moving is None else goals + moving * durations[:, None]
+    given = [option for option in (options["velocity"], moving) if option is not None]
+    return Rollout(
+        primitives,
+        _ratio(primitives, arrivals - starts),
+        starts,
+        goals,
+        velocities,
+        durations,
+        primitives.dmp.n_points,
+        goal_velocities=moving,
+        fixed_velocity=any(bool(option.any()) for option in given),
+    )
+
+
+def _ratio(primitives: Learned, amplitudes: Array) -> Array:
+    learned = primitives.goals - primitives.starts
+    ratio = primitives.dmp.system.ratio(amplitudes, learned, primitives.extents)
+    if not np.isfinite(ratio).all():
+        i, k = (int(index) for index in np.argwhere(~np.isfinite(ratio))[0])
+        i = min(i, len(primitives) - 1)
+        raise DegenerateMovementError(
+            f"{describe(i, primitives.names)}: expected a demonstration with g != x0 in dimension {k} to move to "
+            "another goal, got a closed or flat one; the original formulation scales by g - x0: use "
+            '"bio-inspired" or "amplitude-scaled"'
+        )
+    return ratio

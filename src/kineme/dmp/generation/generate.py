@@ -1,0 +1,265 @@
+"""Generate one movement of one primitive: by the decode matrix, or step by step around obstacles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from kineme.dmp.control.obstacles import ObstacleAvoidance
+from kineme.dmp.control.state import State, Status
+from kineme.dmp.discrete.dmp import Primitives
+from kineme.dmp.generation.learned import Learned
+from kineme.dmp.pose.pose_primitives import PosePrimitives
+from kineme.dmp.recorded_as import in_primitive, in_recording
+from kineme.errors import ExtrapolationWarning, SpecificationError, heard_warnings, warn
+from kineme.io.write_movement import ColumnNames, Columns
+from kineme.movements.channels.coordinates import columns_of
+from kineme.movements.rotations.quaternions import NORM_TOLERANCE
+from kineme.validation import LARGEST, Array
+
+_LONGEST = 10.0  # durations after which a movement around obstacles is given up
+_AIMED = 8  # times that it is aimed beside the via points so that obstacles lead it through them
+_MET = 0.01  # of the extent: a via point that is missed by more is said
+
+
+@dataclass(frozen=True, eq=False)
+class MovementOptions:
+    """What the new movement should be; None leaves it as demonstrated.
+
+    Attributes
+    ----------
+    start, goal : ndarray of shape (d,), optional
+        In the columns of the recording that are not discrete, in their order.
+    duration : float, optional
+        tau [s].
+    rate : float
+        Samples per second, at least.
+    settle : float, optional
+        Continue until within this distance of the goal.
+    obstacles : ndarray of shape (m, d), optional
+        Points to steer around.
+    meet_goal : bool
+        Whether the movement ends exactly at its goal, with the velocity that it has at the demonstrated one. Otherwise
+        it comes as close as the primitive brings it, to some hundredths of the way between the two goals.
+    via : tuple of (share, ndarray of shape (d,))
+        Points to pass, and when as shares of the duration, between 0 and 1; as start and goal. Obstacles lead away
+        from them; the movement is aimed beside them for it, and what is missed all the same is said.
+    avoidance : ObstacleAvoidance, optional
+        How strongly it steers around obstacles.
+    """
+
+    start: Array | None = None
+    goal: Array | None = None
+    duration: float | None = None
+    rate: float = 100.0
+    settle: float | None = None
+    obstacles: Array | None = None
+    meet_goal: bool = False
+    via: tuple[tuple[float, Array], ...] = ()
+    avoidance: ObstacleAvoidance | None = None
+
+
+class Generated(NamedTuple):
+    """A new movement: times (T,), positions (T, d), velocities and accelerations (T, e), and what they are called."""
+
+    columns: Columns
+    names: ColumnNames
+
+
+def generate(learned: Learned, options: MovementOptions) -> Generated:
+    """The new movement in the columns of the recording.
+
+    Orientations are quaternions of norm 1, with angular velocities in the world frame; discrete channels step where
+    they did, at the same share of the duration.
+
+    Raises
+    ------
+    SpecificationError
+        An option that cannot be met; among them obstacles that keep the movement from its goal, more samples than fit
+        into memory, and numbers that are not finite: a robot gets no movement that was not checked.
+
+    Warns
+    -----
+    ExtrapolationWarning
+        A via point that obstacles make the movement miss by more than 1 % of its extent: which, and by how much.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):  # refused below
+        start, goal = (checked_point(learned, getattr(options, name), name) for name in ("start", "goal"))
+        via = tuple((share, _via_point(learned, point)) for share, point in options.via)
+        move = _undisturbed if options.obstacles is None else _around_obstacles
+        made = move(learned.primitive, replace(options, start=start, goal=goal, via=via))
+    for name, column in made.items():
+        if not np.isfinite(column).all():
+            raise SpecificationError(
+                f"expected finite {name} of the new movement, they leave the range of numbers; choose a start, a "
+                "goal and a duration nearer to those demonstrated"
+            )
+    about = learned.primitive.to_recording
+    if about is not None:
+        duration = float(learned.primitive.durations[0]) if options.duration is None else options.duration
+        made["positions"] = in_recording(_signed(made["positions"], learned), about, 0, made["times"] / duration)
+        made |= {name: made[name][:, about.rates_in_order] for name in ("velocities", "accelerations")}
+    return Generated(made, ColumnNames(learned.columns, learned.rates))
+
+
+def checked_point(learned: Learned, point: Array | None, name: str) -> Array | None:
+    """A start or goal in the columns of the recording that move, in those of the primitive.
+
+    Parameters
+    ----------
+    learned : Learned
+    point : ndarray of shape (columns,) or None
+    name : str
+        What the message calls it.
+
+    Raises
+    ------
+    SpecificationError
+        Another number of values, or such that no movement can start or end there.
+    """
+    if point is None:
+        return None
+    names = learned.moving_columns
+    if point.shape != (len(names),):
+        raise SpecificationError(f"expected {len(names)} numbers for {name}, {', '.join(names)}, got {point.size}")
+    if not (np.abs(point) <= LARGEST).all():
+        raise SpecificationError(
+            f"expected finite numbers up to {LARGEST:g} for {name}, got {point.tolist()}; choose another unit"
+        )
+    about = learned.primitive.to_recording
+    for channel, columns in [] if about is None else zip(about.moving, columns_of(about.moving), strict=True):
+        if channel.kind == "orientation" and abs(norm := np.linalg.norm(point[columns]) - 1.0) > NORM_TOLERANCE:
+            raise SpecificationError(
+                f"expected a unit quaternion for {', '.join(channel.columns)} of {name}, got norm {norm + 1.0:.6g}; "
+                "check the order of the columns, or divide it by its norm"
+            )
+    return point if about is None else in_primitive(point, about)
+
+
+def _via_point(learned: Learned, point: Array) -> Array:
+    checked = checked_point(learned, point, "a via point")
+    assert checked is not None
+    return checked
+
+
+def _signed(columns: Array, learned: Learned) -> Array:
+    """Columns of a primitive, with orientations of the recorded sign: q and -q are one, but not in one column."""
+    if not isinstance(learned.primitive, PosePrimitives):
+        return columns
+    columns, start = columns.copy(), learned.primitive.starts[0]
+    for at in range(learned.primitive.n_positions, len(start), 4):
+        if columns[0, at : at + 4] @ start[at : at + 4] < 0:
+            columns[:, at : at + 4] *= -1.0
+    return columns
+
+
+def _undisturbed(primitive: Primitives | PosePrimitives, options: MovementOptions) -> Columns:
+    end = None
+    if options.meet_goal:
+        end = primitive.rollout(duration=options.duration, rate=options.rate).velocities[:, -1]
+    made = primitive.rollout(
+        options.start,
+        options.goal,
+        options.duration,
+        via=options.via or None,
+        end_velocity=end,
+        rate=options.rate,
+        settle=options.settle,
+    )
+    return {
+        "times": made.times[0],
+        "positions": made.positions[0],
+        "velocities": made.velocities[0],
+        "accelerations": made.accelerations[0],
+    }
+
+
+def _around_obstacles(primitive: Primitives | PosePrimitives, options: MovementOptions) -> Columns:
+    obstacles = np.asarray(options.obstacles)
+    n_dims = primitive.n_positions if isinstance(primitive, PosePrimitives) else primitive.n_dims
+    if obstacles.ndim != 2 or obstacles.shape[1] != n_dims or n_dims < 2:
+        raise SpecificationError(
+            f"expected obstacles in the {n_dims} dimensions of the movement, two or more, got shape {obstacles.shape}"
+        )
+    made = _steered(primitive, options, obstacles)
+    return _through(primitive, options, obstacles, made) if options.via else made
+
+
+def _through(
+    primitive: Primitives | PosePrimitives, options: MovementOptions, obstacles: Array, made: Columns
+) -> Columns:
+    """The movement around obstacles that comes nearest to its via points, aimed as far beside them as it missed."""
+    n = obstacles.shape[1]
+    tolerance = _MET * float(np.ptp(made["positions"][:, :n], axis=0).max())
+    best, least = made, _missing(primitive, options, made, n)
+    missing, beside = least, np.zeros_like(least)
+    with heard_warnings():  # of what it is aimed at, which nobody asked for
+        for _ in range(_AIMED):
+            if _largest(least) <= tolerance:
+                break
+            beside = beside + missing
+            aimed = tuple(
+                (share, np.append(point[:n] + off, point[n:]))
+                for (share, point), off in zip(options.via, beside, strict=True)
+            )
+            made = _steered(primitive, replace(options, via=aimed), obstacles)
+            missing = _missing(primitive, options, made, n)
+            if _largest(missing) < _largest(least):
+                best, least = made, missing
+    for (share, point), off in zip(options.via, np.linalg.norm(least, axis=1), strict=True):
+        if not off <= tolerance:
+            warn(
+                f"the via point {np.round(point[:n], 6).tolist()} at {share:g} of the duration is missed by {off:.3g}: "
+                "obstacles lead the movement away; move one of them, or ask for another time",
+                ExtrapolationWarning,
+                stacklevel=4,
+            )
+    return best
+
+
+def _missing(primitive: Primitives | PosePrimitives, options: MovementOptions, made: Columns, n: int) -> Array:
+    """From the movement to each of the k via points, at its time (k, n)."""
+    duration = float(primitive.durations[0]) if options.duration is None else options.duration
+    at = duration * np.array([share for share, _ in options.via])
+    reached = np.column_stack([np.interp(at, made["times"], x) for x in made["positions"][:, :n].T])
+    return np.array([point[:n] for _, point in options.via]) - reached
+
+
+def _largest(missing: Array) -> float:
+    return float(np.linalg.norm(missing, axis=1).max())
+
+
+def _steered(primitive: Primitives | PosePrimitives, options: MovementOptions, obstacles: Array) -> Columns:
+    """The movement under control, with the obstacles where they are."""
+    duration = float(primitive.durations[0]) if options.duration is None else options.duration
+    steps = primitive.rollout(duration=duration, rate=options.rate).times.shape[1] - 1
+    control = primitive.controller(
+        duration / steps,
+        start=options.start,
+        goal=options.goal,
+        duration=duration,
+        via=options.via or None,
+        avoidance=options.avoidance,
+        settle=options.settle,
+    )
+    states = [control.state]
+    while not _arrived(states[-1], options) and len(states) <= _LONGEST * steps:
+        states.append(control.step(obstacles=obstacles))
+    if options.settle is not None and not states[-1].status & Status.SETTLED:
+        raise SpecificationError(
+            f"expected the movement to come within {options.settle:g} of its goal in {_LONGEST:g} durations, the "
+            "obstacles keep it away; move them or the goal"
+        )
+    return {
+        "times": np.array([state.time for state in states]),
+        "positions": np.array([state.position for state in states]),
+        "velocities": np.array([state.velocity for state in states]),
+        "accelerations": np.array([state.acceleration for state in states]),
+    }
+
+
+def _arrived(state: State, options: MovementOptions) -> bool:
+    over = state.progress >= 1.0 - 1e-9
+    return over if options.settle is None else over and bool(state.status & Status.SETTLED)

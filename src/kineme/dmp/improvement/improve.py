@@ -1,0 +1,262 @@
+"""Policy improvement of a primitive by trying variants of it in batches.
+
+Variants of a primitive that are smooth in acceleration and keep start, goal and how they are reached.
+
+The weights of one dimension are changed with the covariance ``(L'L)^-1``, L being second differences with zeros beyond
+both ends, as in E. Theodorou, J. Buchli and S. Schaal, "A Generalized Path Integral Control Approach to Reinforcement
+Learning", JMLR 11, 2010, and M. Kalakrishnan et al., "STOMP", ICRA 2011. Theirs are differences of the
+path; weights are accelerations, so here the acceleration itself has no kinks. That covariance is conditioned on no
+change of position and velocity at the end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kineme.dmp.condition import condition
+from kineme.dmp.discrete.dmp import Primitives
+from kineme.dmp.discrete.operators import decoder
+from kineme.dmp.discrete.rollout import Rollout
+from kineme.dmp.discrete.specification import Specification
+from kineme.dmp.improvement.methods import METHODS, Search
+from kineme.dmp.styles.parameters import check_primitives
+from kineme.errors import SpecificationError
+from kineme.validation import Array, as_numbers, check_choice, check_count, check_number, check_seed, check_switch
+
+_NEGLIGIBLE = 1e-2  # of the largest: directions that change the path less are not explored
+
+
+_FEWEST_BASIS = 4
+_MOST = 100_000  # rollouts, and updates
+_WIDEST = 1e3  # extents
+
+
+@dataclass(frozen=True, eq=False)
+class Improvement:
+    """What `improve` found.
+
+    Attributes
+    ----------
+    primitive : Primitives
+        The variant with the least cost of all that were tried, a batch of one.
+    costs : ndarray of shape (u, n)
+        Cost of each variant in each update; the first of each row is the center of the search, the very first the
+        primitive as it was.
+    exploration : ndarray of shape (u,)
+        Standard deviation of the paths in each update, where it is largest, as a share of the movement's extent.
+    stopped : str
+        Why there were no more updates.
+    """
+
+    primitive: Primitives
+    costs: Array
+    exploration: Array
+    stopped: str
+
+    @property
+    def cost(self) -> float:
+        """The cost of `primitive`."""
+        return float(self.costs.min())
+
+    @property
+    def best(self) -> Array:
+        """The least cost so far, after each update, shape (u,)."""
+        return np.asarray(np.minimum.accumulate(self.costs.min(axis=1)))
+
+
+def improve(  # noqa: PLR0913 - one parameter per option
+    primitive: Primitives,
+    cost: Callable[[Rollout], ArrayLike],
+    rollouts: int = 20,
+    *,
+    updates: int = 50,
+    method: str = "cma-es",
+    exploration: float = 0.1,
+    seed: int | np.random.Generator = 0,
+    target: float | None = None,
+    smallest: float = 1e-4,
+    start: ArrayLike | None = None,
+    goal: ArrayLike | None = None,
+    duration: float | None = None,
+    n_samples: int | None = None,
+    progress: bool = False,
+) -> Improvement:
+    """Find a variant of a primitive that costs less, by trying `rollouts` variants at a time.
+
+    The weights change, with the covariance ``(L'L)^-1`` at first, L being second differences: variants are smooth in
+    acceleration. Start, goal, duration and the way in which the goal is reached, its velocity, stay.
+
+    Parameters
+    ----------
+    primitive : Primitives
+        A batch of one.
+    cost : callable
+        Gets a `Rollout` of `rollouts` movements and returns their costs, shape (rollouts,); less is better. The first
+        movement is the center of the search. A movement that fails needs a large cost, not NaN.
+    rollouts : int, default 20
+        Variants in one update, at least 5.
+    updates : int, default 50
+        The most updates.
+    method : {"cma-es", "pi-bb"}, default "cma-es"
+        Rank the variants and adapt the covariance of the exploration to what helped (Hansen 2016), or average them,
+        weighted by their costs (PI^BB, Stulp and Sigaud 2012).
+    exploration : float, default 0.1
+        Standard deviation of the first paths where it is largest, as a share of the movement's largest extent.
+    seed : int or numpy.random.Generator, default 0
+        Equal seeds give equal results.
+    target : float, optional
+        Stop at a cost of this or less.
+    smallest : float, default 1e-4
+        Stop when the exploration is less than this share of the extent.
+    start, goal, duration, n_samples : optional
+        Of the movements that are tried, as in `Primitives.rollout`.
+    progress : bool, default False
+        Show a progress bar.
+
+    Returns
+    -------
+    Improvement
+        With ``primitive``, never worse than what it was, and the history of costs.
+
+    Raises
+    ------
+    SpecificationError
+        Costs of another number, NaN or infinite; not one primitive; a parameter out of its range.
+    TrajectoryError
+        No primitive, or a start or goal of another shape.
+
+    Examples
+    --------
+    >>> import kineme, numpy as np
+    >>> primitive = kineme.DMP().learn(kineme.load_lasa(["CShape"]))[0]
+    >>> better = kineme.improve(primitive, lambda rollout: np.abs(rollout.accelerations).max(axis=(1, 2)), updates=5)
+    >>> bool(better.cost < better.costs[0, 0])
+    True
+    """
+    check_primitives(primitive)
+    _check_options(primitive, rollouts, updates, method, exploration, target, smallest)
+    check_switch("progress", progress)
+    if not callable(cost):
+        raise SpecificationError(f"expected cost to be a function of a Rollout, got {cost!r}")
+    if not isinstance(seed, np.random.Generator):
+        check_seed("seed", seed)
+    unit = exploration_factor(primitive.dmp)
+    factor = unit * primitive.extents.max() * exploration
+    responses = unit @ decoder(primitive.dmp, primitive.dmp.n_points).Phi[0].T
+    rng = np.random.default_rng(seed)
+    search = Search.start(primitive.n_dims * len(factor))
+    tried: list[Array] = []
+    sizes: list[float] = []
+    best, stopped = (np.inf, search.center), f"{updates} updates"
+    with _bar(updates, progress) as bar:
+        for update in range(updates):
+            drawn = search.draw(rollouts, rng)
+            moved = variants(primitive, factor, drawn).rollout(start, goal, duration, n_samples=n_samples)
+            costs = checked_costs(cost(moved), rollouts, update)
+            tried.append(costs)
+            sizes.append(exploration * largest_deviation(search, responses))
+            best = min(best, (float(costs.min()), drawn[costs.argmin()]), key=lambda pair: pair[0])
+            bar.update()
+            if target is not None and best[0] <= target:
+                stopped = f"a cost of {best[0]:.6g}, at most the target {target:.6g}"
+                break
+            if sizes[-1] < smallest:
+                stopped = f"an exploration of {sizes[-1]:.3g} of the extent, less than {smallest:.3g}"
+                break
+            search = METHODS[method](search, drawn, costs)
+    return Improvement(variants(primitive, factor, best[1][None]), np.array(tried), np.array(sizes), stopped)
+
+
+def _check_options(  # noqa: PLR0913, PLR0917 - the options of improve, in its order
+    primitive: Primitives,
+    rollouts: int,
+    updates: int,
+    method: str,
+    exploration: float,
+    target: float | None,
+    smallest: float,
+) -> None:
+    if len(primitive) != 1:
+        raise SpecificationError(f"expected one primitive to improve, got {len(primitive)}; choose one, primitives[:1]")
+    if primitive.dmp.n_basis < _FEWEST_BASIS:
+        raise SpecificationError(
+            f"expected at least {_FEWEST_BASIS} basis functions, so that the shape can change and the end stay, got "
+            f"{primitive.dmp.n_basis}"
+        )
+    check_count("rollouts", rollouts, 5, most=_MOST)
+    check_count("updates", updates, 1, most=_MOST)
+    check_choice("method", method, list(METHODS))
+    check_number("exploration", exploration, above=0.0, most=_WIDEST)
+    check_number("smallest", smallest, least=0.0)
+    if target is not None:
+        check_number("target", target)
+
+
+def _bar(updates: int, progress: bool) -> AbstractContextManager[Any]:
+    from tqdm import tqdm
+
+    return tqdm(total=updates, desc="improving", leave=False, disable=not progress)
+
+
+def checked_costs(costs: ArrayLike, n: int, update: int) -> Array:
+    """The costs (n,) of the movements of an update, as a copy.
+
+    Raises
+    ------
+    SpecificationError
+        Another number of costs, or costs that are NaN or infinite; with the number of the movement.
+    """
+    found = as_numbers(costs, "cost", f"{n} numbers, the cost of each movement")
+    if found.shape != (n,):
+        raise SpecificationError(
+            f"expected the cost to return {n} numbers, one for each movement of the rollout, got shape {found.shape}; "
+            "reduce over samples and dimensions, axis=(1, 2)"
+        )
+    if not np.isfinite(found).all():
+        i = int(np.argmin(np.isfinite(found)))
+        raise SpecificationError(
+            f"expected finite costs, got {found[i]:g} for movement {i} of update {update}; "
+            "give a movement that fails a large cost"
+        )
+    return found.copy()
+
+
+def exploration_factor(dmp: Specification) -> Array:
+    """F of shape (r, N), ``F.T @ F`` being the covariance of one dimension's change of W.
+
+    The standard deviation of the path is 1 where it is largest; rows are in the order of how much they change the path.
+    """
+    n_basis = dmp.n_basis
+    L = np.diff(np.eye(n_basis + 4, n_basis, -2), n=2, axis=0)
+    smooth = np.linalg.inv(np.linalg.qr(L, mode="r")).T  # F0' F0 = (L'L)^-1
+    response = decoder(dmp, dmp.n_points)
+    kept = condition(smooth, response.Phi[:2, -1]).factor
+    U, S, paths = np.linalg.svd(kept @ response.Phi[0].T, full_matrices=False)
+    chosen = _NEGLIGIBLE * S[0] < S
+    largest = np.linalg.norm(S[chosen, None] * paths[chosen], axis=0).max()
+    return np.asarray(U[:, chosen].T @ kept / largest)
+
+
+def variants(primitive: Primitives, factor: Array, z: Array) -> Primitives:
+    """One primitive n times, its weights changed by z (n, d r) times the factor (r, N) of one dimension."""
+    n, d = len(z), primitive.n_dims
+    changes = (z.reshape(n * d, -1) @ factor).reshape(n, d, -1)
+    repeated = primitive[np.zeros(n, dtype=int)]
+    return replace(repeated, scaled_weights=repeated.scaled_weights + changes)
+
+
+def largest_deviation(search: Search, responses: Array) -> float:
+    """Standard deviation of the paths where it is largest, over dimensions and time; 1 at the start.
+
+    `responses` (r, T) are what each of the r numbers of a dimension adds to its path.
+    """
+    r = len(responses)
+    blocks = search.covariance.reshape(-1, r, search.covariance.shape[0] // r, r)
+    variances = [np.einsum("ru,rs,su->u", responses, blocks[k, :, k], responses).max() for k in range(len(blocks))]
+    return float(search.size * np.sqrt(max(variances)))

@@ -1,0 +1,183 @@
+"""One orientation or pose under live control: what a pose has besides what every controlled movement has."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kineme.dmp.control import inputs
+from kineme.dmp.control.controller import Controller
+from kineme.dmp.control.options import Options
+from kineme.dmp.control.plan import Plan
+from kineme.dmp.control.state import State, Status
+from kineme.dmp.pose.rates import Components, acceleration_components, rate_components, velocity_components
+from kineme.movements.rotations.one_rotation import exp_one, log_one
+from kineme.movements.rotations.quaternions import conjugate, product_components
+from kineme.validation import Array
+
+_MOST_TURNED = 1e6  # rad; quaternions of longer rotation vectors are rounding errors
+_FASTEST = 1e50  # rates of rotation vectors; the products in angular accelerations are finite
+
+
+class PoseState(State):
+    """A pose at one moment: a `State` in the columns of the demonstrations.
+
+    ``position`` and ``goal`` have shape (4,), a unit quaternion, or (7,), the position before it; ``velocity`` and
+    ``acceleration`` have shape (3,), angular in the world frame, or (6,), the linear ones before them. Of p positions
+    and angles and k orientations they have shapes (p + 4 k,) and (p + 3 k,), the orientations last.
+    """
+
+    __slots__ = ()
+
+    @property
+    def pose(self) -> Array:
+        """The same as `position`."""
+        return self.position
+
+    @property
+    def orientation(self) -> Array:
+        """The unit quaternion (4,); of k orientations (4 k,)."""
+        return self.position[-4 * (len(self.position) - len(self.velocity)) :]
+
+
+class PoseController(Controller):
+    """Moves one pose primitive step by step; see `PosePrimitives.controller` and `Controller`.
+
+    It steps through position and rotation vector, in the chart around the goal that it is made with: undisturbed it is
+    the rollout. A goal that turns in flight moves in that chart. Where a step would turn further than a
+    million radians, the orientation stays and is at rest, and the status says so.
+
+    Attributes
+    ----------
+    state : PoseState
+        After the last step; at first the start.
+    """
+
+    state: PoseState
+
+    def __init__(self, plan: Plan, dt: float, options: Options, reference: Array) -> None:
+        references = reference.reshape(-1, 4)
+        self._references = references.tolist()
+        self._backwards = conjugate(references).tolist()
+        self._linear = plan.n_positions  # columns before the orientations
+        super().__init__(plan, dt, options)
+
+    def reset(self) -> PoseState:
+        """Back to the start, with the first goal; returns the state there."""
+        super().reset()
+        return self.state
+
+    def step(  # noqa: PLR0913 - what can happen, a parameter each
+        self,
+        position: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        goal: ArrayLike | None = None,
+        tempo: float = 1.0,
+        coupling: ArrayLike | None = None,
+        obstacles: ArrayLike | None = None,
+        *,
+        goal_velocity: ArrayLike | None = None,
+        obstacle_velocities: ArrayLike | None = None,
+        dt: float | None = None,
+    ) -> PoseState:
+        """Move on by dt. Never raises: what cannot be used is left out, and the status says so.
+
+        Parameters
+        ----------
+        position, goal : array_like of shape (4,) or (7,), optional
+            Measured now, and where to go, in the columns of `PoseState`; quaternions of either sign.
+        velocity : array_like of shape (3,) or (6,), optional
+            Measured now: angular velocity in the world frame [rad/s], for poses after the linear velocity.
+        coupling : array_like of shape (3,) or (6,), optional
+            External angular acceleration during this step, for poses after the linear one.
+        goal_velocity : array_like of shape (3,) or (6,), optional
+            Velocity of the goal, in the columns of `velocity`; its orientation goes on as a rotation vector does.
+        obstacles, obstacle_velocities : array_like of shape (m, 3), optional
+            Points that the position steers around; orientations without a position have none.
+        tempo, dt : float, optional
+            See `Controller.step`.
+
+        Returns
+        -------
+        PoseState
+        """
+        self._events = Status(0)
+        self._step(position, velocity, (goal, goal_velocity), tempo, coupling, (obstacles, obstacle_velocities), dt)
+        return self.state
+
+    def _read_position(self, value: Any) -> Array | None:
+        return self._as_tangent(value, self._origin + self._motion[0])
+
+    def _read_goal(self, value: Any) -> Array | None:
+        return self._as_tangent(value, self._origin + self._goal.target)
+
+    def _read_velocity(self, value: Any, position: Array | None) -> Array | None:
+        return self._as_rates(value, self._origin + self._motion[0] if position is None else position)
+
+    def _read_goal_velocity(self, value: Any) -> Array | None:
+        return self._as_rates(value, self._origin + self._goal.target)
+
+    def _read_coupling(self, value: Any) -> Array | None:
+        return self._as_rates(value, self._origin + self._motion[0])  # J p'' is the part that is linear in p''
+
+    def _as_tangent(self, value: Any, near: Array) -> Array | None:
+        """Position and the rotation vector closest to that of `near`; None for what is no pose."""
+        array = inputs.vector(value, self._n_dims + len(self._references))
+        if array is None:
+            return None
+        columns, close = array.tolist(), near.tolist()
+        tangent = columns[: self._linear]
+        for i, backwards in enumerate(self._backwards):
+            q, p = self._linear + 4 * i, self._linear + 3 * i
+            vector = log_one(product_components(columns[q : q + 4], backwards), close[p : p + 3])
+            if vector is None:  # a quaternion that is none: the motion goes on
+                return None
+            tangent.extend(vector)
+        return np.array(tangent)
+
+    def _as_rates(self, value: Any, x: Array) -> Array | None:
+        """Rates of position and rotation vector at x, from linear and angular ones."""
+        array = inputs.vector(value, self._n_dims)
+        if array is None:
+            return None
+        columns, m = array.tolist(), self._linear
+        rates = np.array([*columns[:m], *self._of_each(rate_components, x.tolist(), columns)])
+        return rates if inputs.usable(rates) and np.abs(rates[m:]).max() <= _FASTEST else None
+
+    def _move(self, dt: float, push: Array, last: Array) -> None:
+        super()._move(dt, push, last)
+        if Status.STATE_KEPT in self._events:
+            motion = self._motion.copy()
+            motion[1:, self._linear :] = 0.0  # else it would be as fast, and kept, in all later steps
+            self._motion = motion
+
+    def _usable(self, motion: Array) -> bool:
+        turned = np.abs(motion[:, self._linear :]).max(axis=1)
+        return super()._usable(motion) and bool(turned[0] <= _MOST_TURNED and turned[1:].max() <= _FASTEST)
+
+    def _derivatives(self) -> tuple[Array, Array]:
+        rate, bend = super()._derivatives()
+        x, dx, ddx = (self._origin + self._motion[0]).tolist(), rate.tolist(), bend.tolist()
+        m = self._linear
+        velocity = np.array([*dx[:m], *self._of_each(velocity_components, x, dx)])
+        return velocity, np.array([*ddx[:m], *self._of_each(acceleration_components, x, dx, ddx)])
+
+    def _of_each(self, function: Callable[..., Components], *columns: list[float]) -> Iterator[float]:
+        """A function of rotation vectors and their rates, for each of the orientations."""
+        for at in range(self._linear, self._n_dims, 3):
+            yield from function(*(column[at : at + 3] for column in columns))
+
+    def _report(self, velocity: Array, acceleration: Array) -> PoseState:
+        state = super()._report(velocity, acceleration)
+        return PoseState(*state._replace(position=self._as_pose(state.position), goal=self._as_pose(state.goal)))
+
+    def _as_pose(self, x: Array) -> Array:
+        columns, m = x.tolist(), self._linear
+        pose = columns[:m]
+        for i, reference in enumerate(self._references):
+            at = m + 3 * i
+            pose.extend(product_components(exp_one(columns[at : at + 3]), reference))
+        return np.array(pose)

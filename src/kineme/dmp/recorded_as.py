@@ -1,0 +1,175 @@
+"""What learned movements were recorded as, and from the columns of a primitive back to those of the recording.
+
+The columns of a primitive are the positions and angles, in the order of their channels, and after them the orientations
+as (w, x, y, z); its rates are those of the positions and angles, and after them angular velocities in the world frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.dmp.discrete_steps import DiscreteSteps, concatenated, steps_of
+from kineme.movements.channels.channel import Channels, is_plain, learned_names, same_columns
+from kineme.movements.channels.coordinates import as_wxyz, columns_of, from_wxyz
+from kineme.movements.preparation.preprocess import Step, preprocess
+from kineme.movements.preparation.trim import TrimRest
+from kineme.movements.trajectories.channels import of_channels
+from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements import Movements
+from kineme.validation import Array
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedAs:
+    """The channels of the recordings that a batch of primitives was learned from.
+
+    Attributes
+    ----------
+    channels : tuple of Channel
+    steps : DiscreteSteps or None
+        Of the discrete channels, if there are any and it is known when they step.
+    """
+
+    channels: Channels
+    steps: DiscreteSteps | None = None
+
+    def take(self, chosen: NDArray[np.intp]) -> RecordedAs:
+        """That of the chosen movements."""
+        return self if self.steps is None else replace(self, steps=self.steps.take(chosen))
+
+    @property
+    def has_steps(self) -> bool:
+        """Whether nothing is missing of the discrete channels."""
+        return self.steps is not None or len(self.moving) == len(self.channels)
+
+    @cached_property
+    def moving(self) -> Channels:
+        """The channels that are not discrete, in the order of the recording."""
+        return tuple(one for one in self.channels if one.coordinates)
+
+    @cached_property
+    def plain(self) -> Channels:
+        """The channels that are positions or angles: the first columns of a primitive."""
+        return tuple(one for one in self.moving if one.kind != "orientation")
+
+    @cached_property
+    def orientations(self) -> Channels:
+        """The channels that are orientations: the last columns of a primitive."""
+        return tuple(one for one in self.moving if one.kind == "orientation")
+
+    @property
+    def column_names(self) -> tuple[str, ...]:
+        """Names of the columns of a primitive."""
+        turned = [one.columns[one.order.index(part)] for one in self.orientations for part in "wxyz"]
+        return (*(name for one in self.plain for name in one.columns), *turned)
+
+    @property
+    def rate_names(self) -> tuple[str, ...]:
+        """Names of the rates of a primitive."""
+        return learned_names((*self.plain, *self.orientations))
+
+    @property
+    def rates_in_order(self) -> list[int]:
+        """The rates of a primitive in the order of the recording."""
+        kinds = [one.kind for one in self.moving for _ in one.coordinates]
+        plain = [k for k, kind in enumerate(kinds) if kind != "orientation"]
+        turned = [k for k, kind in enumerate(kinds) if kind == "orientation"]
+        return np.argsort(plain + turned).tolist()
+
+
+def recorded_as(movements: Demonstrations, steps: Iterable[Step] = ()) -> RecordedAs | None:
+    """What movements were recorded as, where that is known.
+
+    Of the steps that are applied before learning, trimming moves the steps of discrete channels, too.
+    """
+    channels = movements.channels
+    if channels is None:
+        return None
+    columns = [
+        k
+        for one, some in zip(channels, columns_of(channels), strict=True)
+        if one.kind == "discrete"
+        for k in range(some.start, some.stop)
+    ]
+    if not columns:
+        return RecordedAs(channels)
+    trimmed = preprocess(movements, [step for step in steps if isinstance(step, TrimRest)])
+    return RecordedAs(channels, steps_of(trimmed, columns))
+
+
+def merged(several: Sequence[RecordedAs | None]) -> RecordedAs | None:
+    """That of several batches, one after the other; None if they were not recorded as the same.
+
+    Without steps where those of a batch are not known.
+    """
+    known = [one for one in several if one is not None]
+    if len(known) < len(several) or not all(same_columns(one.channels, known[0].channels) for one in known):
+        return None
+    steps = [one.steps for one in known if one.steps is not None]
+    return replace(known[0], steps=concatenated(steps) if len(steps) == len(known) else None)
+
+
+def in_primitive(point: Array, about: RecordedAs) -> Array:
+    """A point in the columns of `RecordedAs.moving`, in the columns of the primitive."""
+    parts = [(one, point[columns]) for one, columns in zip(about.moving, columns_of(about.moving), strict=True)]
+    return np.concatenate(
+        [part for one, part in parts if one.kind != "orientation"]
+        + [as_wxyz(part, one) for one, part in parts if one.kind == "orientation"]
+    )
+
+
+def in_recording(columns: Array, about: RecordedAs, i: int, shares: Array) -> Array:
+    """Movement i in the columns of a primitive (T, d), in all columns of the recording.
+
+    Parameters
+    ----------
+    columns : ndarray of shape (T, d)
+    about : RecordedAs
+    i : int
+        Which movement of the batch the steps of discrete channels are taken from.
+    shares : ndarray of shape (T,)
+        When, as a share of the duration.
+    """
+    values = None if about.steps is None else about.steps.at(i, shares)
+    parts, plain, turned, discrete = [], 0, len(about.plain), 0
+    for one in about.channels:
+        if one.kind == "orientation":
+            parts.append(from_wxyz(columns[:, turned : turned + 4], one))
+            turned += 4
+        elif one.kind == "discrete":
+            assert values is not None
+            parts.append(values[:, discrete : discrete + 1])
+            discrete += 1
+        else:
+            parts.append(columns[:, plain : plain + 1])
+            plain += 1
+    return np.concatenate(parts, axis=1)
+
+
+def with_recorded(movements: Movements, about: RecordedAs, shares: Array, n_primitives: int) -> Movements:
+    """Movements of T samples each in the columns of primitives, with their channels.
+
+    Parameters
+    ----------
+    movements : Movements
+        All of T samples.
+    about : RecordedAs
+    shares : ndarray of shape (T,)
+        When the samples are, as a share of the duration.
+    n_primitives : int
+        One, for all movements, or one for each.
+    """
+    named = {"channels": about.channels, "dimensions": learned_names(about.channels)}
+    if is_plain(about.channels):
+        return replace(movements, **named)  # type: ignore[arg-type]
+    blocks = movements.positions.reshape(-1, len(shares), movements.positions.shape[1])
+    rows = [in_recording(block, about, i if n_primitives > 1 else 0, shares) for i, block in enumerate(blocks)]
+    recorded = np.concatenate(rows)
+    if about.orientations:
+        return of_channels(replace(movements, positions=recorded), about.channels)
+    return replace(movements, recorded=recorded, **named)  # type: ignore[arg-type]

@@ -1,0 +1,206 @@
+"""Movements on the limit cycle and towards it, in a batch: any baseline, amplitude, period, phase and start."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kineme.dmp.base_rollout import BaseRollout
+from kineme.dmp.batch import Batch
+from kineme.dmp.discrete.least_duration import least_durations
+from kineme.dmp.discrete.per_movement import broadcast_length, check_durations, per_movement
+from kineme.dmp.rhythmic.harmonics import as_real, waves
+from kineme.dmp.rhythmic.learned import RhythmicLearned
+from kineme.dmp.rhythmic.operators import limit_cycle
+from kineme.dmp.rhythmic.periods import SAMPLES_PER_PERIOD
+from kineme.dmp.rhythmic.specification import RhythmicSpecification
+from kineme.dmp.spring_damper import transitions
+from kineme.errors import SpecificationError
+from kineme.validation import Array, check_count, check_number, check_samples
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RhythmicRollout(BaseRollout):
+    """n generated movements of T samples each; positions and derivatives are computed when asked for.
+
+    A sequence of `Trajectory`, taken wherever movements are expected; see `BaseRollout`.
+
+    The equation is linear, so a movement is its limit cycle, a Fourier series, plus the free motion of the
+    spring-damper from the state off the cycle: ``x = b + a x_cycle(phi) + e^(A u) (z0 - z_cycle)``.
+    """
+
+    primitives: RhythmicLearned
+    ratio: Array  # (n,), amplitude over the learned one
+    baselines: Array  # (n, d)
+    periods: Array  # (n,)
+    phases: Array  # (n,), of the first sample
+    start: Array | None  # (1 or n, d); None on the cycle
+    velocity: Array | None  # (1 or n, d), per second
+    n_periods: float
+    n_samples: int
+    change: Array | None = None  # (n, d, N) of the weights in force: via points
+
+    def __len__(self) -> int:
+        return len(self.baselines)
+
+    def __repr__(self) -> str:
+        return f"RhythmicRollout({len(self)} movements of {self.n_samples} samples from {self.primitives!r})"
+
+    @property
+    def times(self) -> Array:
+        """Times of the samples (n, T), from 0 [s]."""
+        return self.periods[:, None] * self._u
+
+    @cached_property
+    def positions(self) -> Array:
+        """Positions (n, T, d), in the unit of the demonstrations."""
+        return (self._derivative(0) + self.baselines[:, :, None]).transpose(0, 2, 1)
+
+    @cached_property
+    def velocities(self) -> Array:
+        """Velocities (n, T, d), per second."""
+        return (self._derivative(1) / self.periods[:, None, None]).transpose(0, 2, 1)
+
+    @cached_property
+    def accelerations(self) -> Array:
+        """Accelerations (n, T, d), per second squared."""
+        return (self._derivative(2) / self.periods[:, None, None] ** 2).transpose(0, 2, 1)
+
+    def least_period(self, velocity: ArrayLike | None = None, acceleration: ArrayLike | None = None) -> Array:
+        """The least period of each movement (n,) [s] in which the same path stays within limits.
+
+        ``rollout(period=...)`` moves so; see `Rollout.least_duration`.
+
+        Parameters
+        ----------
+        velocity, acceleration : float or array_like of shape (d,), optional
+            Largest absolute value, per second and per second squared: of all dimensions, or one each.
+
+        Raises
+        ------
+        SpecificationError
+            No limit, or one that is not above 0; a rollout that was given an initial velocity other than 0.
+        """
+        fixed = self.velocity is not None and bool(self.velocity.any())
+        finely = self.n_periods * self.primitives.dmp.n_basis, lambda one, n: replace(one, n_samples=n)
+        return least_durations(self, self.periods, finely, fixed, (velocity, acceleration))
+
+    @property
+    def _batch(self) -> Batch:
+        return self.primitives
+
+    def _take(self, chosen: NDArray[np.intp]) -> RhythmicRollout:
+        def of(rows: Array | None) -> Array | None:
+            return rows if rows is None or len(rows) == 1 else rows[chosen]
+
+        return replace(
+            self,
+            primitives=self.primitives if len(self.primitives) == 1 else self.primitives[chosen],
+            **{name: getattr(self, name)[chosen] for name in ("ratio", "baselines", "periods", "phases")},
+            start=of(self.start),
+            velocity=of(self.velocity),
+            change=None if self.change is None else self.change[chosen],
+        )
+
+    @property
+    def _weights(self) -> tuple[Array, Array]:
+        """The weights in force (1 or n, d, N), and what is to be multiplied by the cycle that they make (n,)."""
+        own = self.primitives.scaled_weights
+        if self.change is None:
+            return own, self.ratio
+        return own * self.ratio[:, None, None] + self.change, np.ones(len(self))
+
+    @property
+    def _u(self) -> Array:
+        return np.linspace(0.0, self.n_periods, self.n_samples)
+
+    def _derivative(self, order: int) -> Array:
+        """Position minus baseline and its derivatives in u = t / period, shape (n, d, T)."""
+        u, dmp = self._u, self.primitives.dmp
+        weights, ratio = self._weights
+        result = cycle(dmp, weights, ratio, (self.phases, 2 * np.pi * u), order)
+        if self.start is None and self.velocity is None:
+            return result
+        at_start = np.zeros(1)
+        on_cycle = [cycle(dmp, weights, ratio, (self.phases, at_start), k)[:, :, 0] for k in (0, 1)]
+        offset = 0.0 if self.start is None else self.start - self.baselines - on_cycle[0]
+        push = 0.0 if self.velocity is None else self.velocity * self.periods[:, None] - on_cycle[1]
+        off_cycle = np.stack(np.broadcast_arrays(offset, push, on_cycle[0])[:2], axis=2)
+        free = transitions(dmp.K, dmp.D, u)  # (T, 2, 2)
+        rows = (free[:, 0], free[:, 1], -dmp.K * free[:, 0] - dmp.D * free[:, 1])[order]
+        return np.asarray(result + off_cycle @ rows.T)
+
+
+def cycle(dmp: RhythmicSpecification, weights: Array, ratio: Array, when: tuple[Array, Array], order: int) -> Array:
+    """The x - b, or a derivative in u, on the limit cycle of these weights (1 or n, d, N), times the ratio (n,).
+
+    `when` is the phases (n,) of the movements and how many radians past them (T,); the result has shape (n, d, T).
+    """
+    (phases, turn), response = when, limit_cycle(dmp)
+    harmonics = np.arange(response.shape[1])
+    response = response * (2j * np.pi * harmonics) ** order
+    synthesis = waves(turn, len(harmonics) - 1).T
+    if (phases == phases[0]).all():
+        series = weights @ (as_real(response * np.exp(1j * phases[0] * harmonics)) @ synthesis)
+    else:
+        series = as_real(weights @ response * np.exp(1j * phases[:, None, None] * harmonics)) @ synthesis
+    return np.asarray(ratio[:, None, None] * series)
+
+
+def rollout(
+    primitives: RhythmicLearned,
+    options: dict[str, ArrayLike | None],
+    n_periods: float,
+    rate: float | None,
+    n_samples: int | None,
+) -> RhythmicRollout:
+    """Check the options and broadcast them over the primitives; see `RhythmicPrimitives.rollout`."""
+    vectors = ("baseline", "start", "velocity")
+    given = {
+        name: per_movement(option, name, primitives.n_dims if name in vectors else None)
+        for name, option in options.items()
+    }
+    n = broadcast_length(len(primitives), given)
+
+    def fill(name: str, default: Array) -> Array:
+        option = given[name]
+        value = default if option is None else option
+        return np.broadcast_to(value, (n, *value.shape[1:]))
+
+    check_number("n_periods", n_periods, above=0.0)
+    periods = fill("period", primitives.periods)
+    check_durations("period", periods)
+    return RhythmicRollout(
+        primitives,
+        fill("amplitude", primitives.amplitudes) / primitives.amplitudes,
+        fill("baseline", primitives.baselines),
+        periods,
+        fill("phase", np.zeros(1)),
+        given["start"],
+        given["velocity"],
+        float(n_periods),
+        _samples(primitives.dmp, float(n_periods), periods, rate, n_samples),
+    )
+
+
+def _samples(
+    dmp: RhythmicSpecification, n_periods: float, periods: Array, rate: float | None, n_samples: int | None
+) -> int:
+    if rate is not None and n_samples is not None:
+        raise SpecificationError("expected either rate or n_samples, got both")
+    if rate is not None:
+        check_number("rate", rate, above=0.0)
+        least = SAMPLES_PER_PERIOD / float(periods.min())
+        if rate < least:
+            raise SpecificationError(
+                f"expected a rate of at least {least:.3g} Hz, that is {SAMPLES_PER_PERIOD} samples per period, got "
+                f"{rate:g} Hz"
+            )
+        wanted = float(periods.max()) * n_periods * rate * (1 - 1e-12) + 1
+        return max(2, check_samples(wanted, dmp.n_basis, "rate times periods"))
+    if n_samples is None:
+        return max(2, check_samples(n_periods * dmp.n_points * (1 - 1e-12) + 1, dmp.n_basis, "n_periods"))
+    return check_samples(check_count("n_samples", n_samples, 2), dmp.n_basis, "n_samples")

@@ -1,0 +1,167 @@
+"""HDF5 as a tree of arrays: robomimic, ALOHA and whatever else keeps movements in groups of data sets."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kineme.errors import DataError
+from kineme.io.arrays.tree_movements import tree_movements
+from kineme.io.arrays.trees import GROUPS, Rate, is_label, rate_of, seconds_named
+from kineme.io.limits import check_expanded
+from kineme.movements.tables.layout import Layout
+from kineme.movements.tables.parsed import Parsed
+
+_SMALL, _CHUNKS = 2**20, 1000  # bytes and chunks that need not be written
+_EXPANDED = 1100  # times as many bytes gzip, which packs best, gives at most
+_LARGE, _PACKED = 2**26, 200  # bytes from which on packing is looked at; times as many as movements pack to at most
+_DEEPEST, _MOST = 12, 1_000_000  # groups within groups; groups and data sets in all
+_LETTERS = 2**20  # of labels, at most
+_SCALE = frozenset({"conversion", "offset"})  # attributes by which samples are multiplied, and which is added
+_UNITS = frozenset({"unit", "units"})  # attributes
+_NAMES = frozenset({"label", "task"})  # attributes
+
+
+def hdf5_movements(path: Path, layout: Layout) -> Parsed:
+    """The movements in an HDF5 file: groups of data sets of one length; only those that are needed are read.
+
+    Data sets that lie in other files are passed over: a file from elsewhere must not make the program read others.
+
+    Raises
+    ------
+    DataError
+        Not such a file, damaged, without movements, with several vectors of which none is chosen, or the package that
+        reads it is not installed; the message names the extra.
+    """
+    try:
+        import h5py
+    except ImportError as error:
+        raise DataError("expected the package h5py to read HDF5; pip install 'kineme[hdf5]'") from error
+    try:
+        with h5py.File(os.fspath(path), "r") as file:
+            return tree_movements(_tree(file, h5py, [0]), layout, "HDF5", GROUPS)
+    except DataError:
+        raise
+    except (OSError, RuntimeError, KeyError) as error:  # as which h5py raises what the HDF5 library finds
+        raise DataError(f"expected an HDF5 file, got something foreign, truncated or damaged ({error})") from error
+
+
+def _tree(group: Any, h5py: Any, counted: list[int], depth: int = 0, unit: Any = None) -> dict[str, Any]:
+    """A group as a mapping: data sets that are not read yet, single numbers and texts, groups.
+
+    `unit` is that of the group around it, for data sets that have none.
+    """
+    tree: dict[str, Any] = {}
+    unit = _unit_in(group, group.attrs) or unit
+    tree |= _said(group, group.attrs)
+    for name in group:
+        counted[0] += 1
+        if counted[0] > _MOST:
+            raise DataError(f"expected an HDF5 file of at most {_MOST:,} groups and data sets, got more")
+        if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+            continue
+        one = group[name]
+        if isinstance(one, Mapping):
+            if depth < _DEEPEST:
+                tree[name] = _tree(one, h5py, counted, depth + 1, unit)
+        elif isinstance(one, h5py.Dataset) and not one.external and not one.is_virtual:
+            names = tuple(one.attrs)
+            rate = rate_of(_said(one, names)) if names else None
+            if one.shape == ():
+                tree[name] = _single(one[()])
+                tree |= {} if rate is None else {"rate": rate.hertz}  # as of NWB's starting_time
+            elif one.shape and one.dtype.kind in "biuf":
+                tree[name] = _Stored(one, (_unit_in(one, names) if names else None) or unit, rate, names)
+            elif one.dtype.names and len(one.shape) == 1:
+                check_expanded(one.shape[0] * one.dtype.itemsize)
+                records = _Stored(one, None, None)[()]
+                tree[name] = {head: records[head] for head in one.dtype.names if one.dtype[head].kind in "biuf"}
+            elif len(one.shape) == 1 and one.dtype.kind in "SO" and is_label(name):
+                tree[name] = _labels(one)
+    return tree
+
+
+def _labels(stored: Any) -> list[str | float | None]:
+    """The texts of a data set that labels movements, one after the other: all may be the same large one in the file."""
+    n_letters, labels = stored.shape[0] * max(1, stored.dtype.itemsize), []
+    for k in range(stored.shape[0]):
+        if n_letters > _LETTERS:
+            raise DataError(f"expected labels of at most {_LETTERS:,} letters in all in {stored.name}, got more")
+        labels.append(_single(stored[k]))
+        n_letters += len(str(labels[-1]))
+    return labels
+
+
+def _said(stored: Any, names: Iterable[str]) -> dict[str, Any]:
+    """The label and the rate among the attributes of a group or of a data set."""
+    values = {
+        name: _single(stored.attrs[name]) for name in names if name.lower() in _NAMES or seconds_named(name) is not None
+    }
+    return {name: value for name, value in values.items() if value is not None}
+
+
+def _unit_in(stored: Any, names: Iterable[str]) -> Any:
+    """The unit in the attributes of a group or of a data set, or one for each of its columns; None without."""
+    for name in names:
+        if name.lower() in _UNITS:
+            value = stored.attrs[name]
+            units = [_single(one) for one in np.ravel(value)] if np.ndim(value) else [_single(value)]
+            if units and all(isinstance(one, str) for one in units):
+                return units[0] if len({*units}) == 1 else units
+    return None
+
+
+class _Stored:
+    """A data set that is read when it is needed, if its samples are in the file.
+
+    What was never written takes no room there, however much it is said to be, and takes minutes to fill.
+
+    Raises
+    ------
+    DataError
+        On reading: samples that were never written, or that expand by more than gzip can, or than movements do.
+    """
+
+    def __init__(self, stored: Any, unit: Any, rate: Rate | None, names: Iterable[str] = ()) -> None:
+        self._stored, self.shape, self.dtype, self.unit, self.rate = stored, stored.shape, stored.dtype, unit, rate
+        scale = {name: _single(stored.attrs[name]) for name in names if name in _SCALE}
+        of_numbers = stored.dtype.names is None
+        # Of NWB.
+        self._scale = {name: value for name, value in scale.items() if of_numbers and isinstance(value, float)}
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> Any:
+        return np.asarray(self[()], dtype)
+
+    def __getitem__(self, rows: Any) -> Any:
+        n_bytes, n_stored = math.prod(self.shape) * self.dtype.itemsize, self._stored.id.get_storage_size()
+        chunks, n_missing = self._stored.chunks, 0
+        if chunks is not None:
+            n_chunks = math.prod(-(-n // width) for n, width in zip(self.shape, chunks, strict=True))
+            n_missing = n_chunks - self._stored.id.get_num_chunks()
+        if n_missing > _CHUNKS or (n_bytes > _SMALL and (n_missing or n_bytes > _EXPANDED * n_stored)):
+            raise DataError(
+                f"expected {n_bytes:,} bytes of samples in the data set {self._stored.name}, got {n_stored:,} in the "
+                "file: the others were never written; write a data set of what was recorded"
+            )
+        if n_bytes > _LARGE and n_bytes > _PACKED * n_stored:
+            raise DataError(
+                f"expected samples that move in the data set {self._stored.name}, got {n_bytes:,} bytes from "
+                f"{n_stored:,} in the file, nearly all of which are alike; write a data set of what was recorded, or a "
+                "shorter one"
+            )
+        values = self._stored[rows]
+        return values * self._scale.get("conversion", 1.0) + self._scale.get("offset", 0.0) if self._scale else values
+
+
+def _single(value: Any) -> str | float | None:
+    """A text or a number; None for anything else."""
+    if isinstance(value, bytes):
+        return value.decode("utf-8", "replace")
+    if isinstance(value, str):
+        return value
+    return float(value) if np.ndim(value) == 0 and isinstance(value, (int, float, np.integer, np.floating)) else None

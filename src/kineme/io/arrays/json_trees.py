@@ -1,0 +1,271 @@
+"""JSON and JSON lines as trees of arrays: samples with names become columns, lists of numbers become arrays."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from kineme.errors import DataError
+from kineme.io.arrays.arrays import arrays_movements, has_known_names
+from kineme.io.arrays.tree_movements import tree_movements
+from kineme.io.limits import check_expanded
+from kineme.io.tables.dialect import is_number
+from kineme.movements.tables.columns import counts_samples, is_time
+from kineme.movements.tables.layout import Layout
+from kineme.movements.tables.parsed import Parsed
+from kineme.movements.tables.time_stamps import is_date, seconds_of_dates
+
+_PARTS = ("name", "part", "bodypart", "joint", "handedness", "side")  # names of a part of a sample
+_NAMES = (*_PARTS, "label", "id")  # also of movements and samples
+_OPENPOSE = re.compile(r"\w+_keypoints_[23]d")
+_COUNT = "\0count"  # of parts without names
+_AXES = frozenset("xyz")
+_NUMBER, _LIST = 32, 88  # bytes of a Python object
+
+
+def json_movements(data: bytes, layout: Layout) -> Parsed:
+    """The movements in JSON: named arrays, samples ``[{"t": 0, "x": 1}, ...]``, lists of either, or these by name."""
+    check_objects(data)
+    try:
+        entries = json.loads(data, object_pairs_hook=_each_once)
+    except json.JSONDecodeError as error:
+        raise DataError(f"expected JSON, got a truncated or damaged file ({error}); write it again") from error
+    if isinstance(entries, Mapping):
+        if (frame := _frame(entries)) is not None:
+            return tree_movements(_columns_of(frame), layout, "JSON", many="take")
+        if has_known_names(entries):
+            return arrays_movements(entries, layout, "JSON")
+    elif not isinstance(entries, list) or not any(isinstance(one, (Mapping, list)) for one in entries[:1]):
+        raise DataError(f"expected an object with times and positions, got a {type(entries).__name__}")
+    return tree_movements(as_tree(entries), layout, "JSON", many="take")
+
+
+def json_lines_movements(data: bytes, layout: Layout) -> Parsed:
+    """The movements in JSON lines: a sample in each line, or a movement in each line."""
+    check_objects(data)
+    entries = []
+    for k, line in enumerate(data.decode("utf-8-sig").splitlines(), 1):
+        if not line.strip():
+            continue
+        try:
+            entries.append(json.loads(line, object_pairs_hook=_each_once))
+        except json.JSONDecodeError as error:
+            raise DataError(f"expected JSON in line {k}, got {line.strip()[:40]!r} ({error.msg}); repair it") from error
+    if not entries:
+        raise DataError("expected samples, got an empty file")
+    return tree_movements(as_tree(entries), layout, "JSON lines", many="take")
+
+
+def _frame(entries: Mapping[str, Any]) -> dict[str, list[Any]] | None:
+    """The columns of a data frame as pandas writes it by columns, by its index, or split; None of something else.
+
+    Its index is a column too: the times if it holds dates.
+    """
+    if {*entries} == {"columns", "index", "data"}:
+        if any(not isinstance(row, list) or len(row) != len(entries["columns"]) for row in entries["data"]):
+            raise DataError("expected a row of data with a number for each of the columns, got another one")
+        heads = ["_".join(map(str, one)) if isinstance(one, list) else str(one) for one in entries["columns"]]
+        return _with_index(
+            entries["index"], dict(zip(heads, map(list, zip(*entries["data"], strict=True)), strict=True))
+        )
+    rows = list(entries.values())
+    if not rows or not all(isinstance(row, Mapping) and row and row.keys() == rows[0].keys() for row in rows):
+        return None
+    if any(isinstance(cell, (Mapping, list)) for row in rows for cell in row.values()):
+        return None
+    if _counts(rows[0]):
+        return _with_index(list(rows[0]), {head: list(column.values()) for head, column in entries.items()})
+    if _counts(entries):
+        return _with_index(list(entries), {head: [row[head] for row in rows] for head in rows[0]})
+    return None
+
+
+def _counts(names: Iterable[str]) -> bool:
+    """Whether names are those of the rows of a frame: numbers or dates."""
+    return all(is_number(name, False) or is_date(name) for name in names)
+
+
+def _with_index(index: list[Any], columns: dict[str, list[Any]]) -> dict[str, list[Any]]:
+    texts = [str(one) for one in index]
+    head = "time" if all(map(is_date, texts)) else "index"
+    if head in columns:
+        return columns
+    return {
+        head: texts if head == "time" else [float(one) if is_number(one, False) else one for one in texts]
+    } | columns
+
+
+def _columns_of(frame: Mapping[str, list[Any]]) -> dict[str, Any]:
+    """Columns as arrays; of times that are texts the seconds, which their head says."""
+    tree = {}
+    for head, cells in frame.items():
+        if is_time(head) and any(isinstance(one, str) for one in cells):
+            seconds, others = seconds_of_dates([str(one) for one in cells])
+            if others:
+                raise DataError(f"expected dates or durations in {head!r}, got {next(iter(others.values()))!r:.80}")
+            tree[f"{head} (s)"] = seconds
+        else:
+            tree[head] = _array(cells)
+    return tree
+
+
+def check_objects(data: bytes) -> None:
+    """Refuse JSON that would take more memory than the limit once it is Python objects."""
+    check_expanded(size_of_objects(data))
+
+
+def size_of_objects(data: bytes) -> int:
+    """The memory [bytes] that JSON takes with the Python objects that it becomes."""
+    lists = data.count(b"[") + data.count(b"{")
+    return len(data) + _NUMBER * data.count(b",") + _LIST * lists
+
+
+def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    entries = dict(pairs)
+    if len(entries) < len(pairs):
+        twice = next(name for name in entries if sum(one == name for one, _ in pairs) > 1)
+        raise DataError(f"expected each entry once, got {twice!r} several times")
+    return entries
+
+
+def as_tree(value: Any) -> Any:
+    """Parsed JSON as a tree of arrays."""
+    if isinstance(value, Mapping):
+        if any(_OPENPOSE.fullmatch(name) for name in value):
+            raise DataError(
+                "expected movements, got the people of one frame, as OpenPose writes it: which of them moves nothing "
+                "says; write a table with a line for each frame, its number or time and the points of one person"
+            )
+        if any(
+            name.lower() == "name" for name in value
+        ):  # strokes of what has one name are one, as of the $N recognizer
+            value = {name: _drawn(one) if name.lower() == "strokes" else one for name, one in value.items()}
+        stamped = {len(one) for name, one in value.items() if is_time(name) and isinstance(one, list)}
+        tree = {name: as_tree(one) for name, one in value.items()}
+        return {
+            name: _stacked(one) if isinstance(one, list) and len(one) in stamped else one for name, one in tree.items()
+        }
+    if not isinstance(value, list) or not value:
+        return value
+    if all(isinstance(one, Mapping) for one in value):
+        return _columns(value) if all(map(_is_sample, value[:2])) else [as_tree(one) for one in value]
+    if any(isinstance(one, Mapping) for one in value):
+        raise DataError("expected a list of samples or of movements, got objects beside other values")
+    if all(isinstance(one, list) and one and all(isinstance(cell, str) for cell in one) for one in value):
+        return None  # pairs of names, as of the bones between joints
+    if all(isinstance(one, list) for one in value) and not _is_matrix(value):
+        return [as_tree(one) for one in value]
+    return _array(value)
+
+
+def _drawn(strokes: Any) -> Any:
+    """The points of several strokes, one after the other; of anything else that."""
+    if not isinstance(strokes, list) or not all(map(_are_objects, strokes)):
+        return strokes
+    return [point for stroke in strokes for point in stroke]
+
+
+def _stacked(rows: list[Any]) -> Any:
+    """Points (T, J, d) over time as one array, of a list of arrays (J, d)."""
+    alike = all(isinstance(one, np.ndarray) and one.ndim == 2 and one.shape == rows[0].shape for one in rows)
+    return np.stack(rows) if alike and rows[0].dtype.kind == "f" else rows
+
+
+def _are_objects(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(one, Mapping) for one in value)
+
+
+def _is_sample(entry: Mapping[str, Any]) -> bool:
+    """Whether an object is one sample, not a movement whose entries are lists over time."""
+    for name, value in entry.items():
+        if is_time(name) or counts_samples(name):
+            return not isinstance(value, list)
+    if any(_are_parts(value) for value in entry.values()):
+        return True
+    if any(name.lower() in _AXES and isinstance(value, list) for name, value in entry.items()):  # x over time
+        return False
+    lists = [one for one in entry.values() if isinstance(one, list)]
+    return len(lists) < len(entry) and not any(isinstance(one, (list, Mapping)) for value in lists for one in value[:1])
+
+
+def _are_parts(value: Any) -> bool:
+    """Whether a value is a list of objects that each have a name and numbers: the points of a body at one time."""
+    return (
+        isinstance(value, list)
+        and bool(value)
+        and all(isinstance(one, Mapping) and _name(one, _PARTS) for one in value)
+        and not any(isinstance(cell, list) or is_time(key) for one in value for key, cell in one.items())
+    )
+
+
+def _name(part: Mapping[str, Any], keys: Sequence[str] = _NAMES) -> str | None:
+    name = next((part[key] for key in keys if key in part), None)
+    return str(name) if isinstance(name, (str, int)) else None
+
+
+def _is_matrix(rows: Sequence[list[Any]]) -> bool:
+    return all(not isinstance(cell, (list, Mapping)) for row in rows for cell in row[:1])
+
+
+def _columns(samples: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Samples with names as one array for each name, NaN where it is missing; parts of a sample by name or number."""
+    flat = [_flat(one) for one in samples]
+    names = dict.fromkeys(name for one in flat for name in one)
+    for name in [name for name in names if name.endswith(f".{_COUNT}")]:
+        del names[name]
+        if len(counts := {one[name] for one in flat if name in one}) > 1:
+            raise DataError(
+                f"expected as many {name.removesuffix(f'.{_COUNT}')!r} in each sample, since nothing names them, got "
+                f"{min(counts)} to {max(counts)}; give each a name"
+            )
+    check_expanded(8 * len(flat) * len(names))
+    return _columns_of({name: [one.get(name) for one in flat] for name in names})
+
+
+def _flat(sample: Mapping[str, Any]) -> dict[str, Any]:
+    plain: dict[str, Any] = {}
+    for name, value in sample.items():
+        if isinstance(value, list) and value and all(map(_are_objects, value)):  # hands, each of many points
+            if not any("categoryName" in one for hand in value for one in hand):  # what MediaPipe holds them for
+                hands = _flat({str(k): hand for k, hand in enumerate(value)})
+                plain |= {f"{name}.{inner}": one for inner, one in hands.items()} | {f"{name}.{_COUNT}": len(value)}
+        elif isinstance(value, Mapping):
+            plain |= {f"{name}.{inner}": one for inner, one in _flat(value).items()}
+        elif _are_objects(value):
+            parts = [_name(one) for one in value]
+            if None not in parts and len({*parts}) < len(parts):
+                raise DataError(f"expected parts of {name!r} with different names in each sample, got {parts!r:.80}")
+            count = None if len({*parts} - {None}) == len(parts) else len(value)
+            for k, one in enumerate(value):
+                cells = {inner: cell for inner, cell in _flat(one).items() if count or inner not in _NAMES}
+                plain |= {f"{name}.{k if count else parts[k]}.{inner}": cell for inner, cell in cells.items()}
+            if count:
+                plain[f"{name}.{_COUNT}"] = count
+        else:
+            plain[name] = value
+    return plain
+
+
+def _array(values: list[Any]) -> Any:
+    """Numbers as an array, NaN for null; texts as objects; a `DataError` for rows that differ in length.
+
+    Nulls alone say nothing of numbers: they are empty texts, which are left aside.
+    """
+    nothing = all(one is None or (isinstance(one, list) and all(cell is None for cell in one)) for one in values)
+    if nothing or any(isinstance(one, str) for one in values):
+        texts = np.empty(len(values), dtype=object)
+        texts[:] = ["" if nothing or one is None else str(one) for one in values]
+        return texts
+    width = max((len(one) for one in values if isinstance(one, list)), default=0)
+    if width:
+        values = [[np.nan] * width if one is None else one for one in values]
+    try:
+        return np.array(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise DataError(
+            "expected samples of one length, each a list of numbers, got rows that differ in length or hold texts"
+        ) from error

@@ -1,0 +1,131 @@
+"""NumPy archives: an array is read on first use, checked before it is decompressed, and never unpickled."""
+
+from __future__ import annotations
+
+import io
+import math
+import sys
+import zipfile
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.lib import format as npy
+from numpy.typing import NDArray
+
+from kineme.errors import DataError
+from kineme.io.limits import check_expanded
+
+_ENDING = ".npy"
+_LONGEST_EMPTY = 1024  # rows of an array without columns, at most
+_HEADS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
+
+
+class Npz(Mapping[str, NDArray[Any]]):
+    """The arrays in the bytes of an npz archive by name.
+
+    Parameters
+    ----------
+    data : bytes
+    path : Path
+        For messages.
+
+    Raises
+    ------
+    DataError
+        On construction: not an archive, or two entries of one name. On access to an array: it is damaged, takes more
+        memory than `kineme.io.limits` allows (all arrays together), or holds Python objects.
+    """
+
+    def __init__(self, data: bytes, path: Path) -> None:
+        self._path, self._taken = path, 0
+        try:
+            self._archive = zipfile.ZipFile(io.BytesIO(data))
+        except Exception as error:  # zipfile raises many exceptions on damaged files
+            raise self._damaged(error) from error
+        listed = [one for one in self._archive.infolist() if one.filename.endswith(_ENDING)]
+        self._members = {one.filename.removesuffix(_ENDING): one for one in listed}
+        if len(self._members) < len(listed):
+            raise self._damaged("two entries of one name")
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        member = self._members[name]
+        try:
+            content = self._content(member)
+            return _decoded(content, repr(name), self._path, self._take)
+        except DataError:
+            raise
+        except Exception as error:  # as above; array headers are Python literals, which can raise more
+            raise self._damaged(error) from error
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._members
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._members)
+
+    def __len__(self) -> int:
+        return len(self._members)
+
+    def _content(self, member: zipfile.ZipInfo) -> bytes:
+        self._take(member.file_size)
+        if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise ValueError(f"an entry {member.filename!r} that is packed in an unusual way")
+        with self._archive.open(member) as file:
+            content = file.read(member.file_size)  # read() without a size decompresses before it checks
+        if len(content) != member.file_size:
+            raise ValueError(f"a truncated entry {member.filename!r}")
+        return content
+
+    def _take(self, n_bytes: int) -> None:
+        self._taken += n_bytes
+        check_expanded(self._taken)
+
+    def _damaged(self, error: object) -> DataError:
+        return DataError(
+            f"expected {self._path} to be an archive of arrays, got something foreign, truncated or damaged ({error}); "
+            "save it again, or take it from a backup"
+        )
+
+
+def array_of_npy(data: bytes, path: Path) -> NDArray[Any]:
+    """The array in the bytes of an npy file.
+
+    Raises
+    ------
+    DataError
+        Not such a file, damaged, larger in memory than `kineme.io.limits` allows, or one of Python objects.
+    """
+    try:
+        return _decoded(data, "it", path, check_expanded)
+    except DataError:
+        raise
+    except Exception as error:  # headers are Python literals, which can raise much
+        raise DataError(
+            f"expected an array saved by numpy.save, got something foreign, truncated or damaged ({error})"
+        ) from error
+
+
+def _decoded(content: bytes, name: str, path: Path, take: Callable[[int], None]) -> NDArray[Any]:
+    """Decode an array; its header must agree with the number of bytes that follow."""
+    file = io.BytesIO(content)
+    shape, fortran_order, dtype = _HEADS[npy.read_magic(file)](file)
+    if dtype.hasobject:
+        raise DataError(
+            f"expected {path} to hold numbers and texts, got Python objects in {name}. Object arrays "
+            "cannot be loaded without executing what they say; save texts as labels.astype(str), and movements "
+            "of unequal length as positions_0, positions_1, ..., or each under its own name"
+        )
+    count = math.prod(shape)
+    take(count * max(8 - dtype.itemsize, 0))  # numbers become float64
+    at = file.tell()
+    if min(shape, default=1) < 0 or not dtype.itemsize or count * dtype.itemsize != len(content) - at:
+        raise ValueError(f"{len(content) - at} bytes for {name} of shape {shape} and type {dtype}")
+    if not count and max(shape) > _LONGEST_EMPTY:
+        raise ValueError(f"{name} of shape {shape}")
+    array = np.frombuffer(content, dtype, offset=at)
+    if dtype.kind == "U" and (array.view(np.dtype("u4").newbyteorder(dtype.byteorder)) > sys.maxunicode).any():
+        raise ValueError(f"texts in {name} that are none")
+    array = array.reshape(shape[::-1]).T if fortran_order else array.reshape(shape)
+    return np.require(array, requirements="A")

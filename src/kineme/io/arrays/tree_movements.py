@@ -1,0 +1,251 @@
+"""The movements of a tree of arrays, with the roles that their columns have."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import chain
+from typing import Any
+
+import numpy as np
+
+from kineme.errors import DataError
+from kineme.io.arrays.arrays import (
+    POSITIONS,
+    TIMES,
+    Named,
+    check_first_axis,
+    numbers_of,
+    parsed_arrays,
+    point_names,
+    sets_or_points,
+)
+from kineme.io.arrays.trees import NAMES, STAMP, Found, Style, listed_shapes, movements_in
+from kineme.io.limits import check_expanded
+from kineme.movements.tables.columns import choose_roles, is_time
+from kineme.movements.tables.layout import Layout
+from kineme.movements.tables.parsed import Parsed, listed, no_lines
+from kineme.movements.tables.table import Segments, Table, table_movements
+from kineme.movements.tables.time_stamps import words_of
+from kineme.movements.trajectories.movements import axis_names
+
+_POINTS = frozenset({"position", "positions", "pos", "translation", "xyz", "point"})
+
+
+def tree_movements(tree: Any, layout: Layout, kind: str, style: Style = NAMES, many: str = "refuse") -> Parsed:
+    """The movements of a tree, see `kineme.io.arrays.trees`.
+
+    Parameters
+    ----------
+    many : {"refuse", "take"}
+        What is done with several arrays of more than one column in a movement if `layout` chooses none: they may mean
+        different things, such as states and commands, or be parts of one state.
+
+    Raises
+    ------
+    DataError
+        No movements; several arrays, none of them chosen; or no times where they are needed.
+    """
+    found = [one for one in movements_in(tree, style) if one.entries]
+    if not found:
+        got = f"no entry 'positions' but {listed(tree)}" if isinstance(tree, Mapping) else "none of numbers"
+        raise DataError(f"expected arrays times and positions, got {got}")
+    found = _of_one_array(found, layout)
+    stamped = any(len(one.entries) > 1 or one.rate is not None for one in found)
+    if not stamped:
+        return _bare(found, layout, kind)
+    found = [_plainly_named(one) for one in found]
+    reference = Counter(tuple(one.entries) for one in found).most_common(1)[0][0]
+    first = next(one for one in found if tuple(one.entries) == reference)
+    names = [name for name, entry in first.entries.items() if entry.shape[0] == first.length]
+    heads, owners = _heads(first, names)
+    if first.rate is not None and not any(map(is_time, names)) and not isinstance(layout.units, float | int):
+        check_first_axis([one.entries[""].shape for one in found if "" in one.entries])
+        layout = replace(layout, units=None)  # the rate is in Hz, whatever stamps are in
+        heads, owners = (*heads, STAMP), (*owners, STAMP)
+    kinds = ["text" if owner != STAMP and _is_text(first.entries[owner]) else "number" for owner in owners]
+    wide = [name for name in names if owners.count(name) > 1]
+    if many == "refuse" and layout.coordinates is None and len(wide) > 1:
+        raise DataError(
+            f"expected one array of coordinates, got {listed_shapes(first.entries, wide)}; say which with columns=, "
+            "in the shell --columns"
+        )
+    roles = choose_roles(heads, kinds, layout)
+    others = [roles.time, roles.nanoseconds, roles.label, *roles.clocks]
+    needed = {owners[k]: k in roles.positions for k in chain(roles.movement, others, roles.positions) if k is not None}
+    parsed = table_movements(_table(found, first, (heads, owners), needed), roles, layout, kind)
+    static = tuple(name for name in first.entries if name not in names)
+    return parsed._replace(detected=parsed.detected._replace(ignored=(*parsed.detected.ignored, *static)))
+
+
+def _of_one_array(found: list[Found], layout: Layout) -> list[Found]:
+    """Movements that may be the points of one, as `sets_or_points` tells them; others as they are.
+
+    They are one array (n, T, d), or n lists of points with names for their coordinates, and have no times.
+    """
+    names = [*found[0].entries]
+    if any([*one.entries] != names for one in found) or any(map(is_time, names)):
+        return found
+    if not _are_numbered([one.place for one in found]) or len({one.label for one in found}) > 1:
+        return found
+    if any(_is_text(entry) or (names != [""] and len(entry.shape) > 1) for entry in found[0].entries.values()):
+        return found
+    check_expanded(8 * sum(int(np.prod(entry.shape)) for one in found for entry in one.entries.values()))
+    several = [[numbers_of(np.asarray(entry)) for entry in one.entries.values()] for one in found]
+    if any(len({len(x) for x in xs}) > 1 for xs in several):
+        return found
+    x = sets_or_points([xs[0] if names == [""] else np.column_stack(xs) for xs in several], layout.every)
+    if len(x) == len(found):
+        return found
+    n_points, *width = np.shape(several[0][0])
+    heads = (
+        point_names(n_points, *width) if names == [""] else [f"{k}.{name}" for k in range(n_points) for name in names]
+    )
+    return [found[0]._replace(place="", entries=dict(zip(heads, x[0].T, strict=True)))]
+
+
+def _are_numbered(places: Sequence[str]) -> bool:
+    """Whether places differ in one number alone, that counts them: frames/0/landmarks, frames/1/landmarks."""
+    parts = [place.split("/") for place in places]
+    differing = [[*column] for column in zip(*parts, strict=False) if len({*column}) > 1]
+    return len({len(one) for one in parts}) == 1 and differing == [[str(k) for k in range(len(places))]]
+
+
+def _bare(found: Sequence[Found], layout: Layout, kind: str) -> Parsed:
+    """Movements that are arrays alone, without times."""
+    if len(found) == 1 and not isinstance(layout.units, float | int):
+        raise DataError(
+            "expected times beside the positions, got one array alone; say the seconds between two samples with "
+            "units=, in the shell --units"
+        )
+    check_expanded(8 * sum(int(np.prod(one.entries[""].shape)) for one in found if "" in one.entries))
+    xs = [numbers_of(np.asarray(next(iter(one.entries.values())))) for one in found]
+    xs = [x[:, None] if x.ndim == 1 else x for x in xs]
+    width = Counter(x.shape[1] for x in xs).most_common(1)[0][0]
+    odd = tuple(
+        f"movement {one.place}: {x.shape[1]} dimensions where most have {width}"
+        for one, x in zip(found, xs, strict=True)
+        if x.shape[1] != width
+    )
+    found = [one for one, x in zip(found, xs, strict=True) if x.shape[1] == width]
+    xs = [x for x in xs if x.shape[1] == width]
+    labels = [one.label for one in found]
+    units = {tuple(_units_of(next(iter(one.entries.values())), width)) for one in found}
+    if len(units) > 1:
+        raise DataError(f"expected movements in one unit, got {sorted(units)}; read them apart")
+    parsed = parsed_arrays(xs, None, Named(labels, TIMES[0], [one.place for one in found]), layout, (kind, "keyed"))
+    measured_in = next(iter(units)) if any(next(iter(units))) and layout.coordinates is None else ()
+    return parsed._replace(detected=parsed.detected._replace(measured_in=measured_in), left_out=odd)
+
+
+def _plainly_named(one: Found) -> Found:
+    """The only array of several columns that means positions loses its name: its coordinates are x, y, z."""
+    wide = [name for name, entry in one.entries.items() if len(entry.shape) > 1]
+    if len(wide) == 1 and wide[0] in POSITIONS:
+        return one._replace(entries={"" if name == wide[0] else name: entry for name, entry in one.entries.items()})
+    return one
+
+
+def _heads(one: Found, names: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """A head for each column, and the array that it is of."""
+    heads, owners = [], []
+    for name in names:
+        shape = one.entries[name].shape
+        width = int(np.prod(shape[1:]))
+        ends: Sequence[Any] = range(width)
+        if len(shape) == 3:
+            heads += [f"{name}.{end}" if name else end for end in point_names(*shape[1:])]
+        elif not name:
+            heads += axis_names(width)
+        elif len(shape) == 1:
+            heads.append(name)
+        else:
+            if words_of(name)[-1:] and words_of(name)[-1] in _POINTS and width in (2, 3):
+                ends = "xyz"[:width]
+            heads += [f"{name}.{end}" for end in ends]
+        owners += [name] * width
+    return tuple(heads), tuple(owners)
+
+
+def _is_text(entry: Any) -> bool:
+    return entry.dtype.kind in "OU"
+
+
+def _units_of(array: Any, width: int) -> list[str]:
+    """The unit of each of the columns of an array, empty where it says none."""
+    unit = getattr(array, "unit", None) or ""
+    return [unit] * width if isinstance(unit, str) else unit if len(unit) == width else [""] * width
+
+
+def _table(
+    found: Sequence[Found], first: Found, columns: tuple[Sequence[str], Sequence[str]], needed: Mapping[str, bool]
+) -> Table:
+    """The arrays that are needed, one movement after the other; what a movement lacks is a fault of its first row.
+
+    `needed` says of each whether it holds coordinates, which are not rounded.
+    """
+    heads, owners = columns
+    lengths = [one.length for one in found]
+    widths = Counter(owners)
+    check_expanded(8 * sum(lengths) * sum(widths[name] for name in needed))
+    offsets = np.concatenate(([0], np.cumsum(lengths))).astype(np.intp)
+    faults: dict[int, str] = {}
+    arrays: dict[str, Any] = {}
+    for name, is_coordinate in needed.items():
+        parts = []
+        of_texts = name in first.entries and _is_text(first.entries[name])
+        for one, length, start in zip(found, lengths, offsets, strict=False):
+            part, fault = _part(one, name, length, (widths[name], of_texts, not is_coordinate))
+            here, there = (_units_of(each.entries.get(name), widths[name]) for each in (one, first))
+            if here != there and not fault:
+                fault = f"expected {name!r} in {', '.join(there)}, as in the first movement, got {', '.join(here)}"
+            parts.append(part)
+            if fault:
+                faults[int(start)] = fault
+        arrays[name] = np.concatenate(parts)
+    numbers = dict.fromkeys(widths, 0)
+    filled: list[Any] = []
+    for owner in owners:
+        filled.append(arrays[owner][:, numbers[owner]] if owner in arrays else None)
+        numbers[owner] += 1
+    segments = Segments(offsets, [one.place for one in found], [one.label for one in found])
+    units = [unit for name in dict.fromkeys(owners) for unit in _units_of(first.entries.get(name), widths[name])]
+    whole = None if len(found) == 1 and not found[0].place and found[0].label is None else segments
+    return Table(tuple(heads), filled, int(offsets[-1]), no_lines, faults, None, units, whole)
+
+
+def _part(one: Found, name: str, length: int, kind: tuple[int, bool, bool]) -> tuple[Any, str]:
+    """An array of a movement as columns (T, d), of numbers or of texts, and what is wrong with it."""
+    width, of_texts, of_time = kind
+    if name == STAMP:
+        stamps = np.full(length, np.nan) if one.rate is None else one.rate.stamps(length)
+        return stamps[:, None], "" if one.rate else "expected a rate as others have, got none"
+    entry = one.entries.get(name)
+    if entry is None:
+        return np.full((length, width), np.nan), f"expected an array {name!r} as others have, got none"
+    if _is_text(entry) and not of_texts:  # of nulls alone
+        return np.full((length, width), np.nan), f"expected numbers in {name!r}, got none"
+    if _is_text(entry):
+        return np.asarray(entry, dtype=object).reshape(-1, 1), ""
+    if entry.shape[0] != length or int(np.prod(entry.shape[1:])) != width:
+        got = f"expected {name!r} of shape {(length, width)}, got {tuple(entry.shape)}"
+        return np.full((length, width), np.nan), got
+    return numbers_of(np.asarray(entry), of_time=of_time).reshape(length, width), ""
+
+
+def nested(arrays: Mapping[str, Any]) -> Any:
+    """Arrays whose names hold slashes as groups within groups."""
+    if not any("/" in name for name in arrays):
+        return arrays
+    tree: dict[str, Any] = {}
+    for name in arrays:
+        *groups, last = name.split("/")
+        here = tree
+        for group in groups:
+            below = here.setdefault(group, {})
+            if not isinstance(below, dict):
+                raise DataError(f"expected {group!r} to be an array or a group, got both")
+            here = below
+        here[last] = arrays[name]
+    return tree

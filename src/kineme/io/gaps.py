@@ -1,0 +1,259 @@
+"""Gaps of recordings: values that are missing are filled where a gap is short, and ends without them are cropped."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.io.problem import in_shell
+from kineme.movements.channels.channel import Channel, Channels
+from kineme.movements.channels.coordinates import period_of_channel
+from kineme.movements.channels.detect import find_channels
+from kineme.movements.channels.wraps import without_wraps
+from kineme.movements.rotations.rotation_vectors import slerp
+from kineme.movements.tables.layout import Layout
+from kineme.movements.tables.parsed import Block, Repair
+from kineme.validation import MIN_SAMPLES, Array
+
+Flags = NDArray[np.bool_]
+
+_LEAST = 0.5  # share of its samples that a movement keeps when it is cropped
+_EDGE = 0.25  # share of the samples that a column may lack at both ends, where cropping to all would leave less
+_SHOWN = 5  # columns in a message beside the first
+_ROUNDING = 1e-9  # of a gap, relative
+
+
+_VAST = np.append(10.0 ** np.arange(20, 39), np.finfo(np.float32).max)
+#: Numbers that programs write where they have no value: 999 to 9999999, 32768, 1e20 to 1e38, the largest of a float32,
+#: with either sign.
+SENTINELS = np.concatenate(
+    [sign * np.concatenate([10.0 ** np.arange(3, 8) - 1, _VAST, _VAST.astype(np.float32), [32768]]) for sign in (-1, 1)]
+)
+
+
+class Spans(NamedTuple):
+    """Runs of missing values of one column: first rows, rows after the last ones, and the time that each takes [s].
+
+    The time is that from the value before to the value after; it is infinite at the ends of a movement.
+    """
+
+    first: NDArray[np.intp]
+    stop: NDArray[np.intp]
+    seconds: Array
+
+
+def spans_of(missing: Flags, times: Array) -> Spans:
+    """Find the runs of missing values (T,) of one movement with time stamps (T,) [s]."""
+    edges = np.diff(np.concatenate(([False], missing, [False])).astype(np.int8))
+    first, stop = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
+    before, after = np.concatenate(([-np.inf], times)), np.concatenate((times, [np.inf]))
+    return Spans(first, stop, after[stop] - before[first])
+
+
+def sentinels_as_missing(block: Block, columns: Sequence[str]) -> tuple[Block, tuple[str, ...]]:
+    """Take numbers as -9999 that stand for no value as missing, and say which in which columns.
+
+    They are that where they lie farther from all other values of their column than these do from each other.
+    """
+    positions, said = block.positions, []
+    with np.errstate(invalid="ignore"):
+        suspected = np.flatnonzero((np.abs(positions) >= np.abs(SENTINELS).min()).any(axis=0))
+    for k in suspected.tolist():
+        x = block.positions[:, k]
+        marks = np.isfinite(x) & np.isin(x, SENTINELS)
+        others = x[np.isfinite(x) & ~marks]
+        if not len(others) or not marks.any():
+            continue
+        low, high = others.min(), others.max()
+        marks &= np.maximum(low - x, x - high) > high - low
+        if marks.any():
+            positions = positions.copy() if positions is block.positions else positions
+            said += [f"{value:g} in {columns[k]}" for value in np.unique(x[marks]).tolist()]
+            positions[marks, k] = np.nan
+    return (replace(block, positions=positions), tuple(said)) if said else (block, ())
+
+
+def fill_gaps(block: Block, columns: Sequence[str], layout: Layout) -> Block:
+    """Crop movements to where all columns have values, and fill the short gaps between; other values stay missing.
+
+    Positions, and angles without their wraps, are interpolated in time by Akima's cubic polynomials (Akima, "A new
+    method of interpolation and smooth curve fitting based on local procedures", J. ACM 17, 1970), orientations by
+    turning at constant angular velocity; discrete channels keep the value before. A movement that would lose half of
+    its samples is cropped only to where those columns have values that lack fewer than a quarter at their ends.
+
+    Parameters
+    ----------
+    block : Block
+        NaN stands for a missing value; the stamps of each movement increase.
+    columns : sequence of d str
+    layout : Layout
+        `fill_gaps` is the longest gap that is filled [s], `kinds` what columns are.
+    """
+    missing: Flags = np.isnan(block.positions)
+    lacking = np.concatenate(([0], np.cumsum(missing.any(axis=1))))[block.offsets]
+    if block.times is None or not lacking[-1]:
+        return block
+    positions, outside = block.positions.copy(), np.zeros(len(block.positions), dtype=bool)
+    number = {name: k for k, name in enumerate(columns)}
+    channels = [
+        (one, [number[name] for name in one.columns])
+        for one in _channels(block, columns, layout, np.asarray(~missing.any(axis=1)))
+    ]
+    repairs = [Repair()] * len(block.labels)
+    for i in np.flatnonzero(np.diff(lacking)).tolist():
+        rows = slice(block.offsets[i], block.offsets[i + 1])
+        times = block.times[rows]
+        filled = _fill(positions[rows], times, layout.fill_gaps, channels)
+        inside = _span_of_all(np.isnan(positions[rows]), layout.skip)
+        outside[rows] = True
+        outside[rows][inside] = False
+        ends = times[[0, -1]] - times[inside][[0, -1]]
+        filled = filled[inside]
+        repairs[i] = Repair(int(np.count_nonzero(filled)), float(filled.max()), float(np.abs(ends).sum()))
+    kept = ~outside
+    offsets = np.concatenate(([0], np.cumsum(kept)))[block.offsets].astype(np.intp)
+    return replace(
+        block,
+        positions=positions[kept],
+        times=block.times[kept],
+        offsets=offsets,
+        rows=np.flatnonzero(kept) if block.rows is None else block.rows[kept],
+        repairs=repairs,
+    )
+
+
+def _span_of_all(missing: Flags, skip: str) -> slice:
+    """The samples from the first to the last one in which all columns of a movement (T, d) have values."""
+    n = len(missing)
+    complete = np.flatnonzero(~missing.any(axis=1))
+    if len(complete) and complete[-1] + 1 - complete[0] >= max(MIN_SAMPLES, 0 if skip == "sample" else _LEAST * n):
+        return slice(int(complete[0]), int(complete[-1]) + 1)
+    known = ~missing
+    ends = np.where(missing.all(axis=0), n, known.argmax(axis=0) + known[::-1].argmax(axis=0))
+    complete = np.flatnonzero(~missing[:, ends < _EDGE * n].any(axis=1))
+    if len(complete) and complete[-1] + 1 - complete[0] >= max(MIN_SAMPLES, _LEAST * n):
+        return slice(int(complete[0]), int(complete[-1]) + 1)
+    return slice(0, n)
+
+
+def _channels(block: Block, columns: Sequence[str], layout: Layout, complete: Flags) -> Channels:
+    """What the columns are, by the samples in which no value is missing; a step across a gap tells nothing."""
+    if np.count_nonzero(complete) < MIN_SAMPLES:
+        return tuple(Channel(name, "position", (name,)) for name in columns)
+    kinds = layout.kinds if isinstance(layout.kinds, Mapping) else {}
+    given = {key: kind for key, kind in kinds.items() if {name.strip() for name in key.split(",")} <= {*columns}}
+    begins = complete & ~np.append(False, complete[:-1])
+    firsts = block.offsets[:-1][np.diff(block.offsets) > 0]
+    begins[firsts] = complete[firsts]
+    offsets = np.append(np.flatnonzero(begins[complete]), np.count_nonzero(complete))
+    return find_channels(columns, block.positions[complete], offsets, given)
+
+
+def _fill(values: Array, times: Array, most: float, channels: Sequence[tuple[Channel, list[int]]]) -> Array:
+    """Fill the short gaps of one movement (T, d) in place; the longest gap in which each sample lay, 0 for none [s]."""
+    longest = np.zeros(len(values))
+    for one, columns in channels:
+        missing: Flags = np.asarray(np.isnan(values[:, columns]).any(axis=1))
+        spans = spans_of(missing, times)
+        short = spans.seconds <= most * (1.0 + _ROUNDING)
+        if not short.any():
+            continue
+        lengths = (spans.stop - spans.first)[short]
+        begun = np.repeat(spans.first[short] - np.cumsum(lengths) + lengths, lengths)
+        chosen = begun + np.arange(len(begun))
+        known = times[~missing], values[~missing][:, columns]
+        values[chosen[:, None], columns] = _between(one, known, times[chosen])
+        longest[chosen] = np.maximum(longest[chosen], np.repeat(spans.seconds[short], lengths))
+    return longest
+
+
+def _between(channel: Channel, known: tuple[Array, Array], times: Array) -> Array:
+    """Values (m, c) of a channel at m times between those at which (n, c) are known."""
+    stamps, values = known
+    after = np.searchsorted(stamps, times)
+    if channel.kind == "discrete":
+        return np.asarray(values[after - 1])
+    if channel.kind == "orientation":
+        order = [channel.order.index(axis) for axis in "wxyz"]
+        share = (times - stamps[after - 1]) / (stamps[after] - stamps[after - 1])
+        turned = slerp(values[after - 1][:, order], values[after][:, order], share)
+        return np.asarray(turned[:, np.argsort(order)])
+    if channel.kind == "angle":
+        period = period_of_channel(channel, values[:, 0])
+        unwrapped = without_wraps(values[:, 0], np.array([0, len(values)]), period)[:, None]
+        between = _smooth(stamps, unwrapped, times)
+        return between if np.array_equal(unwrapped, values) else _wrapped(between, values, period)
+    return _smooth(stamps, values, times)
+
+
+def _smooth(stamps: Array, values: Array, times: Array) -> Array:
+    """Values (m, c) at m times on the curve through those (n, c) at stamps (n,)."""
+    if len(stamps) < 3:
+        return np.interp(times, stamps, values[:, 0])[:, None]
+    from scipy.interpolate import Akima1DInterpolator
+
+    return np.asarray(Akima1DInterpolator(stamps, values)(times))
+
+
+def _wrapped(angles: Array, recorded: Array, period: float) -> Array:
+    """Angles in the turn that the recorded ones lie in, from 0 or from minus half a turn on: that tells an angle."""
+    low = 0.0 if recorded.min() >= 0.0 else -period / 2
+    return np.asarray(low + (angles - low) % period)
+
+
+class Missing(NamedTuple):
+    """The values that one movement lacks: what has none, in which share of the samples, and for how long at most [s].
+
+    `names` are columns, or what several begin with before a dot that lack the same samples; the most frequently
+    missing comes first. `longest` is 0 where values are missing at the ends alone; `everywhere`: in all columns.
+    """
+
+    names: tuple[str, ...]
+    shares: tuple[float, ...]
+    longest: float
+    everywhere: bool
+
+
+def missing_values(block: Block, columns: Sequence[str], i: int) -> Missing:
+    """Find what movement i lacks."""
+    rows = slice(block.offsets[i], block.offsets[i + 1])
+    missing = np.isnan(block.positions[rows])
+    shares = missing.mean(axis=0).tolist()
+    longest = 0.0
+    if block.times is not None:
+        spans = [spans_of(missing[:, k], block.times[rows]).seconds for k, share in enumerate(shares) if share]
+        longest = max((float(seconds[np.isfinite(seconds)].max(initial=0.0)) for seconds in spans), default=0.0)
+    groups: dict[str, list[int]] = {}
+    for k, name in enumerate(columns):
+        groups.setdefault(name.rpartition(".")[0], []).append(k)
+    named: dict[str, float] = {}
+    for group, members in groups.items():
+        together = group and len(members) > 1 and (missing[:, members] == missing[:, members[:1]]).all()
+        named |= {group: shares[members[0]]} if together else {columns[k]: shares[k] for k in members}
+    ordered = sorted((name for name, share in named.items() if share > 0), key=lambda name: -named[name])
+    return Missing(tuple(ordered), tuple(named[name] for name in ordered), longest, len(ordered) == len(named))
+
+
+def in_words(missing: Missing, skip: str) -> str:
+    """What a movement lacks, and the options that read it nevertheless."""
+    first, *others = missing.names
+    shares = [f"{100 * share:.2g}" if share < 0.1 else f"{100 * share:.0f}" for share in missing.shares]
+    more = [f"{share} % of {name!r}" for name, share in zip(others, shares[1:], strict=True)]
+    also = f", {', '.join(more[:_SHOWN])}" + (f" and of {len(more) - _SHOWN} more" if len(more) > _SHOWN else "")
+    lasting = f", for up to {missing.longest:.3g} s" if missing.longest else ""
+    options = {} if missing.everywhere else {"exclude=": f"--exclude {in_shell(missing.names)}"}
+    options |= {"fill_gaps=": f"--fill-gaps {_rounded_up(missing.longest):g}"} if missing.longest else {}
+    options |= {"skip=": "--skip sample"} if skip == "movement" else {}
+    said = f"; say {' or '.join(options.values())}, in Python {' or '.join(options)}" if options else ""
+    share = f"{shares[0]} % of the samples"
+    return f"expected a number in {first!r}, got nothing in {share}{also if others else ''}{lasting}{said}"
+
+
+def _rounded_up(seconds: float) -> float:
+    """Seconds in two digits, not fewer."""
+    unit = 10.0 ** (np.floor(np.log10(seconds)) - 1)
+    return float(np.ceil(round(seconds / unit, 6)) * unit)

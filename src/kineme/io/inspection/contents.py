@@ -1,0 +1,100 @@
+"""What a file or a data set holds, where its format can tell."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from kineme.errors import DataError
+from kineme.io.contents import Contents
+from kineme.io.entries import entries_of
+from kineme.io.formats import FORMATS, data_set_of
+from kineme.reporting.table import Table, to_text
+from kineme.reporting.text import printable
+
+_FILE = "file"  # head of the names of files
+_SHOWN = 20  # rows that are listed whatever they hold
+_IDLE = ("nothing", "is fixed")  # how the last cell of a row begins that holds no movement
+
+
+def contents_of_all(paths: Sequence[Path], follow_links: bool = False) -> list[Contents]:
+    """The contents of all recordings at these paths; of several that have some, each row begins with its file."""
+    try:
+        entries, _ = entries_of(paths, follow_links) if paths else ([], [])
+    except (DataError, OSError):  # reading gives the reason
+        return []
+    listed = {entry.name: found for entry in entries if (found := contents_of(entry.path))}
+    if len(listed) < 2:
+        return next(iter(listed.values()), [])
+    merged: dict[tuple[str, tuple[str, ...]], Contents] = {}
+    for name, several in listed.items():
+        for one in several:
+            before = merged.get((one.name, one.heads), Contents(one.name, (_FILE, *one.heads), (), one.note))
+            rows = tuple((name, *row) for row in one.rows)
+            merged[one.name, one.heads] = before._replace(rows=before.rows + rows, note=before.note or one.note)
+    return list(merged.values())
+
+
+def contents_of(path: Path) -> list[Contents]:
+    """The contents of one recording.
+
+    There are none of a folder of files, of formats that hold movements alone, and of what cannot be opened: reading it
+    gives the reason.
+    """
+    data_set = data_set_of(path)
+    form = FORMATS.get(path.suffix.lower()) if data_set is None else data_set.format
+    if form is None or form.contents is None or (data_set is None and not path.is_file()):
+        return []
+    try:
+        return form.contents(path)
+    except (DataError, OSError):
+        return []
+
+
+def contents_as_data(contents: list[Contents]) -> dict[str, Any]:
+    """A list of dictionaries under each name."""
+    return {one.name: [dict(zip(one.heads, row, strict=True)) for row in one.rows] for one in contents}
+
+
+def contents_as_words(contents: list[Contents]) -> list[str]:
+    """A table of each: what several files have alike once, and of a long list only what holds movements."""
+    return [_in_words(_once(one)) for one in contents]
+
+
+def _in_words(one: Contents) -> str:
+    title = f"{one.name}{f' {one.note}' if one.note else ''}"
+    rows = one.rows
+    if len(rows) > _SHOWN:
+        rows = tuple(row for row in rows if not any(str(cell).startswith(_IDLE) for cell in row[-2:]))
+    n_idle = len(one.rows) - len(rows)
+    more = f"\nand {n_idle} {one.name} that hold no movement; --json lists them" if n_idle else ""
+    return to_text(Table(title, one.heads, [_row(row) for row in rows])) + more
+
+
+def _once(one: Contents) -> Contents:
+    """Rows that several files have alike but for their counts, once: the range of these, and in how many files."""
+    if one.heads[0] != _FILE:
+        return one
+    n_files = len({file for file, *_ in one.rows})
+    groups: dict[tuple[str, ...], list[list[str | int]]] = {}
+    for _, *cells in one.rows:
+        groups.setdefault(tuple(cell for cell in cells if isinstance(cell, str)), []).append(cells)
+    rows = tuple(
+        (*(_range([row[k] for row in alike]) for k in range(len(one.heads) - 1)), f"{len(alike)} of {n_files}")
+        for alike in groups.values()
+    )
+    return one._replace(heads=(*one.heads[1:], "files"), rows=rows)
+
+
+def _range(cells: list[str | int]) -> str:
+    """A text that all rows have, or the least and the greatest of their numbers."""
+    numbers = [cell for cell in cells if isinstance(cell, int)]
+    if not numbers:
+        return str(cells[0])
+    least, greatest = min(numbers), max(numbers)
+    return f"{least:,}" if least == greatest else f"{least:,} to {greatest:,}"
+
+
+def _row(row: tuple[str | int, ...]) -> tuple[str, ...]:
+    return tuple(f"{cell:,}" if isinstance(cell, int) else printable(cell) for cell in row)

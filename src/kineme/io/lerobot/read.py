@@ -1,0 +1,250 @@
+"""A data set of LeRobot as movements: one for each episode, named by its task."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.errors import DataError
+from kineme.io.lerobot.episodes import Episodes, read_episodes, read_tasks
+from kineme.io.lerobot.info import Info, read_info
+from kineme.io.lerobot.shards import Frames, joined, read_shard
+from kineme.movements.tables.columns import choose_roles, column_numbers
+from kineme.movements.tables.layout import Column, Layout
+from kineme.movements.tables.parsed import Parsed, listed, no_lines
+from kineme.movements.tables.table import Segments, Table, table_movements
+from kineme.reporting.text import counted, first_names
+from kineme.validation import Array
+
+_SHOWN = 5  # numbers of episodes in one message
+
+STATE = "observation.state"
+_STAMP = "timestamp [s]"
+_TOLERANCE = 1e-4  # s between the stored stamps and the frames at the declared rate, as LeRobot allows
+
+
+def lerobot_movements(folder: Path, layout: Layout) -> Parsed:
+    """Read a data set of LeRobot, version 2 or 3.
+
+    The coordinates are the entries of ``observation.state``, or of the features that ``columns`` names: whole ones or
+    single entries. A movement is an episode, its place is ``episode 12``, its label the text of its task. Where the
+    stamps are those of frames at the declared rate, to 0.1 ms, exactly these are taken.
+
+    Raises
+    ------
+    DataError
+        No such data set or a damaged description; no feature to choose, or none of that name; pyarrow is not installed.
+    """
+    try:
+        import pyarrow  # noqa: F401
+    except ImportError as error:
+        raise DataError("expected the package pyarrow to read Parquet; pip install 'kineme[parquet]'") from error
+    _check_choices(layout)
+    info = read_info(folder)
+    features, heads, chosen = _chosen(info, layout)
+    declared, (tasks, unsaid) = read_episodes(folder, info), read_tasks(folder)
+    frames, unread = _all_frames(folder, declared, features)
+    frames, offsets, wrong = whole_episodes(frames, declared, unread)
+    left_out = [*declared.problems, *unsaid, *unread.values(), *wrong]
+    if len(offsets) < 2:
+        raise DataError(f"expected episodes in a LeRobot data set, got none that is whole; the first: {left_out[0]}")
+    places = [f"episode {k}" for k in frames.episodes[offsets[:-1]].tolist()]
+    columns = [_stamps(frames, offsets, info.fps), *(frames.values[:, k] for k in chosen)]
+    table = Table(
+        (_STAMP, *heads), columns, len(frames.values), no_lines, frames.faults,
+        segments=Segments(offsets, places, _labels(frames, offsets, tasks)), maker="LeRobot",
+    )  # fmt: skip
+    plain = Layout(time=0, columns=range(1, len(columns)), skip=layout.skip)
+    roles = choose_roles(table.heads, ("number",) * len(table.heads), plain)
+    parsed = table_movements(table, roles, plain, f"v{info.version}")
+    ignored = (*(name for name in info.heads if name not in features), *info.others)
+    return parsed._replace(detected=parsed.detected._replace(ignored=ignored), left_out=tuple(left_out))
+
+
+def _check_choices(layout: Layout) -> None:
+    """Refuse a choice of times, movements or labels that the data set has already made otherwise."""
+    named = {"label": (layout.label, ("task", "task_index")), "time": (layout.time, ("timestamp",))}
+    for what, (given, known) in named.items():
+        if given is not None and given not in known:
+            raise DataError(f"expected {known[0]!r} as {what} of a LeRobot data set, which declares it, got {given!r}")
+    if layout.keys is not None and not set(layout.keys) <= {"episode_index", "episode"}:
+        raise DataError(
+            f"expected 'episode_index' as movement of a LeRobot data set, got {listed(map(str, layout.keys))}"
+        )
+
+
+def _chosen(info: Info, layout: Layout) -> tuple[dict[str, int], tuple[str, ...], list[int]]:
+    """Features that are read with their widths; heads of the coordinates; their columns among those features."""
+    if not info.heads:
+        only = f"only {listed(info.others)}" if info.others else "none"
+        raise DataError(f"expected features of numbers in a LeRobot data set, got {only}")
+    owners = [name for name, entries in info.heads.items() for _ in entries]
+    entries = [entry for one in info.heads.values() for entry in one]
+    full = [f"{name}.{entry}" if entry else name for name, entry in zip(owners, entries, strict=True)]
+    vectors = info.vectors
+    name = STATE if STATE in info.heads else next(iter(vectors)) if len(vectors) == 1 else None
+    if layout.coordinates is not None:
+        short = [entry if owner == name else head for owner, entry, head in zip(owners, entries, full, strict=True)]
+        numbers: Sequence[int] = _numbers_of(full, short, layout.coordinates)
+    elif name is not None:
+        numbers = [k for k, owner in enumerate(owners) if owner == name]
+    else:
+        got = listed(f"{name} ({width})" for name, width in (vectors or dict.fromkeys(info.heads, 1)).items())
+        raise DataError(f"expected the feature {STATE!r}, got {got}; say which with columns=, in the shell --columns")
+    features = {name: len(info.heads[name]) for name in dict.fromkeys(owners[k] for k in numbers)}
+    starts = dict(zip(features, np.cumsum([0, *features.values()]).tolist(), strict=False))
+    columns = [starts[owners[k]] + k - owners.index(owners[k]) for k in numbers]
+    alone = len(features) == 1
+    heads = tuple(entries[k] if alone and entries[k] and not entries[k].isdecimal() else full[k] for k in numbers)
+    return features, heads, columns
+
+
+def _numbers_of(full: Sequence[str], short: Sequence[str], columns: Sequence[Column]) -> list[int]:
+    """Where columns stand that are called by feature and entry or, of the feature read by default, by entry alone."""
+    numbers: list[int] = []
+    for column in columns:
+        try:
+            numbers += column_numbers(full, [column])
+        except DataError:
+            if not isinstance(column, str) or column.isdecimal():
+                raise
+            try:
+                numbers += column_numbers(short, [column])
+            except DataError:
+                pass
+            else:
+                continue
+            raise
+    return numbers
+
+
+def _all_frames(folder: Path, declared: Episodes, features: dict[str, int]) -> tuple[Frames, dict[str, str]]:
+    """The frames of all shards in the order of their episodes; shard -> why it could not be read."""
+    parts: list[Frames] = []
+    unread: dict[str, str] = {}
+    taken, width = 0, sum(features.values())
+    episodes_of: dict[str, list[int]] = {}
+    for k, shard in zip(declared.numbers.tolist(), declared.shards, strict=True):
+        episodes_of.setdefault(shard, []).append(k)
+    for shard, episodes in episodes_of.items():
+        try:
+            part = read_shard(folder, shard, features, taken)
+        except DataError as error:
+            unread[shard] = f"{error}; left out {episode_names(episodes)}"
+            continue
+        parts += part
+        taken += 8 * (width + 4) * sum(len(one.values) for one in part)
+    if not parts:
+        raise DataError(
+            f"expected shards that can be read, got none; the first: {next(iter(unread.values()), 'without frames')}"
+        )
+    return joined(parts), unread
+
+
+def _stamps(frames: Frames, offsets: NDArray[np.intp], fps: float) -> Array:
+    """Seconds since the beginning of each episode: of its frames at the declared rate, else as they are stored."""
+    even = frames.frames / fps
+    others = np.add.reduceat(~(np.abs(frames.stamps - even) <= _TOLERANCE), offsets[:-1]) > 0
+    return np.where(np.repeat(others, np.diff(offsets)), frames.stamps, even)
+
+
+def _labels(frames: Frames, offsets: NDArray[np.intp], tasks: dict[int, str]) -> list[str | None]:
+    """The task of each episode, the most frequent one where there are several."""
+    first = frames.tasks[offsets[:-1]]
+    mixed = np.add.reduceat(frames.tasks != np.repeat(first, np.diff(offsets)), offsets[:-1]) > 0
+    for i in np.flatnonzero(mixed).tolist():
+        known, counts = np.unique(frames.tasks[offsets[i] : offsets[i + 1]], return_counts=True)
+        first[i] = known[counts.argmax()]
+    return [tasks.get(k) or None for k in first.tolist()]
+
+
+def whole_episodes(
+    frames: Frames, declared: Episodes, unread: Collection[str]
+) -> tuple[Frames, NDArray[np.intp], list[str]]:
+    """The frames of the whole episodes, where each begins and ends, and what is wrong with the others.
+
+    An episode that stands behind a later one is kept, and named among the problems; those of shards that could not be
+    read (`unread`) are not.
+    """
+    n = len(frames.values)
+    offsets = np.concatenate(([0], np.flatnonzero(np.diff(frames.episodes)) + 1, [n])).astype(np.intp)[: n + 1]
+    numbers, lengths = frames.episodes[offsets[:-1]], np.diff(offsets)
+    wrong = _miscounted(numbers, lengths, declared) | _disordered(frames, offsets, numbers) | _divided(numbers)
+    bad = np.isin(numbers, list(wrong))
+    left_out = [
+        f"{f'episode {k}' if k >= 0 else 'frames without an episode_index'}: {reason}"
+        for k, reason in sorted(wrong.items())
+    ]
+    left_out += _absent(numbers, declared, unread)
+    left_out += [
+        f"episode {after}: its frames stand behind those of episode {before}; it is read all the same"
+        for before, after in pairwise(numbers[~bad].tolist())
+        if after < before
+    ]
+    if bad.any():
+        frames = _taken(frames, np.repeat(~bad, lengths))
+        offsets = np.concatenate(([0], np.cumsum(lengths[~bad]))).astype(np.intp)
+    return frames, offsets, left_out
+
+
+def episode_names(numbers: Sequence[int]) -> str:
+    """Numbers of episodes for a message; the first and the last of many in a row."""
+    if len(numbers) > 2 and numbers[-1] - numbers[0] == len(numbers) - 1:
+        return f"episodes {numbers[0]} to {numbers[-1]}"
+    return f"{'episode' if len(numbers) == 1 else 'episodes'} {first_names(numbers, _SHOWN)}"
+
+
+def _divided(numbers: NDArray[np.int64]) -> dict[int, str]:
+    """Episodes whose frames stand in several places."""
+    known, counts = np.unique(numbers, return_counts=True)
+    several = counts > 1
+    return {
+        k: f"expected its frames in one place, got them in {count} places"
+        for k, count in zip(known[several].tolist(), counts[several].tolist(), strict=True)
+    }
+
+
+def _disordered(frames: Frames, offsets: NDArray[np.intp], numbers: NDArray[np.int64]) -> dict[int, str]:
+    """Episodes whose frames do not count from 0 in steps of 1."""
+    expected = np.arange(len(frames.frames)) - np.repeat(offsets[:-1], np.diff(offsets))
+    odd = np.flatnonzero(frames.frames != expected)
+    runs, firsts = np.unique(np.searchsorted(offsets, odd, side="right") - 1, return_index=True)
+    return {
+        int(numbers[run]): f"expected frame {expected[k]} next, got frame {frames.frames[k]}"
+        for run, k in zip(runs.tolist(), odd[firsts].tolist(), strict=True)
+    }
+
+
+def _miscounted(numbers: NDArray[np.int64], lengths: NDArray[np.intp], declared: Episodes) -> dict[int, str]:
+    """Episodes that are not declared, or with another length."""
+    where = np.searchsorted(declared.numbers, numbers).clip(max=len(declared.numbers) - 1)
+    known = declared.numbers[where] == numbers
+    wrong = dict.fromkeys(numbers[~known].tolist(), "expected an episode that the meta folder declares")
+    odd = known & (declared.lengths[where] != lengths)
+    return wrong | {
+        int(numbers[i]): f"expected {counted(int(declared.lengths[where[i]]), 'frame')} as declared, got {lengths[i]}"
+        for i in np.flatnonzero(odd).tolist()
+    }
+
+
+def _absent(found: NDArray[np.int64], declared: Episodes, unread: Collection[str]) -> list[str]:
+    """Episodes without frames in shards that were read."""
+    absent = set(np.setdiff1d(declared.numbers, found).tolist())
+    places = zip(declared.numbers.tolist(), declared.shards, strict=True) if absent else ()
+    return [
+        f"episode {k}: expected frames in {shard}, got none"
+        for k, shard in places
+        if k in absent and shard not in unread
+    ]
+
+
+def _taken(frames: Frames, kept: NDArray[np.bool_]) -> Frames:
+    """The kept frames; what is wrong with them keeps its rows."""
+    row = np.cumsum(kept) - 1
+    faults = {int(row[k]): reason for k, reason in frames.faults.items() if kept[k]}
+    values, episodes, numbers, tasks, stamps, _ = frames
+    return Frames(values[kept], episodes[kept], numbers[kept], tasks[kept], stamps[kept], faults)

@@ -1,0 +1,231 @@
+"""Write an episode of LeRobot, version 3.0: into a new data set, or behind the others of one that is there."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.errors import DataError
+from kineme.io.lerobot.info import MARKER, read_json
+from kineme.reporting.atomic import whole_folder, write_atomically
+from kineme.validation import Array
+
+_QUANTILES = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
+
+Statistics = dict[str, list[Any]]  # min, max, mean, std, count and quantiles, a number for each entry
+
+_DATA = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
+_EPISODES = "meta/episodes/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
+_TASKS, _STATISTICS = "meta/tasks.parquet", "meta/stats.json"
+_COUNTERS = ("frame_index", "episode_index", "index", "task_index")
+_IN_CHUNK = 1000  # files
+
+Features = Mapping[str, Array]  # feature -> (T, d)
+
+
+def write_episode(
+    folder: Path, features: Features, entries: Mapping[str, str | None], fps: float, task: str, robot: str
+) -> int:
+    """Write one episode; every file is written whole or not at all, and what counts the episodes last.
+
+    Parameters
+    ----------
+    folder : Path
+        A new folder, or a data set of version 3 with the same features, names and rate: the episode is then its last.
+    features : mapping of str to ndarray of shape (T, d)
+        As ``action`` and ``observation.state``.
+    entries : mapping of d str to str or None
+        Names of their entries, and the unit of each as meta/info.json says it; None where it is not known.
+    fps : float
+        Frames per second.
+    task : str
+        What is done in the episode.
+    robot : str
+        Type of the robot, of a new data set.
+
+    Returns
+    -------
+    int
+        Number of the episode.
+
+    Raises
+    ------
+    DataError
+        The extra ``parquet`` is not installed; or a data set of another version, with other features or another rate.
+    """
+    try:
+        import pyarrow  # noqa: F401 - so that the message names the extra
+    except ImportError as error:
+        raise DataError("expected the package pyarrow to write LeRobot; pip install 'kineme[parquet]'") from error
+    entry = _declared(features, entries)
+    if (folder / MARKER).is_file():
+        info = read_json(folder / MARKER, MARKER)
+        _check(info, entry, fps)
+        return _append(folder, info, features, task)
+    info = {
+        "codebase_version": "v3.0", "fps": int(fps) if float(fps).is_integer() else fps, "features": entry,
+        "total_episodes": 0, "total_frames": 0, "total_tasks": 0, "chunks_size": _IN_CHUNK,
+        "data_files_size_in_mb": 100, "video_files_size_in_mb": 200, "data_path": _DATA, "video_path": None,
+        "robot_type": robot, "splits": {},
+    }  # fmt: skip
+    with whole_folder(folder) as hidden:
+        return _append(hidden, info, features, task)
+
+
+def _declared(features: Features, entries: Mapping[str, str | None]) -> dict[str, Any]:
+    vector = {"dtype": "float32", "shape": [len(entries)], "names": list(entries), "units": list(entries.values())}
+    counter = {"dtype": "int64", "shape": [1], "names": None}
+    stamp = {"timestamp": {"dtype": "float32", "shape": [1], "names": None}}
+    return {**dict.fromkeys(features, vector), **stamp, **dict.fromkeys(_COUNTERS, counter)}
+
+
+def _check(info: Any, entry: Mapping[str, Any], fps: float) -> None:
+    """Refuse a data set that the episode does not fit into."""
+    version, known = info.get("codebase_version"), info.get("features")
+    if not str(version).startswith("v3."):
+        raise DataError(f"expected a LeRobot data set of version 3 to append to, got {version}")
+    if info.get("fps") != fps:
+        raise DataError(f"expected the {info.get('fps')} frames per second of the data set, got {fps:g}")
+    if info.get("data_path") != _DATA:
+        raise DataError(f"expected a data set with the data_path {_DATA}, got {info.get('data_path')}")
+    if known != entry:
+        differing = sorted(name for name in {*known, *entry} if known.get(name) != entry.get(name))
+        raise DataError(
+            f"expected the features of the data set to append to it; they differ in {', '.join(differing)}: "
+            f"{known.get(differing[0])} there, {entry.get(differing[0])} here"
+        )
+
+
+def _append(folder: Path, info: dict[str, Any], features: Features, task: str) -> int:
+    """Data first, then tasks, the episode, statistics, and info, which counts them."""
+    number, start = int(info["total_episodes"]), int(info["total_frames"])
+    length = len(next(iter(features.values())))
+    tasks = _tasks(folder)
+    known = task in tasks
+    tasks = tasks if known else [*tasks, task]
+    place = _next_place(folder, number)
+    frame = np.arange(length)
+    columns: dict[str, NDArray[Any]] = {
+        **{name: np.asarray(values, dtype=np.float32) for name, values in features.items()},
+        "timestamp": (frame / info["fps"]).astype(np.float32),
+        "frame_index": frame,
+        "episode_index": np.full(length, number),
+        "index": start + frame,
+        "task_index": np.full(length, tasks.index(task)),
+    }
+    found = {name: statistics_of(values) for name, values in columns.items()}
+    _write(folder / _DATA.format(**place), {name: _column(values) for name, values in columns.items()})
+    if not known:
+        _write_tasks(folder, tasks)
+    row: dict[str, Any] = {
+        "episode_index": number, "tasks": [task], "length": length, "data/chunk_index": place["chunk_index"],
+        "data/file_index": place["file_index"], "dataset_from_index": start, "dataset_to_index": start + length,
+        **{f"stats/{name}/{key}": value for name, one in found.items() for key, value in one.items()},
+        "meta/episodes/chunk_index": place["chunk_index"], "meta/episodes/file_index": place["file_index"],
+    }  # fmt: skip
+    _write(folder / _EPISODES.format(**place), {name: [value] for name, value in row.items()})
+    before = read_json(folder / _STATISTICS, _STATISTICS) if number else {}
+    _write_json(folder / _STATISTICS, {name: merged_statistics(before.get(name), one) for name, one in found.items()})
+    counts = {"total_episodes": number + 1, "total_frames": start + length, "total_tasks": len(tasks)}
+    _write_json(folder / MARKER, info | counts | {"splits": {"train": f"0:{number + 1}"}})
+    return number
+
+
+def _next_place(folder: Path, number: int) -> dict[str, int]:
+    """Where the files of an episode stand: behind all that hold an earlier one.
+
+    What an episode that was never counted left there is written over.
+    """
+    from pyarrow import parquet
+
+    last = -1
+    for path in (folder / "meta" / "episodes").glob("chunk-*/file-*.parquet"):
+        table = parquet.read_table(path, columns=["episode_index", "data/chunk_index", "data/file_index"]).to_pydict()
+        for episode, *place in zip(*table.values(), strict=True):
+            if episode < number:
+                own = (int(path.parent.name.removeprefix("chunk-")), int(path.stem.removeprefix("file-")))
+                last = max([last, *(chunk * _IN_CHUNK + file for chunk, file in (own, place))])
+    return {"chunk_index": (last + 1) // _IN_CHUNK, "file_index": (last + 1) % _IN_CHUNK}
+
+
+def _tasks(folder: Path) -> list[str]:
+    """Texts of the tasks in the order of their numbers."""
+    from pyarrow import parquet
+
+    if not (folder / _TASKS).is_file():
+        return []
+    table = parquet.read_table(folder / _TASKS).to_pydict()
+    texts = table.get("task", table.get("__index_level_0__"))
+    if texts is None or sorted(table["task_index"]) != list(range(len(texts))):
+        raise DataError(f"expected {_TASKS} with a text for each task from 0 on, got another one")
+    return [text for _, text in sorted(zip(table["task_index"], texts, strict=True))]
+
+
+def _write_tasks(folder: Path, tasks: Sequence[str]) -> None:
+    """The texts are the index, as pandas and LeRobot read it."""
+    index = {
+        "index_columns": ["task"], "column_indexes": [], "pandas_version": "2.2.3",
+        "columns": [
+            {"name": name, "field_name": name, "pandas_type": kind, "numpy_type": numpy, "metadata": None}
+            for name, kind, numpy in (("task_index", "int64", "int64"), ("task", "unicode", "object"))
+        ],
+    }  # fmt: skip
+    columns = {"task_index": np.arange(len(tasks)), "task": list(tasks)}
+    _write(folder / _TASKS, columns, {"pandas": json.dumps(index)})
+
+
+def _column(values: NDArray[Any]) -> Any:
+    import pyarrow as pa
+
+    if values.ndim == 1:
+        return pa.array(values)
+    return pa.FixedSizeListArray.from_arrays(pa.array(values.ravel()), values.shape[1])
+
+
+def _write(path: Path, columns: Mapping[str, Any], metadata: dict[str, str] | None = None) -> None:
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    buffer = io.BytesIO()
+    parquet.write_table(pa.table(dict(columns)).replace_schema_metadata(metadata), buffer)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_atomically(path, buffer.getvalue())
+
+
+def _write_json(path: Path, content: Any) -> None:
+    write_atomically(path, (json.dumps(content, indent=4, ensure_ascii=False) + "\n").encode())
+
+
+def statistics_of(values: NDArray[Any]) -> Statistics:
+    """Statistics of one feature over the frames of an episode, values of shape (T,) or (T, d)."""
+    rows = np.asarray(values, dtype=np.float64).reshape(len(values), -1)
+    found = {"min": rows.min(axis=0), "max": rows.max(axis=0), "mean": rows.mean(axis=0), "std": rows.std(axis=0)}
+    quantiles = dict(zip(_QUANTILES, np.quantile(rows, list(_QUANTILES.values()), axis=0), strict=True))
+    return {
+        **{name: one.tolist() for name, one in found.items()},
+        "count": [len(rows)],
+        **{name: one.tolist() for name, one in quantiles.items()},
+    }
+
+
+def merged_statistics(first: Statistics | None, second: Statistics) -> Statistics:
+    """Statistics of all frames from those of two parts; the quantiles are weighted means, as LeRobot takes them."""
+    if first is None:
+        return second
+    a, b = ({name: np.asarray(values, dtype=np.float64) for name, values in one.items()} for one in (first, second))
+    n = a["count"] + b["count"]
+    share = b["count"] / n
+    mean = a["mean"] + share * (b["mean"] - a["mean"])
+    variance = (1 - share) * a["std"] ** 2 + share * b["std"] ** 2 + share * (1 - share) * (b["mean"] - a["mean"]) ** 2
+    merged = {
+        "min": np.minimum(a["min"], b["min"]), "max": np.maximum(a["max"], b["max"]), "mean": mean,
+        "std": np.sqrt(variance),
+    }  # fmt: skip
+    merged |= {name: a[name] + share * (b[name] - a[name]) for name in _QUANTILES if name in a}
+    return {**{name: one.tolist() for name, one in merged.items()}, "count": [int(n[0])]}

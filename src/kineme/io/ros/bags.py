@@ -1,0 +1,217 @@
+"""Open a bag of ROS 1 or ROS 2 and stream the bytes of its messages, by the package rosbags."""
+
+from __future__ import annotations
+
+import os
+import struct
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from itertools import groupby
+from pathlib import Path
+from typing import Any, BinaryIO, NamedTuple
+
+from kineme.errors import DataError
+from kineme.io.limits import check_in_passing
+from kineme.io.ros.bound_chunks import bound_chunks_of_mcap, bound_chunks_of_ros_1, check_overlaps
+from kineme.io.ros.damage import REMEDIES, refused
+from kineme.io.ros.databases import plain_name
+from kineme.io.ros.expand import expand_message
+from kineme.io.ros.expanded_folder import Folder, expanded_folder
+
+#: File ending -> the first bytes of every such file. What begins otherwise is not given to rosbags.
+_MAGIC = {".bag": b"#ROSBAG V2.0\n", ".mcap": b"\x89MCAP0\r\n", ".db3": b"SQLite format 3\0"}
+
+_HEAD = struct.Struct("<BQ")  # kind and length of a record of MCAP
+_HEADER, _CHUNK, _ATTACHMENT = 1, 6, 9  # kinds
+_LONGEST = 64  # bytes of a profile
+_SIZE_AT = 16  # where a chunk says to how many bytes it expands
+
+_KINDS = {".bag": "ROS 1 bag", ".mcap": "MCAP", ".db3": "ROS 2 SQLite"}
+
+
+class Topic(NamedTuple):
+    """A topic of a bag: what it is called, the type of its messages, and how many there are.
+
+    `connections` are of rosbags; several nodes may publish one topic.
+    """
+
+    name: str
+    type: str
+    n_messages: int
+    connections: tuple[Any, ...]
+
+
+class Bag(NamedTuple):
+    """An open bag.
+
+    Attributes
+    ----------
+    kind : str
+        Such as ``"ROS 1 bag"``.
+    topics : tuple of Topic
+        In alphabetic order. A topic that carries several types occurs once for each.
+    reader : object
+        Of rosbags.
+    version : {1, 2}
+        Of ROS.
+    remedy : str
+        What may help if the bag is damaged.
+    compression : {"", "file", "message"}
+        What is compressed each for itself, apart from chunks.
+    """
+
+    kind: str
+    topics: tuple[Topic, ...]
+    reader: Any
+    version: int
+    remedy: str
+    compression: str = ""
+
+
+@contextmanager
+def open_bag(path: Path) -> Iterator[Bag]:
+    """Open a bag, a file or a folder.
+
+    Raises
+    ------
+    DataError
+        No bag, damaged, of a kind that rosbags does not read, or rosbags is not installed; the message names the extra.
+    """
+    try:
+        from rosbags.rosbag1 import Reader as Reader1
+        from rosbags.rosbag2 import Reader as Reader2
+    except ImportError as error:
+        raise DataError("expected the package rosbags to read bags of ROS; pip install 'kineme[ros]'") from error
+    ending = "" if path.is_dir() else path.suffix.lower()
+    remedy = REMEDIES[ending]
+    bound_chunks_of_mcap()
+    with ExitStack() as stack:
+        folder = stack.enter_context(expanded_folder(path)) if not ending else Folder(path, (path,), "")
+        _check_files(folder, path)
+        plain = stack.enter_context(plain_name(folder.path, ending))
+        with refused("expected a bag of ROS that can be opened", remedy):
+            reader: Any = (Reader1 if ending == ".bag" else Reader2)(plain)
+            if ending == ".bag":
+                _read_any_order(reader)
+            reader.open()
+        stack.callback(reader.close)
+        with refused("expected the topics of a bag of ROS", remedy):
+            if ending == ".bag":
+                bound_chunks_of_ros_1(reader)
+            elif folder.compression == "message":  # expanded here, up to a limit
+                reader.storage.metadata = reader.storage.metadata._replace(compression_mode=None)
+            topics = _topics(reader.connections)
+        version = 1 if ending == ".bag" else 2
+        yield Bag(_KINDS.get(ending, "ROS 2 bag"), topics, reader, version, remedy, folder.compression)
+
+
+def _read_any_order(reader: Any) -> None:
+    """Let rosbags look at the order of fields in each index record of a bag of ROS 1, and not in the first alone.
+
+    roscpp writes them in another order than rosbag, which may have appended to what roscpp recorded.
+    """
+    read = reader.read_index_data
+
+    def read_anew(at: int, indexes: Any) -> None:
+        reader.index_data_header_offsets = None
+        read(at, indexes)
+
+    reader.read_index_data = read_anew
+
+
+def _check_files(folder: Folder, path: Path) -> None:
+    for one in folder.files:
+        if one.suffix.lower() == ".mcap" or one == path:
+            try:
+                check_records(one)
+            except DataError as error:
+                raise DataError(str(error) if one == path else f"{one.name}: {error}") from error
+
+
+def messages_of(bag: Bag, topics: Sequence[Topic]) -> Iterator[tuple[int, int, bytes]]:
+    """Index of the topic, time of recording [ns since 1970] and bytes of every message of some topics.
+
+    They come in the order of that time.
+
+    Raises
+    ------
+    DataError
+        The bag is damaged from here on.
+    """
+    connections = [one for topic in topics for one in topic.connections]
+    if not connections:  # none would mean all to rosbags
+        return
+    index_of = {id(one): k for k, topic in enumerate(topics) for one in topic.connections}
+    with refused("expected messages to the end", bag.remedy):
+        for storage in storages_of(bag):
+            check_overlaps(storage, [topic.name for topic in topics])
+        for connection, recorded, raw in bag.reader.messages(connections=connections):
+            data = expand_message(raw) if bag.compression == "message" else raw
+            yield index_of[id(connection)], int(recorded), data
+
+
+def storages_of(bag: Bag) -> Sequence[Any]:
+    """What rosbags reads each file of a bag of ROS 2 with; none for ROS 1."""
+    if bag.version == 1:
+        return ()
+    storage = bag.reader.storage
+    return getattr(storage, "storages", (storage,))
+
+
+def _topics(connections: Sequence[Any]) -> tuple[Topic, ...]:
+    def key(one: Any) -> tuple[str, str]:
+        return str(one.topic), _type_name(str(one.msgtype))
+
+    groups = [(name, list(some)) for name, some in groupby(sorted(connections, key=key), key)]
+    return tuple(Topic(*name, sum(int(one.msgcount) for one in some), tuple(some)) for name, some in groups)
+
+
+def _type_name(name: str) -> str:
+    """The name of a type as in ROS 2: some writers leave out its middle part."""
+    package, _, rest = name.partition("/")
+    return f"{package}/msg/{rest}" if rest and "/" not in rest else name
+
+
+def check_records(path: Path) -> bytes:
+    """Refuse a file that is none of ROS by its first bytes, and an MCAP file whose records are none or too large.
+
+    Returns the profile of an MCAP file, ``b"ros2"`` of one of ROS 2; nothing of other files.
+
+    Records are passed over by their lengths. Other damage is left to rosbags, which may find its way by the index.
+
+    Raises
+    ------
+    DataError
+        The message names what may help.
+    """
+    magic = _MAGIC[path.suffix.lower()]
+    with path.open("rb") as file:
+        first = file.read(len(magic))
+        if first != magic:
+            raise DataError(
+                f"expected a {path.suffix.lower()} file of ROS, which begins with {magic!r}, got "
+                f"{'an empty file' if not first else repr(first)}"
+            )
+        return _check_mcap(file, len(magic)) if path.suffix.lower() == ".mcap" else b""
+
+
+def _check_mcap(file: BinaryIO, at: int) -> bytes:
+    """Rosbags takes each nine zeros for a record, of which there may be billions, and reads records whole."""
+    magic, profile = _MAGIC[".mcap"], b"ros2"  # what has no header is left to rosbags
+    end = file.seek(0, os.SEEK_END)
+    file.seek(max(end - len(magic), 0))
+    if file.read() != magic:
+        raise DataError(f"expected an MCAP file that was closed, got one that ends before; {REMEDIES['.mcap']}")
+    while at + _HEAD.size <= end - len(magic):
+        file.seek(at)
+        kind, length = _HEAD.unpack(file.read(_HEAD.size))
+        if not kind:
+            raise DataError(f"expected a record of MCAP at byte {at:,}, got zeros; {REMEDIES['.mcap']}")
+        if kind != _ATTACHMENT and at + length < end:
+            check_in_passing(length, f"a record of MCAP at byte {at:,}")
+        if kind == _HEADER and len(size := file.read(4)) == 4:
+            profile = file.read(min(int.from_bytes(size, "little"), _LONGEST))
+        if kind == _CHUNK and len(size := file.read(_SIZE_AT + 8)) == _SIZE_AT + 8:
+            check_in_passing(int.from_bytes(size[_SIZE_AT:], "little"), f"a chunk of MCAP at byte {at:,}")
+        at += _HEAD.size + length
+    return profile

@@ -1,0 +1,253 @@
+"""Read the movements of a bag: one of what is streamed, or one for each message that holds a whole movement."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kineme.errors import DataError
+from kineme.io.ros.bags import Bag, Topic, open_bag
+from kineme.io.ros.choose import Choice, choose
+from kineme.io.ros.databases import logs_beside
+from kineme.io.ros.frames import Edge, Step, chain, connected_graph, edge_of, transforms_in
+from kineme.io.ros.merge_streams import SECOND, clock_of, in_order, merge_streams, stamps_of, values_at
+from kineme.io.ros.message_types import POSE, TYPES, nanoseconds_of, transform_row
+from kineme.io.ros.paths import Paths, read_paths
+from kineme.io.ros.rotations import are_rotations, from_ros, to_ros
+from kineme.io.ros.streams import Samples, Stamps, Stream, check_kept, read_streams, stream_of
+from kineme.movements.rotations.quaternions import conjugate, continuous, product, rotated
+from kineme.movements.tables.columns import Roles, column_numbers, is_no_coordinate
+from kineme.movements.tables.layout import AS_KNOWN, Layout
+from kineme.movements.tables.parsed import Parsed, no_lines
+from kineme.movements.tables.table import Table, table_movements
+from kineme.reporting.text import counted
+from kineme.validation import MIN_SAMPLES, Array
+
+_CHECKED = 2**14
+
+_CLOCKS = ("header.stamp", "recorded")  # columns of the time stamps
+
+
+def read_bag(path: Path, layout: Layout) -> Parsed:
+    """Read what `layout` asks for of a bag of ROS 1 or ROS 2.
+
+    Raises
+    ------
+    DataError
+        No bag, damaged, or nothing that can be read without being asked for; the message names topics or frames.
+    """
+    with open_bag(path) as bag:
+        choice = choose(bag, layout)
+        paths = [one for one in choice.topics if one.type in TYPES and TYPES[one.type].path]
+        if not paths:
+            parsed = _streamed(bag, choice, layout)
+            return parsed._replace(left_out=(*parsed.left_out, *logs_beside(path)))
+        if len(choice.topics) > 1 or choice.frames:
+            raise DataError(
+                f"topic {paths[0].name}: each of its messages is a movement of its own, expected it alone, got other "
+                "topics or frames beside it"
+            )
+        return _whole(bag, read_paths(bag, paths[0], layout.skip), layout)
+
+
+def _streamed(bag: Bag, choice: Choice, layout: Layout) -> Parsed:
+    streams: list[Stream] = []
+    left_out: list[str] = []
+    if choice.frames:
+        streams, left_out = read_transforms(bag, choice.transforms, choice.frames, layout.skip)
+    if choice.topics:
+        others, lost = read_streams(bag, choice.topics, layout.skip, layout.coordinates)
+        streams, left_out = [*streams, *others], [*left_out, *lost]
+    of_headers, reason = clock_of(streams)
+    if str(layout.time) in _CLOCKS:
+        of_headers = layout.time == _CLOCKS[0]
+    one, lost = merge_streams(streams, of_headers)
+    stamps = [one.recorded if one.stamped is None else one.stamped, one.recorded]
+    columns = [*(each / SECOND for each in stamps), *one.values.T]
+    what = [f"frames {parent}:{child}" for parent, child in choice.frames]
+    what += [f"topic {topic.name} of {topic.type}" for topic in choice.topics]
+    said_what = ", ".join(what) + (AS_KNOWN if choice.as_known else "")
+    heads = (*_CLOCKS, *one.heads)
+    of_joints = any(topic.type.endswith("/JointState") for topic in choice.topics)
+    roles = _roles(heads, 0 if of_headers else 1, layout, of_joints)
+    table = Table(heads, columns, len(one.values), no_lines, dates_in="s")
+    said = "stamps of headers" if of_headers else f"time of recording: {reason}" if reason else "as asked for"
+    return _parsed(table, roles, layout, (bag.kind, said_what, said), [*left_out, *lost])
+
+
+def _whole(bag: Bag, paths: Paths, layout: Layout) -> Parsed:
+    numbers = np.repeat(np.arange(len(paths.lengths)), paths.lengths)
+    names = np.empty(len(numbers), dtype=object)
+    names[:] = [str(paths.places[k]) for k in numbers]
+    times: Any = np.zeros(len(numbers)) if paths.times is None else paths.times
+    heads = (paths.time, "message", *paths.heads)
+    table = Table(heads, [times, names, *paths.values.T], len(numbers), no_lines, dates_in="s")
+    chosen = _roles(heads, 0, layout)
+    roles = chosen._replace(movement=(1,))
+    about = (bag.kind, f"topic {paths.topic.name} of {paths.topic.type}, a movement a message", "stamps of its points")
+    parsed = _parsed(table, roles, layout, about, paths.left_out)
+    if paths.times is not None:
+        return parsed
+    detected = parsed.detected._replace(time=None, units_from="no times: one second each")
+    return parsed._replace(detected=detected, block=replace(parsed.block, times=None))
+
+
+def _roles(heads: tuple[str, ...], time: int, layout: Layout, of_joints: bool = True) -> Roles:
+    """All columns but stamps, numbers of things, and covariances are coordinates, or those chosen.
+
+    The names of joints are any words.
+    """
+    aside = {k for k, head in enumerate(heads) if "covariance" in head or (not of_joints and is_no_coordinate(head))}
+    measured = tuple(k for k in range(2, len(heads)) if k not in aside)
+    positions = measured or tuple(range(2, len(heads)))
+    if layout.time is not None:
+        time = column_numbers(heads, [layout.time])[0]
+    if layout.coordinates is not None:
+        positions = column_numbers(heads, layout.coordinates)
+    if layout.keys is not None or layout.label is not None:
+        raise DataError("expected movements that are told apart by messages, got a column for that, or for labels")
+    used = {0, 1, *positions}  # stamps are not left aside: they are of two clocks, and one is chosen
+    return Roles(time, positions, (), None, tuple(k for k in range(len(heads)) if k not in used))
+
+
+def _parsed(table: Table, roles: Roles, layout: Layout, about: tuple[str, str, str], left_out: list[str]) -> Parsed:
+    kind, what, clock = about
+    parsed = table_movements(table, roles, layout, kind)
+    return Parsed(parsed.detected._replace(layout=what, units_from=clock), parsed.block, tuple(left_out))
+
+
+def read_transforms(
+    bag: Bag, topics: Sequence[Topic], wanted: Sequence[Edge], skip: str
+) -> tuple[list[Stream], list[str]]:
+    """The pose of each child frame in its parent frame, and what was left out.
+
+    Raises
+    ------
+    DataError
+        A frame that is not there, no way between two frames, nothing that moves between them; or damage, where `skip`
+        is ``"movement"``.
+    """
+    if not topics:
+        raise DataError("expected a topic of transforms, such as /tf, got none")
+    graph = connected_graph(bag, topics, wanted)
+    steps = [chain(graph, *pair) for pair in wanted]
+    bad: list[str] = []
+    needed = {step.edge for way in steps for step in way}
+    try:
+        found, parents = _collect(bag, topics, needed, bad)
+    except DataError as error:
+        raise DataError(f"{', '.join(f'topic {one.name}' for one in topics)}: {error}") from error
+    left_out = [f"{bad[0]}{f'; {len(bad) - 1} more like this' if len(bad) > 1 else ''}"] if bad else []
+    if bad and skip == "movement":
+        raise DataError(f"{left_out[0]}; to keep the others, say skip='sample', in the shell --skip sample")
+    edges = {edge: _usable(edge, samples, left_out) for edge, samples in found.items()}
+    for child, counts in parents.items():
+        kept = next(edge[0] for edge in needed if edge[1] == child)
+        for parent in sorted(set(counts) - {kept}):
+            left_out.append(f"frame {child!r}: {counted(counts[parent], 'transform')} from another parent, {parent!r}")
+    pairs = zip(wanted, steps, strict=True)
+    return [_composed(f"{parent}:{child}", way, edges, left_out) for (parent, child), way in pairs], left_out
+
+
+def _collect(
+    bag: Bag, topics: Sequence[Topic], needed: set[Edge], bad: list[str]
+) -> tuple[dict[Edge, Samples], dict[str, Counter[str]]]:
+    """The needed transforms, and for their children how often each parent occurs."""
+    found = {edge: Samples.empty() for edge in needed}
+    children = {child for _, child in needed}
+    counts: Counter[Edge] = Counter()  # by names as they are in messages, of which there are few
+    samples_of: dict[Edge, Samples | None] = {}
+    for n, (_, recorded, transform) in enumerate(transforms_in(bag, topics, bad)):
+        header = transform.header
+        names = header.frame_id, transform.child_frame_id
+        counts[names] += 1
+        if names not in samples_of:
+            samples_of[names] = found.get(edge_of(transform))
+        if (samples := samples_of[names]) is not None:
+            samples.values.extend(transform_row(transform.transform))
+            samples.recorded.append(recorded)
+            samples.stamped.append(nanoseconds_of(header.stamp))
+        if not n % _CHECKED:
+            check_kept(list(found.values()))
+    parents: dict[str, Counter[str]] = {child: Counter() for child in children}
+    for names, n in counts.items():
+        parent, child = (name.removeprefix("/") for name in names)
+        if child in children:
+            parents[child][parent] += n
+    return found, parents
+
+
+def _usable(edge: Edge, samples: Samples, left_out: list[str]) -> Stream:
+    """The transforms of an edge whose rotations are rotations, each once: some nodes publish the last one again."""
+    where = f"transform {edge[0]}:{edge[1]}"
+    stream = stream_of(where, POSE, samples)
+    assert stream.stamped is not None
+    good = are_rotations(stream.values[:, 3:]) & np.isfinite(stream.values).all(axis=1)
+    if n_bad := int((~good).sum()):
+        first = int(np.argmin(good))
+        norm = float(np.linalg.norm(stream.values[first, 3:]))
+        left_out.append(f"{where}: expected rotations of norm 1, got {norm:.3g} in {counted(n_bad, 'transform')}")
+        if not good.any():
+            raise DataError(left_out[-1])
+    kept = np.flatnonzero(good)
+    kept = kept[np.diff(stream.stamped[kept], prepend=stream.stamped[kept[0]] - 1) != 0]
+    if len(kept) == len(good):
+        return stream
+    return replace(stream, values=stream.values[kept], recorded=stream.recorded[kept], stamped=stream.stamped[kept])
+
+
+def _composed(name: str, way: Sequence[Step], edges: dict[Edge, Stream], left_out: list[str]) -> Stream:
+    moving = [edges[step.edge] for step in way if not _is_fixed(edges[step.edge])]
+    if not moving:
+        raise DataError(f"frames {name}: expected a frame that moves in the other, got transforms that never change")
+    of_headers, reason = clock_of(moving)
+    at = _common_stamps(name, moving, of_headers, left_out)
+    start = int(at[0])
+    seconds = (at - start) / SECOND
+    p, q = np.zeros((len(at), 3)), np.tile([1.0, 0.0, 0.0, 0.0], (len(at), 1))
+    for step in way:
+        p, q = _then(p, q, _at(seconds, start, edges[step.edge], of_headers), step.forward)
+    return Stream(name, POSE, np.hstack((p, to_ros(continuous(q)))), at, at if of_headers else None, reason)
+
+
+def _is_fixed(stream: Stream) -> bool:
+    return bool((stream.values == stream.values[0]).all())
+
+
+def _common_stamps(name: str, moving: Sequence[Stream], of_headers: bool, left_out: list[str]) -> Stamps:
+    """The stamps of the transform that has most of them, within the time in which all others are known too."""
+    stamps = [np.unique(stamps_of(one, of_headers)) for one in moving]
+    first, last = max(one[0] for one in stamps), min(one[-1] for one in stamps)
+    inside = [one[(one >= first) & (one <= last)] for one in stamps]
+    k = max(range(len(inside)), key=lambda i: len(inside[i]))
+    most = inside[k]
+    if len(most) < MIN_SAMPLES:
+        raise DataError(
+            f"frames {name}: expected transforms that are known at the same time, at least {MIN_SAMPLES} times, got "
+            f"{len(most)}, of {', '.join(one.name for one in moving)}"
+        )
+    if n_lost := len(stamps[k]) - len(most):
+        left_out.append(f"frames {name}: {counted(n_lost, 'stamp')} of {moving[k].name}, at which others are not known")
+    return most
+
+
+def _at(seconds: Array, start: int, stream: Stream, of_headers: bool) -> Array:
+    """A transform at the common stamps, (n, 7)."""
+    if _is_fixed(stream):
+        return np.repeat(stream.values[:1], len(seconds), axis=0)
+    stamps, values = in_order(stream, of_headers)
+    return values_at(seconds, (stamps - start) / SECOND, stream, values)
+
+
+def _then(p: Array, q: Array, transform: Array, forward: bool) -> tuple[Array, Array]:
+    """The pose (p, q) followed by transforms (n, 7), or by their inverses."""
+    x, r = transform[:, :3], from_ros(transform[:, 3:])
+    if not forward:
+        r = conjugate(r)
+        x = -rotated(r, x)
+    return p + rotated(q, x), product(q, r)

@@ -1,0 +1,274 @@
+"""The samples of topics, kept as numbers while the messages pass by."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.errors import DataError
+from kineme.io.limits import check_expanded
+from kineme.io.ros.bags import Bag, Topic, messages_of
+from kineme.io.ros.decode import decoder_of
+from kineme.io.ros.message_types import TYPES, Heads, nanoseconds_of
+from kineme.io.ros.number_fields import number_fields
+from kineme.io.ros.rotations import are_rotations
+from kineme.movements.tables.layout import Column
+from kineme.movements.tables.parsed import listed
+from kineme.reporting.text import counted
+from kineme.validation import Array
+
+Stamps = NDArray[np.int64]
+
+_CHECKED = 2**14  # messages between two looks at the memory
+_COPIES = 3  # of the numbers, until they are movements
+
+
+@dataclass(frozen=True, eq=False)
+class Stream:
+    """Samples of a topic or of a transform, in the order of the recording.
+
+    Attributes
+    ----------
+    name : str
+        Of the topic, or the frames of the transform.
+    heads : tuple of d str
+    values : ndarray of shape (n, d)
+    recorded : ndarray of shape (n,)
+        When each message was recorded [ns since 1970].
+    stamped : ndarray of shape (n,) or None
+        The stamps in the headers of the messages [ns]; None if they have no headers.
+    why : str
+        Why there are no such stamps, where it is not for want of headers.
+    """
+
+    name: str
+    heads: Heads
+    values: Array
+    recorded: Stamps
+    stamped: Stamps | None
+    why: str = ""
+
+
+class Samples(NamedTuple):
+    """Numbers that are collected: the rows one after the other, and two stamps for each [ns]."""
+
+    values: array[float]
+    recorded: array[int]
+    stamped: array[int]
+
+    @classmethod
+    def empty(cls) -> Samples:
+        """No samples yet."""
+        return cls(array("d"), array("q"), array("q"))
+
+    @property
+    def n_bytes(self) -> int:
+        """Memory of the numbers."""
+        return 8 * (len(self.values) + len(self.recorded) + len(self.stamped))
+
+
+class _Open(NamedTuple):
+    """What is collected of one topic."""
+
+    decode: Any
+    row: Any
+    stamp: Any  # message -> [ns]; None if messages do not tell their own time
+    groups: dict[Heads, tuple[Samples, list[int] | None]]  # heads -> their samples, and their order in these
+    first: dict[Heads, Heads]  # sorted heads -> those that came first
+    bad: list[str]
+    counts: list[int]  # messages, those without a sample
+
+
+def read_streams(
+    bag: Bag, topics: Sequence[Topic], skip: str, columns: Sequence[Column] | None = None
+) -> tuple[list[Stream], list[str]]:
+    """The samples of topics, and what was left out; `columns` are those that are asked for.
+
+    Messages of one topic may have different columns, as the states of joints that several nodes publish. They are
+    streams of their own where they share no column; of those that do, the most frequent are read.
+
+    Raises
+    ------
+    DataError
+        A topic without samples; or damage, where `skip` is ``"movement"``.
+    """
+    opened = [_open(bag, topic) for topic in topics]
+    left_out: list[str] = []
+    try:
+        _collect(bag, topics, opened)
+    except DataError as error:
+        n = sum(one.counts[0] for one in opened)
+        about = f"{', '.join(f'topic {one.name}' for one in topics)}: after {counted(n, 'message')}: {error}"
+        if skip == "movement" or not n:
+            raise DataError(f"{about}{_TO_KEEP if n else ''}") from error
+        left_out.append(about)
+    streams: list[Stream] = []
+    for topic, one in zip(topics, opened, strict=True):
+        left_out += _losses(topic, one, skip)
+        streams += [
+            with_rotations(stream, f"topic {topic.name}: ", skip, left_out, columns)
+            for stream in _streams(topic, one, left_out)
+        ]
+    return streams, left_out
+
+
+_TO_KEEP = "; to keep the others, say skip='sample', in the shell --skip sample"
+
+
+def _open(bag: Bag, topic: Topic) -> _Open:
+    kind = TYPES.get(topic.type)
+    if kind is None:
+        fields = number_fields(bag, topic)
+        heads, stamp = fields.heads, (lambda message: message.stamp) if fields.has_header else None
+        return _Open(fields.decode, lambda message: (heads, message.row), stamp, {}, {}, [], [0, 0])
+    stamp = (lambda message: nanoseconds_of(message.header.stamp)) if kind.has_header else None
+    return _Open(decoder_of(bag, topic), kind.row, stamp, {}, {}, [], [0, 0])
+
+
+def _collect(bag: Bag, topics: Sequence[Topic], opened: Sequence[_Open]) -> None:
+    n = 0
+    for k, recorded, raw in messages_of(bag, topics):
+        decode, row_of, stamp_of, groups, _, bad, counts = opened[k]
+        counts[0] += 1
+        try:
+            message = decode(raw)
+            heads, row = row_of(message)
+        except ValueError as error:
+            bad.append(f"message {counts[0] - 1}: {error}" if not bad else "")
+            continue
+        if not heads:
+            counts[1] += 1
+            continue
+        samples, order = groups.get(heads) or _group(opened[k], heads)
+        samples.values.extend(row if order is None else [row[i] for i in order])
+        samples.recorded.append(recorded)
+        if stamp_of is not None:
+            samples.stamped.append(stamp_of(message))
+        n += 1
+        if not n % _CHECKED:
+            check_kept([one for each in opened for one, _ in each.groups.values()])
+
+
+def check_kept(some: Sequence[Samples]) -> None:
+    """Refuse to keep more numbers than the limit of memory allows; samples may occur several times."""
+    check_expanded(_COPIES * sum(one.n_bytes for one in {id(one): one for one in some}.values()), "a topic")
+
+
+def _group(one: _Open, heads: Heads) -> tuple[Samples, list[int] | None]:
+    """The samples with these columns, in whatever order they came first."""
+    first = one.first.setdefault(tuple(sorted(heads)), heads)
+    if first == heads:
+        one.groups[heads] = Samples.empty(), None
+    else:
+        place = {head: k for k, head in enumerate(heads)}
+        one.groups[heads] = one.groups[first][0], [place[head] for head in first]
+    return one.groups[heads]
+
+
+def _losses(topic: Topic, one: _Open, skip: str) -> list[str]:
+    """What was not read of a topic, or an error where that costs the movement."""
+    n, without = one.counts
+    losses = []
+    if one.bad:
+        more = f"; {len(one.bad) - 1} more like this" if len(one.bad) > 1 else ""
+        reason = f"topic {topic.name}: {one.bad[0]}{more}"
+        if skip == "movement":
+            raise DataError(f"{reason}{_TO_KEEP if one.groups else ''}")
+        losses.append(reason)
+    if without and without < n:
+        losses.append(f"topic {topic.name}: {counted(without, 'message')} without positions")
+    if n < topic.n_messages:
+        losses.append(f"topic {topic.name}: expected {counted(topic.n_messages, 'message')}, got {n:,}")
+    if not one.groups:
+        what = f"{counted(n, 'message')} without positions" if without else "no messages"
+        raise DataError(f"topic {topic.name}: expected samples of {topic.type}, got {what}")
+    return losses
+
+
+def _streams(topic: Topic, one: _Open, left_out: list[str]) -> list[Stream]:
+    """Streams of one topic, the longest first."""
+    whole = [(heads, samples) for heads, (samples, order) in one.groups.items() if order is None]
+    whole.sort(key=lambda group: -len(group[1].recorded))
+    streams: list[Stream] = []
+    taken: set[str] = set()
+    for heads, samples in whole:
+        if shared := taken & set(heads):
+            n = counted(len(samples.recorded), "message")
+            left_out.append(f"topic {topic.name}: {n} with other columns {listed(heads)}, which share {min(shared)!r}")
+            continue
+        taken |= set(heads)
+        streams.append(stream_of(topic.name, heads, samples, one.stamp is not None))
+    return streams
+
+
+def stream_of(name: str, heads: Heads, samples: Samples, has_header: bool = True) -> Stream:
+    """What was collected, as arrays."""
+    values = np.frombuffer(samples.values, np.float64).reshape(-1, len(heads))
+    stamped = np.frombuffer(samples.stamped, np.int64) if has_header else None
+    return Stream(name, heads, values, np.frombuffer(samples.recorded, np.int64), stamped)
+
+
+def rotations_in(heads: Heads) -> list[int]:
+    """The first of the four columns of every quaternion."""
+    ends = ("orientation.x", "orientation.y", "orientation.z", "orientation.w")
+    starts = range(len(heads) - 3)
+    return [k for k in starts if all(heads[k + i].endswith(end) for i, end in enumerate(ends))]
+
+
+def with_rotations(
+    stream: Stream, where: str, skip: str, left_out: list[str], columns: Sequence[Column] | None = None
+) -> Stream:
+    """The stream without quaternions that are none.
+
+    Those that are zero in every sample were never set: their columns are left out, and so are those that `columns`, if
+    given, does not ask for. Others cost their sample or, where `skip` is ``"movement"``, the movement.
+    """
+    unset = [k for k in rotations_in(stream.heads) if not stream.values[:, k : k + 4].any()]
+    if unset:
+        dropped = [k + i for k in unset for i in range(4)]
+        left_out.append(f"{where}{', '.join(stream.heads[k] for k in dropped)}, which are 0 in every message")
+        stream = _without(stream, unset)
+    wrong = [k for k in rotations_in(stream.heads) if not are_rotations(stream.values[:, k : k + 4]).all()]
+    stream = _without(stream, [k for k in wrong if not _is_asked(stream, range(k, k + 4), columns)])
+    good = np.ones(len(stream.values), dtype=bool)
+    for k in rotations_in(stream.heads):
+        good &= are_rotations(stream.values[:, k : k + 4])
+    if good.all():
+        return stream
+    bad = np.flatnonzero(~good)
+    norms = [float(np.linalg.norm(stream.values[bad[0], k : k + 4])) for k in rotations_in(stream.heads)]
+    reason = (
+        f"{where}expected orientations of norm 1, got the norm {max(norms, key=lambda norm: abs(norm - 1)):.3g} in "
+        f"message {bad[0]}{f'; {len(bad) - 1} more like this' if len(bad) > 1 else ''}"
+    )
+    if skip == "movement" or len(bad) == len(good):
+        raise DataError(reason + (_TO_KEEP if len(bad) < len(good) else ""))
+    left_out.append(reason)
+    stamped = None if stream.stamped is None else stream.stamped[good]
+    return replace(stream, values=stream.values[good], recorded=stream.recorded[good], stamped=stamped)
+
+
+def _without(stream: Stream, rotations: Sequence[int]) -> Stream:
+    """The stream without the quaternions that begin at these columns."""
+    if not rotations:
+        return stream
+    dropped = {k + i for k in rotations for i in range(4)}
+    kept = [k for k in range(len(stream.heads)) if k not in dropped]
+    return replace(stream, heads=tuple(stream.heads[k] for k in kept), values=stream.values[:, kept])
+
+
+def _is_asked(stream: Stream, numbers: Iterable[int], columns: Sequence[Column] | None) -> bool:
+    """Whether one of the columns with these numbers is asked for: by its name, the beginning of it, or a pattern.
+
+    A column that is asked for by its number may be any.
+    """
+    if columns is None or any(not isinstance(one, str) or one.isdecimal() for one in columns):
+        return True
+    names = [name for k in numbers for name in (stream.heads[k], f"{stream.name}.{stream.heads[k]}")]
+    return any(fnmatchcase(name, str(one)) or name.startswith(f"{one}.") for name in names for one in columns)

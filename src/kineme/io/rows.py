@@ -1,0 +1,259 @@
+"""Text of which each line is a movement: tables with a label first, and the ``.ts`` files of time-series archives."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from kineme.errors import DataError
+from kineme.io.arrays.arrays import ROWS, Named, parsed_arrays
+from kineme.io.limits import check_expanded
+from kineme.io.tables.dialect import is_number, is_skipped, separator_of, split
+from kineme.io.tables.text_table import lines_of
+from kineme.movements.tables.columns import LABEL_WORDS, column_numbers
+from kineme.movements.tables.layout import Layout
+from kineme.movements.tables.parsed import Parsed, listed
+from kineme.movements.tables.time_stamps import is_date, seconds_of_dates, words_of
+from kineme.movements.trajectories.movements import axis_names
+from kineme.validation import Array
+
+_CELL = 100  # bytes of a cell in Python
+_COUNTED = re.compile(r"(.*?)[\W_]*(\d+)")  # x0, wrist.x_12
+_COLON = re.compile(r":(?![^()]*\))")  # between columns, not within a date
+_PAIR = re.compile(r"\(([^,()]*),([^,()]*)\)")  # a time and a value
+_WHOLE = re.compile(r"[-+]?\d+(?:\.0*)?(?:[eE][-+]?0+)?")  # also as programs write classes as floats, 1.0000000e+00
+_FRACTION = re.compile(r"[.eE].*")  # of a whole number
+_PEEK = 20  # lines by which labels are known
+
+
+class _Line(NamedTuple):
+    """A line, its number counted from 1, and its cells."""
+
+    number: int
+    cells: list[str]
+
+
+class _Series(NamedTuple):
+    """The movements of lines, with the number of each and its label; and why others could not be read."""
+
+    lines: list[int]
+    labels: list[str | None]
+    positions: list[Array]
+    times: list[Array]
+    left_out: list[str]
+
+
+def row_movements(data: bytes, layout: Layout) -> Parsed:
+    """The movements of a table, one in each line: its label, then the coordinates of sample after sample.
+
+    The coordinates of a sample are named by `layout.columns`, or by heads such as x0, y0, x1, y1. The label is in the
+    column `layout.label`; by default in the first or the last one if it holds words, or a whole number beside a whole
+    number of samples.
+    Cells that are empty or NaN at the end of a line pad it.
+
+    Raises
+    ------
+    DataError
+        Nothing says what the coordinates of a sample are, or no movements.
+    """
+    lines, heads = _table(data)
+    names = _names(layout, heads)
+    label = _label_column(lines, heads, len(names), layout)
+    series = _Series([], [], [], [], [])
+    for line in lines:
+        cells = list(line.cells)
+        text = cells.pop(label) if label is not None and label < len(cells) else None
+        try:
+            values = np.array([cell or "nan" for cell in cells], dtype=np.float64)
+        except ValueError:
+            odd = next(cell for cell in cells if not is_number(cell or "nan", False))
+            series.left_out.append(f"line {line.number}: expected numbers, got {odd!r:.40}")
+            continue
+        values = values[: 1 + np.flatnonzero(~np.isnan(values))[-1]] if not np.isnan(values).all() else values[:0]
+        if len(values) % len(names):
+            series.left_out.append(
+                f"line {line.number}: expected samples of {len(names)} coordinates, got {len(values)} numbers"
+            )
+            continue
+        series.lines.append(line.number)
+        series.labels.append((_FRACTION.sub("", text) if _WHOLE.fullmatch(text) else text) if text else None)
+        series.positions.append(values.reshape(-1, len(names)))
+    parsed = _parsed(series, names, layout, "CSV")
+    head = () if label is None else (heads[label] if heads else f"column {label}",)
+    return parsed._replace(detected=parsed.detected._replace(label=head))
+
+
+def _table(data: bytes) -> tuple[list[_Line], list[str]]:
+    """The lines, split into cells, and the heads, if there are any."""
+    check_expanded(len(data) + _CELL * sum(map(data.count, (b",", b";", b"\t", b" "))))
+    texts = [(number, line) for number, line in enumerate(lines_of(data), 1) if not is_skipped(line)]
+    if not texts:
+        raise DataError("expected a movement in each line, got an empty file")
+    separator = separator_of([line for _, line in texts[:2]])
+    lines = [_Line(number, split(line, separator)) for number, line in texts]
+    numbers = [sum(is_number(cell, False) for cell in line.cells) for line in lines[:2]]
+    if len(lines) > 1 and not numbers[0] and numbers[1]:
+        return lines[1:], lines[0].cells
+    return lines, []
+
+
+def _names(layout: Layout, heads: Sequence[str]) -> list[str]:
+    """The names of the coordinates of a sample."""
+    if layout.coordinates is not None:
+        return [str(name) for name in layout.coordinates]
+    stems = [match[1] for head in heads if (match := _COUNTED.fullmatch(head))]
+    names = list(dict.fromkeys(stems))
+    if names and all(names) and stems == names * (len(stems) // len(names)):
+        return names
+    raise DataError(
+        "expected the coordinates of a sample, got no heads that name them as x0, y0, x1, y1; say columns=('x', 'y') "
+        "where a line is x, y, x, y, ..., in the shell --columns x,y"
+    )
+
+
+def _label_column(lines: Sequence[_Line], heads: Sequence[str], width: int, layout: Layout) -> int | None:
+    """The column of the labels, or None where there is none."""
+    first = lines[0].cells
+    if layout.label is not None:
+        return column_numbers(heads or [f"column {k}" for k in range(len(first))], [layout.label])[0]
+    if named := [k for k, head in enumerate(heads) if {*words_of(head)} & LABEL_WORDS]:
+        return named[0]
+    for k in (0, len(first) - 1):
+        if not all(is_number(line.cells[k] if k < len(line.cells) else "0", False) for line in lines[:_PEEK]):
+            return k
+    return _class_column(lines, width)
+
+
+def _class_column(lines: Sequence[_Line], width: int) -> int | None:
+    """The column of classes that are whole numbers beside samples of `width` coordinates, or None."""
+    peeked, n_cells = lines[:_PEEK], len(lines[0].cells)
+    last = n_cells - 1 if all(len(line.cells) == n_cells for line in lines) else 0
+    ends = [k for k in (0, last) if all(_WHOLE.fullmatch(line.cells[k]) for line in peeked)]
+    if width > 1:
+        if any(len(line.cells) % width != 1 for line in peeked):
+            return None
+        if not ends:
+            raise DataError(
+                f"expected a label in the first or the last of {n_cells} cells, since one is left beside samples of "
+                f"{width} coordinates, got fractions in both; say which with label=, in the shell --label-column"
+            )
+        return ends[0]
+    if 0 not in ends or all(_WHOLE.fullmatch(cell) for line in peeked for cell in line.cells if cell):
+        return None
+    classes = {line.cells[0].lstrip("+-") for line in peeked}
+    return 0 if len(classes) > 1 or all(map(str.isdecimal, classes)) else None
+
+
+def series_movements(data: bytes, layout: Layout) -> Parsed:
+    """The movements of a ``.ts`` file, as sktime and aeon write them: one in each line below ``@data``.
+
+    The columns of a movement are separated by colons, its values by commas, each alone or as ``(time,value)``; the
+    label is last where ``@classLabel`` says so. A value of ``@targetLabel`` is no label.
+
+    Raises
+    ------
+    DataError
+        No such file, or no movements.
+    """
+    check_expanded(len(data) + _CELL * data.count(b","))
+    flags, body = _head(data)
+    timed, labeled = _says(flags, "timestamps"), _says(flags, "classlabel")
+    targeted = _says(flags, "targetlabel")
+    series = _Series([], [], [], [], [])
+    for number, text in body:
+        parts = _COLON.split(text)
+        label = parts.pop().strip() if labeled or targeted else None
+        try:
+            columns = [_timed(part) if timed else _values(part) for part in parts]
+            times, x = _side_by_side(columns, timed)
+        except ValueError as error:
+            series.left_out.append(f"line {number}: {error}")
+            continue
+        series.lines.append(number)
+        series.labels.append(label if labeled else None)
+        series.positions.append(x)
+        series.times.append(times)
+    if timed and any(is_date(stamp.strip()) for stamp, _ in _PAIR.findall(body[0][1])):
+        layout = replace(layout, units="s")  # dates were counted in seconds
+    width = max((x.shape[1] for x in series.positions), default=1)
+    parsed = _parsed(series, axis_names(width), layout, "TS", timed)
+    ignored = ("the target",) if targeted else ()
+    return parsed._replace(detected=parsed.detected._replace(ignored=ignored, label=("the class",) if labeled else ()))
+
+
+def _head(data: bytes) -> tuple[dict[str, str], list[tuple[int, str]]]:
+    """The attributes in lower case, and the lines below ``@data`` with their numbers."""
+    flags: dict[str, str] = {}
+    lines = enumerate(lines_of(data), 1)
+    for _, line in lines:
+        text = line.strip()
+        if text.lower() == "@data":
+            body = [(number, one.strip()) for number, one in lines if one.strip() and not one.startswith(("#", "%"))]
+            if not body:
+                break
+            return flags, body
+        if text.startswith("@"):
+            name, _, value = text[1:].partition(" ")
+            flags[name.lower()] = value.strip()
+        elif text and not text.startswith(("#", "%")):
+            break
+    raise DataError("expected a .ts file of a time-series archive, with movements below a line @data, got none")
+
+
+def _says(flags: dict[str, str], name: str) -> bool:
+    return flags.get(name, "false").lower().split()[:1] == ["true"]
+
+
+def _values(part: str) -> tuple[Array, Array]:
+    x = np.array(part.replace("?", "nan").split(","), dtype=np.float64)
+    return np.arange(float(len(x))), x
+
+
+def _timed(part: str) -> tuple[Array, Array]:
+    pairs = _PAIR.findall(part)
+    if len(pairs) != part.count("("):
+        raise ValueError(f"expected pairs (time,value), got {part[:40]!r}")
+    stamps = [stamp.strip() for stamp, _ in pairs]
+    x = np.array([cell.replace("?", "nan") for _, cell in pairs], dtype=np.float64)
+    if not all(map(is_date, stamps)):
+        return np.array(stamps, dtype=np.float64), x
+    return seconds_of_dates(stamps)[0], x
+
+
+def _side_by_side(columns: Sequence[tuple[Array, Array]], timed: bool) -> tuple[Array, Array]:
+    """The columns of a movement as times (T,) and positions (T, d), without padding at the end."""
+    if not columns:
+        raise ValueError("expected values of at least one dimension, got none")
+    lengths = [len(x) for _, x in columns]
+    if len({*lengths}) > 1:
+        raise ValueError(f"expected columns of one length, got {listed(map(str, lengths))}")
+    times = columns[0][0]
+    if timed and not all(np.array_equal(t, times) for t, _ in columns):
+        raise ValueError("expected columns at the same times, got several clocks")
+    x = np.column_stack([x for _, x in columns])
+    filled = np.flatnonzero(~np.isnan(x).all(axis=1))
+    end = filled[-1] + 1 if len(filled) else 0
+    return times[:end], x[:end]
+
+
+def _parsed(series: _Series, names: Sequence[str], layout: Layout, kind: str, timed: bool = False) -> Parsed:
+    """Movements of the width of the first, with what the others lack."""
+    if not series.positions:
+        reason = f"; {series.left_out[0]}" if series.left_out else ""
+        raise DataError(f"expected a movement in each line, got none{reason}")
+    fits = [x.shape[1] == len(names) for x in series.positions]
+    kept = [k for k, fit in enumerate(fits) if fit]
+    left_out = [
+        f"line {series.lines[k]}: expected {len(names)} columns, got {series.positions[k].shape[1]}"
+        for k, fit in enumerate(fits)
+        if not fit
+    ]
+    xs = [series.positions[k] for k in kept]
+    places = [f"line {series.lines[k]}" for k in kept]
+    named = Named([series.labels[k] for k in kept], "times", places, names)
+    parsed = parsed_arrays(xs, [series.times[k] for k in kept] if timed else None, named, layout, (kind, ROWS))
+    return parsed._replace(left_out=(*series.left_out, *left_out))

@@ -1,0 +1,285 @@
+"""The dialect of a table of samples: separator, decimal mark, heads, and types of the columns."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from itertools import islice
+from typing import NamedTuple
+
+from kineme.errors import DataError
+from kineme.io.limits import check_expanded
+from kineme.movements.tables.columns import is_time
+from kineme.movements.tables.time_stamps import is_date
+from kineme.reporting.text import text_in
+from kineme.units import unit_named
+
+COMMENTS = ("#", "%", "//")
+LONGEST = 2**22  # characters of a line, at most
+_SEPARATORS = (";", "\t", ",")
+_LETTERS = frozenset("mnwvahg-")  # units that may be names
+_PEEK = 20  # samples from which the dialect is detected
+_HEAD = 100_000  # lines among which they are
+_MOST_HEADS = 5  # lines of heads, at most
+_WIDEST, _SHORT = 100_000, 1000  # columns, at most; characters of a line that is not checked
+_CELL = 32  # memory of a cell in Python, per character [bytes]
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?(nan|inf(inity)?)", re.IGNORECASE)
+_MISSING = frozenset({"", "na", "n/a", "#n/a", "<na>", "null", "none"})  # as R, pandas and others write a gap
+_STAMP = re.compile(r"\d+([:/.-])\d+\1\d+")  # digits of a date or of a time of day
+_SEPARATOR_LINE = re.compile(r'"?sep=.{0,2}', re.IGNORECASE)
+COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
+#: A number whose marks lie between thousands for certain: 1,234.5 and 1.234,5 and 1 234,5 and 1'234 and 1,234,567.
+_THOUSANDS = re.compile(
+    r"[-+]?[1-9]\d{0,2}((,\d{3})+\.\d*|(\.\d{3})+,\d*|(,\d{3}){2,}|(\.\d{3}){2,}"
+    r"|([ '\u2019\xa0\u202f_]\d{3})+([.,]\d*)?)"
+)
+_COMMA_NUMBERS = re.compile(rf"\s*{COMMA_NUMBER.pattern}(\s+{COMMA_NUMBER.pattern})+\s*")  # between blanks
+
+
+class Dialect(NamedTuple):
+    """How a table is written: its separator (None: blanks), decimal comma, heads, and where the numbers begin."""
+
+    separator: str | None
+    decimal_comma: bool
+    heads: tuple[str, ...]
+    named: bool
+    first: int  # line of the first sample, counted from 0
+    kinds: tuple[str, ...]  # "number", "date" or "text" per column
+    measured_in: tuple[str, ...] = ()  # per column, from a row of units below the heads
+    end: int | None = None  # line after the last sample; None: the end of the file
+    names_rows: bool = False  # whether the first column tells movements or labels apart, be these numbers
+
+    def is_sample(self, line: str) -> bool:
+        """Whether a line holds a sample. A comment does not, but a name may begin like a comment.
+
+        A line that begins with one of `COMMENTS` is a sample where the first column holds names, the line has as many
+        cells as there are columns, and those of numbers hold numbers. Where most of the names are numbers, as 1 and
+        2, ``%d`` is a name, and ``#1`` a row that was commented out.
+        """
+        if not is_skipped(line):
+            return True
+        if not (self.names_rows or self.kinds[0] == "text") or not line.strip():
+            return False
+        cells = split(line, self.separator)
+        if self.kinds[0] == "number" and is_number(cells[0].lstrip("#%/ "), self.decimal_comma):
+            return False
+        return len(cells) == len(self.kinds) and all(
+            is_number(cell, self.decimal_comma)
+            for cell, kind in zip(cells[1:], self.kinds[1:], strict=True)
+            if kind == "number"
+        )
+
+
+def is_skipped(line: str) -> bool:
+    """Whether a line is empty, begins as a comment, or says the separator to Excel: ``sep=;``."""
+    stripped = line.strip()
+    return not stripped or stripped.startswith(COMMENTS) or _SEPARATOR_LINE.fullmatch(stripped) is not None
+
+
+def check_line(line: str) -> None:
+    """Refuse a line that is too long to be one of a table, before it is split.
+
+    Raises
+    ------
+    DataError
+        More than 4 MiB, or more than 100,000 columns.
+    """
+    if len(line) <= _SHORT:
+        return
+    check_expanded(_CELL * len(line), "lines")
+    if len(line) <= _WIDEST:
+        return
+    n_columns = 1 + max(map(line.count, _SEPARATORS))
+    if len(line) > LONGEST or n_columns > _WIDEST:
+        raise DataError(
+            f"expected lines of at most {LONGEST:,} characters and {_WIDEST:,} columns, got one of {len(line):,} "
+            f"characters and {n_columns:,} columns"
+        )
+
+
+def split(line: str, separator: str | None) -> list[str]:
+    """The cells of a line."""
+    plain = line.rstrip("\r\n")
+    cells = _quoted_cells(plain, separator) if '"' in line else plain.split(separator)
+    return [cell.strip() for cell in cells]
+
+
+def _quoted_cells(line: str, separator: str | None) -> list[str]:
+    """The cells of a line with quoted cells; a doubled quote within them stands for one quote.
+
+    Python's csv is not used: its limit on the length of cells holds for the whole process.
+    """
+    end = r"\s" if separator is None else re.escape(separator)
+    cell = re.compile(rf'[^\S{end}]*"([^"]*(?:""[^"]*)*)(?:"([^{end}]*))?|([^{end}]*)')
+    gap = re.compile(r"\s+" if separator is None else end)
+    line = line.strip() if separator is None else line
+    cells, at = [], 0
+    while match := cell.match(line, at):
+        cells.append(match[3] if match[1] is None else match[1].replace('""', '"') + (match[2] or ""))
+        if (between := gap.match(line, match.end())) is None:
+            break
+        at = between.end()
+    return cells
+
+
+def detect_dialect(text: Iterable[str]) -> Dialect:
+    """The dialect of a table, from its first lines; no more lines are read than needed."""
+    lines, kept = [], []
+    for line in islice(text, _HEAD):
+        check_line(line)
+        lines.append(line)
+        if not is_skipped(line):
+            kept.append(len(lines) - 1)
+        if len(kept) == _PEEK:
+            break
+    if not kept:
+        more = len(lines) == _HEAD
+        raise DataError(f"expected samples, got {f'none in the first {_HEAD:,} lines' if more else 'an empty file'}")
+    kept = _below_preamble(lines, _with_names_like_comments(lines, kept))
+    separator = separator_of([lines[k] for k in kept[:2]])
+    cells = [split(lines[k], separator) for k in kept]
+    comma = separator != "," and any(COMMA_NUMBER.fullmatch(cell) for row in cells for cell in row)
+    n_heads = _n_heads(cells, comma)
+    kept, cells = kept[n_heads - 1 :], [_joined(cells[:n_heads]), *cells[n_heads:]]
+    named = not _is_sample(cells, comma)
+    heads, first = cells[0] if named else _commented_head(lines[: kept[0]], separator, len(cells[0])), kept[0] + named
+    numbered = not named and _counts_columns(cells)
+    first += numbered
+    units = units_in(cells[1]) if named and len(cells) > 2 and len(cells[1]) <= len(cells[0]) else ()
+    if units:
+        units, first = (*units, *[""] * (len(cells[0]) - len(units))), kept[1] + 1
+    body = cells[named + bool(units) or numbered :]
+    kinds = tuple(_kind([row[k] for row in body if k < len(row)], comma) for k in range(len(cells[0])))
+    for k, (kind, cell) in enumerate(zip(kinds, body[0] if body else (), strict=False)):
+        if kind == "text" and _STAMP.search(cell) and (is_time(heads[k]) if heads else k == 0):
+            where = repr(heads[k]) if heads else "the first column"
+            raise DataError(
+                f"expected times such as 2024-05-06T07:08:09.25 or 07:08:09.25 in {where}, got {cell!r:.80}; write "
+                f"them so{'' if heads else ', or name the columns in a first line'}"
+            )
+    if heads:
+        return Dialect(separator, comma, tuple(map(text_in, heads)), True, first, kinds, units)
+    return Dialect(separator, comma, tuple(f"column {k}" for k in range(len(kinds))), False, first, kinds)
+
+
+def _n_heads(cells: Sequence[list[str]], comma: bool) -> int:
+    """The number of lines of heads: several where a name in the first stands above several columns, as of points."""
+    top = [cell for cell in cells[0] if cell]
+    lines = next((k for k, row in enumerate(cells) if any(is_number(cell, comma) for cell in row)), 1)
+    alike = len({len(row) for row in cells[:lines]}) == 1 and len({*top}) < len(top)
+    return lines if 1 < lines <= _MOST_HEADS and alike and not any(map(units_in, cells[1:lines])) else 1
+
+
+def _joined(rows: Sequence[list[str]]) -> list[str]:
+    """Lines of heads as one: ``nose`` above ``x`` is nose.x. DeepLabCut's line of the scorer is left out."""
+    if len(rows) == 1:
+        return rows[0]
+    names = [row[1:] for row in rows if row[0] != "scorer"]
+    first = next((row[0] for row in reversed(rows) if row[0]), "")
+    heads = (".".join(filter(None, cells)) for cells in zip(*names, strict=True))
+    return ["frame" if first == "coords" else first, *heads]
+
+
+def units_in(cells: Sequence[str]) -> tuple[str, ...]:
+    """The units in a row that holds nothing but units, without brackets; empty if it is no such row."""
+    plain = tuple(cell.strip("[]() ") for cell in cells)
+    letters = [cell.lower() in _LETTERS for cell in plain]
+    known = sum(unit_named(cell) is not None for cell, letter in zip(plain, letters, strict=True) if not letter)
+    others = sum(unit_named(cell) is None for cell, letter in zip(plain, letters, strict=True) if cell and not letter)
+    return plain if known and not others and 2 * sum(map(bool, plain)) >= len(plain) else ()
+
+
+def _below_preamble(lines: Sequence[str], kept: list[int]) -> list[int]:
+    """The lines from the heads on, where lines of other lengths without rows of numbers stand above them.
+
+    So loggers write the device, the rate and the time. Below the heads all lines have as many cells.
+    """
+    top, separator = (separator_of([lines[k] for k in part]) for part in (kept[:2], kept[-2:]))
+    widths = {len(split(lines[k], top)) for k in kept}
+    if len(widths) == 1 and widths != {1}:
+        return kept
+    rows = [split(lines[k], separator) for k in kept]
+    width, comma = len(rows[-1]), separator != ","
+    first = next(k for k, row in enumerate(rows) if len(row) == width)
+    numbers = [sum(is_number(cell, comma) for cell in row) for row in rows]
+    is_preamble = all(n < max(2, len(row)) for n, row in zip(numbers[:first], rows[:first], strict=True))
+    below = rows[first:]
+    if width < 2 or len(below) < 3 or numbers[first] or not is_preamble or any(len(row) != width for row in below):
+        return kept
+    return kept[first:]
+
+
+def _with_names_like_comments(lines: Sequence[str], kept: list[int]) -> list[int]:
+    """Add the lines below the first kept one that begin like comments but are rows: ``#1,0.0,0.25,0.75``.
+
+    Only if the first cells of all other rows are not numbers; otherwise such a line is a row that was commented out.
+    """
+    separator = separator_of([lines[kept[0]]])
+    if separator is None or len(kept) == len(lines) - kept[0]:  # no line below was skipped
+        return kept
+    rows = [split(lines[k], separator) for k in kept]
+    if any(is_number(row[0], separator != ",") for row in rows):
+        return kept
+    below = (k for k in range(kept[0] + 1, len(lines)) if lines[k].strip() and is_skipped(lines[k]))
+    marked = (k for k in below if _is_row(split(lines[k], separator), len(rows[0]), separator))
+    return sorted({*kept, *islice(marked, _PEEK)})[:_PEEK]
+
+
+def _is_row(cells: Sequence[str], n_columns: int, separator: str) -> bool:
+    return len(cells) == n_columns and any(is_number(cell, separator != ",") for cell in cells[1:])
+
+
+def separator_of(lines: Sequence[str]) -> str | None:
+    """The mark between cells, by the first lines; None for blanks."""
+    for mark in _SEPARATORS:
+        if all(mark in line for line in lines):
+            return None if mark == "," and all(map(_COMMA_NUMBERS.fullmatch, lines)) else mark
+    return None
+
+
+def is_missing(cell: str) -> bool:
+    """Whether a cell says that there is no value: it is empty, ``NA``, ``null``."""
+    return cell.lower() in _MISSING
+
+
+def is_number(cell: str, comma: bool) -> bool:
+    """Whether a cell reads as a number."""
+    return bool(_NUMBER.fullmatch(cell) or (comma and COMMA_NUMBER.fullmatch(cell)))
+
+
+def marks_within(cell: str) -> str:
+    """How a number is to be written that nobody can read for its marks; empty where a cell is no such number.
+
+    Those between thousands would have to be told from decimal marks anew in each column.
+    """
+    if _THOUSANDS.fullmatch(cell):
+        return " without marks between thousands"
+    return " with a decimal point, without marks between thousands" if COMMA_NUMBER.fullmatch(cell) else ""
+
+
+def _is_sample(cells: Sequence[list[str]], comma: bool) -> bool:
+    """Whether the first line holds a sample, not heads: it has as many numbers as the next, and at least one."""
+    counts = [sum(is_number(cell, comma) for cell in row) for row in cells[:2]]
+    return counts[0] > 0 and counts[0] >= counts[-1]
+
+
+def _counts_columns(cells: Sequence[list[str]]) -> bool:
+    """Whether the first line only numbers the columns, 0, 1, 2, above fractions, as data frames without heads do."""
+    return cells[0] == [str(k) for k in range(len(cells[0]))] and any("." in cell for cell in cells[-1])
+
+
+def _commented_head(lines: Sequence[str], separator: str | None, n_columns: int) -> list[str]:
+    """The heads in the last comment above the samples, if it has as many words as columns, and one is for time."""
+    comments = [line.strip().lstrip("#%/") for line in lines if line.strip()]
+    if not comments:
+        return []
+    heads = split(comments[-1].strip(), separator)
+    return heads if len(heads) == n_columns and any(map(is_time, heads)) else []
+
+
+def _kind(cells: Sequence[str], comma: bool) -> str:
+    filled = [cell for cell in cells if not is_missing(cell)] or [cell for cell in cells if cell.lower() == "none"]
+    if filled and all(map(is_date, filled)):
+        return "date"
+    n_numbers = sum(is_number(cell, comma) or bool(marks_within(cell)) for cell in filled)
+    return "number" if 2 * n_numbers >= len(filled) else "text"

@@ -1,0 +1,204 @@
+"""Parquet tables; the roles of the columns are found as in text tables."""
+
+from __future__ import annotations
+
+import io
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from kineme.errors import DataError
+from kineme.io.limits import check_expanded
+from kineme.io.tables.list_columns import is_list, rows_of_lists, width_of
+from kineme.movements.tables.columns import Roles, choose_roles
+from kineme.movements.tables.layout import Layout
+from kineme.movements.tables.parsed import no_lines
+from kineme.movements.tables.table import Table
+from kineme.movements.tables.time_stamps import nanoseconds
+from kineme.validation import ROUNDED, too_long_integer
+
+_ROWS = 2**18  # rows that are decompressed at a time
+_WIDEST = 1000  # numbers in a list; images have more
+_STATE, _COMMANDS = "observation.state", frozenset({"action"})  # of LeRobot's episodes
+
+
+_LARGE, _EXPANDED = 2**26, 1000  # bytes from which on packing is looked at; times as many as repeated rows alone give
+
+
+def read_parquet_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
+    """Read the columns that have a role. Dates and durations are nanoseconds; missing values are NaN.
+
+    A column of lists counts as one column for each number in them, ``state.0``, ``state.1``. Without a choice such
+    columns are coordinates only where no plain ones are, and ``observation.state`` always is.
+
+    Raises
+    ------
+    DataError
+        Not a Parquet file, damaged, or the package that reads it is not installed; the message names the extra.
+    """
+    try:
+        import pyarrow as pa
+        from pyarrow import parquet
+    except ImportError as error:
+        raise DataError("expected the package pyarrow to read Parquet; pip install 'kineme[parquet]'") from error
+    try:
+        file = parquet.ParquetFile(io.BytesIO(data))
+        names, types = tuple(file.schema_arrow.names), file.schema_arrow.types
+        heads, kinds, owners = _expanded(names, types, _lists_to_read(file, layout), file)
+        roles = choose_roles(_told(heads, kinds, [types[k] for k in owners], layout), kinds, layout)
+        needed = sorted({owners[k] for k in range(len(heads)) if k not in roles.ignored})
+        check_expanded(n_bytes := 8 * max(file.metadata.num_rows, 0) * (len(heads) - len(roles.ignored)))
+        if n_bytes > _LARGE and n_bytes > _EXPANDED * len(data):
+            raise DataError(
+                f"expected samples that move, got {file.metadata.num_rows:,} rows in {len(data):,} bytes, which cannot "
+                "differ; write the rows that were recorded"
+            )
+        _refuse_twins(names, needed)
+        texts = {owners[k] for k in (*roles.movement, roles.label) if k is not None}
+        if nested := [k for k in needed if k in texts and pa.types.is_nested(types[k])]:
+            raise DataError(f"expected names in {names[nested[0]]!r}, got {types[nested[0]]}")
+        named = [names[k] for k in needed if k in texts]  # kept as dictionaries: few different texts in many rows
+        file = parquet.ParquetFile(io.BytesIO(data), read_dictionary=named)
+        table = pa.Table.from_batches(_batches(file, [names[k] for k in needed]))
+        faults: dict[int, str] = {}
+        read = {k: _read(table.column(names[k]), names[k], k in texts, (owners.count(k), faults)) for k in needed}
+    except (pa.ArrowException, OSError) as error:
+        if isinstance(error, DataError):
+            raise
+        raise DataError(f"expected a Parquet file, got something foreign, truncated or damaged ({error})") from error
+    if table.num_rows == 0:
+        raise DataError("expected samples, got a table without rows")
+    for k in {owners[k] for k in roles.positions if not is_list(types[owners[k]])}:
+        if (integer := too_long_integer(table.column(names[k]).to_numpy())) is not None:
+            raise DataError(f"expected numbers in {names[k]!r} that floats can hold, got {integer}{ROUNDED}")
+    parts = {owner: iter(read[owner].T if read[owner].ndim > 1 else (read[owner],)) for owner in read}
+    columns = [next(parts[owner]) if owner in parts else None for owner in owners]
+    dated = roles.time is not None and kinds[roles.time] == "date"
+    return Table(heads, columns, table.num_rows, no_lines, faults, "ns" if dated else None), roles
+
+
+def _lists_to_read(file: Any, layout: Layout) -> set[str]:
+    """The columns of lists that count: all if the caller chooses, else one, and only where it is meant."""
+    import pyarrow as pa
+
+    names, types = file.schema_arrow.names, file.schema_arrow.types
+    lists = {name for name, kind in zip(names, types, strict=True) if is_list(kind) and names.count(name) == 1}
+    if layout.coordinates is not None or not lists:
+        return lists
+    if _STATE in lists:
+        return {_STATE}
+    try:
+        kinds = [_kind(pa, kind) for kind in types]
+        choose_roles(_told(names, kinds, types, layout), kinds, layout)
+    except DataError:
+        if len(lists) > 1:
+            got = ", ".join(sorted(lists))
+            raise DataError(
+                f"expected one column of lists, or plain columns, got {got}; say which with columns=, "
+                "in the shell --columns"
+            ) from None
+        return lists
+    return set()
+
+
+def _told(heads: Sequence[str], kinds: Sequence[str], types: Sequence[Any], layout: Layout) -> list[str]:
+    """Heads without that of a vector of commands, ``action``, which is no label, unless it is chosen."""
+    chosen = {layout.label, *(layout.keys or ()), *(layout.coordinates or ())}
+    columns = zip(heads, kinds, types, strict=True)
+    lost = _COMMANDS - chosen
+    return ["" if head in lost and kind == "text" and is_list(t) else head for head, kind, t in columns]
+
+
+def _expanded(
+    names: Sequence[str], types: Sequence[Any], lists: set[str], file: Any
+) -> tuple[tuple[str, ...], tuple[str, ...], list[int]]:
+    """Heads and kinds of the columns, those of lists once for each number, and the column of the file of each."""
+    import pyarrow as pa
+
+    heads, kinds, owners = [], [], []
+    for k, (name, kind) in enumerate(zip(names, types, strict=True)):
+        width = width_of(kind, file, name) if name in lists else 0
+        if 0 < width <= _WIDEST:
+            heads += [f"{name}.{i}" for i in range(width)]
+            kinds += ["number"] * width
+        else:
+            heads.append(name)
+            kinds.append(_kind(pa, kind))
+        owners += [k] * max(1, width if width <= _WIDEST else 1)
+    return tuple(heads), tuple(kinds), owners
+
+
+def _read(column: Any, head: str, is_text: bool, listed: tuple[int, dict[int, str]]) -> Any:
+    """A column as texts, as numbers, or as the numbers in its lists, whose faults are added to those known."""
+    width, faults = listed
+    if is_text:
+        return _texts(column, head)
+    if not is_list(column.type):
+        return _numbers(column, head)
+    rows, wrong = rows_of_lists(column, width, head)
+    faults |= wrong
+    return rows
+
+
+def _kind(pa: Any, kind: Any) -> str:
+    of = pa.types
+    if of.is_timestamp(kind) or of.is_date(kind) or of.is_duration(kind):
+        return "date"
+    return "number" if of.is_integer(kind) or of.is_floating(kind) or of.is_decimal(kind) else "text"
+
+
+def _batches(file: Any, needed: Sequence[str]) -> list[Any]:
+    """The columns, some rows at a time; refused once they take more memory than the limit.
+
+    The metadata about the pages of columns are not used: pyarrow ends the process if they are damaged.
+    """
+    batches, n_bytes = [], 0
+    for batch in file.iter_batches(_ROWS, columns=list(needed)):
+        n_bytes += batch.nbytes
+        check_expanded(n_bytes)
+        batches.append(batch)
+    if not batches:
+        raise DataError("expected samples, got a table without rows")
+    return batches
+
+
+def _refuse_twins(heads: Sequence[str], needed: Sequence[int]) -> None:
+    counts = Counter(heads)
+    if twins := [heads[k] for k in needed if counts[heads[k]] > 1]:
+        raise DataError(f"expected columns of different names, got {twins[0]!r} {counts[twins[0]]} times")
+
+
+def _texts(column: Any, head: str) -> Any:
+    """Names as texts, empty for missing ones."""
+    import pyarrow as pa
+
+    if not pa.types.is_dictionary(column.type):
+        column = column.dictionary_encode()
+    parts = [np.empty(0, dtype=object)]
+    for chunk in column.chunks:
+        known = np.array([*(_text(one, head) for one in chunk.dictionary.to_pylist()), ""], dtype=object)
+        which = chunk.indices.cast(pa.int64()).fill_null(len(known) - 1).to_numpy()
+        if len(which) and not 0 <= which.min() <= which.max() < len(known):  # pyarrow does not check the indices
+            raise DataError(f"expected names in {head!r}, got numbers of names that are not there: damaged bytes")
+        parts.append(known[which])
+    return np.concatenate(parts)
+
+
+def _text(one: Any, head: str) -> str:
+    if isinstance(one, bytes):
+        return one.decode("utf-8", "replace")
+    if one != one:  # noqa: PLR0124 - only NaN differs from itself
+        raise DataError(f"expected names in {head!r}, got {one!r}")
+    return "" if one is None else str(one)
+
+
+def _numbers(column: Any, head: str) -> Any:
+    values = column.to_numpy()
+    if values.dtype.kind in "Mm":
+        return nanoseconds(values)
+    try:
+        return values.astype(np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise DataError(f"expected numbers in the column {head!r}, got {column.type}") from error

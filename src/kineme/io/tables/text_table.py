@@ -1,0 +1,304 @@
+"""CSV and similar text tables, read by NumPy's C parser."""
+
+from __future__ import annotations
+
+import io
+import re
+from codecs import BOM_UTF8
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import cache
+from itertools import chain, islice
+from typing import Any
+
+import numpy as np
+
+from kineme.errors import DataError
+from kineme.io.limits import check_expanded
+from kineme.io.motion_capture.export_heads import ExportHead
+from kineme.io.tables.dialect import COMMENTS, LONGEST, Dialect, detect_dialect, is_missing, marks_within, split
+from kineme.io.tables.exports import export_head, export_table, with_times
+from kineme.io.tables.tolerant_table import quotes_are_plain, read_slowly, try_rows
+from kineme.movements.tables.columns import Roles, choose_roles
+from kineme.movements.tables.layout import Layout
+from kineme.movements.tables.table import Table
+from kineme.movements.tables.time_stamps import seconds_of_dates
+from kineme.validation import MIN_SAMPLES, ROUNDED, Array
+
+_POSITION = re.compile(r"(.*)position(\d+)")  # of a joint
+_EXACT_TO = 2.0**53
+_INTEGER, _DIGITS = re.compile(r"[-+]?\d{16,}"), 300
+_EMPTY_LINE = re.compile(rb"\n[ \t\r]*\n")
+_SMOOTH = 0.3  # of the range: a step from 999 to 1.002 is less if these are thousands, and more if they are decimals
+_GROUPED = re.compile(r"[-+]?[1-9]\d{0,2}[.,]\d{3}")  # a number that may be thousands
+_NUMBER, _TEXT, _COLUMN = 8, 64, 1000  # bytes of a number, a text and a column
+
+
+def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
+    """Read a table of samples by lines.
+
+    Separated by comma, semicolon, tab or blanks; with a head line or without; quoted or not; with decimal commas
+    where the separator is another mark. Empty lines and comments are skipped, see `Dialect.is_sample`. A head may stand
+    in the last comment, as `numpy.savetxt` writes it.
+
+    Raises
+    ------
+    DataError
+        Not text, no samples, or no columns of numbers.
+    """
+    _check_lines(data)
+    encoding = _encoding(data)
+    if (export := export_head(_lines(data, encoding), len(data))) is not None:
+        return _read_export(data, encoding, export, layout)
+    dialect = detect_dialect(_lines(data, encoding))
+    _check_memory(data, dialect)
+    roles = choose_roles(dialect.heads, dialect.kinds, layout, dialect.named)
+    dated = roles.time is not None and dialect.kinds[roles.time] == "date"
+    texts = {k for k in (*roles.movement, roles.label, *roles.ignored, roles.time if dated else None) if k is not None}
+    if 0 in {roles.label, *roles.movement}:
+        dialect = dialect._replace(names_rows=True)
+    rows, faults = _rows(data, encoding, dialect, texts)
+    if roles.time is None and layout.every is None and _EMPTY_LINE.search(data):
+        _check_one_block([line for line, _ in _samples(data, encoding, dialect)])
+    columns = [rows[name] for name in rows.dtype.names or ()]
+    if long := [k for k in roles.positions if (np.abs(columns[k]) >= _EXACT_TO).any()]:
+        faults |= _rounded(_samples(data, encoding, dialect), dialect, long)
+    if unread := [k for k in roles.positions if np.isnan(columns[k]).all()]:
+        _check_written(_samples(data, encoding, dialect), dialect, unread)
+    if dialect.separator != ",":
+        if b"." in data and b"," in data and (grouped := [k for k in roles.positions if _may_be_thousands(columns[k])]):
+            _check_marks(_samples(data, encoding, dialect), dialect, grouped)
+        for k in roles.positions:
+            if _may_be_grouped(columns[k]):
+                split_lines = (split(line, dialect.separator) for _, line in _samples(data, encoding, dialect))
+                _check_grouped((row[k] for row in split_lines if k < len(row)), dialect.heads[k])
+    if dated and roles.time is not None:
+        columns[roles.time], others = seconds_of_dates(columns[roles.time].tolist())
+        head = dialect.heads[roles.time]
+        faults = {
+            row: f"expected a date in {head!r}, got {cell or 'nothing'!r}" for row, cell in others.items()
+        } | faults
+    line_of = _line_numbers(data, encoding, dialect)
+    dates_in = "s" if dated else None
+    heads = _with_names_of_joints(dialect.heads, columns)
+    return Table(heads, columns, len(rows), line_of, faults, dates_in, dialect.measured_in), roles
+
+
+def _check_written(samples: Iterator[tuple[int, str]], dialect: Dialect, columns: Sequence[int]) -> None:
+    """Refuse columns that hold nothing that reads as a number, unless they hold nothing at all."""
+    for _, line in samples:
+        cells = split(line, dialect.separator)
+        for k in columns if len(cells) == len(dialect.heads) else ():
+            if not is_missing(cells[k]):
+                raise DataError(
+                    f"expected numbers in {dialect.heads[k]!r}{marks_within(cells[k])}, got {cells[k]!r}; write them "
+                    "so, or leave the column aside with exclude=, in the shell --exclude"
+                )
+
+
+def _check_one_block(numbers: Sequence[int]) -> None:
+    """Refuse samples without times that empty lines part, of which nobody said that they are one movement."""
+    sizes = np.diff([0, *(np.flatnonzero(np.diff(numbers) > 1) + 1), len(numbers)])
+    if len(sizes) > 1 and sizes.min() >= MIN_SAMPLES:
+        every = (
+            f"say every={sizes[0]}, in the shell --every {sizes[0]}"
+            if (sizes == sizes[0]).all()
+            else "save each in a file of its own"
+        )
+        raise DataError(
+            f"expected one movement, got {len(sizes)} blocks of {sizes.min()} to {sizes.max()} samples between lines "
+            f"that are left out; {every}, or remove those lines"
+        )
+
+
+def _may_be_thousands(x: Array) -> bool:
+    """Whether all numbers have at most three digits before the mark and three behind it, which may be thousands."""
+    x = x[np.isfinite(x)]
+    return len(x) > 0 and bool((np.abs(x) < 1000).all() and (np.abs(1000 * x - np.rint(1000 * x)) < 1e-6).all())
+
+
+def _may_be_grouped(x: Array) -> bool:
+    """Whether some of such numbers are whole: 999, 1.002."""
+    n_whole = int((x[np.isfinite(x)] == np.rint(x[np.isfinite(x)])).sum())
+    return 0 < n_whole < np.isfinite(x).sum() and _may_be_thousands(x)
+
+
+def _check_marks(samples: Iterator[tuple[int, str]], dialect: Dialect, columns: Sequence[int]) -> None:
+    """Refuse columns of thousands alone, 1,002 or 1.002, beside others that have the other mark before decimals."""
+    numbers = [k for k, kind in enumerate(dialect.kinds) if kind == "number"]
+    marked: dict[int, dict[str, str]] = {k: {} for k in numbers}  # column -> mark -> the first cell with it
+    for _, line in samples:
+        cells = split(line, dialect.separator)
+        if len(cells) == len(dialect.heads):
+            columns = [
+                k
+                for k in columns
+                if is_missing(cells[k]) or cells[k].lstrip("+-").isdecimal() or _GROUPED.fullmatch(cells[k])
+            ]
+            if not columns:
+                return
+            for k in numbers:
+                for mark in {".", ","} & {*cells[k]}:
+                    marked[k].setdefault(mark, cells[k])
+    for k in columns:
+        other = [cell for several in marked.values() for mark, cell in several.items() if mark not in marked[k]]
+        if len(marked[k]) == 1 and other:
+            raise DataError(
+                f"expected numbers in {dialect.heads[k]!r} without marks between thousands, got "
+                f"{next(iter(marked[k].values()))!r} beside {other[0]!r}; write them without such marks"
+            )
+
+
+def _check_grouped(column: Iterable[str], head: str) -> None:
+    """Refuse cells in which a mark is between thousands: 999, 1.002, which are one step apart and not one thousand."""
+    cells: list[str] = []
+    for cell in column:
+        if not (cell.lstrip("+-").isdecimal() or _GROUPED.fullmatch(cell)):
+            return
+        cells.append(cell)
+    marked = np.array([_GROUPED.fullmatch(cell) is not None for cell in cells])
+    x = np.array([float(re.sub("[.,]", "", cell)) for cell in cells])
+    between = np.flatnonzero(marked[1:] != marked[:-1])
+    small, large = (
+        float(np.median(np.abs(np.diff(each)[between]))) / float(np.ptp(each)) if len(between) and np.ptp(each) else 0.0
+        for each in (x, np.where(marked, x / 1000, x))
+    )
+    if small < _SMOOTH < large:
+        odd, plain = (cells[int(np.argmax(each))] for each in (marked, ~marked))
+        raise DataError(
+            f"expected numbers in {head!r} without marks between thousands, got {odd!r} beside {plain!r}; write them "
+            "without such marks"
+        )
+
+
+def _rounded(samples: Iterator[tuple[int, str]], dialect: Dialect, columns: Sequence[int]) -> dict[int, str]:
+    """Row -> the first integer in some columns that a number of 64 bits would round."""
+    faults: dict[int, str] = {}
+    for row, (_, line) in enumerate(samples):
+        cells = split(line, dialect.separator)
+        for k in columns if len(cells) == len(dialect.heads) else ():
+            if _INTEGER.fullmatch(cells[k]) and (len(cells[k]) > _DIGITS or int(cells[k]) != int(float(cells[k]))):
+                faults[row] = (
+                    f"expected a number in {dialect.heads[k]!r} that a float can hold, got {cells[k]}{ROUNDED}"
+                )
+    return faults
+
+
+def _with_names_of_joints(heads: tuple[str, ...], columns: Sequence[Any]) -> tuple[str, ...]:
+    """Heads with the names of joints in place of ``field.position0`` where the column ``field.name0`` says one name.
+
+    So rostopic writes the state of joints; a bag has them under their names too.
+    """
+    renamed = list(heads)
+    place = {head: k for k, head in enumerate(heads)}
+    for head, k in place.items():
+        match = _POSITION.fullmatch(head)
+        beside = None if match is None else place.get(f"{match[1]}name{match[2]}")
+        if beside is not None and columns[beside].dtype.kind == "O" and len(names := {*columns[beside].tolist()}) == 1:
+            renamed[k] = next(iter(names)) or head
+    return tuple(renamed) if len({*renamed}) == len(renamed) else heads
+
+
+def _read_export(data: bytes, encoding: str, export: tuple[ExportHead, Dialect], layout: Layout) -> tuple[Table, Roles]:
+    """Read the text export of a motion capture system; the rate in its head becomes time stamps."""
+    head, dialect = export
+    data = data.replace(b",", b"\t") if head.packed else data
+    _check_memory(data, dialect)
+    heads, kinds, measured_in = with_times(head, dialect)
+    roles = choose_roles(heads, kinds, layout)
+    rows, faults = _rows(data, encoding, dialect, {k for k in (*roles.movement, roles.label) if k is not None})
+    faults = {row: text for row, text in faults.items() if "columns" in text}  # other cells are taken for gaps
+    columns = [rows[name] for name in rows.dtype.names or ()]
+    line_of = _line_numbers(data, encoding, dialect)
+    table = Table(heads, columns, len(rows), line_of, faults, None, measured_in)
+    return export_table(head, table), roles
+
+
+def _rows(data: bytes, encoding: str, dialect: Dialect, texts: set[int]) -> tuple[Any, dict[int, str]]:
+    """The samples as a structured array, and row -> what is wrong there."""
+    dtype = np.dtype([(f"c{k}", "O" if k in texts else "f8") for k in range(len(dialect.heads))])
+    rows = _read_fast(data, encoding, dialect, dtype)
+    return read_slowly(_samples(data, encoding, dialect), dialect, dtype) if rows is None else (rows, {})
+
+
+def _line_numbers(data: bytes, encoding: str, dialect: Dialect) -> Callable[[int], int | None]:
+    @cache
+    def lines() -> Any:
+        return np.fromiter((line for line, _ in _samples(data, encoding, dialect)), np.intp)
+
+    def line_of(row: int) -> int | None:
+        return int(lines()[row])
+
+    return line_of
+
+
+def _check_lines(data: bytes) -> None:
+    """Refuse bytes with a stretch so long that no table has such lines, before anything is made of them."""
+    for at in range(0, len(data) - LONGEST, LONGEST):
+        if data.find(b"\n", at, at + LONGEST) < 0 and data.find(b"\r", at, at + LONGEST) < 0:
+            raise DataError(f"expected lines of at most {LONGEST:,} characters, got a longer one")
+
+
+def lines_of(data: bytes) -> Iterator[str]:
+    """The lines of a text of any encoding that `read_text_table` takes; a `DataError` if it is none."""
+    _check_lines(data)
+    return _lines(data, _encoding(data))
+
+
+def _encoding(data: bytes) -> str:
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return "utf-16"
+    if b"\0" in data:
+        raise DataError("expected text, got bytes that are none")
+    try:
+        data if data.isascii() else data.decode("utf-8")
+    except UnicodeDecodeError:
+        return "latin-1"  # degree signs of older programs, for example
+    return "utf-8-sig"
+
+
+def _lines(data: bytes, encoding: str) -> Iterator[str]:
+    """The lines, decoded; `_encoding` has checked that all bytes are valid."""
+    if encoding != "utf-16":
+        return iter(io.TextIOWrapper(io.BytesIO(data), encoding=encoding))
+    return _checked_lines(data, encoding)
+
+
+def _checked_lines(data: bytes, encoding: str) -> Iterator[str]:
+    try:
+        for line in io.TextIOWrapper(io.BytesIO(data), encoding=encoding):
+            if "\0" in line:
+                raise DataError("expected text, got bytes that are none")
+            yield line
+    except UnicodeError as error:
+        raise DataError(f"expected text, got bytes that are none ({error})") from error
+
+
+def _samples(data: bytes, encoding: str, dialect: Dialect) -> Iterator[tuple[int, str]]:
+    """Line number, counted from 1, and text of every sample."""
+    numbered = enumerate(islice(_lines(data, encoding), dialect.first, dialect.end), dialect.first + 1)
+    return ((k, line) for k, line in numbered if dialect.is_sample(line))
+
+
+def _check_memory(data: bytes, dialect: Dialect) -> None:
+    """Refuse a table that would take more memory than the limit, from the number of its lines and columns."""
+    n_lines = 1 + max(data.count(b"\n"), data.count(b"\r"))
+    row = sum(_TEXT if kind == "text" else _NUMBER for kind in dialect.kinds)
+    check_expanded(len(data) + _COLUMN * len(dialect.kinds) + n_lines * row)
+
+
+def _read_fast(data: bytes, encoding: str, dialect: Dialect, dtype: np.dtype[Any]) -> Any:
+    """All samples as a structured array, or None if a line differs from the others: then `read_slowly` is needed."""
+    has_text = any(dtype[name].kind == "O" for name in dtype.names or ())
+    if dialect.decimal_comma and has_text:
+        return None  # a comma in a name is not a decimal mark
+    if b'"' in data and not (encoding != "utf-16" and quotes_are_plain(data.removeprefix(BOM_UTF8), dialect)):
+        return None
+    lines: Iterator[str] = islice(_lines(data, encoding), dialect.first, dialect.end)
+    if any(mark.encode() in data for mark in COMMENTS):
+        lines = filter(dialect.is_sample, lines)
+    if dialect.decimal_comma:
+        lines = (line.replace(",", ".") for line in lines)
+    first = next(filter(dialect.is_sample, lines), None)
+    if first is None:
+        raise DataError("expected samples, got none below the heads")
+    return try_rows(chain((first,), lines), dialect, dtype)

@@ -1,0 +1,112 @@
+"""The style of all figures: colors that color-blind readers can tell apart, sizes of a printed column."""
+
+from __future__ import annotations
+
+import io
+import sys
+import warnings
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from kineme.errors import DataError
+from kineme.reporting.atomic import write_atomically
+from kineme.reporting.text import printable_lines
+
+#: Okabe and Ito's palette, from dark to light.
+BLUE, ORANGE, GREEN, PURPLE, GRAY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#777777"
+SEQUENCE = (BLUE, ORANGE, GREEN)
+LINES = ("-", "--", ":")
+
+_RC: dict[str, Any] = {
+    "font.size": 9,
+    "axes.titlesize": 9,
+    "axes.labelsize": 9,
+    "legend.fontsize": 8,
+    "xtick.labelsize": 8,
+    "ytick.labelsize": 8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.7,
+    "lines.linewidth": 1.4,
+    "legend.frameon": False,
+    "axes.formatter.limits": (-3, 4),
+    "svg.hashsalt": "kineme",
+    "svg.fonttype": "path",
+}
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure of the given size in inches, without any window system."""
+    import matplotlib
+
+    matplotlib.rcParams.update(_RC)  # type: ignore[arg-type]
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+class _PyplotFigure(Figure):
+    """A figure of pyplot that notebooks show once: not as the value of a cell and at the end of the cell, too."""
+
+    def _ipython_display_(self) -> None:
+        import matplotlib
+
+        if "inline" in matplotlib.get_backend():
+            sys.modules["matplotlib.pyplot"].close(self)
+        raise NotImplementedError  # IPython goes on as without this method
+
+
+def figure_to_show(width: float, height: float) -> Figure:
+    """As `new_figure`, but of `matplotlib.pyplot` where the caller has imported that, whose ``show`` then shows it."""
+    if (pyplot := sys.modules.get("matplotlib.pyplot")) is None:
+        return new_figure(width, height)
+    import matplotlib
+
+    matplotlib.rcParams.update(_RC)  # type: ignore[arg-type]
+    figure: Figure = pyplot.figure(figsize=(width, height), layout="constrained", FigureClass=_PyplotFigure)
+    return figure
+
+
+#: What each file format needs to come out the same at every run.
+FORMATS: dict[str, dict[str, Any]] = {
+    "png": {"metadata": {"Software": None}},
+    "svg": {"metadata": {"Date": None}},
+    "pdf": {"metadata": {"CreationDate": None}},
+}
+
+
+def encode_figure(figure: Figure, kind: str, dpi: int = 150) -> bytes:
+    """The figure as the bytes of a file of that kind, see `FORMATS`.
+
+    Control characters in names from files are escaped here if `drawable` has not done it: SVG repeats the names in
+    comments, where XML allows no control characters.
+    """
+    from matplotlib.text import Text
+
+    for text in figure.findobj(Text):
+        if (shown := printable_lines(text.get_text())) != text.get_text():
+            text.set_text(shown)
+    buffer = io.BytesIO()
+    with warnings.catch_warnings():  # a character that the font lacks is drawn as a box
+        warnings.filterwarnings("ignore", r"Glyph \d+", UserWarning)
+        figure.savefig(buffer, format=kind, dpi=dpi, **FORMATS[kind])
+    return buffer.getvalue()
+
+
+def render(figure: Figure, dpi: int) -> dict[str, bytes]:
+    """The figure as ``{"png": ..., "svg": ...}``, byte for byte the same at every run."""
+    return {kind: encode_figure(figure, kind, dpi) for kind in ("png", "svg")}
+
+
+def save_figure(figure: Figure, path: Path) -> Path:
+    """Write the figure in the format that the file's ending names, atomically.
+
+    Raises
+    ------
+    DataError
+        An ending that is not in `FORMATS`.
+    """
+    kind = path.suffix.lower().removeprefix(".")
+    if kind not in FORMATS:
+        raise DataError(f"expected a picture ending in one of {', '.join(FORMATS)}, got {path.suffix or 'none'!r}")
+    return write_atomically(path, encode_figure(figure, kind))

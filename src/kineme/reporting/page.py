@@ -1,0 +1,58 @@
+"""The style of all HTML reports: one page that needs no other file."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from typing import Any
+
+from kineme.reporting.text import in_markup
+
+_STYLE = """
+:root { color-scheme: light; }
+body { font: 16px/1.5 system-ui, sans-serif; color: #1a1a1a; background: #fff; max-width: 68rem;
+       margin: 2rem auto; padding: 0 1rem; }
+h1 { font-size: 1.7rem; margin-bottom: .3rem; } h2 { font-size: 1.25rem; margin-top: 2.5rem; }
+p.lead { color: #444; margin-top: 0; max-width: 48rem; }
+figure { margin: 1.6rem 0; overflow-x: auto; } figcaption, figure p { color: #444; font-size: .9rem; max-width: 52rem; }
+img { max-width: 100%; height: auto; }
+table { border-collapse: collapse; font-size: .84rem; font-variant-numeric: tabular-nums; }
+caption { text-align: left; white-space: nowrap; font-weight: 600; padding-bottom: .4rem; font-size: .95rem; }
+th, td { padding: .28rem .7rem .28rem 0; text-align: left; vertical-align: top; border-bottom: 1px solid #e3e3e3; }
+thead th { border-bottom: 1.5px solid #1a1a1a; } tbody th { font-weight: 500; }
+@media (max-width: 40rem) {
+  caption { white-space: normal; max-width: calc(100vw - 2rem); }
+  th, td { padding-right: .4rem; }
+}
+footer { color: #555; font-size: .85rem; margin-top: 3rem; border-top: 1px solid #ddd; padding-top: 1rem; }
+"""
+
+
+def picture(svg: bytes, caption: str, head: str = "") -> str:
+    """A figure element with the drawing inside; `head` stands before the visible caption."""
+    return (
+        f'<figure><img alt="{in_markup(caption)}" src="data:image/svg+xml;base64,{b64encode(svg).decode()}">'
+        f"<figcaption>{in_markup(head + caption)}</figcaption></figure>"
+    )
+
+
+def page(title: str, heading: str, body: str, facts: dict[str, Any]) -> str:
+    """A whole HTML document.
+
+    Parameters
+    ----------
+    title, heading : str
+        For the browser's tab, and above the text.
+    body : str
+        HTML.
+    facts : dict
+        Settings and versions, printed at the end.
+    """
+    listed = "; ".join(f"{in_markup(key)} {in_markup(value)}" for key, value in facts.items())
+    return f"""<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{in_markup(title)}</title><style>{_STYLE}</style></head><body>
+<h1>{in_markup(heading)}</h1>
+{body}
+<footer>{listed}</footer>
+</body></html>
+"""

@@ -1,0 +1,200 @@
+"""A table as data, written as text for the terminal, as HTML for reports and notebooks, and as a data frame."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping, Sequence
+from itertools import zip_longest
+from shutil import get_terminal_size
+from statistics import fmean
+from textwrap import fill
+from typing import Any, NamedTuple
+from unicodedata import category, east_asian_width
+
+from kineme.errors import DataError
+from kineme.reporting.text import LONGEST_CELL, in_markup, printable, printable_lines, shortened
+
+_PIPED = 160  # columns of a table that is not on a terminal, beyond which its last column is wrapped
+_GAP = 2  # blanks between columns
+_NARROW = 12  # columns below which no word is shortened
+
+
+class Table(NamedTuple):
+    """A title, column heads, rows of text with the row's name first, and the text below the table."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: Sequence[tuple[str, ...]]
+    reading: str = ""
+
+
+def mean_and_range(values: Sequence[float]) -> str:
+    """Mean and range over draws, as ``0.954 (0.89-1.00)``."""
+    return f"{fmean(values):.3f} ({min(values):.2f}-{max(values):.2f})"
+
+
+def to_text(table: Table, width: int | None = None) -> str:
+    """Columns aligned for a terminal.
+
+    What does not fit into the width is wrapped, widest columns first; words that are wider than their column lose their
+    middle. Where not even that leaves a few letters to each, every row becomes a list. `width` is that of the terminal
+    by default. Where the output goes elsewhere, nothing is cut but names of more than 120 letters, and only the last
+    column is wrapped.
+    """
+    lines = [(*(_cell(one) for one in row[:-1]), printable(row[-1])) for row in (table.columns, *table.rows)]
+    natural = [max(width_of(row[k]) for row in lines) for k in range(len(table.columns))]
+    columns = _terminal_width() if width is None else width
+    title = printable_lines(table.title)
+    if columns is None:
+        widths: list[int] | None = _with_last(natural, _PIPED)
+        reading = fill(printable_lines(table.reading), 110)
+    else:
+        title = "\n".join("\n".join(wrapped(line, columns)) for line in title.split("\n"))
+        reading = fill(printable_lines(table.reading), min(columns, 110))
+        widths = _narrowed(lines, natural, columns - _GAP * (len(natural) - 1))
+    if widths is None:
+        return "\n".join(filter(None, [title, *_as_lists(lines, columns or _PIPED), reading]))
+    rendered = [_aligned(row, widths) for row in lines]
+    rule = "-" * max(width_of(line) for row in rendered for line in row)
+    body = [line for row in rendered[1:] for line in row]
+    return "\n".join(filter(None, [title, rule, *rendered[0], rule, *body, reading]))
+
+
+def _terminal_width() -> int | None:
+    """Columns of the terminal that the output goes to; None where it goes elsewhere."""
+    return get_terminal_size().columns if sys.stdout.isatty() else None
+
+
+def _cell(text: str) -> str:
+    """A cell, shortened: a column is as wide as its widest cell, and one long name would hide the other columns."""
+    return shortened(printable(text), LONGEST_CELL)
+
+
+def _with_last(natural: list[int], width: int) -> list[int]:
+    """The widths, the last one as much as is left."""
+    return [*natural[:-1], max(24, min(natural[-1], width - sum(natural[:-1]) - 2 * len(natural)))]
+
+
+def _narrowed(lines: Sequence[tuple[str, ...]], natural: list[int], width: int) -> list[int] | None:
+    """Widths that sum up to `width` at most; None where columns would get too narrow.
+
+    The widest columns are narrowed first, at first down to their widest words, then further.
+    """
+    words = [max(widest_word(row[k]) for row in lines) for k in range(len(natural))]
+    for least in (words, [min(one, _NARROW) for one in words]):
+        if sum(least) <= width:
+            limit = next(n for n in range(max(natural), 0, -1) if _total(natural, least, n) <= width)
+            widths = [max(low, min(one, limit)) for one, low in zip(natural, least, strict=True)]
+            for k in range(len(widths)):  # what is left over by whole columns
+                widths[k] += max(0, min(natural[k] - widths[k], width - sum(widths)))
+            return widths
+    return None
+
+
+def _total(natural: list[int], least: list[int], limit: int) -> int:
+    return sum(max(low, min(one, limit)) for one, low in zip(natural, least, strict=True))
+
+
+def _aligned(row: tuple[str, ...], widths: list[int]) -> list[str]:
+    """The lines of a row."""
+    cells = [
+        [cell] if width_of(cell) <= width else wrapped(cell, width) for cell, width in zip(row, widths, strict=True)
+    ]
+    lines = zip_longest(*cells, fillvalue="")
+    gap = " " * _GAP
+    return [gap.join(padded(cell, width) for cell, width in zip(line, widths, strict=True)).rstrip() for line in lines]
+
+
+def _as_lists(lines: Sequence[tuple[str, ...]], width: int) -> list[str]:
+    """Each row as a list of heads and cells."""
+    heads, *rows = lines
+    return [
+        line
+        for row in rows
+        for line in ("-" * width, *(each for pair in zip(heads, row, strict=True) for each in _entry(*pair, width)))
+    ]
+
+
+def _entry(head: str, cell: str, width: int) -> list[str]:
+    return wrapped(f"{head}: {cell}", width) if head else wrapped(cell, width)
+
+
+def to_html(table: Table) -> str:
+    """A table element with caption."""
+    head = "".join(f'<th scope="col">{in_markup(cell)}</th>' for cell in table.columns)
+    body = "".join(
+        f'<tr><th scope="row">{in_markup(row[0])}</th>'
+        + "".join(f"<td>{in_markup(cell)}</td>" for cell in row[1:])
+        + "</tr>"
+        for row in table.rows
+    )
+    reading = f"<p>{in_markup(table.reading)}</p>" if table.reading else ""
+    return (
+        f"<figure><table><caption>{in_markup(table.title)}</caption><thead><tr>{head}</tr></thead>"
+        f"<tbody>{body}</tbody></table>{reading}</figure>"
+    )
+
+
+def data_frame(columns: Mapping[str, Any]) -> Any:
+    """Columns as a data frame of pandas.
+
+    Raises
+    ------
+    DataError
+        The package pandas is not installed.
+    """
+    try:
+        import pandas as pd
+    except ImportError as error:
+        raise DataError("expected the package pandas for a data frame; pip install pandas") from error
+    return pd.DataFrame(columns)
+
+
+def width_of(text: str) -> int:
+    """Columns that a line takes: two for East Asian wide characters and emoji, none for marks that combine."""
+    return len(text) if text.isascii() else sum(map(_columns, text))
+
+
+def padded(text: str, width: int) -> str:
+    """The text with blanks after it up to a width."""
+    return text + " " * (width - width_of(text))
+
+
+def fitted(text: str, width: int) -> str:
+    """The text; of one wider than `width`, its beginning and its end, with an ellipsis between."""
+    if width_of(text) <= width:
+        return text
+    end = (width - 1) // 2
+    return f"{_beginning(text, width - 1 - end)}…{_beginning(text[::-1], end)[::-1]}"
+
+
+def wrapped(text: str, width: int) -> list[str]:
+    """Lines of at most `width` columns, cut at blanks; words that are wider are shortened."""
+    lines: list[str] = []
+    for word in (fitted(one, width) for one in text.split()):
+        if lines and width_of(lines[-1]) + 1 + width_of(word) <= width:
+            lines[-1] += f" {word}"
+        else:
+            lines.append(word)
+    return lines or [""]
+
+
+def widest_word(text: str) -> int:
+    """Columns of the widest word."""
+    return max(map(width_of, text.split()), default=0)
+
+
+def _beginning(text: str, width: int) -> str:
+    """As many characters as fit."""
+    used = 0
+    for k, mark in enumerate(text):
+        used += _columns(mark)
+        if used > width:
+            return text[:k]
+    return text
+
+
+def _columns(mark: str) -> int:
+    if category(mark) in {"Mn", "Me"}:
+        return 0
+    return 2 if east_asian_width(mark) in {"W", "F"} else 1

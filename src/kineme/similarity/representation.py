@@ -1,0 +1,184 @@
+"""Representations of movements: a quantity along a phase, compared sample by sample or pair by pair."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.dmp.discrete.basis import MOST_BASIS
+from kineme.dmp.discrete.dmp import DMP
+from kineme.dmp.discrete.operators import encoder, forcing_matrix
+from kineme.dmp.discrete.specification import MOST_POINTS
+from kineme.errors import SpecificationError
+from kineme.movements.preparation.arc_length import resample_by_arc_length
+from kineme.movements.preparation.spline import spline_matrix
+from kineme.similarity.normalization import Normalization
+from kineme.validation import Array, check_choice, check_count, check_number
+
+#: Compared sample by sample: a movement is a row of numbers.
+ROW_QUANTITIES = ("positions", "forcing")
+#: Compared pair by pair, see `kineme.kernels.pair_distances`.
+PAIR_QUANTITIES = ("elastic", "turning", "cloud")
+QUANTITIES = ROW_QUANTITIES + PAIR_QUANTITIES
+
+#: Quantity -> name of the representation.
+PAIR_NAMES = {"elastic": "elastic path", "turning": "turning angles", "cloud": "point cloud"}
+
+
+@dataclass(frozen=True)
+class Representation:
+    """One way to describe an evenly sampled, smooth path: by a row of numbers, or by what pairs are compared by.
+
+    A recognizer compares movements in several representations and averages the similarities: what misleads one of them,
+    such as uneven timing or a deformed path, leaves another one unimpaired.
+
+    Parameters
+    ----------
+    quantity : {"positions", "forcing", "elastic", "turning", "cloud"}
+        Sample by sample: "positions", the path itself, or "forcing", the forcing term f of a bio-inspired DMP learned
+        from it, which turns with the movement. The DMP is fitted to the path with a curvature penalty
+        (``fit="trajectory"``), so that no noise is differentiated. Pair by pair: "elastic", dynamic time warping of
+        tangents, positions and turning angles, "turning", of turning angles alone, or "cloud", points in any order, see
+        `kineme.kernels.elastic` and `kineme.kernels.point_cloud`. They need positions over arc length beside them.
+    arc_share : float, default 1.0
+        The phase: 0 is time, 1 arc length, between them a blend; see `arc_length_phase`. Arc length is independent of
+        timing; time distinguishes movements that differ in timing only. What is compared pair by pair takes arc length.
+    n_points : int, default 100
+        Samples along the phase.
+    n_basis, stiffness, ridge
+        Of the DMP; for "forcing" alone.
+    weight : float, default 1.0
+        Share in the average where no weights are given or fitted, relative to those of the others.
+
+    Raises
+    ------
+    SpecificationError
+        A parameter out of its range, or another phase than arc length for what is compared pair by pair.
+    """
+
+    quantity: str
+    arc_share: float = 1.0
+    n_points: int = 100
+    n_basis: int = 40
+    stiffness: float = 100.0
+    ridge: float = 1e-3
+    weight: float = 1.0
+
+    def __post_init__(self) -> None:
+        check_choice("quantity", self.quantity, QUANTITIES)
+        check_number("arc_share", self.arc_share, least=0.0)
+        if self.arc_share > 1:  # above 1 the phase could decrease
+            raise SpecificationError(f"expected arc_share to be a share of at most 1, got {self.arc_share!r}")
+        check_count("n_points", self.n_points, 2, most=MOST_POINTS)
+        check_count("n_basis", self.n_basis, 3, most=MOST_BASIS)
+        check_number("stiffness", self.stiffness, above=0.0)
+        check_number("ridge", self.ridge, least=0.0)
+        check_number("weight", self.weight, above=0.0)
+        if self.in_pairs and self.arc_share != 1:
+            raise SpecificationError(f"expected arc_share=1 with quantity={self.quantity!r}, got {self.arc_share!r}")
+
+    @property
+    def in_pairs(self) -> bool:
+        """Whether movements are compared pair by pair, and not sample by sample."""
+        return self.quantity in PAIR_QUANTITIES
+
+    @property
+    def name(self) -> str:
+        """As in "forcing over arc length", or "elastic path"."""
+        if self.in_pairs:
+            return PAIR_NAMES[self.quantity]
+        phase = {0.0: "time", 1.0: "arc length"}.get(self.arc_share, f"{self.arc_share:g} arc length")
+        return f"{self.quantity} over {phase}"
+
+    def along(self, paths: Array) -> Array:
+        """Paths (n, d, T) at even values of the phase, (n, d, n_points)."""
+        if self.arc_share == 0:
+            every, remainder = divmod(paths.shape[2] - 1, self.n_points - 1)
+            return paths[:, :, ::every] if remainder == 0 else paths @ spline_matrix(paths.shape[2], self.n_points).T
+        return resample_by_arc_length(paths, self.n_points, self.arc_share)
+
+    def describe(self, paths: NDArray[Any], translation: bool = True) -> NDArray[Any]:
+        """Rows (n, d * n_points), dimension-major, of normalized paths (n, d, n_points) along the phase.
+
+        For what is compared sample by sample; in the precision of the paths. Without `translation` the paths still have
+        their position, and it is added to the forcing term: f itself does not depend on it, so that movements at other
+        positions would be similar in that representation.
+        """
+        described = paths
+        if self.quantity == "forcing":
+            described = (paths.reshape(-1, self.n_points) @ forcing_operator(self, paths.dtype)).reshape(paths.shape)
+            if not translation:
+                described += paths.mean(axis=2, keepdims=True)
+        return described.reshape(len(paths), -1)
+
+
+#: What gives the rotation of a pair, and the points of which elastic paths and point clouds consist.
+POSITIONS = Representation("positions", arc_share=1.0, weight=2.0)
+#: Representations that fail on different movements; in an average of kernels one that succeeds suffices. Those of the
+#: whole shape count twice. `python -m bench --only default_representations` tells what each is worth.
+DEFAULT_REPRESENTATIONS = (
+    POSITIONS,
+    Representation("forcing", arc_share=0.0),
+    Representation("elastic", weight=2.0),
+    Representation("turning"),
+    Representation("cloud", weight=2.0),
+)
+#: Where position or size distinguishes movements: none of these takes it out by itself.
+ROW_REPRESENTATIONS = (
+    Representation("positions", arc_share=1.0),
+    Representation("forcing", arc_share=1.0),
+    Representation("forcing", arc_share=0.0),
+)
+
+
+def default_representations(normalization: Normalization) -> tuple[Representation, ...]:
+    """Those of a recognizer: of the whole shape, unless position or size distinguishes movements."""
+    shape_alone = normalization.translation and normalization.scale != "none"
+    return DEFAULT_REPRESENTATIONS if shape_alone else ROW_REPRESENTATIONS
+
+
+def check_representations(representations: Any) -> tuple[Representation, ...]:
+    """Refuse anything but one or several representations."""
+    try:
+        given = tuple(representations)
+    except TypeError:
+        given = ()
+    if not given or not all(isinstance(one, Representation) for one in given):
+        raise SpecificationError(
+            "expected representations to be a tuple of kineme.similarity.representation.Representation, one or more, "
+            f"or None for the default ones, got {representations!r}"
+        )
+    gives_rotation = any(one.quantity == "positions" and one.arc_share == 1 for one in given)
+    if any(one.in_pairs for one in given) and not gives_rotation:
+        raise SpecificationError(
+            "expected Representation('positions', arc_share=1.0) beside those that are compared pair by pair, whose "
+            "rotation it gives; add it"
+        )
+    return tuple(sorted(given, key=lambda one: one.in_pairs))  # the order within each sort stays
+
+
+def rotating(representations: tuple[Representation, ...]) -> int:
+    """Which of them gives the rotation to those compared pair by pair: the first of positions over arc length."""
+    return next(r for r, one in enumerate(representations) if one.quantity == "positions" and one.arc_share == 1)
+
+
+@lru_cache(maxsize=32)
+def forcing_operator(representation: Representation, dtype: np.dtype[Any]) -> NDArray[Any]:
+    """Matrix (T, T) from positions to f at as many points: subtract the start, encode, apply Eq. (2)."""
+    dmp = DMP(
+        "bio-inspired",
+        n_basis=representation.n_basis,
+        stiffness=representation.stiffness,
+        fit="trajectory",
+        ridge=representation.ridge,
+        n_points=representation.n_points,
+    )
+    operator = encoder(dmp, representation.n_points).weights @ forcing_matrix(dmp, representation.n_points).T / dmp.K
+    operator[0] -= operator.sum(axis=0)  # (x - x0) E = x E - x0 (sum of the rows of E)
+    operator = operator.astype(dtype, copy=False)
+    operator.setflags(write=False)
+    return operator

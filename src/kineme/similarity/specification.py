@@ -1,0 +1,121 @@
+"""The specification of a comparison: its parameters, without estimates from movements."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from kineme.errors import SpecificationError
+from kineme.kernels.procrustes import Procrustes
+from kineme.kernels.soft_rotation import RotationPrior
+from kineme.movements.preparation.smooth import Smooth
+from kineme.similarity.log_averages import LOG_MEANS
+from kineme.similarity.normalization import Normalization
+from kineme.similarity.representation import DEFAULT_REPRESENTATIONS, Representation, check_representations
+from kineme.validation import check_choice, check_number
+
+
+@dataclass(frozen=True)
+class ComparisonSpecification:
+    """Representations, invariances, smoothing and average.
+
+    Kernel widths and weights are estimated from movements, see `Comparison`.
+
+    Parameters
+    ----------
+    representations : tuple of R Representation
+        Those compared sample by sample first. By default positions over arc length, forcing term over time, elastic
+        path, turning angles, and point cloud.
+    normalization : Normalization
+        The normalization of translation and size.
+    cutoff : float or None, default 10.0
+        Movements are smoothed below this many cycles each, see `Smooth`; None for recordings without noise.
+    max_angle : float, optional
+        Largest rotation [rad] between movements of one class, instead of the prior; 0 for none.
+    mean : {"arithmetic", "geometric", "harmonic", "quadratic", "min"}, default "arithmetic"
+        The A-average over representations.
+    prior : RotationPrior or None
+        How rare rotations are, in two and three dimensions, if there is no `max_angle`. None is a limit
+        of pi/3.
+
+    Raises
+    ------
+    SpecificationError
+        A parameter out of its range, or `max_angle` and a prior that is not the default.
+    """
+
+    representations: tuple[Representation, ...] = DEFAULT_REPRESENTATIONS
+    normalization: Normalization = field(default_factory=Normalization)
+    cutoff: float | None = 10.0
+    max_angle: float | None = None
+    mean: str = "arithmetic"
+    prior: RotationPrior | None = field(default_factory=RotationPrior)
+
+    def __post_init__(self) -> None:
+        check_choice("mean", self.mean, list(LOG_MEANS))
+        if self.cutoff is not None:
+            Smooth(self.cutoff)  # checks its own parameter
+        object.__setattr__(self, "representations", check_representations(self.representations))
+        if self.max_angle is not None:
+            check_number("max_angle", self.max_angle, least=0.0)
+        if self.prior is not None and not isinstance(self.prior, RotationPrior):
+            raise SpecificationError(
+                f"expected rotation_prior to be a kineme.RotationPrior or None, got {self.prior!r}; write "
+                "kineme.RotationPrior(concentration=0.03)"
+            )
+        if self.max_angle is not None and self.prior not in (None, RotationPrior()):
+            raise SpecificationError(
+                f"expected max_angle or rotation_prior, got max_angle={self.max_angle!r} and {self.prior}; leave one "
+                "out: under a prior, a large rotation costs similarity and none is forbidden"
+            )
+
+    @property
+    def by_rows(self) -> tuple[Representation, ...]:
+        """The representations that are compared sample by sample; they come first."""
+        return tuple(one for one in self.representations if not one.in_pairs)
+
+    @property
+    def by_pairs(self) -> tuple[Representation, ...]:
+        """The representations that are compared pair by pair."""
+        return self.representations[len(self.by_rows) :]
+
+    @property
+    def specification(self) -> ComparisonSpecification:
+        """The specification itself."""
+        return self
+
+    def procrustes(self, n_dims: int) -> Procrustes:
+        """The distance between rows of movements of `n_dims` dimensions."""
+        if self.max_angle is not None and 0 <= self.max_angle - math.pi <= 1e-12 and n_dims in (2, 3):
+            return Procrustes(n_dims, math.pi, RotationPrior(0.0))  # no limit: the fast way
+        if self.max_angle is not None:
+            return Procrustes(n_dims, float(self.max_angle))
+        if n_dims not in (2, 3):
+            return Procrustes(n_dims, 0.0)
+        return Procrustes(n_dims, math.pi / 3 if self.prior is None else math.pi, self.prior)
+
+
+class Compares(Protocol):
+    """An object with the specification of a comparison: a specification itself, a `Comparison`, a recognizer."""
+
+    @property
+    def specification(self) -> ComparisonSpecification:
+        """How movements are compared."""
+        ...
+
+
+def specification_of(like: Compares | None) -> ComparisonSpecification:
+    """The specification that `like` is or has; the default one for None.
+
+    Raises
+    ------
+    SpecificationError
+        `like` has none, or one with a parameter out of its range.
+    """
+    found = ComparisonSpecification() if like is None else getattr(like, "specification", None)
+    if not isinstance(found, ComparisonSpecification):
+        raise SpecificationError(
+            f"expected like to be a kineme.Recognizer, a Comparison, a ComparisonSpecification or None, got {like!r}"
+        )
+    return found

@@ -1,0 +1,102 @@
+"""Columns that are no coordinates: derivatives and confidences of positions, and numbers that stand for no value."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import kineme
+from kineme.io.column_order import notes_on_aside
+from kineme.io.inspection.gaps import notes_on_gaps
+from kineme.io.inspection.inspect import inspect
+from kineme.io.recordings import read_recordings_from_bytes
+from kineme.movements.tables.layout import Layout
+
+T = 40
+U = np.linspace(0, 1, T)
+
+
+def _written(path, heads, values=None):
+    columns = {head: np.sin((k + 1) * U) for k, head in enumerate(heads)}
+    pd.DataFrame({"t": U} | columns | (values or {})).to_csv(path, index=False)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("positions", "others"),
+    [
+        (["x", "y"], ["x_vel", "y_velocity", "vx", "dy", "x_dot", "x_acc", "ay", "a_x"]),
+        (["x [mm]", "y [mm]"], ["x_velocity [mm/s]", "vy [mm/s]"]),
+        (["pos_x", "pos_y"], ["vel_x", "acc_y", "xVel"]),
+        (["joint1_position", "elbow"], ["joint1_velocity", "joint1_effort", "elbow_vel"]),
+        (["nose_x", "nose_y"], ["nose_likelihood"]),
+        (["x0", "y0", "Hand.X", "Hand.Y"], ["score0", "Hand.Visibility"]),
+        (["x", "y"], ["confidence", "residual"]),
+        (["q[0]", "actual_q_0"], ["dq[0]", "actual_qd_0", "qdot[0]"]),
+    ],
+)
+def test_derivatives_and_confidences_are_left_aside_beside_their_positions(tmp_path, positions, others):
+    path = _written(tmp_path / "a.csv", [*positions, *others])
+    read = kineme.read_recordings(path)
+    assert read.detected[0][0].columns == tuple(positions)
+    (note,) = notes_on_aside(how for how, _ in read.detected)
+    assert all(head in note for head in others[:6])
+    assert "--columns" in note
+    assert note in inspect(read).notes
+    kept = kineme.read_recordings(path, columns=[*positions, *others])
+    assert kept.demonstrations.n_dims == len(positions) + len(others)
+
+
+@pytest.mark.parametrize(
+    "heads", [("vx", "vy"), ("acc_x", "acc_y", "gyro_x"), ("score", "x2"), ("ear_score", "nose_x")]
+)
+def test_the_same_words_without_such_positions_are_coordinates(tmp_path, heads):
+    read = kineme.read_recordings(_written(tmp_path / "a.csv", heads))
+    assert read.detected[0][0].columns == heads
+    assert notes_on_aside(how for how, _ in read.detected) == []
+
+
+def test_counters_numbers_of_things_and_other_clocks_are_no_coordinates(tmp_path):
+    clocks = ["epoc (ms)", "motionTimestamp_sinceReboot(s)"]
+    others = ["PacketCounter", "loggingSample(N)", "stroke_id", "TrackingId", "__index_level_0__", *clocks]
+    read = kineme.read_recordings(_written(tmp_path / "a.csv", ["x", "low (min)", *others]))
+    assert read.detected[0][0].columns == ("x", "low (min)")
+    assert {*read.detected[0][0].ignored} == {*others}
+    sessions = np.repeat([0.0, 1.0], T // 2)
+    read = kineme.read_recordings(_written(tmp_path / "a.csv", ["x"], {"session": sessions}))
+    assert (read.demonstrations.dimensions, len(read)) == (("x",), 2)
+
+
+def test_dates_that_are_not_understood_are_no_names_before_the_times():
+    for stamp in ("01/05/2024 10:00:01.000", "5.1.2024 9:00", "10:00:01.000 ->"):
+        text = "\n".join(f"{stamp},{u},{np.sin(u)}" for u in U)
+        with pytest.raises(
+            kineme.DataError, match=r"expected times such as .* in the first column, got .* write them so"
+        ):
+            read_recordings_from_bytes(text.encode(), "a.csv", Layout())
+    text = "\n".join(f"arm2,{u},{np.sin(u)}" for u in U)
+    assert read_recordings_from_bytes(text.encode(), "a.csv", Layout()).demonstrations.durations.tolist() == [1.0]
+
+
+@pytest.mark.parametrize("sentinel", [-9999, 999, -99999.0, 1e20, 3.4028234663852886e38, -32768])
+def test_a_number_that_stands_for_no_value_is_missing_and_said(tmp_path, sentinel):
+    lost = np.where((U > 0.4) & (U < 0.5), sentinel, np.sin(U))
+    read = kineme.read_recordings(_written(tmp_path / "a.csv", ["y"], {"x": lost}))
+    np.testing.assert_allclose(read.demonstrations.positions[:, 1], np.sin(U), atol=1e-4)
+    assert f"{sentinel:g} in x counts as no value" in notes_on_gaps(read)[0]
+    assert read.sources[0].filled == 4
+
+
+@pytest.mark.parametrize("reach", [600, 2000])
+def test_a_number_within_reach_of_the_others_is_a_value(tmp_path, reach):
+    x = np.where(U > 0.9, 999, reach * U)
+    read = kineme.read_recordings(_written(tmp_path / "a.csv", ["y"], {"x": x, "z": np.full(T, 999)}))
+    np.testing.assert_allclose(read.demonstrations.positions[:, 1:], np.column_stack([x, np.full(T, 999)]))
+    assert notes_on_gaps(read) == []
+
+
+def test_long_stretches_of_such_a_number_are_refused_as_gaps(tmp_path):
+    lost = np.where((U > 0.2) & (U < 0.8), -9999, np.sin(U))
+    with pytest.raises(kineme.KinemeError, match=r"got nothing in .*--fill-gaps"):
+        kineme.read_recordings(_written(tmp_path / "a.csv", ["y"], {"x": lost}))

@@ -1,0 +1,171 @@
+"""Representations and weights chosen on the training movements."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from sklearn.base import clone
+
+from kineme import Recognizer, Representation
+from kineme.errors import SpecificationError
+from kineme.kernels.procrustes import Prepared, Procrustes
+from kineme.similarity.describe import describe
+from kineme.similarity.described import Described
+from kineme.similarity.representation import DEFAULT_REPRESENTATIONS, ROW_REPRESENTATIONS
+from kineme.similarity.similarity import AveragedSimilarity
+from kineme.similarity.weights import aligned_weights, fitted_weights
+from kineme.similarity.widths import impostor_widths
+from movement_samples import draw_shapes
+
+
+def _timed(n, seed):
+    """One noisy path, done early or late: classes that differ in timing only."""
+    random = np.random.default_rng(seed)
+    u = np.linspace(0, 1, 80)
+    movements, labels = [], []
+    for i in range(n):
+        bend = 1 + 0.3 * random.normal()
+        phase = u ** (2.0 if i % 2 else 0.5)
+        movements.append(np.column_stack((phase, bend * np.sin(3 * phase))) + 0.002 * random.normal(size=(80, 2)))
+        labels.append("late" if i % 2 else "early")
+    return movements, labels
+
+
+def test_what_differs_in_timing_only_is_left_to_time():
+    recognizer = Recognizer(classifier="nearest", weights="fitted").fit(*_timed(24, seed=0))
+    over_time = [one.arc_share == 0 for one in recognizer.representations_]
+    assert recognizer.weights_[over_time].sum() > 0.5
+    fresh, truth = _timed(60, seed=1)
+    assert recognizer.score(fresh, truth) == 1.0
+    assert recognizer.score(fresh, truth) >= clone(recognizer).set_params(weights="equal").fit(
+        *_timed(24, seed=0)
+    ).score(fresh, truth)
+
+
+def test_the_weights_are_those_of_largest_centered_alignment():
+    """Against a search over all weights on a grid of twentieths."""
+    demos = draw_shapes([9] * 3, seed=4, spread=1.2)
+    recognizer = Recognizer(ROW_REPRESENTATIONS, weights="equal").fit(demos)
+    weights = aligned_weights(
+        recognizer.comparison_.similarity, recognizer.references_.described, recognizer.references_.labels
+    )
+    kernels = np.exp(
+        recognizer.comparison_.similarity.logs(recognizer.references_.described, recognizer.references_.described)
+    )
+    same = (recognizer.references_.labels[:, None] == recognizer.references_.labels[None]).astype(float)
+
+    def centered(gram):
+        off = ~np.eye(len(gram), dtype=bool)
+        H = np.eye(len(gram)) - 1.0 / len(gram)
+        own = np.where(off, gram, 0.0).sum(axis=1) / (len(gram) - 1)
+        return (H @ np.where(off, gram, np.diag(own)) @ H)[off]
+
+    def alignment(w):
+        joint, target = centered(np.tensordot(w, kernels, 1)), centered(same)
+        return joint @ target / np.linalg.norm(joint) / np.linalg.norm(target)
+
+    grid = [np.array(w) / 20 for w in itertools.product(range(21), repeat=3) if sum(w) == 20]
+    assert alignment(weights) >= max(map(alignment, grid)) - 1e-4
+
+
+@pytest.mark.parametrize("counts", [[1, 1, 1], [7, 9], [30], [8, 8]])
+def test_by_default_each_representation_has_its_own_weight(counts):
+    recognizer = Recognizer().fit(draw_shapes(counts))
+    assert recognizer.representations_ == DEFAULT_REPRESENTATIONS
+    np.testing.assert_allclose(recognizer.weights_, np.array([2, 1, 2, 1, 2]) / 8)
+
+
+@pytest.mark.parametrize("weights", ["auto", "equal", "fitted"])
+def test_weights_sum_to_one_and_every_part_has_one(weights):
+    recognizer = Recognizer(weights=weights).fit(draw_shapes([8] * 4, spread=0.8))
+    assert (recognizer.weights_ > 0).all()
+    assert recognizer.weights_.sum() == pytest.approx(1.0)
+    described = recognizer.references_.described
+    assert described.n_representations == len(recognizer.widths_) == len(recognizer.representations_)
+    answer = recognizer.recognize(recognizer.demonstrations_[0])
+    assert set(answer.responsibilities) == {one.name for one in recognizer.representations_}
+    assert sum(answer.responsibilities.values()) == pytest.approx(1.0)
+
+
+def test_given_weights_are_those_of_the_weighted_mean():
+    demos, fresh = draw_shapes([3] * 3), draw_shapes([5] * 3, seed=3)
+    equal = Recognizer(weights="equal").fit(demos)
+    given = Recognizer(weights=(2.0, 1.0, 1.0, 3.0, 1.0)).fit(demos)
+    each = np.exp(equal.comparison_.similarity.logs(equal.describe(fresh), equal.references_.described))
+    expected = np.log(np.tensordot(np.array([2.0, 1.0, 1.0, 3.0, 1.0]) / 8.0, each, 1))
+    np.testing.assert_allclose(given.log_similarity(fresh), expected, rtol=1e-4, atol=1e-4)  # single precision
+    one = Recognizer(weights=(0.0, 3.0, 0.0, 0.0, 0.0)).fit(demos)
+    alone = Recognizer((DEFAULT_REPRESENTATIONS[1],)).fit(demos)
+    np.testing.assert_allclose(one.log_similarity(fresh), alone.log_similarity(fresh), rtol=1e-4, atol=1e-4)
+
+
+def test_positions_without_weight_still_give_the_rotation():
+    demos, fresh = draw_shapes([3] * 3), draw_shapes([5] * 3, seed=3)
+    whole, clouds = Recognizer().fit(demos), Recognizer(weights=(0, 0, 0, 0, 1)).fit(demos)
+    logs = whole.comparison_.similarity.logs(whole.describe(fresh), whole.references_.described)
+    np.testing.assert_allclose(clouds.log_similarity(fresh), logs[4] - np.log(5 * 2 / 8), rtol=1e-4, atol=1e-4)
+    assert clouds.recognize(fresh[0]).responsibilities["point cloud"] == pytest.approx(1.0)
+
+
+def test_kernels_that_know_nothing_stay_equal():
+    class Blind:
+        def logs(self, A, B):
+            return np.zeros((2, len(A), len(B)))
+
+    rows = Prepared(np.zeros((20, 1)), np.zeros(20))
+    described = Described((rows, rows), Procrustes(1, 0.0))
+    np.testing.assert_array_equal(aligned_weights(Blind(), described, np.arange(20) % 2), [0.5, 0.5])
+
+
+@pytest.mark.parametrize("weights", [(1.0, 2.0), (0.0,) * 5, (1.0, -1.0, 1.0, 1.0, 1.0), (1.0, np.nan, 1.0, 1.0, 1.0)])
+def test_weights_that_cannot_be_are_refused(weights):
+    with pytest.raises(SpecificationError, match="5 numbers from 0, not all 0"):
+        Recognizer(weights=weights).fit(draw_shapes([1, 1]))
+
+
+def test_weights_need_the_arithmetic_mean():
+    with pytest.raises(SpecificationError, match="mean='arithmetic', got them with mean='min'"):
+        Recognizer(mean="min", weights=(1, 1, 1, 1, 1)).fit(draw_shapes([1, 1]))
+    with pytest.raises(SpecificationError, match=r"weights.*'loud'"):
+        Recognizer(weights="loud").fit(draw_shapes([1, 1]))
+    with pytest.raises(SpecificationError, match="mean='arithmetic', got it with mean='min'"):
+        Recognizer(mean="min", weights="fitted").fit(draw_shapes([8, 8]))
+    np.testing.assert_allclose(Recognizer(mean="min").fit(draw_shapes([8, 8])).weights_, 0.2)
+
+
+@pytest.mark.parametrize(
+    ("representations", "weights"),
+    [
+        ((Representation("positions"), Representation("elastic")), (0, 1)),
+        ((Representation("positions", n_points=50), Representation("elastic")), (0, 1)),
+        ((Representation("positions", n_points=50), Representation("positions"), Representation("cloud")), (0, 1, 1)),
+    ],
+    ids=["other weight", "other points", "the first of two"],
+)
+def test_any_positions_without_weight_still_give_the_rotation(representations, weights):
+    demos, fresh = draw_shapes([3] * 3), draw_shapes([5] * 3, seed=3)
+    some, every = Recognizer(representations, weights=weights).fit(demos), Recognizer(representations).fit(demos)
+    assert some.representations_ == representations
+    np.testing.assert_array_equal(some.widths_, every.widths_)
+    np.testing.assert_array_equal(
+        some.describe(fresh).pairs.positions.squares, every.describe(fresh).pairs.positions.squares
+    )
+
+
+def test_positions_are_kept_once_and_compared_once():
+    whole = Recognizer().fit(draw_shapes([3] * 3)).references_.described
+    for part in (whole, whole.take(slice(0, 2)), whole.empty(2), whole.select([0, 2])):
+        assert part.pairs.positions is part.blocks[0]
+
+
+def test_half_of_a_fitted_weight_is_the_representations_own():
+    demos = draw_shapes([6] * 4, seed=3, spread=0.4)
+    described, labels = describe(demos), np.asarray(demos.labels)
+    similarity = AveragedSimilarity(described.procrustes, impostor_widths(described, labels))
+    aligned = aligned_weights(similarity, described, labels)
+    own = np.array([one.weight for one in DEFAULT_REPRESENTATIONS])
+    found = fitted_weights(similarity, described, labels, DEFAULT_REPRESENTATIONS)
+    assert np.abs(aligned - own / own.sum()).max() > 0.05
+    np.testing.assert_allclose(found, 0.5 * aligned + 0.5 * own / own.sum())

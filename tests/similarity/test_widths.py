@@ -1,0 +1,101 @@
+"""Widths of the kernels: shares of typical distances to the nearest movement of another class, or beyond a gap."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kineme.kernels.shapes import CloudSpec, ElasticSpec
+from kineme.similarity import distances as module
+from kineme.similarity.describe import describe
+from kineme.similarity.distances import squared_distances
+from kineme.similarity.representation import DEFAULT_REPRESENTATIONS, Representation
+from kineme.similarity.similarity import averaged
+from kineme.similarity.specification import ComparisonSpecification
+from kineme.similarity.weights import given_weights
+from kineme.similarity.widths import SHARE, gap_widths, impostor_widths
+from movement_samples import draw_shapes
+
+
+@pytest.fixture(scope="module")
+def shapes():
+    demos = draw_shapes([40, 30, 50], spread=0.8)
+    return describe(demos), np.asarray(demos.labels)
+
+
+def test_a_width_is_the_share_of_the_median_distance_to_an_impostor_among_hundreds(shapes):
+    described, labels = shapes
+    other = np.sqrt(np.where(labels[:, None] == labels, np.inf, squared_distances(described, described)))
+    np.testing.assert_allclose(impostor_widths(described, labels), SHARE * np.median(other.min(axis=2), axis=1))
+
+
+def test_of_one_class_every_other_movement_is_an_impostor(shapes):
+    described = shapes[0].take(slice(0, 20))
+    squares = squared_distances(described, described)
+    squares[:, np.arange(20), np.arange(20)] = np.inf
+    expected = SHARE * np.sqrt(np.median(squares.min(axis=2), axis=1))
+    np.testing.assert_allclose(impostor_widths(described, np.zeros(20)), expected, rtol=0.05)
+
+
+def test_without_labels_it_is_the_first_distance_beyond_the_largest_ratio(shapes):
+    """Of at most half of the movements, so that a stranger at the end of the order is no gap."""
+    described = shapes[0].take(np.r_[:10, 40:50, 70:80])
+    widths = []
+    for squares in squared_distances(described, described):
+        ordered = np.sort(np.sqrt(squares), axis=1)[:, 1:]
+        at = np.diff(np.log(np.maximum(ordered[:, :15], 1e-9)), axis=1).argmax(axis=1)
+        widths.append(SHARE * np.median(ordered[np.arange(30), at + 1]))
+    np.testing.assert_allclose(gap_widths(described), widths, rtol=1e-6)
+
+
+def test_many_pairs_are_compared_as_few_are(shapes, monkeypatch):
+    described, whole = shapes[0], squared_distances(shapes[0], shapes[0])
+    monkeypatch.setattr(module, "_TILE_PAIRS", 7 * len(described))
+    np.testing.assert_allclose(squared_distances(described, described), whole, rtol=1e-5, atol=2e-3)
+
+
+def test_what_is_selected_of_what_is_compared_pair_by_pair(shapes):
+    described, whole = shapes[0].take(slice(0, 9)), squared_distances(*2 * (shapes[0].take(slice(0, 9)),))
+    for chosen in ([0, 4], [0, 3], [0, 2, 4], [1, 3]):
+        some = described.select(chosen)
+        np.testing.assert_allclose(squared_distances(some, some), whole[chosen], rtol=1e-6, atol=1e-6)
+
+
+def test_positions_give_the_rotation_wherever_they_stand():
+    demos = draw_shapes([3] * 3, 3)
+    elastic, timing, positions = Representation("elastic"), Representation("forcing", 0.0), Representation("positions")
+    for order in ((elastic, timing, positions), (timing, positions, elastic), (positions, timing, elastic)):
+        how = ComparisonSpecification(representations=order)
+        assert how.representations[-1] is elastic
+        described = describe(demos, how)
+        squares = squared_distances(described, described)
+        default = describe(demos)
+        np.testing.assert_allclose(squares[2], squared_distances(default, default)[2], atol=1e-5)
+
+
+def test_the_size_of_what_is_compared_pair_by_pair_is_that_of_opposite_tangents(shapes):
+    np.testing.assert_allclose(shapes[0].sizes(), [10.0, shapes[0].sizes()[1], 2.0, 2.0, 2.0], rtol=1e-4)
+
+
+def test_an_average_over_the_first_representations_is_one(shapes):
+    similarity = averaged(shapes[0]).by_rows(2)
+    assert similarity.weights is None
+    weighted = type(similarity)(similarity.procrustes, np.ones(5), weights=np.array([2.0, 1, 2, 1, 2]) / 8)
+    np.testing.assert_allclose(weighted.by_rows(2).weights, [2 / 3, 1 / 3])
+    np.testing.assert_allclose(weighted.by_rows(2).log_weights(), np.log([4 / 3, 2 / 3]))
+
+
+def test_the_largest_weights_that_can_be_given():
+    np.testing.assert_allclose(given_weights([1.7e308, 1.7e308, 0], 3), [0.5, 0.5, 0.0])
+
+
+def test_the_numbers_that_docs_and_benchmarks_justify():
+    """`python -m bench --only defaults` and `nested` tell what hangs on them: whoever changes one runs these again."""
+    named = [(one.quantity, one.arc_share, one.weight) for one in DEFAULT_REPRESENTATIONS]
+    assert named == [
+        ("positions", 1.0, 2.0), ("forcing", 0.0, 1.0), ("elastic", 1.0, 2.0), ("turning", 1.0, 1.0),
+        ("cloud", 1.0, 2.0),
+    ]  # fmt: skip
+    assert SHARE == 0.4
+    assert ElasticSpec() == ElasticSpec(n_segments=33, band=6, position_weight=0.5, turning_weight=8.0)
+    assert CloudSpec() == CloudSpec(n_points=20, turning_weight=16.0, line_weight=0.75)
