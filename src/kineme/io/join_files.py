@@ -175,7 +175,7 @@ def _together(files: Sequence[FileRead]) -> list[str]:
     """The files that share at least half of the time of the densest one, which is the first."""
     if len(files) < 2:
         return []
-    durations = [float(np.ptp(_times(read))) for read in files]
+    durations = [end - begin for begin, end in map(_span, files)]
     long = [k for k, duration in enumerate(durations) if duration >= _SHARED * float(np.median(durations))]
     densest = max(long, key=lambda k: len(_times(files[k])) / durations[k])
     begin, end = _span(files[densest])
@@ -192,10 +192,12 @@ def _are_sensors(files: Sequence[FileRead]) -> bool:
     spans = np.array([_span(read) for read in files])
     if spans[:, 0].min() > _SINCE_1970:
         return True
+    if (np.ptp(spans, axis=0) > _ALIKE * np.ptp(spans)).any():
+        return False
     of_files = [
         (frozenset(Columns(read.detected.columns, ()).names), sensors_of(read.path)) for read in files if read.detected
     ]
-    return len({*of_files}) == len(files) and bool((np.ptp(spans, axis=0) <= _ALIKE * np.ptp(spans)).all())
+    return len({*of_files}) == len(files)
 
 
 def _joined(members: Sequence[Placed], together: Sequence[str], given: Given) -> Placed:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from kineme.recognition.left_out import LEAST, distances
 from kineme.sampling import evenly_spaced
@@ -65,8 +65,28 @@ def fit_exponent(away: Array, classes: NDArray[np.intp]) -> float:
         likelihood = logs[rows, classes] - np.log(np.exp(logs).sum(axis=1))
         return 0.5 * ((log_exponent - math.log(EXPONENT)) / _SPREAD) ** 2 - float(likelihood.sum())
 
-    bounds = [math.log(bound) for bound in _BOUNDS]
-    return float(math.exp(minimize_scalar(loss, bounds=bounds, method="bounded", options={"xatol": 1e-4}).x))
+    low, high = (math.log(bound) for bound in _BOUNDS)
+    return math.exp(_golden_section(loss, low, high))
+
+
+def _golden_section(loss: Callable[[float], float], low: float, high: float) -> float:
+    """The argument with the least loss, to 1e-4: golden-section search (Kiefer 1953).
+
+    `scipy.optimize` finds the same; its import takes as long as recognizing hundreds of recordings.
+    """
+    ratio = (math.sqrt(5) - 1) / 2
+    left, right = high - ratio * (high - low), low + ratio * (high - low)
+    left_loss, right_loss = loss(left), loss(right)
+    while high - low > 1e-4:
+        if left_loss <= right_loss:
+            high, right, right_loss = right, left, left_loss
+            left = high - ratio * (high - low)
+            left_loss = loss(left)
+        else:
+            low, left, left_loss = left, right, right_loss
+            right = low + ratio * (high - low)
+            right_loss = loss(right)
+    return (low + high) / 2
 
 
 def _log_odds(away: Array, exponent: float) -> Array:

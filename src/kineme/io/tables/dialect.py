@@ -135,9 +135,12 @@ def detect_dialect(text: Iterable[str]) -> Dialect:
     if not kept:
         more = len(lines) == _HEAD
         raise DataError(f"expected samples, got {f'none in the first {_HEAD:,} lines' if more else 'an empty file'}")
-    kept = _below_preamble(lines, _with_names_like_comments(lines, kept))
+    kept = _with_names_like_comments(lines, kept)
     separator = separator_of([lines[k] for k in kept[:2]])
     cells = [split(lines[k], separator) for k in kept]
+    if (below := _below_preamble(lines, kept, cells)) != kept:
+        kept, separator = below, separator_of([lines[k] for k in below[:2]])
+        cells = [split(lines[k], separator) for k in kept]
     comma = separator != "," and any(COMMA_NUMBER.fullmatch(cell) for row in cells for cell in row)
     n_heads = _n_heads(cells, comma)
     kept, cells = kept[n_heads - 1 :], [_joined(cells[:n_heads]), *cells[n_heads:]]
@@ -189,15 +192,15 @@ def units_in(cells: Sequence[str]) -> tuple[str, ...]:
     return plain if known and not others and 2 * sum(map(bool, plain)) >= len(plain) else ()
 
 
-def _below_preamble(lines: Sequence[str], kept: list[int]) -> list[int]:
+def _below_preamble(lines: Sequence[str], kept: list[int], cells: Sequence[list[str]]) -> list[int]:
     """The lines from the heads on, where lines of other lengths without rows of numbers stand above them.
 
     So loggers write the device, the rate and the time. Below the heads all lines have as many cells.
     """
-    top, separator = (separator_of([lines[k] for k in part]) for part in (kept[:2], kept[-2:]))
-    widths = {len(split(lines[k], top)) for k in kept}
+    widths = {*map(len, cells)}
     if len(widths) == 1 and widths != {1}:
         return kept
+    separator = separator_of([lines[k] for k in kept[-2:]])
     rows = [split(lines[k], separator) for k in kept]
     width, comma = len(rows[-1]), separator != ","
     first = next(k for k, row in enumerate(rows) if len(row) == width)

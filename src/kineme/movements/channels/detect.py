@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -111,6 +112,7 @@ def find_channels(
     return with_periods(tuple(channels), in_order(columns, heads, tuple(channels)))
 
 
+@lru_cache(maxsize=4096)  # the recordings of a folder have the same heads
 def unit_of(head: str) -> str | None:
     """The unit in the head of a column: the text in brackets that it ends in, or a word for an angle or a length."""
     _, bracketed = split_head(head)

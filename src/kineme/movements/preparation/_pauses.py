@@ -57,7 +57,7 @@ def _fill_shortened(times, positions, steps, kept):  # type: ignore[no-untyped-d
     last = len(times) - 1
     usual = _fill_steps(times, steps)
     reach, rests = _fill_resting(positions, kept)
-    if not rests and usual == np.inf:
+    if not rests and not _may_have_gaps(steps, usual):
         return False
     motion, path = 0.0, 0.0
     for j in range(last):
@@ -81,14 +81,32 @@ def _fill_shortened(times, positions, steps, kept):  # type: ignore[no-untyped-d
 @jit
 def _fill_steps(times, steps):  # type: ignore[no-untyped-def]
     """Steps of one movement, 0 after its last sample; above which they may be gaps, infinite where none is."""
-    last, least, most = len(times) - 1, np.inf, 0.0
+    last, most = len(times) - 1, 0.0
     for j in range(last):
         steps[j] = times[j + 1] - times[j]
-        least, most = min(least, steps[j]), max(most, steps[j])
+        most = max(most, steps[j])
     steps[last] = 0.0
-    if most <= GAP * least:  # the median is no smaller
+    n_short, share = 0, most / GAP
+    for j in range(last):
+        n_short += steps[j] < share  # a sum has no branch and becomes vector instructions
+    if n_short <= last // 2:  # the median is at least that share of the longest step
         return np.inf
     return GAP * nth_smallest(steps[:last].copy(), last // 2)
+
+
+@jit
+def _may_have_gaps(steps, usual):  # type: ignore[no-untyped-def]
+    """Whether a step may be a gap in a movement without rests, before its path is measured, which takes longest."""
+    if usual == np.inf:
+        return False
+    motion, before = 0.0, 0.0
+    for j in range(len(steps)):
+        motion += min(steps[j], usual)
+    for j in range(len(steps) - 1):
+        if steps[j] > EQUAL * max(usual, min(GAP * max(before, steps[j + 1]), PAUSE * motion)):
+            return True
+        before = steps[j]
+    return False
 
 
 @jit
