@@ -117,20 +117,20 @@ define environment
 endef
 
 bench: .venv-bench/ready
-	PYTHONPATH=src .venv-bench/bin/python -m bench
+	PYTHONPATH=src:experiments .venv-bench/bin/python -m bench
 
 # Two steps: the peer that comes as source is compiled with pinned tools, nothing is fetched aside.
-.venv-bench/ready: requirements/run.txt bench/build.txt bench/peers.txt
+.venv-bench/ready: requirements/run.txt experiments/build.txt experiments/peers.txt
 	$(PYTHON) -m venv --clear .venv-bench
-	.venv-bench/bin/pip install --quiet --require-hashes -r requirements/run.txt -r bench/build.txt
-	.venv-bench/bin/pip install --quiet --require-hashes --no-build-isolation -r bench/peers.txt
+	.venv-bench/bin/pip install --quiet --require-hashes -r requirements/run.txt -r experiments/build.txt
+	.venv-bench/bin/pip install --quiet --require-hashes --no-build-isolation -r experiments/peers.txt
 	touch $@
 
 evaluate: .venv-rivals/ready
 	.venv-rivals/bin/kineme evaluate lasa --out out/
 
-.venv-rivals/ready: bench/rivals.txt pyproject.toml .venv-rivals/python
-	$(call environment,.venv-rivals,bench/rivals.txt)
+.venv-rivals/ready: experiments/rivals.txt pyproject.toml .venv-rivals/python
+	$(call environment,.venv-rivals,experiments/rivals.txt)
 
 # Warnings are errors; all that is wrong is told. What Sphinx read and the examples drew is kept, so that the next build is
 # short. GALLERY=0 shows the examples without running them.
@@ -143,13 +143,13 @@ check-docs: $(DEV)/ready
 	KINEME_SITE=out/docs $(DEV)/bin/pytest -p no:cacheprovider tests/test_built_site.py
 
 figures: $(DEV)/ready
-	$(DEV)/bin/python docs/make_figures.py
+	PYTHONPATH=experiments $(DEV)/bin/python docs/make_figures.py
 
 reference: $(DEV)/ready
 	$(DEV)/bin/python docs/make_reference.py
 
 tables: $(DEV)/ready
-	$(DEV)/bin/python docs/make_tables.py
+	PYTHONPATH=experiments $(DEV)/bin/python -m result_tables
 
 # After another version: its numbers and sums in vendored.json, which tests compare.
 SCENE = src/kineme/robots/view/vendor
@@ -164,9 +164,9 @@ lock:
 	uv pip compile pyproject.toml --group lowest --resolution lowest-direct --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --quiet -o requirements/lowest.txt
 	uv pip compile --group package --universal --generate-hashes --no-emit-index-url --no-header --quiet -o requirements/package.txt
 	uv pip compile requirements/ros2.in --universal --python-version 3.11 --no-emit-package empy --generate-hashes --no-annotate --no-emit-index-url --no-header --quiet -o requirements/ros2.txt
-	uv pip compile bench/build.in -c requirements/run.txt --universal --generate-hashes --no-emit-index-url --no-header --quiet -o bench/build.txt
-	uv pip compile bench/peers.in pyproject.toml --extra parquet --extra ros --extra robot --extra studio -c requirements/run.txt --universal --generate-hashes --no-emit-index-url --no-header --quiet -o bench/peers.txt
-	uv pip compile pyproject.toml bench/rivals.in --group build --universal --generate-hashes --no-emit-index-url --no-header --quiet -o bench/rivals.txt
+	uv pip compile experiments/build.in -c requirements/run.txt --universal --generate-hashes --no-emit-index-url --no-header --quiet -o experiments/build.txt
+	uv pip compile experiments/peers.in pyproject.toml --extra parquet --extra ros --extra robot --extra studio -c requirements/run.txt --universal --generate-hashes --no-emit-index-url --no-header --quiet -o experiments/peers.txt
+	uv pip compile pyproject.toml experiments/rivals.in --group build --universal --generate-hashes --no-emit-index-url --no-header --quiet -o experiments/rivals.txt
 
 clean:
 	rm -rf .venv .venv-dev .venv-dev-* .venv-lowest .venv-package .venv-ros2 .venv-bench .venv-rivals out docs/gallery docs/reference/generated docs/concepts/interactive/primitive.html

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
-from measured import DOCS, rows
 from walk_through import walk
 
 import kineme
 from kineme.control import ObstacleAvoidance
 from kineme.dmp.styles.figure import draw_morph
 from kineme.reporting.figures import BLUE, GRAY, GREEN, ORANGE, new_figure
+from result_tables.measured import DOCS, rows
 
 _FEWEST = 20  # answers that a point of the reliability diagram stands for
 COLORS = {"original": BLUE, "bio-inspired": ORANGE, "amplitude-scaled": GREEN}

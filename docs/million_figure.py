@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from matplotlib.figure import Figure
-from million_tables import by_part
 
 from kineme.reporting.figures import new_figure
+from result_tables.million import by_part
 
 _COLORS = ("tab:gray", "tab:blue", "tab:green", "tab:orange", "tab:red", "tab:purple")
 

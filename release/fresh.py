@@ -63,7 +63,7 @@ def check_base(python: str, wheel: Path, folder: Path) -> None:
     fresh.run("kineme", "reproduce", "--out", "out")
     fresh.step("demonstrated.py")
     fresh.install(wheel, TOGETHER, "requirements/dev.txt", "--dry-run")
-    fresh.install(wheel, ("rivals",), "bench/rivals.txt", "--dry-run")
+    fresh.install(wheel, ("rivals",), "experiments/rivals.txt", "--dry-run")
 
 
 def check_extras(python: str, wheel: Path, folder: Path) -> None:

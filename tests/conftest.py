@@ -5,7 +5,6 @@ from __future__ import annotations
 import gc
 import os
 import shutil
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +12,6 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from soaking import examples
-
-sys.path.append(str(Path(__file__).parents[1] / "docs"))  # for `walk_through`, which runs the pages
 
 settings.register_profile(
     "deterministic",
@@ -73,7 +70,7 @@ def development_data():
 @pytest.fixture(scope="session")
 def gestures(development_data):
     """Digits and solids that five people drew in the air, and who."""
-    from kineme.experiments.evaluation.data import load_data
+    from kineme_experiments.evaluation.data import load_data
 
     data = load_data(str(development_data / "gestures3d.npz"))
     return data.demonstrations, np.asarray(data.people)

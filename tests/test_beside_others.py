@@ -2,23 +2,22 @@
 
 import json
 import pkgutil
-import sys
 from importlib import metadata
 from pathlib import Path
 
-import beside_tables
-import feature_table
 import numpy as np
 import pytest
-from measured import SHOWN, filled
 from walk_through import walk
 
 import kineme
 from kineme.cli import main as commands
+from result_tables import beside as beside_tables
+from result_tables import features as feature_table
+from result_tables.measured import SHOWN, filled
 
 ROOT = Path(__file__).parents[1]
 
-MIGRATED = json.loads((ROOT / "bench" / "results" / "migrating.json").read_text(encoding="utf-8"))["rows"]
+MIGRATED = json.loads((ROOT / "experiments" / "results" / "migrating.json").read_text(encoding="utf-8"))["rows"]
 
 
 @pytest.mark.parametrize("page", beside_tables.tables())
@@ -105,11 +104,8 @@ def test_ours_gives_the_result_that_the_peer_gave(row, tmp_path):
 
 @pytest.mark.parametrize("row", MIGRATED, ids=lambda row: row["details"]["page"])
 def test_the_peer_measured_again(row):
-    sys.path.insert(0, str(ROOT))
-    try:
-        from bench.migrating import COMPARED, executed
-    finally:
-        sys.path.remove(str(ROOT))
+    from bench.migrating import COMPARED, executed
+
     page = row["details"]["page"]
     module, compare, *_ = COMPARED[page]
     pytest.importorskip(module, reason=f"{module} is not installed; make bench installs and compares it")

@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 
 from concept_figures import EXAMPLES, SCRIPTS
-from concept_tables import PAGE, speed
-from measured import filled
 from walk_through import DOCS
+
+from result_tables.concepts import PAGE, speed
+from result_tables.measured import filled
 
 
 def test_the_page_holds_the_table_of_the_results():

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-SOURCES = sorted((ROOT / "src").rglob("*.py"))
+SOURCES = sorted([*(ROOT / "src").rglob("*.py"), *(ROOT / "experiments" / "kineme_experiments").rglob("*.py")])
 MAX_FILE, MAX_FUNCTION = 400, 60
 
 

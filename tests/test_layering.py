@@ -16,7 +16,7 @@ FRONT_DOOR = ("__init__", "__main__", "control", "orientation", "styles")  # the
 @cache  # the sources do not change while they are read here
 def _layers():
     """Chapter, or chapter/room -> its line in the list, from the bottom up."""
-    listed = (ROOT / "CONTRIBUTING.md").read_text().partition("    src/kineme/\n")[2].partition("\n\n")[0]
+    listed = (ROOT / "CONTRIBUTING.md").read_text().partition("    src/kineme/\n")[2].partition("    experiments/")[0]
     layers, chapter = {}, ""
     for height, line in enumerate(listed.splitlines()):
         names = re.split(r"\s{2,}", line.strip())[0].replace("/", "").split(", ")
@@ -97,6 +97,16 @@ def test_no_files_import_each_other_in_a_circle():
     graph = {name: {one if one in names else one.rpartition(".")[0] for one in _all_imports(path)} - {name}
              for name, path in names.items()}  # fmt: skip
     assert len(list(TopologicalSorter(graph).static_order())) >= len(names)  # a CycleError names the files
+
+
+def test_only_commands_import_experiments_and_experiments_no_front_ends():
+    experiments = sorted((ROOT / "experiments" / "kineme_experiments").rglob("*.py"))
+    assert experiments
+    assert not [path for path in experiments for _, chapter, *_ in _imported(path) if chapter in {"cli", "studio"}]
+    importing = {path: [one for one in _all_imports(path) if one.startswith("kineme_experiments")] for path in _modules()}
+    assert {_chapter_of(path) for path, names in importing.items() if names} == {"cli"}
+    ]
+    assert {_chapter_of(path) for path in importing} == {"cli"}
 
 
 def test_every_chapter_and_room_that_is_listed_exists():

@@ -1,8 +1,9 @@
 """Tables and sentences of the guide hold what the benchmark measured."""
 
 import pytest
-from make_tables import GUIDES
-from measured import filled
+
+from result_tables.__main__ import GUIDES
+from result_tables.measured import filled
 
 
 @pytest.mark.parametrize("module", GUIDES, ids=lambda module: module.PAGE.name)

@@ -38,8 +38,6 @@ def places() -> dict[int, list[str]]:
     found: dict[int, list[str]] = {}
     for path in sorted(_ROOT.rglob("*.py")):
         inside = path.relative_to(_ROOT)
-        if inside.parts[0] == "experiments":
-            continue
         module = ".".join(["kineme", *inside.with_suffix("").parts]).removesuffix(".__init__")
         for name, text in _docstrings(ast.parse(path.read_text(encoding="utf-8")), module):
             owner, _, member = name.rpartition(".")

@@ -10,8 +10,8 @@ left out at a time.
 import matplotlib.pyplot as plt
 import numpy as np
 
-from kineme.experiments.reproduction.experiments import run_draw
-from kineme.experiments.reproduction.representations import REPRESENTATIONS
+from kineme_experiments.paper.experiments import run_draw
+from kineme_experiments.paper.representations import REPRESENTATIONS
 
 # %%
 # Twelve random draws of three letters each, those of ``kineme reproduce``.

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from kineme.cli.evaluate import METHOD_NAMES, PROTOCOL_NAMES
-from kineme.experiments.evaluation.methods import METHODS
-from kineme.experiments.evaluation.protocols import PROTOCOLS
 from kineme.io.write_movement import write_movement
+from kineme_experiments.evaluation.methods import METHODS
+from kineme_experiments.evaluation.protocols import PROTOCOLS
 
 
 def run(*arguments, by=commands.run):

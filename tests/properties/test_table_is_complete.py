@@ -27,7 +27,6 @@ OTHER_PARTS = {
     "cli": "calls the layers below",
     "dmp.control": "one movement by contract",
     "datasets": "reads files",
-    "experiments": "scores of whole sets, and the paper's experiments on them",
     "dmp.generation": "one movement by contract",
     "io": "reads and writes files, one by one; reports on whole sets",
     "library": "its class is in the table; what lies under it writes and reads rows of a database",

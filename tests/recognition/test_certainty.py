@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import kineme
-from kineme.experiments.evaluation.data import load_data
 from kineme.recognition.certainty import LEAST_CONFIDENCE, certainty
 from kineme.recognition.early.live_state import LiveState, LiveStatus
+from kineme_experiments.evaluation.data import load_data
 
 STRENGTH = {"looks like": 0, "probably": 1, "sure": 2}
 

@@ -9,12 +9,12 @@ import pytest
 from sklearn.utils import Bunch
 
 import kineme
-from kineme.experiments.evaluation.splits import one_person_out
 from kineme.recognition.early import evidence
 from kineme.recognition.early.early import cut, partial_shares
 from kineme.recognition.early.hypotheses import Early, Ending, Hypotheses, hypotheses
 from kineme.recognition.early.prefixes import smooth_paths
 from kineme.similarity.widths import SHARE
+from kineme_experiments.evaluation.splits import one_person_out
 
 
 def log_classes(*movements):

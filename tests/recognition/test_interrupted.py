@@ -7,7 +7,7 @@ import pytest
 
 import kineme
 from kineme import Recognizer
-from kineme.experiments.evaluation.data import load_data
+from kineme_experiments.evaluation.data import load_data
 from movement_samples import draw_shapes, interrupted
 
 any_pause = pytest.mark.parametrize("at_rest", [True, False], ids=["at rest", "without samples"])

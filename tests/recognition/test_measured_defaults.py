@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 
 import pytest
-from make_tables import DEFAULTS, PAGE, tables
-from measured import filled
+
+from result_tables.__main__ import DEFAULTS, PAGE, tables
+from result_tables.measured import filled
 
 ROOT = Path(__file__).parents[2]
 
 
 def _measured():
-    rows = json.loads((ROOT / "bench" / "results" / "defaults.json").read_text(encoding="utf-8"))["rows"]
+    rows = json.loads((ROOT / "experiments" / "results" / "defaults.json").read_text(encoding="utf-8"))["rows"]
     return {row["what"]: row["ours"] for row in rows}
 
 
@@ -38,9 +38,6 @@ def test_the_whole_is_ahead_of_each_part():
 
 
 def test_one_number_of_it_measured_again():
-    sys.path.insert(0, str(ROOT))
-    try:
-        from bench.defaults import LEVELS, accuracy
-    finally:
-        sys.path.remove(str(ROOT))
+    from bench.defaults import LEVELS, accuracy
+
     assert accuracy({}, LEVELS["strongly"], 5) == pytest.approx(_measured()["defaults, strongly"], abs=0.003)

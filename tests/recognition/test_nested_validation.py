@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from unittest.mock import patch
 
@@ -18,11 +17,8 @@ ROOT = str(Path(__file__).parents[2])
 
 @pytest.fixture(scope="module")
 def nested():
-    sys.path.insert(0, ROOT)
-    try:
-        from bench import nested
-    finally:
-        sys.path.remove(ROOT)
+    from bench import nested
+
     return nested
 
 

@@ -255,11 +255,11 @@ TABLE = {
 
 
 def _results(subject):
-    return json.loads((ROOT / "bench" / "results" / f"{subject}.json").read_text())["rows"]
+    return json.loads((ROOT / "experiments" / "results" / f"{subject}.json").read_text())["rows"]
 
 
 def test_the_page_shows_what_was_measured():
-    """docs/guide/recognition.md against bench/results/open_set.json."""
+    """docs/guide/recognition.md against experiments/results/open_set.json."""
     measured = {row["what"]: row["ours"] for row in _results("open_set")}
     page = " ".join((ROOT / "docs" / "guide" / "recognition.md").read_text(encoding="utf-8").split())
     for name, title in TABLE.items():
@@ -273,7 +273,7 @@ def test_the_page_shows_what_was_measured():
 
 
 def test_the_page_shows_how_often_words_are_right():
-    """docs/guide/recognition.md against bench/results/certainty.json."""
+    """docs/guide/recognition.md against experiments/results/certainty.json."""
     rows = {row["what"]: row for row in _results("certainty")}
     page = (ROOT / "docs" / "guide" / "recognition.md").read_text(encoding="utf-8")
     for name in ("gestures3d", "letters2d", "strokes2d", "multistrokes2d", "words2d", "signs2d", "exercises6d"):

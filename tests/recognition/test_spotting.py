@@ -14,7 +14,6 @@ import pytest
 
 import kineme
 from kineme import Demonstrations, Recognizer, SpecificationError, Trajectory, TrajectoryError
-from kineme.experiments.evaluation.spotting import Counts, concatenate, count_spotted
 from kineme.movements.segmentation.motion import observe
 from kineme.movements.segmentation.segmentation import pieces_of
 from kineme.recognition import compared_windows
@@ -37,6 +36,7 @@ from kineme.recognition.spotting import (
     closest_classes,
     far,
 )
+from kineme_experiments.evaluation.spotting import Counts, concatenate, count_spotted
 from movement_samples import draw_shapes
 from soaking import SOAK
 

@@ -13,7 +13,7 @@ from kineme.cli.options import GroupedCommand, whole
 from kineme.cli.output import write
 from kineme.cli.reading import LAYOUT_OPTIONS, layout_options, read
 
-# The names of the tables in kineme.experiments.evaluation, written out so that --help loads nothing; a test compares
+# The names of the tables in kineme_experiments.evaluation, written out so that --help loads nothing; a test compares
 # them.
 PROTOCOL_NAMES = (
     "few-shot", "leave-one-out", "cross-validation", "robustness", "any-angle", "open-set", "earliness",
@@ -58,14 +58,14 @@ def evaluate(data: tuple[str, ...], protocols: tuple[str, ...], methods: tuple[s
     recognizer with the paper's configuration and with other methods, under the same splits and perturbations. Several
     data sets get a folder each. Rivals that are not installed are reported and left out: pip install 'kineme[rivals]'.
     """
-    from kineme.experiments.evaluation.data import load_data
-    from kineme.experiments.evaluation.methods import METHODS
-    from kineme.experiments.evaluation.protocols import PROTOCOLS
-    from kineme.experiments.evaluation.run import Runner
-    from kineme.experiments.evaluation.run import evaluate as run
-    from kineme.experiments.evaluation.summary import summarize
-    from kineme.experiments.evaluation.trials import Settings
     from kineme.runtime.parallel import n_threads
+    from kineme_experiments.evaluation.data import load_data
+    from kineme_experiments.evaluation.methods import METHODS
+    from kineme_experiments.evaluation.protocols import PROTOCOLS
+    from kineme_experiments.evaluation.run import Runner
+    from kineme_experiments.evaluation.run import evaluate as run
+    from kineme_experiments.evaluation.summary import summarize
+    from kineme_experiments.evaluation.trials import Settings
 
     quick, out = options["quick"], options["out"]
     contenders = methods or tuple(name for name in METHODS if not (quick and name in _SLOW))
@@ -87,7 +87,7 @@ def evaluate(data: tuple[str, ...], protocols: tuple[str, ...], methods: tuple[s
 
 def _check_read(data: tuple[str, ...]) -> None:
     """Refuse options that say how recordings are read where all data are packaged."""
-    from kineme.experiments.evaluation.data import PACKAGED
+    from kineme_experiments.evaluation.data import PACKAGED
 
     context = click.get_current_context()
     for option in context.command.params:
@@ -106,8 +106,8 @@ def _numbered(sets: list[Any]) -> list[Any]:
 
 
 def _print(name: str, evaluation: Any) -> None:
-    from kineme.experiments.evaluation.conclusions import verdict
     from kineme.reporting.table import to_text
+    from kineme_experiments.evaluation.conclusions import verdict
 
     write("\n\n".join([name] * bool(name) + list(map(to_text, evaluation.tables))))
     for what, reason in (evaluation.results.absent | evaluation.results.skipped).items():

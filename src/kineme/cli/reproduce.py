@@ -25,7 +25,7 @@ def reproduce(out: Path, draws: int | None, seed: int, quick: bool) -> None:
     """
     from tqdm import tqdm
 
-    from kineme.experiments.reproduction.run import reproduce as run
+    from kineme_experiments.paper.run import reproduce as run
 
     def progress(items, total):  # type: ignore[no-untyped-def]
         return tqdm(items, total=total, desc="reproducing", unit="part", leave=False, disable=None)

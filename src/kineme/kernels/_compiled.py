@@ -15,8 +15,8 @@ from kineme.kernels._rows import Rows
 from kineme.runtime.compiled import jit
 
 # Bytes of each feature of those rows of B that are packed together, and rows of A that go over them at once. The strips
-# of sums stay in L1, and each packed number that comes from L2 serves four pairs: see bench/README.md for how near that
-# is to the processor's limit.
+# of sums stay in L1, and each packed number that comes from L2 serves four pairs: see experiments/README.md for how
+# near that is to the processor's limit.
 _PANEL_BYTES = 512
 _ROWS = 4
 

@@ -43,8 +43,9 @@ class TwoStageSearch:
     largest; they are exact as long as no more than 256 others could be the nearest of their class, else not too small
     for the nearest classes, and possibly too small for those far away.
 
-    On bent handwriting (bench/library.py; one busy core), of 100 movements asked among 40,000 in the plane and of 40
-    among 10,000 in space, all got the class of comparing all; an answer took 8 ms and 10 ms of processor time.
+    On bent handwriting (``python -m bench --only library``; one busy core), of 100 movements asked among 40,000 in the
+    plane and of 40 among 10,000 in space, all got the class of comparing all; an answer took 8 ms and 10 ms of
+    processor time.
 
     Attributes
     ----------

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 
 import pytest
@@ -13,7 +12,7 @@ import kineme
 ROOT = Path(__file__).parents[3]
 MEASURED = {
     row["what"]: row["ours"]
-    for row in json.loads((ROOT / "bench" / "results" / "dmp_defaults.json").read_text(encoding="utf-8"))["rows"]
+    for row in json.loads((ROOT / "experiments" / "results" / "dmp_defaults.json").read_text(encoding="utf-8"))["rows"]
 }
 SHOWN = {
     "forcing, 80": "forcing, 80, the paper's",
@@ -28,11 +27,8 @@ SHOWN = {
 
 @pytest.fixture(scope="module")
 def bench():
-    sys.path.insert(0, str(ROOT))
-    try:
-        from bench import dmp_defaults
-    finally:
-        sys.path.remove(str(ROOT))
+    from bench import dmp_defaults
+
     return dmp_defaults
 
 

@@ -1,19 +1,11 @@
 """What the page on via points says was measured is of what the library does."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
-from modulation_tables import tables
 
+from bench.joining import met
+from bench.via_points import PRIORS, STEPS, pairs, through
 from kineme import DMP
-
-ROOT = Path(__file__).parents[3]
-sys.path.insert(0, str(ROOT))
-from bench.joining import met  # noqa: E402
-from bench.via_points import PRIORS, STEPS, pairs, through  # noqa: E402
-
-sys.path.remove(str(ROOT))
+from result_tables.modulation import tables
 
 
 def test_the_first_prior_is_that_of_the_library():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme.experiments.evaluation.data import DataSet
+from kineme_experiments.evaluation.data import DataSet
 
 
 @pytest.fixture(scope="session")

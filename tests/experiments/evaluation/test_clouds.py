@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from kineme.experiments.evaluation import methods as module
-from kineme.experiments.evaluation.methods import (
+from kineme_experiments.evaluation import methods as module
+from kineme_experiments.evaluation.methods import (
     PlusCloud,
     PointCloud,
     QuickCloud,
@@ -137,9 +137,9 @@ def test_the_point_cloud_answers_as_another_implementation(small):
 
 def test_plus_reaches_on_real_gestures_what_it_is_known_to_reach(development_data):
     """One shot by other people, digits drawn in space: .82 is known, and the half without the angle is far below."""
-    from kineme.experiments.evaluation.data import DataSet, load_data
-    from kineme.experiments.evaluation.score_split import score_split
-    from kineme.experiments.evaluation.trials import Settings
+    from kineme_experiments.evaluation.data import DataSet, load_data
+    from kineme_experiments.evaluation.score_split import score_split
+    from kineme_experiments.evaluation.trials import Settings
 
     read = load_data(str(development_data / "gestures3d.npz"))
     digits = np.char.isdigit(read.demonstrations.labels.astype(str))

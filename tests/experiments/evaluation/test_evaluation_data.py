@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme.experiments.evaluation.data import load_data
 from kineme.io.write_movement import write_movement
+from kineme_experiments.evaluation.data import load_data
 
 
 @pytest.fixture

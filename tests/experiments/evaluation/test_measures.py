@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sklearn.metrics import roc_auc_score
 
-from kineme.experiments.evaluation.score_split import accuracy, auroc, open_set
+from kineme_experiments.evaluation.score_split import accuracy, auroc, open_set
 
 
 @given(st.integers(0, 1000), st.booleans())

@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kineme.experiments.evaluation.data import DataSet
-from kineme.experiments.evaluation.protocols import PROTOCOLS
-from kineme.experiments.evaluation.score_split import clustered
-from kineme.experiments.evaluation.splits import one_person_out, within_person
-from kineme.experiments.evaluation.trials import Settings
+from kineme_experiments.evaluation.data import DataSet
+from kineme_experiments.evaluation.protocols import PROTOCOLS
+from kineme_experiments.evaluation.score_split import clustered
+from kineme_experiments.evaluation.splits import one_person_out, within_person
+from kineme_experiments.evaluation.trials import Settings
 
 LABELS = np.array(list("abcd") * 15)
 PEOPLE = np.repeat(list("xyz"), 20)

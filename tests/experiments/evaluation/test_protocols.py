@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 
 from kineme.cli.evaluate import _QUICK_SHOTS
-from kineme.experiments.evaluation import person_protocols
-from kineme.experiments.evaluation import score_split as scoring
-from kineme.experiments.evaluation.conditions import STRENGTHS, TOGETHER, robustness_conditions
-from kineme.experiments.evaluation.data import DataSet
-from kineme.experiments.evaluation.methods import METHODS, DefaultRecognizer, Method, Options
-from kineme.experiments.evaluation.protocols import PROTOCOLS, usable_shots
-from kineme.experiments.evaluation.score_split import does, score_split
-from kineme.experiments.evaluation.spotting import Stretch, concatenate_all
-from kineme.experiments.evaluation.trials import TASKS, Settings
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.recognition.early.early import cut
 from kineme.recognition.recognizer import Recognizer
+from kineme_experiments.evaluation import person_protocols
+from kineme_experiments.evaluation import score_split as scoring
+from kineme_experiments.evaluation.conditions import STRENGTHS, TOGETHER, robustness_conditions
+from kineme_experiments.evaluation.data import DataSet
+from kineme_experiments.evaluation.methods import METHODS, DefaultRecognizer, Method, Options
+from kineme_experiments.evaluation.protocols import PROTOCOLS, usable_shots
+from kineme_experiments.evaluation.score_split import does, score_split
+from kineme_experiments.evaluation.spotting import Stretch, concatenate_all
+from kineme_experiments.evaluation.trials import TASKS, Settings
 
 SETTINGS = Settings(splits=2, seed=3, shots=(1, 2))
 AVAILABLE = [name for name, one in METHODS.items() if not one.unavailable()]

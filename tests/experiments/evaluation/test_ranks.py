@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from kineme.experiments.evaluation.methods import METHODS
-from kineme.experiments.evaluation.rank_figure import draw_ranks
-from kineme.experiments.evaluation.ranks import MIN_BLOCKS, Ranks, blocks_of, rank, rank_rows
-from kineme.experiments.evaluation.rows import Row
+from kineme_experiments.evaluation.methods import METHODS
+from kineme_experiments.evaluation.rank_figure import draw_ranks
+from kineme_experiments.evaluation.ranks import MIN_BLOCKS, Ranks, blocks_of, rank, rank_rows
+from kineme_experiments.evaluation.rows import Row
 
 #: Table 6 of Demsar (JMLR 2006): C4.5 and three variants of its parameters on 14 data sets.
 DEMSAR = np.array(

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme.experiments.evaluation.linear_classifiers import MiniRocket
-from kineme.experiments.evaluation.neighbors import DTWNeighbor, EuclideanNeighbor, average_linkage
-from kineme.experiments.evaluation.paths import paths_over_length, paths_over_time
 from kineme.movements.preparation.perturbations import Perturbation
+from kineme_experiments.evaluation.linear_classifiers import MiniRocket
+from kineme_experiments.evaluation.neighbors import DTWNeighbor, EuclideanNeighbor, average_linkage
+from kineme_experiments.evaluation.paths import paths_over_length, paths_over_time
 
 
 @pytest.fixture(scope="module")

@@ -6,17 +6,17 @@ import re
 import pytest
 
 import kineme
-from kineme.experiments.evaluation import methods
-from kineme.experiments.evaluation.conclusions import conclusion, verdict
-from kineme.experiments.evaluation.conditions import UNTOUCHED
-from kineme.experiments.evaluation.data import DataSet
-from kineme.experiments.evaluation.methods import METHODS
-from kineme.experiments.evaluation.optional import optional_module, why_missing
-from kineme.experiments.evaluation.protocols import PROTOCOLS
-from kineme.experiments.evaluation.results import Results
-from kineme.experiments.evaluation.rows import to_csv
-from kineme.experiments.evaluation.run import Runner, draw_protocol, evaluate
-from kineme.experiments.evaluation.trials import Settings, shots_label
+from kineme_experiments.evaluation import methods
+from kineme_experiments.evaluation.conclusions import conclusion, verdict
+from kineme_experiments.evaluation.conditions import UNTOUCHED
+from kineme_experiments.evaluation.data import DataSet
+from kineme_experiments.evaluation.methods import METHODS
+from kineme_experiments.evaluation.optional import optional_module, why_missing
+from kineme_experiments.evaluation.protocols import PROTOCOLS
+from kineme_experiments.evaluation.results import Results
+from kineme_experiments.evaluation.rows import to_csv
+from kineme_experiments.evaluation.run import Runner, draw_protocol, evaluate
+from kineme_experiments.evaluation.trials import Settings, shots_label
 from soaking import SOAK
 
 SMALL = ["few-shot", "robustness"], ["kineme", "euclidean"]

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kineme.experiments.evaluation.splits import few_shot, folds, half_unknown, one_left_out
+from kineme_experiments.evaluation.splits import few_shot, folds, half_unknown, one_left_out
 
 LABELS = np.array(list("abcd" * 3 + "ab" * 4))
 seeds, indices = st.integers(0, 10**6), st.integers(0, 50)

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme.experiments.evaluation.spotting import (
+from kineme.recognition.spotting import Spotted
+from kineme_experiments.evaluation.spotting import (
     Counts,
     Stretch,
     concatenate,
@@ -17,7 +18,6 @@ from kineme.experiments.evaluation.spotting import (
     count_spotted,
     overlap,
 )
-from kineme.recognition.spotting import Spotted
 
 SHAPES = ["CShape", "NShape", "Sshape", "WShape"]
 
