@@ -8,7 +8,8 @@ import zipfile
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-PACKAGE = "src/kineme/"
+#: Folders of the packages, and how much of their paths a wheel leaves out.
+PACKAGES = {"src/kineme/": "src/", "experiments/kineme_experiments/": "experiments/"}
 #: Beside the package, in the source archive.
 BESIDE = {
     "CHANGELOG.md", "CITATION.cff", "LICENSE", "MANIFEST.in", "README.md", "SECURITY.md", "pyproject.toml",
@@ -34,7 +35,7 @@ def tracked(under: str = "") -> set[str]:
 def faults_of_wheel(wheel: Path) -> list[str]:
     """What is missing in a wheel or too much; [] if it holds the package, its licenses and its records."""
     records = "-".join(wheel.name.split("-")[:2]) + ".dist-info"
-    wanted = {name.removeprefix("src/") for name in tracked(PACKAGE)}
+    wanted = {name.removeprefix(outer) for package, outer in PACKAGES.items() for name in tracked(package)}
     wanted |= {f"{records}/{name}" for name in RECORDS} | {f"{records}/licenses/{name}" for name in LICENSES}
     with zipfile.ZipFile(wheel) as archive:
         return _differences(wheel.name, set(archive.namelist()), wanted)
@@ -45,7 +46,8 @@ def faults_of_source(archive: Path) -> list[str]:
     with tarfile.open(archive) as opened:
         held = {member.name.partition("/")[2] for member in opened.getmembers() if member.isfile()}
     held = {name for name in held if ".egg-info/" not in name}
-    return _differences(archive.name, held, tracked(PACKAGE) | BESIDE | WRITTEN)
+    packages = set().union(*map(tracked, PACKAGES))
+    return _differences(archive.name, held, packages | BESIDE | WRITTEN)
 
 
 def _differences(name: str, held: set[str], wanted: set[str]) -> list[str]:

@@ -103,10 +103,10 @@ def test_only_commands_import_experiments_and_experiments_no_front_ends():
     experiments = sorted((ROOT / "experiments" / "kineme_experiments").rglob("*.py"))
     assert experiments
     assert not [path for path in experiments for _, chapter, *_ in _imported(path) if chapter in {"cli", "studio"}]
-    importing = {path: [one for one in _all_imports(path) if one.startswith("kineme_experiments")] for path in _modules()}
-    assert {_chapter_of(path) for path, names in importing.items() if names} == {"cli"}
-    ]
-    assert {_chapter_of(path) for path in importing} == {"cli"}
+    importing = {
+        _chapter_of(path) for path in _modules() for name in _all_imports(path) if name.startswith("kineme_experiments")
+    }
+    assert importing == {"cli"}
 
 
 def test_every_chapter_and_room_that_is_listed_exists():
