@@ -14,7 +14,7 @@ from library_crashes import BATCH, check_what_is_left, draw_batch, kill_while_le
 from library_samples import contents, draw_movements
 
 from kineme import ActionLibrary, DataError
-from kineme.library.storage.folder import FILE
+from kineme.library.storage.connection import FILE
 
 KILLS, KILLS_OF_ONE_LIBRARY = 100, 10
 FLIPS = 3000

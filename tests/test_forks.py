@@ -13,7 +13,7 @@ import pytest
 
 from kineme import DMP, ActionLibrary, DataError, Trajectory
 from kineme.kernels import Laplacian
-from kineme.library.storage import fork_safety
+from kineme.library.storage import safety
 from kineme.runtime import compiled, forks, parallel
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="no forks here")
@@ -144,7 +144,7 @@ def test_no_connection_is_open_over_a_fork(library):
 
 
 def test_a_child_refuses_a_library_that_was_in_use_at_the_fork(monkeypatch, library):
-    monkeypatch.setattr(fork_safety, "_PATIENCE", 0.1)
+    monkeypatch.setattr(safety, "_PATIENCE", 0.1)
     reading, done = threading.Event(), threading.Event()
 
     def read():

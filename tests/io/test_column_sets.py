@@ -13,7 +13,7 @@ import kineme
 from kineme.io.inspection.inspect import inspect
 from kineme.io.name_rule import NameRule
 from kineme.io.recordings import read_paths
-from kineme.library.recognition.known_sources import known_sources
+from kineme.library.storage.source import known_sources
 from kineme.movements.channels.detect import name_of
 from kineme.movements.tables.layout import Layout
 

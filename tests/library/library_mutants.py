@@ -17,7 +17,7 @@ from library_samples import contents
 
 import kineme
 from kineme import ActionLibrary, KinemeError
-from kineme.library.storage.folder import FILE
+from kineme.library.storage.connection import FILE
 from kineme.library.storage.schema import COLUMNS
 
 VALUES = (

@@ -8,7 +8,7 @@ from contextlib import closing
 import numpy as np
 
 from kineme import Demonstrations
-from kineme.library.storage.folder import FILE
+from kineme.library.storage.connection import FILE
 from kineme.library.storage.schema import COLUMNS
 
 

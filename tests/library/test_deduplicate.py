@@ -9,7 +9,7 @@ from library_samples import draw_movements
 
 import kineme
 from kineme import ActionLibrary
-from kineme.library.learning import learn
+from kineme.library import learn
 from kineme.library.storage.source import Source
 from kineme.orientation import exp
 

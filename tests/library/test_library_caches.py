@@ -12,10 +12,10 @@ import pytest
 from library_samples import draw_movements
 
 from kineme import ActionLibrary
-from kineme.library.recognition import calibration_cache
-from kineme.library.recognition import reduced_features_cache as features_cache
-from kineme.library.recognition.members import members_of
-from kineme.library.recognition.recognize import LibraryRecognizer
+from kineme.library import calibration_cache
+from kineme.library import reduced_features_cache as features_cache
+from kineme.library.members import members_of
+from kineme.library.recognize import LibraryRecognizer
 from kineme.recognition.confidence import EXPONENT
 from kineme.recognition.conformal import Calibration, calibrate
 

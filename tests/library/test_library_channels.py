@@ -15,11 +15,11 @@ import kineme
 from kineme import ActionLibrary, Demonstrations
 from kineme.dmp.generation.generate import MovementOptions, generate
 from kineme.errors import DataError, TrajectoryError
-from kineme.library.recognition.recognize import LibraryRecognizer
+from kineme.library.grounding import learned_of
+from kineme.library.recognize import LibraryRecognizer
 from kineme.library.storage.channels import channels_of_text, other_columns
-from kineme.library.storage.folder import FILE
+from kineme.library.storage.connection import FILE
 from kineme.library.storage.read import movements
-from kineme.library.symbols.grounding import learned_of
 from kineme.movements.channels.channel import Channel
 from kineme.movements.trajectories.channels import of_channels
 from kineme.orientation import PoseDMP, exp, product

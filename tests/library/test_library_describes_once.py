@@ -8,7 +8,7 @@ from library_samples import draw_movements
 
 import kineme.anchoring
 from kineme import ActionLibrary, Recognizer
-from kineme.library.recognition.recognize import LibraryRecognizer
+from kineme.library.recognize import LibraryRecognizer
 from kineme.similarity import describe
 
 

@@ -11,7 +11,7 @@ import pytest
 from library_samples import contents, draw_movements, tables
 
 from kineme import ActionLibrary, DataError
-from kineme.library.storage.folder import FILE
+from kineme.library.storage.connection import FILE
 
 
 @pytest.fixture(scope="module")

@@ -22,7 +22,7 @@ from library_samples import contents, draw_movements
 
 from kineme import ActionLibrary, DataError
 from kineme.library.storage import connection, store
-from kineme.library.storage.folder import FILE
+from kineme.library.storage.connection import FILE
 
 
 @pytest.fixture

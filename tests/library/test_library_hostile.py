@@ -16,9 +16,8 @@ from library_attacks import DEFINITIONS, ROWS, attack, copy_of, make_endless, ma
 from library_samples import contents
 
 from kineme import ActionLibrary, DataError, KinemeError
-from kineme.library.storage import defense
-from kineme.library.storage.connection import connect
-from kineme.library.storage.folder import FILE
+from kineme.library.storage import safety
+from kineme.library.storage.connection import FILE, connect
 from kineme.library.storage.schema import SCHEMA_VERSION
 
 
@@ -222,7 +221,7 @@ def test_pages_that_lead_to_each_other_do_not_hang(export, tmp_path, monkeypatch
     make_endless(export)
     start = time.monotonic()
     _is_refused(export, tmp_path, r"damaged bytes")
-    monkeypatch.setattr(defense, "_SECONDS", 0.2)
+    monkeypatch.setattr(safety, "_SECONDS", 0.2)
     with ActionLibrary(_opened(export, tmp_path), read_only=True) as library:
         assert any("interrupted" in str(one) for one in library.verify())
     assert time.monotonic() - start < 300
@@ -236,8 +235,8 @@ def test_what_a_file_defines_is_never_trusted(victim, tmp_path, mode):
         assert connection.execute("PRAGMA trusted_schema").fetchone() == (0,)
         assert connection.execute("PRAGMA cell_size_check").fetchone() == (1,)
         if hasattr(connection, "getconfig"):  # from Python 3.12 on
-            assert not any(connection.getconfig(getattr(sqlite3, name)) for name in defense._OFF)
-        defense.defend_foreign(connection, path)
+            assert not any(connection.getconfig(getattr(sqlite3, name)) for name in safety._OFF)
+        safety.defend_foreign(connection, path)
         assert connection.execute("PRAGMA query_only").fetchone() == (1,)
         assert connection.getlimit(sqlite3.SQLITE_LIMIT_TRIGGER_DEPTH) == 0
         assert connection.getlimit(sqlite3.SQLITE_LIMIT_LENGTH) == max(1 << 20, path.stat().st_size)

@@ -12,7 +12,7 @@ from library_samples import draw_movements
 
 import kineme
 from kineme import ActionLibrary, Demonstrations, SpecificationError, Trajectory, TrajectoryError
-from kineme.library.learning import learn as learning
+from kineme.library import learn as learning
 from kineme.library.storage.source import Source
 from kineme.similarity.describe import feature_rows
 

@@ -16,10 +16,10 @@ from kineme import ActionLibrary, Recognizer
 from kineme.anchoring.proposals.propose import propose as propose_clusters
 from kineme.errors import TrajectoryError
 from kineme.io.people import each_person
-from kineme.library.recognition.recognize import LibraryRecognizer
-from kineme.library.storage.folder import FILE
-from kineme.library.symbols import proposals
-from kineme.library.symbols.recognized import known_symbols
+from kineme.library import proposals
+from kineme.library.proposals import known_symbols
+from kineme.library.recognize import LibraryRecognizer
+from kineme.library.storage.connection import FILE
 
 PEOPLE = ["anna", "ben", "cleo"]
 

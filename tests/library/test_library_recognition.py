@@ -10,9 +10,9 @@ from library_samples import draw_movements
 
 from kineme import ActionLibrary, Demonstrations, Recognizer
 from kineme.errors import SpecificationError, TrajectoryError
-from kineme.library.recognition import calibration_cache
-from kineme.library.recognition import reduced_features_cache as features_cache
-from kineme.library.recognition.recognize import LibraryRecognizer
+from kineme.library import calibration_cache
+from kineme.library import reduced_features_cache as features_cache
+from kineme.library.recognize import LibraryRecognizer
 from kineme.recognition import sampled_calibration
 from kineme.recognition.left_out import distances
 from kineme.similarity.stored_references import StoredReferences

@@ -11,7 +11,7 @@ import pytest
 
 import kineme
 from kineme.anchoring.proposals.proposals import Proposal, Proposals
-from kineme.library.symbols.proposals import _without
+from kineme.library.proposals import _without
 
 MIXED = {"CShape": "round", "GShape": "gee", "NShape": "mixed", "Sine": "mixed"}
 

@@ -9,7 +9,7 @@ import pytest
 from library_samples import draw_movements
 
 from kineme import ActionLibrary, Recognizer, SpecificationError, Trajectory
-from kineme.library.recognition.recognize import LibraryRecognizer
+from kineme.library.recognize import LibraryRecognizer
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import pytest
 from library_samples import draw_movements
 
 from kineme import ActionLibrary, Demonstrations, SpecificationError, TrajectoryError
-from kineme.library.learning import learn as learning
+from kineme.library import learn as learning
 from kineme.library.storage.undo import can_undo
 
 

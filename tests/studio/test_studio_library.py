@@ -19,7 +19,7 @@ from studio_samples import asked, drawing, make_library
 from kineme import ActionLibrary, Trajectory
 from kineme.cli import main
 from kineme.errors import DataError
-from kineme.library.learning import learn as learning
+from kineme.library import learn as learning
 from kineme.library.storage.store import Store
 from kineme.studio.server import library_routes
 from kineme.studio.server.studio import Studio

@@ -69,8 +69,7 @@ def anchor(folder: Path, **options: Any) -> None:
     Example: kineme anchor --library actions/ --accept all --names names.json
     """
     from kineme.library.library import ActionLibrary
-    from kineme.library.symbols.proposals import propose
-    from kineme.library.symbols.recognized import Recognized, assign_recognized, recognized
+    from kineme.library.proposals import Recognized, assign_recognized, propose, recognized
 
     scripted = options["accept"] is not None or options["reject"] is not None
     interactive = not scripted and not options["as_json"] and sys.stdin.isatty()

@@ -63,8 +63,8 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
     from kineme.io.annotations.writers import targets_of, write_annotations
     from kineme.io.entries import expanded, paths_of
     from kineme.io.inspection.gaps import notes_on_gaps
+    from kineme.library.annotate import annotate as find
     from kineme.library.library import ActionLibrary
-    from kineme.library.recognition.annotate import annotate as find
 
     as_json, as_csv, force, error_rate = (options.pop(one) for one in ("as_json", "as_csv", "force", "error_rate"))
     if as_csv and (as_json or output is not None):

@@ -126,7 +126,7 @@ def _people(root: Path, recordings: Any, person: str | None, by_person: bool) ->
 
 
 def _learn(library: Any, root: Path, recordings: Any, options: dict[str, Any], labels: list[Any], groups: Any) -> Any:
-    from kineme.library.learning.recordings import learn_recordings
+    from kineme.library.learn import learn_recordings
 
     with _progress(len(recordings)) as progress:
         return learn_recordings(library.store, recordings, options, labels, progress, root, groups)

@@ -64,7 +64,7 @@ def list_symbols(folder: Path, version: int | None, as_json: bool) -> None:
 @json_option
 def show(symbol: str, folder: Path, as_json: bool) -> None:
     """Show one symbol: its movements, where they come from, and how they vary."""
-    from kineme.library.symbols.symbol_report import symbol_report
+    from kineme.library.storage.symbols import symbol_report
 
     with opened(folder) as actions:
         data = symbol_report(actions.store, symbol)

@@ -170,7 +170,7 @@ def read(paths: Path | Sequence[Path], options: dict[str, Any], library: Any = N
         if known.get(name) is None:
             known.pop(name, None)
     if library is not None:
-        from kineme.library.recognition.known_sources import known_sources
+        from kineme.library.storage.source import known_sources
 
         known["known"] = known_sources(library.store)
     known["kinds"] = dict(known.get("kinds") or ()) or None

@@ -75,7 +75,7 @@ def between(first: str, second: str, folder: Path, as_json: bool) -> None:
 def draw(path: Path, folder: Path, as_json: bool) -> None:
     """Draw a map of the symbols, similar ones near each other: a .png, .svg or .pdf file."""
     from kineme.anchoring.figures.symbol_map import draw_map
-    from kineme.library.symbols.grounding import prototype_of, space_of
+    from kineme.library.grounding import prototype_of, space_of
     from kineme.reporting.figures import save_figure
 
     with opened(folder) as actions:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import SpecificationError
 from kineme.library.storage import changes, export_import, read, symbols, undo, verify
-from kineme.library.storage.folder import FILE, as_folder
+from kineme.library.storage.connection import FILE, as_folder
 from kineme.library.storage.read import Ids
 from kineme.library.storage.specification import Specification
 from kineme.library.storage.store import Store, history
@@ -23,15 +23,14 @@ if TYPE_CHECKING:
     from kineme.anchoring.grounding.space import Between, Near
     from kineme.anchoring.proposals.proposals import Proposal
     from kineme.dmp.discrete.dmp import DMP, Primitives
-    from kineme.library.learning.learn import LearnReport
-    from kineme.library.recognition.recognize import LibraryRecognizer
+    from kineme.library.learn import LearnReport
+    from kineme.library.proposals import LibraryProposals, Review
+    from kineme.library.recognize import LibraryRecognizer
     from kineme.library.storage.source import Source
+    from kineme.library.storage.store import Version
     from kineme.library.storage.symbols import Symbol
     from kineme.library.storage.undo import Undone
     from kineme.library.storage.verify import Problem
-    from kineme.library.storage.versions import Version
-    from kineme.library.symbols.proposals import LibraryProposals
-    from kineme.library.symbols.review import Review
     from kineme.movements.channels.channel import Channels
     from kineme.movements.trajectories.demonstrations import Demonstrations
     from kineme.movements.trajectories.movements_like import HasDemonstrations
@@ -213,7 +212,7 @@ class ActionLibrary:
         the same content read with the same options. Such a movement is added to the symbol of its label only if it
         belongs to none, and who showed it is stored only if that was not known.
         """
-        from kineme.library.learning.learn import learn
+        from kineme.library.learn import learn
 
         return learn(self.store, movements, labels, source, places, progress, groups)
 
@@ -319,7 +318,7 @@ class ActionLibrary:
 
     @cached_property
     def _recognizer(self) -> LibraryRecognizer:
-        from kineme.library.recognition.recognize import LibraryRecognizer
+        from kineme.library.recognize import LibraryRecognizer
 
         return LibraryRecognizer(self.store)
 
@@ -421,7 +420,7 @@ class ActionLibrary:
         dict
             Name of the symbol -> number of new members.
         """
-        from kineme.library.symbols.recognized import assign_recognized, recognized
+        from kineme.library.proposals import assign_recognized, recognized
 
         return assign_recognized(self.store, recognized(self.store, error_rate))
 
@@ -440,7 +439,7 @@ class ActionLibrary:
         proposal is left out if four fifths of its movements were in one rejected proposal. Fewer than three movements
         make no proposal.
         """
-        from kineme.library.symbols.proposals import propose
+        from kineme.library.proposals import propose
 
         return propose(self.store, ids, method, n_clusters, min_members)
 
@@ -449,13 +448,13 @@ class ActionLibrary:
 
         Members that were assigned to other symbols since the proposal was made stay there.
         """
-        from kineme.library.symbols.proposals import accept
+        from kineme.library.proposals import accept
 
         accept(self.store, proposal, name, description)
 
     def reject(self, proposal: Proposal) -> None:
         """Reject a proposal: its movements stay without a symbol and are not proposed again."""
-        from kineme.library.symbols.proposals import reject
+        from kineme.library.proposals import reject
 
         reject(self.store, proposal)
 
@@ -474,25 +473,25 @@ class ActionLibrary:
         units : str or sequence of d str, optional
             Units of the positions, as "mm", or one of each dimension.
         """
-        from kineme.library.symbols.grounding import ground_symbol
+        from kineme.library.grounding import ground_symbol
 
         return ground_symbol(self.store, who, by, units)
 
     def nearest(self, who: str, k: int = 3) -> tuple[Near, ...]:
         """The symbols most similar to one, nearest first; see `kineme.anchoring.grounding.space.ConceptualSpace`."""
-        from kineme.library.symbols.grounding import space_of
+        from kineme.library.grounding import space_of
 
         return space_of(self.store).nearest(self[who].name, k)
 
     def between(self, a: str, b: str, eps: float = 0.25) -> tuple[Between, ...]:
         """The symbols that lie between two, the smallest detour first."""
-        from kineme.library.symbols.grounding import space_of
+        from kineme.library.grounding import space_of
 
         return space_of(self.store).between(self[a].name, self[b].name, eps)
 
     def morph(self, a: str, b: str, shares: ArrayLike = 0.5) -> Primitives:
         """Primitives between two symbols, one for each share of the way: 0 is a, 1 is b."""
-        from kineme.library.symbols.grounding import morph_symbols
+        from kineme.library.grounding import morph_symbols
 
         return morph_symbols(self.store, a, b, shares)
 
@@ -501,6 +500,6 @@ class ActionLibrary:
 
         The result suggests calls of `merge` and `split`; nothing is changed.
         """
-        from kineme.library.symbols.review import review
+        from kineme.library.proposals import review
 
         return review(self.store)

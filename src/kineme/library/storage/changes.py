@@ -11,9 +11,8 @@ from kineme.errors import SpecificationError
 from kineme.library.storage.read import as_ids
 from kineme.library.storage.rows import Row, among, check_text, listed, next_key, parsed_column, select
 from kineme.library.storage.schema import COLUMNS, MAX_DOCUMENT
-from kineme.library.storage.store import NOW, Store
+from kineme.library.storage.store import NOW, Change, Store
 from kineme.library.storage.symbols import HOW, add_members, check_name, make, state_of
-from kineme.library.storage.versions import Change
 from kineme.validation import check_choice, check_number
 
 _STATE = COLUMNS["symbol_state"]

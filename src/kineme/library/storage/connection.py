@@ -8,21 +8,73 @@ commits thousands of movements at a time.
 from __future__ import annotations
 
 import os
+import re
 import sqlite3
+import time
 import zlib
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote
 
-from kineme.errors import DataError
-from kineme.library.storage.defense import defend
-from kineme.library.storage.folder import LOGS, new_database
-from kineme.library.storage.fork_safety import Connection, open_connection
+from kineme.errors import DataError, KinemeError, SpecificationError
 from kineme.library.storage.rows import Row, damage, insert, select
+from kineme.library.storage.safety import Connection, defend, open_connection
 from kineme.library.storage.schema import APPLICATION_ID, CREATE, META, MIGRATIONS, PAGE_SIZE, SCHEMA_VERSION
-from kineme.library.storage.sqlite_errors import in_plain_words
+from kineme.reporting.atomic import whole_file
+
+_DAMAGED = (
+    "expected {path} to be readable, got damaged bytes ({error}); take the file from a backup or an export: where the "
+    "file can still be opened, kineme library verify names what is damaged"
+)
+
+#: Messages of SQLite about damage without an error code of its own.
+_DAMAGE = ("decode", "unsupported file format")
+
+#: Primary result code of SQLite -> message; see sqlite.org/rescode.html for the codes.
+_WORDS = {
+    sqlite3.SQLITE_BUSY: (
+        "expected to write to {path}, got no turn: another process has been writing for more than {wait:g} s; "
+        "try again when it has finished"
+    ),
+    sqlite3.SQLITE_FULL: (
+        "expected room to write to {path}, got a full disk; nothing of this step was stored, and what was committed "
+        "before is safe: free some space and run it again"
+    ),
+    sqlite3.SQLITE_IOERR: (
+        "expected to read or write {path}, got an input/output error ({error}); nothing of this step was stored, and "
+        "what was committed before is safe: check the disk and its free space, and run it again"
+    ),
+    sqlite3.SQLITE_READONLY: (
+        "expected to write to {path}, got a read-only file or folder ({error}); open it with read_only=True or change "
+        "the permissions"
+    ),
+    sqlite3.SQLITE_CANTOPEN: (
+        "expected to open {path}, got {error}; check that the folder exists and that you may read and write in it, or "
+        "open it with read_only=True; where a crash has left a log (-wal) beside it, reading needs to write once"
+    ),
+    sqlite3.SQLITE_CORRUPT: _DAMAGED,
+    sqlite3.SQLITE_INTERRUPT: (
+        "expected {path} to be read within a time that its size allows, got a file whose pages do not end; do not use "
+        "it: take it from a backup or an export that you trust"
+    ),
+    sqlite3.SQLITE_TOOBIG: "expected {path} to hold no value larger than itself, got one ({error}): damaged bytes",
+    sqlite3.SQLITE_NOTADB: (
+        "expected {path} to be a library, got a file that is no database ({error}); correct the path, or take it from "
+        "a backup"
+    ),
+}
+_WORDS[sqlite3.SQLITE_LOCKED] = _WORDS[sqlite3.SQLITE_BUSY]
+_WORDS[sqlite3.SQLITE_PERM] = _WORDS[sqlite3.SQLITE_READONLY]
+
+
+FILE = "library.sqlite"
+LOGS = ("-wal", "-journal")  # suffixes of the files beside a database from which SQLite may change it
+_COMPANIONS = (*LOGS, "-shm")
+_DAY = 86400.0  # seconds
+_LEFT = re.compile(r"\..+\.[0-9a-f]{8}")
 
 _WRITER_CACHE_KIB = 65536
 _LOG_BYTES = 1 << 26  # size to which the write-ahead log is truncated
@@ -177,3 +229,82 @@ def transaction(connection: sqlite3.Connection) -> Iterator[None]:
         if connection.in_transaction:
             connection.execute("ROLLBACK")
         raise
+
+
+def as_folder(folder: Any) -> Path:
+    """The folder of a library that exists or is to be created.
+
+    Raises
+    ------
+    SpecificationError
+        No path, or one without a name: an empty text would be the current folder.
+    """
+    name = os.fsdecode(folder) if isinstance(folder, str | os.PathLike) else ""
+    if not name.strip() or "\0" in name:
+        raise SpecificationError(f"expected the folder of a library, got {folder!r}; the current one is '.'")
+    return Path(name)
+
+
+@contextmanager
+def new_database(path: Path) -> Iterator[Path]:
+    """Context manager: a name beside `path` for a new database, which is renamed to `path`, if that does not exist.
+
+    Raises
+    ------
+    FileExistsError
+        A file of that name exists, or another process was faster; it is unchanged.
+    """
+    if not path.exists():
+        _remove_old_leftovers(path.parent)
+    with whole_file(path, replace=False, companions=_COMPANIONS) as beside:
+        yield beside
+
+
+def _remove_old_leftovers(folder: Path) -> None:
+    """Delete the files of processes that were killed here more than a day ago.
+
+    Unlike `kineme.reporting.atomic.remove_leftovers`, for libraries of any name: an export often has a name that is
+    never used again.
+    """
+    for path in folder.glob(".*"):
+        with suppress(OSError):  # another process was faster, or no permission
+            if _LEFT.fullmatch(path.name) and time.time() - path.lstat().st_mtime > _DAY and _is_library(path):
+                for end in ("", *_COMPANIONS):
+                    path.with_name(path.name + end).unlink(missing_ok=True)
+
+
+def _is_library(path: Path) -> bool:
+    """Whether a file begins like a library."""
+    if path.is_symlink() or not path.is_file():
+        return False
+    with path.open("rb") as file:
+        head = file.read(72)
+    return head[:16] == b"SQLite format 3\0" and head[68:] == APPLICATION_ID.to_bytes(4, "big")
+
+
+class BusyError(DataError):
+    """Another process writes; the same may be tried again later."""
+
+
+@contextmanager
+def in_plain_words(path: Path, wait: float) -> Iterator[None]:
+    """Convert errors of the database to `DataError`; programming errors stay as they are."""
+    try:
+        yield
+    except KinemeError:
+        raise
+    except FileExistsError:  # handled by the caller
+        raise
+    except OSError as error:
+        raise DataError(f"expected to read or write {path}, got an error of the system ({error})") from error
+    except UnicodeDecodeError as error:  # of a name of a column
+        raise DataError(_DAMAGED.format(path=path, error=error)) from error
+    except sqlite3.Error as error:
+        code = getattr(error, "sqlite_errorcode", None)
+        words = _WORDS.get(code & 0xFF) if code is not None else None
+        if words is None and any(said in str(error) for said in _DAMAGE):
+            words = _DAMAGED
+        if words is None:
+            raise
+        kind = BusyError if words == _WORDS[sqlite3.SQLITE_BUSY] else DataError
+        raise kind(words.format(path=path, wait=wait, error=error)) from error

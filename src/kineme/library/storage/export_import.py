@@ -9,12 +9,20 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 
 from kineme.errors import DataError
-from kineme.library.storage.connection import check_alone, check_kind, connect, migrate
-from kineme.library.storage.defense import defend_foreign, limited, limited_copy
-from kineme.library.storage.folder import FILE, LOGS, as_folder, new_database
+from kineme.library.storage.connection import (
+    FILE,
+    LOGS,
+    as_folder,
+    check_alone,
+    check_kind,
+    connect,
+    in_plain_words,
+    migrate,
+    new_database,
+)
 from kineme.library.storage.rows import damage
+from kineme.library.storage.safety import defend_foreign, limited, limited_copy
 from kineme.library.storage.schema import SCHEMA_VERSION
-from kineme.library.storage.sqlite_errors import in_plain_words
 from kineme.library.storage.store import Store
 from kineme.library.storage.verify import verify
 

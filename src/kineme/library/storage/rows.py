@@ -9,8 +9,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from kineme.errors import DataError, SpecificationError
-from kineme.library.storage.column_checks import GOOD
-from kineme.library.storage.schema import BLOBS, COLUMNS, MAX_TEXT, OPTIONAL_BLOBS, SINCE
+from kineme.library.storage.schema import BLOBS, COLUMNS, GOOD, MAX_TEXT, OPTIONAL_BLOBS, SINCE
 
 Row = tuple[Any, ...]
 

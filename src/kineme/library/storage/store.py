@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import sqlite3
 import uuid
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from numbers import Integral
 from pathlib import Path
@@ -14,15 +15,21 @@ from threading import Lock, RLock
 from typing import Any
 
 from kineme.errors import DataError, SpecificationError
-from kineme.library.storage import fork_safety
+from kineme.library.storage import safety
 from kineme.library.storage.channels import channels_of_text
-from kineme.library.storage.connection import check_kind, checked_meta, connect, create, migrate, transaction
-from kineme.library.storage.defense import size_of
-from kineme.library.storage.rows import insert, parsed_column, select
+from kineme.library.storage.connection import (
+    check_kind,
+    checked_meta,
+    connect,
+    create,
+    in_plain_words,
+    migrate,
+    transaction,
+)
+from kineme.library.storage.rows import Row, damaged, insert, parsed_column, retire, select
+from kineme.library.storage.safety import size_of
 from kineme.library.storage.schema import COUNTED, LARGEST_ID, READABLE, SCHEMA_VERSION
 from kineme.library.storage.specification import Specification, as_n_dims
-from kineme.library.storage.sqlite_errors import in_plain_words
-from kineme.library.storage.versions import Change, Moment, Version, moment_at
 from kineme.movements.channels.channel import Channels
 
 NOW = LARGEST_ID  # later than every version: the current state
@@ -66,7 +73,7 @@ class Store:
         self._waking, self._asleep, self._closed = Lock(), False, False
         if not self.path.exists():
             self._create(specification)
-        with in_plain_words(self.path, wait), fork_safety.awake():
+        with in_plain_words(self.path, wait), safety.awake():
             self._reader = self._connect()
             try:
                 self._check_kind()
@@ -77,10 +84,10 @@ class Store:
             except BaseException:
                 self._reader.close()
                 raise
-            fork_safety.register(self)
+            safety.register(self)
 
     def _connect(self) -> sqlite3.Connection:
-        fork_safety.refuse_if_lost(self.path)
+        safety.refuse_if_lost(self.path)
         return connect(self.path, "ro" if self.read_only else "rw", self.wait).allow_forks()
 
     def sleep(self) -> None:
@@ -93,7 +100,7 @@ class Store:
             self._writer = None
 
     def carried_over(self) -> list[sqlite3.Connection]:
-        """The connections that were open at a fork; see `fork_safety`."""
+        """The connections that were open at a fork; see `safety`."""
         if self._closed or self._asleep:
             return []
         return [one for one in (self._writer, self._reader) if one is not None]
@@ -182,9 +189,9 @@ class Store:
         DataError
             The library was closed, or is not to be used in this process.
         """
-        with fork_safety.awake(), in_plain_words(self.path, self.wait):
+        with safety.awake(), in_plain_words(self.path, self.wait):
             # Before the lock: in a forked child, a thread that does not exist may hold it.
-            fork_safety.refuse_if_lost(self.path)
+            safety.refuse_if_lost(self.path)
             with self._read_turn:
                 if not self._n_reading:
                     self._check_open()
@@ -209,9 +216,9 @@ class Store:
             Opened for reading only, the file vanished, the disk is full, another process writes for too long.
         """
         detail = {} if detail is None else detail
-        with fork_safety.awake(), in_plain_words(self.path, self.wait):
+        with safety.awake(), in_plain_words(self.path, self.wait):
             # Before the lock: in a forked child, a thread that does not exist may hold it.
-            fork_safety.refuse_if_lost(self.path)
+            safety.refuse_if_lost(self.path)
             with self._write_turn:
                 self._check_open()
                 self._wake()
@@ -260,9 +267,9 @@ class Store:
 
     def close(self) -> None:
         """Close both connections, once no thread uses them; the last process to close leaves a single file."""
-        if fork_safety.is_lost(self.path):
+        if safety.is_lost(self.path):
             return
-        with fork_safety.awake():
+        with safety.awake():
             self._closed = True  # no new reads or writes begin
             with self._read_turn:
                 self._reader.close()
@@ -276,3 +283,75 @@ def history(store: Store) -> tuple[Version, ...]:
     with store.reading() as connection:
         rows = select(connection, "version", "id <= :v", {"v": store.as_of})
     return tuple(Version(row[0], row[1], row[2], parsed_column("version", row, "detail", dict)) for row in rows)
+
+
+@dataclass(frozen=True)
+class Version:
+    """One version.
+
+    Attributes
+    ----------
+    id : int
+        Its number, from 1.
+    at : str
+        When it was committed, ISO 8601, UTC.
+    action : str
+        "learn", "rename", ...
+    detail : mapping
+        Details of the change.
+    """
+
+    id: int
+    at: str
+    action: str
+    detail: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A version and its numbers of alive rows, by which rows that damage has hidden are noticed."""
+
+    version: int
+    movements: int = 0
+    members: int = 0
+    symbols: int = 0
+
+
+def moment_at(connection: sqlite3.Connection, version: int) -> Moment:
+    """The last version up to the given one.
+
+    Raises
+    ------
+    DataError
+        Its row is damaged.
+    """
+    last = connection.execute("SELECT max(id) FROM version WHERE id <= :v", {"v": version}).fetchone()[0]
+    if last is None:
+        return Moment(0)
+    rows = select(connection, "version", "id = :last", {"last": last})
+    if not rows:
+        raise damaged("version", (last,))
+    return Moment(last, *rows[0][4:])
+
+
+@dataclass(frozen=True)
+class Change:
+    """An open transaction."""
+
+    connection: sqlite3.Connection
+    version: int
+    counts: dict[str, int]
+
+    def insert(self, table: str, rows: Sequence[Row]) -> None:
+        """Add rows to a table."""
+        insert(self.connection, table, rows)
+        self._count(table, len(rows))
+
+    def retire(self, table: str, rows: Sequence[Row]) -> None:
+        """Mark selected rows as removed from this version on."""
+        retire(self.connection, table, rows, self.version)
+        self._count(table, -len(rows))
+
+    def _count(self, table: str, more: int) -> None:
+        if table in COUNTED:
+            self.counts[COUNTED[table]] += more

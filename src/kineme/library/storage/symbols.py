@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
+from kineme.library.storage.read import groups, movements, records
 from kineme.library.storage.rows import (
     ALIVE,
     Row,
@@ -27,8 +28,7 @@ from kineme.library.storage.rows import (
     select,
 )
 from kineme.library.storage.schema import COLUMNS, MAX_TEXT
-from kineme.library.storage.store import Store
-from kineme.library.storage.versions import Change, Moment
+from kineme.library.storage.store import Change, Moment, Store
 
 _ALIKE = 100  # characters of names that are compared: the time of the search is quadratic
 
@@ -209,3 +209,50 @@ def add_members(change: Change, pairs: Sequence[tuple[int, int]], how: str) -> N
     first = next_key(change.connection, "member")
     rows = [(first + k, movement, key, how, change.version, None) for k, (movement, key) in enumerate(pairs)]
     change.insert("member", rows)
+
+
+def symbol_report(store: Store, who: str) -> dict[str, Any]:
+    """A symbol as plain data.
+
+    Returns
+    -------
+    dict
+        ``id``, ``name``, ``description``, ``prototype``, ``parents``, and ``members``: per movement its id, name, file,
+        position in the file, person, n_samples, duration [s], start and goal.
+    """
+    shown = symbol(store, who)
+    members = []
+    if len(shown):
+        about = records(store, shown.members)
+        files = _files(store, sorted({one["source"] for one in about if one["source"] is not None}))
+        people = groups(store, shown.members).tolist()
+        for one, movement, person in zip(about, movements(store, shown.members), people, strict=True):
+            members.append(
+                {
+                    "id": one["id"],
+                    "name": one["name"],
+                    "source": files.get(one["source"]),
+                    "place": one["place"],
+                    "person": person,
+                    "samples": one["n_samples"],
+                    "duration": one["duration"],
+                    "start": movement.positions[0].tolist(),
+                    "goal": movement.positions[-1].tolist(),
+                }
+            )
+    return {
+        "id": shown.id,
+        "name": shown.name,
+        "description": shown.description,
+        "prototype": shown.prototype,
+        "parents": list(shown.parents),
+        "members": members,
+    }
+
+
+def _files(store: Store, keys: list[int]) -> dict[int, str]:
+    """Key of a source -> its path, as given."""
+    with store.reading() as connection:
+        rows = select(connection, "source", among("id"), {"keys": listed(keys)})
+    path = COLUMNS["source"].index("path")
+    return {row[0]: row[path] for row in rows}

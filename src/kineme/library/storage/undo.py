@@ -10,8 +10,7 @@ from typing import NamedTuple
 from kineme.errors import SpecificationError
 from kineme.library.storage.rows import ALIVE, Row, among, has_table, listed, next_key, parsed_column, select
 from kineme.library.storage.schema import BLOBS, COLUMNS, CONTINUES, OPTIONAL_BLOBS, RESTORE, RETURNS, UNDO
-from kineme.library.storage.store import NOW, Store
-from kineme.library.storage.versions import Change
+from kineme.library.storage.store import NOW, Change, Store
 
 _MOVEMENT = {name: k for k, name in enumerate(COLUMNS["movement"])}
 _STATE = {name: k for k, name in enumerate(COLUMNS["symbol_state"])}

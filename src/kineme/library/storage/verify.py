@@ -1,6 +1,6 @@
 """Verify a library: every page, checksum, value, reference and size.
 
-Checks of contents, which SQLite cannot do, take rows with right checksums whose columns fulfill `column_checks.CHECKS`.
+Checks of contents, which SQLite cannot do, take rows with right checksums whose columns fulfill `schema.CHECKS`.
 They yield the keys of invalid rows with a description of what is wrong.
 """
 
@@ -18,11 +18,21 @@ from numpy.typing import NDArray
 
 from kineme.errors import DataError, KinemeError
 from kineme.library.storage.channels import other_columns
-from kineme.library.storage.column_checks import ALL_GOOD, CHECKS, GOOD
 from kineme.library.storage.connection import connect
-from kineme.library.storage.defense import limited
 from kineme.library.storage.rows import Row, has_table, parsed, row_name, sealed
-from kineme.library.storage.schema import BLOBS, COLUMNS, COUNTED, LARGEST_ID, LATER_META, META, RETURNS
+from kineme.library.storage.safety import limited
+from kineme.library.storage.schema import (
+    ALL_GOOD,
+    BLOBS,
+    CHECKS,
+    COLUMNS,
+    COUNTED,
+    GOOD,
+    LARGEST_ID,
+    LATER_META,
+    META,
+    RETURNS,
+)
 from kineme.library.storage.store import Store
 from kineme.validation import Array
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from kineme.library.storage.rows import Row, among, listed, select
 from kineme.library.storage.schema import COLUMNS, RETURNS, UNDO
-from kineme.library.storage.versions import Version
+from kineme.library.storage.store import Version
 from kineme.reporting.text import counted, printable, shortened
 from kineme.studio.server.studio import Studio
 

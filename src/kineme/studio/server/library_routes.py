@@ -13,7 +13,7 @@ from kineme.anchoring.figures.symbol_map import classical_scaling
 from kineme.anchoring.grounding.space import conceptual_space
 from kineme.dmp.discrete.formulations import FORMULATIONS
 from kineme.io.write_movement import WRITERS
-from kineme.library.recognition.members import described
+from kineme.library.members import described
 from kineme.library.storage import read
 from kineme.library.storage.undo import can_undo
 from kineme.reporting.text import printable

@@ -10,8 +10,8 @@ from fastapi import APIRouter
 from pydantic import BaseModel
 
 from kineme.anchoring.proposals.proposals import Proposal
+from kineme.library import proposals as stored
 from kineme.library.storage import read
-from kineme.library.symbols import proposals as stored
 from kineme.studio.server.plain import numbers, thumbnail
 from kineme.studio.server.records import AsOf, Change, Description, Name, Points, ProposalKey, Version
 from kineme.studio.server.refusals import ConflictError

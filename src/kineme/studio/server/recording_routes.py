@@ -15,8 +15,8 @@ from kineme.io.annotations.label_table import LabelRow
 from kineme.io.annotations.labeled_pieces import labeled_pieces
 from kineme.io.annotations.read_labels import LabelTable
 from kineme.io.merge_files import Recordings
-from kineme.library.learning.recordings import learn_recordings
-from kineme.library.recognition.annotate import annotate
+from kineme.library.annotate import annotate
+from kineme.library.learn import learn_recordings
 from kineme.movements.channels.channel import recorded_names
 from kineme.movements.trajectories.movements import axis_names
 from kineme.sampling import evenly_spaced

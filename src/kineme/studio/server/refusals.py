@@ -14,7 +14,7 @@ from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from kineme.errors import KinemeError
-from kineme.library.storage.sqlite_errors import BusyError
+from kineme.library.storage.connection import BusyError
 from kineme.reporting.text import in_markup
 from kineme.studio.server.studio_words import in_studio_words
 from kineme.studio.server.work import StoppedError

@@ -13,8 +13,8 @@ from kineme.dmp.generation.learned import Learned, learn_one
 from kineme.dmp.styles.learn import learn_styles
 from kineme.dmp.styles.model import StyleModel
 from kineme.errors import SpecificationError, heard_warnings
+from kineme.library.grounding import prototype_of
 from kineme.library.storage import read
-from kineme.library.symbols.grounding import prototype_of
 from kineme.studio.server.rollout_records import Obstacle, Operated, Wanted, What
 from kineme.studio.server.studio import Studio
 from kineme.studio.snapshot.primitive import snapshot_of_primitive

@@ -8,12 +8,12 @@ import numpy as np
 
 from kineme.dmp.discrete.dmp import DMP, Primitives
 from kineme.errors import SpecificationError
+from kineme.library.grounding import prototype_of
 from kineme.library.library import ActionLibrary
-from kineme.library.recognition.members import Members, members_of
-from kineme.library.recognition.recognize import known_members
+from kineme.library.members import Members, members_of
+from kineme.library.recognize import known_members
 from kineme.library.storage import read
 from kineme.library.storage.symbols import symbol
-from kineme.library.symbols.grounding import prototype_of
 from kineme.recognition.classifiers import fit_prototype
 from kineme.recognition.early.hypotheses import Early
 from kineme.recognition.known_classes import FittedRecognizer, KnownClasses, known_classes

@@ -14,7 +14,7 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.library.recognition.members import Members, described_references
+from kineme.library.members import Members, described_references
 from kineme.library.storage.rows import among, listed
 from kineme.library.storage.store import Store
 from kineme.recognition.conformal import Calibration, calibrate

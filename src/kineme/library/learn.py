@@ -7,19 +7,22 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from itertools import pairwise
+from pathlib import PurePath
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import TrajectoryError
-from kineme.library.learning.commit import Committed, commit, serialize_new
-from kineme.library.learning.deduplicate import Batch, find_stored
-from kineme.library.learning.serialize import check, evenly_sampled, relative_times, stored_times
+from kineme.io.merge_files import Recordings
+from kineme.io.merge_files import Source as File
+from kineme.library.commit import Batch, Committed, commit, find_stored, serialize_new
+from kineme.library.serialize import check, evenly_sampled, relative_times, stored_times
 from kineme.library.storage.channels import other_columns, to_bytes
 from kineme.library.storage.read import count
 from kineme.library.storage.source import Source
@@ -344,3 +347,48 @@ def _times_as_read(demos: Demonstrations, even: NDArray[np.bool_]) -> Array:
         read = np.frombuffer(stored, np.float32 if len(stored) == 4 * (b - a) else np.float64)
         relative[a:b] = (demos.times[a] + read) - demos.times[a]
     return relative
+
+
+def learn_recordings(  # noqa: PLR0913, PLR0917 - those of `ActionLibrary.learn`
+    store: Store,
+    recordings: Recordings,
+    options: Mapping[str, Any] | None = None,
+    labels: Sequence[str | None] | None = None,
+    progress: Progress | None = None,
+    root: str | PurePath = "",
+    groups: Sequence[str | None] | None = None,
+) -> LearnReport:
+    """Store the recordings of `kineme.io.recordings.read_recordings`.
+
+    Parameters
+    ----------
+    store : Store
+        The library, ``ActionLibrary.store``.
+    recordings : Recordings
+    options : mapping, optional
+        Options of the reader. The same file read with other options is another source.
+    labels : sequence of n str or None, optional
+        Names of symbols; by default each movement's own label.
+    progress : callable, optional
+        As for `ActionLibrary.learn`.
+    root : str or Path, optional
+        Folder that was read; stored before the names of the files.
+    groups : sequence of n str or None, optional
+        As for `ActionLibrary.learn`.
+    """
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    told = {name: value for name, value in (options or {}).items() if value is not None}
+    files = {one.path: _source(one, PurePath(root) / one.path, told, now) for one in recordings.sources}
+    return learn(
+        store,
+        recordings.demonstrations,
+        list(recordings.labels) if labels is None else labels,
+        [files[one.path] for one in recordings.sources],
+        places=[one.place for one in recordings.sources],
+        progress=progress,
+        groups=groups,
+    )
+
+
+def _source(one: File, path: PurePath, told: Mapping[str, Any], now: str) -> Source:
+    return Source(path.as_posix(), one.sha256, one.size, path.suffix.lower().lstrip("."), told, now)

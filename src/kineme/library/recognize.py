@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.library.recognition.calibration_cache import calibrated, calibrated_once, sample_comparison
-from kineme.library.recognition.members import Members, described_references, members_of, some_members
-from kineme.library.recognition.reduced_features_cache import ReducedMovements, open_cache, updated
+from kineme.library.calibration_cache import calibrated, calibrated_once, sample_comparison
+from kineme.library.members import Members, described_references, members_of, some_members
+from kineme.library.reduced_features_cache import ReducedMovements, open_cache, updated
 from kineme.library.storage import read
 from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store

@@ -9,7 +9,7 @@ from kineme.errors import KinemeError
 from kineme.io.annotations.annotation import Annotation
 from kineme.io.merge_files import Recordings, Source
 from kineme.io.problem import Problem
-from kineme.library.recognition.recognize import some_of_each_symbol
+from kineme.library.recognize import some_of_each_symbol
 from kineme.library.storage.store import Store
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.recognition.compared_windows import Templates

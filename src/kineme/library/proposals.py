@@ -3,21 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kineme.anchoring.proposals.assign import assign_described
+from kineme.anchoring.proposals.merge_split import Merge, Split, suggest_merges, suggest_splits
 from kineme.anchoring.proposals.proposals import Proposal, Proposals
 from kineme.anchoring.proposals.propose import DEFAULT_METHOD
 from kineme.anchoring.proposals.propose import propose as propose_clusters
 from kineme.errors import SpecificationError
-from kineme.library.recognition.members import described, groups_of
+from kineme.library.members import described, described_references, groups_of
 from kineme.library.storage import changes, read
 from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store, history
-from kineme.library.symbols.recognized import Recognized, known_symbols
+from kineme.library.storage.symbols import symbols
+from kineme.movements.trajectories.labels import label_array
+from kineme.recognition.known_classes import KnownClasses, fit_known_classes, open_set_labels
+from kineme.sampling import evenly_spaced
+
+_MOST = 3000  # movements that are compared at most, equally many of each symbol
+
 
 _SAME = 0.8  # share of members in a rejected proposal from which on a proposal counts as the same
 
@@ -141,3 +149,93 @@ def _without(proposed: Proposals, rejected: list[NDArray[np.intp]]) -> Proposals
         for one in (proposed.proposals[k] for k in kept)
     )
     return Proposals(proposals, number[proposed.clusters], proposed.widths)
+
+
+@dataclass(frozen=True, eq=False)
+class Recognized:
+    """Movements without a symbol that are recognized as one.
+
+    Attributes
+    ----------
+    ids : dict
+        Name of a symbol -> ids of the movements.
+    known : KnownClasses or None
+        By what they were recognized; None if there was nothing to recognize, or no symbol.
+    """
+
+    ids: dict[str, Ids] = field(default_factory=dict)
+    known: KnownClasses | None = None
+
+    def all_ids(self) -> Ids:
+        """Ids of all recognized movements."""
+        return np.concatenate([np.empty(0, dtype=np.int64), *self.ids.values()])
+
+
+def known_symbols(store: Store) -> KnownClasses | None:
+    """What recognizes the symbols, fitted to at most 3000 of their movements; None without any."""
+    if not any(map(len, symbols(store))):
+        return None
+    ids, labels = evenly_many_members(store)
+    how, references = store.specification, described_references(store, ids, labels)
+    return fit_known_classes(
+        how.comparison, references, how.weights, how.classifier, groups_of(store, ids), store.channels
+    )
+
+
+def recognized(store: Store, error_rate: float = 0.05) -> Recognized:
+    """Recognize the movements without a symbol; nothing is changed."""
+    unlabeled = read.unlabeled_ids(store)
+    known = known_symbols(store) if len(unlabeled) else None
+    if known is None:
+        return Recognized()
+    names = open_set_labels(known, described(store, unlabeled, known.comparison), error_rate)[0].tolist()
+    ids = {
+        str(name): unlabeled[np.array([one == name for one in names])]
+        for name in dict.fromkeys(name for name in names if name is not None)
+    }
+    return Recognized(ids, known)
+
+
+def assign_recognized(store: Store, joining: Recognized) -> dict[str, int]:
+    """Assign movements to the symbols that they are recognized as; how many to each."""
+    for name, members in joining.ids.items():
+        changes.assign(store, members, name, "recognized")
+    return {name: len(members) for name, members in joining.ids.items()}
+
+
+@dataclass(frozen=True)
+class Review:
+    """Symbols that could be merged, and symbols that could be split.
+
+    Attributes
+    ----------
+    merges : tuple of Merge
+        See `kineme.anchoring.suggest_merges`.
+    splits : tuple of Split
+        See `kineme.anchoring.suggest_splits`; the parts are ids of movements.
+    """
+
+    merges: tuple[Merge, ...]
+    splits: tuple[Split, ...]
+
+
+def review(store: Store) -> Review:
+    """Compare at most 3000 members of symbols; see `ActionLibrary.review`."""
+    ids, labels = evenly_many_members(store)
+    if len(np.unique(labels)) < 2:
+        return Review((), ())
+    members, like = described(store, ids), store.specification.comparison
+    splits = suggest_splits(members, labels, like=like)
+    return Review(
+        suggest_merges(members, labels, like=like),
+        tuple(one._replace(parts=(ids[one.parts[0]], ids[one.parts[1]])) for one in splits),
+    )
+
+
+def evenly_many_members(store: Store) -> tuple[Ids, NDArray[Any]]:
+    """At most 3000 members of symbols, equally many of each, and the names of their symbols."""
+    shown = [symbol for symbol in symbols(store) if len(symbol)]
+    share = max(1, _MOST // max(1, len(shown)))
+    some = [one.members[evenly_spaced(len(one), share)] for one in shown]
+    labels = np.repeat(label_array([one.name for one in shown]), [len(members) for members in some])
+    return np.concatenate([np.empty(0, dtype=np.int64), *some]), labels

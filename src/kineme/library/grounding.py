@@ -17,7 +17,7 @@ from kineme.dmp.discrete.dmp import Primitives
 from kineme.dmp.generation.learned import Learned, has_orientation, learn_one
 from kineme.dmp.recorded_as import recorded_as
 from kineme.errors import SpecificationError
-from kineme.library.recognition.members import described
+from kineme.library.members import described
 from kineme.library.storage import read
 from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store

@@ -1,1 +1,0 @@
-"""Store movements and files in the database."""

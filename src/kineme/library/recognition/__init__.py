@@ -1,1 +1,0 @@
-"""Recognition with the movements of a library."""

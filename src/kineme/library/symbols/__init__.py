@@ -1,1 +1,0 @@
-"""Symbols of a library: proposals, grounding and reports."""
