@@ -15,9 +15,9 @@ from arm_samples import simulated, stroke, tip_in
 from kineme.errors import TrajectoryError
 from kineme.robots import load, move
 from kineme.robots.execution.retime import fastest, sampled
+from kineme.robots.kinematics.descent import postures
 from kineme.robots.kinematics.inverse import InverseKinematics
-from kineme.robots.kinematics.postures import postures
-from kineme.robots.models.table import MODELS
+from kineme.robots.models.load import MODELS
 from soaking import examples
 
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")

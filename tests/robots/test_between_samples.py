@@ -18,8 +18,7 @@ from kineme.robots.checks.along import along
 from kineme.robots.execution.between import _bernstein, between, dense_times, extreme
 from kineme.robots.execution.retime import _by_length as by_length
 from kineme.robots.execution.retime import fastest, sampled
-from kineme.robots.execution.timing import as_generated
-from kineme.robots.execution.torques import Torques
+from kineme.robots.execution.timing import Torques, as_generated
 from soaking import SOAK, examples
 
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")

@@ -9,8 +9,7 @@ from kineme import read_recordings
 from kineme.errors import TrajectoryError
 from kineme.movements.channels.channel import Channel
 from kineme.robots import load, move
-from kineme.robots.planning.joint_names import check_order, joints_among
-from kineme.robots.planning.roles import space_of
+from kineme.robots.planning.roles import check_order, joints_among, space_of
 
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")
 

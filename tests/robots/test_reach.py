@@ -16,7 +16,7 @@ from kineme.errors import TrajectoryError
 from kineme.robots import load, move
 from kineme.robots.kinematics.descent import kinematics
 from kineme.robots.kinematics.inverse import ORIENTATIONS
-from kineme.robots.models.table import MODELS
+from kineme.robots.models.load import MODELS
 from soaking import combined
 
 pinocchio = pytest.importorskip("pinocchio", reason="the extra robot is not installed")

@@ -14,9 +14,9 @@ from kineme.orientation import PoseDMP
 from kineme.robots import InfeasibleError, load, move
 from kineme.robots.checks.along import along
 from kineme.robots.kinematics.inverse import InverseKinematics
-from kineme.robots.models.table import MODELS
+from kineme.robots.models.load import MODELS
 from kineme.robots.planning.generate_at import generate_at
-from kineme.robots.planning.request import request_of
+from kineme.robots.planning.move import request_of
 
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")
 

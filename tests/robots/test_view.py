@@ -23,11 +23,10 @@ from kineme.reporting import figures
 from kineme.robots import load, move, write_view
 from kineme.robots.checks.along import along
 from kineme.robots.kinematics.inverse import InverseKinematics
-from kineme.robots.models.table import MODELS
+from kineme.robots.models.load import MODELS
 from kineme.robots.view import shapes as module
-from kineme.robots.view.scene_data import MOST_SAMPLES, as_script_data
 from kineme.robots.view.shapes import shapes_of
-from kineme.robots.view.write_view import view_page
+from kineme.robots.view.write_view import MOST_SAMPLES, as_script_data, view_page
 
 FOLDER = Path(view.__file__).parent
 VENDORED = json.loads((FOLDER / "vendor" / "vendored.json").read_text())

@@ -86,9 +86,8 @@ def written_in_words(options: dict[str, Any]) -> str:
 
 def write_files(made: Any, options: dict[str, Any]) -> None:
     """Write what is asked for."""
-    from kineme.robots.export.action_goal import write_action_goal
-    from kineme.robots.export.bag import write_bag
     from kineme.robots.export.columns import encode_joints, write_joints
+    from kineme.robots.export.ros import write_action_goal, write_bag
 
     trajectory = made.trajectory
     writers = {"output": write_joints, "ros1": write_bag, "ros2": write_bag, "action_goal": write_action_goal}
@@ -174,7 +173,7 @@ def move(**options: Any) -> None:
     """  # noqa: D301 - a backspace tells click to keep the lines
     from kineme.errors import heard_warnings
     from kineme.reporting.table import to_text
-    from kineme.robots.checks.report import preflight_table
+    from kineme.robots.checks.check import preflight_table
     from kineme.robots.models.load import load
 
     if options["slow_down"] and options["fastest"]:
@@ -228,7 +227,7 @@ def _moved(robot: Any, options: dict[str, Any]) -> Any:
         )
     except InfeasibleError as error:
         from kineme.reporting.table import to_text
-        from kineme.robots.checks.report import preflight_table
+        from kineme.robots.checks.check import preflight_table
 
         if error.preflight is not None:
             write(to_text(preflight_table(error.preflight)), err=True)

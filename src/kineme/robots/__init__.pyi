@@ -14,8 +14,8 @@ from kineme.robots.kinematics.inverse import InverseKinematics as InverseKinemat
 
 # Files for robots and for people
 from kineme.robots.export.columns import write_joints as write_joints
-from kineme.robots.export.bag import write_bag as write_bag
-from kineme.robots.export.action_goal import write_action_goal as write_action_goal
+from kineme.robots.export.ros import write_bag as write_bag
+from kineme.robots.export.ros import write_action_goal as write_action_goal
 from kineme.robots.export.lerobot import write_lerobot as write_lerobot
 from kineme.robots.view.figure import draw_robot_movement as draw_robot_movement
 from kineme.robots.view.write_view import write_view as write_view

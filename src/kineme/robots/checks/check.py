@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from kineme.reporting.table import Table
 from kineme.robots.models.robot import Robot
 
 
@@ -55,3 +57,23 @@ class Preflight:
 def unit_of(robot: Robot, joint: int, order: int = 0) -> str:
     """Unit of the position of a joint, of its velocity (order 1) or its acceleration (order 2)."""
     return robot.units[joint] + ("", "/s", "/s^2")[order]
+
+
+def preflight_table(preflight: Preflight) -> Table:
+    """One line for each check: the worst value beside its limit, when, and whether it passed."""
+    rows = [
+        (f"{one.what}, {one.where}", f"{one.worst:.3g}", _limit(one), one.unit, f"{one.time:.2f}", _verdict(one))
+        for one in preflight.checks
+    ]
+    unchecked = f"Not checked: {'; '.join(preflight.unchecked)}." if preflight.unchecked else ""
+    return Table("Preflight", ("check", "worst", "limit", "unit", "at [s]", ""), rows, unchecked)
+
+
+def _limit(check: Check) -> str:
+    return "" if math.isnan(check.limit) else f"{check.limit:.4g}"
+
+
+def _verdict(check: Check) -> str:
+    if math.isnan(check.limit):
+        return ""
+    return "ok" if check.passed else "FAILED"

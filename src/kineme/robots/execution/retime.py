@@ -11,8 +11,7 @@ from scipy.interpolate import CubicSpline
 
 from kineme.errors import DataError, TrajectoryError
 from kineme.robots.execution.joint_trajectory import JointTrajectory
-from kineme.robots.execution.timing import Timed, n_samples
-from kineme.robots.execution.torques import Torques, knows_masses
+from kineme.robots.execution.timing import Timed, Torques, knows_masses, n_samples
 from kineme.robots.models.robot import Robot
 from kineme.validation import Array
 

@@ -12,6 +12,9 @@ from kineme.robots.execution.joint_trajectory import JointTrajectory
 from kineme.robots.models.robot import Robot
 from kineme.validation import Array
 
+_PEAK_VELOCITY, _PEAK_ACCELERATION = 15 / 8, 10 / np.sqrt(3)  # of the polynomial, per distance and duration
+_SHORTEST = 0.5  # [s]
+
 STANDS = 1e-8  # of the limit of velocity: what counts as standing, also for controllers of ROS
 _GENTLE = 0.02, 0.1  # from such a share of the limit of velocity on a ramp takes so long at least [s]
 _SHARE = 0.5  # of the limit of acceleration that a ramp may take
@@ -82,3 +85,53 @@ def _ramp(robot: Robot, velocity: Array) -> float:
         return 0.0
     moving, shortest = _GENTLE
     return max(shortest * min(1.0, share / moving), float(np.max(_PEAK * velocity / (_SHARE * robot.acceleration))))
+
+
+def approach(robot: Robot, start: Array, end: Array, rate: float, factor: float = 1.0) -> JointTrajectory:
+    """All joints together from `start` to `end` (n,), standing at both, at half the velocity and acceleration allowed.
+
+    The polynomial of least jerk, ``q(u) = start + (end - start) (10 u^3 - 15 u^4 + 6 u^5)``, u from 0 to 1; Flash and
+    Hogan 1985. Sampled at `rate` [1/s]; `factor` times as long as those limits allow.
+    """
+    distance = np.abs(end - start)
+    by_velocity = _PEAK_VELOCITY * distance / (_SHARE * robot.velocity)
+    by_acceleration = np.sqrt(_PEAK_ACCELERATION * distance / (_SHARE * robot.acceleration))
+    duration = factor * max(_SHORTEST, float(by_velocity.max()), float(by_acceleration.max()))
+    u = np.linspace(0.0, 1.0, n_samples(duration, rate))[:, None]
+    shape = u**3 * (10 - 15 * u + 6 * u**2)
+    velocity = 30 * u**2 * (1 - u) ** 2 / duration
+    acceleration = 60 * u * (1 - u) * (1 - 2 * u) / duration**2
+    change = (end - start)[None]
+    return JointTrajectory(
+        robot.joints, duration * u[:, 0], start + change * shape, change * velocity, change * acceleration, {}
+    )
+
+
+def knows_masses(robot: Robot) -> bool:
+    """Whether the model says what its links weigh."""
+    return float(sum(inertia.mass for inertia in robot.model.inertias)) > 0
+
+
+class Torques:
+    """Torques of one arm, posture by posture: inverse dynamics by the recursive Newton-Euler algorithm of Pinocchio.
+
+    Without friction, and without a load that the model does not have.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        import pinocchio
+
+        self._inverse_dynamics = pinocchio.rnea
+        self._model, self._data = robot.model, robot.model.createData()
+        self._known = knows_masses(robot)
+        self._most = np.where(np.isnan(robot.effort), np.inf, robot.effort)
+
+    def of(self, q: Array, velocities: Array, accelerations: Array) -> Array:
+        """Torques (n,) [Nm, N] at joint positions, velocities and accelerations (n,); nan without masses."""
+        if not self._known:
+            return np.full(len(q), np.nan)
+        return np.array(self._inverse_dynamics(self._model, self._data, q, velocities, accelerations))
+
+    def exceeded(self, torques: Array) -> bool:
+        """Whether a joint would need more than it has; False where that is not known."""
+        return bool((np.abs(torques) > self._most).any())

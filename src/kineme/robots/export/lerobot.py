@@ -11,8 +11,7 @@ from kineme.errors import SpecificationError
 from kineme.io.lerobot.write_episode import write_episode
 from kineme.robots.execution.joint_trajectory import JointTrajectory
 from kineme.robots.models.robot import Robot
-from kineme.robots.planning.joint_names import DRIVERS
-from kineme.robots.planning.roles import JOINT_UNITS
+from kineme.robots.planning.roles import DRIVERS, JOINT_UNITS
 from kineme.units import UNITS, split_head
 from kineme.validation import Array, check_choice, check_number
 

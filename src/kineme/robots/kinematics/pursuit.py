@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from kineme.robots.kinematics.cost import AT_A_STOP, costs_of
-from kineme.robots.kinematics.descent import distances, kinematics, step_within
-from kineme.robots.kinematics.postures import postures
+from kineme.robots.kinematics.choose import AT_A_STOP, costs_of
+from kineme.robots.kinematics.descent import distances, kinematics, postures, step_within
 from kineme.robots.kinematics.relaxation import relaxed
 from kineme.robots.kinematics.task_path import TaskPath
 from kineme.robots.models.robot import Robot

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kineme.errors import TrajectoryError
-from kineme.robots.kinematics.descent import kinematics
-from kineme.robots.kinematics.postures import postures
+from kineme.robots.kinematics.descent import kinematics, postures
 from kineme.robots.kinematics.task_path import TaskPath
 from kineme.robots.models.robot import Robot
 from kineme.validation import Array

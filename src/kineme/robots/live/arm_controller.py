@@ -15,7 +15,7 @@ from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.rotations.matrices import matrices_of
 from kineme.movements.rotations.one_rotation import matrix_one
 from kineme.robots.checks.tracking import TRACKED, TURNED
-from kineme.robots.execution.torques import Torques
+from kineme.robots.execution.timing import Torques
 from kineme.robots.kinematics.reach import point_in_words, reaching_postures
 from kineme.robots.live.live_kinematics import LiveKinematics
 from kineme.robots.models.robot import Robot, check_robot

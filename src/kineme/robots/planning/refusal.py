@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kineme.errors import SpecificationError, TrajectoryError
-from kineme.robots.checks.between_samples import SAMPLING
+from kineme.robots.checks.along import SAMPLING
 from kineme.robots.checks.check import Check, Preflight
 from kineme.robots.kinematics.reach import point_in_words
 from kineme.robots.models.robot import Robot

@@ -11,15 +11,13 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
-from kineme.robots.checks.between_samples import SAMPLING
+from kineme.robots.checks.along import SAMPLING
 from kineme.robots.checks.check import Check
-from kineme.robots.checks.preflight import preflight
-from kineme.robots.checks.steps import Steps, steps_kept
-from kineme.robots.execution.approach import approach
+from kineme.robots.checks.preflight import Steps, preflight, steps_kept
 from kineme.robots.execution.between import dense_times
 from kineme.robots.execution.joint_trajectory import JointTrajectory, joined
 from kineme.robots.execution.retime import fastest, sampled
-from kineme.robots.execution.timing import LONGEST, Timed, as_generated, n_samples
+from kineme.robots.execution.timing import LONGEST, Timed, approach, as_generated, n_samples
 from kineme.robots.kinematics.task_path import TaskPath
 from kineme.robots.models.robot import Robot
 from kineme.robots.planning.robot_movement import RobotMovement

@@ -10,12 +10,12 @@ from typing import NamedTuple
 from xml.etree import ElementTree
 
 from kineme.errors import DataError
-from kineme.robots.models.meshes import find_mesh
+from kineme.robots.models.load import FOLDER, MODELS
 from kineme.robots.models.numbers import finite_numbers
 from kineme.robots.models.robot import Robot
-from kineme.robots.models.table import FOLDER, MODELS
-from kineme.robots.models.urdf import read_root
-from kineme.robots.view.elements import Element, as_text, origin_of, set_color
+from kineme.robots.models.urdf import find_mesh, read_root
+
+Element = ElementTree.Element
 
 _PACKAGE = "example-robot-data"
 _ROBOTS = "cmeel.prefix/share/example-robot-data/robots"  # within what its wheel installs
@@ -217,3 +217,22 @@ def robots_folder() -> Path | None:
     except PackageNotFoundError:
         return None
     return folder if folder.is_dir() else None
+
+
+def origin_of(given: Element) -> Element:
+    """A copy of the origin of an element; at 0 what it does not say."""
+    origin = given.find("origin")
+    values = {name: [] if origin is None else finite_numbers(origin.get(name), 3) for name in ("xyz", "rpy")}
+    return ElementTree.Element("origin", {name: as_text(value or [0.0, 0.0, 0.0]) for name, value in values.items()})
+
+
+def set_color(shape: Element, rgba: tuple[float, ...]) -> None:
+    """Give a shape a color, unless it has one."""
+    if shape.find("material") is None:
+        material = ElementTree.SubElement(shape, "material", name="")
+        ElementTree.SubElement(material, "color", rgba=as_text(list(rgba)))
+
+
+def as_text(values: list[float]) -> str:
+    """Numbers as an attribute."""
+    return " ".join(f"{value:.9g}" for value in values)

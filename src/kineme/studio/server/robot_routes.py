@@ -11,16 +11,15 @@ from pydantic import BaseModel, Field
 from kineme.dmp.generation.learned import Learned
 from kineme.errors import KinemeError, SpecificationError
 from kineme.robots.checks.check import Preflight
-from kineme.robots.models.load import load
+from kineme.robots.models.load import MODELS, load
 from kineme.robots.models.robot import Robot
-from kineme.robots.models.table import MODELS
 from kineme.robots.planning.generate_at import generate_at
 from kineme.robots.planning.move import move as move_arm
 from kineme.robots.planning.refusal import InfeasibleError
 from kineme.robots.planning.robot_movement import RobotMovement
 from kineme.robots.planning.roles import space_of
-from kineme.robots.view.scene_data import scene_data
 from kineme.robots.view.shapes import shapes_of
+from kineme.robots.view.write_view import scene_data
 from kineme.studio.server.plain import numbers
 from kineme.studio.server.records import Number, Point, Text
 from kineme.studio.server.rollout_records import Operated

@@ -1,18 +1,79 @@
-"""A joint trajectory in a bag of ROS 1 or ROS 2."""
+"""A joint trajectory as messages of ROS: JointTrajectory, and JointState at each sample for those who play it."""
 
 from __future__ import annotations
 
+import json
+import re
+from collections.abc import Iterator
 from pathlib import Path
 from shutil import rmtree
 from typing import Any
 
+import numpy as np
+
 from kineme.errors import DataError
-from kineme.reporting.atomic import whole_file, whole_folder
+from kineme.reporting.atomic import whole_file, whole_folder, write_atomically
 from kineme.robots.execution.joint_trajectory import JointTrajectory
-from kineme.robots.export.ros_messages import STATE, TRAJECTORY, state_messages, trajectory_message
+
+_WITHOUT_POINT = re.compile(r"(?<=[ \[-])(\d+)(e[-+]\d+)")
+
 
 TOPIC = "/joint_trajectory_controller/joint_trajectory"  # that of ros2_control
 STATES = "/joint_states"
+
+TRAJECTORY, STATE = "trajectory_msgs/msg/JointTrajectory", "sensor_msgs/msg/JointState"
+_SECOND = 1_000_000_000  # [ns]
+
+
+def trajectory_message(types: dict[str, Any], trajectory: JointTrajectory) -> Any:
+    """One JointTrajectory; its time stamp is 0, which controllers take as now."""
+    points = [
+        types["trajectory_msgs/msg/JointTrajectoryPoint"](
+            positions=positions,
+            velocities=velocities,
+            accelerations=accelerations,
+            effort=np.zeros(0),
+            time_from_start=types["builtin_interfaces/msg/Duration"](**seconds_and_nanoseconds(nanoseconds(time))),
+        )
+        for time, positions, velocities, accelerations in zip(
+            trajectory.times, trajectory.positions, trajectory.velocities, trajectory.accelerations, strict=True
+        )
+    ]
+    return types[TRAJECTORY](header=_header(types, 0), joint_names=list(trajectory.joints), points=points)
+
+
+def state_messages(types: dict[str, Any], trajectory: JointTrajectory) -> Iterator[tuple[int, Any]]:
+    """A JointState for each sample with its time from the start [ns]; discrete channels are further names."""
+    names = [*trajectory.joints, *trajectory.steps]
+    steps = np.column_stack([np.zeros((len(trajectory), 0)), *trajectory.steps.values()])
+    for t, time in enumerate(trajectory.times):
+        stamp = nanoseconds(time)
+        yield (
+            stamp,
+            types[STATE](
+                header=_header(types, stamp),
+                name=names,
+                position=np.concatenate((trajectory.positions[t], steps[t])),
+                velocity=np.concatenate((trajectory.velocities[t], np.zeros(steps.shape[1]))),
+                effort=np.zeros(0),
+            ),
+        )
+
+
+def nanoseconds(time: float) -> int:
+    """A time [s] in nanoseconds."""
+    return round(float(time) * _SECOND)
+
+
+def seconds_and_nanoseconds(stamp: int) -> dict[str, int]:
+    """Nanoseconds as ROS divides them."""
+    return {"sec": stamp // _SECOND, "nanosec": stamp % _SECOND}
+
+
+def _header(types: dict[str, Any], stamp: int) -> Any:
+    header = types["std_msgs/msg/Header"]
+    counted = {"seq": 0} if "seq" in header.__dataclass_fields__ else {}  # ROS 1 counts messages
+    return header(stamp=types["builtin_interfaces/msg/Time"](**seconds_and_nanoseconds(stamp)), frame_id="", **counted)
 
 
 def write_bag(path: str | Path, trajectory: JointTrajectory, topic: str = TOPIC) -> Path:
@@ -91,3 +152,31 @@ def _definition(store: Any, kind: str, trajectory: JointTrajectory) -> dict[str,
         return {"msgdef": about + definition, "md5sum": checksum}
     definition, _ = store.generate_msgdef(kind, ros_version=2)
     return {"msgdef": about + definition, "rihs01": store.hash_rihs01(kind)}
+
+
+def write_action_goal(path: str | Path, trajectory: JointTrajectory) -> Path:
+    """Write JSON, which is YAML too: both ``.json`` and ``.yaml`` are read by ROS 2.
+
+    Numbers without a decimal point, as 1e-05, get one: YAML 1.1 takes them for texts.
+    """
+    goal = action_goal(trajectory)["trajectory"]
+    points = _WITHOUT_POINT.sub(r"\1.0\2", json.dumps(goal["points"]))  # there are no texts in them but their keys
+    text = f'{{"trajectory": {{"joint_names": {json.dumps(goal["joint_names"])}, "points": {points}}}}}\n'
+    return write_atomically(Path(path), text.encode())
+
+
+def action_goal(trajectory: JointTrajectory) -> dict[str, dict[str, Any]]:
+    """The goal as numbers, texts, lists and dicts."""
+    points = []
+    for time, q, v, a in zip(
+        trajectory.times, trajectory.positions, trajectory.velocities, trajectory.accelerations, strict=True
+    ):
+        points.append(
+            {
+                "positions": q.tolist(),
+                "velocities": v.tolist(),
+                "accelerations": a.tolist(),
+                "time_from_start": seconds_and_nanoseconds(nanoseconds(time)),
+            }
+        )
+    return {"trajectory": {"joint_names": list(trajectory.joints), "points": points}}
