@@ -16,8 +16,9 @@ ROOT = Path(__file__).parents[1]
 PAGES = pages()
 _UNTYPED = "matplotlib.*,mujoco.*,numba.*,pandas.*,pyarrow.*,scipy.*,sklearn.*"
 # The package itself is checked with its own settings, elsewhere.
+MYPYPATH = os.pathsep.join(str(ROOT / folder) for folder in ("src", "experiments"))
 _CONFIGURATION = f"[mypy]\nstrict = True\n[mypy-{_UNTYPED}]\nignore_missing_imports = True\n"
-_CONFIGURATION += "[mypy-kineme.*]\nfollow_imports = silent\n"
+_CONFIGURATION += "[mypy-kineme.*,kineme_experiments.*]\nfollow_imports = silent\n"
 
 #: What comes back is a record, which an editor completes, and not Any.
 RESULTS = """
@@ -88,7 +89,7 @@ def checked(tmp_path_factory):
         command += ["--disable-error-code", "type-arg"]  # its ndarray names no type of elements by itself
     done = subprocess.run(
         [*command, *sorted(path.name for path in folder.glob("*.py"))],
-        capture_output=True, text=True, check=False, cwd=folder, env={**os.environ, "MYPYPATH": str(ROOT / "src")},
+        capture_output=True, text=True, check=False, cwd=folder, env={**os.environ, "MYPYPATH": MYPYPATH},
     )  # fmt: skip
     assert done.returncode in (0, 1), done.stderr
     return done.stdout.splitlines()

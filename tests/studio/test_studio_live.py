@@ -20,7 +20,7 @@ from kineme.studio.server.changes import Changes
 from kineme.studio.server.live_socket import _Client, parsed_samples
 from kineme.studio.server.live_sources import MOST, Follower, Sources
 from kineme.studio.server.studio import Studio
-from kineme.studio.snapshot.early import DRAWN
+from kineme.studio.snapshot.recognition import DRAWN
 
 
 def _said(socket, kind):

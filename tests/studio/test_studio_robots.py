@@ -11,7 +11,7 @@ from kineme.errors import DataError
 from kineme.robots.kinematics import reach
 from kineme.robots.planning import refusal
 from kineme.studio.server import robot_routes
-from kineme.studio.server.studio_words import in_studio_words
+from kineme.studio.server.refusals import in_studio_words
 
 SIZE = 0.15  # meters on the arm
 

@@ -10,10 +10,9 @@ from typing import Any
 
 import click
 
-from kineme.cli.channels import differences
 from kineme.cli.options import Finite, GroupedCommand, force_option, heading, json_option, library_option
 from kineme.cli.output import check_new, say, write
-from kineme.cli.reading import known_choices, layout_options, problem_lines, read, recordings_argument
+from kineme.cli.reading import differences, known_choices, layout_options, problem_lines, read, recordings_argument
 from kineme.reporting.text import counted, printable
 
 

@@ -20,8 +20,7 @@ from kineme.cli.options import (
     whole,
 )
 from kineme.cli.output import check_new, write, write_bytes
-from kineme.cli.reading import layout_options
-from kineme.cli.source import read_source
+from kineme.cli.reading import layout_options, read_source
 from kineme.reporting.text import printable
 
 _BAD_FIT = 0.05  # of the extent of the recording

@@ -12,20 +12,17 @@ import click
 
 from kineme.cli.anchor import anchor
 from kineme.cli.annotate import annotate
-from kineme.cli.evaluate import evaluate
+from kineme.cli.evaluate import evaluate, reproduce
 from kineme.cli.generate import generate
 from kineme.cli.inspect import inspect
 from kineme.cli.learn import learn
 from kineme.cli.library import library
-from kineme.cli.merge_split import COMMANDS as MERGE_SPLIT
 from kineme.cli.move import move
 from kineme.cli.output import write
-from kineme.cli.page import page
 from kineme.cli.recognize import recognize
-from kineme.cli.reproduce import reproduce
 from kineme.cli.segment import segment
-from kineme.cli.studio import studio
-from kineme.cli.symbols import COMMANDS as MEANING
+from kineme.cli.studio import page, studio
+from kineme.cli.symbols import COMMANDS
 from kineme.errors import KinemeError
 from kineme.reporting.text import printable, printable_lines
 from kineme.runtime.compiled import tell_when_compiling
@@ -94,7 +91,7 @@ main.add_command(move)
 main.add_command(inspect)
 main.add_command(learn)
 main.add_command(library)
-for command in (*MERGE_SPLIT, *MEANING):
+for command in COMMANDS:
     library.add_command(command)
 main.add_command(page)
 main.add_command(recognize)

@@ -20,8 +20,7 @@ from kineme.cli.options import (
     whole,
 )
 from kineme.cli.output import check_new, say, write, write_bytes
-from kineme.cli.reading import layout_options
-from kineme.cli.source import name_of_source, read_source
+from kineme.cli.reading import layout_options, name_of_source, read_source
 from kineme.reporting.text import printable
 
 _NEW_FILE = click.Path(path_type=Path)

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
-from kineme.cli.options import READING, Finite, under
+from kineme.cli.options import READING, SPECIFICATION, Finite, under
 from kineme.reporting.text import printable
 
 _NAMED = 6  # columns that a sentence names
@@ -218,3 +219,100 @@ def _watched(files: Any) -> Any:
     from tqdm import tqdm
 
     return tqdm(files, desc="reading", unit="file", leave=False, disable=None)  # None: on a terminal only
+
+
+def read_source(options: dict[str, Any]) -> Any:
+    """The primitive of a symbol, a recording or a file, with the recording that it is of."""
+    source = options["source"]
+    if _is_symbol(source, options["folder"]):
+        _check_of_symbol(source)
+        from kineme.library.library import ActionLibrary
+        from kineme.library.grounding import learned_of
+
+        with ActionLibrary(options["folder"], read_only=True) as library:
+            return learned_of(library.store, source)
+    from kineme.dmp.discrete.dmp import DMP
+    from kineme.dmp.generation.learned import SAVED, Learned, learn_one, load_saved
+
+    if source != "-" and not Path(source).exists():
+        raise FileNotFoundError(
+            f"expected a recording or a saved primitive, found no file {printable(source)}; "
+            "for a symbol, name its --library"
+        )
+    if Path(source).suffix.lower() == SAVED:
+        return Learned(_chosen(load_saved(Path(source)), options))
+    dmp = DMP(**{name: options[name] for name in SPECIFICATION})
+    recordings = read(Path(source), {name: options[name] for name in LAYOUT_OPTIONS})
+    return learn_one(_chosen(recordings, options), dmp)
+
+
+def _check_of_symbol(source: str) -> None:
+    """Refuse options that say how a recording is read or learned: a symbol of a library was when it was learned."""
+    context = click.get_current_context()
+    for option in context.command.params:
+        is_given = context.get_parameter_source(option.name or "") == ParameterSource.COMMANDLINE
+        if is_given and option.name in (*LAYOUT_OPTIONS, *SPECIFICATION, "index"):
+            raise click.UsageError(
+                f"expected {option.opts[0]} with a recording, got it with {printable(source)}, a symbol of a library: "
+                f"its columns and primitives are those that it was learned with; say {option.opts[0]} to kineme learn"
+            )
+
+
+def name_of_source(options: dict[str, Any]) -> str:
+    """The name of the symbol, or that of the file without its ending."""
+    source = options["source"]
+    if not _is_symbol(source, options["folder"]):
+        return Path(source).stem
+    from kineme.library.library import ActionLibrary
+
+    with ActionLibrary(options["folder"], read_only=True) as library:
+        return next((one.name for one in library.symbols() if one.id == source), str(source))
+
+
+def _chosen(several: Any, options: dict[str, Any]) -> Any:
+    """The one that is asked for by --index, or the only one."""
+    n, index = len(several), options["index"]
+    if index is None and n > 1:
+        raise click.UsageError(f"expected one movement, {printable(options['source'])} holds {n}; choose with --index")
+    if index is not None and index >= n:
+        raise click.BadParameter(f"{printable(options['source'])} holds {n}, counted from 0", param_hint="--index")
+    return several[index or 0]
+
+
+def _is_symbol(source: str, folder: Path | None) -> bool:
+    """Whether SOURCE is a symbol: with --library always; with a library from the environment, unless a file exists."""
+    given = click.get_current_context().get_parameter_source("folder")
+    return folder is not None and (given != ParameterSource.ENVIRONMENT or not Path(source).exists())
+
+
+def differences(learned: Any, asked: Any) -> list[str]:
+    """A sentence for each way in which recordings that are compared with a library have other channels than it.
+
+    Other kinds are refused elsewhere; what differs here are names, units, and whether channels are known.
+    """
+    from kineme.movements.channels.detect import name_of
+
+    if learned is None or not any(one.coordinates for one in learned):
+        return []
+    if asked is None:
+        return [
+            "The recordings do not agree in the names of their columns, which are taken in their order as those of the "
+            f"library: {_some([one.name for one in learned])}"
+        ]
+    moving = [[one for one in channels if one.coordinates] for channels in (asked, learned)]
+    by_name = {name_of(one.name).lower(): one for one in moving[0]}
+    if all(name_of(one.name).lower() in by_name for one in moving[1]):
+        moving[0] = [by_name[name_of(one.name).lower()] for one in moving[1]]
+    pairs = list(zip(*moving, strict=False))
+    sentences = []
+    if other := [pair for pair in pairs if name_of(pair[0].name).lower() != name_of(pair[1].name).lower()]:
+        here, there = (_some([pair[k].name for pair in other]) for k in (0, 1))
+        sentences.append(f"Columns are compared in their order: {here} of the recordings with {there} of the library")
+    if units := [pair for pair in pairs if None not in (pair[0].unit, pair[1].unit) and pair[0].unit != pair[1].unit]:
+        here, there = (_some([f"{pair[k].name} in {pair[k].unit}" for pair in units]) for k in (0, 1))
+        sentences.append(f"Units are converted: {here} in the recordings, {there} in the library")
+    if silent := [pair[0].name for pair in pairs if pair[0].unit is None and pair[1].unit is not None]:
+        sentences.append(
+            f"The recordings do not say the unit of {_some(silent)}, which is taken for that of the library"
+        )
+    return sentences

@@ -8,10 +8,9 @@ from typing import Any
 
 import click
 
-from kineme.cli.channels import differences
 from kineme.cli.options import Finite, GroupedCommand, json_option, library_option, whole
 from kineme.cli.output import say
-from kineme.cli.reading import known_choices, layout_options, problem_lines, read, recordings_argument
+from kineme.cli.reading import differences, known_choices, layout_options, problem_lines, read, recordings_argument
 from kineme.reporting.text import printable
 
 _AT_ONCE = 250  # movements recognized between two steps of the progress bar: fewer cost more each

@@ -14,8 +14,8 @@ from kineme.library.library import ActionLibrary
 from kineme.reporting.atomic import whole_file
 from kineme.reporting.text import counted, in_markup
 from kineme.similarity.describe import N_POINTS
-from kineme.studio.snapshot.early import DRAWN
 from kineme.studio.snapshot.make import snapshot_of_library
+from kineme.studio.snapshot.recognition import DRAWN
 from kineme.studio.snapshot.snapshot import Snapshot
 
 _IMPORT = re.compile(r'^import \{([^}]*)\} from "(\.[^"]+)";\n', re.MULTILINE)

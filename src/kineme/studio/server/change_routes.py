@@ -9,7 +9,6 @@ from pydantic import Field
 
 from kineme.errors import SpecificationError
 from kineme.library.storage import changes
-from kineme.studio.server.plain import trajectory
 from kineme.studio.server.records import (
     VERSION,
     Change,
@@ -22,6 +21,7 @@ from kineme.studio.server.records import (
     Text,
     Times,
     Version,
+    trajectory,
 )
 from kineme.studio.server.refusals import ConflictError
 from kineme.studio.server.studio import Writes

@@ -18,7 +18,7 @@ from kineme.recognition.answer import Answer
 from kineme.recognition.early.stream import Live
 from kineme.studio.server.changes import Changes
 from kineme.studio.server.live_sources import Follower, Source, Sources, parsed_name
-from kineme.studio.server.plain import plain_answer, plain_state
+from kineme.studio.server.records import plain_answer, plain_state
 from kineme.studio.server.studio import Studio
 from kineme.validation import LARGEST, Array
 

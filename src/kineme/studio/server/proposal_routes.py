@@ -10,10 +10,19 @@ from fastapi import APIRouter
 from pydantic import BaseModel
 
 from kineme.anchoring.proposals.proposals import Proposal
-from kineme.library import proposals as stored
 from kineme.library.storage import read
-from kineme.studio.server.plain import numbers, thumbnail
-from kineme.studio.server.records import AsOf, Change, Description, Name, Points, ProposalKey, Version
+from kineme.library import proposals as stored
+from kineme.studio.server.records import (
+    AsOf,
+    Change,
+    Description,
+    Name,
+    Points,
+    ProposalKey,
+    Version,
+    numbers,
+    thumbnail,
+)
 from kineme.studio.server.refusals import ConflictError
 from kineme.studio.server.studio import Reads, Studio, Writes
 

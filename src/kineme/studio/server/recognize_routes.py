@@ -7,8 +7,7 @@ from typing import Any
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
-from kineme.studio.server.plain import plain_answer, trajectory
-from kineme.studio.server.records import Number, Point, Sent, Times
+from kineme.studio.server.records import Number, Point, Sent, Times, plain_answer, trajectory
 from kineme.studio.server.studio import Reads
 
 

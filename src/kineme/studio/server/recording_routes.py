@@ -20,10 +20,9 @@ from kineme.library.learn import learn_recordings
 from kineme.movements.channels.channel import recorded_names
 from kineme.movements.trajectories.movements import axis_names
 from kineme.sampling import evenly_spaced
-from kineme.studio.server.plain import numbers
-from kineme.studio.server.records import Change, ChannelOut, Learned, Name, Number, RecordingKey, Sent, Text
+from kineme.studio.server.records import Change, ChannelOut, Learned, Name, Number, RecordingKey, Sent, Text, numbers
+from kineme.studio.server.refusals import in_studio_words
 from kineme.studio.server.studio import Reads, Studio, Writes
-from kineme.studio.server.studio_words import in_studio_words
 from kineme.studio.server.uploads import go_on
 from kineme.studio.server.work import Work, while_wanted
 

@@ -20,12 +20,10 @@ from kineme.robots.planning.robot_movement import RobotMovement
 from kineme.robots.planning.roles import space_of
 from kineme.robots.view.shapes import shapes_of
 from kineme.robots.view.write_view import scene_data
-from kineme.studio.server.plain import numbers
-from kineme.studio.server.records import Number, Point, Text
-from kineme.studio.server.rollout_records import Operated
-from kineme.studio.server.rollouts import learned_as
+from kineme.studio.server.records import Number, Point, Text, numbers
+from kineme.studio.server.refusals import in_studio_words
+from kineme.studio.server.rollouts import Operated, learned_as
 from kineme.studio.server.studio import Reads
-from kineme.studio.server.studio_words import in_studio_words
 
 
 class ArmsOut(BaseModel):

@@ -9,10 +9,20 @@ from fastapi import APIRouter
 from fastapi.responses import Response
 
 from kineme.io.write_movement import encode_movement
-from kineme.studio.server.plain import numbers, thumbnail
-from kineme.studio.server.records import SymbolKey
-from kineme.studio.server.rollout_records import Exported, Moved, Operated, PrimitiveOut, StylesOut, Wanted
-from kineme.studio.server.rollouts import learned_as, make, moving_positions, primitive_document, styles_of
+from kineme.studio.server.records import SymbolKey, numbers, thumbnail
+from kineme.studio.server.rollouts import (
+    Exported,
+    Moved,
+    Operated,
+    PrimitiveOut,
+    StylesOut,
+    Wanted,
+    learned_as,
+    make,
+    moving_positions,
+    primitive_document,
+    styles_of,
+)
 from kineme.studio.server.studio import Reads
 
 router = APIRouter(prefix="/api", tags=["movement"])

@@ -20,7 +20,7 @@ from kineme.recognition.early.stream import Live
 from kineme.studio.server.refusals import ConflictError, MissingError
 from kineme.studio.server.uploads import Uploads
 from kineme.studio.server.work import Works
-from kineme.studio.snapshot.early import DRAWN
+from kineme.studio.snapshot.recognition import DRAWN
 
 Made = TypeVar("Made")
 

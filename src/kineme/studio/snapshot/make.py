@@ -19,9 +19,8 @@ from kineme.recognition.early.hypotheses import Early
 from kineme.recognition.known_classes import FittedRecognizer, KnownClasses, known_classes
 from kineme.sampling import evenly_spaced
 from kineme.similarity.describe import N_POINTS
-from kineme.studio.snapshot.early import early_part
 from kineme.studio.snapshot.movements import movement_parts
-from kineme.studio.snapshot.recognition import recognition_parts
+from kineme.studio.snapshot.recognition import early_part, recognition_parts
 from kineme.studio.snapshot.snapshot import Snapshot
 
 #: Numbers of the stored paths, at most: 1.3 MB in base64, so that a page with all else stays below 2 MB.

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from kineme.dmp.discrete.dmp import DMP, Primitives
 from kineme.dmp.discrete.fits import trajectory_regression
 from kineme.dmp.discrete.operators import decoder, smoothness_factor
+from kineme.dmp.pose.pose_primitives import PosePrimitives
 from kineme.studio.snapshot.snapshot import Snapshot
 
 
@@ -54,3 +55,14 @@ def _encoder(dmp: DMP) -> dict[str, NDArray[Any]]:
         response._replace(goal=np.zeros_like(response.goal)), dmp.K, dmp.ridge_strength
     )
     return {"encoder": weights, "encoder velocity": velocity}
+
+
+def snapshot_of_primitive(primitive: Primitives | PosePrimitives) -> Snapshot | None:
+    """A batch of one, for `openPrimitive` of the runtime; None if not every column is a position.
+
+    Angles, orientations and discrete values are written in other columns than those that move, which the runtime does
+    not know.
+    """
+    if isinstance(primitive, PosePrimitives) or any(one.kind != "position" for one in primitive.channels or ()):
+        return None
+    return movement_parts(primitive, learns=False)
