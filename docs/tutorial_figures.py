@@ -60,7 +60,7 @@ def place() -> Figure:
         bags = kineme.read_recordings(f"{folder}/recordings", topic="/joint_states")
     rows, hand = names["rows"], names["hand"]
     times, joints, opened = rows[:, 0], rows[:, 1:8], rows[:, 8] > 0.5
-    guided = [_of_the_hand(hand, one.positions) for one in bags.demonstrations]
+    guided = [_of_the_hand(hand, demonstration.positions) for demonstration in bags.demonstrations]
     moved = _of_the_hand(hand, joints)
     begins = int(np.argmin(np.linalg.norm(joints - bags.demonstrations[0].positions[0], axis=1)))
     figure = new_figure(9.6, 3.8)

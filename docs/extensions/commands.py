@@ -64,8 +64,8 @@ def _title(text: str, rule: str) -> list[str]:
 def _text(text: str) -> list[str]:
     """The paragraphs of a help text, without its examples, which stand under their own heading."""
     paragraphs = [one.strip(" \n") for one in text.split("\n\n")]
-    paragraphs = [one for one in paragraphs if not one.startswith(("\b", "As in", "Example: "))]
-    return [line for one in paragraphs for line in (_sentence(one), "")]
+    paragraphs = [paragraph for paragraph in paragraphs if not paragraph.startswith(("\b", "As in", "Example: "))]
+    return [line for paragraph in paragraphs for line in (_sentence(paragraph), "")]
 
 
 def _sentence(text: str) -> str:

@@ -52,7 +52,7 @@ def places() -> dict[int, list[str]]:
 
 def _cited(text: str) -> set[int]:
     sentences = re.split(r"(?<=[.:])\s+(?=[A-Z])|\n\n", text)
-    own = [one for one in sentences if not _OTHERS.search(one)]
+    own = [sentence for sentence in sentences if not _OTHERS.search(sentence)]
     return {int(number) for one in own for cited in _CITED.findall(one) for number in re.findall(r"\d", cited)}
 
 

@@ -84,7 +84,7 @@ def chosen(step: int) -> list[Row]:
     """Mean error at samples left out, % of the extent: no more than the default's wherever there is noise or none."""
     rows = []
     for name, movements in data_sets(step).items():
-        extents = [float(np.ptp(one.positions, axis=0).max()) for one in movements]
+        extents = [float(np.ptp(movement.positions, axis=0).max()) for movement in movements]
         for noise in NOISES:
             rng = np.random.default_rng(SEED)
             shown = [

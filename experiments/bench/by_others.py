@@ -47,4 +47,4 @@ def _turned(one: Recorded) -> Recorded:
     angles = np.random.default_rng(0).uniform(0.0, 2 * np.pi, len(one.labels))
     turns = Rotation.from_rotvec(angles[:, None] * np.array(VERTICAL)).as_matrix()
     arrays = [each.positions @ turn.T for each, turn in zip(one.demos, turns, strict=True)]
-    return one._replace(demos=kineme.Demonstrations.from_arrays(arrays, one.labels, [each.times for each in one.demos]))
+    return one._replace(demos=kineme.Demonstrations.from_arrays(arrays, one.labels, [demo.times for demo in one.demos]))

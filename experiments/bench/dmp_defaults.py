@@ -90,13 +90,13 @@ def sensed(demos: Demonstrations, sensor: Sensor, seed: int) -> Demonstrations:
     """The movements as `sensor` records them, at no more than `RATE`; the first and the last stamp stay."""
     rng = np.random.default_rng(seed)
     positions, times = [], []
-    for one in demos:
-        n = min(len(one.times), max(10, round(one.duration * RATE)))
-        even = np.linspace(one.times[0], one.times[-1], n)
+    for demo in demos:
+        n = min(len(demo.times), max(10, round(demo.duration * RATE)))
+        even = np.linspace(demo.times[0], demo.times[-1], n)
         step = (even[-1] - even[0]) / (n - 1)
         stamps = even + np.append(0, np.append(rng.uniform(-1, 1, n - 2) * sensor.jitter * step, 0))
-        x = np.column_stack([np.interp(stamps, one.times, column) for column in one.positions.T])
-        positions.append(x + rng.normal(size=x.shape) * sensor.noise * np.ptp(one.positions, axis=0).max())
+        x = np.column_stack([np.interp(stamps, demo.times, column) for column in demo.positions.T])
+        positions.append(x + rng.normal(size=x.shape) * sensor.noise * np.ptp(demo.positions, axis=0).max())
         times.append(stamps)
     return Demonstrations.from_arrays(positions, demos.labels, times)
 
@@ -117,7 +117,7 @@ def acceleration(dmp: DMP, demos: Demonstrations, measured: Demonstrations) -> f
     """Median of the hardest acceleration to goals `FAR` off, over that of the demonstration without noise."""
     primitives = dmp.learn(measured)
     shown = _hardest(DMP(fit="trajectory", n_basis=40).learn(demos).rollout(n_samples=400).accelerations)
-    extents = np.array([np.ptp(one.positions, axis=0).max() for one in demos])
+    extents = np.array([np.ptp(demo.positions, axis=0).max() for demo in demos])
     ratios = []
     for axis in range(demos.n_dims):
         for sign in (-1, 1):

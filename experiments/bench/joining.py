@@ -46,8 +46,8 @@ TAKEN = (("median", lambda x: float(np.median(x))), ("largest", lambda x: float(
 def chained(parts: list[Primitives]) -> list[Array]:
     """Paths (T, d) of the parts, each from where the one before it ends."""
     paths: list[Array] = []
-    for one in parts:
-        path = one.rollout(n_samples=STEPS + 1).positions[0]
+    for part in parts:
+        path = part.rollout(n_samples=STEPS + 1).positions[0]
         paths.append(path - path[0] + (paths[-1][-1] if paths else path[0]))
     return paths
 
@@ -61,7 +61,7 @@ def off(parts: list[Primitives], paths: list[Array]) -> float:
 
 def stretches(parts: list[Primitives], whole: Rollout) -> list[Array]:
     """The stretches (T, d) of the joined movement that belong to the parts."""
-    durations = np.array([one.durations[0] for one in parts])
+    durations = np.array([part.durations[0] for part in parts])
     ends = np.cumsum(durations)
     when = [np.linspace(end - duration, end, STEPS + 1) for end, duration in zip(ends, durations, strict=True)]
     return [np.column_stack([np.interp(t, whole.times[0], x) for x in whole.positions[0].T]) for t in when]
@@ -69,13 +69,13 @@ def stretches(parts: list[Primitives], whole: Rollout) -> list[Array]:
 
 def larger_accelerations(parts: list[Primitives], whole: Rollout) -> float:
     """The largest acceleration of the joined movement, over that of its parts."""
-    own = max(np.abs(one.rollout(n_samples=STEPS + 1).accelerations).max() for one in parts)
+    own = max(np.abs(part.rollout(n_samples=STEPS + 1).accelerations).max() for part in parts)
     return float(np.abs(whole.accelerations).max() / own)
 
 
 def met(parts: list[Primitives]) -> list[Array]:
     """The parts, with the mean velocity and acceleration of both where two meet, by the smoothest change."""
-    own = [one.rollout(n_samples=STEPS + 1) for one in parts]
+    own = [part.rollout(n_samples=STEPS + 1) for part in parts]
     ends = np.array([[(x[0, 0], x[0, -1]) for x in (one.velocities, one.accelerations)] for one in own])
     middle = 0.5 * (ends[1:, :, 0] + ends[:-1, :, 1])  # (2 meetings, velocity and acceleration, d)
     ends[1:, :, 0], ends[:-1, :, 1] = middle, middle

@@ -107,7 +107,7 @@ def _exhaustive(library: Any, asked: Array) -> list[str]:
     described = describe(asked, comparison)
     ids = library.ids()
     ends = np.cumsum(library.specification.widths(library.n_dims))[:-1]
-    kept = [library.specification.comparison.by_rows.index(one) for one in comparison.specification.by_rows]
+    kept = [library.specification.comparison.by_rows.index(by_row) for by_row in comparison.specification.by_rows]
     top, best = np.full(len(asked), -np.inf), np.zeros(len(asked), dtype=np.int64)
     for start in range(0, len(ids), 4096):
         blocks = np.split(library.features(ids[start : start + 4096]), ends, axis=1)

@@ -72,7 +72,7 @@ def movement_sets(quick: bool) -> list[Movements]:
     found = [_perturbed("LASA, all strongly", lasa, 1 if quick else COPIES)]
     letters, gestures = recorded("letters2d.npz"), recorded("gestures3d.npz")
     if letters is not None:
-        unlabeled = kineme.Demonstrations.from_arrays([one.positions for one in letters.demos], letters.labels)
+        unlabeled = kineme.Demonstrations.from_arrays([demo.positions for demo in letters.demos], letters.labels)
         found.append(_perturbed("letters, all strongly", unlabeled, 1 if quick else COPIES))
     if gestures is not None:
         digits = np.char.isdigit(gestures.labels)
@@ -99,4 +99,4 @@ def _series(path: Path) -> Iterator[tuple[NDArray[Any], str]]:
     lines = path.read_text(encoding="utf-8").splitlines()
     for line in lines[lines.index("@data") + 1 :]:
         *dimensions, label = line.split(":")
-        yield np.array([one.split(",") for one in dimensions], dtype=float).T, label
+        yield np.array([dimension.split(",") for dimension in dimensions], dtype=float).T, label

@@ -55,7 +55,7 @@ def _of_one(browser: Any, folder: Path, n_dims: int, each: int, repeats: int) ->
     labels = np.tile(np.asarray(shapes.labels), each)
     copies = [one for k in range(each) for one in (shapes if k == 0 else _PERTURBATION.apply(shapes, SEED + k))]
     with kineme.ActionLibrary(folder, create=True) as library:
-        library.learn([kineme.Trajectory(one.times, one.positions) for one in copies], labels.tolist())
+        library.learn([kineme.Trajectory(copy.times, copy.positions) for copy in copies], labels.tolist())
         write_page(folder / "page.html", library)
     asked = _PERTURBATION.apply(shapes[:_ASKED], SEED + 9)
     movements = [{"times": one.times.tolist(), "positions": one.positions.tolist()} for one in asked]

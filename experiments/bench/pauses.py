@@ -64,8 +64,8 @@ def _draw(
 def interrupted(demos: kineme.Demonstrations, seconds: float, at_rest: bool, seed: int) -> kineme.Demonstrations:
     """Each movement with one pause somewhere."""
     rng, arrays, times = np.random.default_rng(seed), [], []
-    for one in demos:
-        t, x = np.array(one.times), np.array(one.positions)
+    for demo in demos:
+        t, x = np.array(demo.times), np.array(demo.positions)
         at = int(rng.uniform(0.05, 0.95) * (len(t) - 1)) + 1
         n_rest = max(1, int(seconds / np.median(np.diff(t)))) if at_rest else 0
         rest = t[at - 1] + seconds / max(1, n_rest) * np.arange(1, n_rest + 1)

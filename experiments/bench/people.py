@@ -44,7 +44,7 @@ def recorded(name: str) -> Recorded | None:
         if "times" in z:
             times = [one.astype(float) - float(one[0]) for one in np.split(z["times"], ends)]
         else:
-            times = [np.arange(len(one)) / RATE for one in arrays]
+            times = [np.arange(len(array)) / RATE for array in arrays]
     return Recorded(kineme.Demonstrations.from_arrays(arrays, labels, times), labels, people)
 
 

@@ -70,9 +70,9 @@ def _our_errors(demos: Demonstrations, dmp: DMP) -> Array:
 
 def _peer_errors(demos: Demonstrations, replay: Replay) -> Array:
     errors = []
-    for one in demos:
-        u, path = replay(one.times - one.times[0], one.positions)
-        errors.append(min(_error(one.positions, u + shift / (N_SAMPLES - 1), path) for shift in STEPS_OFF))
+    for demo in demos:
+        u, path = replay(demo.times - demo.times[0], demo.positions)
+        errors.append(min(_error(demo.positions, u + shift / (N_SAMPLES - 1), path) for shift in STEPS_OFF))
     return np.array(errors)
 
 

@@ -10,7 +10,7 @@ import kineme
 def lifted(demos: kineme.Demonstrations) -> kineme.Demonstrations:
     """The same movements with z = 0.3 x + 5 sin(y / 10), in their unit."""
     positions = [
-        np.column_stack((one.positions, 0.3 * one.positions[:, 0] + 5 * np.sin(one.positions[:, 1] / 10)))
-        for one in demos
+        np.column_stack((demo.positions, 0.3 * demo.positions[:, 0] + 5 * np.sin(demo.positions[:, 1] / 10)))
+        for demo in demos
     ]
-    return kineme.Demonstrations.from_arrays(positions, demos.labels, [one.times for one in demos])
+    return kineme.Demonstrations.from_arrays(positions, demos.labels, [demo.times for demo in demos])

@@ -94,7 +94,7 @@ def _nested() -> str:
     for row in rows("nested"):
         (chosen, count), *others = row["details"]["chosen"]
         weights, k = ", ".join(map("{:g}".format, chosen["weights"])), " / ".join(map(str, chosen["concentrations"]))
-        often = f" ({count} of {count + sum(one[1] for one in others)} people)" if others else ""
+        often = f" ({count} of {count + sum(other[1] for other in others)} people)" if others else ""
         best = row["details"]["best in hindsight"]["accuracy"]
         lines.append(
             f"| {row['what']} | {weights}{often} | {chosen['share']:g} | {k} | {chosen['band']} | {row['ours']:.3f} "

@@ -107,7 +107,7 @@ def _cell(ahead: list[Ahead]) -> str:
     one = ahead[0]
     what = "" if one.measure == "accuracy" else f", {MEASURES[one.measure]}"
     rivals = sorted(ahead, key=lambda each: -each.theirs)
-    named = ", ".join(f"{METHODS[each.rival].title} {each.theirs:.3f}" for each in rivals)
+    named = ", ".join(f"{METHODS[rival.rival].title} {rival.theirs:.3f}" for rival in rivals)
     return f"{one.condition.label}{what} ({one.ours:.3f}): {named}"
 
 
@@ -118,7 +118,12 @@ def verdict(results: Results) -> str:
         return "Nothing is concluded about rivals: in no table did kineme and a rival take part together."
     ahead = {(name, one.condition, one.measure) for name in protocols for one in cells_ahead(name, results)}
     n_cells = sum(_n_compared(name, results) for name in protocols)
-    absent = {name: why for one in protocols for name, why in missing(one, results).items() if why != _cannot_do(one)}
+    absent = {
+        name: why
+        for protocol in protocols
+        for name, why in missing(protocol, results).items()
+        if why != _cannot_do(protocol)
+    }
     alone = [PROTOCOLS[name].title for name, by_method in results.outcomes.items() if set(by_method) == {OURS}]
     if ahead:
         parts = [f"A rival is ahead of kineme in {len(ahead)} of {n_cells} cells; each table lists its own."]

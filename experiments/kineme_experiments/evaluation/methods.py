@@ -98,7 +98,7 @@ class LearnsBeginnings:
         """Learn from labeled movements and their beginnings."""
         parts = [one for share in _SHARES for one in cut(demonstrations, share)]
         labels = np.tile(require_labels(demonstrations), len(_SHARES))
-        arrays, times = [one.positions for one in parts], [one.times for one in parts]
+        arrays, times = [part.positions for part in parts], [part.times for part in parts]
         self.contender.fit(Demonstrations.from_arrays(arrays, labels, times))
 
     def classify(self, demonstrations: Demonstrations) -> tuple[NDArray[Any], Array]:

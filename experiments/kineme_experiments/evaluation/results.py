@@ -29,7 +29,7 @@ class Results(NamedTuple):
 
     def conditions(self, protocol: str) -> list[Condition]:
         """All conditions of a protocol in their order, as listed by the method that took part in most of them."""
-        return max((list(one) for one in self.outcomes[protocol].values()), key=len, default=[])
+        return max((list(outcome) for outcome in self.outcomes[protocol].values()), key=len, default=[])
 
     def numbers(self) -> dict[str, Any]:
         """Everything but the seconds, for JSON; in six digits, which do not depend on the order of summation."""
@@ -76,8 +76,8 @@ def collect(scores: Mapping[Any, list[Scores]], absent: dict[str, str], skipped:
 
 def _averaged(scores: list[Scores]) -> dict[Condition, dict[str, float]]:
     grouped: dict[Condition, list[dict[str, float]]] = {}
-    for one in scores:
-        grouped.setdefault(one.condition, []).append(one.values)
+    for score in scores:
+        grouped.setdefault(score.condition, []).append(score.values)
     return {
         condition: {measure: fmean(values[measure] for values in all_values) for measure in all_values[0]}
         for condition, all_values in grouped.items()

@@ -286,7 +286,9 @@ def draw_protocol(protocol: str, results: Results) -> bytes | None:
 
 def _draw_panel(axes, protocol: str, results: Results, conditions: list[Condition]) -> None:  # type: ignore[no-untyped-def]
     for method in results.outcomes[protocol]:
-        points = [(one.strength, results.mean(protocol, method, one, "accuracy")) for one in conditions]
+        points = [
+            (condition.strength, results.mean(protocol, method, condition, "accuracy")) for condition in conditions
+        ]
         measured = [(x, y) for x, y in points if y is not None]
         color, line = _STYLES[method]
         label = METHODS[method].title

@@ -78,10 +78,11 @@ def _spot(contender: Any, trial: Trial, seed: list[int]) -> Iterator[Scores]:
     recordings = concatenate_all(test, labels, [2, *seed], rests=trial.rests)
     began = time.perf_counter()
     contender.fit(trial.demonstrations[trial.split.train])
-    found = [contender.spot(one.recording) for one in recordings]
+    found = [contender.spot(recording.recording) for recording in recordings]
     seconds = time.perf_counter() - began
     counts = sum(
-        (count_spotted(*both) for both in zip(found, [one.truth for one in recordings], strict=True)), Counts()
+        (count_spotted(*both) for both in zip(found, [recording.truth for recording in recordings], strict=True)),
+        Counts(),
     )
     yield Scores(trial.condition, {"precision": counts.precision, "recall": counts.recall}, seconds)
 

@@ -105,8 +105,8 @@ def concatenate(
     rng : numpy.random.Generator
     rests : bool, default True
     """
-    paths = [one.positions - one.positions.mean(axis=0) for one in movements]
-    times = [one.times - one.times[0] for one in movements]
+    paths = [movement.positions - movement.positions.mean(axis=0) for movement in movements]
+    times = [movement.times - movement.times[0] for movement in movements]
     step = float(np.median(np.concatenate([np.diff(t) for t in times])))
     extent = float(np.median([np.linalg.norm(np.ptp(x, axis=0)) for x in paths]))
     paths = [x + _OFFSET * extent * rng.normal(size=x.shape[1]) / np.sqrt(x.shape[1]) for x in paths]

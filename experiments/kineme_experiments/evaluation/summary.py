@@ -36,7 +36,7 @@ def summarize(names: Sequence[str], evaluations: Sequence[Evaluation], out: Path
     out : Path
         An existing folder.
     """
-    rows = [row for one in evaluations for row in one.rows]
+    rows = [row for evaluation in evaluations for row in evaluation.rows]
     ranks = rank_rows(rows)
     content = {
         "format": _FORMAT,

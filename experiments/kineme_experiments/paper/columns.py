@@ -22,7 +22,7 @@ PRINTED = {"rbf": paper.SVM_RBF, "tre": paper.SVM_TRE}
 
 def over(draws: Draws, kind: str, key: str) -> list[float]:
     """One value from each draw that has it."""
-    return [one[kind][key] for one in draws if kind in one]
+    return [draw[kind][key] for draw in draws if kind in draw]
 
 
 def columns_of(draws: Draws, kind: str, reading: str, suffix: str = "") -> dict[str, list[float]]:

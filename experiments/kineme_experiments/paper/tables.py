@@ -135,7 +135,7 @@ def _svm(draws: Draws, title: str, with_paper: bool) -> Table:
         ):
             cells = map(mean_and_range, columns_of(draws, "svm", reading, f"/{name}/{widths}").values())
             rows.append((f"{kernel}: {reading}, {words}", *cells))
-    n = sum("svm" in one for one in draws)
+    n = sum("svm" in draw for draw in draws)
     reading = read_svm(draws, with_paper)
     return Table(f"{title} ({n} draws: mean, range; C = {paper.PENALTY:g})", ("", *COLUMNS), rows, reading)
 

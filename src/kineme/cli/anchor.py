@@ -211,9 +211,9 @@ def _text(data: dict[str, Any], alone: str) -> str:
     lines += [f"{counted(n, 'movement')} would join {printable(name)}" for name, n in data["would_join"].items()]
     proposals = data["proposals"]
     rows = [
-        (str(one["number"]), str(len(one["movements"])), f"{one['stability']:.2f}", f"{one['cohesion']:.2f}",
-         "" if one["nearest"] is None else str(one["nearest"]))
-        for one in proposals
+        (str(proposal["number"]), str(len(proposal["movements"])), f"{proposal['stability']:.2f}",
+         f"{proposal['cohesion']:.2f}", "" if proposal["nearest"] is None else str(proposal["nearest"]))
+        for proposal in proposals
     ]  # fmt: skip
     title = f"{counted(len(proposals), 'proposal')}, {counted(len(data['left_over']), 'movement')} left over{alone}"
     lines.append(

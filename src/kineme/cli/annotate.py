@@ -84,12 +84,15 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
         notes += differences(library.channels, parsed.demonstrations.channels)
     written = [] if output is None else write_annotations(output, found.annotations, sources, form, movements)
     data = {
-        "annotations": [as_row(one) | {"certainty": _certainty(one, found.calibrated)} for one in found.annotations],
+        "annotations": [
+            as_row(annotation) | {"certainty": _certainty(annotation, found.calibrated)}
+            for annotation in found.annotations
+        ],
         "seconds": float(parsed.demonstrations.durations.sum()),
         "calibrated": found.calibrated,
         "written": [str(one) for one in written],
         "notes": notes,
-        "problems": [str(one) for one in (*parsed.problems, *found.problems)],
+        "problems": [str(problem) for problem in (*parsed.problems, *found.problems)],
     }
     problems = problem_lines((*parsed.problems, *found.problems), "not annotated: ")
     if as_csv:
@@ -132,7 +135,7 @@ def _text(data: dict[str, Any], problems: list[str]) -> str:
     from kineme.reporting.table import to_text
 
     rows, written = data["annotations"], data["written"]
-    known = [one for one in rows if not one["unknown"]]
+    known = [row for row in rows if not row["unknown"]]
     said = f"{counted(len(known), 'movement')} of {counted(len({one['symbol'] for one in known}), 'symbol')}"
     lines = [f"{said}, {len(rows) - len(known):,} unknown, in {data['seconds']:,.1f} s"]
     if rows:
@@ -158,13 +161,13 @@ def _each(rows: list[dict[str, Any]]) -> Any:
         heads,
         [
             (
-                printable(f"{one['recording']} {one['place']}".strip()),
-                f"{one['start']:.2f}",
-                f"{one['end']:.2f}",
-                "unknown" if one["unknown"] else printable(one["symbol"]),
-                one["certainty"],
+                printable(f"{row['recording']} {row['place']}".strip()),
+                f"{row['start']:.2f}",
+                f"{row['end']:.2f}",
+                "unknown" if row["unknown"] else printable(row["symbol"]),
+                row["certainty"],
             )
-            for one in rows
+            for row in rows
         ],
     )
 
@@ -172,7 +175,7 @@ def _each(rows: list[dict[str, Any]]) -> Any:
 def _totals(rows: list[dict[str, Any]]) -> Any:
     from kineme.reporting.table import Table
 
-    names = ["unknown" if one["unknown"] else printable(one["symbol"]) for one in rows]
+    names = ["unknown" if row["unknown"] else printable(row["symbol"]) for row in rows]
     seconds: Counter[str] = Counter()
     for name, one in zip(names, rows, strict=True):
         seconds[name] += one["end"] - one["start"]

@@ -46,7 +46,7 @@ def inspect(
     from kineme.io.inspection.inspect import nothing_read
     from kineme.io.inspection.report import as_data, as_words
 
-    files = [one for one in recordings if str(one) != "-"]
+    files = [recording for recording in recordings if str(recording) != "-"]
     contents = contents_of_all(files, options["follow_links"])
     unlike: tuple[int, ...] = ()
     recorded: Any = None

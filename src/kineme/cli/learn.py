@@ -150,7 +150,7 @@ def _named(library: Any, ids: Any, labels: list[Any]) -> dict[str, Any]:
         if symbol is not None and label is not None and symbol != label
     )
     return {
-        "without_symbol": sum(one is None for one in names),
+        "without_symbol": sum(name is None for name in names),
         "kept": [{"symbol": one[0], "label": one[1], "movements": n} for one, n in kept.items()],
     }
 

@@ -140,14 +140,17 @@ def history(folder: Path, limit: int, as_json: bool) -> None:
     """List the versions: what changed, and when."""
     with opened(folder) as actions:
         versions = actions.history()
-    data = [{"version": one.id, "at": one.at, "action": one.action, **one.detail} for one in versions[-limit:]]
+    data = [
+        {"version": version.id, "at": version.at, "action": version.action, **version.detail}
+        for version in versions[-limit:]
+    ]
 
     def text() -> str:
         from kineme.reporting.table import Table, to_text
 
         rows = [
-            (str(one.id), one.at[:19].replace("T", " "), one.action, printable(in_words(one.detail)))
-            for one in versions[-limit:]
+            (str(version.id), version.at[:19].replace("T", " "), version.action, printable(in_words(version.detail)))
+            for version in versions[-limit:]
         ]
         return to_text(Table(counted(len(versions), "version"), ("version", "at (UTC)", "action", "what"), rows))
 

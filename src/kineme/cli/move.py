@@ -272,7 +272,7 @@ def _as_data(made: Any) -> dict[str, Any]:
     def known(value: Any) -> Any:
         return None if isinstance(value, float) and not math.isfinite(value) else value
 
-    checks = [{name: known(value) for name, value in one._asdict().items()} for one in made.preflight.checks]
+    checks = [{name: known(value) for name, value in check._asdict().items()} for check in made.preflight.checks]
     return {
         "robot": made.robot.name,
         "duration": made.trajectory.duration,

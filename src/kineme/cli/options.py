@@ -137,7 +137,7 @@ def _names(folder: Path) -> list[str]:
     from kineme.library.library import ActionLibrary
 
     with ActionLibrary(folder, read_only=True) as library:
-        return [one.name if _PLAIN.fullmatch(one.name) else one.id for one in library.symbols()]
+        return [symbol.name if _PLAIN.fullmatch(symbol.name) else symbol.id for symbol in library.symbols()]
 
 
 def library_option_of(*, required: bool, words: str) -> Callable[[Any], Any]:

@@ -211,7 +211,7 @@ def _some(names: Sequence[str]) -> str:
 
 def problem_lines(problems: Any, lost: str = "not read: ") -> list[str]:
     """A line for each problem: what was lost, or that samples alone were."""
-    return [f"{'read but for samples: ' if one.samples else lost}{printable(one)}" for one in problems]
+    return [f"{'read but for samples: ' if problem.samples else lost}{printable(problem)}" for problem in problems]
 
 
 def _watched(files: Any) -> Any:
@@ -266,7 +266,7 @@ def name_of_source(options: dict[str, Any]) -> str:
     from kineme.library.library import ActionLibrary
 
     with ActionLibrary(options["folder"], read_only=True) as library:
-        return next((one.name for one in library.symbols() if one.id == source), str(source))
+        return next((symbol.name for symbol in library.symbols() if symbol.id == source), str(source))
 
 
 def _chosen(several: Any, options: dict[str, Any]) -> Any:
@@ -299,7 +299,7 @@ def differences(learned: Any, asked: Any) -> list[str]:
             "The recordings do not agree in the names of their columns, which are taken in their order as those of the "
             f"library: {_some([one.name for one in learned])}"
         ]
-    moving = [[one for one in channels if one.coordinates] for channels in (asked, learned)]
+    moving = [[channel for channel in channels if channel.coordinates] for channels in (asked, learned)]
     by_name = {name_of(one.name).lower(): one for one in moving[0]}
     if all(name_of(one.name).lower() in by_name for one in moving[1]):
         moving[0] = [by_name[name_of(one.name).lower()] for one in moving[1]]

@@ -150,11 +150,11 @@ def _text(pieces: list[dict[str, Any]], problems: list[str], output: Path | None
     heads = ("recording", "piece", "start [s]", "end [s]", "duration [s]")
     rows = [
         (
-            printable(f"{one['recording']} {one['place']}".strip()),
-            str(one["piece"]),
-            *(f"{one[name]:.3f}" for name in ("start", "end", "duration")),
+            printable(f"{piece['recording']} {piece['place']}".strip()),
+            str(piece["piece"]),
+            *(f"{piece[name]:.3f}" for name in ("start", "end", "duration")),
         )
-        for one in pieces
+        for piece in pieces
     ]
     lines = [to_text(Table("", heads, rows))] if rows else []
     lines += [f"not cut: {printable(problem)}" for problem in problems]

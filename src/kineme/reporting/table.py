@@ -81,7 +81,7 @@ def _narrowed(lines: Sequence[tuple[str, ...]], natural: list[int], width: int) 
     The widest columns are narrowed first, at first down to their widest words, then further.
     """
     words = [max(widest_word(row[k]) for row in lines) for k in range(len(natural))]
-    for least in (words, [min(one, _NARROW) for one in words]):
+    for least in (words, [min(word, _NARROW) for word in words]):
         if sum(least) <= width:
             limit = next(n for n in range(max(natural), 0, -1) if _total(natural, least, n) <= width)
             widths = [max(low, min(one, limit)) for one, low in zip(natural, least, strict=True)]

@@ -74,7 +74,9 @@ def _renew_cached_properties() -> None:
         for value in list(vars(module).values())
         if isinstance(value, type)
     }
-    for attribute in (value for one in classes for value in vars(one).values() if isinstance(value, cached_property)):
+    for attribute in (
+        value for klass in classes for value in vars(klass).values() if isinstance(value, cached_property)
+    ):
         vars(attribute)["lock"] = RLock()
 
 

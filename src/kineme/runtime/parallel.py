@@ -94,7 +94,11 @@ def _restore(limiter: Any) -> None:
 @contextmanager
 def _control(controller: Any) -> Iterator[None]:
     """Let the calling thread set limits; from threadpoolctl 3.7 on, only the first thread that tries may."""
-    libraries = [one for one in controller.lib_controllers if hasattr(one, "clear_controlling_thread")]
+    libraries = [
+        lib_controller
+        for lib_controller in controller.lib_controllers
+        if hasattr(lib_controller, "clear_controlling_thread")
+    ]
     for library in libraries:
         library.clear_controlling_thread(force=True)
     try:

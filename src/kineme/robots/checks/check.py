@@ -62,8 +62,15 @@ def unit_of(robot: Robot, joint: int, order: int = 0) -> str:
 def preflight_table(preflight: Preflight) -> Table:
     """One line for each check: the worst value beside its limit, when, and whether it passed."""
     rows = [
-        (f"{one.what}, {one.where}", f"{one.worst:.3g}", _limit(one), one.unit, f"{one.time:.2f}", _verdict(one))
-        for one in preflight.checks
+        (
+            f"{check.what}, {check.where}",
+            f"{check.worst:.3g}",
+            _limit(check),
+            check.unit,
+            f"{check.time:.2f}",
+            _verdict(check),
+        )
+        for check in preflight.checks
     ]
     unchecked = f"Not checked: {'; '.join(preflight.unchecked)}." if preflight.unchecked else ""
     return Table("Preflight", ("check", "worst", "limit", "unit", "at [s]", ""), rows, unchecked)

@@ -70,7 +70,7 @@ def roles_of(channels: Channels | None, n_columns: int, space: str, robot: Robot
         return Roles(positions, (), turned, {}, {}, list(range(n_columns)))
     at = list(zip(channels, columns_of(channels), strict=True))
     along = [(one, columns.start) for one, columns in at if one.kind in _KINDS[space]]
-    angles = [one.name for one in channels if one.kind == "angle" and space == "tip"]
+    angles = [channel.name for channel in channels if channel.kind == "angle" and space == "tip"]
     if angles:
         raise TrajectoryError(
             f"expected the tip by its position, and turned by a quaternion, got the angles {', '.join(angles)}; "
@@ -193,8 +193,10 @@ def space_of(channels: Channels | None, columns: Array, robot: Robot) -> str:
     nothing is known and which are neither points nor poses.
     """
     if channels is not None:
-        angles = sum(one.kind == "angle" for one in channels)
-        named = joints_among([one.name for one in channels if one.kind in _KINDS["joints"]], robot) is not None
+        angles = sum(channel.kind == "angle" for channel in channels)
+        named = (
+            joints_among([channel.name for channel in channels if channel.kind in _KINDS["joints"]], robot) is not None
+        )
         return "joints" if named or angles == robot.n_joints else "tip"
     d = columns.shape[1]
     posed = d == 7 and bool(np.all(np.abs(np.linalg.norm(columns[:, 3:], axis=1) - 1) <= NORM_TOLERANCE))
@@ -221,7 +223,7 @@ def joints_among(names: Sequence[str], robot: Robot) -> list[int] | None:
     places = [_places(plain, joint) for joint in robot.joints]
     if (exact := _single(places)) is not None:
         return exact
-    if all(places) and {*names} == {names[k] for each in places for k in each}:
+    if all(places) and {*names} == {names[k] for place in places for k in place}:
         joint, several = max(zip(robot.joints, places, strict=True), key=lambda one: len(one[1]))
         raise TrajectoryError(
             f"expected one column for each joint, got {', '.join(names[k] for k in several)} for {joint}; choose with "
@@ -275,7 +277,7 @@ def _places(names: Sequence[str], joint: str) -> list[int]:
 
 def _single(places: Sequence[list[int]]) -> list[int] | None:
     """The column of each joint, if every joint has one and no two the same."""
-    columns = [each[0] for each in places if len(each) == 1]
+    columns = [place[0] for place in places if len(place) == 1]
     return columns if len({*columns}) == len(places) else None
 
 

@@ -70,12 +70,12 @@ def said(version: Version, before: Row | None = None, undone: Sequence[Version] 
 
 def _in_one(versions: Sequence[Version]) -> Version:
     """The one change that they are; of several, all that one call learned."""
-    details = [dict(one.detail) for one in versions]
-    if len(versions) == 1 or not all("added" in one and "symbols" in one for one in details):
+    details = [dict(version.detail) for version in versions]
+    if len(versions) == 1 or not all("added" in detail and "symbols" in detail for detail in details):
         return versions[-1]
     whole = {
-        "added": sum(one["added"] for one in details),
-        "symbols": [name for one in details for name in one["symbols"]],
+        "added": sum(detail["added"] for detail in details),
+        "symbols": [name for detail in details for name in detail["symbols"]],
     }
     return replace(versions[-1], detail=whole)
 
@@ -137,7 +137,7 @@ def _value(value: Any) -> str:
 
 def _annotated_before(studio: Studio, versions: Sequence[Version]) -> dict[int, Row]:
     """Version -> the row of the symbol's state that it replaced."""
-    keys = {"keys": listed(one.id for one in versions if one.action == "annotate")}
+    keys = {"keys": listed(version.id for version in versions if version.action == "annotate")}
     with studio.library.store.reading() as connection:
         rows = select(connection, "symbol_state", among("removed"), keys)
     return {row[_STATE["removed"]]: row for row in rows}
@@ -332,8 +332,8 @@ def _document(studio: Studio) -> _Document:
 
 def _library(studio: Studio) -> dict[str, Any]:
     library, shown = studio.library, studio.shown()
-    symbols = sorted(shown.symbols.values(), key=lambda one: one.name)
-    typical = [one.prototype or (int(one.members[0]) if len(one) else None) for one in symbols]
+    symbols = sorted(shown.symbols.values(), key=lambda symbol: symbol.name)
+    typical = [symbol.prototype or (int(symbol.members[0]) if len(symbol) else None) for symbol in symbols]
     drawn = {one["id"]: one for one in _listed(studio, np.array([key for key in typical if key], dtype=np.int64))}
     channels = library.channels
     return {
@@ -341,7 +341,7 @@ def _library(studio: Studio) -> dict[str, Any]:
         "version": shown.version,
         "n_movements": len(library),
         "n_dims": library.n_dims,
-        "channels": None if channels is None else [one._asdict() for one in channels],
+        "channels": None if channels is None else [channel._asdict() for channel in channels],
         "read_only": studio.read_only,
         "can_undo": can_undo(library.store),
         "unlabeled": len(library) - len(shown.symbol_of),
@@ -383,13 +383,13 @@ def _listed(studio: Studio, ids: read.Ids) -> list[dict[str, Any]]:
 
 def _map(studio: Studio) -> dict[str, Any]:
     shown = studio.shown()
-    groups = [one.members for one in shown.symbols.values() if len(one)]
+    groups = [symbol.members for symbol in shown.symbols.values() if len(symbol)]
     if len(rest := studio.library.unlabeled()):
         groups.append(rest)
     if not groups:
         return {"points": []}
     share = max(1, _ON_MAP // len(groups))
-    ids = np.concatenate([one[evenly_spaced(len(one), share)] for one in groups])[:_MOST_ON_MAP]
+    ids = np.concatenate([group[evenly_spaced(len(group), share)] for group in groups])[:_MOST_ON_MAP]
     like = studio.library.specification.comparison
     space = conceptual_space(tuple(ids.tolist()), described(studio.library.store, ids), like)
     where = classical_scaling(space.distances)[0]

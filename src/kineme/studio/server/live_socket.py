@@ -107,8 +107,8 @@ class _Client:
     async def _tell(self) -> None:
         with suppress(WebSocketDisconnect, RuntimeError):
             while news := self._news():
-                for one in news:
-                    await self._send(one)
+                for new in news:
+                    await self._send(new)
                 await asyncio.sleep(_PAUSE)
 
     def _news(self) -> list[dict[str, Any]]:
@@ -147,7 +147,7 @@ class _Client:
                 self._held = following
                 break
             blocks.append(following.samples)
-        return told if len(blocks) == 1 else _Told(np.concatenate([one for one in blocks if one is not None]))
+        return told if len(blocks) == 1 else _Told(np.concatenate([block for block in blocks if block is not None]))
 
     async def _answer(self, told: _Told) -> dict[str, Any] | None:
         run = asyncio.get_running_loop().run_in_executor

@@ -39,8 +39,8 @@ class Sources:
 
     def tell(self) -> None:
         """Tell everyone."""
-        for one in list(self._listeners):
-            one()
+        for listener in list(self._listeners):
+            listener()
 
     def add(self) -> Source:
         """A program that was not there yet."""

@@ -33,8 +33,8 @@ def save(recordings: Recordings, path: Path) -> None:
         "channels": None if demos.channels is None else channels_to_data(demos.channels),
         "n_dims": demos.n_dims,
         "dimensions": whole.dimensions,
-        "sources": [list(one) for one in recordings.sources],
-        "problems": [[one.file, one.line, one.reason] for one in recordings.problems],
+        "sources": [list(source) for source in recordings.sources],
+        "problems": [[problem.file, problem.line, problem.reason] for problem in recordings.problems],
     }
     recorded = demos.positions if demos.channels is None else demos.recorded
     with path.open("wb") as file:
@@ -67,7 +67,7 @@ def load(path: Path) -> Recordings:
 
 def _recordings(arrays: dict[str, Any], told: dict[str, Any]) -> Recordings:
     sources = tuple(Source(*one) for one in told["sources"])
-    names = tuple(f"{one.path}#{one.place}" if one.place else one.path for one in sources)
+    names = tuple(f"{source.path}#{source.place}" if source.place else source.path for source in sources)
     dimensions = None if told["dimensions"] is None else tuple(told["dimensions"])
     parts = (arrays["recorded"], arrays["offsets"], arrays["durations"], arrays["stamps"], None, names, dimensions)
     whole = Movements(*parts)

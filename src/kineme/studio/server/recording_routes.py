@@ -143,7 +143,7 @@ async def send(
     return {
         "recording": key,
         "tables": [_table(read, k) for k in range(len(read))],
-        "problems": [in_studio_words(str(one)) for one in read.problems],
+        "problems": [in_studio_words(str(problem)) for problem in read.problems],
         "plots": [_plot(read, k) for k in range(len(read))],
     }
 
@@ -175,8 +175,13 @@ def _spotted(studio: Studio, key: str, asked: Spotting, work: Work) -> dict[str,
     if found.problems:
         raise SpecificationError(found.problems[0].what)
     spans = [
-        {"begin": each.span[0], "end": each.span[1], "label": each.symbol, "p": numbers(each.p_value)}
-        for each in found.annotations
+        {
+            "begin": annotation.span[0],
+            "end": annotation.span[1],
+            "label": annotation.symbol,
+            "p": numbers(annotation.p_value),
+        }
+        for annotation in found.annotations
     ]
     return {"spans": spans, "rests": _rests(spans, duration)}
 
@@ -232,7 +237,7 @@ def _columns(read: Recordings) -> list[str]:
 
 def _columns_of(read: Recordings, names: Sequence[str]) -> list[str]:
     """The columns of channels, such as the four of an orientation; other names are those of columns."""
-    known = {one.name: one.columns for one in read.demonstrations.channels or ()}
+    known = {channel.name: channel.columns for channel in read.demonstrations.channels or ()}
     return [column for name in names for column in known.get(name, (name,))]
 
 
@@ -244,8 +249,8 @@ def _table(read: Recordings, k: int) -> dict[str, Any]:
     ]
     if demos.channels is not None:
         channels = [
-            {"name": one.name, "kind": one.kind, "columns": list(one.columns), "unit": one.unit}
-            for one in demos.channels
+            {"name": channel.name, "kind": channel.kind, "columns": list(channel.columns), "unit": channel.unit}
+            for channel in demos.channels
         ]
     rate = numbers((n - 1) / duration)
     return {
@@ -271,6 +276,6 @@ def _plot(read: Recordings, k: int) -> dict[str, Any]:
 
 def _rests(spans: list[dict[str, Any]], duration: float) -> list[dict[str, float]]:
     """What lies between the spans."""
-    ends = np.array([0.0, *(one["end"] for one in spans)])
-    begins = np.array([*(one["begin"] for one in spans), duration])
+    ends = np.array([0.0, *(span["end"] for span in spans)])
+    begins = np.array([*(span["begin"] for span in spans), duration])
     return [{"begin": float(begin), "end": float(end)} for begin, end in zip(ends, begins, strict=True) if end > begin]

@@ -149,15 +149,15 @@ def _answer(robot: Robot, preflight: Preflight | None) -> dict[str, Any]:
         "passed": preflight is not None and preflight.passed,
         "checks": [
             {
-                "what": one.what,
-                "where": one.where,
-                "worst": numbers(one.worst),
-                "limit": numbers(one.limit),
-                "unit": one.unit,
-                "time": numbers(one.time),
-                "passed": bool(one.passed),
+                "what": check.what,
+                "where": check.where,
+                "worst": numbers(check.worst),
+                "limit": numbers(check.limit),
+                "unit": check.unit,
+                "time": numbers(check.time),
+                "passed": bool(check.passed),
             }
-            for one in checks
+            for check in checks
         ],
         "unchecked": [] if preflight is None else list(preflight.unchecked),
         "assumed": list(robot.assumed),

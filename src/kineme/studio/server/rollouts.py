@@ -112,8 +112,8 @@ def _around(learned: Learned, options: MovementOptions, balls: list[Obstacle]) -
     """The movement, steered around balls as strongly as it takes; what it touches all the same is said."""
     if not balls:
         return generate(learned, options), []
-    centers, radii = [one.center for one in balls], np.array([one.radius for one in balls])
-    if len({len(one) for one in centers}) > 1:
+    centers, radii = [ball.center for ball in balls], np.array([ball.radius for ball in balls])
+    if len({len(center) for center in centers}) > 1:
         raise SpecificationError("expected obstacles of equally many dimensions")
     points, placed = np.array(centers), _placed(learned)
     if points.shape[1] == len(learned.moving_columns):  # a point of the movement: an orientation says nothing of where

@@ -228,7 +228,7 @@ class LimitedConnection(H11Protocol):
         super().connection_made(transport)
         self._await_head()
         connections: Any = self.connections
-        alive = [one for one in connections if not one.transport.is_closing()]
+        alive = [connection for connection in connections if not connection.transport.is_closing()]
         if len(alive) > most_connections():
             waiting = [one for one in alive if isinstance(one, LimitedConnection) and one.is_waiting]
             min(waiting, key=lambda one: one._since).transport.abort()  # itself where all others work

@@ -84,8 +84,8 @@ class Studio:
 
     def _show(self) -> Shown:
         version, symbols = self.library.version, self.library.symbols()
-        symbol_of = {int(i): one.id for one in symbols for i in one.members}
-        return Shown(version, {one.id: one for one in symbols}, symbol_of)
+        symbol_of = {int(i): symbol.id for symbol in symbols for i in symbol.members}
+        return Shown(version, {symbol.id: symbol for symbol in symbols}, symbol_of)
 
     def kept(self, name: str, make: Callable[[], Made]) -> Made:
         """What was made at this version of the library, else made now; one thread makes it, others wait."""

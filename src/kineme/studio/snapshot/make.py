@@ -50,7 +50,7 @@ def snapshot_of_library(library: ActionLibrary, most: int | None = None, early: 
     made = _snapshot(known, primitives, early)
     made.header["n_all"] = len(members.ids)
     made.header["ids"] = taken.ids.tolist()
-    made.header["channels"] = None if store.channels is None else [one.name for one in store.channels]
+    made.header["channels"] = None if store.channels is None else [channel.name for channel in store.channels]
     return made
 
 

@@ -63,6 +63,6 @@ def snapshot_of_primitive(primitive: Primitives | PosePrimitives) -> Snapshot | 
     Angles, orientations and discrete values are written in other columns than those that move, which the runtime does
     not know.
     """
-    if isinstance(primitive, PosePrimitives) or any(one.kind != "position" for one in primitive.channels or ()):
+    if isinstance(primitive, PosePrimitives) or any(channel.kind != "position" for channel in primitive.channels or ()):
         return None
     return movement_parts(primitive, learns=False)

@@ -75,7 +75,7 @@ def _starts(demos: Demonstrations) -> Array:
 
 def _comparison(how: Comparison, pairs: Any) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
     representations, similarity = how.representations, how.similarity
-    by_rows = [one for one in representations if not one.in_pairs]
+    by_rows = [representation for representation in representations if not representation.in_pairs]
     rows = []
     arrays: dict[str, NDArray[Any]] = {}
     for r, one in enumerate(by_rows):
@@ -92,12 +92,14 @@ def _comparison(how: Comparison, pairs: Any) -> tuple[dict[str, Any], dict[str, 
         "mean": how.mean,
         "rule": rotation_rule(how.procrustes),
         "by_rows": rows,
-        "by_pairs": [PAIR_QUANTITIES.index(one.quantity) for one in representations[len(by_rows) :]],
+        "by_pairs": [
+            PAIR_QUANTITIES.index(representation.quantity) for representation in representations[len(by_rows) :]
+        ],
         "rotating": rotating(representations) if pairs is not None else -1,
         "shapes": None if pairs is None else pair_rule(pairs.shapes),
         "widths": [float(width) if np.isfinite(width) else None for width in similarity.widths],
         "weights": weights.tolist(),
-        "names": [one.name for one in representations],
+        "names": [representation.name for representation in representations],
     }
     return header, arrays
 
