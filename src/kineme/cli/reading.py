@@ -226,8 +226,8 @@ def read_source(options: dict[str, Any]) -> Any:
     source = options["source"]
     if _is_symbol(source, options["folder"]):
         _check_of_symbol(source)
-        from kineme.library.library import ActionLibrary
         from kineme.library.grounding import learned_of
+        from kineme.library.library import ActionLibrary
 
         with ActionLibrary(options["folder"], read_only=True) as library:
             return learned_of(library.store, source)

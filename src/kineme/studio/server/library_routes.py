@@ -19,8 +19,8 @@ from kineme.library.members import described
 from kineme.library.storage import read
 from kineme.library.storage.rows import Row, among, listed, select
 from kineme.library.storage.schema import COLUMNS, RETURNS, UNDO
+from kineme.library.storage.store import Version
 from kineme.library.storage.undo import can_undo
-from kineme.library.storage.versions import Version
 from kineme.reporting.text import counted, printable, shortened
 from kineme.runtime.collector import collector_paused
 from kineme.sampling import evenly_spaced

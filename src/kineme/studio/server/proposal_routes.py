@@ -10,8 +10,8 @@ from fastapi import APIRouter
 from pydantic import BaseModel
 
 from kineme.anchoring.proposals.proposals import Proposal
-from kineme.library.storage import read
 from kineme.library import proposals as stored
+from kineme.library.storage import read
 from kineme.studio.server.records import (
     AsOf,
     Change,

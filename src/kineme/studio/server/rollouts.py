@@ -15,8 +15,8 @@ from kineme.dmp.styles.learn import learn_styles
 from kineme.dmp.styles.model import StyleModel
 from kineme.errors import SpecificationError, heard_warnings
 from kineme.io.write_movement import WRITERS
-from kineme.library.storage import read
 from kineme.library.grounding import prototype_of
+from kineme.library.storage import read
 from kineme.studio.server.records import Number, Point, Points, Sent, Text
 from kineme.studio.server.studio import Studio
 from kineme.studio.snapshot.movements import snapshot_of_primitive
