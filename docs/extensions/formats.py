@@ -8,9 +8,9 @@ from importlib.resources import files
 from typing import Any
 
 from extensions.tables import kind, table
-from kineme.io.annotations import writers as annotations
-from kineme.io.formats import DATA_SETS, FORMATS
-from kineme.io.write_movement import WRITERS
+from kineme.io.reading.formats import DATA_SETS, FORMATS
+from kineme.io.writing import annotations
+from kineme.io.writing.write_movement import WRITERS
 from kineme.reporting.figures import FORMATS as FIGURES
 
 #: Endings that are read together -> what they are, and the extra that reading them takes.

@@ -25,7 +25,7 @@ _TRANSFORM, _STATE = 96, 420  # bytes of a message, about
 # would count what the parent took.
 _OURS = """
 import json, sys, time
-from kineme.io.recordings import read_recordings
+from kineme.io.reading.recordings import read_recordings
 begin = time.process_time()
 read = read_recordings(sys.argv[1], **json.loads(sys.argv[2]))
 seconds = time.process_time() - begin

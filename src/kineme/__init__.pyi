@@ -15,10 +15,10 @@ from kineme.movements.segmentation.segment import segment as segment
 from kineme.movements.segmentation.segmentation import Segmentation as Segmentation
 
 # Recordings in files, and data sets
-from kineme.io.recordings import read_recordings as read_recordings
-from kineme.io.recordings import read_recording as read_recording
-from kineme.io.merge_files import Recordings as Recordings
-from kineme.io.write_movement import write_movement as write_movement
+from kineme.io.reading.recordings import read_recordings as read_recordings
+from kineme.io.reading.recordings import read_recording as read_recording
+from kineme.io.reading.merge_files import Recordings as Recordings
+from kineme.io.writing.write_movement import write_movement as write_movement
 from kineme import datasets as datasets
 from kineme.datasets.lasa import load_lasa as load_lasa
 

@@ -11,7 +11,7 @@ import pytest
 from commands import answer, run, start
 
 import kineme
-from kineme.io.write_movement import write_movement
+from kineme.io.writing.write_movement import write_movement
 
 RATE = 100.0
 LETTERS = ["CShape", "GShape", "Sshape"]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from kineme.cli.evaluate import METHOD_NAMES, PROTOCOL_NAMES
-from kineme.io.write_movement import write_movement
+from kineme.io.writing.write_movement import write_movement
 from kineme_experiments.evaluation.methods import METHODS
 from kineme_experiments.evaluation.protocols import PROTOCOLS
 

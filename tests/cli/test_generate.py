@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme.io.recordings import read_recording
-from kineme.io.write_movement import write_movement
+from kineme.io.reading.recordings import read_recording
+from kineme.io.writing.write_movement import write_movement
 
 
 def run(*arguments, by=commands.run, **options):

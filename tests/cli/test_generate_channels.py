@@ -7,7 +7,7 @@ from matplotlib.image import imread
 
 import kineme
 from kineme.dmp.generation.figure import short_names
-from kineme.io.write_movement import write_movement
+from kineme.io.writing.write_movement import write_movement
 from kineme.orientation import exp, log, product
 
 HEADS = "t,tool.x,tool.y,tool.z,tool.qx,tool.qy,tool.qz,tool.qw,gripper"

@@ -9,7 +9,7 @@ import commands
 import pytest
 
 import kineme
-from kineme.io.write_movement import write_movement
+from kineme.io.writing.write_movement import write_movement
 
 PNG = b"\x89PNG\r\n"
 

@@ -7,7 +7,7 @@ import pytest
 from commands import answer, run, start
 
 import kineme
-from kineme.io.write_movement import write_movement
+from kineme.io.writing.write_movement import write_movement
 
 
 @pytest.fixture(scope="module")

@@ -14,8 +14,8 @@ from commands import answer, run, start
 
 import kineme
 from kineme.anchoring.grounding.grounding_io import grounding_schema, primitive_from
-from kineme.io.recordings import read_recording
-from kineme.io.write_movement import write_movement
+from kineme.io.reading.recordings import read_recording
+from kineme.io.writing.write_movement import write_movement
 
 
 @pytest.fixture(scope="module")

@@ -17,10 +17,8 @@ import numpy as np
 
 import kineme
 from kineme.dmp.rhythmic.rhythmic_dmp import RhythmicPrimitives
-from kineme.io.annotations.labeled_pieces import labeled_pieces
-from kineme.io.annotations.read_labels import read_labels
-from kineme.io.lerobot.copy import copy_with_motions
-from kineme.io.lerobot.motions import OWN, Motion
+from kineme.io.lerobot.copy import OWN, Motion, copy_with_motions
+from kineme.io.reading.read_labels import labeled_pieces, read_labels
 from kineme.orientation import PosePrimitives
 from lerobot_sets import write_v2, write_v3
 

@@ -9,7 +9,7 @@ from scipy.io import savemat
 
 import kineme
 from kineme.io.arrays.arrays import arrays_movements
-from kineme.io.recordings import read_recordings, read_recordings_from_bytes
+from kineme.io.reading.recordings import read_recordings, read_recordings_from_bytes
 from kineme.movements.tables.layout import Layout
 
 T = np.arange(5) / 10

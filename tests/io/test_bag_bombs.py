@@ -13,12 +13,12 @@ import pytest
 import kineme
 from bag_files import SECOND, START, Maker, stamps, store, write_bag, write_mcap
 from kineme.io.limits import VARIABLE
-from kineme.io.recordings import read_recordings
+from kineme.io.reading.recordings import read_recordings
 from limited_child import MIB, LimitedChild
 from soaking import combined
 
 SIZE = 160 * MIB
-MODULES = ("kineme.io.recordings", "kineme.io.ros.read_bag", "rosbags.rosbag1", "rosbags.rosbag2", "lz4.frame")
+MODULES = ("kineme.io.reading.recordings", "kineme.io.ros.read_bag", "rosbags.rosbag1", "rosbags.rosbag2", "lz4.frame")
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +58,7 @@ def file_of(path):
 
 
 def refusal(child, path):
-    outcome = child.call("kineme.io.recordings:read_recordings", path)
+    outcome = child.call("kineme.io.reading.recordings:read_recordings", path)
     assert outcome.how == "refused", outcome
     assert path.name in outcome.what
     return outcome.what
@@ -182,14 +182,14 @@ def test_chunks_of_one_time_are_in_memory_together(tmp_path, child, at_once):
     if at_once:
         assert "a set of chunks of one time that takes at most 67,108,864 bytes" in refusal(child, path)
     else:
-        outcome = child.call("kineme.io.recordings:read_recordings", path)
+        outcome = child.call("kineme.io.reading.recordings:read_recordings", path)
         assert outcome.how == "done", outcome
 
 
 def test_bytes_that_are_cut_off_are_refused():
     import lz4.frame
 
-    from kineme.io.ros.expand import expand
+    from kineme.io.ros.damage import expand
 
     for name, compress in {"bz2": bz2.compress, "lz4": lz4.frame.compress}.items():
         data = compress(bytes(range(200)) * 50)

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 import kineme
 from bag_files import KINDS, SECOND, START, Maker, pose_rows, stamps, write_bag
-from kineme.io.recordings import read_recordings
+from kineme.io.reading.recordings import read_recordings
 
 EVERY = pytest.mark.parametrize("kind", KINDS)
 

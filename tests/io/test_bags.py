@@ -6,7 +6,7 @@ import pytest
 import kineme
 from bag_files import KINDS, SECOND, START, Maker, pose_rows, stamps, write_bag
 from kineme.io.limits import VARIABLE
-from kineme.io.recordings import read_recording, read_recordings
+from kineme.io.reading.recordings import read_recording, read_recordings
 
 POSE = tuple(f"position.{axis}" for axis in "xyz") + tuple(f"orientation.{axis}" for axis in "xyzw")
 EVERY = pytest.mark.parametrize("kind", KINDS)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme.io.recordings import read_recordings
+from kineme.io.reading.recordings import read_recordings
 from kineme.io.ros.add_topic import copy_with_topic
 from ros_programs import ros_1
 

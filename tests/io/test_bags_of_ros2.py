@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from bag_files import write_bag, write_mcap
-from kineme.io.recordings import read_recordings
+from kineme.io.reading.recordings import read_recordings
 from kineme.io.ros.add_topic import copy_with_topic
 from ros_programs import ros_2
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kineme.errors import DataError
-from kineme.io.recordings import read_recordings_from_bytes
+from kineme.io.reading.recordings import read_recordings_from_bytes
 from kineme.movements.tables.layout import Layout
 
 N = 24

@@ -7,10 +7,10 @@ import pandas as pd
 import pytest
 
 import kineme
-from kineme.io.column_order import notes_on_aside
-from kineme.io.inspection.gaps import notes_on_gaps
 from kineme.io.inspection.inspect import inspect
-from kineme.io.recordings import read_recordings_from_bytes
+from kineme.io.reading.column_order import notes_on_aside
+from kineme.io.reading.recording_gaps import notes_on_gaps
+from kineme.io.reading.recordings import read_recordings_from_bytes
 from kineme.movements.tables.layout import Layout
 
 T = 40

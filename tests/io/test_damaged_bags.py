@@ -9,8 +9,8 @@ import pytest
 
 import kineme
 from bag_files import KINDS, SECOND, START, Maker, pose_rows, stamps, write_bag
-from kineme.io.recordings import read_recordings
-from kineme.io.write_movement import write_movement
+from kineme.io.reading.recordings import read_recordings
+from kineme.io.writing.write_movement import write_movement
 
 EVERY = pytest.mark.parametrize("kind", KINDS)
 

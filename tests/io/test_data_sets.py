@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme.io import formats
-from kineme.io.entries import root_of
-from kineme.io.folders import files_under
-from kineme.io.formats import DataSet, Format, data_set_of
 from kineme.io.limits import VARIABLE
-from kineme.io.recordings import read_recording, read_recordings
+from kineme.io.reading import formats
+from kineme.io.reading.entries import files_under, root_of
+from kineme.io.reading.formats import DataSet, Format, data_set_of
+from kineme.io.reading.recordings import read_recording, read_recordings
 from kineme.movements.tables.parsed import Block, Detected, Parsed
 
 X = np.sin(np.arange(24.0)).reshape(12, 2)

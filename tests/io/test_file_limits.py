@@ -14,7 +14,7 @@ import pytest
 import kineme
 from kineme.io import limits
 from kineme.io.limits import VARIABLE, max_file_bytes
-from kineme.io.recordings import read_recordings, read_recordings_from_bytes
+from kineme.io.reading.recordings import read_recordings, read_recordings_from_bytes
 from kineme.movements.tables.layout import Layout
 from limited_child import MIB, LimitedChild
 
@@ -125,8 +125,8 @@ def test_more_bytes_than_an_entry_admits_are_not_expanded():
     whole = archive(("positions.npy", bytes(120 * MIB)), ("times.npy", entry(T)))
     small = whole.replace(struct.pack("<I", 120 * MIB), struct.pack("<I", 176))
     assert small != whole
-    with LimitedChild(("kineme.io.recordings",), memory=60 * MIB) as child:
-        outcome = child.call("kineme.io.recordings:read_recordings_from_bytes", small, "a.npz", Layout())
+    with LimitedChild(("kineme.io.reading.recordings",), memory=60 * MIB) as child:
+        outcome = child.call("kineme.io.reading.recordings:read_recordings_from_bytes", small, "a.npz", Layout())
     assert outcome.how == "refused", outcome
     assert "CRC" in outcome.what  # not that the memory was too small
 

@@ -6,8 +6,8 @@ from click.testing import CliRunner
 
 from kineme.cli import main
 from kineme.errors import DataError, SpecificationError
-from kineme.io.inspection.gaps import notes_on_gaps
-from kineme.io.recordings import read_recording, read_recordings, read_recordings_from_bytes
+from kineme.io.reading.recording_gaps import notes_on_gaps
+from kineme.io.reading.recordings import read_recording, read_recordings, read_recordings_from_bytes
 from kineme.movements.tables.layout import Layout
 
 RATE = 100

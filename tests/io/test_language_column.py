@@ -7,10 +7,7 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme.io.lerobot import text_column
-from kineme.io.lerobot.copy import copy_with_motions
-from kineme.io.lerobot.language import COLUMN
-from kineme.io.lerobot.motions import OWN, Motion
+from kineme.io.lerobot.copy import LANGUAGE, MOTION_TEXTS, OWN, Motion, copy_with_motions
 from lerobot_sets import write_v2, write_v3
 
 pa = pytest.importorskip("pyarrow")
@@ -40,7 +37,8 @@ def lists(folder):
     """(episode, rows) of every frame, by pandas."""
     frames = pd.concat([pd.read_parquet(folder / shard) for shard in SHARDS if (folder / shard).exists()])
     return [
-        (k, [*rows] if rows is not None else None) for k, rows in zip(frames.episode_index, frames[COLUMN], strict=True)
+        (k, [*rows] if rows is not None else None)
+        for k, rows in zip(frames.episode_index, frames[LANGUAGE], strict=True)
     ]
 
 
@@ -70,18 +68,18 @@ def test_stamps_are_those_of_frames(tmp_path, source):
     target = copied(source, tmp_path / "named")
     frames = pd.read_parquet(target / SHARDS[0])
     stored = set(frames.timestamp[frames.episode_index == 0].tolist())
-    assert {one["timestamp"] for rows in frames[COLUMN] for one in rows} <= stored
+    assert {one["timestamp"] for rows in frames[LANGUAGE] for one in rows} <= stored
 
 
 def test_the_type_is_that_of_lerobot(tmp_path, source):
-    kind = parquet.read_schema(copied(source, tmp_path / "named") / SHARDS[0]).field(COLUMN).type
+    kind = parquet.read_schema(copied(source, tmp_path / "named") / SHARDS[0]).field(LANGUAGE).type
     fields = {one.name: (one.type, one.nullable) for one in kind.value_type}
     assert list(fields) == ["role", "content", "style", "timestamp", "camera", "tool_calls"]
     assert fields["role"] == (pa.string(), False)
     assert fields["timestamp"] == (pa.float32(), False)
     assert fields["content"] == fields["camera"] == fields["style"] == (pa.string(), True)
     info = json.loads((tmp_path / "named" / "meta" / "info.json").read_text())
-    assert info["features"][COLUMN] == {"dtype": "language", "shape": [1], "names": None}
+    assert info["features"][LANGUAGE] == {"dtype": "language", "shape": [1], "names": None}
 
 
 def test_all_other_columns_and_files_are_as_they_were(tmp_path, source):
@@ -94,7 +92,7 @@ def test_all_other_columns_and_files_are_as_they_were(tmp_path, source):
     assert changed == {*SHARDS, "meta/info.json"}
     for shard in SHARDS:
         old, new = (parquet.ParquetFile(folder / shard) for folder in (source, target))
-        assert new.read().drop_columns([COLUMN]).equals(old.read(), check_metadata=True)
+        assert new.read().drop_columns([LANGUAGE]).equals(old.read(), check_metadata=True)
         assert new.schema_arrow.metadata == old.schema_arrow.metadata
         assert new.metadata.num_row_groups == old.metadata.num_row_groups
         compressions = [
@@ -103,7 +101,7 @@ def test_all_other_columns_and_files_are_as_they_were(tmp_path, source):
         ]
         assert compressions[0].items() <= compressions[1].items()
     old, new = (json.loads((folder / "meta" / "info.json").read_text()) for folder in (source, target))
-    del new["features"][COLUMN]
+    del new["features"][LANGUAGE]
     assert new == old
 
 
@@ -116,7 +114,7 @@ def test_groups_of_rows_and_compression_stay(tmp_path, source):
     assert [new.metadata.row_group(k).num_rows for k in range(new.metadata.num_row_groups)] == [7] * 7 + [1]
     group = new.metadata.row_group(0)
     assert {group.column(k).compression for k in range(group.num_columns)} == {"ZSTD"}
-    assert new.read().drop_columns([COLUMN]).equals(table, check_metadata=True)
+    assert new.read().drop_columns([LANGUAGE]).equals(table, check_metadata=True)
     assert all(rows == EXPECTED[k] for k, rows in lists(target))
 
 
@@ -124,9 +122,9 @@ def with_rows(source, rows_of, kind=None):
     """Write a column of LeRobot's into the first shard: of a frame's number, its rows."""
     table = parquet.read_table(source / SHARDS[0])
     column = pa.array([rows_of(k) for k in range(len(table))], type=kind)
-    parquet.write_table(table.append_column(COLUMN, column), source / SHARDS[0])
+    parquet.write_table(table.append_column(LANGUAGE, column), source / SHARDS[0])
     info = json.loads((source / "meta" / "info.json").read_text())
-    info["features"][COLUMN] = {"dtype": "language", "shape": [1], "names": None}
+    info["features"][LANGUAGE] = {"dtype": "language", "shape": [1], "names": None}
     (source / "meta" / "info.json").write_text(json.dumps(info))
 
 
@@ -140,8 +138,8 @@ def test_texts_that_are_there_stay(tmp_path, source):
     )
     info = (source / "meta" / "info.json").read_bytes()
     after = copied(source, tmp_path / "named")
-    new = parquet.read_table(after / SHARDS[0]).column(COLUMN).to_pylist()
-    old = parquet.read_table(source / SHARDS[0]).column(COLUMN).to_pylist()
+    new = parquet.read_table(after / SHARDS[0]).column(LANGUAGE).to_pylist()
+    old = parquet.read_table(source / SHARDS[0]).column(LANGUAGE).to_pylist()
     assert new == [[*was, *EXPECTED[0]] if k < 20 else was for k, was in enumerate(old)]
     assert new[49] is None
     assert (after / "meta" / "info.json").read_bytes() == info
@@ -150,8 +148,8 @@ def test_texts_that_are_there_stay(tmp_path, source):
 def test_a_column_as_another_program_infers_it(tmp_path, source):
     """Without texts in JSON, stamps of 64 bits, as of lists of Python."""
     with_rows(source, lambda k: [{**SUBTASK, "tool_calls": None}])
-    new = parquet.read_table(copied(source, tmp_path / "named") / SHARDS[0]).column(COLUMN)
-    assert new.type == parquet.read_schema(source / SHARDS[0]).field(COLUMN).type
+    new = parquet.read_table(copied(source, tmp_path / "named") / SHARDS[0]).column(LANGUAGE)
+    assert new.type == parquet.read_schema(source / SHARDS[0]).field(LANGUAGE).type
     assert [one["content"] for one in new[0].as_py()] == ["reach", '{"symbol": "né"}', "later"]
 
 
@@ -171,8 +169,8 @@ def test_a_column_of_json(tmp_path, source):
         fields=fields,
     )
     column = pa.ListArray.from_arrays(pa.array([0, 1] + [1] * (len(table) - 1), pa.int32()), row_, type=kind)
-    parquet.write_table(table.append_column(COLUMN, column), source / SHARDS[0])
-    new = parquet.read_table(copied(source, tmp_path / "named") / SHARDS[0]).column(COLUMN)
+    parquet.write_table(table.append_column(LANGUAGE, column), source / SHARDS[0])
+    new = parquet.read_table(copied(source, tmp_path / "named") / SHARDS[0]).column(LANGUAGE)
     assert [one["content"] for one in new[0].as_py()] == ["reach", '{"symbol": "né"}', "later"]
     assert [one["content"] for one in new[1].as_py()] == ['{"symbol": "né"}', "later"]
 
@@ -222,7 +220,7 @@ def test_a_second_copy_replaces_the_texts_of_the_first_and_keeps_those_of_others
 
 
 def texts_of(folder, k):
-    return pd.read_parquet(folder / f"data/chunk-000/episode_{k:06d}.parquet")[text_column.COLUMN].tolist()
+    return pd.read_parquet(folder / f"data/chunk-000/episode_{k:06d}.parquet")[MOTION_TEXTS].tolist()
 
 
 def test_version_2_takes_texts_in_json(tmp_path):
@@ -239,9 +237,9 @@ def test_version_2_takes_texts_in_json(tmp_path):
     assert set(after) == set(before)
     assert {"meta/episodes.jsonl", "meta/tasks.jsonl"} == same
     old, new = (parquet.read_table(folder / "data/chunk-000/episode_000001.parquet") for folder in (source, target))
-    assert new.drop_columns([text_column.COLUMN]).equals(old, check_metadata=True)
+    assert new.drop_columns([MOTION_TEXTS]).equals(old, check_metadata=True)
     old, new = (json.loads((folder / "meta" / "info.json").read_text()) for folder in (source, target))
-    assert new["features"].pop(text_column.COLUMN) == {"dtype": "string", "shape": [1], "names": None}
+    assert new["features"].pop(MOTION_TEXTS) == {"dtype": "string", "shape": [1], "names": None}
     assert new == old
     assert kineme.read_recordings(target).labels.tolist() == kineme.read_recordings(source).labels.tolist()
 
@@ -262,7 +260,7 @@ def test_another_column_of_that_name_in_version_2_is_refused(tmp_path, values, w
     source = write_v2(tmp_path / "set")
     path = source / "data/chunk-000/episode_000001.parquet"
     table = parquet.read_table(path)
-    parquet.write_table(table.append_column(text_column.COLUMN, pa.array(values * len(table))), path)
+    parquet.write_table(table.append_column(MOTION_TEXTS, pa.array(values * len(table))), path)
     with pytest.raises(kineme.DataError, match=rf"episode_000001\.parquet: expected {words}"):
         copied(source, tmp_path / "named")
 

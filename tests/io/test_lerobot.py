@@ -10,7 +10,7 @@ import pytest
 import kineme
 from kineme.errors import DataError
 from kineme.io.inspection.inspect import inspect
-from kineme.io.lerobot.episodes import read_tasks
+from kineme.io.lerobot.info import read_tasks
 from kineme.io.limits import VARIABLE
 from lerobot_sets import NAMES, TASKS, write_v2, write_v3
 from limited_child import MIB, LimitedChild
@@ -352,14 +352,14 @@ def test_pictures_alone_are_refused_by_their_names(folder):
 
 @pytest.fixture(scope="module")
 def child():
-    modules = ("kineme.io.recordings", "kineme.io.lerobot.read", "pyarrow.parquet")
+    modules = ("kineme.io.reading.recordings", "kineme.io.lerobot.read", "pyarrow.parquet")
     with pytest.MonkeyPatch.context() as patch, LimitedChild(modules, memory=150 * MIB) as child:
         patch.setenv(VARIABLE, str(16 * MIB))
         yield child
 
 
 def refusal(child, folder):
-    outcome = child.call("kineme.io.recordings:read_recordings", folder)
+    outcome = child.call("kineme.io.reading.recordings:read_recordings", folder)
     assert outcome.how == "refused", outcome
     return outcome.what
 

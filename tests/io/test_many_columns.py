@@ -7,7 +7,7 @@ import time
 import pytest
 
 import kineme
-from kineme.io.recordings import read_recordings_from_bytes
+from kineme.io.reading.recordings import read_recordings_from_bytes
 from kineme.movements.tables.columns import choose_roles
 from kineme.movements.tables.layout import Layout
 

@@ -5,7 +5,7 @@ import pytest
 
 import kineme
 from bag_files import START, Maker, pose_rows, stamps, store, write_json_mcap, write_mcap
-from kineme.io.recordings import read_recordings
+from kineme.io.reading.recordings import read_recordings
 
 
 def serialized(m, ns, row):

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from kineme.errors import DataError
-from kineme.io.inspection.inspect import inspect
-from kineme.io.inspection.report import as_words
-from kineme.io.recordings import read_recordings, read_recordings_from_bytes
+from kineme.io.inspection.inspect import as_words, inspect
+from kineme.io.reading.recordings import read_recordings, read_recordings_from_bytes
 from kineme.movements.channels.channel import recorded_names
 from kineme.movements.tables.layout import Layout
 

@@ -9,7 +9,7 @@ import pytest
 
 import kineme
 from bag_files import KINDS, SECOND, START, Maker, pose_rows, stamps, write_bag
-from kineme.io.ros.bag_contents import bag_contents
+from kineme.io.ros.choose import bag_contents
 from kineme.io.ros.number_fields import NumberFields, Step, number_fields
 
 pytest.importorskip("rosbags")

@@ -9,7 +9,7 @@ import pytest
 from pyarrow import parquet
 
 import kineme
-from kineme.io.recordings import read_recordings_from_bytes
+from kineme.io.reading.recordings import read_recordings_from_bytes
 from kineme.io.tables.parquet import _texts
 from kineme.movements.tables.layout import Layout
 

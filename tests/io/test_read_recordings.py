@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme.io.formats import FORMATS
-from kineme.io.recordings import read_recording, read_recordings
-from kineme.io.write_movement import write_movement
+from kineme.io.reading.formats import FORMATS
+from kineme.io.reading.recordings import read_recording, read_recordings
+from kineme.io.writing.write_movement import write_movement
 
 
 @pytest.mark.parametrize("source", lasa_files.SOURCES)

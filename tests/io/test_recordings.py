@@ -9,8 +9,8 @@ import pytest
 
 import kineme
 import kineme.orientation
-from kineme.io.recordings import read_recording
-from kineme.io.write_movement import WRITERS, ColumnNames, write_movement
+from kineme.io.reading.recordings import read_recording
+from kineme.io.writing.write_movement import WRITERS, ColumnNames, write_movement
 
 TIMES = np.array([0.0, 0.1, 0.25, 0.4, 0.5])
 PATH = np.array([[0.0, 1.0], [0.5, 1.5], [1.0, 2.5], [1.5, 2.0], [2.0, 3.0]])
@@ -148,7 +148,7 @@ def test_lists_are_written_as_arrays_are(tmp_path):
 
 
 def test_the_page_lists_every_format():
-    from kineme.io.formats import DATA_SETS, FORMATS
+    from kineme.io.reading.formats import DATA_SETS, FORMATS
 
     page = (Path(__file__).parents[2] / "docs" / "guide" / "recordings.md").read_text(encoding="utf-8")
     table = page.partition("## What is read")[2].partition("\n## ")[0]

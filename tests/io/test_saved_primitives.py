@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme.io.container import write_container
+from kineme.io.arrays.npz import write_container
 
 ARRAYS = ("scaled_weights", "starts", "goals", "velocities", "durations", "extents", "weights")
 
@@ -90,7 +90,7 @@ def test_pickled_objects_are_never_loaded(tmp_path):
 
 
 def test_a_later_version_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("kineme.io.container.VERSION", 7)
+    monkeypatch.setattr("kineme.io.arrays.npz.VERSION", 7)
     path = learned().save(tmp_path / "x")
     monkeypatch.undo()
     with pytest.raises(kineme.DataError, match="version 1 or earlier, got 7; upgrade kineme"):

@@ -8,8 +8,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import kineme
-from kineme.io.recordings import read_recordings_from_bytes
-from kineme.io.tables import text_table, tolerant_table
+from kineme.io.reading.recordings import read_recordings_from_bytes
+from kineme.io.tables import text_table
 from kineme.io.tables.text_table import read_text_table
 from kineme.movements.tables.layout import Layout
 
@@ -29,16 +29,15 @@ def outcome(data, layout=Layout()):  # noqa: B008 - frozen
 def by_lines(data, layout=Layout()):  # noqa: B008
     """The same, every line by itself."""
     with pytest.MonkeyPatch.context() as patched:
-        for module in (tolerant_table, text_table):
-            patched.setattr(module, "try_rows", lambda *_: None)
+        patched.setattr(text_table, "try_rows", lambda *_: None)
         return outcome(data, layout)
 
 
 def in_stretches(data, layout=Layout()):  # noqa: B008
     """The same, some lines at a time."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(text_table, "try_rows", lambda *_: None)
-        patched.setattr(tolerant_table, "_STRETCH", 2)
+        patched.setattr(text_table, "_read_fast", lambda *_: None)
+        patched.setattr(text_table, "_STRETCH", 2)
         return outcome(data, layout)
 
 

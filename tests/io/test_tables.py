@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import kineme
-from kineme.io.gaps import SENTINELS
-from kineme.io.recordings import read_recordings, read_recordings_from_bytes
+from kineme.io.reading.check_block import SENTINELS
+from kineme.io.reading.recordings import read_recordings, read_recordings_from_bytes
 from kineme.movements.tables.columns import choose_roles, is_time
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.parsed import distinct

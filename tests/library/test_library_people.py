@@ -15,7 +15,7 @@ import kineme
 from kineme import ActionLibrary, Recognizer
 from kineme.anchoring.proposals.propose import propose as propose_clusters
 from kineme.errors import TrajectoryError
-from kineme.io.people import each_person
+from kineme.io.reading.merge_files import each_person
 from kineme.library import proposals
 from kineme.library.proposals import known_symbols
 from kineme.library.recognize import LibraryRecognizer

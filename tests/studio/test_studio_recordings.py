@@ -20,7 +20,7 @@ from studio_samples import BEARER, drawing
 
 from kineme import ActionLibrary
 from kineme.errors import DataError
-from kineme.io.recordings import read_recordings
+from kineme.io.reading.recordings import read_recordings
 from kineme.studio.server import app, read_upload, recording_routes, uploads
 from kineme.studio.server import work as work_module
 from kineme.studio.server.refusals import MissingError

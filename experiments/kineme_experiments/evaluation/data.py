@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 
 from kineme.datasets.lasa import LASA_26, PAPER_LETTERS, load_lasa
 from kineme.errors import DataError
-from kineme.io.merge_files import Recordings
-from kineme.io.people import people_of
-from kineme.io.recordings import read_recordings
+from kineme.io.reading.merge_files import Recordings, people_of
+from kineme.io.reading.recordings import read_recordings
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import label_array
 
@@ -45,7 +44,7 @@ class DataSet(NamedTuple):
 def load_data(data: str, read_path: Callable[[Path], Recordings] = read_recordings) -> DataSet:
     """A packaged data set by its name, or recordings with labels: a folder per label, a column, or an array of labels.
 
-    People are read as `kineme.io.people` says. What cannot be read, a movement of other dimensions
+    People are read as `kineme.io.reading.merge_files` says. What cannot be read, a movement of other dimensions
     than most, a movement without a label, and the only movement of a class are left out, and the reason is kept.
     `read_path` reads the recordings.
 

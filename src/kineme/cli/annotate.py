@@ -17,13 +17,13 @@ from kineme.reporting.text import counted, printable
 
 
 class Format(click.ParamType):  # type: ignore[type-arg]
-    """A key of `kineme.io.annotations.writers.WRITERS`, which --help does not load."""
+    """A key of `kineme.io.writing.annotations.WRITERS`, which --help does not load."""
 
     name = "NAME"
 
     def convert(self, value: Any, param: Any, ctx: Any) -> str:
         """The name, if there is such a format."""
-        from kineme.io.annotations.writers import WRITERS
+        from kineme.io.writing.annotations import WRITERS
 
         if value not in WRITERS:
             self.fail(f"expected one of {', '.join(WRITERS)}, got {value!r}", param, ctx)
@@ -58,10 +58,11 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
 
     Example: kineme annotate long.csv --library actions/ -o long-labels.csv
     """
-    from kineme.io.annotations.tables import as_row, to_csv
-    from kineme.io.annotations.writers import targets_of, write_annotations
-    from kineme.io.entries import expanded, paths_of
-    from kineme.io.inspection.gaps import notes_on_gaps
+    from kineme.io.reading.entries import expanded
+    from kineme.io.reading.recording_gaps import notes_on_gaps
+    from kineme.io.reading.recordings import paths_of
+    from kineme.io.writing.annotation import as_row, to_csv
+    from kineme.io.writing.annotations import targets_of, write_annotations
     from kineme.library.annotate import annotate as find
     from kineme.library.library import ActionLibrary
 

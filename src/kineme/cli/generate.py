@@ -144,7 +144,7 @@ def _plot(path: Path, learned: Any, made: Any, obstacles: Any) -> None:
 
 
 def _write(output: Path, made: Any, ending: str) -> None:
-    from kineme.io.write_movement import encode_movement, write_movement
+    from kineme.io.writing.write_movement import encode_movement, write_movement
 
     if str(output) == "-":
         write_bytes(encode_movement(made.columns, ending, made.names))

@@ -40,11 +40,10 @@ def inspect(
     Example: kineme inspect recordings/ --plot recordings.png
     """
     from kineme.errors import DataError
-    from kineme.io.entries import in_words
     from kineme.io.inspection.contents import contents_as_data, contents_as_words, contents_of_all
+    from kineme.io.inspection.inspect import as_data, as_words, nothing_read
     from kineme.io.inspection.inspect import inspect as summarize
-    from kineme.io.inspection.inspect import nothing_read
-    from kineme.io.inspection.report import as_data, as_words
+    from kineme.io.reading.entries import in_words
 
     files = [recording for recording in recordings if str(recording) != "-"]
     contents = contents_of_all(files, options["follow_links"])

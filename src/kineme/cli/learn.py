@@ -51,7 +51,7 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
 
     Example: kineme learn recordings/ --library actions/
     """
-    from kineme.io.entries import root_of
+    from kineme.io.reading.entries import root_of
     from kineme.library.library import ActionLibrary
 
     as_json, label, no_labels = options.pop("as_json"), options.pop("label"), options.pop("no_labels")
@@ -85,9 +85,9 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
 
 def _notes(recordings: Any) -> list[str]:
     """What a person should know of how recordings were read, before they rely on what is learned."""
-    from kineme.io.column_order import notes_on_aside, notes_on_order
-    from kineme.io.inspection.extents import notes_on_extents, notes_on_sizes
-    from kineme.io.inspection.gaps import notes_on_gaps, notes_on_sampling
+    from kineme.io.inspection.inspect import notes_on_extents, notes_on_sizes
+    from kineme.io.reading.column_order import notes_on_aside, notes_on_order
+    from kineme.io.reading.recording_gaps import notes_on_gaps, notes_on_sampling
     from kineme.movements.channels.column_match import columns_recorded
 
     demos = recordings.demonstrations
@@ -101,8 +101,7 @@ def _labeled(recordings: Any, table: Path | None) -> Any:
     """The stretches that a table labels, where there is one."""
     if table is None:
         return recordings
-    from kineme.io.annotations.labeled_pieces import labeled_pieces
-    from kineme.io.annotations.read_labels import read_labels
+    from kineme.io.reading.read_labels import labeled_pieces, read_labels
 
     return labeled_pieces(recordings, read_labels(table))
 
@@ -110,7 +109,7 @@ def _labeled(recordings: Any, table: Path | None) -> Any:
 def _people(root: Path, recordings: Any, person: str | None, by_person: bool) -> list[str | None] | None:
     """Who showed each movement, as far as the options and the recordings say."""
     from kineme.errors import DataError
-    from kineme.io.people import each_person
+    from kineme.io.reading.merge_files import each_person
 
     if recordings.people is not None and person is not None:
         raise click.UsageError("expected --person, or people from --person-column or --label-pattern, not both")

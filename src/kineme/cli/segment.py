@@ -57,7 +57,7 @@ def segment(
 
     Example: kineme segment long.csv -o pieces/ --plot pieces.png
     """
-    from kineme.io.entries import paths_of
+    from kineme.io.reading.recordings import paths_of
 
     as_json, force = options.pop("as_json"), options.pop("force")
     chosen = {name: value for name in _PARAMETERS if (value := options.pop(name)) is not None}
@@ -106,7 +106,7 @@ def _cut(parsed: Any, by: str, chosen: dict[str, Any], problems: list[str]) -> t
 
 def _files(cut: list[Any], movements: list[Any], output: Path | None, form: str) -> list[Path]:
     """A file for each piece; none without a folder for them."""
-    from kineme.io.file_names import distinct_stems
+    from kineme.io.writing.write_movement import distinct_stems
 
     if output is None:
         return []
@@ -117,7 +117,7 @@ def _files(cut: list[Any], movements: list[Any], output: Path | None, form: str)
 
 
 def _write(cut: list[Any], files: list[Path], output: Path) -> None:
-    from kineme.io.write_movement import write_movement
+    from kineme.io.writing.write_movement import write_movement
 
     output.mkdir(parents=True, exist_ok=True)
     pieces = (piece for one in cut for piece in one)

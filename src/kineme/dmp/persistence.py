@@ -36,14 +36,14 @@ T = TypeVar("T")
 
 def save_as(kind: str, path: str | Path, header: dict[str, Any], arrays: Arrays) -> Path:
     """Write a header of plain data and arrays to one file, with the name of its content."""
-    from kineme.io.container import write_container  # files load when they are used
+    from kineme.io.arrays.npz import write_container  # files load when they are used
 
     return write_container(Path(path), kind, header, dict(arrays))
 
 
 def load_as(kind: str, path: str | Path, build: Callable[[dict[str, Any], Arrays], T]) -> T:
     """Read a file with content of the given name and build it; a header or arrays that do not fit are a `DataError`."""
-    from kineme.io.container import read_container
+    from kineme.io.arrays.npz import read_container
 
     path = as_path(path, f"the path of a file of {kind}")
     if path.is_dir() or not path.exists():

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from kineme.errors import KinemeError
-from kineme.io.annotations.annotation import Annotation
-from kineme.io.merge_files import Recordings, Source
-from kineme.io.problem import Problem
+from kineme.io.reading.merge_files import Recordings, Source
+from kineme.io.records import Problem
+from kineme.io.writing.annotation import Annotation
 from kineme.library.recognize import some_of_each_symbol
 from kineme.library.storage.store import Store
 from kineme.movements.trajectories.trajectory import Trajectory

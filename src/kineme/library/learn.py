@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import TrajectoryError
-from kineme.io.merge_files import Recordings
-from kineme.io.merge_files import Source as File
+from kineme.io.reading.merge_files import Recordings
+from kineme.io.reading.merge_files import Source as File
 from kineme.library.commit import Batch, Committed, commit, find_stored, serialize_new
 from kineme.library.serialize import check, evenly_sampled, relative_times, stored_times
 from kineme.library.storage.channels import other_columns, to_bytes
@@ -358,7 +358,7 @@ def learn_recordings(  # noqa: PLR0913, PLR0917 - those of `ActionLibrary.learn`
     root: str | PurePath = "",
     groups: Sequence[str | None] | None = None,
 ) -> LearnReport:
-    """Store the recordings of `kineme.io.recordings.read_recordings`.
+    """Store the recordings of `kineme.io.reading.recordings.read_recordings`.
 
     Parameters
     ----------

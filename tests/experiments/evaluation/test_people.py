@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme.io.write_movement import write_movement
+from kineme.io.writing.write_movement import write_movement
 from kineme_experiments.evaluation.data import load_data
 
 

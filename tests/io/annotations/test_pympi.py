@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from kineme.io.annotations.annotation import Annotation
-from kineme.io.annotations.read_labels import read_labels
-from kineme.io.annotations.writers import write_annotations
+from kineme.io.reading.read_labels import read_labels
+from kineme.io.writing.annotation import Annotation
+from kineme.io.writing.annotations import write_annotations
 
 elan = pytest.importorskip("pympi.Elan", reason="no package pympi-ling")
 

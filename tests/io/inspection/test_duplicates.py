@@ -7,7 +7,7 @@ import pytest
 
 from kineme import Demonstrations
 from kineme.io.inspection.inspect import duplicates_among
-from kineme.io.recordings import read_recordings
+from kineme.io.reading.recordings import read_recordings
 
 
 @pytest.mark.parametrize(("difference", "found"), [(0.0, [[0, 1]]), (5e-7, [[0, 1]]), (2e-6, []), (1e-2, [])])

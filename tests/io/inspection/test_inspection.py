@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from kineme.io.inspection.figure import draw_recordings
-from kineme.io.inspection.inspect import duplicates_among, inspect
-from kineme.io.inspection.report import as_data, as_words
-from kineme.io.inspection.sampling import GAP, sampling_of
-from kineme.io.recordings import read_recordings, read_recordings_from_bytes
-from kineme.io.write_movement import write_movement
+from kineme.io.inspection.inspect import as_data, as_words, duplicates_among, inspect
+from kineme.io.reading.recording_gaps import GAP, sampling_of
+from kineme.io.reading.recordings import read_recordings, read_recordings_from_bytes
+from kineme.io.writing.write_movement import write_movement
 from kineme.movements.tables.layout import Layout
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.reporting.figures import encode_figure

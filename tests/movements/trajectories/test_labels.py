@@ -10,7 +10,7 @@ import pytest
 
 import kineme
 from kineme import Demonstrations, Recognizer, Trajectory, TrajectoryError
-from kineme.io.recordings import read_recordings_from_bytes
+from kineme.io.reading.recordings import read_recordings_from_bytes
 from kineme.movements.tables.layout import Layout
 from kineme.movements.trajectories.labels import label_array
 

@@ -14,7 +14,7 @@ from kineme.dmp.generation.learned import Learned
 from kineme.dmp.pose.pose_primitives import PosePrimitives
 from kineme.dmp.recorded_as import in_primitive, in_recording
 from kineme.errors import ExtrapolationWarning, SpecificationError, heard_warnings, warn
-from kineme.io.write_movement import ColumnNames, Columns
+from kineme.io.writing.write_movement import ColumnNames, Columns
 from kineme.movements.channels.coordinates import columns_of
 from kineme.movements.rotations.quaternions import NORM_TOLERANCE
 from kineme.validation import LARGEST, Array

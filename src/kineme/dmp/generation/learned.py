@@ -10,7 +10,7 @@ import numpy as np
 from kineme.dmp.discrete.dmp import DMP, Primitives
 from kineme.dmp.pose.pose_dmp import PoseDMP
 from kineme.dmp.pose.pose_primitives import PosePrimitives
-from kineme.io.container import kind_of
+from kineme.io.arrays.npz import kind_of
 from kineme.movements.channels.channel import learned_names, recorded_names
 from kineme.movements.trajectories.movements import axis_names
 from kineme.movements.trajectories.trajectory import Trajectory

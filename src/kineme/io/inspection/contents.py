@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from kineme.errors import DataError
-from kineme.io.contents import Contents
-from kineme.io.entries import entries_of
-from kineme.io.formats import FORMATS, data_set_of
+from kineme.io.reading.entries import entries_of
+from kineme.io.reading.formats import FORMATS, data_set_of
+from kineme.io.records import Contents
 from kineme.reporting.table import Table, to_text
 from kineme.reporting.text import printable
 

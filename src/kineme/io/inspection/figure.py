@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 from kineme.io.inspection.inspect import labels_in_order
-from kineme.io.merge_files import Recordings
+from kineme.io.reading.merge_files import Recordings
 from kineme.movements.trajectories.movements import axis_names
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.reporting.figures import BLUE, GRAY, ORANGE, new_figure

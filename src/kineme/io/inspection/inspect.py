@@ -1,26 +1,36 @@
-"""Summary of a set of recordings in numbers."""
+"""Summary of a set of recordings in numbers, as text and as plain data, and what files hold besides."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import re
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.io.column_order import notes_on_aside, notes_on_order
-from kineme.io.inspection.extents import extents_of, notes_on_extents, notes_on_sizes
-from kineme.io.inspection.gaps import notes_on_gaps, notes_on_sampling
-from kineme.io.inspection.sampling import Sampling, sampling_of
-from kineme.io.merge_files import Recordings
-from kineme.io.problem import Problem
-from kineme.movements.channels.channel import Channels
+from kineme.io.reading.column_order import notes_on_aside, notes_on_order
+from kineme.io.reading.merge_files import Recordings
+from kineme.io.reading.recording_gaps import Sampling, notes_on_gaps, notes_on_sampling, sampling_of
+from kineme.io.records import Problem
+from kineme.movements.channels.channel import Channel, Channels
 from kineme.movements.channels.column_match import columns_recorded
-from kineme.movements.channels.coordinates import columns_of
+from kineme.movements.channels.coordinates import columns_of, lever_of
 from kineme.movements.tables.parsed import Detected
 from kineme.movements.tables.time_stamps import GUESSED
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.reporting.text import first_names
+from kineme.reporting.table import Table, to_text
+from kineme.reporting.text import counted, first_names, printable
 from kineme.validation import Array
+
+_SHOWN = 20  # lines of a list; the rest is counted
+_COLUMNS, _CHANNELS, _FILES = 24, 12, 3  # names in a line
+
+
+_MORE = 10.0  # times the extent of all others
+_LARGER = 30.0  # times the extent of the smallest movement of a label: a degree and a radian are 57 apart
+_LISTED = 6  # columns that the note on extents names
+_END = re.compile(r"[\W\d_]*([\[(][^\[\]()]*[\])]\s*)?$")  # number and unit
 
 _STAMP = 1e-6  # times since the start are equal if they differ by less than this share of the duration
 
@@ -225,3 +235,178 @@ def _are_equal(demonstrations: Demonstrations, i: int, k: int) -> bool:
     one, other = demonstrations[i], demonstrations[k]
     since = np.abs((one.times - one.times[0]) - (other.times - other.times[0])).max()
     return np.array_equal(one.recorded, other.recorded) and bool(since <= _STAMP * one.duration)
+
+
+def extents_of(demos: Demonstrations) -> Array:
+    """The sides (n, d) of the box around each movement."""
+    x, starts = demos.positions, demos.offsets[:-1]
+    return np.asarray(np.maximum.reduceat(x, starts, axis=0) - np.minimum.reduceat(x, starts, axis=0))
+
+
+def notes_on_extents(demos: Demonstrations) -> list[str]:
+    """A sentence if some columns reach much further than all others, as a gripper in mm beside joints in radians.
+
+    Columns that belong together are one group: one axis or one joint may move alone. Rotations are left aside, they
+    are brought to the size of positions.
+    """
+    greatest = extents_of(demos).max(axis=0, initial=0.0)
+    groups: dict[str, dict[str, float]] = {}
+    at = 0
+    for one in demos.channels or ():
+        if one.kind in ("position", "angle"):
+            groups.setdefault(_group(one), {})[one.name] = float(greatest[at])
+        at += len(one.coordinates)
+    if len(groups) < 2:
+        return []
+    *_, second, widest = sorted(groups.values(), key=lambda group: max(group.values()))
+    here, there = max(widest.values()), max(second.values())
+    return [_note([*widest], here, there)] if there > 0 and here >= _MORE * there else []
+
+
+def notes_on_sizes(demos: Demonstrations) -> list[str]:
+    """A sentence if movements of one label differ in size as millimeters and meters do, whose unit no file says."""
+    extents = extents_of(demos).max(axis=1, initial=0.0)
+    labels = np.full(len(demos), None) if demos.labels is None else demos.labels
+    for label in dict.fromkeys(labels.tolist()):
+        chosen = np.flatnonzero((labels == label) & (extents > 0.0))
+        if not len(chosen):
+            continue
+        small, large = (int(chosen[k]) for k in (extents[chosen].argmin(), extents[chosen].argmax()))
+        if extents[large] >= _LARGER * extents[small]:
+            of_label = "" if label is None else f" of {label}"
+            names = demos.names or [f"movement {k}" for k in range(len(demos))]
+            return [
+                f"movements{of_label} extend from {extents[small]:.3g}, {names[small]}, to {extents[large]:.3g}, "
+                f"{names[large]}; if these are two units, as of mm and m or degrees and radians, say them in the heads"
+            ]
+    return []
+
+
+def _group(one: Channel) -> str:
+    """The same of columns that count in one unit: it is known, or their names are those of axes or joints."""
+    if one.unit or one.kind == "angle":
+        return one.unit or "an angle"
+    stem = _END.sub("", one.name).lower()
+    return "an axis" if stem.endswith(("x", "y", "z")) else stem
+
+
+def _note(names: Sequence[str], here: float, there: float) -> str:
+    spans, steps = ("spans", f", or say --kind {names[0]}=discrete") if len(names) == 1 else ("span", "")
+    return (
+        f"{first_names(names, _LISTED)} {spans} up to {here:.3g}, the other columns up to {there:.3g}, which hardly "
+        f"count in what is learned: bring all to similar sizes, or choose some with --columns{steps}"
+    )
+
+
+def as_data(inspection: Inspection) -> dict[str, Any]:
+    """Nested lists and dictionaries; units as the fields of `Inspection` and `LabelSummary` say."""
+    return {
+        "movements": inspection.movements,
+        "files": inspection.files,
+        "dimensions": inspection.dimensions,
+        "labels": [
+            {name: value._asdict() if isinstance(value, Range) else value for name, value in one._asdict().items()}
+            for one in inspection.labels
+        ],
+        "detected": [{**how._asdict(), "files": n} for how, n in inspection.detected],
+        "channels": [one._asdict() for one in inspection.channels or ()],
+        "duplicates": [list(group) for group in inspection.duplicates],
+        "problems": [{"file": one.file, "line": one.line, "reason": one.reason} for one in inspection.problems],
+        "notes": list(inspection.notes),
+    }
+
+
+def as_words(inspection: Inspection) -> str:
+    """A table of labels, how files were read, duplicates, and what could not be read."""
+    rows = [_row(one) for one in inspection.labels]
+    title = (
+        f"{counted(inspection.movements, 'movement')} of {counted(inspection.dimensions, 'dimension')} "
+        f"in {counted(inspection.files, 'file')}"
+    )
+    heads = ("label", "movements", "samples", "duration [s]", "rate [Hz]", "jitter", "gaps", "extent")
+    parts = [to_text(Table(title, heads, rows))]
+    parts += _listed("read as", [f"{_understood(how)} ({counted(n, 'file')})" for how, n in inspection.detected])
+    channels = inspection.channels or ()
+    parts += _listed("kinds", _kinds(channels))
+    parts += _listed("the same movement more than once", [" = ".join(group) for group in inspection.duplicates])
+    parts += _listed("not read", _once([one for one in inspection.problems if not one.samples]))
+    parts += _listed("read but for samples", _once([one for one in inspection.problems if one.samples]))
+    parts += _listed("note", list(inspection.notes))
+    return "\n\n".join(parts)
+
+
+def _listed(head: str, lines: list[str]) -> list[str]:
+    if not lines:
+        return []
+    more = [f"  and {len(lines) - _SHOWN} more"] if len(lines) > _SHOWN else []
+    return ["\n".join([f"{head}:", *(f"  {printable(line)}" for line in lines[:_SHOWN]), *more])]
+
+
+def _once(problems: Sequence[Problem]) -> list[str]:
+    """A line for each reason, with the files that share it."""
+    files: dict[str, dict[str, None]] = {}
+    for problem in problems:
+        files.setdefault(problem.what, {})[problem.file] = None
+    return [
+        f"{first_names([*names], _FILES)}{', ' if what.startswith('line ') else ': '}{what}"
+        for what, names in files.items()
+    ]
+
+
+def _row(one: LabelSummary) -> tuple[str, ...]:
+    gaps = f"{one.gaps} (to {one.longest_gap:.3g} s)" if one.gaps else "-"
+    jitter = f"{100 * one.jitter:.2g} %" if one.jitter >= 1e-6 else "-"
+    ranges = [_rate_range(values) for values in (one.samples, one.duration, one.rate)]
+    label = "(no label)" if one.label is None else printable(one.label)
+    return (label, f"{one.movements}", *ranges, jitter, gaps, _rate_range(one.extent))
+
+
+def _rate_range(values: Range) -> str:
+    """The median alone if minimum and maximum are equal, else all three."""
+    least, median, greatest = (f"{value:.4g}" if value < 1e6 else f"{value:.3g}" for value in values)
+    return median if least == greatest else f"{median} ({least} to {greatest})"
+
+
+def _kinds(channels: Channels) -> list[str]:
+    """A line for each channel that is no position; of many, a line for each kind."""
+    lever = lever_of(channels)
+    others = [(one, _kind(one, lever)) for one in channels if one.kind != "position"]
+    if len(others) <= _CHANNELS:
+        return [f"{', '.join(one.columns)}: {kind}" for one, kind in others]
+    names: dict[str, list[str]] = {}
+    for one, kind in others:
+        names.setdefault(kind, []).append(one.name)
+    return [f"{first_names(alike, _CHANNELS)}: {kind}" for kind, alike in names.items()]
+
+
+def _kind(channel: Channel, lever: float) -> str:
+    what = {
+        "angle": f"angle{f' in {channel.unit}' if channel.unit else ''}; wraps are taken away",
+        "orientation": f"orientation, a quaternion {', '.join(channel.order)}; learned as its integrated rotation"
+        + ("" if lever == 1 else f", a radian as {lever:g}"),
+        "discrete": "discrete; kept as it is, not learned",
+    }
+    return what[channel.kind]
+
+
+def _understood(how: Detected) -> str:
+    times = "no times" if how.time is None else f"time {how.time!r} in {how.units} ({how.units_from})"
+    parts = [f"{how.format}, {how.layout}: {times}", f"coordinates {_coordinates(how)}"]
+    for what, columns in (
+        ("movement", [one for one in how.movement if one not in how.person]),
+        ("label", how.label),
+        ("person", how.person),
+        ("left aside", how.ignored),
+    ):
+        if named := [column for column in columns if column]:
+            parts.append(f"{what} {first_names(named, _COLUMNS)}")
+    return "; ".join(parts)
+
+
+def _coordinates(how: Detected) -> str:
+    """The coordinates with their units, once if they have the same."""
+    known = set(how.measured_in)
+    if len(known) == 1:
+        return f"{first_names(how.columns, _COLUMNS)} in {known.pop()}"
+    named = zip(how.columns, how.measured_in or [""] * len(how.columns), strict=True)
+    return first_names([f"{name} [{unit}]" if unit else name for name, unit in named], _COLUMNS)

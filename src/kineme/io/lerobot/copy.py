@@ -1,20 +1,75 @@
-"""Copy a data set of LeRobot with texts about the movements of its episodes."""
+"""Copy a data set of LeRobot with texts about the movements of its episodes.
+
+Version 3 has a column for them, `language_persistent`, of rows that hold from a time of an episode on. Programs for
+version 2 read texts but no lists of rows: in its column `annotation.motion` each frame holds the rows of its episode as
+one text, a list in JSON with the fields of the rows of version 3.
+"""
 
 from __future__ import annotations
 
 import json
 import os
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from kineme.errors import DataError
-from kineme.io.lerobot.episodes import read_episodes
-from kineme.io.lerobot.info import MARKER, read_info, read_json
-from kineme.io.lerobot.motions import Motion
-from kineme.io.lerobot.write_shard import COLUMNS, Column, write_shard
+from kineme.io.lerobot.info import MARKER, read_episodes, read_info, read_json
+
+#: Of a movement, in coordinates of the robot: not of a camera, which stays null.
+ROLE, STYLE = "assistant", "motion"
+#: With which a content of this package begins: rows that do are replaced, those of others stay.
+OWN = '{"annotator": "kineme"'
 
 _OWN = ("meta", "data")  # folders whose files other programs write over; other ones hold videos
+
+LANGUAGE = "language_persistent"
+LANGUAGE_FEATURE = {"dtype": "language", "shape": [1], "names": None}  # as it stands in meta/info.json
+MOTION_TEXTS = "annotation.motion"
+TEXT_FEATURE = {"dtype": "string", "shape": [1], "names": None}
+
+
+class Motion(NamedTuple):
+    """A text about a movement of an episode.
+
+    Attributes
+    ----------
+    start : float
+        Seconds since the beginning of the episode; the stored stamp of the nearest frame is written.
+    content : str
+        JSON that begins with `OWN`, so that a later copy can replace it.
+    """
+
+    start: float
+    content: str
+
+
+class Column(NamedTuple):
+    """The column of a version that carries texts.
+
+    Attributes
+    ----------
+    name : str
+    feature : dict
+        Its entry in meta/info.json.
+    type_in : callable
+        Schema of a shard -> type of the column, whether the shard has it or not.
+    leaves : callable
+        Type -> paths of its parts in a Parquet file.
+    extended : callable
+        See `with_language`.
+    """
+
+    name: str
+    feature: dict[str, Any]
+    type_in: Callable[[Any], Any]
+    leaves: Callable[[Any], list[str]]
+    extended: Callable[[Any, Any, Any, Any], Any]
 
 
 def copy_with_motions(source: Path, target: Path, motions: Mapping[int, Sequence[Motion]]) -> None:
@@ -75,3 +130,255 @@ def _declare(source: Path, target: Path, column: Column) -> None:
         return
     known["features"][column.name] = column.feature
     target.write_text(json.dumps(known, indent=4, ensure_ascii=False), encoding="utf-8")
+
+
+def write_shard(source: Path, target: Path, motions: Mapping[int, Sequence[Motion]], column: Column) -> None:
+    """Copy a shard, group of rows after group of rows, with the texts of its episodes on each of their frames.
+
+    Texts of others stay, before those that are added; those of this package are replaced. All other columns, what the
+    file says of itself, its groups of rows and its compression are those of the source.
+
+    Raises
+    ------
+    DataError
+        A column of that name which is none of LeRobot's, or a damaged file.
+    """
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    try:
+        with _opened(source) as file:
+            schema = file.schema_arrow
+            kind = column.type_in(schema)
+            with _reading():
+                rows = _snapped(file, motions)
+            if column.name not in schema.names:
+                schema = schema.append(pa.field(column.name, kind))
+            packed = _compression(file.metadata, column.leaves(kind))
+            with parquet.ParquetWriter(target, schema, compression=packed) as writer:
+                for k in range(file.num_row_groups):
+                    with _reading():
+                        table = file.read_row_group(k, use_threads=False)
+                    writer.write_table(
+                        _extended(table, rows, column, kind, schema), row_group_size=max(table.num_rows, 1)
+                    )
+    except DataError as error:
+        raise DataError(f"{source.name}: {error}") from error
+    except (pa.ArrowException, ValueError, KeyError) as error:
+        raise DataError(f"expected the shard {source.name} to take the column {column.name}, got: {error}") from error
+
+
+def _opened(source: Path) -> Any:
+    from pyarrow import parquet
+
+    with _reading():
+        return parquet.ParquetFile(source)
+
+
+@contextmanager
+def _reading() -> Iterator[None]:
+    """Damage is an error of the data; what is wrong with the disk when writing stays one of the system."""
+    try:
+        yield
+    except OSError as error:
+        raise DataError(f"expected a Parquet file, got a damaged one ({error})") from error
+
+
+def _compression(metadata: Any, leaves: Sequence[str]) -> str | dict[str, str]:
+    """Leaf of a column -> how the source compresses it; the new column as the first one."""
+    if not metadata.num_row_groups or not metadata.num_columns:
+        return "snappy"
+    group = metadata.row_group(0)
+    columns = [group.column(k) for k in range(group.num_columns)]
+    known = {one.path_in_schema: str(one.compression) for one in columns}
+    known = dict.fromkeys(leaves, str(columns[0].compression)) | known
+    return {path: "NONE" if name == "UNCOMPRESSED" else name for path, name in known.items()}
+
+
+def _snapped(file: Any, motions: Mapping[int, Sequence[Motion]]) -> dict[int, list[Motion]]:
+    """The texts of the episodes of a shard, each at the stamp of a frame, in the order of time."""
+    known = file.read(columns=["episode_index", "timestamp"], use_threads=False)
+    episodes, stamps = (known.column(name).to_numpy() for name in ("episode_index", "timestamp"))
+    found: dict[int, list[Motion]] = {}
+    for episode in np.unique(episodes).tolist():
+        own = stamps[episodes == episode] if episode in motions else stamps[:0]
+        nearest = [float(own[np.abs(own - one.start).argmin()]) for one in motions.get(episode, ())]
+        some = zip(nearest, motions.get(episode, ()), strict=True)
+        found[episode] = sorted(one._replace(start=stamp) for stamp, one in some)
+    return found
+
+
+def _extended(table: Any, motions: Mapping[int, list[Motion]], column: Column, kind: Any, schema: Any) -> Any:
+    """Rows of a shard with the column, new or longer."""
+    import pyarrow as pa
+
+    known, episode_of = np.unique(table.column("episode_index").to_numpy(), return_inverse=True)
+    old = table.column(column.name) if column.name in table.column_names else None
+    if old is not None:
+        old = pa.concat_arrays(old.chunks) if old.num_chunks else pa.nulls(0, kind)
+    new = column.extended(old, [motions.get(int(k), []) for k in known], episode_of, kind)
+    columns = [new if name == column.name else table.column(name) for name in schema.names]
+    return pa.Table.from_arrays(columns, schema=schema)
+
+
+def language_type(schema: Any) -> Any:
+    """The type of the column: that which the shard has, else LeRobot's, with calls of tools as texts in JSON."""
+    import pyarrow as pa
+
+    if LANGUAGE in schema.names:
+        kind = schema.field(LANGUAGE).type
+        known = {one.name for one in kind.value_type} if _is_list_of_language_rows(kind) else set()
+        if not {"role", "content", "style", "timestamp"} <= known:
+            raise DataError(f"expected rows with role, content, style, timestamp in {LANGUAGE}, got {kind}")
+        return kind
+    fields = [
+        pa.field("role", pa.string(), nullable=False),
+        pa.field("content", pa.string()),
+        pa.field("style", pa.string()),
+        pa.field("timestamp", pa.float32(), nullable=False),
+        pa.field("camera", pa.string()),
+        pa.field("tool_calls", pa.list_(pa.string())),
+    ]
+    return pa.list_(pa.struct(fields))
+
+
+def _is_list_of_language_rows(kind: Any) -> bool:
+    import pyarrow as pa
+
+    return bool(pa.types.is_list(kind) and pa.types.is_struct(kind.value_type))
+
+
+def language_leaves(kind: Any) -> list[str]:
+    """Paths of the parts of the column in a Parquet file."""
+    leaves = [f"{LANGUAGE}.list.element.{one.name}" for one in kind.value_type]
+    return [*leaves, *(f"{leaf}.list.element" for leaf in leaves)]
+
+
+def with_language(old: Any, motions: Sequence[Sequence[Motion]], episode_of: NDArray[np.intp], kind: Any) -> Any:
+    """The column of some rows: those of others that are there, behind them the texts of each row's episode.
+
+    Parameters
+    ----------
+    old : pyarrow array or None
+        The column so far.
+    motions : sequence of sequences of Motion
+        For each of some episodes.
+    episode_of : ndarray of shape (T,)
+        Which of them a row belongs to.
+    kind : pyarrow type
+        See `language_type`.
+    """
+    import pyarrow as pa
+
+    added = _language_rows([one for some in motions for one in some], kind.value_type)
+    counts = np.array([len(some) for some in motions], dtype=np.int64)
+    if old is None:
+        return _lengthened(pa.nulls(len(episode_of), kind), added, counts, episode_of, kind, False)
+    return _lengthened(old, added, counts, episode_of, kind, True)
+
+
+def _lengthened(
+    old: Any, added: Any, counts: NDArray[np.int64], episode_of: NDArray[np.intp], kind: Any, keep_nulls: bool
+) -> Any:
+    """Lists with those of the episode behind: what is added stands episode after episode, `counts` of each."""
+    import pyarrow as pa
+
+    flat, before = _lists_of_others(old)
+    own = counts[episode_of]
+    lengths = before + own
+    offsets = np.concatenate(([0], np.cumsum(lengths)))
+    within = np.arange(offsets[-1]) - np.repeat(offsets[:-1], lengths)
+    first_old = np.cumsum(before) - before
+    first_added = len(flat) + (np.cumsum(counts) - counts)[episode_of] - before
+    is_old = within < np.repeat(before, lengths)
+    where = within + np.where(is_old, np.repeat(first_old, lengths), np.repeat(first_added, lengths))
+    values = pa.concat_arrays([flat, added]).take(pa.array(where))
+    absent = pa.array(np.asarray(old.is_null()) & (own == 0)) if keep_nulls else None
+    return pa.ListArray.from_arrays(pa.array(offsets, pa.int32()), values, type=kind, mask=absent)
+
+
+def _lists_of_others(old: Any) -> tuple[Any, NDArray[np.int64]]:
+    """The rows in all lists that are not of this package, and how many each list has."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    flat = old.flatten()
+    counts = pc.fill_null(pc.list_value_length(old), 0).to_numpy(zero_copy_only=False).astype(np.int64)
+    style, content = (pc.cast(pc.struct_field(flat, name), pa.string()) for name in ("style", "content"))
+    ours = pc.and_(pc.equal(style, STYLE), pc.starts_with(content, OWN))
+    kept = ~pc.fill_null(ours, False).to_numpy(zero_copy_only=False)
+    until = np.concatenate(([0], np.cumsum(kept)))[np.concatenate(([0], np.cumsum(counts)))]
+    return flat.take(np.flatnonzero(kept)), np.diff(until).astype(np.int64)
+
+
+def _language_rows(motions: Sequence[Motion], kind: Any) -> Any:
+    import pyarrow as pa
+
+    known: dict[str, list[Any]] = {
+        "role": [ROLE] * len(motions),
+        "content": [one.content for one in motions],
+        "style": [STYLE] * len(motions),
+        "timestamp": [one.start for one in motions],
+    }
+    fields = list(kind)
+    arrays = [
+        pa.array(known[one.name], type=one.type) if one.name in known else pa.nulls(len(motions), one.type)
+        for one in fields
+    ]
+    return pa.StructArray.from_arrays(arrays, fields=fields)
+
+
+def text_type(schema: Any) -> Any:
+    """The type of the column; a `DataError` if the shard has another of that name."""
+    import pyarrow as pa
+
+    kind = schema.field(MOTION_TEXTS).type if MOTION_TEXTS in schema.names else pa.string()
+    if kind not in (pa.string(), pa.large_string()):
+        raise DataError(f"expected texts in {MOTION_TEXTS}, got {kind}")
+    return kind
+
+
+def text_leaves(kind: Any) -> list[str]:
+    """Paths of the parts of the column in a Parquet file."""
+    return [MOTION_TEXTS]
+
+
+def with_texts(old: Any, motions: Sequence[Sequence[Motion]], episode_of: NDArray[np.intp], kind: Any) -> Any:
+    """The column of some rows, see `with_language`."""
+    import pyarrow as pa
+
+    known, text_of = [""], np.zeros(len(episode_of), dtype=np.intp)
+    if old is not None:
+        coded = old.dictionary_encode()
+        known = [text or "" for text in coded.dictionary.to_pylist()] + [""]
+        text_of = coded.indices.fill_null(len(known) - 1).to_numpy(zero_copy_only=False).astype(np.intp)
+    both, which = np.unique(np.column_stack((text_of, episode_of)), axis=0, return_inverse=True)
+    texts = [
+        json.dumps(_texts_of_others(known[t]) + _text_rows(motions[e]), ensure_ascii=False) for t, e in both.tolist()
+    ]
+    return pa.array(texts, kind).take(pa.array(which.ravel()))
+
+
+def _texts_of_others(text: str) -> list[Any]:
+    """The rows of a text that are not of this package."""
+    if not text:
+        return []
+    try:
+        rows = json.loads(text)
+    except (ValueError, RecursionError):
+        rows = None
+    if not isinstance(rows, list):
+        raise DataError(f"expected lists in JSON in {MOTION_TEXTS}, got {text[:40]!r}")
+    return [one for one in rows if not (isinstance(one, dict) and str(one.get("content")).startswith(OWN))]
+
+
+def _text_rows(motions: Sequence[Motion]) -> list[dict[str, Any]]:
+    plain = {"role": ROLE, "style": STYLE, "camera": None, "tool_calls": None}
+    return [{**plain, "content": one.content, "timestamp": one.start} for one in motions]
+
+
+#: Version -> its column.
+COLUMNS = {
+    2: Column(MOTION_TEXTS, TEXT_FEATURE, text_type, text_leaves, with_texts),
+    3: Column(LANGUAGE, LANGUAGE_FEATURE, language_type, language_leaves, with_language),
+}

@@ -2,8 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple
+
+from kineme.errors import DataError
+from kineme.units import unit_named
+
+_SECTIONS = ("trajectories", "segments", "objects", "joints", "model outputs", "devices")  # the first one there is read
+_OTHERS = ("events",)
+_QUATERNION = ("rx", "ry", "rz", "rw")
+
+
+_FIRST = "PathFileType"
+
+
+_POSES = ("x", "y", "z", "roll", "pitch", "yaw", "residual", *(f"rot[{k}]" for k in range(9)))
+
+
+_EXPECTED = ("rigid body marker", "bone marker", "trained markerset marker")  # computed from the pose, not measured
+
+
+_KEY = re.compile(
+    r"(version|nrows|ncolumns|indegrees|datatype|datarate|opensimversion|num_\w+)\s*=|(datacolumns|datarows)\s+\d",
+    re.IGNORECASE,
+)
+_END = "endheader"
+_AXES = {"quaternion": "wxyz", "vec3": "xyz", "unitvec3": "xyz"}
+#: A column that has one of these words is no coordinate, and its unit is not said by ``inDegrees``.
+_OTHER = re.compile(
+    r"force|torque|moment|activation|excitation|length|veloc|speed|accel|power|emg|fiber|tendon|control|reserve|residual"
+    r"|(^|_)[vp][xyz]$|multiplier|lambda|/forceset/"
+)
+_TRANSLATION = re.compile(r"_t[xyz](/value)?$")
 
 STAMP = "time [s]"  # head of the times
 
@@ -71,3 +102,263 @@ def without_common_subject(names: Iterable[str]) -> list[str]:
     parts = [name.partition(":") for name in names]
     subjects = {first for first, colon, _ in parts if colon}
     return [rest if colon and len(subjects) == 1 else first + colon + rest for first, colon, rest in parts]
+
+
+def opensim_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) -> ExportHead | None:
+    """The head of a motion or storage file of OpenSim, or None if the first lines do not look like one.
+
+    Source: OpenSim, "Motion (.mot) Files" and "Storage (.sto) Files", in the older and the newer version of their head.
+    Lines such as ``nRows=153`` and ``inDegrees=yes``, or of SIMM ``datarows 153``, end with ``endheader``; then come a
+    row of names, the first of them ``time``, and the samples. Where ``DataType`` says ``Quaternion`` or ``Vec3``, a
+    cell holds several numbers between commas, of a quaternion w, x, y, z.
+    """
+    if not any(_KEY.match(line.strip().lstrip("\ufeff")) for line in lines[:3]):
+        return None
+    at = next((k for k, line in enumerate(lines) if line.strip().lower() == _END), None)
+    if at is None:
+        raise DataError(f"expected {_END!r} at the end of the head of an OpenSim file, got none")
+    said = dict(_pair(line) for line in lines[:at] if "=" in line)
+    named = next((k for k in range(at + 1, len(lines)) if lines[k].strip()), None)
+    sample = None if named is None else next((k for k in range(named + 1, len(lines)) if lines[k].strip()), None)
+    if named is None or sample is None:
+        raise DataError(f"expected names and samples below {_END!r} of an OpenSim file, got none")
+    separator = "\t" if "\t" in lines[sample].strip() else None
+    names = cells_of(lines[named], "\t") if "\t" in lines[named].strip() else lines[named].split()
+    while names and not names[-1]:
+        names.pop()
+    if not names or names[0].lower() != "time":
+        raise DataError(f"expected 'time' as first column of an OpenSim file, got {names[:1]}")
+    kind = said.get("datatype", "double").lower()
+    packed = kind not in ("double", "float", "int")
+    heads, units = [STAMP], ["s"]
+    if packed:
+        cells = cells_of(lines[sample], "\t")[1:]
+        for name, cell in zip(names[1:], cells, strict=False):
+            n = cell.count(",") + 1
+            axes = _AXES.get(kind, "") if n == len(_AXES.get(kind, "")) else [str(k) for k in range(n)]
+            heads += [f"{name}.{axis}" for axis in axes]
+            units += [said.get("units", "") if kind == "vec3" else ""] * n
+    else:
+        heads += names[1:]
+        units += [_unit(name, said.get("indegrees", ""), lines[0]) for name in names[1:]]
+    return ExportHead("OpenSim", separator, tuple(heads), tuple(units), named + 1, packed=packed)
+
+
+def _pair(line: str) -> tuple[str, str]:
+    key, _, value = line.partition("=")
+    return key.strip().lower(), value.strip()
+
+
+def _unit(name: str, in_degrees: str, title: str) -> str:
+    """The unit of a column: ``inDegrees`` says it of coordinates that turn, and those that shift are in meters.
+
+    Without degrees, radians are sure only where the title says that the columns are coordinates.
+    """
+    plain = name.lower()
+    coordinates = "coordinates" in title.lower() or plain.endswith("/value")
+    if in_degrees.lower() not in ("yes", "no") or _OTHER.search(plain):
+        return ""
+    if any(word in title.lower() for word in ("force", "speed", "accel", "control", "activation")):
+        return ""
+    if _TRANSLATION.search(plain):
+        return "m"
+    return "deg" if in_degrees.lower() == "yes" else "rad" if coordinates else ""
+
+
+def optitrack_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) -> ExportHead | None:
+    """The head of an export of Motive, or None if the first line does not look like one.
+
+    Source: OptiTrack, "Data Export: CSV", versions 1.2 and later of the format. The first line holds names and values
+    in turn: ``Format Version,1.23,...,Export Frame Rate,120,...,Length Units,Meters``. After an empty line there are
+    rows with the type, the name, the id and, since version 1.25, the parent of each column, then one with what it
+    holds, and the row of heads ``Frame,Time (Seconds),X``.
+    """
+    known = cells_of(lines[0], ",") if lines else []
+    if not known or known[0].lower() != "format version":
+        return None
+    said = dict(zip((cell.lower() for cell in known[::2]), known[1::2], strict=False))
+    rows = [cells_of(line, ",") for line in lines]
+    at = next((k for k, row in enumerate(rows) if [cell.lower() for cell in row[:1]] == ["frame"]), None)
+    if at is None:
+        raise DataError("expected an OptiTrack export with a row of heads 'Frame, Time (Seconds), X, ...', got none")
+    above = [row for row in rows[1:at] if any(row)]
+    if len(above) < 3:
+        raise DataError("expected an OptiTrack export with rows of types, names and contents above the heads")
+    length = unit.symbol if (unit := unit_named(said.get("length units", ""))) is not None else ""
+    n = len(rows[at])
+    kinds, names, contents = ((row + [""] * n)[:n] for row in (above[0], above[1], above[-1]))
+    solved = any(kind.lower() in ("rigid body", "bone") for kind in kinds)
+    plain = without_common_subject(names[2:])
+    quaternions = "quaternion" in said.get("rotation type", "quaternion").lower()
+    heads, units = ["frame", "time [s]"], ["", "s"]
+    axes = [cell.lower() for cell in rows[at][2:]]
+    for kind, name, content, axis in zip(kinds[2:], plain, contents[2:], axes, strict=True):
+        what = content.lower()
+        left_out = (solved and kind.lower() in _EXPECTED) or axis not in "xyzw" or not axis
+        if left_out or what not in ("position", "rotation"):
+            heads.append("")
+        elif what == "position":
+            heads.append(f"{name}.position.{axis}" if solved else f"{name}.{axis}")
+        else:
+            heads.append(f"{name}.{'orientation' if quaternions else 'rotation'}.{axis}")
+        units.append(
+            "" if not heads[-1] or (what == "rotation" and quaternions) else "deg" if what == "rotation" else length
+        )
+    rate = positive(said.get("export frame rate") or said.get("capture frame rate") or "")
+    timed = len(rows[at]) > 1 and rows[at][1].lower().startswith("time")
+    if not timed:
+        heads[1] = ""
+    return ExportHead("OptiTrack", ",", tuple(heads[:n]), tuple(units[:n]), at + 1, None, rate)
+
+
+def qualisys_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) -> ExportHead | None:
+    """The head of an export of Qualisys Track Manager, or None if the first line does not look like one.
+
+    Source: Qualisys, "Motion data (.tsv)" and "6DOF data (.tsv)". Lines of a keyword, a tab and its value:
+    ``FREQUENCY``, ``NO_OF_FRAMES``, ``MARKER_NAMES`` or ``BODY_NAMES``, ...; then, if asked for, a row of heads; then
+    the samples, with or without a frame and a time before them. Positions are in millimeters.
+    """
+    if not lines or lines[0].lstrip("\ufeff").split("\t")[0].strip() not in ("NO_OF_FRAMES", "FILE_VERSION"):
+        return None
+    said: dict[str, list[str]] = {}
+    at = 0
+    for line in lines:
+        key, *values = cells_of(line, "\t")
+        if not key.isupper() or not key.replace("_", "").isalnum():
+            break
+        said.setdefault(key, values)
+        at += 1
+    bodies = "BODY_NAMES" in said
+    names = [name for name in said.get("BODY_NAMES" if bodies else "MARKER_NAMES", []) if name]
+    if not names:
+        raise DataError("expected a Qualisys export of 3D or 6DOF data with MARKER_NAMES or BODY_NAMES, got neither")
+    row = cells_of(lines[at], "\t") if at < len(lines) else []
+    headed = bool(row) and not any(_is_number(cell) for cell in row)
+    at += headed
+    sample = cells_of(lines[at], "\t") if at < len(lines) else []
+    while sample and not sample[-1]:
+        sample.pop()
+    heads, units = _columns(names, bodies)
+    before = ["frame", "time [s]"] if len(sample) == len(heads) + 2 else []
+    n = len(heads) + len(before)
+    if len(sample) != n:
+        raise DataError(f"expected {n} columns for the names {names[:3]} ... of a Qualisys export, got {len(sample)}")
+    rate = positive("".join(said.get("FREQUENCY", [])[:1]))
+    if rate is None and not before:
+        raise DataError(f"expected a FREQUENCY in hertz or a column of times, got {said.get('FREQUENCY')}")
+    measured_in = (*("" for _ in before), *units)
+    return ExportHead("Qualisys", "\t", (*before, *heads), measured_in, at, None, rate, zeros_are_gaps=True)
+
+
+def _columns(names: Sequence[str], bodies: bool) -> tuple[list[str], list[str]]:
+    """Heads and units; residuals and the rotation matrix beside the angles are left aside."""
+    if not bodies:
+        return [f"{name}.{axis}" for name in names for axis in "xyz"], ["mm"] * 3 * len(names)
+    one = [("position.", "mm")] * 3 + [("", "deg")] * 3 + [("", "")] * 10
+    heads = [
+        f"{name}.{group}{what}" if unit else ""
+        for name in names
+        for what, (group, unit) in zip(_POSES, one, strict=True)
+    ]
+    return heads, [unit for _ in names for _, unit in one]
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell.replace(",", "."))
+    except ValueError:
+        return False
+    return True
+
+
+def trc_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) -> ExportHead | None:
+    """The head of a TRC file, or None if the first line does not look like one.
+
+    Tracked markers over time, as Cortex of Motion Analysis writes them, and OpenSim, OptiTrack and others after it.
+
+    Source: OpenSim, "Marker (.trc) Files". A line ``PathFileType 4 (X/Y/Z) name.trc``, a row of keys and one of their
+    values (``DataRate``, ``Units``, ...), a row with ``Frame#``, ``Time`` and the name above the first column of each
+    marker, a row of axes ``X1 Y1 Z1``, mostly an empty line, and the samples; all separated by tabs, or by commas where
+    a program for tables has saved the file.
+    """
+    first = lines[0].lstrip("\ufeff") if lines else ""
+    if not first.startswith(_FIRST):
+        return None
+    separator = next((one for one in ",;" if first[len(_FIRST) :].startswith(one)), "\t")
+    if len(lines) < 6:
+        raise DataError(f"expected a TRC file with keys, names and samples, got {len(lines)} lines")
+    keys, values, names, axes = (cells_of(line, separator) for line in lines[1:5])
+    said = dict(zip((key.lower() for key in keys), values, strict=False))
+    if [cell.lower() for cell in names[:2]] != ["frame#", "time"]:
+        raise DataError(f"expected the heads 'Frame#', 'Time' and names in line 4 of a TRC file, got {names[:2]}")
+    n = max(
+        (k + 1 for k, cell in enumerate(axes) if cell), default=len(names)
+    )  # names may end in more tabs than samples
+    plain, ends = list(filled((names + [""] * n)[:n])), (axes + [""] * n)[:n]
+    columns = [
+        f"{name}.{end[0].lower()}" if end[:1] in "XYZ" and end else "" for name, end in zip(plain, ends, strict=True)
+    ]
+    unit = said.get("units", "")
+    heads = ("frame", "time [s]", *columns[2:])
+    measured_in = ("", "s", *(unit if head else "" for head in heads[2:]))
+    first_sample = 5 if any(cells_of(lines[5], separator)) else 6
+    rate = positive(said.get("datarate", ""))
+    return ExportHead("TRC", separator, heads, measured_in, first_sample, None, rate, zeros_are_gaps=True)
+
+
+def vicon_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) -> ExportHead | None:
+    """The head of the first section of markers, else of segments, objects, joints, outputs, devices; or None.
+
+    Source: Vicon, "Nexus User Guide: Export data to ASCII". A file has one or more sections: a line with the name of
+    the section, a line with its rate, a row with ``subject:marker`` above the first column of each, the row of heads
+    ``Frame,Sub Frame,X,Y,Z,...``, a row of units, and the samples up to an empty line.
+    """
+    first = next((k for k, line in enumerate(lines) if line.strip(" \t\r\n,")), None)
+    if first is None or _name(lines[first]) not in (*_SECTIONS, *_OTHERS):
+        return None
+    found = {_name(line): k for k, line in reversed(list(enumerate(lines))) if _name(line) in _SECTIONS}
+    section = next((one for one in _SECTIONS if one in found), None)
+    if section is None:
+        raise DataError("expected a Vicon export with trajectories, segments or joints, got events alone")
+    at = found[section]
+    if len(lines) < at + 5:
+        raise DataError(f"expected samples below the section {section!r} of a Vicon export, got its head alone")
+    separator = "\t" if "\t" in lines[at + 3] else ","
+    rate = positive(lines[at + 1].strip(" \t\r\n,"))
+    names, heads, units = (cells_of(line, separator) for line in lines[at + 2 : at + 5])
+    if rate is None or not heads or heads[0].lower() != "frame":
+        raise DataError(f"expected a rate, names and the heads 'Frame, Sub Frame, ...' below the section {section!r}")
+    n = len(heads)
+    plain = without_common_subject(filled((names + [""] * n)[:n]))
+    turned = _quaternions(heads[:n])
+    columns = [_head(section, *one) for one in zip(plain, heads[:n], turned, strict=True)]
+    columns[0] = "frame"
+    columns[1] = "sub frame" if n > 1 and heads[1].lower() == "sub frame" else columns[1]
+    end = next((k for k in range(at + 5, len(lines)) if not lines[k].strip(" \t\r\n,")), None)
+    measured_in = tuple(
+        "" if quaternion else unit for unit, quaternion in zip((units + [""] * n)[:n], turned, strict=True)
+    )
+    return ExportHead("Vicon", separator, tuple(columns), measured_in, at + 5, end, rate)
+
+
+def _name(line: str) -> str:
+    return line.strip(" \t\r\n,\ufeff").lower()
+
+
+def _quaternions(heads: Sequence[str]) -> list[bool]:
+    """Per column whether it is one of RX, RY, RZ, RW side by side."""
+    plain, turned = [head.lower() for head in heads], [False] * len(heads)
+    for k in range(len(plain) - 3):
+        if tuple(plain[k : k + 4]) == _QUATERNION:
+            turned[k : k + 4] = [True] * 4
+    return turned
+
+
+def _head(section: str, name: str, head: str, quaternion: bool) -> str:
+    axis = head.lower()
+    name = name.removeprefix("Global Angle (Quaternion) ")
+    if quaternion:
+        return f"{name}.orientation.{axis[1]}"
+    if section in ("segments", "objects") and len(axis) == 2 and axis[0] in "rt" and axis[1] in "xyz":
+        return f"{name}.{'rotation' if axis[0] == 'r' else 'position'}.{axis[1]}"
+    return f"{name}.{axis if axis in ('x', 'y', 'z') else head}"

@@ -16,11 +16,8 @@ from typing import Any, BinaryIO, NamedTuple
 
 from kineme.errors import DataError
 from kineme.io.ros.bags import Bag, open_bag, storages_of
-from kineme.io.ros.bound_chunks import compression_of_ros_1
-from kineme.io.ros.damage import refused
-from kineme.io.ros.decode import standard_types
-from kineme.io.ros.expand import expand
-from kineme.io.ros.expanded_folder import INFORMATION, METADATA
+from kineme.io.ros.damage import INFORMATION, METADATA, compression_of_ros_1, expand, refused
+from kineme.io.ros.number_fields import standard_types
 
 TEXT = "std_msgs/msg/String"  # every version of ROS knows it
 

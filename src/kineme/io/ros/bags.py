@@ -1,4 +1,7 @@
-"""Open a bag of ROS 1 or ROS 2 and stream the bytes of its messages, by the package rosbags."""
+"""Open a bag of ROS 1 or ROS 2 and stream the bytes of its messages, by the package rosbags.
+
+Bags in SQLite need names that SQLite takes, and the log of what is not in the database yet.
+"""
 
 from __future__ import annotations
 
@@ -8,15 +11,23 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from itertools import groupby
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, BinaryIO, NamedTuple
 
 from kineme.errors import DataError
 from kineme.io.limits import check_in_passing
-from kineme.io.ros.bound_chunks import bound_chunks_of_mcap, bound_chunks_of_ros_1, check_overlaps
-from kineme.io.ros.damage import REMEDIES, refused
-from kineme.io.ros.databases import plain_name
-from kineme.io.ros.expand import expand_message
-from kineme.io.ros.expanded_folder import Folder, expanded_folder
+from kineme.io.ros.damage import (
+    REMEDIES,
+    Folder,
+    bound_chunks_of_mcap,
+    bound_chunks_of_ros_1,
+    check_overlaps,
+    expand_message,
+    expanded_folder,
+    refused,
+)
+
+_MEAN_MORE = frozenset("?#%")
 
 #: File ending -> the first bytes of every such file. What begins otherwise is not given to rosbags.
 _MAGIC = {".bag": b"#ROSBAG V2.0\n", ".mcap": b"\x89MCAP0\r\n", ".db3": b"SQLite format 3\0"}
@@ -215,3 +226,36 @@ def _check_mcap(file: BinaryIO, at: int) -> bytes:
             check_in_passing(int.from_bytes(size[_SIZE_AT:], "little"), f"a chunk of MCAP at byte {at:,}")
         at += _HEAD.size + length
     return profile
+
+
+@contextmanager
+def plain_name(path: Path, ending: str) -> Iterator[Path]:
+    """The path, or a link to it: the name of a database is an address to SQLite, where these characters mean more."""
+    files = [one for kind in ("*.db3*", "*.mcap*") for one in path.glob(kind)] if not ending else [path]
+    if ending not in ("", ".db3") or not _MEAN_MORE & set("".join(map(str, files))):
+        yield path
+        return
+    plain = str.maketrans(dict.fromkeys(_MEAN_MORE, "_"))
+    with TemporaryDirectory() as folder:
+        for one in files:
+            (Path(folder) / one.name.translate(plain)).symlink_to(one.resolve())
+        if ending:
+            yield Path(folder) / path.name.translate(plain)
+            return
+        about = (path / "metadata.yaml").read_text(encoding="utf-8")
+        for one in files:
+            about = about.replace(one.name, one.name.translate(plain))
+        (Path(folder) / "metadata.yaml").write_text(about, encoding="utf-8")
+        yield Path(folder)
+
+
+def logs_beside(path: Path) -> list[str]:
+    """What is left out of a bag in SQLite: the log of a recording that was cut off, which holds its last messages."""
+    files = sorted(path.glob("*.db3")) if path.is_dir() else [path] if path.suffix.lower() == ".db3" else []
+    logs = [(one, one.with_name(f"{one.name}-wal")) for one in files]
+    return [
+        f"{log.name}: messages that are not in the database yet; to add them, open it once: sqlite3 {one.name} "
+        "'PRAGMA wal_checkpoint(TRUNCATE)'"
+        for one, log in logs
+        if log.is_file() and log.stat().st_size
+    ]

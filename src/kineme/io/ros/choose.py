@@ -1,24 +1,27 @@
-"""Which topics and frames of a bag are read: those that are asked for, or the only one that can be."""
+"""Topics and frames of a bag: what it holds, and what is read of it, that which is asked for or the only choice."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter, deque
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from difflib import get_close_matches
-from typing import NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from kineme.errors import DataError, KinemeError
-from kineme.io.ros.bags import Bag, Topic, messages_of
-from kineme.io.ros.decode import decoder_of
-from kineme.io.ros.frames import Edge, connected_graph, transform_topics
-from kineme.io.ros.message_types import TRANSFORMS, TYPES, Heads
-from kineme.io.ros.number_fields import number_fields
+from kineme.io.records import Contents
+from kineme.io.ros.bags import Bag, Topic, messages_of, open_bag
+from kineme.io.ros.number_fields import TRANSFORMS, TYPES, Heads, Row, decoder_of, number_fields, transform_row
 from kineme.movements.channels.detect import find_channels
 from kineme.movements.tables.layout import Known, Layout
+from kineme.movements.tables.parsed import listed
 from kineme.reporting.text import counted, first_names
 from kineme.validation import MIN_SAMPLES
+
+Edge = tuple[str, str]  # parent, child
 
 _LOOKED_AT = 16  # messages of a topic, of which the first ones may be none or hold no sample
 
@@ -192,3 +195,174 @@ def _numbers(heads: Heads, row: Sequence[float]) -> tuple[int, int]:
         return 0, 0
     channels = find_channels(heads, np.array([row], dtype=float), np.array([0, 1]), {})
     return len(heads), sum(one.kind == "orientation" for one in channels)
+
+
+class Step(NamedTuple):
+    """A transform on the way between two frames; `forward` leads from the parent to the child."""
+
+    edge: Edge
+    forward: bool
+
+
+class Graph(NamedTuple):
+    """What is known of the frames: for each child how many transforms each of its parents has."""
+
+    parents: dict[str, Counter[str]]
+
+    @property
+    def edges(self) -> list[Edge]:
+        """Each child with the parent that it has most transforms of, in alphabetic order."""
+        return sorted((counts.most_common(1)[0][0], child) for child, counts in self.parents.items())
+
+
+def transform_topics(bag: Bag) -> list[Topic]:
+    """The topics with transforms between frames."""
+    return [one for one in bag.topics if one.type in TRANSFORMS and one.n_messages]
+
+
+def transforms_in(bag: Bag, topics: Sequence[Topic], bad: list[str]) -> Iterator[tuple[int, int, Any]]:
+    """Index of the topic, time of recording [ns], and transform; messages that are none are added to `bad`."""
+    decoders = [decoder_of(bag, topic) for topic in topics]
+    for n, (k, recorded, raw) in enumerate(messages_of(bag, topics)):
+        try:
+            message = decoders[k](raw)
+        except ValueError as error:
+            bad.append(f"topic {topics[k].name}: message {n}: {error}")
+            continue
+        for transform in message.transforms:
+            yield k, recorded, transform
+
+
+def edge_of(transform: Any) -> Edge:
+    """Parent and child, as in ROS 2 without a slash in front."""
+    return transform.header.frame_id.removeprefix("/"), transform.child_frame_id.removeprefix("/")
+
+
+def connected_graph(bag: Bag, topics: Sequence[Topic], wanted: Sequence[Edge], most: int | None = None) -> Graph:
+    """The frames, read until all wanted pairs are connected, or `most` transforms, or to the end."""
+    graph = Graph({})
+    open_pairs = list(wanted)
+    known: set[Edge] = set()
+    try:
+        for n, (_, _, transform) in enumerate(transforms_in(bag, topics, [])):
+            edge = edge_of(transform)
+            graph.parents.setdefault(edge[1], Counter())[edge[0]] += 1
+            if edge not in known:
+                known.add(edge)
+                open_pairs = [pair for pair in open_pairs if _way(graph.edges, *pair) is None]
+                if wanted and not open_pairs:
+                    break
+            if most is not None and n + 1 >= most:
+                break
+    except DataError:
+        if not graph.parents:
+            raise
+    return graph
+
+
+def chain(graph: Graph, parent: str, child: str) -> list[Step]:
+    """The transforms from one frame to another.
+
+    Raises
+    ------
+    DataError
+        There is no such frame, or no way between them; the message lists the frames.
+    """
+    edges = graph.edges
+    frames = sorted({frame for edge in edges for frame in edge})
+    for frame in (parent, child):
+        if frame not in frames:
+            alike = get_close_matches(frame, frames, 3)
+            meant = f" (did you mean {' or '.join(alike)}?)" if alike else ""
+            raise DataError(f"expected a frame {frame!r}{meant}, got the frames {listed(frames)}")
+    way = _way(edges, parent, child)
+    if way is None:
+        mine = sorted(_reached(edges, parent))
+        others = sorted(_reached(edges, child))
+        raise DataError(
+            f"expected transforms that lead from {parent!r} to {child!r}, got none; {parent!r} is connected with "
+            f"{listed(one for one in mine if one != parent)}, {child!r} with "
+            f"{listed(one for one in others if one != child)}"
+        )
+    return way
+
+
+def _neighbors(edges: Iterable[Edge]) -> dict[str, list[tuple[str, Step]]]:
+    near: dict[str, list[tuple[str, Step]]] = {}
+    for parent, child in edges:
+        near.setdefault(parent, []).append((child, Step((parent, child), True)))
+        near.setdefault(child, []).append((parent, Step((parent, child), False)))
+    return near
+
+
+def _way(edges: Sequence[Edge], start: str, end: str) -> list[Step] | None:
+    """The shortest way between two frames, or None."""
+    near, ways = _neighbors(edges), {start: list[Step]()}
+    waiting = deque([start])
+    while waiting and end not in ways:
+        here = waiting.popleft()
+        for there, step in near.get(here, ()):
+            if there not in ways:
+                ways[there] = [*ways[here], step]
+                waiting.append(there)
+    return ways.get(end)
+
+
+def _reached(edges: Sequence[Edge], start: str) -> set[str]:
+    """The frames that are connected with one."""
+    near, reached, waiting = _neighbors(edges), {start}, [start]
+    while waiting:
+        for there, _ in near.get(waiting.pop(), ()):
+            if there not in reached:
+                reached.add(there)
+                waiting.append(there)
+    return reached
+
+
+def bag_contents(path: Path) -> list[Contents]:
+    """Topics with types, numbers of messages and how they are read; and frames with numbers of transforms.
+
+    Raises
+    ------
+    DataError
+        The bag cannot be opened.
+    """
+    with open_bag(path) as bag:
+        rows = tuple((one.name, one.type, one.n_messages, _read_as(bag, one)) for one in bag.topics)
+        topics = Contents("topics", ("topic", "type", "messages", "read as"), rows)
+        return [topics, _frames(bag)] if transform_topics(bag) else [topics]
+
+
+def _read_as(bag: Bag, topic: Topic) -> str:
+    if topic.type in TRANSFORMS:
+        return "frames" if topic.n_messages else "nothing: empty"
+    if topic.type not in TYPES:
+        try:
+            n = len(number_fields(bag, topic).heads)
+        except DataError:
+            return "nothing: no numbers"
+        return f"{counted(n, 'number')}: {PLAIN}" if holds_samples(topic) else "nothing: too few messages"
+    if not can_be_read(topic):
+        return "nothing: too few messages"
+    return "a movement for each message" if TYPES[topic.type].path else "a movement"
+
+
+def _frames(bag: Bag) -> Contents:
+    """The transforms of the first messages: all of them would take as long as to read the bag."""
+    counts: Counter[Edge] = Counter()
+    first: dict[Edge, Row] = {}
+    moving: set[Edge] = set()
+    note, n, bad = "", 0, list[str]()
+    try:
+        for n, (_, _, transform) in enumerate(transforms_in(bag, transform_topics(bag), bad), 1):
+            edge, row = edge_of(transform), transform_row(transform.transform)
+            counts[edge] += 1
+            if first.setdefault(edge, row) != row:
+                moving.add(edge)
+            if n == FRAMES_LOOKED_AT:
+                note = f"of the first {n:,} transforms"
+                break
+    except DataError as error:
+        note = f"of the first {n:,} transforms: {error}"
+    rows = tuple((*edge, counts[edge], "moves" if edge in moving else "is fixed") for edge in sorted(counts))
+    return Contents("frames", ("parent", "child", "transforms", "the child"), rows, note)

@@ -1,11 +1,28 @@
-"""What rosbags raises on a damaged bag becomes a `DataError`, with what may help."""
+"""Read damaged bags safely: rosbags' errors become a `DataError`, and nothing expands beyond a limit.
+
+What compressed bytes say of their size may be wrong, and a few may become gigabytes. Rosbags itself expands a chunk
+whole before it looks at its size, if it does.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from bz2 import BZ2Decompressor
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import cache, partial
+from pathlib import Path, PurePath
+from tempfile import TemporaryDirectory
+from typing import Any, NamedTuple
 
 from kineme.errors import DataError, KinemeError
+from kineme.io.limits import VARIABLE, check_in_passing, max_file_bytes, most_in_passing
+
+METADATA = "metadata.yaml"
+INFORMATION = "rosbag2_bagfile_information"
+
+_MOST_RATIO = 64  # of recordings; a file larger than the limit on files is expanded up to this ratio
+_AT_ONCE = 2**20
+
 
 #: File ending, or none for a folder -> what may help if the bag is damaged.
 REMEDIES = {
@@ -29,3 +46,187 @@ def refused(expected: str, remedy: str) -> Iterator[None]:
         reason = reason or type(error).__name__
         unknown = ", which rosbags does not know" if isinstance(error, KeyError) else ""
         raise DataError(f"{expected}, got: {reason[:300]}{unknown}; {remedy}") from error
+
+
+def expand(compression: str, data: bytes, size: int, what: str = "a chunk") -> bytes:
+    """Expand all frames in some bytes.
+
+    Parameters
+    ----------
+    compression : {"zstd", "lz4", "bz2"}
+    data : bytes
+    size : int
+        How many bytes they should become; it is checked against the limit on files first.
+    what : str
+        They are, for messages.
+
+    Raises
+    ------
+    DataError
+        They become more, or more than a file may take, or are cut off.
+    """
+    check_in_passing(size, what)
+    parts, n_bytes = [], 0
+    while True:
+        one = _decompressor(compression)()
+        parts.append(one.decompress(data, max_length=size + 1 - n_bytes))
+        n_bytes += len(parts[-1])
+        if n_bytes > size:
+            raise DataError(f"expected {what} that expands to {size:,} bytes, got one that expands to more")
+        if not one.eof:
+            raise DataError(f"expected {what} in {compression}, got one that is cut off")
+        data = one.unused_data
+        if not data:
+            return b"".join(parts)
+
+
+def expand_message(data: bytes) -> bytes:
+    """Expand a message of a bag whose messages are compressed each for itself, by zstd; its size is said nowhere."""
+    from rosbags.rosbag2.storage_mcap import zstd
+
+    check_in_passing(zstd.get_frame_info(data).decompressed_size or 0, "a message")
+    return expand("zstd", data, most_in_passing(), "a message")
+
+
+def _decompressor(compression: str) -> Callable[[], Any]:
+    if compression == "bz2":
+        return BZ2Decompressor
+    if compression == "lz4":
+        from lz4.frame import LZ4FrameDecompressor
+
+        return LZ4FrameDecompressor
+    from rosbags.rosbag2.storage_mcap import zstd
+
+    return zstd.ZstdDecompressor
+
+
+def bound_chunks_of_ros_1(reader: Any) -> None:
+    """Bound every chunk of an open bag of ROS 1.
+
+    Raises
+    ------
+    DataError
+        A chunk is larger than a file may be.
+    """
+    for at, chunk in reader.chunks.items():
+        check_in_passing(chunk.datasize, f"a chunk at byte {at:,}")
+        reader.chunks[at] = chunk._replace(decompressor=partial(_expand_of_ros_1, reader.bio, at))
+
+
+def compression_of_ros_1(file: Any, at: int) -> tuple[str, int]:
+    """How the chunk at a byte of a bag of ROS 1 is compressed, and the size [bytes] that it expands to."""
+    from rosbags.rosbag1.reader import Header, RecordType
+
+    file.seek(at)
+    header = Header.read(file, RecordType.CHUNK)
+    return header.get_string("compression"), header.get_uint32("size")
+
+
+def _expand_of_ros_1(file: Any, at: int, data: bytes) -> bytes:
+    compression, size = compression_of_ros_1(file, at)
+    return data if compression == "none" else expand(compression, data, size, f"a chunk at byte {at:,}")
+
+
+@cache
+def bound_chunks_of_mcap() -> None:
+    """Bound the chunks of every MCAP file from now on: it is a table of rosbags that says how they are expanded.
+
+    Each entry takes the bytes and the size that they must have; rosbags refuses another size later.
+    """
+    from rosbags.rosbag2.storage_mcap import DECOMPRESSORS
+
+    DECOMPRESSORS.update({name: partial(expand, name) for name in ("lz4", "zstd")})
+
+
+def check_overlaps(storage: Any, topics: Sequence[str]) -> None:
+    """Refuse an MCAP file of which too much must be in memory at once: chunks whose times overlap are read together.
+
+    Raises
+    ------
+    DataError
+        All chunks of a time with messages of these topics take more than a file may.
+    """
+    ids = [one.id for one in storage.connections if one.topic in topics]
+    chunks = [one for one in getattr(storage, "chunks", ()) if any(one.channel_count.get(k, 0) for k in ids)]
+    begins = [(one.message_start_time, 0, max(one.uncompressed_size, one.compressed_size)) for one in chunks]
+    ends = [(one.message_end_time, 1, -max(one.uncompressed_size, one.compressed_size)) for one in chunks]
+    n_bytes = 0
+    for _, _, change in sorted(begins + ends):
+        n_bytes += change
+        check_in_passing(n_bytes, "a set of chunks of one time")
+
+
+class Folder(NamedTuple):
+    """A folder that rosbags can open, the files of the bag in it, and what is compressed: "file", "message" or ""."""
+
+    path: Path
+    files: tuple[Path, ...]
+    compression: str
+
+
+@contextmanager
+def expanded_folder(path: Path) -> Iterator[Folder]:
+    """The folder, or one with its files expanded.
+
+    A folder that is none of ROS 2, or whose files are missing, is left to rosbags to refuse.
+
+    Raises
+    ------
+    DataError
+        A file expands to more than 64 times its size and the limit on files.
+    """
+    about = _information(path)
+    mode = str(about.get("compression_mode", "")).lower().replace("none", "")
+    files = tuple(path / PurePath(str(one)).name for one in about.get("relative_file_paths") or ())
+    is_whole = all(one.is_file() for one in files)
+    if mode != "file" or about.get("compression_format") != "zstd" or not is_whole:
+        yield Folder(path, files if is_whole else (), mode)
+        return
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        for one in files:
+            _expand_file(one, folder / one.stem)
+        plain = {**about, "compression_mode": "", "relative_file_paths": [one.stem for one in files]}
+        _write(folder / METADATA, {INFORMATION: plain})
+        yield Folder(folder, tuple(folder / one.stem for one in files), mode)
+
+
+def _information(path: Path) -> dict[str, Any]:
+    """What the folder says of itself, or nothing: rosbags reads it too, and says why it cannot."""
+    from ruamel.yaml import YAML
+
+    try:
+        whole = YAML(typ="safe").load((path / METADATA).read_text(encoding="utf-8"))
+        return dict(whole[INFORMATION])
+    except Exception:
+        return {}
+
+
+def _write(path: Path, whole: Any) -> None:
+    from ruamel.yaml import YAML
+
+    with path.open("w", encoding="utf-8") as file:
+        YAML(typ="safe").dump(whole, file)
+
+
+def _expand_file(source: Path, target: Path) -> None:
+    from rosbags.rosbag2.storage_mcap import zstd
+
+    most = max(max_file_bytes(), _MOST_RATIO * source.stat().st_size)
+    with source.open("rb") as start:
+        declared = zstd.get_frame_info(start.read(64)).decompressed_size or 0
+    _check(declared, most, source)
+    n_bytes = 0
+    with zstd.open(source, "rb") as old, target.open("wb") as new:
+        while some := old.read(_AT_ONCE):
+            n_bytes += len(some)
+            _check(n_bytes, most, source)
+            new.write(some)
+
+
+def _check(n_bytes: int, most: int, source: Path) -> None:
+    if n_bytes > most:
+        raise DataError(
+            f"{source.name}: expected a file that expands to at most {most:,} bytes, got one that expands to "
+            f"{n_bytes:,} or more; if you trust it, set the environment variable {VARIABLE} to more"
+        )

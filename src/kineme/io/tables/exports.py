@@ -10,12 +10,15 @@ import numpy as np
 
 from kineme.errors import DataError
 from kineme.io.limits import check_expanded
-from kineme.io.motion_capture.export_heads import STAMP, ExportHead
-from kineme.io.motion_capture.opensim import opensim_head
-from kineme.io.motion_capture.optitrack import optitrack_head
-from kineme.io.motion_capture.qualisys import qualisys_head
-from kineme.io.motion_capture.trc import trc_head
-from kineme.io.motion_capture.vicon import vicon_head
+from kineme.io.motion_capture.export_heads import (
+    STAMP,
+    ExportHead,
+    opensim_head,
+    optitrack_head,
+    qualisys_head,
+    trc_head,
+    vicon_head,
+)
 from kineme.io.tables.dialect import COMMA_NUMBER, Dialect, check_line, split
 from kineme.movements.tables.table import Table
 

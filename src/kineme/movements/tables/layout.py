@@ -80,7 +80,7 @@ class Layout:
     fill_gaps : float
         Longest gap [s] that is filled, from the value before it to the value after it; 0 fills none.
     rows : bool
-        Whether each line of a text is a movement, see `kineme.io.rows`; `columns` then name the coordinates
+        Whether each line of a text is a movement, see `kineme.io.arrays.rows`; `columns` then name the coordinates
         of a sample.
     every : int, optional
         Number of samples of a movement, where a recording holds one after the other.

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kineme.io.write_movement import ColumnNames, Columns, encode_movement, write_movement
+from kineme.io.writing.write_movement import ColumnNames, Columns, encode_movement, write_movement
 from kineme.robots.execution.joint_trajectory import JointTrajectory
 
 

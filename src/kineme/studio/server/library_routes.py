@@ -14,7 +14,7 @@ from pydantic import BaseModel
 from kineme.anchoring.figures.symbol_map import classical_scaling
 from kineme.anchoring.grounding.space import conceptual_space
 from kineme.dmp.discrete.formulations import FORMULATIONS
-from kineme.io.write_movement import WRITERS
+from kineme.io.writing.write_movement import WRITERS
 from kineme.library.members import described
 from kineme.library.storage import read
 from kineme.library.storage.rows import Row, among, listed, select

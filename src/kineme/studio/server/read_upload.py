@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from kineme.errors import DataError, KinemeError
-from kineme.io.merge_files import Recordings, Source
-from kineme.io.problem import Problem
-from kineme.io.recordings import read_recordings
+from kineme.io.reading.merge_files import Recordings, Source
+from kineme.io.reading.recordings import read_recordings
+from kineme.io.records import Problem
 from kineme.movements.channels.plain_data import channels_from_data, channels_to_data
 from kineme.movements.trajectories.channels import of_channels
 from kineme.movements.trajectories.demonstrations import Demonstrations

@@ -11,10 +11,8 @@ from fastapi import APIRouter, Header, Request
 from pydantic import BaseModel, Field
 
 from kineme.errors import SpecificationError
-from kineme.io.annotations.label_table import LabelRow
-from kineme.io.annotations.labeled_pieces import labeled_pieces
-from kineme.io.annotations.read_labels import LabelTable
-from kineme.io.merge_files import Recordings
+from kineme.io.reading.merge_files import Recordings
+from kineme.io.reading.read_labels import LabelRow, LabelTable, labeled_pieces
 from kineme.library.annotate import annotate
 from kineme.library.learn import learn_recordings
 from kineme.movements.channels.channel import recorded_names

@@ -8,7 +8,7 @@ from urllib.parse import quote
 from fastapi import APIRouter
 from fastapi.responses import Response
 
-from kineme.io.write_movement import encode_movement
+from kineme.io.writing.write_movement import encode_movement
 from kineme.studio.server.records import SymbolKey, numbers, thumbnail
 from kineme.studio.server.rollouts import (
     Exported,

@@ -14,7 +14,7 @@ from kineme.dmp.generation.learned import Learned, learn_one
 from kineme.dmp.styles.learn import learn_styles
 from kineme.dmp.styles.model import StyleModel
 from kineme.errors import SpecificationError, heard_warnings
-from kineme.io.write_movement import WRITERS
+from kineme.io.writing.write_movement import WRITERS
 from kineme.library.grounding import prototype_of
 from kineme.library.storage import read
 from kineme.studio.server.records import Number, Point, Points, Sent, Text

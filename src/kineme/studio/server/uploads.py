@@ -21,7 +21,7 @@ from threading import Lock
 from urllib.parse import unquote
 
 from kineme.errors import DataError
-from kineme.io.merge_files import Recordings
+from kineme.io.reading.merge_files import Recordings
 from kineme.studio.server.read_upload import REFUSED, load
 from kineme.studio.server.refusals import MissingError
 

@@ -1,1 +1,0 @@
-"""What happens when in a recording, as records, in files that other programs read."""

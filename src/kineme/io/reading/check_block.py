@@ -1,0 +1,421 @@
+"""Fill short gaps, crop ends without values, drop the invalid movements of a file and report why.
+
+No Python loop runs over the valid movements.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.errors import DataError, TrajectoryError
+from kineme.io.records import Problem, in_shell
+from kineme.movements.channels.channel import Channel, Channels
+from kineme.movements.channels.coordinates import period_of_channel
+from kineme.movements.channels.detect import find_channels
+from kineme.movements.channels.wraps import without_wraps
+from kineme.movements.rotations.rotation_vectors import slerp
+from kineme.movements.tables.layout import Layout
+from kineme.movements.tables.parsed import Block, Repair
+from kineme.reporting.text import counted
+from kineme.validation import (
+    LARGEST_POSITION,
+    LARGEST_STAMP,
+    MIN_SAMPLES,
+    SHORTEST_STEP,
+    SMALLEST_EXTENT,
+    Array,
+    too_small,
+)
+
+_LEAST = 0.5  # share of its samples that a movement keeps when it is cropped
+_EDGE = 0.25  # share of the samples that a column may lack at both ends, where cropping to all would leave less
+_SHOWN = 5  # columns in a message beside the first
+_ROUNDING = 1e-9  # of a gap, relative
+
+
+_VAST = np.append(10.0 ** np.arange(20, 39), np.finfo(np.float32).max)
+#: Numbers that programs write where they have no value: 999 to 9999999, 32768, 1e20 to 1e38, the largest of a float32,
+#: with either sign.
+SENTINELS = np.concatenate(
+    [sign * np.concatenate([10.0 ** np.arange(3, 8) - 1, _VAST, _VAST.astype(np.float32), [32768]]) for sign in (-1, 1)]
+)
+
+Flags = NDArray[np.bool_]
+
+
+def check_block(block: Block, file: str, layout: Layout, columns: Sequence[str]) -> tuple[Block, list[Problem]]:
+    """The valid movements, gaps filled and ends cropped, and one problem for each invalid movement.
+
+    Parameters
+    ----------
+    block : Block
+    file : str
+        Name of the file in the problems.
+    layout : Layout
+        `skip`: what is dropped for a sample that is missing, infinite, out of range, or not later than the one before:
+        its movement, or the sample alone. Movements of fewer than `MIN_SAMPLES` samples, or with an extent out of
+        range, are always dropped; the ranges are those of `kineme.validation`. `fill_gaps`: see
+        `kineme.io.reading.check_block.fill_gaps`.
+    columns : sequence of d str
+        Names of the columns.
+    """
+    skip, problems = layout.skip, list[Problem]()
+    odd = _unusable(block, skip)
+    if odd.any():
+        starts = block.offsets[:-1]
+        n_odd = np.diff(np.concatenate(([0], np.cumsum(odd)))[block.offsets])
+        for i in np.flatnonzero(n_odd).tolist():
+            first = int(starts[i] + np.argmax(odd[starts[i] : block.offsets[i + 1]]))
+            problems.append(_problem(block, file, i, first, (int(n_odd[i]), skip)))
+        block = _keep(block, ~odd) if skip == "sample" else take_movements(block, n_odd == 0)
+    if np.isnan(block.positions).any():
+        block, lacking = _without_missing(fill_gaps(block, columns, layout), file, skip, columns)
+        problems += lacking
+    lengths = np.diff(block.offsets)
+    for i in np.flatnonzero(lengths < MIN_SAMPLES).tolist():
+        reason = f"expected at least {MIN_SAMPLES} samples, got {lengths[i]}"
+        line = block.line_of(block.row(int(block.offsets[i]))) if lengths[i] and len(lengths) > 1 else None
+        problems.append(Problem(file, line, movement_of(block, i) + reason, TrajectoryError))
+    block = take_movements(block, lengths >= MIN_SAMPLES)
+    good = np.ones(len(block.labels), dtype=bool)
+    for i, extent in too_small(block.positions, block.offsets):
+        reason = f"expected an extent of at least {SMALLEST_EXTENT:g}, got {extent:g}; choose another unit"
+        problems.append(Problem(file, None, movement_of(block, i) + reason, TrajectoryError))
+        good[i] = False
+    return take_movements(block, good), sorted(problems, key=lambda problem: problem.line or 0)
+
+
+def _without_missing(block: Block, file: str, skip: str, columns: Sequence[str]) -> tuple[Block, list[Problem]]:
+    """A block without the movements, or with `skip` the samples alone, that lack values; a problem for each."""
+    lacking: Flags = np.asarray(np.isnan(block.positions).any(axis=1))
+    counts = np.diff(np.concatenate(([0], np.cumsum(lacking)))[block.offsets])
+    readable: Flags = np.asarray(
+        np.diff(block.offsets) - counts >= MIN_SAMPLES if skip == "sample" else counts == 0, dtype=np.bool_
+    )
+    problems = []
+    for i in np.flatnonzero(counts).tolist():
+        first = int(block.offsets[i] + np.argmax(lacking[block.offsets[i] :]))
+        left_out = int(counts[i]) if readable[i] else 0
+        effect = f"; {counted(left_out, 'sample')} like this left out" if left_out else ""
+        missing = missing_values(block, columns, i)
+        reason = movement_of(block, i) + in_words(missing, skip) + effect
+        line = block.line_of(block.row(first))
+        problems.append(Problem(file, line, reason, DataError, left_out, () if left_out else missing.names))
+    block = take_movements(block, readable)
+    return _keep(block, ~np.asarray(np.isnan(block.positions).any(axis=1))), problems
+
+
+def _unusable(block: Block, skip: str) -> Flags:
+    """Per sample: out of range, or not later than the sample before; if samples are dropped, than all kept before."""
+    total = len(block.positions)
+    odd: Flags = np.asarray((np.abs(block.positions) > LARGEST_POSITION).any(axis=1))  # what is missing comes later
+    if block.faults:
+        odd |= np.isin(np.arange(total) if block.rows is None else block.rows, list(block.faults))
+    if block.times is None or not total:
+        return odd
+    step = np.diff(block.times, prepend=-np.inf)
+    odd |= ~(np.abs(block.times) <= LARGEST_STAMP)
+    step[block.offsets[:-1][np.diff(block.offsets) > 0]] = np.inf
+    late = ~(step >= SHORTEST_STEP)
+    if skip == "sample" and (odd | late).any():
+        return odd | _late_after_leaving_out(block.times, block.offsets, odd, late)
+    return odd | late
+
+
+def _late_after_leaving_out(times: Array, offsets: NDArray[np.intp], odd: Flags, late: Flags) -> Flags:
+    """Samples not later than all usable ones before them, in the movements that have a fault."""
+    result = np.zeros_like(odd)
+    owners = np.unique(np.searchsorted(offsets, np.flatnonzero(odd | late), side="right") - 1)
+    for i in owners:
+        rows = slice(offsets[i], offsets[i + 1])
+        usable = np.where(odd[rows], -np.inf, times[rows])
+        before = np.maximum.accumulate(np.concatenate(([-np.inf], usable[:-1])))
+        with np.errstate(invalid="ignore"):  # dropped samples may be NaN or infinite
+            result[rows] = ~odd[rows] & ~(usable - before >= SHORTEST_STEP)
+    return result
+
+
+def _problem(block: Block, file: str, i: int, k: int, odd: tuple[int, str]) -> Problem:
+    row, (n_odd, skip) = block.row(k), odd
+    samples = f"{n_odd} samples like this" if n_odd > 1 else "this sample"
+    effect = f"; {samples} left out" if skip == "sample" else f"; {n_odd - 1} more like this" if n_odd > 1 else ""
+    known = (block.faults or {}).get(row)
+    reason = movement_of(block, i) + (known or _reason(block, i, k)) + effect
+    left_out = n_odd if skip == "sample" and block.offsets[i + 1] - block.offsets[i] - n_odd >= MIN_SAMPLES else 0
+    return Problem(file, block.line_of(row), reason, DataError if known else TrajectoryError, left_out)
+
+
+def movement_of(block: Block, i: int) -> str:
+    """Movement i at the beginning of a message; empty if the file holds but one."""
+    return f"movement {' '.join(block.places[i].splitlines())}: " if block.places[i] else ""
+
+
+def _reason(block: Block, i: int, k: int) -> str:
+    at = f" at sample {k - block.offsets[i]}"
+    if np.isinf(block.positions[k]).any():
+        return f"expected finite positions, got {block.positions[k].tolist()}{at}"
+    if np.nanmax(np.abs(block.positions[k]), initial=0.0) > LARGEST_POSITION:
+        return (
+            f"expected positions up to {LARGEST_POSITION:g}, got {block.positions[k].tolist()}{at}; choose another unit"
+        )
+    times = block.times
+    assert times is not None
+    if not np.isfinite(times[k]):
+        return f"expected finite times, got {times[k]}{at}"
+    if abs(times[k]) > LARGEST_STAMP:
+        return f"expected times up to {LARGEST_STAMP:g} s, got {times[k]:.9g}{at}"
+    before = times[k - 1]
+    if before < times[k]:
+        return f"expected at least {SHORTEST_STEP:g} s between stamps, got {before:.9g} and {times[k]:.9g} s{at}"
+    what = "duplicate" if times[k] == before else "decreasing"
+    return f"expected strictly increasing times, got {what} stamps {before:.9g} and {times[k]:.9g} s{at}"
+
+
+def _keep(block: Block, kept: Flags) -> Block:
+    """The kept samples of every movement."""
+    offsets = np.concatenate(([0], np.cumsum(kept)))[block.offsets].astype(np.intp)
+    rows = np.flatnonzero(kept) if block.rows is None else block.rows[kept]
+    times = None if block.times is None else block.times[kept]
+    return replace(block, positions=block.positions[kept], times=times, offsets=offsets, rows=rows)
+
+
+def take_movements(block: Block, chosen: Flags) -> Block:
+    """The chosen movements of a block."""
+    if chosen.all():
+        return block
+    kept = _keep(block, np.repeat(chosen, np.diff(block.offsets)))
+    ends = kept.offsets[np.concatenate(([True], chosen))]
+    labels = [label for label, one in zip(block.labels, chosen, strict=True) if one]
+    places = [place for place, one in zip(block.places, chosen, strict=True) if one]
+    people = block.people and [person for person, one in zip(block.people, chosen, strict=True) if one]
+    repairs = block.repairs and [repair for repair, one in zip(block.repairs, chosen, strict=True) if one]
+    return replace(kept, offsets=ends, labels=labels, places=places, people=people, repairs=repairs)
+
+
+class Spans(NamedTuple):
+    """Runs of missing values of one column: first rows, rows after the last ones, and the time that each takes [s].
+
+    The time is that from the value before to the value after; it is infinite at the ends of a movement.
+    """
+
+    first: NDArray[np.intp]
+    stop: NDArray[np.intp]
+    seconds: Array
+
+
+def spans_of(missing: Flags, times: Array) -> Spans:
+    """Find the runs of missing values (T,) of one movement with time stamps (T,) [s]."""
+    edges = np.diff(np.concatenate(([False], missing, [False])).astype(np.int8))
+    first, stop = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
+    before, after = np.concatenate(([-np.inf], times)), np.concatenate((times, [np.inf]))
+    return Spans(first, stop, after[stop] - before[first])
+
+
+def sentinels_as_missing(block: Block, columns: Sequence[str]) -> tuple[Block, tuple[str, ...]]:
+    """Take numbers as -9999 that stand for no value as missing, and say which in which columns.
+
+    They are that where they lie farther from all other values of their column than these do from each other.
+    """
+    positions, said = block.positions, []
+    with np.errstate(invalid="ignore"):
+        suspected = np.flatnonzero((np.abs(positions) >= np.abs(SENTINELS).min()).any(axis=0))
+    for k in suspected.tolist():
+        x = block.positions[:, k]
+        marks = np.isfinite(x) & np.isin(x, SENTINELS)
+        others = x[np.isfinite(x) & ~marks]
+        if not len(others) or not marks.any():
+            continue
+        low, high = others.min(), others.max()
+        marks &= np.maximum(low - x, x - high) > high - low
+        if marks.any():
+            positions = positions.copy() if positions is block.positions else positions
+            said += [f"{value:g} in {columns[k]}" for value in np.unique(x[marks]).tolist()]
+            positions[marks, k] = np.nan
+    return (replace(block, positions=positions), tuple(said)) if said else (block, ())
+
+
+def fill_gaps(block: Block, columns: Sequence[str], layout: Layout) -> Block:
+    """Crop movements to where all columns have values, and fill the short gaps between; other values stay missing.
+
+    Positions, and angles without their wraps, are interpolated in time by Akima's cubic polynomials (Akima, "A new
+    method of interpolation and smooth curve fitting based on local procedures", J. ACM 17, 1970), orientations by
+    turning at constant angular velocity; discrete channels keep the value before. A movement that would lose half of
+    its samples is cropped only to where those columns have values that lack fewer than a quarter at their ends.
+
+    Parameters
+    ----------
+    block : Block
+        NaN stands for a missing value; the stamps of each movement increase.
+    columns : sequence of d str
+    layout : Layout
+        `fill_gaps` is the longest gap that is filled [s], `kinds` what columns are.
+    """
+    missing: Flags = np.isnan(block.positions)
+    lacking = np.concatenate(([0], np.cumsum(missing.any(axis=1))))[block.offsets]
+    if block.times is None or not lacking[-1]:
+        return block
+    positions, outside = block.positions.copy(), np.zeros(len(block.positions), dtype=bool)
+    number = {name: k for k, name in enumerate(columns)}
+    channels = [
+        (one, [number[name] for name in one.columns])
+        for one in _channels(block, columns, layout, np.asarray(~missing.any(axis=1)))
+    ]
+    repairs = [Repair()] * len(block.labels)
+    for i in np.flatnonzero(np.diff(lacking)).tolist():
+        rows = slice(block.offsets[i], block.offsets[i + 1])
+        times = block.times[rows]
+        filled = _fill(positions[rows], times, layout.fill_gaps, channels)
+        inside = _span_of_all(np.isnan(positions[rows]), layout.skip)
+        outside[rows] = True
+        outside[rows][inside] = False
+        ends = times[[0, -1]] - times[inside][[0, -1]]
+        filled = filled[inside]
+        repairs[i] = Repair(int(np.count_nonzero(filled)), float(filled.max()), float(np.abs(ends).sum()))
+    kept = ~outside
+    offsets = np.concatenate(([0], np.cumsum(kept)))[block.offsets].astype(np.intp)
+    return replace(
+        block,
+        positions=positions[kept],
+        times=block.times[kept],
+        offsets=offsets,
+        rows=np.flatnonzero(kept) if block.rows is None else block.rows[kept],
+        repairs=repairs,
+    )
+
+
+def _span_of_all(missing: Flags, skip: str) -> slice:
+    """The samples from the first to the last one in which all columns of a movement (T, d) have values."""
+    n = len(missing)
+    complete = np.flatnonzero(~missing.any(axis=1))
+    if len(complete) and complete[-1] + 1 - complete[0] >= max(MIN_SAMPLES, 0 if skip == "sample" else _LEAST * n):
+        return slice(int(complete[0]), int(complete[-1]) + 1)
+    known = ~missing
+    ends = np.where(missing.all(axis=0), n, known.argmax(axis=0) + known[::-1].argmax(axis=0))
+    complete = np.flatnonzero(~missing[:, ends < _EDGE * n].any(axis=1))
+    if len(complete) and complete[-1] + 1 - complete[0] >= max(MIN_SAMPLES, _LEAST * n):
+        return slice(int(complete[0]), int(complete[-1]) + 1)
+    return slice(0, n)
+
+
+def _channels(block: Block, columns: Sequence[str], layout: Layout, complete: Flags) -> Channels:
+    """What the columns are, by the samples in which no value is missing; a step across a gap tells nothing."""
+    if np.count_nonzero(complete) < MIN_SAMPLES:
+        return tuple(Channel(name, "position", (name,)) for name in columns)
+    kinds = layout.kinds if isinstance(layout.kinds, Mapping) else {}
+    given = {key: kind for key, kind in kinds.items() if {name.strip() for name in key.split(",")} <= {*columns}}
+    begins = complete & ~np.append(False, complete[:-1])
+    firsts = block.offsets[:-1][np.diff(block.offsets) > 0]
+    begins[firsts] = complete[firsts]
+    offsets = np.append(np.flatnonzero(begins[complete]), np.count_nonzero(complete))
+    return find_channels(columns, block.positions[complete], offsets, given)
+
+
+def _fill(values: Array, times: Array, most: float, channels: Sequence[tuple[Channel, list[int]]]) -> Array:
+    """Fill the short gaps of one movement (T, d) in place; the longest gap in which each sample lay, 0 for none [s]."""
+    longest = np.zeros(len(values))
+    for one, columns in channels:
+        missing: Flags = np.asarray(np.isnan(values[:, columns]).any(axis=1))
+        spans = spans_of(missing, times)
+        short = spans.seconds <= most * (1.0 + _ROUNDING)
+        if not short.any():
+            continue
+        lengths = (spans.stop - spans.first)[short]
+        begun = np.repeat(spans.first[short] - np.cumsum(lengths) + lengths, lengths)
+        chosen = begun + np.arange(len(begun))
+        known = times[~missing], values[~missing][:, columns]
+        values[chosen[:, None], columns] = _between(one, known, times[chosen])
+        longest[chosen] = np.maximum(longest[chosen], np.repeat(spans.seconds[short], lengths))
+    return longest
+
+
+def _between(channel: Channel, known: tuple[Array, Array], times: Array) -> Array:
+    """Values (m, c) of a channel at m times between those at which (n, c) are known."""
+    stamps, values = known
+    after = np.searchsorted(stamps, times)
+    if channel.kind == "discrete":
+        return np.asarray(values[after - 1])
+    if channel.kind == "orientation":
+        order = [channel.order.index(axis) for axis in "wxyz"]
+        share = (times - stamps[after - 1]) / (stamps[after] - stamps[after - 1])
+        turned = slerp(values[after - 1][:, order], values[after][:, order], share)
+        return np.asarray(turned[:, np.argsort(order)])
+    if channel.kind == "angle":
+        period = period_of_channel(channel, values[:, 0])
+        unwrapped = without_wraps(values[:, 0], np.array([0, len(values)]), period)[:, None]
+        between = _smooth(stamps, unwrapped, times)
+        return between if np.array_equal(unwrapped, values) else _wrapped(between, values, period)
+    return _smooth(stamps, values, times)
+
+
+def _smooth(stamps: Array, values: Array, times: Array) -> Array:
+    """Values (m, c) at m times on the curve through those (n, c) at stamps (n,)."""
+    if len(stamps) < 3:
+        return np.interp(times, stamps, values[:, 0])[:, None]
+    from scipy.interpolate import Akima1DInterpolator
+
+    return np.asarray(Akima1DInterpolator(stamps, values)(times))
+
+
+def _wrapped(angles: Array, recorded: Array, period: float) -> Array:
+    """Angles in the turn that the recorded ones lie in, from 0 or from minus half a turn on: that tells an angle."""
+    low = 0.0 if recorded.min() >= 0.0 else -period / 2
+    return np.asarray(low + (angles - low) % period)
+
+
+class Missing(NamedTuple):
+    """The values that one movement lacks: what has none, in which share of the samples, and for how long at most [s].
+
+    `names` are columns, or what several begin with before a dot that lack the same samples; the most frequently
+    missing comes first. `longest` is 0 where values are missing at the ends alone; `everywhere`: in all columns.
+    """
+
+    names: tuple[str, ...]
+    shares: tuple[float, ...]
+    longest: float
+    everywhere: bool
+
+
+def missing_values(block: Block, columns: Sequence[str], i: int) -> Missing:
+    """Find what movement i lacks."""
+    rows = slice(block.offsets[i], block.offsets[i + 1])
+    missing = np.isnan(block.positions[rows])
+    shares = missing.mean(axis=0).tolist()
+    longest = 0.0
+    if block.times is not None:
+        spans = [spans_of(missing[:, k], block.times[rows]).seconds for k, share in enumerate(shares) if share]
+        longest = max((float(seconds[np.isfinite(seconds)].max(initial=0.0)) for seconds in spans), default=0.0)
+    groups: dict[str, list[int]] = {}
+    for k, name in enumerate(columns):
+        groups.setdefault(name.rpartition(".")[0], []).append(k)
+    named: dict[str, float] = {}
+    for group, members in groups.items():
+        together = group and len(members) > 1 and (missing[:, members] == missing[:, members[:1]]).all()
+        named |= {group: shares[members[0]]} if together else {columns[k]: shares[k] for k in members}
+    ordered = sorted((name for name, share in named.items() if share > 0), key=lambda name: -named[name])
+    return Missing(tuple(ordered), tuple(named[name] for name in ordered), longest, len(ordered) == len(named))
+
+
+def in_words(missing: Missing, skip: str) -> str:
+    """What a movement lacks, and the options that read it nevertheless."""
+    first, *others = missing.names
+    shares = [f"{100 * share:.2g}" if share < 0.1 else f"{100 * share:.0f}" for share in missing.shares]
+    more = [f"{share} % of {name!r}" for name, share in zip(others, shares[1:], strict=True)]
+    also = f", {', '.join(more[:_SHOWN])}" + (f" and of {len(more) - _SHOWN} more" if len(more) > _SHOWN else "")
+    lasting = f", for up to {missing.longest:.3g} s" if missing.longest else ""
+    options = {} if missing.everywhere else {"exclude=": f"--exclude {in_shell(missing.names)}"}
+    options |= {"fill_gaps=": f"--fill-gaps {_rounded_up(missing.longest):g}"} if missing.longest else {}
+    options |= {"skip=": "--skip sample"} if skip == "movement" else {}
+    said = f"; say {' or '.join(options.values())}, in Python {' or '.join(options)}" if options else ""
+    share = f"{shares[0]} % of the samples"
+    return f"expected a number in {first!r}, got nothing in {share}{also if others else ''}{lasting}{said}"
+
+
+def _rounded_up(seconds: float) -> float:
+    """Seconds in two digits, not fewer."""
+    unit = 10.0 ** (np.floor(np.log10(seconds)) - 1)
+    return float(np.ceil(round(seconds / unit, 6)) * unit)

@@ -1,0 +1,188 @@
+"""The tables of formats: file extension -> reader, and what marks a folder that is one data set -> reader."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from kineme.io.arrays.arrays import POSITIONS, arrays_movements, has_known_names
+from kineme.io.arrays.bodies import body_movements
+from kineme.io.arrays.hdf5 import hdf5_movements
+from kineme.io.arrays.json_trees import json_lines_movements, json_messages, json_movements
+from kineme.io.arrays.matlab import mat_movements
+from kineme.io.arrays.npz import Npz, array_of_npy
+from kineme.io.arrays.rows import row_movements, series_movements
+from kineme.io.arrays.tree_movements import nested, tree_movements
+from kineme.io.lerobot.info import MARKER
+from kineme.io.lerobot.read import lerobot_movements
+from kineme.io.motion_capture.bvh import read_bvh_table
+from kineme.io.motion_capture.c3d import read_c3d_table
+from kineme.io.motion_capture.mvnx import read_mvnx_table
+from kineme.io.records import Contents
+from kineme.io.ros.bags import check_records
+from kineme.io.ros.choose import bag_contents
+from kineme.io.ros.read_bag import read_bag
+from kineme.io.tables.parquet import read_parquet_table
+from kineme.io.tables.text_table import read_text_table
+from kineme.movements.tables.layout import Layout
+from kineme.movements.tables.parsed import Parsed
+from kineme.movements.tables.table import table_movements
+
+
+class Format(NamedTuple):
+    """The reader of a format: of the bytes of a file, or of its path.
+
+    A reader of a path keeps only what it returns, so that files may be larger than the memory; it alone checks
+    `kineme.io.limits`, against what it keeps. `read_bytes` or `read_path` is given, never both.
+
+    Attributes
+    ----------
+    read_bytes, read_path : callable or None
+    label_is_stem : bool
+        Whether the name of the file is the label of its movements.
+    contents : callable, optional
+        What a file holds besides what is read of it, for formats that hold more than one recording.
+    has_lines : bool
+        Whether it is text, of which each line may be a movement.
+    """
+
+    read_bytes: Callable[[bytes, Layout], Parsed] | None = None
+    read_path: Callable[[Path, Layout], Parsed] | None = None
+    label_is_stem: bool = False
+    contents: Callable[[Path], list[Contents]] | None = None
+    has_lines: bool = False
+
+
+class DataSet(NamedTuple):
+    """A folder that is one source: its files have a meaning only together.
+
+    Attributes
+    ----------
+    marker : str
+        Path of the file that makes a folder such a data set.
+    beside : tuple of str
+        Patterns of file names in the folder, one of which must be there too; empty if the marker is enough.
+    parts : tuple of str
+        Patterns of the files that are read; their bytes identify the source.
+    format : Format
+        It reads the path of the folder.
+    says : bytes
+        What is among the first bytes of the marker, where other programs write files of that name.
+    """
+
+    marker: str
+    beside: tuple[str, ...]
+    parts: tuple[str, ...]
+    format: Format
+    says: bytes = b""
+
+    def files(self, folder: Path) -> list[Path]:
+        """The files that are read, sorted; hidden ones are passed over."""
+        found = {path for pattern in (self.marker, *self.parts) for path in folder.glob(pattern) if path.is_file()}
+        relative = sorted(path.relative_to(folder) for path in found)
+        return [folder / one for one in relative if not any(part.startswith(".") for part in one.parts)]
+
+
+def _read_text(data: bytes, layout: Layout) -> Parsed:
+    if layout.rows:
+        return row_movements(data, layout)
+    return table_movements(*read_text_table(data, layout), layout, "CSV")
+
+
+def _read_parquet(data: bytes, layout: Layout) -> Parsed:
+    return table_movements(*read_parquet_table(data, layout), layout, "Parquet")
+
+
+def _read_npz(data: bytes, layout: Layout) -> Parsed:
+    arrays = Npz(data, Path("it"))
+    if (parsed := body_movements(arrays, layout, "NPZ")) is not None:
+        return parsed
+    if has_known_names(arrays):
+        return arrays_movements(arrays, layout, "NPZ")
+    return tree_movements(nested(arrays), layout, "NPZ")
+
+
+def _read_npy(data: bytes, layout: Layout) -> Parsed:
+    array = array_of_npy(data, Path("it"))
+    if array.dtype.names:  # a table, as of pandas' to_records
+        return tree_movements({name: array[name] for name in array.dtype.names}, layout, "NPY")
+    return arrays_movements({POSITIONS[0]: array}, layout, "NPY")
+
+
+def _read_bvh(data: bytes, layout: Layout) -> Parsed:
+    return table_movements(*read_bvh_table(data, layout), layout, "BVH")
+
+
+def _read_c3d(data: bytes, layout: Layout) -> Parsed:
+    return table_movements(*read_c3d_table(data, layout), layout, "C3D")
+
+
+def _read_mvnx(data: bytes, layout: Layout) -> Parsed:
+    return table_movements(*read_mvnx_table(data, layout), layout, "MVNX")
+
+
+def _read_mcap(path: Path, layout: Layout) -> Parsed:
+    return read_bag(path, layout) if check_records(path) == b"ros2" else json_messages(path, layout)
+
+
+_BAG = Format(read_path=read_bag, contents=bag_contents)
+
+#: File ending -> format. A reader raises a `DataError` or any `ValueError`, `KeyError` or `TypeError`.
+FORMATS: dict[str, Format] = {
+    ".csv": Format(_read_text, has_lines=True),
+    ".tsv": Format(_read_text, has_lines=True),
+    ".txt": Format(_read_text, has_lines=True),
+    ".npz": Format(_read_npz),
+    ".json": Format(json_movements),
+    ".jsonl": Format(json_lines_movements),
+    ".ndjson": Format(json_lines_movements),
+    ".npy": Format(_read_npy),
+    ".parquet": Format(_read_parquet),
+    ".mat": Format(mat_movements, label_is_stem=True),
+    ".h5": Format(read_path=hdf5_movements),
+    ".hdf5": Format(read_path=hdf5_movements),
+    ".ts": Format(series_movements, has_lines=True),
+    ".bvh": Format(_read_bvh),
+    ".c3d": Format(_read_c3d),
+    ".trc": Format(_read_text),
+    ".mot": Format(_read_text),
+    ".sto": Format(_read_text),
+    ".mvnx": Format(_read_mvnx),
+    ".bag": _BAG,
+    ".db3": _BAG,
+    ".mcap": Format(read_path=_read_mcap, contents=bag_contents),
+}
+
+_HEAD = 4096  # bytes of a marker that are read to know it
+
+#: Folders that are one source.
+DATA_SETS: tuple[DataSet, ...] = (
+    DataSet(
+        MARKER,
+        ("data",),
+        ("meta/*.jsonl", "meta/*.parquet", "meta/episodes/*/*.parquet", "data/*/*.parquet"),
+        Format(read_path=lerobot_movements),
+    ),
+    DataSet("metadata.yaml", ("*.db3*", "*.mcap*"), ("*.db3*", "*.mcap*"), _BAG, b"rosbag2_bagfile_information"),
+)
+
+
+def data_set_of(folder: Path) -> DataSet | None:
+    """The row of `DATA_SETS` for a folder; None for a folder of files and for what is no folder."""
+    return next((one for one in DATA_SETS if _is_marked(folder, one)), None)
+
+
+def _is_marked(folder: Path, data_set: DataSet) -> bool:
+    try:
+        marker = folder / data_set.marker
+        if not marker.is_file() or not (not data_set.beside or any(_matches(folder, data_set.beside))):
+            return False
+        with marker.open("rb") as file:
+            return data_set.says in file.read(_HEAD)
+    except OSError:
+        return False
+
+
+def _matches(folder: Path, patterns: tuple[str, ...]) -> Iterator[Path]:
+    return (path for pattern in patterns for path in folder.glob(pattern))

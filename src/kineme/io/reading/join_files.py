@@ -1,0 +1,292 @@
+"""Files on one clock as one recording: the sensors of a phone, each in a file of its own, side by side."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from kineme.errors import DataError
+from kineme.io.reading.column_order import sensors_of
+from kineme.io.reading.entries import Entry, as_text, name_of
+from kineme.io.reading.read_file import FileRead, select_columns
+from kineme.io.records import Problem
+from kineme.io.ros.rotations import interpolated
+from kineme.movements.channels.channel import Channels, recorded_names
+from kineme.movements.channels.column_match import Columns, numbers_by_name
+from kineme.movements.channels.coordinates import canonical, columns_of, in_order, off_norm
+from kineme.movements.channels.detect import Given, find_channels
+from kineme.movements.channels.one_unit import in_one_unit
+from kineme.movements.tables.columns import column_numbers, excluded_numbers
+from kineme.movements.tables.layout import Layout
+from kineme.movements.tables.parsed import Block, Detected, Parsed, Repair
+from kineme.reporting.text import counted, first_names
+from kineme.validation import MIN_SAMPLES, Array
+
+#: A file, and where it was found.
+Placed = tuple[FileRead, Entry]
+
+_SHARED = 0.5  # of the time of a recording that a file must cover
+_SINCE_1970 = 1e8  # s: stamps that count from a time which all devices share
+_ALIKE = 0.05  # of a duration by which files of one recording may begin or end apart, where no such time tells
+_NAMED = 4  # files that a note names
+
+
+def join_files(files: Sequence[Placed], layout: Layout) -> list[Placed]:
+    """One recording of all files of a folder that hold one movement each on one clock; other files as they are.
+
+    The samples are those of the file that has most in a second, while all of them last. Others are interpolated:
+    linearly, angles without their wraps, orientations by turning evenly; a discrete channel keeps the value before.
+    Columns are named by their file, ``Gyroscope.x``; the label is the folder around that of the recording. A file that
+    covers less than half of the recording is a problem.
+
+    Parameters
+    ----------
+    files : sequence of (FileRead, Entry)
+        With all of their columns.
+    layout : Layout
+        The columns of the recordings, by the names that they have there, and their kinds. A file without any of the
+        columns that are chosen is passed over.
+    """
+    result: list[Placed] = []
+    for members in _folders(files).values():
+        timed = [read for read, _ in members if _is_timed(read)]
+        if len(_together(timed)) < 2:
+            result += members
+            continue
+        chosen = _with_chosen_columns(timed, layout)
+        together = _together(chosen) or [chosen[0].path]
+        joined = [member for member in members if member[0].path in together]
+        recording, place = _joined(joined, together, layout.kinds or {})
+        aside = tuple(name for read in timed if read not in chosen for name in _heads(read))
+        if recording.detected is not None:
+            recording = recording._replace(
+                detected=recording.detected._replace(ignored=(*recording.detected.ignored, *aside))
+            )
+        result.append((_selected(recording, layout), place))
+        for read, entry in members:
+            if read.path in together:
+                continue
+            if _is_timed(read):
+                if read not in chosen:
+                    continue
+                begin, end = _span(read)
+                reason = (
+                    f"expected samples at the time of {together[0]}, got some from {begin:.12g} to {end:.12g} s; move "
+                    "it elsewhere if it is another recording"
+                )
+                lost = [*read.problems, Problem(read.path, None, reason)]
+                result.append((read._replace(block=None, problems=lost), entry))
+            else:
+                result.append((read, entry))
+    return result
+
+
+def _with_chosen_columns(files: Sequence[FileRead], layout: Layout) -> list[FileRead]:
+    """The files that have columns which are asked for, or those of the movements to compare with; all if none has."""
+    heads = [_heads(read) for read in files]
+    known = layout.known.columns if layout.known is not None else ()
+    of_all = [name for names in heads for name in names]
+    wanted = layout.coordinates or (known if None not in numbers_by_name(of_all, known) else ())
+    kept = [
+        read
+        for read, names in zip(files, heads, strict=True)
+        if (not wanted or excluded_numbers(names, wanted))
+        and len(excluded_numbers(names, layout.excluded)) < len(names)
+    ]
+    return kept or list(files)
+
+
+def _heads(read: FileRead) -> list[str]:
+    assert read.detected is not None
+    return [f"{Path(read.path).stem}.{name}" for name in read.detected.columns]
+
+
+def _selected(read: FileRead, layout: Layout) -> FileRead:
+    """A recording with the columns that are chosen, in their order."""
+    if read.detected is None or read.block is None:
+        return read
+    parsed = Parsed(read.detected, read.block)
+    try:
+        parsed = select_columns(lambda choice: _in_order(parsed, choice), layout)
+    except DataError as error:
+        return read._replace(block=None, problems=[Problem(read.path, None, str(error)), *read.problems])
+    return read._replace(detected=parsed.detected, block=parsed.block)
+
+
+def _in_order(parsed: Parsed, layout: Layout) -> Parsed:
+    detected, block = parsed.detected, parsed.block
+    if layout.coordinates is None:
+        return parsed
+    chosen = column_numbers(detected.columns, layout.coordinates)
+    detected = detected._replace(
+        columns=tuple(detected.columns[k] for k in chosen),
+        measured_in=tuple(detected.measured_in[k] for k in chosen) if detected.measured_in else (),
+        ignored=(*detected.ignored, *(name for k, name in enumerate(detected.columns) if k not in chosen)),
+    )
+    return parsed._replace(detected=detected, block=replace(block, positions=block.positions[:, chosen]))
+
+
+def notes_on_clocks(files: Sequence[Placed]) -> tuple[str, ...]:
+    """Say that files of one folder lie on one clock, and how they are read as one recording."""
+    folders = []
+    for members in _folders(files).values():
+        timed = [read for read, _ in members if _is_timed(read)]
+        together = _together(timed)
+        if len(together) > 1 and _are_sensors([read for read in timed if read.path in together]):
+            folders.append(together)
+    if not folders:
+        return ()
+    others = f", and so do files in {counted(len(folders) - 1, 'other folder')}" if len(folders) > 1 else ""
+    names = first_names(sorted(folders[0]), _NAMED)
+    return (f"{names} lie on one clock{others}; --join-files, in Python join_files=True, makes one recording of them",)
+
+
+def _folders(files: Sequence[Placed]) -> Mapping[Path, list[Placed]]:
+    """The files of each folder."""
+    folders: dict[Path, list[Placed]] = {}
+    for read, entry in files:
+        folders.setdefault(entry.path.parent, []).append((read, entry))
+    return folders
+
+
+def _is_timed(read: FileRead) -> bool:
+    """Whether a file holds one movement with time stamps."""
+    return read.block is not None and read.block.times is not None and len(read.block.labels) == 1
+
+
+def _times(read: FileRead) -> Array:
+    assert read.block is not None
+    assert read.block.times is not None
+    return read.block.times
+
+
+def _span(read: FileRead) -> tuple[float, float]:
+    times = _times(read)
+    return float(times[0]), float(times[-1])
+
+
+def _together(files: Sequence[FileRead]) -> list[str]:
+    """The files that share at least half of the time of the densest one, which is the first."""
+    if len(files) < 2:
+        return []
+    durations = [end - begin for begin, end in map(_span, files)]
+    long = [k for k, duration in enumerate(durations) if duration >= _SHARED * float(np.median(durations))]
+    densest = max(long, key=lambda k: len(_times(files[k])) / durations[k])
+    begin, end = _span(files[densest])
+    shared = [
+        k
+        for k, read in enumerate(files)
+        if k != densest and min(end, _span(read)[1]) - max(begin, _span(read)[0]) >= _SHARED * (end - begin)
+    ]
+    return [files[k].path for k in (densest, *shared)]
+
+
+def _are_sensors(files: Sequence[FileRead]) -> bool:
+    """Whether files that overlap are parts of one recording, and not repetitions that all begin at 0."""
+    spans = np.array([_span(read) for read in files])
+    if spans[:, 0].min() > _SINCE_1970:
+        return True
+    if (np.ptp(spans, axis=0) > _ALIKE * np.ptp(spans)).any():
+        return False
+    of_files = [
+        (frozenset(Columns(read.detected.columns, ()).names), sensors_of(read.path)) for read in files if read.detected
+    ]
+    return len({*of_files}) == len(files)
+
+
+def _joined(members: Sequence[Placed], together: Sequence[str], given: Given) -> Placed:
+    """The recording of files whose times overlap, the densest one named first in `together`."""
+    entry = members[0][1]
+    folder = entry.path.parent
+    of_root = entry.relative.parent == Path()
+    name = as_text(name_of(folder) if of_root else Path(entry.name).parent)
+    place = Entry(folder, name_of(folder) if of_root else entry.relative.parent, name)
+    reads = [read for read, _ in members]
+    reference = next(read for read in reads if read.path == together[0])
+    spans = [_span(read) for read in reads]
+    begin, end = max(first for first, _ in spans), min(last for _, last in spans)
+    times = _times(reference)
+    at = times[(times >= begin) & (times <= end)]
+    problems = [problem for read in reads for problem in read.problems]
+    lines = "".join(f"{read.sha256}  {Path(read.path).name}\n" for read in reads)
+    common = FileRead(
+        name, hashlib.sha256(lines.encode()).hexdigest(), sum(read.size for read in reads),
+        max(read.mtime for read in reads), None, None, problems,
+    )  # fmt: skip
+    if len(at) < MIN_SAMPLES:
+        reason = f"expected files that last together, got {counted(len(at), 'sample')} at the time of all"
+        return common._replace(problems=[*problems, Problem(name, None, reason)]), place
+    if len(at) < len(times):
+        n_lost, of = len(times) - len(at), Path(reference.path).name
+        reason = f"{counted(n_lost, 'sample')} of {of} before others begin or after they end"
+        problems.append(Problem(name, None, reason, samples=n_lost))
+    parts = [_part(read, at, given) for read in reads]
+    detected = reference.detected
+    assert detected is not None
+    heads, units, ignored = (tuple(text for part in parts for text in part[k]) for k in (0, 1, 2))
+    how = Detected(
+        " and ".join(dict.fromkeys(read.detected.format for read in reads if read.detected)),
+        f"{len(reads)} files on one clock", heads, detected.time, detected.units, detected.units_from,
+        ignored=ignored, measured_in=units if any(units) else (),
+        converted=tuple(text for read in reads if read.detected for text in read.detected.converted),
+    )  # fmt: skip
+    repairs = [repair for read in reads for repair in (read.block and read.block.repairs) or ()]
+    repair = Repair(
+        sum(one.filled for one in repairs), max((one.longest for one in repairs), default=0.0),
+        max((one.cropped for one in repairs), default=0.0),
+    )  # fmt: skip
+    labels = {read.block.labels[0] for read in reads if read.block} - {as_text(entry.relative.parent.name), None}
+    label = labels.pop() if len(labels) == 1 else as_text(place.relative.parent.name) or None
+    block = Block(np.hstack([part[3] for part in parts]), at, np.array([0, len(at)]), [label], [""], repairs=[repair])
+    how, block = in_one_unit(how, block)
+    return common._replace(detected=how, block=block), place
+
+
+def _part(read: FileRead, at: Array, given: Given) -> tuple[list[str], list[str], list[str], Array]:
+    """Heads, units, columns left aside, and values of a file at other times."""
+    block, detected = read.block, read.detected
+    assert block is not None
+    assert detected is not None
+    stem = Path(read.path).stem
+    own = dict(_own(given, stem, detected.columns))
+    channels = find_channels(detected.columns, block.positions, block.offsets, own, detected.measured_in)
+    columns = in_order(block.positions, detected.columns, channels)
+    if not any(True for _ in off_norm(columns, channels)):
+        columns = canonical(columns, block.offsets, channels)
+    units = dict(zip(detected.columns, detected.measured_in or [""] * len(detected.columns), strict=True))
+    names = recorded_names(channels)
+    return (
+        [f"{stem}.{name}" for name in names],
+        [units[name] for name in names],
+        [f"{stem}.{name}" for name in detected.ignored],
+        _values_at(at, _times(read), columns, channels),
+    )
+
+
+def _own(given: Given, stem: str, heads: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """The kinds that are given for columns of a file, by its own heads."""
+    for key, kind in given.items():
+        names = [name.strip() for name in key.split(",")]
+        plain = [name.removeprefix(f"{stem}.") for name in names]
+        if all(name.startswith(f"{stem}.") for name in names) and {*plain} <= {*heads}:
+            yield ",".join(plain), kind
+
+
+def _values_at(at: Array, times: Array, columns: Array, channels: Channels) -> Array:
+    """Columns (T, m) of channels at times `at` within their own `times`."""
+    values = np.empty((len(at), columns.shape[1]))
+    before = np.searchsorted(times, at, side="right") - 1
+    for channel, where in zip(channels, columns_of(channels), strict=True):
+        if channel.kind == "orientation":
+            norms = np.interp(at, times, np.linalg.norm(columns[:, where], axis=1))  # what is no rotation stays none
+            turned = interpolated(at, times, columns[:, where])  # on great circles, whatever the order
+            values[:, where] = norms[:, None] * turned
+        elif channel.kind == "discrete":
+            values[:, where] = columns[before, where]
+        else:
+            values[:, where.start] = np.interp(at, times, columns[:, where.start])
+    return values

@@ -1,0 +1,390 @@
+"""Merge many files into one set of demonstrations, each movement with its source and who made it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
+from pathlib import Path, PurePosixPath
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.errors import DataError, TrajectoryError
+from kineme.io.arrays.npz import Npz
+from kineme.io.reading.check_block import check_block, movement_of, take_movements
+from kineme.io.reading.column_order import dimensions_unlike, in_one_set
+from kineme.io.reading.read_file import FileRead
+from kineme.io.records import Problem, note_on_missing
+from kineme.movements.channels.channel import Channels, is_plain, recorded_names
+from kineme.movements.channels.coordinates import canonical, in_order, off_norm
+from kineme.movements.channels.detect import Given, find_channels
+from kineme.movements.tables.layout import Layout
+from kineme.movements.tables.parsed import Block, Detected, Repair
+from kineme.movements.trajectories.channels import of_channels
+from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.labels import label_array
+from kineme.movements.trajectories.movement_sequence import MovementSequence
+from kineme.movements.trajectories.movements import Movements
+from kineme.reporting.text import counted
+
+#: Names of an array (n,) of people in an npz archive, one for each of its n movements.
+NAMES = ("people", "person", "subjects", "subject")
+_DEPTH = 3  # person/label/recording
+
+_HINT = "check the order of the columns, or divide the quaternions by their norms"
+
+
+class Source(NamedTuple):
+    """The source of a movement.
+
+    Attributes
+    ----------
+    path : str
+        Relative to the folder that was read, with forward slashes; the name of the file if one file was read.
+    sha256 : str
+        Of the file's bytes, in hexadecimal.
+    size : int
+        Bytes.
+    mtime : float
+        Last modification of the file, in seconds since 1970.
+    place : str
+        Which movement of the file: its key in a long table, its index in arrays; empty if the file holds but one.
+    label : str or None
+    person : str or None
+        Who showed it, where a column or ``label_pattern`` says it.
+    filled : int
+        Number of samples of which missing values are interpolated.
+    longest_gap : float
+        Longest gap that was filled, from the sample before to the sample after [s].
+    cropped : float
+        Time at both ends that was left out, since columns have no values there [s].
+    """
+
+    path: str
+    sha256: str
+    size: int
+    mtime: float
+    place: str
+    label: str | None
+    person: str | None = None
+    filled: int = 0
+    longest_gap: float = 0.0
+    cropped: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Recordings(MovementSequence):
+    """Movements with their sources, and the problems of what could not be read.
+
+    A sequence of `Trajectory`, taken wherever movements are expected.
+
+    Attributes
+    ----------
+    demonstrations : Demonstrations
+        The movements of the most frequent number of dimensions (of two equally frequent, the one met first); those
+        of other dimensions are among the problems. They carry labels if every one of them has one.
+    sources : tuple of Source
+        One per movement.
+    problems : tuple of Problem
+    detected : tuple of (Detected, int)
+        How files were understood, and how many in this way; most frequent first.
+    notes : tuple of str
+        What else a person should know of how they were read.
+    """
+
+    demonstrations: Demonstrations
+    sources: tuple[Source, ...]
+    problems: tuple[Problem, ...]
+    detected: tuple[tuple[Detected, int], ...]
+    notes: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.sources)
+
+    @cached_property
+    def labels(self) -> NDArray[Any]:
+        """The label of each movement or None, shape (n,), objects, also where some have none; read-only."""
+        labels = np.empty(len(self.sources), dtype=object)
+        labels[:] = [source.label for source in self.sources]
+        labels.setflags(write=False)
+        return labels
+
+    @property
+    def people(self) -> list[str | None] | None:
+        """Who showed each movement, by a column, or ``{person}`` in ``label_pattern``; None where these say nothing."""
+        people = [source.person for source in self.sources]
+        return people if any(people) else None
+
+    @property
+    def short_names(self) -> list[str]:
+        """A name for each movement: its place where all are of one file, as ``episode 3``; else file and place."""
+        one_file = len({source.path for source in self.sources}) == 1
+        return [
+            source.place
+            if source.place and one_file
+            else f"{source.path}#{source.place}"
+            if source.place
+            else source.path
+            for source in self.sources
+        ]
+
+    def __repr__(self) -> str:
+        n_files = len({source.path for source in self.sources})
+        files, problems = counted(n_files, "file"), counted(len(self.problems), "problem")
+        return f"Recordings({self.demonstrations!r}, {files}, {problems})"
+
+    def without_labels(self) -> Recordings:
+        """The same movements, with no label on any."""
+        plain = Demonstrations.of_movements(replace(self.demonstrations.movements, labels=None))
+        sources = tuple(source._replace(label=None) for source in self.sources)
+        return replace(self, demonstrations=plain, sources=sources)
+
+
+def merge_files(
+    files: Sequence[FileRead],
+    where: str,
+    problems: Sequence[Problem] = (),
+    kinds: Given | None = None,
+    skip: str = "movement",
+    by_number: bool = False,
+) -> Recordings:
+    """One `Recordings` of all files that hold movements.
+
+    Parameters
+    ----------
+    files : sequence of FileRead
+    where : str
+        What is read, for the message.
+    problems : sequence of Problem
+        Those known before.
+    kinds : mapping, optional
+        Kinds of channels that are given, see `kineme.movements.channels.detect.find_channels`.
+    skip : {"movement", "sample"}
+        What a quaternion that is not of norm 1 costs.
+    by_number : bool, default False
+        Whether the columns of the files were chosen by their numbers, so that other names are no problem.
+
+    Raises
+    ------
+    DataError
+        There is none.
+    """
+    reported = [*problems, *(problem for one in files for problem in one.problems)]
+    full = [one for one in files if one.block is not None and len(one.block.labels)]
+    if not full:
+        if len(reported) == 1 and reported[0].file == Path(where).name:  # one file alone: it is named once
+            raise DataError(str(reported[0]._replace(file=where)))
+        first = f"; {len(reported)} could not be read, the first {reported[0]}" if reported else ""
+        raise DataError("; ".join([f"expected recordings in {where}, found none{first}", *note_on_missing(reported)]))
+    dims: Counter[int] = Counter()
+    for one in full:
+        dims[_block(one).positions.shape[1]] += len(_block(one).labels)
+    n_dims = dims.most_common(1)[0][0]
+    odd = [one for one in full if _block(one).positions.shape[1] != n_dims]
+    full = [one for one in full if _block(one).positions.shape[1] == n_dims]
+    reported += dimensions_unlike(odd, full)
+    understood = {one.path: one.detected for one in full}
+    full, channels, odd_channels = with_channels(full, kinds or {}, skip, by_number)
+    reported += odd_channels
+    if not any(len(_block(one).labels) for one in full):
+        none = next((one for one in reported if not one.samples), reported[0])
+        raise DataError(f"expected recordings in {where}, found none; the first that is none: {none}")
+    sources = tuple(
+        Source(one.path, one.sha256, one.size, one.mtime, place, label, person or one.person, *repair)
+        for one in full
+        for place, label, person, repair in zip(
+            _block(one).places, _block(one).labels, _people(one), _repairs(one), strict=True
+        )
+    )
+    detected = Counter(how for one in full if (how := understood[one.path]))
+    return Recordings(_demonstrations(full, sources, channels), sources, tuple(reported), tuple(detected.most_common()))
+
+
+def _people(one: FileRead) -> Sequence[str | None]:
+    """Who showed each movement, as the file says it."""
+    return _block(one).people or [None] * len(_block(one).labels)
+
+
+def _repairs(one: FileRead) -> Sequence[Repair]:
+    """What was done about missing values of each movement."""
+    return _block(one).repairs or [Repair()] * len(_block(one).labels)
+
+
+def _block(one: FileRead) -> Block:
+    assert one.block is not None
+    return one.block
+
+
+def _demonstrations(files: Sequence[FileRead], sources: Sequence[Source], channels: Channels | None) -> Demonstrations:
+    blocks = [_block(one) for one in files]
+    lengths = np.concatenate([np.diff(block.offsets) for block in blocks])
+    offsets = np.concatenate(([0], np.cumsum(lengths)))
+    positions = _concatenated([block.positions for block in blocks])
+    times = _concatenated([_stamps(block) for block in blocks])
+    labels: Any = [source.label for source in sources]
+    names = tuple(f"{source.path}#{source.place}" if source.place else source.path for source in sources)
+    durations = times[offsets[1:] - 1] - times[offsets[:-1]]
+    labeled = None if None in labels else label_array(labels, len(labels), names)
+    merged = Movements(positions, offsets, durations, times, labeled, names)
+    return Demonstrations.of_movements(merged if channels is None else of_channels(merged, channels))
+
+
+def _concatenated(arrays: Sequence[Any]) -> Any:
+    return np.ascontiguousarray(arrays[0] if len(arrays) == 1 else np.concatenate(arrays))
+
+
+def _stamps(block: Block) -> Any:
+    """Time stamps; if a file has none, even ones over one second."""
+    if block.times is not None:
+        return block.times
+    lengths = np.diff(block.offsets)
+    within = np.arange(len(block.positions)) - np.repeat(block.offsets[:-1], lengths)
+    return within / np.repeat(lengths - 1, lengths)
+
+
+def with_channels(
+    files: Sequence[FileRead], given: Given, skip: str = "movement", by_number: bool = False
+) -> tuple[list[FileRead], Channels | None, list[Problem]]:
+    """The channels of files with equally many columns, the files that have them, and problems.
+
+    Kinds are found for all files together: a gripper that no file opens is one still, and one that some file moves
+    continuously is a position in all of them. Columns are put in order and converted by their names, see `in_one_set`.
+    Files whose columns have no names, or are chosen `by_number`, are merged by the order of their columns while all
+    are positions or angles, without the wraps of angles, and then nothing is known of the channels; else they are
+    problems. A quaternion that is not of norm 1 costs its movement, or with `skip`
+    ``"sample"`` that sample alone.
+
+    Raises
+    ------
+    SpecificationError
+        See `find_channels`.
+    """
+    same, nameless, problems = in_one_set(files, by_number)
+    channels = _channels_of(same, given)
+    if nameless and is_plain(channels):
+        place = {one.path: k for k, one in enumerate(files)}
+        return _without_wraps(sorted([*same, *nameless], key=lambda one: place[one.path]), given), None, problems
+    heads = list(recorded_names(channels))
+    problems += [
+        Problem(one.path, None, f"no names of columns where most files have {heads}; name them as these are")
+        for one in nameless
+    ]
+    checked = [_check_orientations(_in_order(one, channels), channels, skip) for one in same]
+    return [one for one, _ in checked], channels, [*problems, *(one for _, several in checked for one in several)]
+
+
+def _channels_of(files: Sequence[FileRead], given: Given) -> Channels:
+    """The channels of files that all have the same heads."""
+    blocks, detected = [_block(one) for one in files], files[0].detected
+    assert detected is not None
+    return find_channels(
+        detected.columns,
+        np.concatenate([block.positions for block in blocks]) if len(blocks) > 1 else blocks[0].positions,
+        np.concatenate(([0], np.cumsum(np.concatenate([np.diff(block.offsets) for block in blocks])))),
+        given,
+        detected.measured_in,
+    )
+
+
+def _without_wraps(files: Sequence[FileRead], given: Given) -> list[FileRead]:
+    """Files of several heads, in the columns of each the angles continuous."""
+    groups: dict[tuple[str, ...], list[FileRead]] = {}
+    for one in files:
+        groups.setdefault(one.detected.columns if one.detected else (), []).append(one)
+    known = {}
+    for heads, group in groups.items():
+        here = {
+            key: kind
+            for key, kind in given.items()
+            if key in heads or {name.strip() for name in key.split(",")} <= {*heads}
+        }
+        known[heads] = _channels_of(group, here)
+    result = []
+    for one in files:
+        block, channels = _block(one), known[one.detected.columns if one.detected else ()]
+        if is_plain(channels):
+            block = replace(block, positions=canonical(block.positions, block.offsets, channels))
+        result.append(one._replace(block=block))
+    return result
+
+
+def _in_order(one: FileRead, channels: Channels) -> FileRead:
+    """A file with the columns of each of its channels side by side."""
+    block, heads = _block(one), one.detected.columns if one.detected else ()
+    return one._replace(block=replace(block, positions=in_order(block.positions, heads, channels)))
+
+
+def _check_orientations(one: FileRead, channels: Channels, skip: str) -> tuple[FileRead, list[Problem]]:
+    """A file without the movements, or the samples alone, in which a quaternion is not of norm 1."""
+    block, problems, faults = _block(one), [], dict[int, str]()
+    good = np.ones(len(block.labels), dtype=bool)
+    for channel, odd, norms in off_norm(block.positions, channels):
+        owners = np.searchsorted(block.offsets, odd, side="right") - 1
+        reasons = [
+            f"expected unit quaternions in {', '.join(channel.columns)}, got norm {norms[k]:.6g} at sample "
+            f"{k - block.offsets[i]}; {_HINT}"
+            for i, k in zip(owners.tolist(), odd.tolist(), strict=True)
+        ]
+        faults |= dict(zip((block.row(k) for k in odd.tolist()), reasons, strict=True))
+        for i, first in zip(*map(np.ndarray.tolist, np.unique(owners, return_index=True)), strict=True):
+            line = block.line_of(block.row(int(odd[first])))
+            problems.append(Problem(one.path, line, movement_of(block, i) + reasons[first], TrajectoryError))
+        good[owners] = False
+    if faults and skip == "sample":
+        block, problems = check_block(replace(block, faults=faults), one.path, Layout(skip=skip), ())
+        return one._replace(block=block), problems
+    return one._replace(block=take_movements(block, good)), problems
+
+
+def people_of(path: Path, sources: Sequence[Source]) -> NDArray[Any] | None:
+    """As `each_person`, shape (n,); None where any is unknown, or all are one, so that nothing tells people apart."""
+    people = each_person(path, sources)
+    if None in people or len(set(people)) < 2:
+        return None
+    named = np.empty(len(people), dtype=object)
+    named[:] = people
+    return named
+
+
+def each_person(path: Path, sources: Sequence[Source]) -> list[str | None]:
+    """The person of each movement, or None where it is unknown.
+
+    Where a column or a label pattern names the person, that one. In an npz archive, an array named as in `NAMES`, one
+    entry for each movement. Else the folder above that of the label: ``person/label/recording``.
+
+    Parameters
+    ----------
+    path : Path
+        The folder or file that was read.
+    sources : sequence of Source
+        Of the movements.
+
+    Raises
+    ------
+    DataError
+        Not one person for each movement of a file.
+    """
+    of_file = cache(lambda name: _people_in(path / name if path.is_dir() else path))
+    return [source.person or _person(source, of_file(source.path)) for source in sources]
+
+
+def _person(source: Source, listed: list[str] | None) -> str | None:
+    if listed is None:
+        folders = PurePosixPath(source.path).parts
+        return folders[-_DEPTH] if len(folders) >= _DEPTH else None
+    index = int(source.place or 0)
+    if index >= len(listed):
+        raise DataError(f"expected a person for each movement in {source.path}, got {len(listed)}; add the others")
+    return listed[index]
+
+
+def _people_in(file: Path) -> list[str] | None:
+    """The people named in a file, or None."""
+    if file.suffix.lower() != ".npz":
+        return None
+    arrays = Npz(file.read_bytes(), file)
+    name = next((one for one in NAMES if one in arrays), None)
+    return None if name is None else [str(one) for one in np.atleast_1d(arrays[name]).tolist()]

@@ -1,0 +1,303 @@
+"""Read one file: hashed, and parsed into checked movements; failures become problems."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import stat
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from kineme.errors import DataError, KinemeError
+from kineme.io.limits import check_expanded
+from kineme.io.reading.check_block import check_block, sentinels_as_missing
+from kineme.io.reading.entries import OUTSIDE, as_text, leads_out
+from kineme.io.reading.formats import FORMATS, Format, data_set_of
+from kineme.io.records import Problem
+from kineme.movements.channels.column_match import numbers_by_name
+from kineme.movements.channels.detect import unit_of
+from kineme.movements.channels.one_unit import in_one_unit
+from kineme.movements.tables.columns import excluded_numbers
+from kineme.movements.tables.layout import Known, Layout
+from kineme.movements.tables.parsed import Block, Detected, Parsed, listed
+
+#: Exceptions of readers on invalid files; RecursionError is too deep nesting.
+_UNREADABLE = (
+    KinemeError,
+    ValueError,
+    KeyError,
+    TypeError,
+    EOFError,
+    OSError,
+    ArithmeticError,
+    RecursionError,
+    MemoryError,
+)
+
+_SPREADSHEETS = frozenset({".xlsx", ".xlsm", ".xls", ".ods", ".numbers"})
+_NOWHERE = "expected a file, got a link that leads nowhere; delete it, or restore what it leads to"
+
+
+class FileRead(NamedTuple):
+    """The result for one file: movements and how they were read, or neither; and its problems."""
+
+    path: str  # relative to the folder that is read
+    sha256: str
+    size: int
+    mtime: float
+    detected: Detected | None
+    block: Block | None
+    problems: list[Problem]
+    person: str | None = None  # who showed the movements, where the name of the file says it
+
+
+def read_file(path: Path, relative: Path, layout: Layout, follow_links: bool = False) -> FileRead:
+    """Read a file, or a folder that is one data set; it need not exist any more.
+
+    Parameters
+    ----------
+    path : Path
+    relative : Path
+        Path in the result. Its innermost folder is the label of movements without one in the file, unless the format
+        takes the name of the file itself.
+    layout : Layout
+    follow_links : bool, default False
+        Whether links in a data set that lead out of it are read.
+    """
+    name = as_text(relative)
+    try:
+        parts, form = _parts(path, relative, follow_links)
+        known = [os.stat(part) for part in parts]
+        if not all(stat.S_ISREG(one.st_mode) for one in known):  # reading a pipe would wait forever
+            raise DataError("expected a file, got a pipe or a device")
+        if form.read_path is None:
+            check_expanded(known[0].st_size)
+            data = path.read_bytes()
+    except (OSError, MemoryError, DataError) as error:
+        reason = _NOWHERE if path.is_symlink() and not os.path.exists(path) else _plainly(error)
+        return FileRead(name, "", 0, 0.0, None, None, [Problem(name, None, reason)])
+    if form.read_path is None:
+        return read_bytes(data, relative, layout, known[0].st_mtime)
+    size, mtime = sum(one.st_size for one in known), max(one.st_mtime for one in known)
+    read = _parsed(partial(form.read_path, path), form, relative, layout)
+    if read.block is None:
+        return read._replace(size=size, mtime=mtime)
+    try:
+        return read._replace(sha256=_sha256(parts, path), size=size, mtime=mtime)
+    except OSError as error:  # it was there a moment ago
+        return FileRead(name, "", size, mtime, None, None, [Problem(name, None, _plainly(error))])
+
+
+def read_bytes(data: bytes, relative: Path, layout: Layout, mtime: float = 0.0) -> FileRead:
+    """Read the content of a file of that name."""
+    form = format_of(relative)
+    sha256 = hashlib.sha256(data).hexdigest()
+    if form.read_bytes is None:
+        reason = f"expected the path of a {relative.suffix} file, got its bytes alone; write them to a file"
+        read = FileRead(as_text(relative), "", 0, 0.0, None, None, [Problem(as_text(relative), None, reason)])
+    else:
+        read = _parsed(partial(_expanded, form.read_bytes, data), form, relative, layout)
+    return read._replace(sha256=sha256, size=len(data), mtime=mtime)
+
+
+def _expanded(read: Callable[[bytes, Layout], Parsed], data: bytes, layout: Layout) -> Parsed:
+    check_expanded(len(data))
+    return read(data, layout)
+
+
+def _parsed(parse: Callable[[Layout], Parsed], form: Format, relative: Path, layout: Layout) -> FileRead:
+    """What a reader returns, checked, or the problem with it."""
+    name = as_text(relative)
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):  # overflow gives infinity, which is reported later
+            if layout.rows and not form.has_lines:
+                raise DataError("expected text, of which each line is a movement, got another format; leave out rows")
+            parsed = select_columns(parse, layout)
+            detected, block, left_out = parsed if layout.every is None else in_blocks(parsed, layout.every)
+            block, sentinels = sentinels_as_missing(block, detected.columns)
+            detected, block = in_one_unit(detected._replace(sentinels=sentinels), block)
+            block, problems = check_block(block, name, layout, detected.columns)
+    except _UNREADABLE as error:
+        return FileRead(name, "", 0, 0.0, None, None, [Problem(name, None, _plainly(error))])
+    label = as_text(relative.stem) if form.label_is_stem else as_text(relative.parent.name) or None
+    labels = [label if one is None else _storable(one) for one in block.labels]
+    people = block.people and [None if one is None else _storable(one) for one in block.people]
+    bare = Block(block.positions, block.times, block.offsets, labels, block.places)  # releases the bytes of the file
+    block = replace(bare, people=people, repairs=block.repairs)
+    problems += [Problem(name, None, _storable(" ".join(reason.splitlines()))) for reason in left_out]
+    return FileRead(name, "", 0, 0.0, detected, block, problems)
+
+
+def _parts(path: Path, relative: Path, follow_links: bool) -> tuple[list[Path], Format]:
+    """The files that hold a source, and its format."""
+    data_set = data_set_of(path)
+    if data_set is None:
+        return [path], format_of(relative)
+    parts = data_set.files(path)
+    outside = [] if follow_links else [part for part in parts if leads_out(part, path)]
+    if outside:
+        raise DataError(f"{as_text(outside[0].relative_to(path))} is {OUTSIDE}")
+    return parts, data_set.format
+
+
+def _sha256(parts: Sequence[Path], path: Path) -> str:
+    """Of the bytes of a file; of a data set, of the names of its files and of their checksums."""
+    known = []
+    for part in parts:
+        with part.open("rb") as file:
+            known.append(hashlib.file_digest(file, "sha256").hexdigest())
+    if parts == [path]:
+        return known[0]
+    names = [as_text(part.relative_to(path)) for part in parts]
+    lines = [f"{one}  {name}\n" for one, name in zip(known, names, strict=True)]
+    return hashlib.sha256("".join(lines).encode()).hexdigest()
+
+
+def format_of(path: Path) -> Format:
+    """The row of `FORMATS` for a file's extension.
+
+    Raises
+    ------
+    DataError
+        No format has that extension; the message lists those that exist.
+    """
+    form = FORMATS.get(path.suffix.lower())
+    if path.suffix.lower() in _SPREADSHEETS:
+        raise DataError(f"expected a table of text, got the spreadsheet {path.name}; save its sheet as .csv")
+    if form is None:
+        raise DataError(f"expected a file ending in one of {', '.join(FORMATS)}, got {path.suffix or 'no ending'!r}")
+    return form
+
+
+def _storable(label: str) -> str:
+    """A label without lone surrogates, which JSON can hold but which cannot be encoded as UTF-8."""
+    return label.encode("utf-8", "backslashreplace").decode("utf-8")
+
+
+def _plainly(error: BaseException) -> str:
+    """The message of an exception on one line."""
+    return " ".join(_reason(error).splitlines())
+
+
+def _reason(error: BaseException) -> str:
+    if isinstance(error, KinemeError):
+        return str(error)
+    if isinstance(error, MemoryError):
+        return "expected a file that fits into the memory; split it"
+    if isinstance(error, OSError):
+        return f"expected a file that can be read, got: {error.strerror or error}"
+    if isinstance(error, RecursionError):
+        return "expected times and positions, got lists within lists within lists, too many to be arrays"
+    reason = f"no entry {error}" if isinstance(error, KeyError) else str(error) or type(error).__name__
+    return f"expected times and positions, got {reason}"
+
+
+def in_blocks(parsed: Parsed, every: int) -> Parsed:
+    """Cut each movement of a file into movements of `every` samples.
+
+    Raises
+    ------
+    DataError
+        A movement whose number of samples is not divisible by it: nobody knows where the others begin.
+    """
+    block = parsed.block
+    lengths = np.diff(block.offsets)
+    if (odd := np.flatnonzero(lengths % every)).size:
+        i = int(odd[0])
+        where = f" in movement {block.places[i]}" if block.places[i] else ""
+        raise DataError(
+            f"expected blocks of {every} samples, got {lengths[i]} samples{where}: {lengths[i] // every} blocks and "
+            f"{lengths[i] % every} more; give the right number, or repair the file"
+        )
+    counts = lengths // every
+    owners = np.repeat(np.arange(len(lengths)), counts).tolist()
+    numbers = (np.arange(len(owners)) - np.repeat(np.cumsum(counts) - counts, counts)).tolist()
+    places = [f"{block.places[i]}/{k}" if block.places[i] else str(k) for i, k in zip(owners, numbers, strict=True)]
+    cut = replace(
+        block,
+        offsets=np.arange(len(owners) + 1) * every,
+        labels=[block.labels[i] for i in owners],
+        places=places,
+        people=block.people and [block.people[i] for i in owners],
+    )
+    detected = parsed.detected._replace(layout=f"{parsed.detected.layout}, blocks of {every} samples")
+    return parsed._replace(detected=detected, block=cut)
+
+
+def select_columns(parse: Callable[[Layout], Parsed], layout: Layout) -> Parsed:
+    """Parse a file, and keep the columns that are asked for.
+
+    Where nobody chooses columns, those of the movements to compare with are read, if the file has all of them; and a
+    column without any value is left aside. Columns that are chosen by their numbers are those in that order, whatever
+    their names.
+
+    Raises
+    ------
+    DataError
+        Some columns of the movements to compare with are there, others are not; or no column is left.
+    """
+    names = layout.known.columns if layout.known is not None and layout.coordinates is None else ()
+    if names and not any(name.isdecimal() for name in names):
+        try:
+            return _kept(parse(replace(layout, columns=names)), layout)
+        except KinemeError:
+            pass  # it has other columns, which may be compared in their order
+    parsed = parse(layout)
+    if layout.known is not None and layout.by_number:
+        return _named_as(_kept(parsed, layout), layout.known)
+    heads = parsed.detected.columns
+    places = numbers_by_name(heads, names)
+    lost = [name for name, place in zip(names, places, strict=True) if place is None]
+    if names and not lost and len(names) < len(heads):  # in other units, which their heads end in
+        chosen = tuple(heads[place] for place in places if place is not None)
+        return _kept(parse(replace(layout, columns=chosen)), layout)
+    if 0 < len(lost) < len(names) != len(heads):
+        raise DataError(
+            f"expected the columns of the library, got none of {listed(lost)} but {listed(heads)}; record them too, or "
+            "choose as many others with columns=, in the shell --columns"
+        )
+    return _kept(parsed, layout)
+
+
+def _kept(parsed: Parsed, layout: Layout) -> Parsed:
+    """A file without the columns that are excluded or, unless they were chosen, hold nothing."""
+    detected, block = parsed.detected, parsed.block
+    heads = detected.columns
+    dropped = excluded_numbers(heads, layout.excluded)
+    if layout.coordinates is None and len(block.positions):
+        nothing = np.flatnonzero(np.isnan(block.positions[0]))
+        dropped |= {*nothing[np.isnan(block.positions[:, nothing]).all(axis=0)].tolist()}
+    if not dropped:
+        return parsed
+    kept = [k for k in range(len(heads)) if k not in dropped]
+    if not kept:
+        raise DataError(
+            f"expected columns with numbers besides those that are excluded, got {listed(heads)}; exclude fewer"
+            if layout.excluded
+            else f"expected numbers in the columns {listed(heads)}, got none"
+        )
+    detected = detected._replace(
+        columns=_at(heads, kept),
+        measured_in=detected.measured_in and _at(detected.measured_in, kept),
+        ignored=(*detected.ignored, *(heads[k] for k in sorted(dropped))),
+    )
+    return parsed._replace(detected=detected, block=replace(block, positions=block.positions[:, kept]))
+
+
+def _named_as(parsed: Parsed, known: Known) -> Parsed:
+    """A file with the names of as many columns of the movements to compare with, in its own units."""
+    detected = parsed.detected
+    names = next((heads for heads in (known.columns, known.moving) if len(heads) == len(detected.columns)), None)
+    if names is None:
+        return parsed
+    units = detected.measured_in or tuple(unit_of(head) or "" for head in detected.columns)
+    return parsed._replace(detected=detected._replace(columns=names, measured_in=units))
+
+
+def _at(texts: Sequence[str], numbers: Sequence[int]) -> tuple[str, ...]:
+    return tuple(texts[k] for k in numbers)

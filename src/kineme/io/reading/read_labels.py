@@ -1,0 +1,427 @@
+"""Labels beside a long recording, and the recording cut into labeled movements by them.
+
+Tables of labels are CSV, JSON, ELAN's documents and tab-delimited exports, and Audacity's label tracks.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+from xml.etree import ElementTree
+
+import numpy as np
+
+from kineme.errors import DataError
+from kineme.io.limits import check_expanded, read_limited
+from kineme.io.reading.merge_files import Recordings, Source
+from kineme.io.records import Problem
+from kineme.io.writing.annotation import UNKNOWN
+from kineme.movements.tables.time_stamps import TIME_UNITS
+from kineme.movements.trajectories.channels import of_channels
+from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.labels import label_array
+from kineme.movements.trajectories.movements import Movements
+from kineme.reporting.text import counted, text_in
+from kineme.units import UNITS, converted, split_head, unit_named
+from kineme.validation import MIN_SAMPLES, Array
+
+#: Share of a stretch that may lie outside its recording: somebody who labels to the end rounds it up.
+_OUTSIDE = 0.1
+
+
+_TIMES = "|".join(sorted(map(re.escape, TIME_UNITS), key=len, reverse=True))
+_UNIT = rf"(\b|_({_TIMES})$)"
+_START = re.compile(rf"(start|begin|onset|from){_UNIT}|(start|begin)[ _]?time")
+_END = re.compile(rf"(end|stop|offset|to){_UNIT}|(end|stop)[ _]?time")
+_LAST_WORD = re.compile(rf"(?<![.a-zµμ])({_TIMES})\W*$")  # that of hh:mm:ss.ms says how a clock is written
+_COUNTED = re.compile(r"\b(frame|sample|index|idx|row)s?\b")  # what is no time without a rate
+_LABELS = frozenset(
+    {
+        "label", "labels", "symbol", "annotation", "annotations", "value", "text", "name", "class", "action", "gesture",
+        "activity", "category", "behavior", "event",
+    }
+)  # fmt: skip
+_RECORDINGS, _PLACES = frozenset({"recording", "file", "path"}), frozenset({"place"})
+_CLOCK = re.compile(r"(?:(\d+):)?(\d+):(\d+(?:[.,]\d+)?)")
+_NOTHING = frozenset({"", "-", "?", UNKNOWN, "none", "nan", "null"})  # labels that say that there is none
+
+
+class LabelRow(NamedTuple):
+    """A row of a table of labels.
+
+    Attributes
+    ----------
+    start, end : float
+        In seconds.
+    label : str or None
+    recording, place : str
+        Which recording, and which movement of it; empty where the table does not say.
+    line : int
+        Row of the table, from 1.
+    """
+
+    start: float
+    end: float
+    label: str | None
+    recording: str
+    place: str
+    line: int
+
+
+class Heads(NamedTuple):
+    """Columns of a table of labels by their roles, the units of start and end, and whether ELAN wrote the heads."""
+
+    start: int
+    end: int
+    label: int
+    recording: int | None
+    place: int | None
+    units: tuple[str, str]
+    of_elan: bool
+
+
+def heads_of(cells: Sequence[str]) -> Heads | None:
+    """The roles of the columns of a table with these heads; None if they are none.
+
+    Raises
+    ------
+    DataError
+        No column of labels; or a start and an end in another unit than of time, as frames.
+    """
+    names = [cell.strip().strip('"#').strip().lower() for cell in cells]
+    either = [[k for k, one in enumerate(names) if wanted.match(one)] for wanted in (_START, _END)]
+    starts, ends = ([k for k in some if _is_time(names[k])] for some in either)
+    if all(either) and not (starts and ends):
+        odd = next(k for some in either for k in some if not _is_time(names[k]))
+        raise DataError(
+            f"expected start and end in a unit of time (s, ms, us, ns, min, h), got {cells[odd].strip()!r}; divide "
+            "frames or samples by the rate, and name the unit in brackets"
+        )
+    if not starts or not ends:
+        return None
+    start, end = (min(some, key=lambda k: "hh:mm" in names[k]) for some in (starts, ends))
+    known = [k for k, one in enumerate(names) if one in _LABELS]
+    others = [k for k, one in enumerate(names) if k not in {*starts, *ends} and not one.startswith("duration")]
+    aside = _RECORDINGS | _PLACES
+    labels = known or [k for k in others if names[k] and names[k] not in aside]
+    if len(labels) != 1 and not known:
+        raise DataError(f"expected one column of labels beside start and end, got {list(cells)}; call it label")
+    return Heads(
+        start,
+        end,
+        labels[0],
+        next((k for k, one in enumerate(names) if one in _RECORDINGS), None),
+        next((k for k, one in enumerate(names) if one in _PLACES), None),
+        (_unit_of(names[start]), _unit_of(names[end])),
+        "time - " in names[start],
+    )
+
+
+def _is_time(name: str) -> bool:
+    """Whether a head of a start or an end says no other unit than of time."""
+    unit = unit_named(split_head(name)[1] or "")
+    return _COUNTED.search(name) is None if unit is None else unit.quantity == "time"
+
+
+def _unit_of(name: str) -> str:
+    """The unit of the times below a head in lower case: in brackets, or its last word; else seconds."""
+    unit, word = unit_named(split_head(name)[1] or ""), _LAST_WORD.search(name)
+    if unit is not None and unit.quantity == "time":
+        return unit.symbol
+    return word[1] if word else "s"
+
+
+def heads_of_cells(cells: Sequence[str]) -> Heads | None:
+    """The roles of the columns of a table without heads, start, end and label in this order; None if they are none."""
+    clocks = [k for k, cell in enumerate(cells) if ":" in cell and seconds_of(cell) is not None]
+    numbers = [k for k, cell in enumerate(cells[:-1]) if ":" not in cell and seconds_of(cell) is not None]
+    times = clocks if len(clocks) > 1 else numbers
+    return Heads(times[0], times[1], len(cells) - 1, None, None, ("s", "s"), True) if len(times) > 1 else None
+
+
+def row_of(cells: Sequence[str], heads: Heads, line: int) -> LabelRow:
+    """A row as a record.
+
+    Raises
+    ------
+    DataError
+        Times that are none, or an end before the start; the message names the line.
+    """
+    if len(cells) <= max(heads.start, heads.end, heads.label):
+        raise DataError(f"line {line}: expected start, end and label, got {list(cells)}")
+    start, end = (_time_in(cells[k], unit) for k, unit in zip((heads.start, heads.end), heads.units, strict=True))
+    if not end > start:
+        raise DataError(
+            f"line {line}: expected a start and an end after it, got {cells[heads.start]!r} and {cells[heads.end]!r}"
+        )
+    recording, place = (
+        "" if k is None or k >= len(cells) else text_in(cells[k].strip()) for k in (heads.recording, heads.place)
+    )
+    label = text_in(cells[heads.label].strip())
+    return LabelRow(start, end, None if label.lower() in _NOTHING else label, recording, place, line)
+
+
+def _time_in(cell: str, unit: str) -> float:
+    """Seconds of a cell in a unit of time; of mm:ss.sss whatever the unit is; NaN of what is none."""
+    time = seconds_of(cell)
+    if time is None:
+        return math.nan
+    return time if ":" in cell else float(converted(time, UNITS[unit], UNITS["s"]))
+
+
+def seconds_of(cell: str) -> float | None:
+    """A time as seconds or as hh:mm:ss.sss; None if it is neither."""
+    text = cell.strip()
+    if clock := _CLOCK.fullmatch(text):
+        hours, minutes, seconds = clock.groups()
+        return 3600.0 * int(hours or 0) + 60.0 * int(minutes) + float(seconds.replace(",", "."))
+    try:
+        value = float(text.replace(",", "."))
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
+_SKIPPED = ("\\", '"#', "#")  # frequencies of Audacity, and what ELAN says of the media
+_CELL = 200  # bytes that a character of a table may take in Python, at most
+_EXPECTED = "expected a table with columns start, end and label"
+_MILLISECONDS = Heads(0, 1, 2, None, None, ("ms", "ms"), True)
+
+
+class LabelTable(NamedTuple):
+    """Labels beside a recording.
+
+    Attributes
+    ----------
+    name : str
+        Of the file.
+    rows : tuple of LabelRow
+    since_start : bool
+        Whether times count from the first sample, as in ELAN and Audacity; else they are by the recording's clock.
+    """
+
+    name: str
+    rows: tuple[LabelRow, ...]
+    since_start: bool
+
+
+def read_labels(path: Path) -> LabelTable:
+    """Read the labels in a file.
+
+    Parameters
+    ----------
+    path : Path
+        ``.eaf`` is a document of ELAN, ``.json`` a list of objects; anything else is a table whose cells are separated
+        by tabs, semicolons or commas. With heads, these name the columns; without, as Audacity and ELAN export tables,
+        the first two times are start and end, and the last column is the label.
+
+    Raises
+    ------
+    DataError
+        No such table; the message names the file, and the line if there is one.
+    OSError
+        The file cannot be read.
+    """
+    with path.open("rb") as file:
+        data = read_limited(file)
+    readers = {".eaf": _elan, ".json": _json}
+    try:
+        check_expanded(_CELL * len(data) if path.suffix.lower() in readers else 10 * len(data), "a table of labels")
+        rows, since_start = readers.get(path.suffix.lower(), _table)(data)
+        if not rows:
+            raise DataError(f"{_EXPECTED}, got no labels")
+    except (DataError, ValueError, RecursionError, csv.Error, ElementTree.ParseError) as error:
+        raise DataError(f"labels {path}: {error}") from error
+    return LabelTable(str(path), tuple(rows), since_start)
+
+
+def _table(data: bytes) -> tuple[list[LabelRow], bool]:
+    text = data.decode("utf-8-sig")
+    first = next((one for one in text.splitlines() if one.strip() and not one.startswith(_SKIPPED)), "")
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=max("\t;,", key=first.count))
+    cells = [(reader.line_num, row) for row in reader if any(row) and not row[0].startswith(("\\", "#"))]
+    if not cells:
+        return [], False
+    if heads := heads_of(cells[0][1]):
+        return [row_of(row, heads, k) for k, row in cells[1:]], heads.of_elan
+    plain = heads_of_cells(cells[0][1])
+    if plain is None:
+        raise DataError(f"{_EXPECTED}, got {first[:80]!r}")
+    return [row_of(row, plain, k) for k, row in cells], True
+
+
+def _json(data: bytes) -> tuple[list[LabelRow], bool]:
+    rows = json.loads(data)
+    if not isinstance(rows, list) or not all(isinstance(one, dict) for one in rows):
+        raise DataError("expected a list of objects with start, end and label, got something else")
+    names = list(dict.fromkeys(str(name) for one in rows for name in one))
+    heads = heads_of(names)
+    if heads is None:
+        raise DataError(f"expected objects with start, end and label, got {names[:20]}")
+    return [row_of([_text(one.get(name)) for name in names], heads, k) for k, one in enumerate(rows, 1)], False
+
+
+def _text(value: Any) -> str:
+    return "" if value is None else str(value)
+
+
+def _elan(data: bytes) -> tuple[list[LabelRow], bool]:
+    root = ElementTree.fromstring(data)
+    slots = {one.get("TIME_SLOT_ID"): one.get("TIME_VALUE", "") for one in root.iter("TIME_SLOT")}
+    tiers = {one.get("TIER_ID", ""): one.findall(".//ALIGNABLE_ANNOTATION") for one in root.iter("TIER")}
+    aligned = {name: found for name, found in tiers.items() if found}
+    name = "symbol" if "symbol" in aligned else next(iter(aligned), None)
+    if name is None:
+        return [], True
+    if name != "symbol" and len(aligned) > 1:
+        raise DataError(
+            f"expected one tier with annotations, or one named symbol, got {list(aligned)}; delete the others"
+        )
+    return [row_of(_cells(one, slots), _MILLISECONDS, k) for k, one in enumerate(aligned[name], 1)], True
+
+
+def _cells(annotation: Any, slots: dict[str | None, str]) -> Sequence[str]:
+    times = [slots.get(annotation.get(f"TIME_SLOT_REF{i}"), "") for i in (1, 2)]
+    return [*times, annotation.findtext("ANNOTATION_VALUE") or ""]
+
+
+def labeled_pieces(recordings: Recordings, table: LabelTable) -> Recordings:
+    """The stretches of recordings that a table labels, as movements of their own.
+
+    A stretch begins and ends at the samples nearest to its times. Times by the recording's clock that all lie outside
+    of it, and would fit counted from its first sample, are taken so. Columns named recording and place say which
+    recording a row is of; without them there must be one. A stretch outside of its recording, of fewer than four
+    samples, or labeled twice is a problem, and so are rows of recordings that are not there.
+
+    Raises
+    ------
+    DataError
+        Several recordings, and a table that does not say which row is of which; no stretch at all.
+    """
+    demos, rows = recordings.demonstrations, table.rows
+    if len(demos) > 1 and not any(row.recording or row.place for row in rows):
+        raise DataError(
+            f"expected labels {table.name} beside one recording, got {len(demos)}; say which row is of which in "
+            "columns recording and place"
+        )
+    stretches: list[tuple[int, int]] = []
+    sources: list[Source] = []
+    paths = {source.path for source in recordings.sources}
+    meant = {name: _paths_of(name, paths) for name in dict.fromkeys(row.recording for row in rows)}
+    problems = [*recordings.problems, *_of_none(table, recordings.sources, meant), *_of_several(table, meant)]
+    for i, source in enumerate(recordings.sources):
+        first, last = demos.offsets[i : i + 2]
+        own = [
+            row for row in rows if (not row.recording or len(meant[row.recording]) == 1) and _is_of(row, source, meant)
+        ]
+        times = demos.movements.stamps[first:last]
+        since = table.since_start or _counts_from_start(own, times)
+        lines: dict[tuple[int, int], int] = {}  # stretch -> line that labels it
+        for row in own:
+            origin = float(times[0]) if since else 0.0
+            start, stop = _samples(row, times, origin)
+            outside = max(times[0] - origin - row.start, 0.0) + max(row.end + origin - times[-1], 0.0)
+            if stop - start < MIN_SAMPLES or outside > _OUTSIDE * (row.end - row.start):
+                problems.append(Problem(table.name, row.line, _too_short(row, source, times, since)))
+            elif (line := lines.setdefault((start, stop), row.line)) != row.line:
+                problems.append(
+                    Problem(table.name, row.line, f"expected one label for a stretch, line {line} has it too")
+                )
+            else:
+                stretches.append((int(first) + start, int(first) + stop))
+                sources.append(source._replace(place=_place(source, times, start, stop), label=row.label))
+    if not stretches:
+        raise DataError(
+            f"expected labels {table.name} within {recordings.sources[0].path}, found none"
+            + (f"; the first that is none: {problems[-1]}" if len(problems) > len(recordings.problems) else "")
+        )
+    return replace(
+        recordings, demonstrations=_cut(demos, stretches, sources), sources=tuple(sources), problems=tuple(problems)
+    )
+
+
+def _of_none(table: LabelTable, sources: Sequence[Source], meant: Mapping[str, Sequence[str]]) -> list[Problem]:
+    """The rows of recordings that are not there, as one problem."""
+    lost = [row for row in table.rows if not any(_is_of(row, source, meant) for source in sources)]
+    if not lost:
+        return []
+    wanted = f"{lost[0].recording} {lost[0].place}".strip()
+    more = f", and {counted(len(lost) - 1, 'row')} more" if len(lost) > 1 else ""
+    return [
+        Problem(table.name, lost[0].line, f"expected a recording {wanted} among those that are read, found none{more}")
+    ]
+
+
+def _of_several(table: LabelTable, meant: Mapping[str, Sequence[str]]) -> list[Problem]:
+    """The rows of which several recordings may be meant, one problem for each name."""
+    first = {row.recording: row.line for row in reversed(table.rows)}
+    return [
+        Problem(
+            table.name,
+            first[name],
+            f"expected one recording {name}, got {', '.join(paths)}; write its folder in the column recording too",
+        )
+        for name, paths in meant.items()
+        if name and len(paths) > 1
+    ]
+
+
+def _paths_of(recording: str, paths: Collection[str]) -> list[str]:
+    """The recordings that a name may mean: itself, else those in folders below, else the end of a longer path."""
+    if recording in paths:
+        return [recording]
+    below = sorted(path for path in paths if path.endswith(f"/{recording}"))
+    return below or sorted((path for path in paths if recording.endswith(f"/{path}")), key=len)[-1:]
+
+
+def _is_of(row: LabelRow, source: Source, meant: Mapping[str, Sequence[str]]) -> bool:
+    if row.place and row.place != source.place:
+        return False
+    return not row.recording or source.path in meant[row.recording]
+
+
+def _counts_from_start(rows: Sequence[LabelRow], times: Array) -> bool:
+    """Whether no stretch is within the recording by its clock, and all are counted from its first sample."""
+    duration = float(times[-1] - times[0])
+    outside = all(row.end < times[0] or row.start > times[-1] for row in rows)
+    return outside and all(row.start >= 0.0 and row.end <= duration * (1.0 + 1e-6) for row in rows)
+
+
+def _samples(row: LabelRow, times: Array, origin: float) -> tuple[int, int]:
+    """The samples from the one nearest to the start to the one nearest to the end: first, and one past the last."""
+    half = 0.5 * float(np.median(np.diff(times)))
+    start = int(np.searchsorted(times, origin + row.start - half))
+    return start, int(np.searchsorted(times, origin + row.end + half))
+
+
+def _place(source: Source, times: Array, start: int, stop: int) -> str:
+    ends = (np.format_float_positional(times[k], precision=4, trim="-") for k in (start, stop - 1))
+    return f"{source.place} {'-'.join(ends)} s".strip()
+
+
+def _too_short(row: LabelRow, source: Source, times: Array, since: bool) -> str:
+    origin = float(times[0]) if since else 0.0
+    return (
+        f"expected at least {MIN_SAMPLES} samples, and nine tenths, of the time between {row.start:g} and "
+        f"{row.end:g} s in {source.path}; it lasts from {times[0] - origin:g} to {times[-1] - origin:g} s"
+    )
+
+
+def _cut(demos: Demonstrations, stretches: Sequence[tuple[int, int]], sources: Sequence[Source]) -> Demonstrations:
+    """The stretches of samples as movements; what is learned of orientations and angles begins anew in each."""
+    whole, kept = demos.movements, np.concatenate([np.arange(*one) for one in stretches])
+    offsets = np.concatenate(([0], np.cumsum([stop - start for start, stop in stretches])))
+    times, labels = whole.stamps[kept], [one.label for one in sources]
+    names = tuple(f"{one.path}#{one.place}" for one in sources)
+    positions = np.ascontiguousarray((demos.positions if whole.channels is None else demos.recorded)[kept])
+    labeled = None if None in labels else label_array(labels, len(labels), names)
+    durations = times[offsets[1:] - 1] - times[offsets[:-1]]
+    pieces = Movements(positions, offsets, durations, times, labeled, names, whole.dimensions)
+    return Demonstrations.of_movements(pieces if whole.channels is None else of_channels(pieces, whole.channels))

@@ -1,0 +1,249 @@
+"""Read recorded movements from a folder or a file of any format, see `kineme.io.reading.formats`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from kineme.errors import DataError, SpecificationError, warn
+from kineme.io.limits import max_file_bytes
+from kineme.io.reading.entries import entries_of, in_words, name_of, root_of
+from kineme.io.reading.formats import data_set_of
+from kineme.io.reading.join_files import Placed, join_files, notes_on_clocks
+from kineme.io.reading.merge_files import Recordings, merge_files
+from kineme.io.reading.name_rule import TASK, NameRule
+from kineme.io.reading.read_file import format_of, read_bytes, read_file
+from kineme.io.reading.recording_gaps import notes_on_gaps
+from kineme.movements.preparation.trim import TrimRest
+from kineme.movements.tables.columns import excluded_numbers
+from kineme.movements.tables.layout import FILL_GAPS, Column, Layout
+from kineme.movements.tables.parsed import listed
+from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.trajectory import Trajectory
+
+Progress = Callable[[Sequence[Path]], Iterable[Path]]
+
+
+def read_recordings(  # noqa: PLR0913 - one parameter per question that a table of samples may leave open
+    path: str | Path | Sequence[str | Path],
+    *,
+    time: Column | None = None,
+    columns: Column | Sequence[Column] | None = None,
+    movement: Column | Sequence[Column] | None = None,
+    label: Column | None = None,
+    units: str | float | None = None,
+    skip: str = "movement",
+    kinds: Mapping[str, str] | None = None,
+    topic: str | Sequence[str] | None = None,
+    frame: str | Sequence[str] | None = None,
+    person: Column | None = None,
+    label_pattern: str | None = None,
+    label_by: str | int | None = None,
+    trim: bool = False,
+    follow_links: bool = False,
+    exclude: Column | Sequence[Column] | None = None,
+    fill_gaps: float = FILL_GAPS,
+    rows: bool = False,
+    every: int | None = None,
+    join_files: bool = False,
+    progress: Progress | None = None,
+) -> Recordings:
+    """Read all movements of a folder, a file, a data set that is a folder, or of several of them.
+
+    In a folder, a movement that carries no label itself has the name of its file's innermost folder; files directly
+    in the folder that is read have none. Hidden files are passed over. What cannot be read is listed, the rest is
+    read. A file that would take more memory than `kineme.io.limits` allows is not read.
+
+    Parameters
+    ----------
+    path : str or Path or sequence of them
+        A folder, a file of a format in `kineme.io.reading.formats.FORMATS`, or a folder of `DATA_SETS` there.
+        A pattern such as ``"optitrack/*.csv"`` stands for what it matches. The names of several are as they are given,
+        and what cannot be read among them is listed.
+    time, label : str or int, optional
+        Columns of a table, by head or counted from 0. By default they are found by their heads.
+    columns, movement : str or int or sequence of them, optional
+        Columns of the coordinates, and of what tells movements apart. What several heads begin with, before a dot,
+        stands for all of them: ``"wrist"`` for ``wrist.x`` and ``wrist.y``; where no head has the name, ``*`` stands
+        for any text and ``?`` for any character, in all columns but times: ``"LASI*"``, ``"*_x"``.
+    units : {"s", "ms", "us", "ns"} or float, optional
+        Unit of the time stamps, or its length in seconds. By default told by the head or by the stamps' size. As a
+        number it is also the step between samples of files without time stamps.
+    skip : {"movement", "sample"}, default "movement"
+        Whether a repeated sample, or one with missing values that are not filled, costs its whole movement or is left
+        out alone. Both are reported.
+    kinds : mapping, optional
+        What columns are, where their heads and values do not say it: ``{"gripper": "discrete", "q1": "angle",
+        "a,b,c,d": "xyzw"}``, the last one a quaternion in that order; also ``"position"``; see
+        `Demonstrations.channels`. As in `columns`, what several heads begin with stands for all of them.
+    topic : str or sequence of str, optional
+        Topics of ROS bags; of several, the others are interpolated to the stamps of the first. By default the only
+        one that can be read.
+    frame : str or sequence of str, optional
+        Frames of ROS bags as ``"parent:child"``: the pose of the child in the parent, composed of the transforms.
+    person : str or int, optional
+        Column of a table that names who showed a movement; another movement begins where it changes. People are in
+        `Recordings.people`.
+    label_pattern : str, optional
+        File names that say the label, who showed the movements, or both: ``"{person}_{label}_{n}.csv"``. Text outside
+        the braces is taken literally, ``{n}`` is a number, other fields are passed over, and each takes as little as it
+        can. With slashes it is compared with folders too: ``"{person}/{label}_{n}.csv"``. A file that it does not match
+        is a problem. People are in `Recordings.people`.
+    label_by : {"task", "folder"} or int, optional
+        ``"task"``: the label in the recording, as the tasks of LeRobot, and never a folder; ``"folder"``: the innermost
+        folder, whatever the file says; a number: the folder so many levels up, 1 for the innermost.
+    trim : bool, default False
+        Whether the rests before and after each movement are left out, by `TrimRest` with its default tolerance. Rest is
+        told by what is learned: a gripper that closes at rest is left out with it.
+    follow_links : bool, default False
+        Whether links that lead out of the folder are read; else they are problems. Links within it always are read.
+    exclude : str or int or sequence of them, optional
+        Columns that are left aside, named as in `columns`; files that do not have them are read nevertheless.
+    fill_gaps : float, default 0.2
+        Longest gap of a column that is filled, from the value before to the value after it [s]; 0 fills none. Values
+        are interpolated by Akima's cubic polynomials, orientations by turning evenly, and discrete channels keep the
+        value before. At its ends a movement is cropped to where all columns have values, unless that would cost half
+        of it. `Source` says of each movement what was filled and cropped.
+    rows : bool, default False
+        Whether each line of a text file is one movement: a label, then the coordinates of its samples, one sample after
+        the other. `columns` names the coordinates of a sample, ``("x", "y")`` where a line goes on x, y, x, y, and
+        `label` the column of the label. `units` is the step between samples.
+    every : int, optional
+        Number of samples of a movement, where a file holds one after the other without a mark between them.
+    join_files : bool, default False
+        Whether the files of a folder that lie on one clock, as those of a phone's sensors, are one recording, see
+        `kineme.io.reading.join_files`. Its label is the folder around that of the files.
+    progress : callable, optional
+        Wraps the list of files, to show how far the reading is.
+
+    Raises
+    ------
+    DataError
+        Nothing there, or nothing in it that can be read, the message gives the first problem; or a column to exclude
+        that no file has.
+    SpecificationError
+        An unknown unit or choice, a gap that is no number of seconds, a label pattern that cannot be understood, or a
+        limit of memory that is no number.
+    """
+    layout = Layout(
+        time, columns, movement, label, units, skip, kinds, topic, frame, person,
+        exclude=exclude, fill_gaps=fill_gaps, rows=rows, every=every,
+    )  # fmt: skip
+    rule = NameRule(label_pattern, label_by)
+    paths = [Path(path)] if isinstance(path, (str, Path)) else [Path(one) for one in path]
+    return read_paths(paths, layout, rule, follow_links=follow_links, trim=trim, join=join_files, progress=progress)
+
+
+def read_paths(  # noqa: PLR0913 - those of `read_recordings`, in records
+    paths: Sequence[Path],
+    layout: Layout,
+    rule: NameRule,
+    *,
+    follow_links: bool = False,
+    trim: bool = False,
+    join: bool = False,
+    progress: Progress | None = None,
+    standard_input: tuple[str, bytes] | None = None,
+) -> Recordings:
+    """As `read_recordings`, and what a file of some name would hold, from the standard input."""
+    max_file_bytes()
+    if rule.label_by is not None and layout.label is not None:
+        raise SpecificationError("expected label or label_by, not both")
+    if rule.names_person and layout.person is not None:
+        raise SpecificationError("expected person, a column, or {person} in label_pattern, not both")
+    entries, problems = entries_of(paths, follow_links)
+    read, where = [], list(paths)
+    if standard_input is not None:
+        name, data = Path(standard_input[0]), standard_input[1]
+        read.append(rule.apply(read_bytes(data, name, layout), name))
+        where.append(name)
+    by_path = {entry.path: entry for entry in entries}
+    parts = layout
+    if join:  # their columns are chosen when they are side by side
+        known = layout.known and replace(layout.known, columns=())
+        parts = replace(layout, columns=None, exclude=None, known=known)
+
+    def placed(path: Path, layout: Layout) -> Placed:
+        entry = by_path[path]
+        relative = Path(entry.relative.name) if rule.label_by == TASK else entry.relative
+        one = read_file(path, relative, layout, follow_links)
+        one = one._replace(path=entry.name, problems=[each._replace(file=entry.name) for each in one.problems])
+        return one, entry._replace(relative=relative)
+
+    files = [placed(path, parts) for path in (by_path if progress is None else progress(list(by_path)))]
+    notes = () if join else notes_on_clocks(files)
+    if join:
+        joined = join_files(files, layout)
+        beside = {entry.path for _, entry in joined} - {*by_path}  # folders that are one recording
+        alone = {entry.path for _, entry in joined if entry.path in by_path and entry.path.parent not in beside}
+        files = [
+            placed(entry.path, layout) if parts != layout and entry.path in alone else (one, entry)
+            for one, entry in joined
+        ]
+    read += [rule.apply(one, entry.path) for one, entry in files]
+    recordings = merge_files(read, in_words(where), problems, layout.kinds, layout.skip, layout.by_number)
+    recordings = replace(recordings, notes=notes)
+    _check_excluded(recordings, layout)
+    if layout.person is not None and recordings.people is None:
+        raise DataError(
+            f"expected a column {layout.person!r} of a table that names people, found none in {in_words(where)}; "
+            "say who showed them with label_pattern=, in the shell also with --by-person or --person"
+        )
+    return trimmed(recordings) if trim else recordings
+
+
+def _check_excluded(recordings: Recordings, layout: Layout) -> None:
+    """Refuse a column to exclude that no file has: it is most likely misspelled."""
+    left_aside = sorted({name for how, _ in recordings.detected for name in how.ignored})
+    for column in layout.excluded:
+        if not isinstance(column, int) and not column.isdecimal() and not excluded_numbers(left_aside, [column]):
+            others = sorted({name for how, _ in recordings.detected for name in how.columns})
+            raise DataError(f"expected columns like {column!r} to exclude, got none but {listed(others)}")
+
+
+def read_recordings_from_bytes(data: bytes, name: str, layout: Layout) -> Recordings:
+    """Read what a file of that name would hold, for data that come from elsewhere."""
+    return read_paths([], layout, NameRule(), standard_input=(name, data))
+
+
+def trimmed(recordings: Recordings) -> Recordings:
+    """Recordings without the rests at both ends of each movement, see `TrimRest`."""
+    moving = TrimRest().apply(recordings.demonstrations)
+    return replace(recordings, demonstrations=Demonstrations.of_movements(moving))
+
+
+def read_recording(path: str | Path) -> Trajectory:
+    """Read a file that holds one movement, in any format of `kineme.io.reading.formats.FORMATS`.
+
+    Raises
+    ------
+    DataError
+        The file is not what its name says, or holds several movements; the message names the line.
+    FileNotFoundError
+        There is no such file.
+    TrajectoryError
+        The numbers are no movement, see `Trajectory`.
+    """
+    path = Path(path)
+    if data_set_of(path) is None:
+        format_of(path)
+    path.stat()
+    read = read_file(path, name_of(path), Layout())
+    for problem in read.problems:
+        raise problem.error(str(problem._replace(file=str(path))))
+    one = merge_files([read], str(path))
+    for problem in one.problems:
+        raise problem.error(str(problem._replace(file=str(path))))
+    if len(one) > 1:
+        raise DataError(f"expected one movement in {path}, got {len(one)}; read them with read_recordings")
+    for note in notes_on_gaps(one):
+        warn(f"{path}: {note}", UserWarning, 2)
+    named = replace(one.demonstrations.movements, names=(str(name_of(path)),), labels=None)
+    return Demonstrations.of_movements(named)[0]
+
+
+def paths_of(paths: Sequence[Path], recordings: Recordings) -> list[Path]:
+    """The files and data sets that recordings were read from at these paths; for the standard input there is none."""
+    root = root_of(*(path for path in paths if str(path) != "-"))
+    return [root / name for name in dict.fromkeys(source.path for source in recordings.sources)]

@@ -1,0 +1,75 @@
+"""What is wrong with a file, and what a recording holds besides the movements that are read of it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from shlex import quote
+from typing import NamedTuple
+
+from kineme.errors import DataError, KinemeError
+from kineme.reporting.text import first_names
+
+_SHOWN = 20  # columns that a sentence names
+
+
+class Problem(NamedTuple):
+    """Something that could not be read.
+
+    `line` counts from 1; None if the file has no lines. `error` is the class that is raised if only this file is read.
+    `samples` is how many samples were left out of a movement that was read, 0 if the movement or the file was not.
+    `missing` names columns without values, whatever begins so; without them the movement could be read.
+    """
+
+    file: str
+    line: int | None
+    reason: str
+    error: type[KinemeError] = DataError
+    samples: int = 0
+    missing: tuple[str, ...] = ()
+
+    @property
+    def what(self) -> str:
+        """Line and reason, without the file."""
+        return f"line {self.line}: {self.reason}" if self.line else self.reason
+
+    def __str__(self) -> str:
+        return f"{self.file}{', ' if self.line else ': '}{self.what}"
+
+
+def note_on_missing(problems: Sequence[Problem]) -> list[str]:
+    """Say which columns keep several movements from being read, if there are such, and how to leave them out."""
+    lacking = [one for one in problems if one.missing]
+    if len(lacking) < 2:
+        return []
+    counts = Counter(name for one in lacking for name in one.missing)
+    names = [name for name, _ in counts.most_common()]
+    shown = first_names([f"{name} in {counts[name]}" for name in names], _SHOWN)
+    return [
+        f"{len(lacking)} movements were not read, since columns have no values for too long: {shown}; leave them "
+        f"out with --exclude {in_shell(names)}, say --columns, or fill longer gaps with --fill-gaps"
+    ]
+
+
+def in_shell(names: Sequence[str]) -> str:
+    """Columns as one argument of an option, quoted where a shell needs it."""
+    return quote(",".join(f'"{name}"' if "," in name else name for name in names))
+
+
+class Contents(NamedTuple):
+    """A list of things in a recording, as a table.
+
+    Attributes
+    ----------
+    name : str
+        What they are: ``"topics"``.
+    heads : tuple of str
+    rows : tuple of tuple of str or int
+    note : str
+        What should be known about the list.
+    """
+
+    name: str
+    heads: tuple[str, ...]
+    rows: tuple[tuple[str | int, ...], ...]
+    note: str = ""

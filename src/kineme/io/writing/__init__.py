@@ -1,0 +1,1 @@
+"""Movements and annotations out, each file written whole or not at all."""

@@ -1,0 +1,352 @@
+"""The table of writers of annotations, and which of them writes to a path."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import NamedTuple
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+from kineme.errors import DataError
+from kineme.io.lerobot.copy import OWN, Motion, copy_with_motions
+from kineme.io.lerobot.info import MARKER, read_info
+from kineme.io.reading.formats import FORMATS, data_set_of
+from kineme.io.ros.add_topic import copy_with_topic
+from kineme.io.ros.choose import bag_contents
+from kineme.io.writing.annotation import UNKNOWN, Annotation, as_row, write_audacity, write_csv, write_json
+from kineme.io.writing.write_movement import Movement, distinct_stems
+from kineme.reporting.atomic import whole_file, whole_folder, write_atomically
+from kineme.reporting.text import printable
+
+_SCHEMA = {
+    "xmlns:xsi": "http://www.w3.org/2001/XMLSchema-instance",
+    "xsi:noNamespaceSchemaLocation": "http://www.mpi.nl/tools/elan/EAFv3.0.xsd",
+}
+_ASSOCIATION = "Symbolic_Association"
+_MEANING = "1-1 association with a parent annotation"
+
+#: Tiers below that of the symbols: one annotation each for every annotation of it.
+_DEPENDENT: dict[str, Callable[[Annotation], str]] = {
+    "p-value": lambda one: f"{one.p_value:.3g}",
+    "confidence": lambda one: f"{one.confidence:.3g}",
+}
+
+
+def write_elan(path: Path, annotations: Sequence[Annotation], source: Path | None) -> Path:
+    """Write a document with the tier ``symbol`` and, below it, tiers with p-values and confidences.
+
+    Times are milliseconds since the first sample. Unknown motion is annotated as ``unknown``.
+
+    Raises
+    ------
+    DataError
+        A time before the first sample: the format has no negative times.
+    """
+    root = Element(
+        "ANNOTATION_DOCUMENT",
+        {"AUTHOR": "", "DATE": datetime.now(UTC).isoformat(timespec="seconds"), "FORMAT": "3.0", "VERSION": "3.0"}
+        | _SCHEMA,
+    )
+    SubElement(root, "HEADER", MEDIA_FILE="", TIME_UNITS="milliseconds")
+    order = SubElement(root, "TIME_ORDER")
+    tier = SubElement(root, "TIER", LINGUISTIC_TYPE_REF="symbol", TIER_ID="symbol")
+    for k, one in enumerate(annotations, 1):
+        start, end = _milliseconds(one)
+        slots = {f"TIME_SLOT_REF{i}": f"ts{2 * k - 2 + i}" for i in (1, 2)}
+        for slot, value in zip(slots.values(), (start, end), strict=True):
+            SubElement(order, "TIME_SLOT", TIME_SLOT_ID=slot, TIME_VALUE=str(value))
+        ids = {"ANNOTATION_ID": f"a{k}"} | slots
+        aligned = SubElement(SubElement(tier, "ANNOTATION"), "ALIGNABLE_ANNOTATION", ids)
+        SubElement(aligned, "ANNOTATION_VALUE").text = UNKNOWN if one.symbol is None else printable(one.symbol)
+    for number, (name, text) in enumerate(_DEPENDENT.items(), 1):
+        below = SubElement(root, "TIER", LINGUISTIC_TYPE_REF="number", PARENT_REF="symbol", TIER_ID=name)
+        for k, one in enumerate(annotations, 1):
+            ids = {"ANNOTATION_ID": f"a{number * len(annotations) + k}", "ANNOTATION_REF": f"a{k}"}
+            referring = SubElement(SubElement(below, "ANNOTATION"), "REF_ANNOTATION", ids)
+            SubElement(referring, "ANNOTATION_VALUE").text = text(one)
+    _types(root)
+    indent(root, " ")
+    return write_atomically(path, tostring(root, "UTF-8", xml_declaration=True) + b"\n")
+
+
+def _types(root: Element) -> None:
+    plain = {"GRAPHIC_REFERENCES": "false"}
+    SubElement(root, "LINGUISTIC_TYPE", plain, LINGUISTIC_TYPE_ID="symbol", TIME_ALIGNABLE="true")
+    below = {"CONSTRAINTS": _ASSOCIATION, "LINGUISTIC_TYPE_ID": "number", "TIME_ALIGNABLE": "false"}
+    SubElement(root, "LINGUISTIC_TYPE", plain | below)
+    SubElement(root, "CONSTRAINT", DESCRIPTION=_MEANING, STEREOTYPE=_ASSOCIATION)
+
+
+def _milliseconds(one: Annotation) -> tuple[int, int]:
+    """Start and end, at least a millisecond apart."""
+    start, end = (round(1000 * time) for time in one.span)
+    if start < 0:
+        raise DataError(
+            f"expected annotations that start after the first sample of {one.recording}, got one at {start / 1000} s"
+        )
+    return start, max(end, start + 1)
+
+
+TOPIC = "/kineme/annotations"
+_SECOND = 10**9  # ns
+_EPISODE = "episode "  # a movement's place in a data set of LeRobot begins with it
+_LEFT_OUT = ("recording",)  # of a row: the copy is the recording
+
+
+def is_bag(source: Path) -> bool:
+    """Whether it is a bag of ROS, a file or a folder."""
+    if source.is_dir():
+        known = data_set_of(source)
+        return known is not None and known.format.contents is bag_contents
+    known_ending = FORMATS.get(source.suffix.lower())
+    return known_ending is not None and known_ending.contents is bag_contents
+
+
+def is_lerobot(source: Path) -> bool:
+    """Whether it is the folder of a data set of LeRobot."""
+    known = data_set_of(source) if source.is_dir() else None
+    return known is not None and known.marker == MARKER
+
+
+def write_bag(path: Path, annotations: Sequence[Annotation], source: Path | None) -> Path:
+    """Write a copy of a bag with the topic `TOPIC`: messages of std_msgs/String with JSON, all others byte for byte.
+
+    A message is stamped with the end of its movement. Ends by a clock that the time of recording does not know, such as
+    that of a simulation, count from the first sample as the time of recording counts from the first message.
+
+    Raises
+    ------
+    DataError
+        The copy is to be of another kind than the bag or in a folder that is there, or the bag takes no topic: see
+        `copy_with_topic`.
+    """
+    source = _of_one(path, source)
+    check_bag(path, source)
+
+    def texts(first: int, last: int) -> list[tuple[int, str]]:
+        inside = all(first - _SECOND <= one.end * _SECOND <= last + _SECOND for one in annotations)
+        spans = [(one.end, 0) if inside else (one.end - one.origin, first) for one in annotations]
+        stamps = [max(0, shift + round(time * _SECOND)) for time, shift in spans]
+        return [(stamp, _json(one)) for stamp, one in zip(stamps, annotations, strict=True)]
+
+    with whole_folder(path) if source.is_dir() else whole_file(path) as beside:
+        copy_with_topic(source, beside, TOPIC, texts)
+    return path
+
+
+def write_lerobot(path: Path, annotations: Sequence[Annotation], source: Path | None) -> Path:
+    """Write a copy of a data set of LeRobot whose frames carry the annotations of their episode.
+
+    They are rows of the style `motion`, stamped with the start of their movement, with JSON as content. Those that an
+    earlier call has written are replaced. All else is as it was: see `copy_with_motions`.
+
+    Raises
+    ------
+    DataError
+        A damaged data set, or `path` is there.
+    """
+    source = _of_one(path, source)
+    check_lerobot(path, source)
+    motions: dict[int, list[Motion]] = {}
+    for one in annotations:
+        number = one.place.removeprefix(_EPISODE)
+        if not number.isdecimal():
+            raise DataError(f"expected annotations of episodes, got one of {one.place!r}")
+        motions.setdefault(int(number), []).append(Motion(one.start, OWN + ", " + _json(one)[1:]))
+    with whole_folder(path) as beside:
+        copy_with_motions(source, beside, motions)
+    return path
+
+
+def check_bag(path: Path, source: Path) -> None:
+    """Refuse a path where no copy of that bag can be written, before the bag is read."""
+    _check_apart(path, source)
+    if source.is_dir():
+        _check_new_folder(path, source)
+    elif path.suffix.lower() != source.suffix.lower():
+        raise DataError(
+            f"expected a path that ends in {source.suffix} for a copy of {source.name}, got {path.name}; or write a "
+            "table: .csv or .json"
+        )
+
+
+def check_lerobot(path: Path, source: Path) -> None:
+    """Refuse a path where no copy of that data set can be written, or a data set that is damaged."""
+    _check_apart(path, source)
+    _check_new_folder(path, source)
+    read_info(source)
+
+
+def _of_one(path: Path, source: Path | None) -> Path:
+    if source is None:
+        raise DataError(f"expected one recording to copy with its annotations to {path.name}, got several")
+    return source
+
+
+def _check_apart(path: Path, source: Path) -> None:
+    whole = source.resolve()
+    if path.resolve() == whole or whole in path.resolve().parents:
+        raise DataError(f"expected another path for the copy than the recording {source} or one inside, got {path}")
+
+
+def _check_new_folder(path: Path, source: Path) -> None:
+    """A folder with files is never written over: nobody knows whose they are."""
+    if path.suffix.lower() in FORMATS:
+        raise DataError(f"expected the name of a folder for a copy of the folder {source}, got {path.name}")
+    if path.is_file() or (path.is_dir() and any(path.iterdir())):
+        raise DataError(f"expected a new folder for the copy of {source}, {path} is there; name another, or remove it")
+
+
+def _json(one: Annotation) -> str:
+    row = {head: value for head, value in as_row(one).items() if head not in _LEFT_OUT}
+    plain = {
+        head: None if isinstance(value, float) and not math.isfinite(value) else value for head, value in row.items()
+    }
+    return json.dumps(plain, ensure_ascii=False)
+
+
+#: It takes the path to write, the annotations in order of recordings and time, and the recording that they are of as
+#: the user named it, None where there are several. It writes a whole file or folder or nothing, and returns its path.
+Write = Callable[[Path, Sequence[Annotation], Path | None], Path]
+
+
+class Writer(NamedTuple):
+    """A format of annotations.
+
+    Attributes
+    ----------
+    write : callable
+        See `Write`.
+    endings : tuple of str
+        Endings of paths that ask for it.
+    several : bool
+        Whether one file holds the annotations of several movements. Else there is a file for each.
+    copies : callable, optional
+        Whether it writes a copy of a recording, given by its path, with the annotations inside. A path without ending
+        asks for the first writer that says so of the recording.
+    check : callable, optional
+        It takes the path to write and that recording, and raises a `DataError` if no copy can be written there.
+    """
+
+    write: Write
+    endings: tuple[str, ...]
+    several: bool = True
+    copies: Callable[[Path], bool] | None = None
+    check: Callable[[Path, Path], None] | None = None
+
+
+#: Name -> format.
+WRITERS: dict[str, Writer] = {
+    "csv": Writer(write_csv, (".csv",)),
+    "json": Writer(write_json, (".json",)),
+    "elan": Writer(write_elan, (".eaf",), several=False),
+    "audacity": Writer(write_audacity, (".txt",), several=False),
+    "bag": Writer(write_bag, (".bag", ".mcap", ".db3"), copies=is_bag, check=check_bag),
+    "lerobot": Writer(write_lerobot, (), copies=is_lerobot, check=check_lerobot),
+}
+
+
+def writer_of(path: Path, name: str | None, sources: Sequence[Path]) -> Writer:
+    """The writer of that name; without a name, by the ending of the path, or by the only recording.
+
+    Raises
+    ------
+    DataError
+        Nothing says what to write, or a copy of several recordings is asked for.
+    """
+    if name is not None:
+        found = WRITERS[name]
+    else:
+        fitting = [one for one in WRITERS.values() if _fits(one, path, sources)]
+        if not fitting:
+            endings = ", ".join(end for one in WRITERS.values() for end in one.endings)
+            raise DataError(
+                f"expected a path ending in one of {endings}, got {str(path)!r}; or name the format, one of "
+                f"{', '.join(WRITERS)}"
+            )
+        found = fitting[0]
+    if found.copies is not None and not (len(sources) == 1 and found.copies(sources[0])):
+        raise DataError(
+            f"expected one recording that can be copied with its annotations to {str(path)!r}, got "
+            f"{', '.join(map(str, sources))}; write a table: .csv or .json"
+        )
+    return found
+
+
+def _fits(writer: Writer, path: Path, sources: Sequence[Path]) -> bool:
+    if path.suffix.lower() in writer.endings:
+        return writer.copies is None or len(sources) != 1 or writer.copies(sources[0])
+    return not path.suffix and writer.copies is not None and len(sources) == 1 and writer.copies(sources[0])
+
+
+def targets_of(
+    path: Path, sources: Sequence[Path], movements: Sequence[Movement], name: str | None = None
+) -> dict[Path, list[Movement]]:
+    """The files to write, and the movements whose annotations each of them holds.
+
+    Parameters
+    ----------
+    path : Path
+        A file; a folder where a format holds one movement in a file, and the format is named.
+    sources : sequence of Path
+        The recordings, as the user named them.
+    movements : sequence of Movement
+        All movements that are annotated.
+    name : str, optional
+        Key of `WRITERS`.
+
+    Raises
+    ------
+    DataError
+        See `writer_of`; several movements for one file of a format that holds one.
+    """
+    writer = writer_of(path, name, sources)
+    if writer.check is not None:
+        writer.check(path, sources[0])
+    if writer.several:
+        return {path: list(movements)}
+    if path.suffix.lower() in writer.endings:
+        if len(movements) > 1:
+            raise DataError(
+                f"expected one movement to annotate in {path.name}, got {len(movements)}; name a folder, and the format"
+            )
+        return {path: list(movements)}
+    stems = distinct_stems(movements)
+    return {path / f"{stem}{writer.endings[0]}": [key] for stem, key in zip(stems, movements, strict=True)}
+
+
+def write_annotations(
+    path: Path,
+    annotations: Sequence[Annotation],
+    sources: Sequence[Path],
+    name: str | None = None,
+    movements: Sequence[Movement] | None = None,
+) -> list[Path]:
+    """Write annotations of recordings in the format that the name, the ending or the recording asks for.
+
+    `path`, `sources`, `movements` and `name` are those of `targets_of`; by default the movements are those that have
+    annotations. A folder is created where there is a file for each movement.
+
+    Returns
+    -------
+    list of Path
+        What was written.
+
+    Raises
+    ------
+    DataError
+        See `targets_of`.
+    OSError
+        A file that cannot be written.
+    """
+    groups: dict[Movement, list[Annotation]] = {key: [] for key in movements or ()}
+    for one in annotations:
+        groups.setdefault((one.recording, one.place), []).append(one)
+    targets = targets_of(path, sources, list(groups), name)
+    if any(target.parent != path.parent for target in targets):
+        path.mkdir(parents=True, exist_ok=True)
+    write, source = writer_of(path, name, sources).write, sources[0] if len(sources) == 1 else None
+    return [write(target, [one for key in keys for one in groups[key]], source) for target, keys in targets.items()]

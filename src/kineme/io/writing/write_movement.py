@@ -1,0 +1,206 @@
+"""Write one generated movement to a file: CSV, NPZ, JSON, Parquet; name the files of several."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path, PurePosixPath
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kineme.errors import DataError, TrajectoryError
+from kineme.io.arrays.arrays import COLUMNS, RATES
+from kineme.movements.channels.channel import learned_names, recorded_names
+from kineme.movements.segmentation.segment import as_recording
+from kineme.movements.trajectories.movements import axis_names
+from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.reporting.atomic import write_atomically
+from kineme.reporting.text import as_cell
+from kineme.units import split_head
+from kineme.validation import Array, as_numbers, as_path
+
+#: A movement by the path of its recording, and its place in it; see `kineme.io.reading.merge_files.Source`.
+Movement = tuple[str, str]
+
+_DERIVATIVES = ("velocities", "accelerations")
+_NAMES = ("times", "positions", *_DERIVATIVES)
+
+Columns = dict[str, Array]  # times (T,), positions (T, d), velocities and accelerations (T, e)
+
+
+class ColumnNames(NamedTuple):
+    """What the columns of positions are called, and those of velocities and accelerations."""
+
+    positions: tuple[str, ...]
+    rates: tuple[str, ...]
+
+
+def encode_movement(columns: Columns, ending: str, names: ColumnNames | None = None) -> bytes:
+    """The bytes of a file with that ending; see `WRITERS`. Without names the columns are x, y, z or q1, q2, ...
+
+    Raises
+    ------
+    DataError
+        No writer has that extension; the message lists those that exist.
+    """
+    if ending not in WRITERS:
+        raise DataError(f"expected a file ending in one of {', '.join(WRITERS)}, got {ending or 'none'!r}")
+    return WRITERS[ending](columns, names)
+
+
+def write_movement(path: str | Path, movement: MovementsLike | Columns, names: ColumnNames | None = None) -> Path:
+    """Write one movement to a CSV, NPZ, JSON or Parquet file, whole or not at all.
+
+    Parameters
+    ----------
+    path : str or Path
+        Its ending names the format.
+    movement : MovementsLike or dict
+        One movement, in any way that `Demonstrations.of` takes it; of a rollout velocities and accelerations are
+        written too. Or a dict of ``times`` (T,), ``positions`` and, if you like, ``velocities`` and ``accelerations``
+        (T, d).
+    names : ColumnNames, optional
+        Of the columns of a dict. Movements with `channels` are written under their names, as they were recorded.
+
+    Returns
+    -------
+    Path
+        Where it was written; `read_recording` reads it.
+
+    Raises
+    ------
+    DataError
+        An ending that no writer has, a file that cannot be written, or Parquet without the extra ``parquet``.
+    TrajectoryError
+        Several movements, or what is none; a dict without times or positions, or with arrays that do not fit them.
+    TypeError
+        A path that is none, as where the arguments are in the other order.
+    """
+    path = as_path(path, "the path of a file to write", "write write_movement(path, movement)")
+    columns, names = (_checked(movement, names), names) if isinstance(movement, dict) else _columns_of(movement)
+    return write_atomically(path, encode_movement(columns, path.suffix.lower(), names))
+
+
+def _checked(columns: Mapping[str, ArrayLike], names: ColumnNames | None) -> Columns:
+    """A dict of columns as arrays, refused unless all belong to one movement."""
+    if not set(_NAMES[:2]) <= set(columns) <= set(_NAMES):
+        raise TrajectoryError(
+            f"expected a dict of {', '.join(_NAMES[:2])} and, if you like, {', '.join(_DERIVATIVES)}, got "
+            f"{list(columns)}"
+        )
+    arrays = {name: as_numbers(values, name) for name, values in columns.items()}
+    shape = arrays["positions"].shape
+    for name, array in arrays.items():
+        expected = shape[:1] if name == "times" else shape
+        if name in _DERIVATIVES and names is not None:
+            expected = (*shape[:1], len(names.rates))
+        if len(shape) != 2 or array.shape != expected or (names is not None and len(names.positions) != shape[1]):
+            raise TrajectoryError(
+                f"expected times of shape (T,) and the others of shape (T, d), got {name} of shape {array.shape} with "
+                f"positions of shape {shape}" + ("" if names is None else f" and {names}")
+            )
+    return arrays
+
+
+def _columns_of(movement: MovementsLike) -> tuple[Columns, ColumnNames | None]:
+    one = as_recording(movement)
+    derivatives = {name: np.asarray(getattr(movement, name)[0]) for name in _DERIVATIVES if hasattr(movement, name)}
+    rates: Any = getattr(movement, "rate_names", None)  # of rollouts
+    if one.channels is not None:
+        named = ColumnNames(recorded_names(one.channels), tuple(rates or learned_names(one.channels)))
+        return {"times": one.times, "positions": one.recorded, **derivatives}, named
+    of_rollout = None if rates is None else ColumnNames(tuple(getattr(movement, "axis_names", ())), tuple(rates))
+    return {"times": one.times, "positions": one.positions, **derivatives}, of_rollout
+
+
+def _heads(columns: Columns, names: ColumnNames | None) -> list[str]:
+    """What the columns of a table are called: time, the positions, ``v_`` and ``a_`` before names of the others."""
+    axes = {name: axis_names(array.shape[-1]) for name, array in columns.items()}
+    if names is not None:
+        axes |= {
+            "positions": list(names.positions),
+            "velocities": list(names.rates),
+            "accelerations": list(names.rates),
+        }
+    marks = {"positions": ("", ""), "velocities": ("v_", "/s"), "accelerations": ("a_", "/s^2")}
+    return ["time", *(_marked(axis, *marks[name]) for name in columns if name != "times" for axis in axes[name])]
+
+
+def _marked(head: str, prefix: str, per: str) -> str:
+    """The head of a position or of a rate; the unit of a rate, if the head says one, is that per second."""
+    name, unit = split_head(head)
+    return f"{prefix}{head}" if unit is None or not per else f"{prefix}{name} [{unit}{per}]"
+
+
+def _table(columns: Columns) -> Array:
+    """Times and all else side by side, in the order of `_heads`."""
+    return np.column_stack([columns["times"], *(columns[name] for name in columns if name != "times")])
+
+
+def _csv(columns: Columns, names: ColumnNames | None) -> bytes:
+    table = _table(columns)
+    lines = [",".join(map(_cell, _heads(columns, names))), *(",".join(map(repr, row)) for row in table.tolist())]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _cell(text: str) -> str:
+    """A head of CSV, quoted where it must be; a line is a sample, so that no head has line breaks."""
+    text = as_cell(" ".join(text.splitlines()))
+    return '"' + text.replace('"', '""') + '"' if set(text) & set(',"') else text
+
+
+def _npz(columns: Columns, names: ColumnNames | None) -> bytes:
+    buffer = io.BytesIO()
+    named = {} if names is None else {COLUMNS: np.array(names.positions), RATES: np.array(names.rates)}
+    np.savez(buffer, allow_pickle=False, **columns, **named)
+    return buffer.getvalue()
+
+
+def _json(columns: Columns, names: ColumnNames | None) -> bytes:
+    named = {} if names is None else {COLUMNS: [*names.positions], RATES: [*names.rates]}
+    return (json.dumps({**{name: values.tolist() for name, values in columns.items()}, **named}) + "\n").encode()
+
+
+def _parquet(columns: Columns, names: ColumnNames | None) -> bytes:
+    try:
+        import pyarrow as pa
+        from pyarrow import parquet
+    except ImportError as error:
+        raise DataError("expected the package pyarrow to write Parquet; pip install 'kineme[parquet]'") from error
+    buffer = io.BytesIO()
+    arrays = [np.ascontiguousarray(column) for column in _table(columns).T]
+    parquet.write_table(pa.Table.from_arrays([*map(pa.array, arrays)], names=_heads(columns, names)), buffer)
+    return buffer.getvalue()
+
+
+#: File extension -> encoder. All of them keep every bit of the numbers.
+WRITERS: dict[str, Callable[[Columns, ColumnNames | None], bytes]] = {
+    ".csv": _csv, ".npz": _npz, ".json": _json, ".parquet": _parquet
+}  # fmt: skip
+
+
+def distinct_stems(movements: Sequence[Movement]) -> list[str]:
+    """A name for each movement, without ending, such as ``long`` or ``session-3``; none twice, whatever the case.
+
+    Characters that are neither letters nor digits become underscores, so that a name is never a path.
+    """
+    stems: list[str] = []
+    taken: set[str] = set()
+    for recording, place in movements:
+        path = PurePosixPath(recording)
+        parts = [*(part for part in path.parts[:-1] if part not in {"/", "..", "."}), path.stem, place]
+        stem = "-".join(_plain(part) for part in parts if part).strip(".") or "recording"
+        name, k = stem, 1
+        while name.lower() in taken:
+            k += 1
+            name = f"{stem}-{k}"
+        taken.add(name.lower())
+        stems.append(name)
+    return stems
+
+
+def _plain(part: str) -> str:
+    return "".join(mark if mark.isalnum() or mark in "-_." else "_" for mark in part)
