@@ -12,6 +12,8 @@ from kineme.reporting.text import first_names
 
 _SHOWN = 20  # columns that a sentence names
 
+UNKNOWN = "unknown"  # the label of unknown motion, in files that have but one text for each stretch
+
 
 class Problem(NamedTuple):
     """Something that could not be read.

@@ -21,8 +21,7 @@ import numpy as np
 from kineme.errors import DataError
 from kineme.io.limits import check_expanded, read_limited
 from kineme.io.reading.merge_files import Recordings, Source
-from kineme.io.records import Problem
-from kineme.io.writing.annotation import UNKNOWN
+from kineme.io.records import UNKNOWN, Problem
 from kineme.movements.tables.time_stamps import TIME_UNITS
 from kineme.movements.trajectories.channels import of_channels
 from kineme.movements.trajectories.demonstrations import Demonstrations

@@ -10,11 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from kineme.io.records import UNKNOWN
 from kineme.reporting.atomic import write_atomically
 from kineme.reporting.text import as_cell
-
-UNKNOWN = "unknown"  # where a format has but one text for each stretch
-
 
 HEADS = ("recording", "place", "start", "end", "symbol", "p_value", "confidence", "unknown")
 

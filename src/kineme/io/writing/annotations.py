@@ -14,9 +14,10 @@ from kineme.errors import DataError
 from kineme.io.lerobot.copy import OWN, Motion, copy_with_motions
 from kineme.io.lerobot.info import MARKER, read_info
 from kineme.io.reading.formats import FORMATS, data_set_of
+from kineme.io.records import UNKNOWN
 from kineme.io.ros.add_topic import copy_with_topic
 from kineme.io.ros.choose import bag_contents
-from kineme.io.writing.annotation import UNKNOWN, Annotation, as_row, write_audacity, write_csv, write_json
+from kineme.io.writing.annotation import Annotation, as_row, write_audacity, write_csv, write_json
 from kineme.io.writing.write_movement import Movement, distinct_stems
 from kineme.reporting.atomic import whole_file, whole_folder, write_atomically
 from kineme.reporting.text import printable
