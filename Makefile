@@ -1,6 +1,7 @@
 # make demo   the paper's tables and figures, in out/
 # make check  formatter, linter, type checker, and the tests that find most: minutes
 # make test   formatter, linter, type checker, tests
+# make javascript  formatter, linter and type checker of the JavaScript; needs npm
 # make test-pythons  the same with every Python that is found here
 # make test-lowest   the tests with the lowest versions of what kineme depends on
 # make package   wheel and source archive in out/package, checked, and tried in an empty environment of every Python found
@@ -25,7 +26,7 @@ DEV ?= .venv-dev
 # Tests start hundreds of commands: where Python writes no bytecode, each of them compiles the package again.
 export PYTHONDONTWRITEBYTECODE =
 
-.PHONY: demo check test test-pythons test-lowest package ros2 always soak fuzz bench evaluate docs check-docs figures reference tables scene lock clean
+.PHONY: demo check javascript test test-pythons test-lowest package ros2 always soak fuzz bench evaluate docs check-docs figures reference tables scene lock clean
 
 demo: .venv/ready
 	.venv/bin/kineme reproduce --out out/
@@ -116,6 +117,15 @@ define environment
 	touch $@
 endef
 
+# Formatter, linter and type checker of the JavaScript, each checked against its hash; what is shipped needs none of them.
+javascript: node_modules/ready
+	node_modules/.bin/biome ci --reporter=summary
+	node_modules/.bin/tsc --project jsconfig.json
+
+node_modules/ready: package-lock.json
+	npm ci --silent --no-audit --no-fund
+	touch $@
+
 bench: .venv-bench/ready
 	PYTHONPATH=src:experiments .venv-bench/bin/python -m bench
 
@@ -169,4 +179,4 @@ lock:
 	uv pip compile pyproject.toml experiments/rivals.in --group build --universal --generate-hashes --no-emit-index-url --no-header --quiet -o experiments/rivals.txt
 
 clean:
-	rm -rf .venv .venv-dev .venv-dev-* .venv-lowest .venv-package .venv-ros2 .venv-bench .venv-rivals out docs/gallery docs/reference/generated docs/concepts/interactive/primitive.html
+	rm -rf .venv .venv-dev .venv-dev-* .venv-lowest .venv-package .venv-ros2 .venv-bench .venv-rivals node_modules out docs/gallery docs/reference/generated docs/concepts/interactive/primitive.html

@@ -28,16 +28,22 @@ const Ranking = {
 
   /** Stems of the words of a text that say something; names such as load_lasa also by their parts. */
   words: (text) => {
-    const found = splitQuery(text.toLowerCase()).flatMap((word) => (word.includes("_") ? [word, ...word.split("_")] : [word]));
+    const found = splitQuery(text.toLowerCase()).flatMap((word) =>
+      word.includes("_") ? [word, ...word.split("_")] : [word],
+    );
     const stemmer = new Stemmer();
-    return new Set(found.filter((word) => word && !stopwords.has(word) && !/^\d+$/.test(word)).map((word) => stemmer.stemWord(word)));
+    return new Set(
+      found.filter((word) => word && !stopwords.has(word) && !/^\d+$/.test(word)).map((word) => stemmer.stemWord(word)),
+    );
   },
 
   /** The stems that a question asks for; of a name such as column_stack its parts only where no page holds the whole. */
   asked: (query) => {
     const { pages } = Ranking.prepared;
     const names = splitQuery(query).filter((word) => word.includes("_"));
-    const whole = names.filter((word) => [...Ranking.words(word)].some((stem) => stem.includes("_") && pages.has(stem)));
+    const whole = names.filter((word) =>
+      [...Ranking.words(word)].some((stem) => stem.includes("_") && pages.has(stem)),
+    );
     const parts = new Set(whole.flatMap((word) => [...Ranking.words(word)].filter((stem) => !stem.includes("_"))));
     return [...Ranking.words(query)].filter((stem) => !parts.has(stem));
   },
@@ -58,7 +64,8 @@ const Ranking = {
         }
     for (const [inside, members] of Object.entries(index.objects))
       for (const [page, , , , name] of members) {
-        const path = `${inside}.${name}`, text = path.split(".").slice(-2).join(".");
+        const path = `${inside}.${name}`,
+          text = path.split(".").slice(-2).join(".");
         lines.push({ page, text, words: Ranking.words(text), id: path, entry: true });
       }
     return { pages, lines, all: [...pages.keys()] };
@@ -98,17 +105,33 @@ const Ranking = {
     docnames.forEach((name, page) => {
       const text = (name.endsWith("/index") ? 0.6 : 1) * (share((word) => pages.get(word)?.has(page)) / total);
       const line = bestLine.get(page);
-      if (text > 0.6 || line?.score > 0.45) found.push([page, line, (text + 2 * (line?.score ?? 0)) * Ranking.chapter(name)[0]]);
+      if (text > 0.6 || line?.score > 0.45)
+        found.push([page, line, (text + 2 * (line?.score ?? 0)) * Ranking.chapter(name)[0]]);
     });
     messages.sort((a, b) => b.score - a.score).splice(Ranking.mostMessages);
     for (const line of messages) if (line.score > 0.4) found.push([line.page, line, 1 + 2 * line.score]);
     const item = ([page, line, score]) => {
       const here = line && line.score > 0.3 && line.id ? `#${line.id}` : "";
       const message = Ranking.isMessage(line);
-      const title = message ? line.text : here && !line.entry && line.text !== titles[page] ? `${titles[page]} > ${line.text}` : titles[page];
-      return [docnames[page], title, here, Ranking.chapter(docnames[page])[1], score, filenames[page], message ? "index" : "text"];
+      const title = message
+        ? line.text
+        : here && !line.entry && line.text !== titles[page]
+          ? `${titles[page]} > ${line.text}`
+          : titles[page];
+      return [
+        docnames[page],
+        title,
+        here,
+        Ranking.chapter(docnames[page])[1],
+        score,
+        filenames[page],
+        message ? "index" : "text",
+      ];
     };
-    return found.sort((a, b) => a[2] - b[2]).slice(-Ranking.most).map(item);
+    return found
+      .sort((a, b) => a[2] - b[2])
+      .slice(-Ranking.most)
+      .map(item);
   },
 
   chapter: (name) => Ranking.chapters[Object.keys(Ranking.chapters).find((start) => name.startsWith(start))],

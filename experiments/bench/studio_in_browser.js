@@ -53,11 +53,15 @@
     if (this.canvas.id === "move-canvas") painted = true;
     clear.apply(this, box);
   };
-  window.addEventListener("pointermove", (event) => {
-    if (!on) return;
-    moved = true;
-    afterFrame((now) => probe.dragged.push(now - event.timeStamp));
-  }, true);
+  window.addEventListener(
+    "pointermove",
+    (event) => {
+      if (!on) return;
+      moved = true;
+      afterFrame((now) => probe.dragged.push(now - event.timeStamp));
+    },
+    true,
+  );
   const frame = (now) => {
     if (!on) return;
     probe.frames.push(now);

@@ -17,7 +17,7 @@ PAGE = WEB.parent / "page"
 SCRIPTS = sorted(WEB.rglob("*.js"))
 PAGES = sorted(WEB.glob("*.html"))
 STYLES = sorted(WEB.glob("*.css"))
-MAX_FILE = 300
+MAX_FILE = 400
 NODE = shutil.which("node")
 needs_node = pytest.mark.skipif(NODE is None, reason="node is not installed")
 

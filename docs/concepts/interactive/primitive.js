@@ -133,9 +133,17 @@
       dot(parts.now, toPixels(path.map((row) => row[state.t])));
       parts.goal.setAttribute("transform", `translate(${toPixels(state.goal)})`);
       parts.goal.setAttribute("aria-valuenow", state.goal[0].toFixed(1));
-      parts.goal.setAttribute("aria-valuetext", `x ${state.goal[0].toFixed(1)}, y ${state.goal[1].toFixed(1)} millimeters`);
+      parts.goal.setAttribute(
+        "aria-valuetext",
+        `x ${state.goal[0].toFixed(1)}, y ${state.goal[1].toFixed(1)} millimeters`,
+      );
       const terms = attractors(data, state.name, state.one, state.goal, path, state.t);
-      for (const kind of ["pull", "bend"]) drawArrow(parts[kind], path.map((row) => row[state.t]), terms[kind]);
+      for (const kind of ["pull", "bend"])
+        drawArrow(
+          parts[kind],
+          path.map((row) => row[state.t]),
+          terms[kind],
+        );
       parts.rows.forEach((row, k) => drawWeights(data, row, state.one.weights[k], most));
     }
 
@@ -177,7 +185,8 @@
     });
     parts.rows.forEach((row, k) =>
       row.grips.forEach((grip, i) => {
-        const move = (event) => setWeight(k, i, (1 - (2 * (at(parts.weights, event)[1] - k * ROW - 20)) / (ROW - 30)) * most);
+        const move = (event) =>
+          setWeight(k, i, (1 - (2 * (at(parts.weights, event)[1] - k * ROW - 20)) / (ROW - 30)) * most);
         drag(grip, (event) => (grip.focus(), move(event)), move);
         grip.addEventListener("keydown", (event) => {
           const step = { ArrowUp: 1, ArrowDown: -1, PageUp: 5, PageDown: -5 }[event.key];
@@ -219,7 +228,8 @@
         draw();
       },
     };
-    for (const [name, act] of Object.entries(actions)) root.querySelector(`[data-act="${name}"]`).addEventListener("click", act);
+    for (const [name, act] of Object.entries(actions))
+      root.querySelector(`[data-act="${name}"]`).addEventListener("click", act);
     root.querySelector("select").addEventListener("change", (event) => {
       state.name = event.target.value;
       fit();
@@ -304,7 +314,11 @@
     if (length < 6) return;
     const [ux, uy] = [dx / length, dy / length];
     svgNode("path", { d: line([a, [b[0] - 8 * ux, b[1] - 8 * uy]]), "fill-opacity": 0 }, group);
-    const head = [b, [b[0] - 10 * ux - 5 * uy, b[1] - 10 * uy + 5 * ux], [b[0] - 10 * ux + 5 * uy, b[1] - 10 * uy - 5 * ux]];
+    const head = [
+      b,
+      [b[0] - 10 * ux - 5 * uy, b[1] - 10 * uy + 5 * ux],
+      [b[0] - 10 * ux + 5 * uy, b[1] - 10 * uy - 5 * ux],
+    ];
     svgNode("path", { d: `${line(head)}Z`, "stroke-width": 0 }, group);
   }
 

@@ -44,8 +44,11 @@ export function pairDistances(how, d, own, cloud = true, elastic = true) {
   turned(own.points, 0, P, d, d + 1, IDENTITY, place, x);
   const work = { elastic: new Float64Array(K + 1), turning: new Float64Array(K + 1) };
   const room = {
-    rows: new Float64Array(P), columns: new Float64Array(P), nearest: new Int32Array(P),
-    halves: new Float64Array(2 * P), costs: new Float64Array(P * P),
+    rows: new Float64Array(P),
+    columns: new Float64Array(P),
+    nearest: new Int32Array(P),
+    halves: new Float64Array(2 * P),
+    costs: new Float64Array(P * P),
   };
   return (others, j, R, squares) => {
     if (elastic) {
@@ -229,7 +232,15 @@ export function squaredDistances(how, one, stored) {
   const { rule, by_rows: blocks, by_pairs: measures, n_dims: d } = how;
   const m = stored.m;
   const found = new Float64Array((blocks.length + measures.length) * m);
-  const compare = measures.length ? pairDistances(how.shapes, d, one.shapes, measures.includes(2), measures.some((k) => k < 2)) : null;
+  const compare = measures.length
+    ? pairDistances(
+        how.shapes,
+        d,
+        one.shapes,
+        measures.includes(2),
+        measures.some((k) => k < 2),
+      )
+    : null;
   const R = new Float64Array(d * d);
   const squares = new Float64Array(3);
   for (let j = 0; j < m; j++) {
@@ -237,7 +248,16 @@ export function squaredDistances(how, one, stored) {
       const n = blocks[r].n_points;
       const square = stored.squares[r][j];
       const turns = compare !== null && r === how.rotating;
-      const best = align(rule, one.rows[r], 0, stored.rows[r], j * n * d, n, Math.sqrt(one.squares[r] * square), turns ? R : null);
+      const best = align(
+        rule,
+        one.rows[r],
+        0,
+        stored.rows[r],
+        j * n * d,
+        n,
+        Math.sqrt(one.squares[r] * square),
+        turns ? R : null,
+      );
       found[r * m + j] = Math.max(one.squares[r] + square - 2 * best, 0);
     }
     if (compare === null) continue;

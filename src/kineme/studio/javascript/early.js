@@ -15,7 +15,12 @@ const WHOLE = [1];
 /** Progress and time left on average over a class's hypotheses, the remaining path from its best one. */
 function forecast(stored, evidence, label, begun, duration) {
   const { header, arrays } = stored.known;
-  const { early, first, n_movements: m, comparison: { n_dims: d } } = header;
+  const {
+    early,
+    first,
+    n_movements: m,
+    comparison: { n_dims: d },
+  } = header;
   const [G, { prefixes, S }] = [early.n_progress, stored];
   const from = first[label] * G;
   const own = evidence.subarray(from, (first[label + 1] ?? m) * G);
@@ -30,14 +35,18 @@ function forecast(stored, evidence, label, begun, duration) {
   const path = arrays.paths.subarray(Math.floor(best / G) * d * N_POINTS);
   const even = linspace(0, 1, N_POINTS);
   const times = linspace(prefixes.elapsed[best], 1, N_REMAINING);
-  const rows = Array.from({ length: d }, (_, k) => interpolate(times, even, path.subarray(k * N_POINTS, (k + 1) * N_POINTS)));
+  const rows = Array.from({ length: d }, (_, k) =>
+    interpolate(times, even, path.subarray(k * N_POINTS, (k + 1) * N_POINTS)),
+  );
   const R = bestRotation(early.rule, begun.rows, prefixes.rows.subarray(best * d * S, (best + 1) * d * S));
   const size = prefixes.sizes[best] > 0 ? begun.sizes[0] / prefixes.sizes[best] : 1;
-  const remaining = Array.from({ length: N_REMAINING }, (_, p) => Array.from({ length: d }, (_, k) => {
-    let x = 0;
-    for (let h = 0; h < d; h++) x += R[k * d + h] * (rows[h][p] - rows[h][0]);
-    return size * x;
-  }));
+  const remaining = Array.from({ length: N_REMAINING }, (_, p) =>
+    Array.from({ length: d }, (_, k) => {
+      let x = 0;
+      for (let h = 0; h < d; h++) x += R[k * d + h] * (rows[h][p] - rows[h][0]);
+      return size * x;
+    }),
+  );
   return { progress, seconds: left * duration, remaining };
 }
 
@@ -62,7 +71,11 @@ function decision(confidence, patience) {
  * @param {{confidence?: number, patience?: number}} [options]
  */
 export function follow(stored, { confidence = 0.9, patience = 0.05 } = {}) {
-  const { classes, certainty: least, comparison: { n_dims: d, cutoff } } = stored.known.header;
+  const {
+    classes,
+    certainty: least,
+    comparison: { n_dims: d, cutoff },
+  } = stored.known.header;
   const decide = decision(confidence, patience);
   let [leader, furthest] = [-1, 0];
   /**
@@ -92,7 +105,9 @@ export function follow(stored, { confidence = 0.9, patience = 0.05 } = {}) {
     leader = shown;
     return {
       ranked: order.map((c) => ({ name: classes[c], share: share[c] })),
-      probabilities: Object.fromEntries(order.map((c) => [classes[c], share[c] / Math.max(1 - share[classes.length], Number.MIN_VALUE)])),
+      probabilities: Object.fromEntries(
+        order.map((c) => [classes[c], share[c] / Math.max(1 - share[classes.length], Number.MIN_VALUE)]),
+      ),
       unknown: share[classes.length],
       certainty: certainty(least, share[order[0]], { isNew: share[classes.length] > share[order[0]], isOver: false }),
       decided: decided === null ? null : classes[decided],

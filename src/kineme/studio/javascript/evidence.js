@@ -22,7 +22,11 @@ const EXPLAINING = 20; // a movement explains a beginning at about one in so man
 /** Logarithms of the densities of size, duration, timing, speed at the end, and progress, for each hypothesis. */
 function logPriors(stored, begun, duration) {
   const { prefixes, progress, S, logLengths, logDurations, timingSquares } = stored;
-  const { size_spread: sizeSpread, duration_spread: durationSpread, timing_spread: timingSpread } = stored.known.header.early;
+  const {
+    size_spread: sizeSpread,
+    duration_spread: durationSpread,
+    timing_spread: timingSpread,
+  } = stored.known.header.early;
   const [length, longer] = [begun.lengths[0], duration].map(finiteLog);
   const square = product(begun.timing, 0, begun.timing, 0, S);
   const over = (value, spread) => (spread === null ? 0 : 0.5 * (value / spread) ** 2);
@@ -63,7 +67,11 @@ function logOdds({ over, before }, speed) {
  */
 export function logEvidence(stored, begun, path, start, duration) {
   const { header } = stored.known;
-  const { early, first, comparison: { n_dims: d } } = header;
+  const {
+    early,
+    first,
+    comparison: { n_dims: d },
+  } = header;
   const [G, S, prefixes] = [early.n_progress, stored.S, stored.prefixes];
   const priors = logPriors(stored, begun, duration);
   const [w0, w1, w2] = early.widths.map((width) => 2 * width * width);
@@ -86,7 +94,13 @@ export function logEvidence(stored, begun, path, start, duration) {
     const near = logSumExp([-squares[0] / w1, -squares[2] / w2]) - Math.LN2 + logRotation(early.rule, R);
     evidence[h] = near + priors[h] - logSumExp([0, odds]);
   }
-  addOver(stored, path, start, evidence, priors.map((prior) => prior - logSumExp([0, -odds])));
+  addOver(
+    stored,
+    path,
+    start,
+    evidence,
+    priors.map((prior) => prior - logSumExp([0, -odds])),
+  );
   return evidence;
 }
 

@@ -35,7 +35,8 @@ export function beginnings(paths, d, progress, how) {
       const targets = linspace(0, progress[g], S);
       const times = interpolate(targets, phase, even);
       const own = new Float64Array(d * S);
-      for (let k = 0; k < d; k++) own.set(interpolate(targets, phase, path.subarray(k * N_POINTS, (k + 1) * N_POINTS)), k * S);
+      for (let k = 0; k < d; k++)
+        own.set(interpolate(targets, phase, path.subarray(k * N_POINTS, (k + 1) * N_POINTS)), k * S);
       describeBeginning(found, at, own, times, d, S);
       const before = interpolate([(1 - LAST) * times[S - 1]], even, phase)[0];
       endSpeeds[at] = Math.log(Math.max((1 - before / progress[g]) / LAST, LEAST_SPEED));
@@ -81,7 +82,10 @@ export function hypotheses(known) {
   const S = early.shapes.n_segments + 1;
   const each = (value) => Float64Array.from({ length: m * G }, (_, h) => value(h));
   return {
-    known, progress, prefixes, S,
+    known,
+    progress,
+    prefixes,
+    S,
     logLengths: each((h) => finiteLog(prefixes.lengths[h])),
     logDurations: each((h) => finiteLog(arrays.durations[Math.floor(h / G)] * prefixes.elapsed[h])),
     timingSquares: each((h) => product(prefixes.timing, h * S, prefixes.timing, h * S, S)),

@@ -22,8 +22,10 @@ const LARGEST = 1e100; // position, and 1e50 s: squares of larger numbers may ov
  * @returns {Movement}
  */
 export function movement(times, positions, d) {
-  const flat = typeof positions[0] === "object" ? Float64Array.from(Array.from(positions, (one) => [...one]).flat())
-    : Float64Array.from(positions);
+  const flat =
+    typeof positions[0] === "object"
+      ? Float64Array.from(Array.from(positions, (one) => [...one]).flat())
+      : Float64Array.from(positions);
   const t = Float64Array.from(times);
   if (t.length < MIN_SAMPLES) throw new Error(`expected at least ${MIN_SAMPLES} samples, got ${t.length}; draw longer`);
   if (flat.length !== t.length * d) {
@@ -100,7 +102,8 @@ function smoothed(v, x) {
     if (k < T - 3) b[k] = (p[k] * p[k + 1]) / D[k];
     m[k] = right - e * (k > 1 ? m[k - 1] : 0) - f * (k > 2 ? m[k - 2] : 0);
   }
-  for (let k = T - 2; k > 0; k--) m[k] = m[k] / D[k] - a[k] * (k < T - 2 ? m[k + 1] : 0) - b[k] * (k < T - 3 ? m[k + 2] : 0);
+  for (let k = T - 2; k > 0; k--)
+    m[k] = m[k] / D[k] - a[k] * (k < T - 2 ? m[k + 1] : 0) - b[k] * (k < T - 3 ? m[k + 2] : 0);
   for (let j = 0; j < T - 1; j++) {
     const bend = (m[j + 1] - m[j]) * p[j];
     x[j] -= bend;
@@ -202,7 +205,9 @@ function joined(times, gaps, step) {
   for (let head = 0, end = 1; head < T; head = end++) {
     while (end < T && merged[end]) end++;
     const dense = times[end - 1] - times[head] > step;
-    const part = Array.from({ length: end - head }, (_, j) => Math.floor((times[head + j] - times[head]) / (SHARE * step)));
+    const part = Array.from({ length: end - head }, (_, j) =>
+      Math.floor((times[head + j] - times[head]) / (SHARE * step)),
+    );
     for (let j = 1; j < end - head; j++) if (dense || part[j] !== part[j - 1]) merged[head + j] = 0;
   }
   return merged;

@@ -230,7 +230,8 @@ export function recognize(known, one, errorRate = 0.05) {
   const shown = isKnown ? chosen : ranked[0];
   const odds = probabilities(known, compared.similar);
   const own = compared.average.subarray(first[shown], first[shown + 1] ?? known.stored.m);
-  const nearest = descending(own).slice(0, SHOWN)
+  const nearest = descending(own)
+    .slice(0, SHOWN)
     .map((j) => ({ index: first[shown] + j, similarity: Math.exp(own[j]) }));
   const m = known.stored.m;
   const shares = SHARES[how.mean](Float64Array.from(how.widths, (_, r) => compared.logs[r * m + nearest[0].index]));

@@ -9,7 +9,7 @@ const HANDOVER = 0.2; // phase at which shape and goal have equal weight in the 
 const DEPENDENT = 1e-11; // of the largest: via points of which one follows from the others
 // Gauss-Legendre quadrature on [0, 1] with 8 nodes, the second half mirrored.
 const NODES = [0.019855071751231856, 0.10166676129318664, 0.2372337950418355, 0.4082826787521751];
-const WEIGHTS = [0.05061426814518813, 0.11119051722668724, 0.15685332293894363, 0.18134189168918100];
+const WEIGHTS = [0.05061426814518813, 0.11119051722668724, 0.15685332293894363, 0.181341891689181];
 const QUADRATURE = [...NODES.map((x, k) => [x, WEIGHTS[k]]), ...NODES.map((x, k) => [1 - x, WEIGHTS[k]])];
 
 const late = (s) => ((1 + HANDOVER ** 3) * s ** 3) / (s ** 3 + HANDOVER ** 3);
@@ -201,13 +201,18 @@ export function encode({ header, arrays }, one) {
   const duration = times[times.length - 1] - times[0];
   const weights = new Float64Array(d * how.n_basis);
   const velocity = start.map((x, k) => {
-    const [own, v0] = fitted(arrays, how, pull.map((one, t) => rows[k * n + t] - one * rows[k * n + n - 1]));
+    const [own, v0] = fitted(
+      arrays,
+      how,
+      pull.map((one, t) => rows[k * n + t] - one * rows[k * n + n - 1]),
+    );
     weights.set(own, k * how.n_basis);
     return v0 / duration;
   });
   const extents = start.map((x, k) => {
     let [low, high] = [x, x];
-    for (let j = k; j < positions.length; j += d) [low, high] = [Math.min(low, positions[j]), Math.max(high, positions[j])];
+    for (let j = k; j < positions.length; j += d)
+      [low, high] = [Math.min(low, positions[j]), Math.max(high, positions[j])];
     return high - low;
   });
   return { weights, start, goal, velocity, duration, extents, formulation: how.formulation };
@@ -224,7 +229,14 @@ export function encode({ header, arrays }, one) {
 export function rollout({ header, arrays }, one, asked = {}) {
   const how = header.movements;
   const N = how.n_basis;
-  const { start = one.start, goal = one.goal, duration = one.duration, via = [], endVelocity, samples = how.n_points } = asked;
+  const {
+    start = one.start,
+    goal = one.goal,
+    duration = one.duration,
+    via = [],
+    endVelocity,
+    samples = how.n_points,
+  } = asked;
   const amplitude = goal.map((g, k) => g - start[k]);
   const learned = one.goal.map((g, k) => g - one.start[k]);
   const ratio = FORMULATIONS[one.formulation].ratio(amplitude, learned, one.extents);
@@ -232,10 +244,12 @@ export function rollout({ header, arrays }, one, asked = {}) {
     const own = Array.from({ length: N }, (_, i) => one.weights[k * N + i] * ratio[k]);
     return Float64Array.from([...own, amplitude[k], one.velocity[k] * one.duration]);
   });
-  const row = (state, order) => numbers.map((own) => product(own, 0, state, order * (N + 2), N + 2) / duration ** order);
+  const row = (state, order) =>
+    numbers.map((own) => product(own, 0, state, order * (N + 2), N + 2) / duration ** order);
   const map = (state) => row(state, 0).map((x, k) => start[k] + x);
   if (via.length || endVelocity) {
-    const faster = (end) => (endVelocity ? row(end, 1).map((v, k) => (endVelocity[k] - v) * duration) : goal.map(() => 0));
+    const faster = (end) =>
+      endVelocity ? row(end, 1).map((v, k) => (endVelocity[k] - v) * duration) : goal.map(() => 0);
     passThrough(how, arrays.smooth, one.formulation, via, goal, numbers, map, faster);
   }
   const states = keptDecoder(how, one.formulation, samples);

@@ -31,9 +31,10 @@ export function open(text) {
     /** Learn a movement. */
     encode: learn,
     /** The primitive of a class by its name, or one that was learned, in another formulation if one is named. */
-    primitive: (what, formulation) => (typeof what === "string"
-      ? primitiveOf(snapshot, header.classes.indexOf(what), formulation)
-      : inFormulation(snapshot, what, formulation ?? what.formulation)),
+    primitive: (what, formulation) =>
+      typeof what === "string"
+        ? primitiveOf(snapshot, header.classes.indexOf(what), formulation)
+        : inFormulation(snapshot, what, formulation ?? what.formulation),
     /** The movement of a primitive to a new start and goal, through via points. */
     rollout: (primitive, asked) => rollout(snapshot, primitive, asked),
   };

@@ -20,7 +20,16 @@ const d = runtime.header.comparison.n_dims;
 const prototypes = runtime.classes.map((name) => runtime.rollout(runtime.primitive(name)).positions);
 const box = viewed();
 const stage = createStage(element("stage"), runtime.header.view, box);
-const state = { stroke: null, live: null, answer: null, moving: null, held: null, pointer: null, played: null, note: "" };
+const state = {
+  stroke: null,
+  live: null,
+  answer: null,
+  moving: null,
+  held: null,
+  pointer: null,
+  played: null,
+  note: "",
+};
 const known = createKnown(runtime, prototypes, choose);
 let [follow, frame] = [null, 0];
 
@@ -29,7 +38,10 @@ function viewed() {
   const boxes = prototypes.map(boxOf);
   if (!runtime.header.comparison.translation) return boxOf(prototypes.flat());
   const middle = (values) => values.sort((a, b) => a - b)[Math.floor(0.8 * (values.length - 1))];
-  return { center: boxes[0].center.map((_, k) => middle(boxes.map((one) => one.center[k]))), half: middle(boxes.map((one) => one.half)) };
+  return {
+    center: boxes[0].center.map((_, k) => middle(boxes.map((one) => one.center[k]))),
+    half: middle(boxes.map((one) => one.half)),
+  };
 }
 
 function later() {
@@ -82,7 +94,8 @@ function showLive() {
   if (!live) return say("…", "Go on drawing.");
   const done = `${percent(live.progress)} done`;
   if (live.decided === null && live.progress < BEGUN) say("…", done);
-  else if (live.certainty === "new") say("Unknown", `${done}, most like ${live.ranked[0].name}`, "unknown", "new, so far");
+  else if (live.certainty === "new")
+    say("Unknown", `${done}, most like ${live.ranked[0].name}`, "unknown", "new, so far");
   else say(live.decided ?? live.ranked[0].name, done, "", `${live.certainty}, so far`);
   bars(live.probabilities);
 }
@@ -90,13 +103,28 @@ function showLive() {
 function showAnswer() {
   const { answer, moving } = state;
   why([]);
-  if (!answer) return say(moving ? moving.name : "What is it?", moving ? "Drag its start, its goal, or the path itself." : "Draw a movement: with a mouse, a pen or a finger. Or choose a known one.");
+  if (!answer)
+    return say(
+      moving ? moving.name : "What is it?",
+      moving
+        ? "Drag its start, its goal, or the path itself."
+        : "Draw a movement: with a mouse, a pen or a finger. Or choose a known one.",
+    );
   const more = answer.rule === "guess" ? "More drawings of each would say how sure. " : "";
   if (answer.label === null) say("Unknown", `Most like ${answer.ranked[0]}. ${more}`, "unknown", answer.certainty);
-  else say(answer.label, `${more}Drag its start, its goal, or the path; or clear it and draw another.`, "", answer.certainty);
+  else
+    say(
+      answer.label,
+      `${more}Drag its start, its goal, or the path; or clear it and draw another.`,
+      "",
+      answer.certainty,
+    );
   why([
     `${percent(answer.pKnown)} of known movements differ as much.`,
-    `p-values: ${answer.ranked.slice(0, ROWS).map((name) => `${name} ${answer.pValues[name].toPrecision(2)}`).join(", ")}`,
+    `p-values: ${answer.ranked
+      .slice(0, ROWS)
+      .map((name) => `${name} ${answer.pValues[name].toPrecision(2)}`)
+      .join(", ")}`,
     `Similarity to the nearest: ${answer.nearest[0].similarity.toFixed(2)}`,
   ]);
   bars(answer.probabilities);
@@ -110,7 +138,9 @@ function why(reasons) {
 
 /** The most likely ones, if it is a known one; always as many rows; names are text. */
 function bars(probabilities) {
-  const shown = Object.entries(probabilities).sort((a, b) => b[1] - a[1]).slice(0, ROWS);
+  const shown = Object.entries(probabilities)
+    .sort((a, b) => b[1] - a[1])
+    .slice(0, ROWS);
   [...element("bars").children].forEach((row, i) => {
     const [name, track, value] = row.children;
     const [label, share] = shown[i] ?? ["", 0];
@@ -121,7 +151,16 @@ function bars(probabilities) {
 }
 
 function clear() {
-  Object.assign(state, { stroke: null, live: null, answer: null, moving: null, drawn: null, note: "", pointer: null, held: null });
+  Object.assign(state, {
+    stroke: null,
+    live: null,
+    answer: null,
+    moving: null,
+    drawn: null,
+    note: "",
+    pointer: null,
+    held: null,
+  });
   known.select(null);
   bars({});
   showAnswer();
@@ -132,7 +171,8 @@ function clear() {
 function show(name, what, place) {
   try {
     state.moving = createMoving(runtime, name, what, place);
-    if (element("formulation").value) state.note = state.moving.update({ formulation: element("formulation").value }) ?? "";
+    if (element("formulation").value)
+      state.note = state.moving.update({ formulation: element("formulation").value }) ?? "";
   } catch (error) {
     state.moving = null;
     state.note = error.message;
@@ -183,7 +223,14 @@ function down(event) {
   state.held = state.moving?.held(stage, placeOf(event)) ?? null;
   if (state.held) return;
   known.select(null);
-  Object.assign(state, { stroke: { times: [], positions: [] }, answer: null, live: null, drawn: null, moving: null, note: "" });
+  Object.assign(state, {
+    stroke: { times: [], positions: [] },
+    answer: null,
+    live: null,
+    drawn: null,
+    moving: null,
+    note: "",
+  });
   follow = runtime.follow();
   take(event);
 }
@@ -273,9 +320,18 @@ const turned = () => ["turn", "tilt"].map((id) => Number(element(id).value));
 
 function start() {
   for (let i = 0; i < ROWS; i++) {
-    element("bars").append(make("li", {}, make("span", { className: "name" }), make("span", { className: "track" }, make("i")), make("span", { className: "value" })));
+    element("bars").append(
+      make(
+        "li",
+        {},
+        make("span", { className: "name" }),
+        make("span", { className: "track" }, make("i")),
+        make("span", { className: "value" }),
+      ),
+    );
   }
-  for (const name of runtime.formulations) element("formulation").append(make("option", { value: name, textContent: name }));
+  for (const name of runtime.formulations)
+    element("formulation").append(make("option", { value: name, textContent: name }));
   element("formulation").value = runtime.header.movements.formulation;
   element("how").hidden = runtime.formulations.length < 2;
   for (const label of document.querySelectorAll(".turn")) label.hidden = d === 2;
@@ -290,13 +346,20 @@ function start() {
     showAnswer();
     later();
   });
-  for (const id of ["turn", "tilt"]) element(id).addEventListener("input", () => {
-    stage.turned(...turned());
+  for (const id of ["turn", "tilt"])
+    element(id).addEventListener("input", () => {
+      stage.turned(...turned());
+      known.paint(turned());
+      later();
+    });
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
     known.paint(turned());
     later();
   });
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { known.paint(turned()); later(); });
-  new ResizeObserver(() => { known.paint(turned()); later(); }).observe(canvas);
+  new ResizeObserver(() => {
+    known.paint(turned());
+    later();
+  }).observe(canvas);
   clear();
   known.paint(turned());
   // What is drawn first should not wait for what is made once.

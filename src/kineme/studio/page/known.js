@@ -24,7 +24,8 @@ export function createKnown(runtime, prototypes, choose) {
   element("find").hidden = buttons.length <= MANY;
   element("find").addEventListener("input", () => {
     const words = element("find").value.toLowerCase().split(/\s+/);
-    for (const item of element("symbols").children) item.hidden = !words.every((word) => item.textContent.toLowerCase().includes(word));
+    for (const item of element("symbols").children)
+      item.hidden = !words.every((word) => item.textContent.toLowerCase().includes(word));
   });
 
   /** Mark the one of that name; none for null. */

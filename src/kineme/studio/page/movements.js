@@ -14,7 +14,8 @@ const distance = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1]);
 export function placed(runtime, primitive, box) {
   const { positions } = runtime.rollout(primitive);
   const shift = runtime.header.comparison.translation
-    ? boxOf(positions).center.map((c, k) => box.center[k] - c) : box.center.map(() => 0);
+    ? boxOf(positions).center.map((c, k) => box.center[k] - c)
+    : box.center.map(() => 0);
   const moved = (x) => x.map((value, k) => value + shift[k]);
   return { start: moved(primitive.start), goal: moved(primitive.goal) };
 }
@@ -37,7 +38,8 @@ export function createMoving(runtime, name, what, place) {
     try {
       made = runtime.rollout(runtime.primitive(what, formulation), { start, goal, via });
       return null;
-    } catch (error) { // as a closed movement that cannot be scaled, or via points too close together
+    } catch (error) {
+      // as a closed movement that cannot be scaled, or via points too close together
       ({ start, goal, via, formulation } = before);
       return error.message;
     }
@@ -47,8 +49,12 @@ export function createMoving(runtime, name, what, place) {
 
   /** What is under a point of the screen: start, goal, a via point, a place on the path; null for nothing. */
   function held(stage, at) {
-    const ends = [["goal", goal], ["start", start]].filter(([, x]) => distance(stage.project(x), at) < NEAR);
-    if (ends.length) return { what: ends.sort((a, b) => distance(stage.project(a[1]), at) - distance(stage.project(b[1]), at))[0][0] };
+    const ends = [
+      ["goal", goal],
+      ["start", start],
+    ].filter(([, x]) => distance(stage.project(x), at) < NEAR);
+    if (ends.length)
+      return { what: ends.sort((a, b) => distance(stage.project(a[1]), at) - distance(stage.project(b[1]), at))[0][0] };
     const known = via.findIndex(([, x]) => distance(stage.project(x), at) < NEAR);
     if (known >= 0) return { what: "via", time: via[known][0] };
     const away = made.positions.map((x) => distance(stage.project(x), at));
@@ -70,10 +76,20 @@ export function createMoving(runtime, name, what, place) {
     update,
     held,
     drag,
-    get start() { return start; },
-    get goal() { return goal; },
-    get via() { return via; },
-    get positions() { return made.positions; },
-    get times() { return made.times; },
+    get start() {
+      return start;
+    },
+    get goal() {
+      return goal;
+    },
+    get via() {
+      return via;
+    },
+    get positions() {
+      return made.positions;
+    },
+    get times() {
+      return made.times;
+    },
   };
 }

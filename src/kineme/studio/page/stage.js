@@ -28,7 +28,8 @@ export function createStage(canvas, view, box) {
   let [width, height, R] = [1, 1, viewOf(view, 0, 0)];
   let style = getComputedStyle(canvas);
   const scale = () => (FILLED * Math.min(width, height)) / box.half;
-  const rotated = (x) => Array.from({ length: d }, (_, k) => x.reduce((sum, value, h) => sum + R[k * d + h] * (value - box.center[h]), 0));
+  const rotated = (x) =>
+    Array.from({ length: d }, (_, k) => x.reduce((sum, value, h) => sum + R[k * d + h] * (value - box.center[h]), 0));
 
   function project(x) {
     const v = rotated(x);
@@ -97,7 +98,9 @@ export function createStage(canvas, view, box) {
 
 /** A place in the middle of what points cover, and half of how far they reach. */
 export function boxOf(points) {
-  const [low, high] = [Math.min, Math.max].map((most) => points[0].map((_, k) => points.reduce((one, x) => most(one, x[k]), points[0][k])));
+  const [low, high] = [Math.min, Math.max].map((most) =>
+    points[0].map((_, k) => points.reduce((one, x) => most(one, x[k]), points[0][k])),
+  );
   const center = low.map((one, k) => (one + high[k]) / 2);
   return { center, half: Math.max(...high.map((one, k) => one - center[k])) || 1 };
 }

@@ -13,15 +13,21 @@ import { startRecordings } from "./recordings/view.js";
 import { startRobot } from "./robot/view.js";
 
 const AWAY = "The server does not answer. What you draw stays here; trying again.";
-const ANEW = "The studio was started anew, with another token. Open the address that it printed; what you drew here stays until then.";
+const ANEW =
+  "The studio was started anew, with another token. Open the address that it printed; what you drew here stays until then.";
 
 /** The last part of a folder's path. @param {string} folder */
-const lastPart = (folder) => folder.replace(/[/\\]+$/, "").split(/[/\\]/).pop() || folder;
+const lastPart = (folder) =>
+  folder
+    .replace(/[/\\]+$/, "")
+    .split(/[/\\]/)
+    .pop() || folder;
 
 onLibrary((known) => {
   byId("library-name").textContent = lastPart(known.folder);
   byId("library-name").title = known.folder;
-  byId("library-count").textContent = `${counted(known.symbols.length, "symbol")}, ${counted(known.n_movements, "movement")}`;
+  byId("library-count").textContent =
+    `${counted(known.symbols.length, "symbol")}, ${counted(known.n_movements, "movement")}`;
   byId("library-mode").hidden = !known.read_only;
   byId("undo").disabled = !known.can_undo || known.read_only;
   document.body.classList.toggle("read-only", known.read_only);
@@ -32,7 +38,10 @@ onLibrary((known) => {
 function connected(here) {
   byId("status").dataset.state = here ? "here" : "away";
   byId("away-note").hidden = here;
-  if (!here) get("/api/library").catch((/** @type {any} */ error) => (byId("away-note").textContent = error.status === 401 ? ANEW : AWAY));
+  if (!here)
+    get("/api/library").catch(
+      (/** @type {any} */ error) => (byId("away-note").textContent = error.status === 401 ? ANEW : AWAY),
+    );
 }
 
 const draw = startDraw((message) => live.send(message));

@@ -207,7 +207,8 @@
       () => "data:image/gif;base64,R0lGODlhAQABAIAAAP///wAAACH5BAAAAAAALAAAAAABAAEAAAICRAEAOw==",
     );
     const loader = new T.URDFLoader(manager);
-    loader.loadMeshCb = (number, _, material, done) => done(readMesh(T, manager, data.meshes[Number(number)], material));
+    loader.loadMeshCb = (number, _, material, done) =>
+      done(readMesh(T, manager, data.meshes[Number(number)], material));
     manager.onLoad = changed;
     const arm = loader.parse(data.urdf);
     for (const name of data.joints) arm.joints[name].ignoreLimits = true; // what is executed is shown, whatever it is
@@ -235,7 +236,11 @@
       });
     data.executed.forEach(include);
     data.wanted.forEach(include);
-    for (const row of [data.positions[0], data.positions[data.positions.length >> 1], data.positions[data.positions.length - 1]]) {
+    for (const row of [
+      data.positions[0],
+      data.positions[data.positions.length >> 1],
+      data.positions[data.positions.length - 1],
+    ]) {
       pose(arm, row);
       arm.updateMatrixWorld(true);
       for (const link of Object.values(arm.links)) include(link.getWorldPosition(new T.Vector3()).toArray());
@@ -260,13 +265,18 @@
     points.forEach((point, i) => {
       const step = new T.Vector3(...(points[i + 1] ?? point)).sub(new T.Vector3(...(points[i - 1] ?? point)));
       if (step.length() > 1e-9) along = step.normalize();
-      if (Math.abs(along.dot(side)) > 0.99) side = new T.Vector3(Math.abs(along.x) < 0.9 ? 1 : 0, Math.abs(along.x) < 0.9 ? 0 : 1, 0);
+      if (Math.abs(along.dot(side)) > 0.99)
+        side = new T.Vector3(Math.abs(along.x) < 0.9 ? 1 : 0, Math.abs(along.x) < 0.9 ? 0 : 1, 0);
       side = side.clone().addScaledVector(along, -along.dot(side)).normalize();
       const other = along.clone().cross(side);
       for (let k = 0; k < sides; k += 1) {
         const angle = (2 * Math.PI * k) / sides;
         const [c, s] = [radius * Math.cos(angle), radius * Math.sin(angle)];
-        corners.push(point[0] + c * side.x + s * other.x, point[1] + c * side.y + s * other.y, point[2] + c * side.z + s * other.z);
+        corners.push(
+          point[0] + c * side.x + s * other.x,
+          point[1] + c * side.y + s * other.y,
+          point[2] + c * side.z + s * other.z,
+        );
         const [a, b] = [sides * i + k, sides * i + ((k + 1) % sides)];
         if (i + 1 < points.length) faces.push(a, b, a + sides, b, b + sides, a + sides);
       }
@@ -274,7 +284,10 @@
     const geometry = new T.BufferGeometry();
     geometry.setAttribute("position", new T.Float32BufferAttribute(corners, 3));
     geometry.setIndex(faces);
-    const made = new T.Mesh(geometry, new T.MeshBasicMaterial({ color, opacity, transparent: true, depthWrite: opacity === 1 }));
+    const made = new T.Mesh(
+      geometry,
+      new T.MeshBasicMaterial({ color, opacity, transparent: true, depthWrite: opacity === 1 }),
+    );
     made.renderOrder = order;
     made.show = (sample) => geometry.setDrawRange(0, 6 * sides * sample);
     made.frustumCulled = false;

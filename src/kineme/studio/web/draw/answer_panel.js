@@ -11,8 +11,21 @@ const pValue = (/** @type {number} */ p) => (p < 0.001 ? "< 0.001" : p.toFixed(p
 
 /** @param {string} name */
 function row(name) {
-  const parts = { name: make("span", { class: "rank-name" }, name), value: make("span", { class: "rank-value numbers" }), bar: make("span", { class: "fill" }) };
-  return { ...parts, element: make("li", { class: "rank" }, parts.name, parts.value, make("span", { class: "meter", "aria-hidden": "true" }, parts.bar)) };
+  const parts = {
+    name: make("span", { class: "rank-name" }, name),
+    value: make("span", { class: "rank-value numbers" }),
+    bar: make("span", { class: "fill" }),
+  };
+  return {
+    ...parts,
+    element: make(
+      "li",
+      { class: "rank" },
+      parts.name,
+      parts.value,
+      make("span", { class: "meter", "aria-hidden": "true" }, parts.bar),
+    ),
+  };
 }
 
 export class AnswerPanel {
@@ -68,7 +81,12 @@ export class AnswerPanel {
   drawing(state, now) {
     const best = state.ranked[0];
     const left = Number.isFinite(state.arrival) && state.arrival !== null ? Math.max(state.arrival - now, 0) : null;
-    const note = [state.progress === null ? "" : `${percent(state.progress)} of the path`, left === null ? "" : `arrives in ${left.toFixed(1)} s`].filter(Boolean).join(", ");
+    const note = [
+      state.progress === null ? "" : `${percent(state.progress)} of the path`,
+      left === null ? "" : `arrives in ${left.toFixed(1)} s`,
+    ]
+      .filter(Boolean)
+      .join(", ");
     const name = state.decided ?? best?.name;
     if (!best || (state.decided === null && state.progress < BEGUN)) this.words("Still open", "…", note, "open");
     else if (state.certainty === "new") this.words("New, so far", "Unknown", `most like ${best.name}`, "open");
@@ -85,16 +103,28 @@ export class AnswerPanel {
     const isNew = answer.certainty === "new";
     const word = capital(answer.certainty);
     if (isNew) this.words(word, "Unknown", `most like ${best.name}`, "unknown");
-    else this.words(word, answer.label, answer.rule === "guess" ? "more drawings of each would say how sure" : "", answer.certainty === "looks like" ? "open" : "known");
+    else
+      this.words(
+        word,
+        answer.label,
+        answer.rule === "guess" ? "more drawings of each would say how sure" : "",
+        answer.certainty === "looks like" ? "open" : "known",
+      );
     this.progress(1);
     this.list(answer.ranked);
     const nearest = answer.nearest?.[0];
-    this.why([
-      answer.p_known === null ? "" : `p-value of being known: ${pValue(answer.p_known)}`,
-      `p-values of names: ${answer.ranked.slice(0, ROWS).filter((/** @type {any} */ one) => one.p_value !== null).map((/** @type {any} */ one) => `${one.name} ${pValue(one.p_value)}`).join(", ")}`,
-      nearest ? `similarity to the nearest: ${nearest.similarity.toFixed(2)}` : "",
-      answer.promise,
-    ].filter(Boolean));
+    this.why(
+      [
+        answer.p_known === null ? "" : `p-value of being known: ${pValue(answer.p_known)}`,
+        `p-values of names: ${answer.ranked
+          .slice(0, ROWS)
+          .filter((/** @type {any} */ one) => one.p_value !== null)
+          .map((/** @type {any} */ one) => `${one.name} ${pValue(one.p_value)}`)
+          .join(", ")}`,
+        nearest ? `similarity to the nearest: ${nearest.similarity.toFixed(2)}` : "",
+        answer.promise,
+      ].filter(Boolean),
+    );
     this.speak(isNew ? `New: unknown.${library().read_only ? "" : " Give it a name."}` : `${word} ${answer.label}.`);
   }
 

@@ -17,7 +17,10 @@ export class Follow {
     /** @type {import("./sources.js").Source|null} Whose movement is shown. */
     this.source = null;
     this.passed = "";
-    this.sources = new Sources((source) => this.follow(source), () => this.fewer());
+    this.sources = new Sources(
+      (source) => this.follow(source),
+      () => this.fewer(),
+    );
   }
 
   /** Show no program's movement; this one not again. */
@@ -55,17 +58,28 @@ export class Follow {
   begin() {
     this.draw.clear();
     this.draw.kind = "program";
-    this.draw.picture.frame = new Frame(usualSide() ?? 0.5, library().symbols.map((/** @type {any} */ one) => one.path).filter(Boolean));
+    this.draw.picture.frame = new Frame(
+      usualSide() ?? 0.5,
+      library()
+        .symbols.map((/** @type {any} */ one) => one.path)
+        .filter(Boolean),
+    );
     this.draw.filled(true);
   }
 
   /** @param {import("./sources.js").Source} source @param {number} known How many of its samples are painted. */
   paint({ samples, state, ended }, known) {
     const { picture } = this.draw;
-    const rest = ended === null ? (state?.path ?? []).filter((/** @type {number[]} */ one) => one.length === samples[0].length - 1) : [];
+    const rest =
+      ended === null
+        ? (state?.path ?? []).filter((/** @type {number[]} */ one) => one.length === samples[0].length - 1)
+        : [];
     picture.ink = samples.map(([t, ...point]) => [t - samples[0][0], ...point]);
     picture.rest = rest;
-    picture.frame.include([...samples.slice(Math.min(known, samples.length - 1)).map((one) => one.slice(1)), ...rest], picture.board);
+    picture.frame.include(
+      [...samples.slice(Math.min(known, samples.length - 1)).map((one) => one.slice(1)), ...rest],
+      picture.board,
+    );
     picture.board.draw();
     byId("draw-clear").disabled = false;
   }
@@ -83,7 +97,8 @@ export class Follow {
     const { draw } = this;
     const { samples } = this.source;
     byId("draw-replay").disabled = false;
-    if (ended.error || samples.length < LEAST) return draw.panel.words("No answer", "?", ended.error ?? "too short", "unknown");
+    if (ended.error || samples.length < LEAST)
+      return draw.panel.words("No answer", "?", ended.error ?? "too short", "unknown");
     draw.whole = { times: samples.map(([t]) => t), positions: samples.map(([, ...point]) => point) };
     draw.answered(ended.answer);
   }

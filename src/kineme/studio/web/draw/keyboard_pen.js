@@ -24,7 +24,10 @@ export function followKeys(canvas, hear) {
     before = now;
     velocity = velocity.map((value, k) => value + SMOOTH * (wanted()[k] - value));
     const wide = canvas.clientWidth / canvas.clientHeight;
-    at = [Math.min(Math.max(at[0] + passed * velocity[0], 0), wide), Math.min(Math.max(at[1] + passed * velocity[1], 0), 1)];
+    at = [
+      Math.min(Math.max(at[0] + passed * velocity[0], 0), wide),
+      Math.min(Math.max(at[1] + passed * velocity[1], 0), 1),
+    ];
     const moved = Math.hypot(...velocity) > 0.002;
     if (moved && !since) since = now - 1000 * passed;
     if (moved) hear.goes([[(now - since) / 1000, ...at]]);

@@ -13,7 +13,9 @@ with connect("ws://${host}/api/live", additional_headers=header) as live:
     live.send(json.dumps({"finish": True}))
     print(json.loads(live.recv()))`;
 
-const JAVASCRIPT = (/** @type {string} */ host) => `const live = new WebSocket(\`ws://${host}/api/live?token=\${process.env.KINEME_STUDIO_TOKEN}\`);
+const JAVASCRIPT = (
+  /** @type {string} */ host,
+) => `const live = new WebSocket(\`ws://${host}/api/live?token=\${process.env.KINEME_STUDIO_TOKEN}\`);
 const send = (message) => live.send(JSON.stringify(message));
 live.onmessage = ({ data }) => (console.log(data), "answer" in JSON.parse(data) && live.close());
 live.onopen = async () => {
@@ -30,7 +32,11 @@ export function describeLiveSource(element) {
   const code = (/** @type {string} */ text) => make("pre", { tabindex: "0" }, make("code", {}, text));
   fill(
     element,
-    make("p", { class: "small soft" }, "Any program can send a movement while it happens, such as a hand tracker. It is shown here, and each message is answered with what it is so far. The token is in the address that kineme studio prints; KINEME_STUDIO_TOKEN keeps one. In Python:"),
+    make(
+      "p",
+      { class: "small soft" },
+      "Any program can send a movement while it happens, such as a hand tracker. It is shown here, and each message is answered with what it is so far. The token is in the address that kineme studio prints; KINEME_STUDIO_TOKEN keeps one. In Python:",
+    ),
     code(PYTHON(location.host)),
     make("p", { class: "small soft" }, "In JavaScript, with node 22 or later:"),
     code(JAVASCRIPT(location.host)),

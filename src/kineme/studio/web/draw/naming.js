@@ -29,7 +29,12 @@ export function startNaming(page) {
     field.disabled = !open;
     byId("naming-learn").disabled = !open;
     byId("draw-save").disabled = !open;
-    const chip = (/** @type {string} */ name) => make("button", { class: "button chip", type: "button", "aria-label": `Learn as ${name}`, on: { click: () => keep(name) } }, `+ ${name}`);
+    const chip = (/** @type {string} */ name) =>
+      make(
+        "button",
+        { class: "button chip", type: "button", "aria-label": `Learn as ${name}`, on: { click: () => keep(name) } },
+        `+ ${name}`,
+      );
     fill(byId("chips"), ...(open ? names.map(chip) : []));
   };
   return { allow, empty: () => (field.value = ""), focus: () => field.focus({ preventScroll: true }) };

@@ -44,7 +44,8 @@ export class Picture {
     const ink = this.ink.map((one) => this.pixel(one.slice(1)));
     const rest = this.rest.map((one) => this.pixel(one));
     if (this.turns) ground(context, this.frame.camera, this.frame.low, this.frame.high);
-    if (rest.length && ink.length) line(context, [ink[ink.length - 1], ...rest], { color: color("--predicted"), width: 3, dash: [2, 9] });
+    if (rest.length && ink.length)
+      line(context, [ink[ink.length - 1], ...rest], { color: color("--predicted"), width: 3, dash: [2, 9] });
     line(context, ink, { color: color("--ink"), width: 5, alpha: this.replayed === null ? 1 : 0.35 });
     if (ink.length) mark(context, ink[0], "dot", 6, color("--ink"));
     if (rest.length) mark(context, rest[rest.length - 1], "diamond", 8, color("--goal"));

@@ -4,11 +4,19 @@ import { library } from "../parts/library_state.js";
 const USUAL = 0.55; // of the canvas's height, what people draw
 
 /** The larger side of a path. @param {number[][]} path */
-const side = (path) => Math.max(...[0, 1].map((k) => Math.max(...path.map((point) => point[k] ?? 0)) - Math.min(...path.map((point) => point[k] ?? 0))));
+const side = (path) =>
+  Math.max(
+    ...[0, 1].map(
+      (k) => Math.max(...path.map((point) => point[k] ?? 0)) - Math.min(...path.map((point) => point[k] ?? 0)),
+    ),
+  );
 
 /** @returns {number|null} Larger side of a movement of the library, a usual one. */
 export function usualSide() {
-  const sides = library().symbols.filter((/** @type {any} */ one) => one.path?.length).map((/** @type {any} */ one) => side(one.path)).filter((/** @type {number} */ size) => size > 0);
+  const sides = library()
+    .symbols.filter((/** @type {any} */ one) => one.path?.length)
+    .map((/** @type {any} */ one) => side(one.path))
+    .filter((/** @type {number} */ size) => size > 0);
   return sides.sort((/** @type {number} */ a, /** @type {number} */ b) => a - b)[sides.length >> 1] ?? null;
 }
 

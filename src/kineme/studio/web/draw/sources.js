@@ -24,7 +24,10 @@ export class Sources {
     const known = this.known.get(told.id);
     const before = known?.movement === told.movement ? known.samples : [];
     const width = (before[0] ?? told.samples[0])?.length;
-    const source = { ...told, samples: [...before, ...told.samples.filter((/** @type {number[]} */ one) => one.length === width)].slice(-MOST) };
+    const source = {
+      ...told,
+      samples: [...before, ...told.samples.filter((/** @type {number[]} */ one) => one.length === width)].slice(-MOST),
+    };
     this.known.set(told.id, source);
     if (known?.name !== told.name) this.list();
     if (!this.ignored.has(source.name)) this.changed(source);
@@ -55,8 +58,24 @@ export class Sources {
     const focused = document.activeElement?.closest("#sources li")?.getAttribute("data-id");
     const line = (/** @type {Source} */ one) => {
       const off = this.ignored.has(one.name);
-      const button = make("button", { class: "button quiet", type: "button", "aria-pressed": String(off), "aria-label": `Ignore ${one.name}`, on: { click: () => this.ignore(one) } }, off ? "Ignored" : "Ignore");
-      return make("li", { "data-id": String(one.id), class: off ? "off" : "" }, make("span", { class: "source-dot", "aria-hidden": "true" }), make("span", { class: "source-name" }, `Live source connected: ${one.name}`), button);
+      const button = make(
+        "button",
+        {
+          class: "button quiet",
+          type: "button",
+          "aria-pressed": String(off),
+          "aria-label": `Ignore ${one.name}`,
+          on: { click: () => this.ignore(one) },
+        },
+        off ? "Ignored" : "Ignore",
+      );
+      return make(
+        "li",
+        { "data-id": String(one.id), class: off ? "off" : "" },
+        make("span", { class: "source-dot", "aria-hidden": "true" }),
+        make("span", { class: "source-name" }, `Live source connected: ${one.name}`),
+        button,
+      );
     };
     fill(byId("sources"), ...[...this.known.values()].map(line));
     byId("sources").querySelector(`[data-id="${focused}"] button`)?.focus();

@@ -19,7 +19,11 @@ export function followPointer(canvas, hear) {
     return (events.length ? events : [event]).map((one) => sampleOf(one)).filter(later);
   };
   /** @param {PointerEvent} event @returns {Sample} */
-  const sampleOf = (event) => [(event.timeStamp - first) / 1000, (event.clientX - box.left) / box.height, 1 - (event.clientY - box.top) / box.height];
+  const sampleOf = (event) => [
+    (event.timeStamp - first) / 1000,
+    (event.clientX - box.left) / box.height,
+    1 - (event.clientY - box.top) / box.height,
+  ];
   /** @param {Sample} sample */
   const later = (sample) => {
     if (sample[0] <= last) return false;

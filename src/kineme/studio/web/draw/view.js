@@ -21,7 +21,13 @@ const LEAST = 4; // samples that make a movement
 function takesDrawings() {
   const { n_dims: dims, symbols } = library();
   if (dims === null || dims === 2) return true;
-  return dims === 3 && symbols.every((/** @type {any} */ one) => !one.path || one.path.every((/** @type {number[]} */ point) => Math.abs(point[2] - one.path[0][2]) < 1e-9));
+  return (
+    dims === 3 &&
+    symbols.every(
+      (/** @type {any} */ one) =>
+        !one.path || one.path.every((/** @type {number[]} */ point) => Math.abs(point[2] - one.path[0][2]) < 1e-9),
+    )
+  );
 }
 
 /** @param {number[]} point Of the canvas. @param {number} height Of the canvas, in the units of the library. @returns {number[]} In the library's dimensions. */
@@ -53,12 +59,23 @@ class Draw {
     };
     followPointer(byId("draw-canvas"), hear);
     followKeys(byId("draw-canvas"), hear);
-    followTurns(byId("draw-canvas"), () => this.picture.turns, (dx, dy) => this.picture.turn(dx, dy));
+    followTurns(
+      byId("draw-canvas"),
+      () => this.picture.turns,
+      (dx, dy) => this.picture.turn(dx, dy),
+    );
     byId("draw-clear").addEventListener("click", () => this.clear());
     byId("draw-replay").addEventListener("click", () => this.picture.replay());
     byId("draw-move").addEventListener("click", () => this.move());
-    document.addEventListener("keydown", (event) => event.key === "Escape" && currentView() === "draw" && !document.querySelector("dialog[open]") && this.clear());
-    byId("draw-how").addEventListener("click", () => (byId("live-source").scrollIntoView({ block: "start" }), byId("live-source").firstElementChild.focus()));
+    document.addEventListener(
+      "keydown",
+      (event) =>
+        event.key === "Escape" && currentView() === "draw" && !document.querySelector("dialog[open]") && this.clear(),
+    );
+    byId("draw-how").addEventListener(
+      "click",
+      () => (byId("live-source").scrollIntoView({ block: "start" }), byId("live-source").firstElementChild.focus()),
+    );
     onLibrary(() => this.invite());
     describeLiveSource(byId("live-source-text"));
   }
@@ -68,7 +85,11 @@ class Draw {
     const { symbols, read_only: readOnly } = library();
     const takes = takesDrawings();
     this.filled(this.picture.ink.length > 0);
-    byId("draw-empty-title").textContent = !takes ? "Movements in space" : symbols.length ? "Draw a movement here" : "Nothing is known yet";
+    byId("draw-empty-title").textContent = !takes
+      ? "Movements in space"
+      : symbols.length
+        ? "Draw a movement here"
+        : "Nothing is known yet";
     byId("draw-empty-text").textContent = !takes
       ? "This library holds movements that a mouse cannot draw. Send samples from a program and see them here, or drop a recording in Recordings."
       : symbols.length || readOnly
@@ -102,7 +123,8 @@ class Draw {
   goes(samples) {
     this.picture.ink.push(...samples);
     this.picture.board.draw();
-    if (library().symbols.length) this.sending.push(samples.map(([t, ...point]) => [t, ...inLibrary(point, this.height)]));
+    if (library().symbols.length)
+      this.sending.push(samples.map(([t, ...point]) => [t, ...inLibrary(point, this.height)]));
   }
 
   ends() {
@@ -140,7 +162,14 @@ class Draw {
   /** One movement has a name: too few to say what is unlike it. */
   cannotCompare() {
     const names = library().symbols.map((/** @type {any} */ one) => one.name);
-    this.panel.words("Too few to compare", "?", names.length ? `Only ${names[0]} is known. Draw something else and name it, too: two names can be told apart.` : "Give it a name.", "unknown");
+    this.panel.words(
+      "Too few to compare",
+      "?",
+      names.length
+        ? `Only ${names[0]} is known. Draw something else and name it, too: two names can be told apart.`
+        : "Give it a name.",
+      "unknown",
+    );
     this.panel.progress(1);
     this.panel.speak("Give it a name.");
     this.naming.allow(true, names.slice(0, 3));
@@ -153,7 +182,8 @@ class Draw {
     const answer = await post("/api/recognize", asked).catch((/** @type {any} */ error) => ({ error }));
     if (asked !== this.whole) return;
     if (!answer.error) this.answered(answer);
-    else if (!answer.error.status) this.panel.words("No answer yet", "…", "It is asked for again when the server is there.", "open");
+    else if (!answer.error.status)
+      this.panel.words("No answer yet", "…", "It is asked for again when the server is there.", "open");
     else this.refused(answer.error.message);
   }
 
@@ -162,7 +192,8 @@ class Draw {
     if (!this.sending.heard() || !this.drawing) return;
     const { ink, rest } = this.picture;
     this.panel.drawing(state, ink[ink.length - 1]?.[0] ?? 0);
-    this.picture.rest = state.path?.map((/** @type {number[]} */ point) => point.map((value) => value / this.height)) ?? rest;
+    this.picture.rest =
+      state.path?.map((/** @type {number[]} */ point) => point.map((value) => value / this.height)) ?? rest;
     this.picture.board.draw();
   }
 
@@ -176,7 +207,10 @@ class Draw {
     this.panel.final(answer);
     this.label = answer.label;
     byId("draw-move").disabled = answer.label === null;
-    this.naming.allow(true, answer.ranked.slice(0, 3).map((/** @type {any} */ one) => one.name));
+    this.naming.allow(
+      true,
+      answer.ranked.slice(0, 3).map((/** @type {any} */ one) => one.name),
+    );
     this.focusName();
   }
 
@@ -211,7 +245,15 @@ class Draw {
     this.naming.allow(false);
     byId("draw-move").disabled = name === null;
     const alone = library().symbols.length < 2;
-    if (name !== null) this.panel.words("Learned", name, alone ? "Now draw something else and name it: two names can be told apart." : "Draw it again, anywhere and in any size.", "known");
+    if (name !== null)
+      this.panel.words(
+        "Learned",
+        name,
+        alone
+          ? "Now draw something else and name it: two names can be told apart."
+          : "Draw it again, anywhere and in any size.",
+        "known",
+      );
     byId("sources").classList.remove("waits");
     byId("draw-canvas").focus({ preventScroll: true });
   }
@@ -244,5 +286,12 @@ export function startDraw(send) {
   const draw = new Draw(send);
   const renewed = () => (draw.sending.renewed(), draw.follow.sources.renewed(), draw.waits && draw.askOnce());
   const lost = () => draw.sending.lost();
-  return { lost, state: draw.state.bind(draw), answer: draw.answer.bind(draw), error: draw.error.bind(draw), source: (/** @type {any} */ told) => draw.follow.sources.hear(told), renewed };
+  return {
+    lost,
+    state: draw.state.bind(draw),
+    answer: draw.answer.bind(draw),
+    error: draw.error.bind(draw),
+    source: (/** @type {any} */ told) => draw.follow.sources.hear(told),
+    renewed,
+  };
 }

@@ -11,11 +11,23 @@ export const chosen = new Set();
 
 /** @param {any} symbol @param {{open: (id: string) => void, opened: string|null, chose: () => void}} page */
 function card(symbol, page) {
-  const box = make("input", { type: "checkbox", class: "choose changes", "aria-label": `Choose ${symbol.name}`, checked: chosen.has(symbol.id), "data-key": `choose ${symbol.id}` });
+  const box = make("input", {
+    type: "checkbox",
+    class: "choose changes",
+    "aria-label": `Choose ${symbol.name}`,
+    checked: chosen.has(symbol.id),
+    "data-key": `choose ${symbol.id}`,
+  });
   box.addEventListener("change", () => (box.checked ? chosen.add(symbol.id) : chosen.delete(symbol.id), page.chose()));
   const open = make(
     "button",
-    { class: "card-open", type: "button", "aria-current": symbol.id === page.opened ? "true" : null, "data-key": `open ${symbol.id}`, on: { click: () => page.open(symbol.id) } },
+    {
+      class: "card-open",
+      type: "button",
+      "aria-current": symbol.id === page.opened ? "true" : null,
+      "data-key": `open ${symbol.id}`,
+      on: { click: () => page.open(symbol.id) },
+    },
     thumbnail(symbol.path),
     make("span", { class: "card-name", title: symbol.name }, ...breakable(symbol.name)),
     make("span", { class: "soft small" }, counted(symbol.n_members, "movement")),
@@ -28,6 +40,7 @@ export function showCards(page) {
   const { symbols } = library();
   for (const id of chosen) if (!symbols.some((/** @type {any} */ one) => one.id === id)) chosen.delete(id);
   const shown = found(byId("find-symbol"), symbols);
-  byId("none-found").textContent = symbols.length && !shown.length ? "No symbol has these words in its name or description." : "";
+  byId("none-found").textContent =
+    symbols.length && !shown.length ? "No symbol has these words in its name or description." : "";
   keepingFocus(() => fill(byId("cards"), ...shown.map((/** @type {any} */ one) => card(one, page))));
 }

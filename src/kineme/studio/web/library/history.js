@@ -21,7 +21,19 @@ const row = (one, seen) =>
     make("span", { class: "numbers soft" }, `${one.number}`),
     make("span", { class: "said" }, one.said),
     make("time", { class: "soft small" }, String(one.time).replace("T", " ").slice(0, 19)),
-    one.can_restore ? make("button", { class: "button quiet", type: "button", "data-key": `restore ${one.number}`, "aria-label": `Restore version ${one.number}`, on: { click: () => again(one, seen) } }, "Restore") : null,
+    one.can_restore
+      ? make(
+          "button",
+          {
+            class: "button quiet",
+            type: "button",
+            "data-key": `restore ${one.number}`,
+            "aria-label": `Restore version ${one.number}`,
+            on: { click: () => again(one, seen) },
+          },
+          "Restore",
+        )
+      : null,
   );
 
 export async function showHistory() {

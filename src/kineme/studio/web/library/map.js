@@ -37,10 +37,16 @@ export class MovementMap {
   /** @returns {number[][]} Pixels of all points. */
   pixels() {
     const { width, height } = this.board;
-    const range = (/** @type {"x"|"y"} */ axis) => [Math.min(...this.points.map((p) => p[axis])), Math.max(...this.points.map((p) => p[axis]))];
+    const range = (/** @type {"x"|"y"} */ axis) => [
+      Math.min(...this.points.map((p) => p[axis])),
+      Math.max(...this.points.map((p) => p[axis])),
+    ];
     const [[left, right], [low, high]] = [range("x"), range("y")];
     const scale = Math.min((width - 2 * EDGE) / (right - left || 1), (height - 2 * EDGE) / (high - low || 1));
-    return this.points.map(({ x, y }) => [width / 2 + scale * (x - (left + right) / 2), height / 2 - scale * (y - (low + high) / 2)]);
+    return this.points.map(({ x, y }) => [
+      width / 2 + scale * (x - (left + right) / 2),
+      height / 2 - scale * (y - (low + high) / 2),
+    ]);
   }
 
   paint() {
@@ -60,10 +66,19 @@ export class MovementMap {
   names(pixels) {
     const { context } = this.board;
     const places = new Map();
-    this.points.forEach((point, k) => point.symbol !== null && places.set(point.symbol, [...(places.get(point.symbol) ?? []), pixels[k]]));
+    this.points.forEach(
+      (point, k) => point.symbol !== null && places.set(point.symbol, [...(places.get(point.symbol) ?? []), pixels[k]]),
+    );
     const chosen = this.points[this.at]?.symbol ?? null;
     const taken = places.size > MANY ? pixels.map(([x, y]) => [x - 7, x + 7, y + 4, 12]) : [];
-    Object.assign(context, { font: `600 13px ${color("--font")}`, textAlign: "center", lineWidth: 4, strokeStyle: color("--surface"), fillStyle: color("--text"), lineJoin: "round" });
+    Object.assign(context, {
+      font: `600 13px ${color("--font")}`,
+      textAlign: "center",
+      lineWidth: 4,
+      strokeStyle: color("--surface"),
+      fillStyle: color("--text"),
+      lineJoin: "round",
+    });
     context.globalAlpha = chosen === null ? 1 : 0.3;
     for (const [id, members] of places) if (id !== chosen) this.name(id, members, taken);
     context.globalAlpha = 1;
@@ -96,7 +111,10 @@ export class MovementMap {
       [Math.max(...across) + half + 8, middle(along) + 4],
       [Math.min(...across) - half - 8, middle(along) + 4],
     ];
-    const free = ([at, line]) => taken.every(([left, right, other, room]) => at + half < left || at - half > right || Math.abs(line - other) > room);
+    const free = ([at, line]) =>
+      taken.every(
+        ([left, right, other, room]) => at + half < left || at - half > right || Math.abs(line - other) > room,
+      );
     return places.find(([at, line]) => at >= half && at <= width - half && free([at, line])) ?? null;
   }
 

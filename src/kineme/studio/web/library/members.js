@@ -10,8 +10,20 @@ const PAGE = 60;
 /** @param {any} movement @param {Set<number>} chosen @param {() => void} changed */
 export function memberButton(movement, chosen, changed) {
   const about = `${movement.name ?? `Movement ${movement.id}`}, ${Number(movement.duration ?? 0).toFixed(1)} s`;
-  if (library().read_only) return make("div", { class: "member", role: "img", "aria-label": about, title: about }, thumbnail(movement.path));
-  const button = make("button", { class: "member", type: "button", "aria-pressed": String(chosen.has(movement.id)), "aria-label": about, title: about, "data-key": `movement ${movement.id}` }, thumbnail(movement.path));
+  if (library().read_only)
+    return make("div", { class: "member", role: "img", "aria-label": about, title: about }, thumbnail(movement.path));
+  const button = make(
+    "button",
+    {
+      class: "member",
+      type: "button",
+      "aria-pressed": String(chosen.has(movement.id)),
+      "aria-label": about,
+      title: about,
+      "data-key": `movement ${movement.id}`,
+    },
+    thumbnail(movement.path),
+  );
   button.addEventListener("click", () => {
     chosen.has(movement.id) ? chosen.delete(movement.id) : chosen.add(movement.id);
     button.setAttribute("aria-pressed", String(chosen.has(movement.id)));
@@ -27,8 +39,16 @@ export class Members {
     this.query = query;
     this.changed = changed;
     this.chosen = new Set();
-    this.grid = make("div", { class: "members", role: "group", "aria-label": library().read_only ? "Movements" : "Movements; choose some" });
-    this.more = make("button", { class: "button quiet", type: "button", hidden: true, on: { click: () => this.load() } }, "Show more");
+    this.grid = make("div", {
+      class: "members",
+      role: "group",
+      "aria-label": library().read_only ? "Movements" : "Movements; choose some",
+    });
+    this.more = make(
+      "button",
+      { class: "button quiet", type: "button", hidden: true, on: { click: () => this.load() } },
+      "Show more",
+    );
     this.element = make("div", { class: "members-part" }, this.grid, this.more);
     this.shown = 0;
     this.loading = false;

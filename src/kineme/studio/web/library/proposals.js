@@ -24,20 +24,51 @@ async function unlabeled() {
 /** @param {any} proposal @param {Map<number, any>} movements */
 function card(proposal, movements) {
   const chosen = new Set();
-  const field = make("input", { type: "text", list: "names", maxlength: "200", placeholder: "Name", "aria-label": "Name of these movements", "data-key": `proposal ${proposal.medoid}` });
+  const field = make("input", {
+    type: "text",
+    list: "names",
+    maxlength: "200",
+    placeholder: "Name",
+    "aria-label": "Name of these movements",
+    "data-key": `proposal ${proposal.medoid}`,
+  });
   const yes = make("button", { class: "button main", type: "submit" });
-  const label = () => (yes.textContent = chosen.size ? `Name the ${chosen.size} chosen` : `Name all ${proposal.members.length}`);
+  const label = () =>
+    (yes.textContent = chosen.size ? `Name the ${chosen.size} chosen` : `Name all ${proposal.members.length}`);
   label();
-  const shown = [proposal.medoid, ...proposal.members.filter((/** @type {number} */ id) => id !== proposal.medoid)].slice(0, SHOWN);
-  const grid = make("div", { class: "members", role: "group", "aria-label": library().read_only ? "Its movements" : "Its movements; choose some to name those alone" }, ...shown.map((id) => memberButton(movements.get(id) ?? { id, path: null, name: null, duration: 0 }, chosen, label)));
-  const form = make("form", { class: "naming" }, field, yes, make("button", { class: "button quiet", type: "button", on: { click: () => reject(proposal.id) } }, "Not a symbol"));
+  const shown = [
+    proposal.medoid,
+    ...proposal.members.filter((/** @type {number} */ id) => id !== proposal.medoid),
+  ].slice(0, SHOWN);
+  const grid = make(
+    "div",
+    {
+      class: "members",
+      role: "group",
+      "aria-label": library().read_only ? "Its movements" : "Its movements; choose some to name those alone",
+    },
+    ...shown.map((id) => memberButton(movements.get(id) ?? { id, path: null, name: null, duration: 0 }, chosen, label)),
+  );
+  const form = make(
+    "form",
+    { class: "naming" },
+    field,
+    yes,
+    make("button", { class: "button quiet", type: "button", on: { click: () => reject(proposal.id) } }, "Not a symbol"),
+  );
   form.addEventListener("submit", (event) => {
     event.preventDefault();
     const name = field.value.trim();
     if (!name) return field.focus();
     return chosen.size ? assign([...chosen], name) : accept(proposal.id, name);
   });
-  return make("li", { class: "card proposal" }, make("p", { class: "soft small" }, counted(proposal.members.length, "alike movement")), grid, library().read_only ? null : form);
+  return make(
+    "li",
+    { class: "card proposal" },
+    make("p", { class: "soft small" }, counted(proposal.members.length, "alike movement")),
+    grid,
+    library().read_only ? null : form,
+  );
 }
 
 export async function showProposals() {
@@ -48,6 +79,7 @@ export async function showProposals() {
   const movements = await tried(unlabeled);
   if (!answer || !movements || version !== library().version) return;
   const { proposals } = answer;
-  byId("proposals-text").textContent = `${counted(count, "movement")} without a name. ${proposals.length > 1 ? `${proposals.length} groups of them may be a symbol each.` : proposals.length ? "One group of them may be a symbol." : "They form no clear groups yet; choose those that belong together under Show all."}`;
+  byId("proposals-text").textContent =
+    `${counted(count, "movement")} without a name. ${proposals.length > 1 ? `${proposals.length} groups of them may be a symbol each.` : proposals.length ? "One group of them may be a symbol." : "They form no clear groups yet; choose those that belong together under Show all."}`;
   keepingFocus(() => fill(byId("proposal-cards"), ...proposals.map((/** @type {any} */ one) => card(one, movements))));
 }

@@ -12,7 +12,8 @@ import { Members } from "./members.js";
 const UNLABELED = "";
 
 /** @param {string} text @param {() => any} act @param {string} kind */
-const button = (text, act, kind = "") => make("button", { class: `button ${kind}`, type: "button", "data-key": `symbol ${text}`, on: { click: act } }, text);
+const button = (text, act, kind = "") =>
+  make("button", { class: `button ${kind}`, type: "button", "data-key": `symbol ${text}`, on: { click: act } }, text);
 
 /** @param {any} symbol */
 async function rename(symbol) {
@@ -23,7 +24,8 @@ async function rename(symbol) {
 /** @param {any} symbol */
 async function forget(symbol) {
   const text = "Its movements stay in the library without a name. This can be undone.";
-  if (await ask({ title: `Delete ${symbol.name}?`, text, yes: "Delete", danger: true })) await changes.forget(symbol.id, symbol.name);
+  if (await ask({ title: `Delete ${symbol.name}?`, text, yes: "Delete", danger: true }))
+    await changes.forget(symbol.id, symbol.name);
 }
 
 /** @param {any} symbol */
@@ -37,19 +39,44 @@ function description(symbol) {
 /** What can be done with chosen movements. @param {any} symbol Or null of those without one. @param {Members} members */
 function actions(symbol, members) {
   const ids = () => members.ids();
-  const name = (/** @type {string} */ title) => ask({ title, text: `${counted(ids().length, "movement")} chosen. A name that exists is that symbol, another one is a new symbol.`, yes: "Give the name", name: "" });
+  const name = (/** @type {string} */ title) =>
+    ask({
+      title,
+      text: `${counted(ids().length, "movement")} chosen. A name that exists is that symbol, another one is a new symbol.`,
+      yes: "Give the name",
+      name: "",
+    });
   const give = async () => {
     const to = await name("Which name?");
     if (to) await changes.assign(ids(), to);
   };
   const split = async () => {
-    const to = await ask({ title: `Split ${symbol.name}`, text: `${counted(ids().length, "movement")} become a symbol of their own.`, yes: "Split", name: "" });
+    const to = await ask({
+      title: `Split ${symbol.name}`,
+      text: `${counted(ids().length, "movement")} become a symbol of their own.`,
+      yes: "Split",
+      name: "",
+    });
     if (to) await changes.split(symbol.id, ids(), to);
   };
   const drop = async () => {
-    if (await ask({ title: `Delete ${counted(ids().length, "movement")}?`, text: "This can be undone.", yes: "Delete", danger: true })) await changes.deleteMovements(ids());
+    if (
+      await ask({
+        title: `Delete ${counted(ids().length, "movement")}?`,
+        text: "This can be undone.",
+        yes: "Delete",
+        danger: true,
+      })
+    )
+      await changes.deleteMovements(ids());
   };
-  const made = symbol ? [button("Split off", split), button("Give another name", give), button("Remove the name", () => changes.assign(ids(), null))] : [button("Give a name", give, "main")];
+  const made = symbol
+    ? [
+        button("Split off", split),
+        button("Give another name", give),
+        button("Remove the name", () => changes.assign(ids(), null)),
+      ]
+    : [button("Give a name", give, "main")];
   return [...made, button("Delete", drop, "danger")];
 }
 
@@ -58,7 +85,10 @@ export class SymbolPanel {
   /** @param {(id: string) => void} closed */
   constructor(closed) {
     this.closed = closed;
-    byId("symbol").addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => event.key === "Escape" && this.close());
+    byId("symbol").addEventListener(
+      "keydown",
+      (/** @type {KeyboardEvent} */ event) => event.key === "Escape" && this.close(),
+    );
     /** @type {string|null} Id; "" for the movements without a symbol. */
     this.opened = null;
     this.version = -1;
@@ -82,7 +112,12 @@ export class SymbolPanel {
   show() {
     const panel = byId("symbol");
     const symbol = this.opened ? symbolOf(this.opened) : null;
-    if (this.opened === null || (this.opened !== UNLABELED && !symbol) || (this.opened === UNLABELED && !library().unlabeled)) return this.hint(panel);
+    if (
+      this.opened === null ||
+      (this.opened !== UNLABELED && !symbol) ||
+      (this.opened === UNLABELED && !library().unlabeled)
+    )
+      return this.hint(panel);
     if (this.version === library().version) return;
     this.version = library().version;
     panel.classList.add("opened");
@@ -95,9 +130,25 @@ export class SymbolPanel {
     const acts = library().read_only ? [] : actions(symbol, members);
     for (const one of acts) one.disabled = true;
     const bar = make("div", { class: "row", role: "group", "aria-label": "Chosen movements" }, ...acts);
-    const close = make("button", { class: "button quiet square sheet-close", type: "button", "aria-label": "Close", on: { click: () => this.close() } }, "×");
+    const close = make(
+      "button",
+      {
+        class: "button quiet square sheet-close",
+        type: "button",
+        "aria-label": "Close",
+        on: { click: () => this.close() },
+      },
+      "×",
+    );
     const acting = acts.length ? [count, bar] : [];
-    fill(panel, close, ...(symbol ? this.head(symbol) : [make("h2", {}, "Without a name")]), make("h3", {}, counted(symbol ? symbol.n_members : library().unlabeled, "movement")), ...acting, members.element);
+    fill(
+      panel,
+      close,
+      ...(symbol ? this.head(symbol) : [make("h2", {}, "Without a name")]),
+      make("h3", {}, counted(symbol ? symbol.n_members : library().unlabeled, "movement")),
+      ...acting,
+      members.element,
+    );
   }
 
   /** @param {any} symbol */
@@ -106,8 +157,20 @@ export class SymbolPanel {
     const { read_only: readOnly } = library();
     const facts = symbol.duration ? `${Number(symbol.duration).toFixed(1)} s` : "";
     return [
-      make("div", { class: "symbol-head" }, thumbnail(symbol.path), make("div", {}, make("h2", {}, ...breakable(symbol.name)), make("p", { class: "soft" }, facts))),
-      make("div", { class: "row" }, button("Move it", moveIt, "main"), ...(readOnly ? [] : [button("Rename", () => rename(symbol)), button("Delete symbol", () => forget(symbol), "danger")])),
+      make(
+        "div",
+        { class: "symbol-head" },
+        thumbnail(symbol.path),
+        make("div", {}, make("h2", {}, ...breakable(symbol.name)), make("p", { class: "soft" }, facts)),
+      ),
+      make(
+        "div",
+        { class: "row" },
+        button("Move it", moveIt, "main"),
+        ...(readOnly
+          ? []
+          : [button("Rename", () => rename(symbol)), button("Delete symbol", () => forget(symbol), "danger")]),
+      ),
       readOnly ? symbol.description && make("p", {}, symbol.description) : description(symbol),
     ];
   }
@@ -116,6 +179,20 @@ export class SymbolPanel {
   hint(panel) {
     this.opened = null;
     panel.classList.remove("opened");
-    fill(panel, make("div", { class: "empty" }, make("h3", {}, "Choose a symbol"), make("p", {}, library().read_only ? "Here its movements are shown." : "Here it can be renamed, described and deleted; its movements can be split off or given to another symbol. Everything can be undone.")));
+    fill(
+      panel,
+      make(
+        "div",
+        { class: "empty" },
+        make("h3", {}, "Choose a symbol"),
+        make(
+          "p",
+          {},
+          library().read_only
+            ? "Here its movements are shown."
+            : "Here it can be renamed, described and deleted; its movements can be split off or given to another symbol. Everything can be undone.",
+        ),
+      ),
+    );
   }
 }

@@ -16,24 +16,35 @@ let shown = -1; // version
 async function mergeChosen() {
   const ids = [...chosen];
   const names = ids.map((id) => symbolOf(id).name);
-  const into = await ask({ title: `Merge ${counted(ids.length, "symbol")}`, text: names.join(", "), yes: "Merge", name: names[0] });
+  const into = await ask({
+    title: `Merge ${counted(ids.length, "symbol")}`,
+    text: names.join(", "),
+    yes: "Merge",
+    name: names[0],
+  });
   if (!into) return;
   chosen.clear();
   await merge(ids, into);
 }
 
 export function startLibrary() {
-  const panel = new SymbolPanel((id) => (marked(null), /** @type {any} */ (document.querySelector(`[data-key="${CSS.escape(`open ${id}`)}"]`))?.focus()));
+  const panel = new SymbolPanel(
+    (id) => (
+      marked(null), /** @type {any} */ (document.querySelector(`[data-key="${CSS.escape(`open ${id}`)}"]`))?.focus()
+    ),
+  );
   const map = new MovementMap((id) => open(id));
   const chose = () => {
     byId("merging").hidden = library().symbols.length < 2;
-    byId("chosen-count").textContent = chosen.size > 1 ? `${chosen.size} chosen` : chosen.size ? "1 chosen; tick another" : "Tick two or more";
+    byId("chosen-count").textContent =
+      chosen.size > 1 ? `${chosen.size} chosen` : chosen.size ? "1 chosen; tick another" : "Tick two or more";
     byId("merge").disabled = chosen.size < 2 || library().read_only;
   };
   const cards = () => showCards({ open, opened: panel.opened, chose });
   /** @param {string|null} id The one that is open. */
   function marked(id) {
-    for (const one of document.querySelectorAll(".card-open")) one.setAttribute("aria-current", String(/** @type {any} */ (one).dataset.key === `open ${id}`));
+    for (const one of document.querySelectorAll(".card-open"))
+      one.setAttribute("aria-current", String(/** @type {any} */ (one).dataset.key === `open ${id}`));
   }
   function open(/** @type {string} */ id) {
     panel.open(id, true);
@@ -44,7 +55,8 @@ export function startLibrary() {
     shown = library().version;
     const nothing = library().n_movements === 0;
     byId("library-empty").hidden = library().symbols.length > 0;
-    byId("library-empty-text").textContent = `A symbol is a movement with a name. ${library().read_only ? "This library holds none." : nothing ? "Draw one and name it, or drop recordings." : "Name movements that are here, or draw one."}`;
+    byId("library-empty-text").textContent =
+      `A symbol is a movement with a name. ${library().read_only ? "This library holds none." : nothing ? "Draw one and name it, or drop recordings." : "Name movements that are here, or draw one."}`;
     byId("library-head").hidden = !library().symbols.length;
     byId("history").hidden = byId("symbol").hidden = nothing;
     panel.show();

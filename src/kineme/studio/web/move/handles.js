@@ -37,7 +37,10 @@ export class Handles {
 
   /** @param {Handle} handle */
   add(handle) {
-    const made = { handle, button: make("button", { class: `handle ${handle.kind}`, type: "button", "data-key": `handle ${handle.key}` }) };
+    const made = {
+      handle,
+      button: make("button", { class: `handle ${handle.kind}`, type: "button", "data-key": `handle ${handle.key}` }),
+    };
     made.button.addEventListener("pointerdown", (/** @type {PointerEvent} */ event) => this.grab(made, event));
     made.button.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => this.key(made, event));
     byId("handles").append(made.button);
@@ -79,7 +82,13 @@ export class Handles {
       const [x, y] = this.camera.toScreen(handle.at());
       button.style.setProperty("--x", `${x.toFixed(1)}px`);
       button.style.setProperty("--y", `${y.toFixed(1)}px`);
-      button.setAttribute("aria-label", `${handle.name} at ${handle.at().map((value) => this.page.said(value)).join(", ")}`);
+      button.setAttribute(
+        "aria-label",
+        `${handle.name} at ${handle
+          .at()
+          .map((value) => this.page.said(value))
+          .join(", ")}`,
+      );
       button.title = handle.name;
     }
   }

@@ -9,10 +9,30 @@ import { thumbnail } from "../parts/thumbnails.js";
 /** @param {string|null} chosen @param {(id: string) => void} choose */
 export function showPick(chosen, choose) {
   const option = (/** @type {any} */ symbol) => {
-    const radio = make("input", { type: "radio", name: "move", class: "away", checked: symbol.id === chosen, "data-key": `pick ${symbol.id}`, on: { change: () => choose(symbol.id) } });
-    return make("label", { class: "pick-one" }, radio, make("span", { class: "pick-face" }, thumbnail(symbol.path), make("span", { class: "pick-name", title: symbol.name }, ...breakable(symbol.name))));
+    const radio = make("input", {
+      type: "radio",
+      name: "move",
+      class: "away",
+      checked: symbol.id === chosen,
+      "data-key": `pick ${symbol.id}`,
+      on: { change: () => choose(symbol.id) },
+    });
+    return make(
+      "label",
+      { class: "pick-one" },
+      radio,
+      make(
+        "span",
+        { class: "pick-face" },
+        thumbnail(symbol.path),
+        make("span", { class: "pick-name", title: symbol.name }, ...breakable(symbol.name)),
+      ),
+    );
   };
-  const symbols = found(byId("find-pick"), library().symbols.filter((/** @type {any} */ one) => one.path));
+  const symbols = found(
+    byId("find-pick"),
+    library().symbols.filter((/** @type {any} */ one) => one.path),
+  );
   keepingFocus(() => fill(byId("move-pick"), ...symbols.map(option)));
   const at = byId("move-pick").querySelector(":checked")?.closest("label");
   const row = byId("move-pick");

@@ -18,13 +18,22 @@ export class MovePicture {
     this.board = new Board(byId("move-canvas"), () => this.paint());
     this.board.resized = () => (this.fit(), turned());
     this.turned = turned;
-    followTurns(this.board.canvas, () => !this.camera.flat, (dx, dy) => this.turn(dx, dy));
+    followTurns(
+      this.board.canvas,
+      () => !this.camera.flat,
+      (dx, dy) => this.turn(dx, dy),
+    );
   }
 
   /** Points that must be in the picture: those one can take hold of, and paths unless they run far away. */
   points() {
     const { path, start, goal, via, obstacles } = this.plan;
-    const own = [start, goal, ...via.map((/** @type {any} */ one) => one.point), ...obstacles.map((/** @type {any} */ one) => one.center)];
+    const own = [
+      start,
+      goal,
+      ...via.map((/** @type {any} */ one) => one.point),
+      ...obstacles.map((/** @type {any} */ one) => one.center),
+    ];
     const around = [...path, ...own];
     const far = 1.5 * extent(around);
     const near = (/** @type {number[]} */ point) => Math.hypot(...point.map((value, k) => value - path[0][k])) < far;
@@ -60,10 +69,14 @@ export class MovePicture {
     if (!this.plan) return;
     const pixels = (/** @type {number[][]} */ rows) => rows.map((row) => this.camera.toScreen(row));
     if (!this.camera.flat) this.ground();
-    for (const { center, radius } of this.plan.obstacles) this.obstacle(this.camera.toScreen(center), radius * this.camera.scale);
+    for (const { center, radius } of this.plan.obstacles)
+      this.obstacle(this.camera.toScreen(center), radius * this.camera.scale);
     line(context, pixels(this.plan.path), { color: color("--gray"), width: 7, alpha: 0.28 });
-    for (const { path, look } of this.paths) line(context, pixels(path.positions), { color: color(look.color), width: 3.5, dash: look.dash });
-    if (this.time !== null) for (const { path, look } of this.paths) mark(context, this.camera.toScreen(this.at(path)), "dot", 9, color(look.color));
+    for (const { path, look } of this.paths)
+      line(context, pixels(path.positions), { color: color(look.color), width: 3.5, dash: look.dash });
+    if (this.time !== null)
+      for (const { path, look } of this.paths)
+        mark(context, this.camera.toScreen(this.at(path)), "dot", 9, color(look.color));
   }
 
   /** @param {number[]} at @param {number} radius [px] */
@@ -90,7 +103,10 @@ export class MovePicture {
     if (next === 0) return path.positions[0];
     const [before, after] = [path.times[next - 1] - path.times[0], path.times[next] - path.times[0]];
     const share = (this.time - before) / (after - before);
-    return path.positions[next].map((/** @type {number} */ value, /** @type {number} */ k) => path.positions[next - 1][k] + share * (value - path.positions[next - 1][k]));
+    return path.positions[next].map(
+      (/** @type {number} */ value, /** @type {number} */ k) =>
+        path.positions[next - 1][k] + share * (value - path.positions[next - 1][k]),
+    );
   }
 
   turn(/** @type {number} */ dx, /** @type {number} */ dy) {

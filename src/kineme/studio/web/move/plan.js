@@ -20,20 +20,35 @@ export function draggedWay(plan) {
 /** The movement as it was shown. @param {any} symbol @param {any} rollout @returns {Plan} */
 export function asShown(symbol, rollout) {
   const usual = rollout.times[rollout.times.length - 1] - rollout.times[0];
-  return { symbol: symbol.id, start: [...rollout.start], goal: [...rollout.goal], path: rollout.recorded ?? rollout.positions, reach: way(rollout), usual, share: 1, style: null, via: [], obstacles: [] };
+  return {
+    symbol: symbol.id,
+    start: [...rollout.start],
+    goal: [...rollout.goal],
+    path: rollout.recorded ?? rollout.positions,
+    reach: way(rollout),
+    usual,
+    share: 1,
+    style: null,
+    via: [],
+    obstacles: [],
+  };
 }
 
 /** The size of the movement, for distances that fit it. @param {number[][]} path */
 export function extent(path) {
-  const spans = path[0].map((_, k) => Math.max(...path.map((point) => point[k])) - Math.min(...path.map((point) => point[k])));
+  const spans = path[0].map(
+    (_, k) => Math.max(...path.map((point) => point[k])) - Math.min(...path.map((point) => point[k])),
+  );
   return Math.hypot(...spans) || 1;
 }
 
 /** A coordinate as far as it matters in a movement of a size. @param {number} value @param {number} size @returns {string} */
-export const rounded = (value, size) => String(Number(value.toFixed(Math.min(Math.max(Math.ceil(2.2 - Math.log10(size)), 0), 12))));
+export const rounded = (value, size) =>
+  String(Number(value.toFixed(Math.min(Math.max(Math.ceil(2.2 - Math.log10(size)), 0), 12))));
 
 /** What moves: the prototype, or a style of its symbol. @param {Plan} plan */
-export const what = (plan) => (plan.style ? { style: { symbol: plan.symbol, values: plan.style } } : { symbol: plan.symbol });
+export const what = (plan) =>
+  plan.style ? { style: { symbol: plan.symbol, values: plan.style } } : { symbol: plan.symbol };
 
 /** @param {Plan} plan @param {string} formulation @returns {any} A question to the server. */
 export function question(plan, formulation) {

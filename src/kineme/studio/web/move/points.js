@@ -7,7 +7,13 @@ const AXES = ["x", "y", "z"];
 
 /** @param {string} label @param {string} key @param {string} value @param {(value: number) => void} set @param {Record<string, any>} more */
 function number(label, key, value, set, more = {}) {
-  const field = make("input", { type: "number", step: "any", "aria-label": label, "data-key": `number ${key}`, ...more });
+  const field = make("input", {
+    type: "number",
+    step: "any",
+    "aria-label": label,
+    "data-key": `number ${key}`,
+    ...more,
+  });
   field.value = value;
   field.addEventListener("change", () => Number.isFinite(field.valueAsNumber) && set(field.valueAsNumber));
   return field;
@@ -15,9 +21,23 @@ function number(label, key, value, set, more = {}) {
 
 /** @param {string} name @param {number[]} point @param {(value: number) => string} short @param {() => void} changed @param {(()=>void)|null} remove @param {...any} more */
 function row(name, point, short, changed, remove, ...more) {
-  const fields = point.map((value, k) => number(`${name} ${AXES[k] ?? k}`, `${name} ${k}`, short(value), (typed) => ((point[k] = typed), changed())));
-  const away = remove && make("button", { class: "button quiet square", type: "button", "aria-label": `Remove ${name}`, on: { click: remove } }, "×");
-  return make("li", { class: "point" }, make("span", { class: "point-name" }, name), make("span", { class: "point-fields" }, ...fields, ...more), away ?? make("span", {}));
+  const fields = point.map((value, k) =>
+    number(`${name} ${AXES[k] ?? k}`, `${name} ${k}`, short(value), (typed) => ((point[k] = typed), changed())),
+  );
+  const away =
+    remove &&
+    make(
+      "button",
+      { class: "button quiet square", type: "button", "aria-label": `Remove ${name}`, on: { click: remove } },
+      "×",
+    );
+  return make(
+    "li",
+    { class: "point" },
+    make("span", { class: "point-name" }, name),
+    make("span", { class: "point-fields" }, ...fields, ...more),
+    away ?? make("span", {}),
+  );
 }
 
 /** @param {any} plan @param {() => void} changed After a number; `structure` true where a point went away. @param {() => void} removed */
@@ -26,15 +46,58 @@ export function showPoints(plan, changed, removed) {
   const short = (/** @type {number} */ value) => rounded(value, size);
   const drop = (/** @type {any[]} */ list, /** @type {number} */ k) => () => (list.splice(k, 1), removed());
   const via = plan.via.map((/** @type {any} */ one, /** @type {number} */ k) =>
-    row(`Via ${k + 1}`, one.point, short, changed, drop(plan.via, k), number(`Via ${k + 1} when, percent of the duration`, `via ${k} when`, rounded(100 * one.at, 100), (at) => ((one.at = Math.min(Math.max(at / 100, 0.01), 0.99)), changed()), { min: "1", max: "99", title: "When, percent of the duration" })),
+    row(
+      `Via ${k + 1}`,
+      one.point,
+      short,
+      changed,
+      drop(plan.via, k),
+      number(
+        `Via ${k + 1} when, percent of the duration`,
+        `via ${k} when`,
+        rounded(100 * one.at, 100),
+        (at) => ((one.at = Math.min(Math.max(at / 100, 0.01), 0.99)), changed()),
+        { min: "1", max: "99", title: "When, percent of the duration" },
+      ),
+    ),
   );
   const obstacles = plan.obstacles.map((/** @type {any} */ one, /** @type {number} */ k) =>
-    row(`Obstacle ${k + 1}`, one.center, short, changed, drop(plan.obstacles, k), number(`Obstacle ${k + 1} radius`, `obstacle ${k} radius`, short(one.radius), (radius) => ((one.radius = Math.abs(radius) || one.radius), changed()), { min: "0", title: "Radius" })),
+    row(
+      `Obstacle ${k + 1}`,
+      one.center,
+      short,
+      changed,
+      drop(plan.obstacles, k),
+      number(
+        `Obstacle ${k + 1} radius`,
+        `obstacle ${k} radius`,
+        short(one.radius),
+        (radius) => ((one.radius = Math.abs(radius) || one.radius), changed()),
+        { min: "0", title: "Radius" },
+      ),
+    ),
   );
   const extra = via.length || obstacles.length;
-  const heads = [...plan.start.map((/** @type {number} */ _, /** @type {number} */ k) => AXES[k] ?? String(k + 1)), ...(extra ? [via.length && obstacles.length ? "%, radius" : via.length ? "when %" : "radius"] : [])];
-  const head = make("li", { class: "point head", "aria-hidden": "true" }, make("span", {}), make("span", { class: "point-fields" }, ...heads.map((text) => make("span", {}, text))));
+  const heads = [
+    ...plan.start.map((/** @type {number} */ _, /** @type {number} */ k) => AXES[k] ?? String(k + 1)),
+    ...(extra ? [via.length && obstacles.length ? "%, radius" : via.length ? "when %" : "radius"] : []),
+  ];
+  const head = make(
+    "li",
+    { class: "point head", "aria-hidden": "true" },
+    make("span", {}),
+    make("span", { class: "point-fields" }, ...heads.map((text) => make("span", {}, text))),
+  );
   byId("points").classList.toggle("deep", plan.start.length + (extra ? 1 : 0) > 3);
   byId("points").style.setProperty("--columns", String(plan.start.length + (extra ? 1 : 0)));
-  keepingFocus(() => fill(byId("points"), head, row("Start", plan.start, short, changed, null), row("Goal", plan.goal, short, changed, null), ...via, ...obstacles));
+  keepingFocus(() =>
+    fill(
+      byId("points"),
+      head,
+      row("Start", plan.start, short, changed, null),
+      row("Goal", plan.goal, short, changed, null),
+      ...via,
+      ...obstacles,
+    ),
+  );
 }

@@ -18,7 +18,10 @@ export function primitiveOf(what, formulation, version) {
   const key = JSON.stringify([what, formulation, version]);
   if (!known.has(key)) {
     if (known.size > 60) known.clear();
-    known.set(key, ask(what, formulation).catch(() => (known.delete(key), null))); // next time it is asked again
+    known.set(
+      key,
+      ask(what, formulation).catch(() => (known.delete(key), null)),
+    ); // next time it is asked again
   }
   return /** @type {Promise<any>} */ (known.get(key));
 }

@@ -23,19 +23,56 @@ export async function showStyles(symbol, changed, current) {
   const box = make("input", { type: "checkbox", "data-key": "mix" });
   const sliders = styles.lowest.slice(0, SHOWN).map((/** @type {number} */ low, /** @type {number} */ k) => {
     const high = styles.highest[k];
-    const slider = make("input", { type: "range", min: "-100", max: "100", "aria-label": `Style ${k + 1}`, disabled: true });
+    const slider = make("input", {
+      type: "range",
+      min: "-100",
+      max: "100",
+      "aria-label": `Style ${k + 1}`,
+      disabled: true,
+    });
     slider.value = "0";
     slider.addEventListener("input", () => {
       const at = Number(slider.value) / 100;
       values[k] = at < 0 ? -at * low : at * high;
       changed([...values], styles.formulation);
     });
-    return { slider, row: make("label", { class: "style-row" }, make("span", { class: "small" }, `Style ${k + 1}`, make("span", { class: "soft says" }, `${Math.round(100 * styles.explained[k])} % of differences`)), slider) };
+    return {
+      slider,
+      row: make(
+        "label",
+        { class: "style-row" },
+        make(
+          "span",
+          { class: "small" },
+          `Style ${k + 1}`,
+          make("span", { class: "soft says" }, `${Math.round(100 * styles.explained[k])} % of differences`),
+        ),
+        slider,
+      ),
+    };
   });
   box.addEventListener("change", () => {
     for (const { slider } of sliders) slider.disabled = !box.checked;
     changed(box.checked ? [...values] : null, styles.formulation);
   });
-  fill(byId("style-rows"), make("label", { class: "check" }, box, make("span", {}, "Between its recordings", make("span", { class: "soft small says" }, `from their average in the ways they differ; moves as ${styles.formulation}`))), ...sliders.map((/** @type {any} */ one) => one.row));
+  fill(
+    byId("style-rows"),
+    make(
+      "label",
+      { class: "check" },
+      box,
+      make(
+        "span",
+        {},
+        "Between its recordings",
+        make(
+          "span",
+          { class: "soft small says" },
+          `from their average in the ways they differ; moves as ${styles.formulation}`,
+        ),
+      ),
+    ),
+    ...sliders.map((/** @type {any} */ one) => one.row),
+  );
   byId("styles").hidden = false;
 }

@@ -31,7 +31,10 @@ class Move {
     this.named = null;
     this.on = new Set([FORMULATIONS[0].name]);
     this.rollouts = new Map(FORMULATIONS.map((one) => [one.name, new Rollouts(one.name, () => this.redraw())]));
-    this.handles = new Handles(this.camera, { moving: (on) => this.moving(on), said: (value) => rounded(value, extent(this.plan.path)) });
+    this.handles = new Handles(this.camera, {
+      moving: (on) => this.moving(on),
+      said: (value) => rounded(value, extent(this.plan.path)),
+    });
     this.picture = new MovePicture(this.camera, () => this.handles.place());
     this.speed = new Plot(byId("plot-speed"));
     this.acceleration = new Plot(byId("plot-acceleration"));
@@ -40,11 +43,22 @@ class Move {
   }
 
   listen() {
-    const clicks = { "move-play": () => this.play(), "add-via": () => this.addVia(), "add-obstacle": () => this.addObstacle(), "move-reset": () => this.choose(this.plan?.symbol), export: () => this.save() };
+    const clicks = {
+      "move-play": () => this.play(),
+      "add-via": () => this.addVia(),
+      "add-obstacle": () => this.addObstacle(),
+      "move-reset": () => this.choose(this.plan?.symbol),
+      export: () => this.save(),
+    };
     for (const [id, act] of Object.entries(clicks)) byId(id).addEventListener("click", act);
     byId("duration").addEventListener("input", () => this.stretch());
     document.addEventListener("keydown", (event) => {
-      if (event.key !== " " || currentView() !== "move" || /** @type {any} */ (event.target).closest("button, input, select, summary, textarea, dialog")) return;
+      if (
+        event.key !== " " ||
+        currentView() !== "move" ||
+        /** @type {any} */ (event.target).closest("button, input, select, summary, textarea, dialog")
+      )
+        return;
       event.preventDefault();
       this.play();
     });
@@ -61,10 +75,16 @@ class Move {
     const { symbols, version } = library();
     const id = toMove(symbols);
     const formats = library().formats.map((/** @type {string} */ one) => one.replace(/^\./, ""));
-    if (byId("export-format").children.length !== formats.length) fill(byId("export-format"), ...formats.map((/** @type {string} */ one) => make("option", { value: one }, one.toUpperCase())));
+    if (byId("export-format").children.length !== formats.length)
+      fill(
+        byId("export-format"),
+        ...formats.map((/** @type {string} */ one) => make("option", { value: one }, one.toUpperCase())),
+      );
     byId("move-empty").hidden = id !== null;
-    for (const part of ["pick-part", "move-name", "move-tools", "move-plots", "move-panel"]) byId(part).hidden = id === null;
-    for (const name of ["move-play", "add-via", "add-obstacle", "move-reset", "export", "duration"]) byId(name).disabled = id === null;
+    for (const part of ["pick-part", "move-name", "move-tools", "move-plots", "move-panel"])
+      byId(part).hidden = id === null;
+    for (const name of ["move-play", "add-via", "add-obstacle", "move-reset", "export", "duration"])
+      byId(name).disabled = id === null;
     showPick(id, (chosen) => this.choose(chosen));
     if (id === null) this.plan = this.picture.plan = this.chosen = null;
     else if (this.chosen?.id !== id || this.version !== version) this.choose(id);
@@ -83,7 +103,9 @@ class Move {
     this.camera.face([symbol.path]);
     this.picture.sketch(symbol.path);
     byId("move-name").textContent = symbol.name;
-    const rollout = await tried(() => post("/api/rollout", { what: { symbol: symbol.id }, formulation: FORMULATIONS[0].name }));
+    const rollout = await tried(() =>
+      post("/api/rollout", { what: { symbol: symbol.id }, formulation: FORMULATIONS[0].name }),
+    );
     if (this.chosen !== chosen) return; // another one since then, or this one anew
     if (!rollout) return void (this.chosen = null); // so that it is asked for again
     this.plan = this.picture.plan = asShown(symbol, rollout);
@@ -94,7 +116,11 @@ class Move {
     this.picture.fit();
     this.structure();
     const plan = this.plan;
-    showStyles(symbol, (...style) => this.style(...style), () => this.plan === plan);
+    showStyles(
+      symbol,
+      (...style) => this.style(...style),
+      () => this.plan === plan,
+    );
     await this.prepare();
   }
 
@@ -122,18 +148,41 @@ class Move {
   structure() {
     const plan = this.plan;
     const size = extent(plan.path);
-    const point = (/** @type {any} */ owner, /** @type {string} */ field) => ({ at: () => owner[field], move: (/** @type {number[]} */ to) => ((owner[field] = to), this.changed()) });
+    const point = (/** @type {any} */ owner, /** @type {string} */ field) => ({
+      at: () => owner[field],
+      move: (/** @type {number[]} */ to) => ((owner[field] = to), this.changed()),
+    });
     const gone = (/** @type {any[]} */ list, /** @type {number} */ k) => () => (list.splice(k, 1), this.structure());
     const edge = (/** @type {any} */ one) => ({
       at: () => this.camera.moved(one.center, one.radius * this.camera.scale, 0),
-      move: (/** @type {number[]} */ to) => ((one.radius = Math.max(Math.hypot(...to.map((value, k) => value - one.center[k])), 0.01 * size)), this.changed()),
+      move: (/** @type {number[]} */ to) => (
+        (one.radius = Math.max(Math.hypot(...to.map((value, k) => value - one.center[k])), 0.01 * size)), this.changed()
+      ),
     });
     this.handles.set([
       { key: "start", kind: "start", name: "Start", ...point(plan, "start") },
       { key: "goal", kind: "goal", name: "Goal", ...point(plan, "goal") },
-      ...plan.via.map((one, k) => ({ key: `via ${k}`, kind: "via", name: `Via point ${k + 1}`, remove: gone(plan.via, k), ...point(one, "point") })),
-      ...plan.obstacles.map((one, k) => ({ key: `obstacle ${k}`, kind: "obstacle", name: `Obstacle ${k + 1}`, remove: gone(plan.obstacles, k), ...point(one, "center") })),
-      ...plan.obstacles.map((one, k) => ({ key: `rim ${k}`, kind: "rim", name: `Rim of obstacle ${k + 1}`, remove: gone(plan.obstacles, k), ...edge(one) })),
+      ...plan.via.map((one, k) => ({
+        key: `via ${k}`,
+        kind: "via",
+        name: `Via point ${k + 1}`,
+        remove: gone(plan.via, k),
+        ...point(one, "point"),
+      })),
+      ...plan.obstacles.map((one, k) => ({
+        key: `obstacle ${k}`,
+        kind: "obstacle",
+        name: `Obstacle ${k + 1}`,
+        remove: gone(plan.obstacles, k),
+        ...point(one, "center"),
+      })),
+      ...plan.obstacles.map((one, k) => ({
+        key: `rim ${k}`,
+        kind: "rim",
+        name: `Rim of obstacle ${k + 1}`,
+        remove: gone(plan.obstacles, k),
+        ...edge(one),
+      })),
     ]);
     this.changed();
   }
@@ -151,7 +200,11 @@ class Move {
 
   numbers() {
     this.steps.keep(this.plan);
-    showPoints(this.plan, () => this.changed(), () => this.structure());
+    showPoints(
+      this.plan,
+      () => this.changed(),
+      () => this.structure(),
+    );
   }
 
   /** @param {boolean} on */
@@ -173,14 +226,20 @@ class Move {
   /** New paths are there. */
   redraw() {
     if (!this.plan) return;
-    const shown = FORMULATIONS.filter((one) => this.names().includes(one.name) && this.rollouts.get(one.name).path).map((one) => ({ ...one, path: this.rollouts.get(one.name).path }));
+    const shown = FORMULATIONS.filter((one) => this.names().includes(one.name) && this.rollouts.get(one.name).path).map(
+      (one) => ({ ...one, path: this.rollouts.get(one.name).path }),
+    );
     this.picture.paths = shown;
     this.keepInSight();
     this.picture.board.draw();
     this.speed.show(shown.map(({ path, look }) => ({ times: path.times, values: lengths(path.velocities), look })));
-    this.acceleration.show(shown.map(({ path, look }) => ({ times: path.times, values: lengths(path.accelerations), look })));
+    this.acceleration.show(
+      shown.map(({ path, look }) => ({ times: path.times, values: lengths(path.accelerations), look })),
+    );
     this.legend(shown);
-    const said = this.names().flatMap((name) => [this.rollouts.get(name).problem, ...(this.rollouts.get(name).path?.warnings ?? [])]).filter(Boolean);
+    const said = this.names()
+      .flatMap((name) => [this.rollouts.get(name).problem, ...(this.rollouts.get(name).path?.warnings ?? [])])
+      .filter(Boolean);
     const text = [...new Set(said)].join(" ");
     if (byId("move-warnings").textContent !== text) byId("move-warnings").textContent = text;
   }
@@ -190,7 +249,11 @@ class Move {
     const names = shown.map((one) => one.name).join();
     if (this.named === names) return;
     this.named = names;
-    fill(byId("move-legend"), make("li", {}, make("span", { class: "key recorded" }), "recorded"), ...shown.map((one) => make("li", {}, make("span", { class: `key ${one.key}` }), one.name)));
+    fill(
+      byId("move-legend"),
+      make("li", {}, make("span", { class: "key recorded" }), "recorded"),
+      ...shown.map((one) => make("li", {}, make("span", { class: `key ${one.key}` }), one.name)),
+    );
   }
 
   /** @param {string} name @param {boolean} on */
@@ -212,7 +275,8 @@ class Move {
 
   /** Before the last change of a point or the duration. */
   back() {
-    if (!this.plan || !this.steps.back(this.plan)) return say("Nothing is changed here. The arrow in the bar takes back changes of the library.");
+    if (!this.plan || !this.steps.back(this.plan))
+      return say("Nothing is changed here. The arrow in the bar takes back changes of the library.");
     byId("duration").value = String(Math.round((100 * Math.log(this.plan.share)) / Math.log(4)));
     this.structure();
   }
@@ -234,7 +298,12 @@ class Move {
   addObstacle() {
     if (!this.plan) return;
     const size = extent(this.plan.path);
-    this.plan.obstacles.push({ center: this.pointAt(0.6).map((/** @type {number} */ value, /** @type {number} */ k) => value + (k < 2 ? 0.08 * size : 0)), radius: 0.07 * size });
+    this.plan.obstacles.push({
+      center: this.pointAt(0.6).map(
+        (/** @type {number} */ value, /** @type {number} */ k) => value + (k < 2 ? 0.08 * size : 0),
+      ),
+      radius: 0.07 * size,
+    });
     this.structure();
     this.focusHandle(`obstacle ${this.plan.obstacles.length - 1}`);
   }
@@ -251,7 +320,9 @@ class Move {
     const step = (/** @type {number} */ now) => {
       if (this.run !== run) return;
       const time = Math.max(now - began, 0) / 1000;
-      const over = this.picture.paths.every(({ path }) => time > path.times[path.times.length - 1] - path.times[0] + 0.4);
+      const over = this.picture.paths.every(
+        ({ path }) => time > path.times[path.times.length - 1] - path.times[0] + 0.4,
+      );
       this.picture.time = this.speed.cursor = this.acceleration.cursor = over ? null : time;
       this.picture.board.now();
       this.speed.board.now();
@@ -265,7 +336,9 @@ class Move {
     if (!this.plan) return;
     const format = byId("export-format").value;
     const name = this.names()[0] ?? FORMULATIONS[0].name;
-    const saved = await tried(() => download("/api/export", { ...question(this.plan, name), format }, `movement.${format}`));
+    const saved = await tried(() =>
+      download("/api/export", { ...question(this.plan, name), format }, `movement.${format}`),
+    );
     if (saved) say(`Saved as ${saved}.`);
   }
 }

@@ -45,10 +45,15 @@ export async function newer(path, tag) {
 }
 
 /** @param {any} body @returns {RequestInit} */
-const json = (body) => ({ method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) });
+const json = (body) => ({
+  method: "POST",
+  headers: { "Content-Type": "application/json" },
+  body: JSON.stringify(body),
+});
 
 /** @param {string} path @param {any} body @param {AbortSignal} [signal] @returns {Promise<any>} */
-export const post = async (path, body = {}, signal = undefined) => (await request(path, { ...json(body), signal })).json();
+export const post = async (path, body = {}, signal = undefined) =>
+  (await request(path, { ...json(body), signal })).json();
 
 /** @param {string} path @returns {Promise<any>} */
 export const remove = async (path) => (await request(path, { method: "DELETE" })).json();

@@ -2,4 +2,6 @@
 
 /** @param {string} name @returns {(Node|string)[]} */
 export const breakable = (name) =>
-  name.split(/(?<=\p{Ll})(?=\p{Lu})|(?<=[\p{L}\p{N}][_\-./:])(?=[\p{L}\p{N}])/u).flatMap((part, k) => (k ? [document.createElement("wbr"), part] : [part]));
+  name
+    .split(/(?<=\p{Ll})(?=\p{Lu})|(?<=[\p{L}\p{N}][_\-./:])(?=[\p{L}\p{N}])/u)
+    .flatMap((part, k) => (k ? [document.createElement("wbr"), part] : [part]));

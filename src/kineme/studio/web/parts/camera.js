@@ -33,7 +33,8 @@ export class Camera {
     this.middle = low.map((value, k) => (value + high[k]) / 2);
     const room = 1 - 2 * MARGIN;
     const spans = high.map((value, k) => value - low[k]);
-    const away = (/** @type {number[]} */ point) => Math.hypot(...this.middle.map((value, k) => (point[k] ?? 0) - value));
+    const away = (/** @type {number[]} */ point) =>
+      Math.hypot(...this.middle.map((value, k) => (point[k] ?? 0) - value));
     const round = this.flat ? 0 : 2 * Math.max(...points.map(away));
     const across = this.flat ? spans : [round, round];
     this.scale = Math.min((room * width) / Math.max(across[0], 1e-9), (room * height) / Math.max(across[1], 1e-9));

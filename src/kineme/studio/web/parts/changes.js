@@ -16,7 +16,10 @@ async function change(ask, done, same = done) {
     own = answer.version;
     await refresh();
     const changed = answer.version > before; // not where it was stored already
-    say(changed ? done : same, changed && library().can_undo ? { act: () => undo(answer.version), action: "Undo" } : {});
+    say(
+      changed ? done : same,
+      changed && library().can_undo ? { act: () => undo(answer.version), action: "Undo" } : {},
+    );
     return answer;
   });
 }
@@ -38,32 +41,52 @@ async function takeBack(version) {
 }
 
 /** The state of an earlier version again; refused if somebody has changed the library since it was looked at. @param {number} number @param {number} seen */
-export const restore = (number, seen) => change(() => post("/api/library/undo", { version: seen, to: number }), `Version ${number} is restored.`);
+export const restore = (number, seen) =>
+  change(() => post("/api/library/undo", { version: seen, to: number }), `Version ${number} is restored.`);
 
 const of = (/** @type {string} */ id) => `/api/library/symbols/${encodeURIComponent(id)}`;
 
 /** @param {{times: number[], positions: number[][]}} drawn @param {string|null} label */
 export const learn = (drawn, label) =>
-  change(() => post("/api/library/movements", { ...drawn, label, group: null }), label === null ? "Saved without a name." : `Learned as ${label}.`, KNOWN);
+  change(
+    () => post("/api/library/movements", { ...drawn, label, group: null }),
+    label === null ? "Saved without a name." : `Learned as ${label}.`,
+    KNOWN,
+  );
 /** @param {string} id @param {string} name */
 export const rename = (id, name) => change(() => post(`${of(id)}/rename`, { name }), `Renamed to ${name}.`);
 /** @param {string} id @param {string} text */
 export const describe = (id, text) => change(() => post(`${of(id)}/describe`, { text }), "Description saved.");
 /** @param {string} id @param {number[]} ids @param {string} name */
-export const split = (id, ids, name) => change(() => post(`${of(id)}/split`, { ids, name }), `${name} is a symbol of its own.`);
+export const split = (id, ids, name) =>
+  change(() => post(`${of(id)}/split`, { ids, name }), `${name} is a symbol of its own.`);
 /** @param {string[]} ids @param {string} into */
-export const merge = (ids, into) => change(() => post("/api/library/symbols/merge", { ids, into }), `Merged into ${into}.`);
+export const merge = (ids, into) =>
+  change(() => post("/api/library/symbols/merge", { ids, into }), `Merged into ${into}.`);
 /** @param {string} id @param {string} name */
 export const forget = (id, name) => change(() => remove(of(id)), `${name} is deleted; its movements have no name.`);
 /** @param {number[]} ids @param {string|null} symbol */
 export const assign = (ids, symbol) =>
-  change(() => post("/api/library/movements/assign", { ids, symbol }), symbol === null ? "The name is removed." : `Assigned to ${symbol}.`);
+  change(
+    () => post("/api/library/movements/assign", { ids, symbol }),
+    symbol === null ? "The name is removed." : `Assigned to ${symbol}.`,
+  );
 /** @param {number[]} ids */
-export const deleteMovements = (ids) => change(() => post("/api/library/movements/delete", { ids }), ids.length === 1 ? "1 movement is deleted." : `${ids.length} movements are deleted.`);
+export const deleteMovements = (ids) =>
+  change(
+    () => post("/api/library/movements/delete", { ids }),
+    ids.length === 1 ? "1 movement is deleted." : `${ids.length} movements are deleted.`,
+  );
 /** @param {string} id @param {string} name */
-export const accept = (id, name) => change(() => post(`/api/proposals/${encodeURIComponent(id)}/accept`, { name }), `${name} is a symbol now.`);
+export const accept = (id, name) =>
+  change(() => post(`/api/proposals/${encodeURIComponent(id)}/accept`, { name }), `${name} is a symbol now.`);
 /** @param {string} id */
-export const reject = (id) => change(() => post(`/api/proposals/${encodeURIComponent(id)}/reject`), "Not proposed again.");
+export const reject = (id) =>
+  change(() => post(`/api/proposals/${encodeURIComponent(id)}/reject`), "Not proposed again.");
 /** @param {string} recording @param {any} body Without `spans` the whole file, by its labels. */
 export const learnSpans = (recording, body) =>
-  change(() => post(`/api/recordings/${encodeURIComponent(recording)}/learn`, body), body.spans ? "Learned from the recording." : "Learned the whole file, by its labels.", KNOWN);
+  change(
+    () => post(`/api/recordings/${encodeURIComponent(recording)}/learn`, body),
+    body.spans ? "Learned from the recording." : "Learned the whole file, by its labels.",
+    KNOWN,
+  );

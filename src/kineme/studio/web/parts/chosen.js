@@ -16,4 +16,5 @@ export const dragGoal = (symbol, displacement) => (dragged = displacement && { s
 export const draggedGoal = (symbol) => (dragged?.symbol === symbol ? dragged.displacement : null);
 
 /** @param {any[]} symbols @returns {string|null} The chosen one, or the first where it is gone. */
-export const toMove = (symbols) => (symbols.some((one) => one.id === chosen) ? chosen : (symbols.find((one) => one.path)?.id ?? null));
+export const toMove = (symbols) =>
+  symbols.some((one) => one.id === chosen) ? chosen : (symbols.find((one) => one.path)?.id ?? null);

@@ -21,7 +21,11 @@ export function ask({ title, text = "", yes = "OK", name = null, danger = false 
   (name === null ? byId("ask-yes") : byId("ask-name")).focus();
   byId("ask-name").select();
   return new Promise((done) => {
-    dialog.addEventListener("close", () => done(dialog.returnValue === "yes" ? (name === null ? "yes" : byId("ask-name").value.trim() || null) : null), { once: true });
+    dialog.addEventListener(
+      "close",
+      () => done(dialog.returnValue === "yes" ? (name === null ? "yes" : byId("ask-name").value.trim() || null) : null),
+      { once: true },
+    );
   });
 }
 

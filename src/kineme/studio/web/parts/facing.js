@@ -18,7 +18,9 @@ function variances(paths) {
   const sums = [0, 1, 2].map(() => [0, 0, 0]);
   for (const path of paths) {
     const middle = [0, 1, 2].map((k) => path.reduce((sum, point) => sum + point[k], 0) / path.length);
-    for (const point of path) for (const j of [0, 1, 2]) for (const k of [0, 1, 2]) sums[j][k] += (point[j] - middle[j]) * (point[k] - middle[k]);
+    for (const point of path)
+      for (const j of [0, 1, 2])
+        for (const k of [0, 1, 2]) sums[j][k] += (point[j] - middle[j]) * (point[k] - middle[k]);
   }
   return sums;
 }
@@ -26,7 +28,8 @@ function variances(paths) {
 /** @param {number[][][]} paths In space. @returns {{around: number, above: number}} */
 export function facing(paths) {
   const varied = variances(paths);
-  const along = (/** @type {number[]} */ a, /** @type {number[]} */ b) => a.reduce((sum, value, j) => sum + value * b.reduce((more, other, k) => more + varied[j][k] * other, 0), 0);
+  const along = (/** @type {number[]} */ a, /** @type {number[]} */ b) =>
+    a.reduce((sum, value, j) => sum + value * b.reduce((more, other, k) => more + varied[j][k] * other, 0), 0);
   const area = (/** @type {{around: number, above: number}} */ view) => {
     const { right, up } = axesOf(view);
     const askew = Math.sin(view.above) * Math.abs(Math.sin(view.around));

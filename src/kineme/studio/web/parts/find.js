@@ -16,5 +16,7 @@ export function found(field, symbols) {
   field.hidden = symbols.length <= MANY;
   if (field.hidden) field.value = "";
   const words = field.value.toLowerCase().split(/\s+/);
-  return symbols.filter((one) => words.every((word) => `${one.name} ${one.description ?? ""}`.toLowerCase().includes(word)));
+  return symbols.filter((one) =>
+    words.every((word) => `${one.name} ${one.description ?? ""}`.toLowerCase().includes(word)),
+  );
 }

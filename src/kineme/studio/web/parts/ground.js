@@ -8,6 +8,20 @@ const CELLS = 6;
 export function ground(context, camera, low, high) {
   for (let k = 0; k <= CELLS; k += 1) {
     const [x, y] = [0, 1].map((axis) => low[axis] + ((high[axis] - low[axis]) * k) / CELLS);
-    for (const ends of [[[x, low[1]], [x, high[1]]], [[low[0], y], [high[0], y]]]) line(context, ends.map(([a, b]) => camera.toScreen([a, b, low[2]])), { color: color("--line"), width: 1 });
+    for (const ends of [
+      [
+        [x, low[1]],
+        [x, high[1]],
+      ],
+      [
+        [low[0], y],
+        [high[0], y],
+      ],
+    ])
+      line(
+        context,
+        ends.map(([a, b]) => camera.toScreen([a, b, low[2]])),
+        { color: color("--line"), width: 1 },
+      );
   }
 }

@@ -4,5 +4,6 @@
 export function keepingFocus(act) {
   const key = /** @type {HTMLElement} */ (document.activeElement)?.dataset?.key;
   act();
-  if (key && document.activeElement === document.body) /** @type {any} */ (document.querySelector(`[data-key="${CSS.escape(key)}"]`))?.focus({ preventScroll: true });
+  if (key && document.activeElement === document.body)
+    /** @type {any} */ (document.querySelector(`[data-key="${CSS.escape(key)}"]`))?.focus({ preventScroll: true });
 }

@@ -1,7 +1,18 @@
 // What the page knows of the library; views are told when it changes, whoever changed it.
 import { newer } from "./api.js";
 
-const EMPTY = { folder: "", version: 0, n_movements: 0, n_dims: null, channels: null, read_only: false, can_undo: false, symbols: [], unlabeled: 0, formats: [] };
+const EMPTY = {
+  folder: "",
+  version: 0,
+  n_movements: 0,
+  n_dims: null,
+  channels: null,
+  read_only: false,
+  can_undo: false,
+  symbols: [],
+  unlabeled: 0,
+  formats: [],
+};
 
 /** @type {any} */
 let known = EMPTY;
@@ -27,10 +38,12 @@ export const onLibrary = (act) => told.push(act);
 /** The library as it is now: an answer that is under way may be older, and is followed by one more. @returns {Promise<any>} */
 export function refresh() {
   if (!loading) return (loading = load().finally(() => (loading = null)));
-  next ??= loading.catch(() => null).then(() => {
-    next = null;
-    return refresh();
-  });
+  next ??= loading
+    .catch(() => null)
+    .then(() => {
+      next = null;
+      return refresh();
+    });
   return next;
 }
 
@@ -56,5 +69,8 @@ export const COLORS = ["--blue", "--orange", "--green", "--purple", "--sky", "--
 export function lookOf(id) {
   const at = known.symbols.findIndex((/** @type {any} */ one) => one.id === id);
   if (at < 0) return { color: "--gray", mark: "ring" };
-  return { color: COLORS[at % COLORS.length], mark: ["dot", "square", "diamond", "triangle"][Math.floor(at / COLORS.length) % 4] };
+  return {
+    color: COLORS[at % COLORS.length],
+    mark: ["dot", "square", "diamond", "triangle"][Math.floor(at / COLORS.length) % 4],
+  };
 }

@@ -13,7 +13,13 @@ export function readableOn(hex) {
 export function line(context, points, { color, width = 3, dash = [], alpha = 1 }) {
   if (points.length < 2) return;
   context.save();
-  Object.assign(context, { strokeStyle: color, lineWidth: width, lineCap: "round", lineJoin: "round", globalAlpha: alpha });
+  Object.assign(context, {
+    strokeStyle: color,
+    lineWidth: width,
+    lineCap: "round",
+    lineJoin: "round",
+    globalAlpha: alpha,
+  });
   context.setLineDash(dash);
   context.beginPath();
   context.moveTo(points[0][0], points[0][1]);
@@ -27,8 +33,19 @@ const MARKS = {
   dot: (context, r) => context.arc(0, 0, r, 0, 2 * Math.PI),
   ring: (context, r) => context.arc(0, 0, r, 0, 2 * Math.PI),
   square: (context, r) => context.rect(-r, -r, 2 * r, 2 * r),
-  diamond: (context, r) => corners(context, [[0, -1.3 * r], [1.3 * r, 0], [0, 1.3 * r], [-1.3 * r, 0]]),
-  triangle: (context, r) => corners(context, [[0, -1.3 * r], [1.2 * r, r], [-1.2 * r, r]]),
+  diamond: (context, r) =>
+    corners(context, [
+      [0, -1.3 * r],
+      [1.3 * r, 0],
+      [0, 1.3 * r],
+      [-1.3 * r, 0],
+    ]),
+  triangle: (context, r) =>
+    corners(context, [
+      [0, -1.3 * r],
+      [1.2 * r, r],
+      [-1.2 * r, r],
+    ]),
 };
 
 function corners(/** @type {CanvasRenderingContext2D} */ context, /** @type {number[][]} */ points) {

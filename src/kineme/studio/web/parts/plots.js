@@ -27,10 +27,19 @@ export class Plot {
     const end = Math.max(...this.curves.map((one) => one.times[one.times.length - 1]), 1e-9);
     const high = Math.max(...this.curves.flatMap((one) => one.values), 1e-9);
     const [w, h] = [width - EDGE.left - EDGE.right, height - EDGE.top - EDGE.bottom];
-    const at = (/** @type {number} */ t, /** @type {number} */ v) => [EDGE.left + (w * t) / end, EDGE.top + h * (1 - v / high)];
+    const at = (/** @type {number} */ t, /** @type {number} */ v) => [
+      EDGE.left + (w * t) / end,
+      EDGE.top + h * (1 - v / high),
+    ];
     line(context, [at(0, 0), at(end, 0)], { color: color("--line"), width: 1 });
-    for (const one of this.curves) line(context, one.times.map((t, k) => at(t - one.times[0], one.values[k])), { color: color(one.look.color), width: 2.2, dash: one.look.dash });
-    if (this.cursor !== null && this.cursor <= end) line(context, [at(this.cursor, 0), at(this.cursor, high)], { color: color("--text"), width: 1.5 });
+    for (const one of this.curves)
+      line(
+        context,
+        one.times.map((t, k) => at(t - one.times[0], one.values[k])),
+        { color: color(one.look.color), width: 2.2, dash: one.look.dash },
+      );
+    if (this.cursor !== null && this.cursor <= end)
+      line(context, [at(this.cursor, 0), at(this.cursor, high)], { color: color("--text"), width: 1.5 });
     Object.assign(context, { font: `12px ${color("--font")}`, fillStyle: color("--soft"), textAlign: "left" });
     context.fillText(`at most ${Number(high.toPrecision(3))}`, EDGE.left, 12);
     context.fillText("0 s", EDGE.left, height - 5);

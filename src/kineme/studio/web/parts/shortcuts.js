@@ -18,17 +18,28 @@ const KEYS = [
 ];
 
 /** Whether a key is for a field in which one writes. @param {any} target */
-const writes = (target) => target.closest?.("input:not([type=range],[type=checkbox],[type=radio]), textarea, select, [contenteditable]");
+const writes = (target) =>
+  target.closest?.("input:not([type=range],[type=checkbox],[type=radio]), textarea, select, [contenteditable]");
 
 function list() {
-  fill(byId("keys-list"), ...KEYS.flatMap(([keys, text]) => [make("dt", {}, ...keys.split(" ").map((key) => make("kbd", {}, key))), make("dd", {}, text)]));
+  fill(
+    byId("keys-list"),
+    ...KEYS.flatMap(([keys, text]) => [
+      make("dt", {}, ...keys.split(" ").map((key) => make("kbd", {}, key))),
+      make("dd", {}, text),
+    ]),
+  );
   byId("keys").showModal();
   byId("keys").scrollTop = 0; // the focus went to the button at its end
 }
 
 /** Whether a key takes back, other than in a field in which one writes. @param {KeyboardEvent} event */
 export const isUndo = (event) =>
-  (event.ctrlKey || event.metaKey) && !event.shiftKey && event.key.toLowerCase() === "z" && !writes(event.target) && !document.querySelector("dialog[open]");
+  (event.ctrlKey || event.metaKey) &&
+  !event.shiftKey &&
+  event.key.toLowerCase() === "z" &&
+  !writes(event.target) &&
+  !document.querySelector("dialog[open]");
 
 /** @param {KeyboardEvent} event */
 function pressed(event) {

@@ -11,6 +11,11 @@ export function thumbnail(path) {
   if (path) camera.face([path]);
   camera.fit(points, SIDE, SIDE);
   const drawn = points.map((point) => camera.toScreen(point).map((value) => value.toFixed(1)));
-  const parts = drawn.length ? [svg("path", { d: `M${drawn.map((pair) => pair.join(" ")).join("L")}` }), svg("circle", { cx: drawn[0][0], cy: drawn[0][1], r: 4 })] : [];
+  const parts = drawn.length
+    ? [
+        svg("path", { d: `M${drawn.map((pair) => pair.join(" ")).join("L")}` }),
+        svg("circle", { cx: drawn[0][0], cy: drawn[0][1], r: 4 }),
+      ]
+    : [];
   return svg("svg", { class: "thumb", viewBox: `0 0 ${SIDE} ${SIDE}`, "aria-hidden": "true" }, ...parts);
 }

@@ -5,9 +5,16 @@ const STAYS = 7000; // [ms]
 
 /** @param {string} text @param {{act?: () => void, action?: string, failed?: boolean}} options */
 export function say(text, { act, action, failed = false } = {}) {
-  const toast = make("div", { class: failed ? "toast failed" : "toast", role: failed ? "alert" : null }, make("p", {}, text));
+  const toast = make(
+    "div",
+    { class: failed ? "toast failed" : "toast", role: failed ? "alert" : null },
+    make("p", {}, text),
+  );
   const close = () => toast.remove();
-  if (act) toast.append(make("button", { class: "button", type: "button", on: { click: () => (close(), act()) } }, action ?? "Undo"));
+  if (act)
+    toast.append(
+      make("button", { class: "button", type: "button", on: { click: () => (close(), act()) } }, action ?? "Undo"),
+    );
   else toast.append(make("button", { class: "button", type: "button", on: { click: close } }, "Close"));
   byId("toasts").append(toast);
   while (byId("toasts").children.length > 3) byId("toasts").firstChild.remove();

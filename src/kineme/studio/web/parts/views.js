@@ -44,7 +44,8 @@ function step(event) {
 export function startViews() {
   for (const view of VIEWS) byId(`tab-${view}`).addEventListener("click", () => show(view));
   document.querySelector(".tabs").addEventListener("keydown", step);
-  for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click", () => show(button.dataset.view, true));
+  for (const button of document.querySelectorAll("[data-view]"))
+    button.addEventListener("click", () => show(button.dataset.view, true));
   window.addEventListener("hashchange", () => show(location.hash.slice(1)));
   show(VIEWS.includes(location.hash.slice(1)) ? location.hash.slice(1) : "draw");
 }

@@ -14,7 +14,10 @@ async function send(file, signal) {
     return await response.json();
   } catch (error) {
     if (signal.aborted) return undefined;
-    byId("drop-state").textContent = error.status === undefined ? `${file.name} cannot be sent: expected a file, not a folder. The command kineme learn reads folders.` : error.message;
+    byId("drop-state").textContent =
+      error.status === undefined
+        ? `${file.name} cannot be sent: expected a file, not a folder. The command kineme learn reads folders.`
+        : error.message;
     byId("drop-state").classList.add("went-wrong");
     return undefined;
   }
@@ -30,9 +33,13 @@ export function startDropping(read) {
     sending = new AbortController();
     const recording = await send(file, sending.signal);
     if (recording) read(recording, file.name);
-    if (recording && files.length > 1) byId("drop-state").textContent = `One file at a time: ${file.name} is shown, ${counted(files.length - 1, "other")} not read.`;
+    if (recording && files.length > 1)
+      byId("drop-state").textContent =
+        `One file at a time: ${file.name} is shown, ${counted(files.length - 1, "other")} not read.`;
   };
-  byId("file").addEventListener("change", (/** @type {any} */ event) => take(event.target.files).finally(() => (event.target.value = "")));
+  byId("file").addEventListener("change", (/** @type {any} */ event) =>
+    take(event.target.files).finally(() => (event.target.value = "")),
+  );
   const over = (/** @type {DragEvent} */ event) => {
     if (!event.dataTransfer?.types.includes("Files")) return;
     event.preventDefault(); // else the browser leaves the studio for the file

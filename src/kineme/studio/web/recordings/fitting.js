@@ -3,7 +3,8 @@ import { counted } from "../parts/elements.js";
 
 /** Columns that channels are recognized by; an orientation turns in three ways, whatever its columns. @param {any[]} channels */
 export const columnCount = (channels) => channels.reduce((sum, one) => sum + (one.columns?.length || 1), 0);
-const moving = (/** @type {any[]} */ channels) => channels.reduce((sum, one) => sum + (one.kind === "orientation" ? 3 : one.columns?.length || 1), 0);
+const moving = (/** @type {any[]} */ channels) =>
+  channels.reduce((sum, one) => sum + (one.kind === "orientation" ? 3 : one.columns?.length || 1), 0);
 
 /** Names of the channels that are chosen at first. @param {any[]} channels @param {any} library @returns {Set<string>} */
 export function fitting(channels, { n_dims: wanted, channels: known, symbols }) {
@@ -21,5 +22,7 @@ export function mismatch(chosen, { n_dims: wanted, symbols }) {
   const have = moving(chosen);
   if (!have) return "Choose at least one channel.";
   if (!symbols.length) return "No symbol is known yet: add a span, name it, and learn it.";
-  return have === wanted ? "" : `Movements of this library have ${counted(wanted, "column")}; ${have} are chosen. Choose ${wanted}.`;
+  return have === wanted
+    ? ""
+    : `Movements of this library have ${counted(wanted, "column")}; ${have} are chosen. Choose ${wanted}.`;
 }

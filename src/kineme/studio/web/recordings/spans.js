@@ -5,7 +5,13 @@ import { keepingFocus } from "../parts/keep_focus.js";
 /** @param {any[]} spans @param {number} chosen @param {{choose: (k: number) => void, changed: () => void}} page */
 export function showSpans(spans, chosen, page) {
   const time = (/** @type {any} */ span, /** @type {number} */ k, /** @type {"begin"|"end"} */ which) => {
-    const field = make("input", { type: "number", step: "0.01", "aria-label": `${which === "begin" ? "Begin" : "End"} of span ${k + 1}`, "data-key": `span ${k} ${which}`, on: { focus: () => page.choose(k) } });
+    const field = make("input", {
+      type: "number",
+      step: "0.01",
+      "aria-label": `${which === "begin" ? "Begin" : "End"} of span ${k + 1}`,
+      "data-key": `span ${k} ${which}`,
+      on: { focus: () => page.choose(k) },
+    });
     field.value = span[which].toFixed(2);
     field.addEventListener("change", () => {
       if (Number.isFinite(field.valueAsNumber)) span[which] = field.valueAsNumber;
@@ -14,14 +20,40 @@ export function showSpans(spans, chosen, page) {
     return field;
   };
   const name = (/** @type {any} */ span, /** @type {number} */ k) => {
-    const field = make("input", { type: "text", list: "names", maxlength: "200", placeholder: "unknown", "aria-label": `Name of span ${k + 1}`, "data-key": `span ${k} name`, on: { focus: () => page.choose(k) } });
+    const field = make("input", {
+      type: "text",
+      list: "names",
+      maxlength: "200",
+      placeholder: "unknown",
+      "aria-label": `Name of span ${k + 1}`,
+      "data-key": `span ${k} name`,
+      on: { focus: () => page.choose(k) },
+    });
     field.value = span.label ?? "";
     field.addEventListener("change", () => ((span.label = field.value.trim() || null), page.changed()));
     return field;
   };
-  const away = (/** @type {number} */ k) => make("button", { class: "button quiet square", type: "button", "aria-label": `Remove span ${k + 1}`, on: { click: () => (spans.splice(k, 1), page.choose(-1), page.changed()) } }, "×");
+  const away = (/** @type {number} */ k) =>
+    make(
+      "button",
+      {
+        class: "button quiet square",
+        type: "button",
+        "aria-label": `Remove span ${k + 1}`,
+        on: { click: () => (spans.splice(k, 1), page.choose(-1), page.changed()) },
+      },
+      "×",
+    );
   const row = (/** @type {any} */ span, /** @type {number} */ k) =>
-    make("tr", { class: k === chosen ? "chosen" : null }, make("td", {}, time(span, k, "begin")), make("td", {}, time(span, k, "end")), make("td", { class: "wide" }, name(span, k)), make("td", {}, span.p === null || span.p === undefined ? "–" : span.p.toFixed(2)), make("td", {}, away(k)));
+    make(
+      "tr",
+      { class: k === chosen ? "chosen" : null },
+      make("td", {}, time(span, k, "begin")),
+      make("td", {}, time(span, k, "end")),
+      make("td", { class: "wide" }, name(span, k)),
+      make("td", {}, span.p === null || span.p === undefined ? "–" : span.p.toFixed(2)),
+      make("td", {}, away(k)),
+    );
   byId("spans").hidden = !spans.length;
   keepingFocus(() => fill(byId("spans").tBodies[0], ...spans.map(row)));
 }

@@ -53,8 +53,15 @@ export class Timeline {
     this.plot.columns.forEach((/** @type {any} */ column, /** @type {number} */ k) => {
       const low = Math.min(...column.values);
       const span = Math.max(...column.values) - low || 1;
-      const points = this.plot.times.map((/** @type {number} */ t, /** @type {number} */ i) => [this.x(t), 8 + lane * (1 - (column.values[i] - low) / span)]);
-      line(context, points.filter(([x]) => x > -50 && x < this.board.width + 50), { color: color(column.color ?? COLORS[k % COLORS.length]), width: 1.7 });
+      const points = this.plot.times.map((/** @type {number} */ t, /** @type {number} */ i) => [
+        this.x(t),
+        8 + lane * (1 - (column.values[i] - low) / span),
+      ]);
+      line(
+        context,
+        points.filter(([x]) => x > -50 && x < this.board.width + 50),
+        { color: color(column.color ?? COLORS[k % COLORS.length]), width: 1.7 },
+      );
     });
     this.paintAxis();
     this.placeEdges();
@@ -75,7 +82,11 @@ export class Timeline {
     context.fill();
     context.globalAlpha = 1;
     if (k === this.chosen) Object.assign(context, { lineWidth: 3, strokeStyle: color("--text") }).stroke();
-    Object.assign(context, { font: `600 13px ${color("--font")}`, textAlign: "center", fillStyle: span.label === null ? color("--text") : readableOn(paint) });
+    Object.assign(context, {
+      font: `600 13px ${color("--font")}`,
+      textAlign: "center",
+      fillStyle: span.label === null ? color("--text") : readableOn(paint),
+    });
     const text = span.label ?? "unknown";
     if (context.measureText(text).width < w - 10) context.fillText(text, x + w / 2, top + BAND / 2 + 5);
   }
@@ -96,8 +107,15 @@ export class Timeline {
 
   /** @param {"begin"|"end"} which */
   edge(which) {
-    const button = make("button", { class: "edge", type: "button", role: "slider", hidden: true, "data-key": `edge ${which}` });
-    const go = (/** @type {PointerEvent} */ now) => this.moveEdge(which, this.time(now.clientX - this.board.canvas.getBoundingClientRect().left));
+    const button = make("button", {
+      class: "edge",
+      type: "button",
+      role: "slider",
+      hidden: true,
+      "data-key": `edge ${which}`,
+    });
+    const go = (/** @type {PointerEvent} */ now) =>
+      this.moveEdge(which, this.time(now.clientX - this.board.canvas.getBoundingClientRect().left));
     button.addEventListener("pointerdown", (/** @type {PointerEvent} */ event) => {
       if (!drag(button, event, go, () => this.page.changed())) return;
       event.preventDefault();
@@ -107,7 +125,10 @@ export class Timeline {
       const step = { ArrowLeft: -1, ArrowRight: 1, ArrowDown: -1, ArrowUp: 1 }[event.key];
       if (!step) return;
       event.preventDefault();
-      this.moveEdge(which, this.spans[this.chosen][which] + (step * (event.shiftKey ? 10 : 1) * (this.range[1] - this.range[0])) / 500);
+      this.moveEdge(
+        which,
+        this.spans[this.chosen][which] + (step * (event.shiftKey ? 10 : 1) * (this.range[1] - this.range[0])) / 500,
+      );
       this.page.changed();
     });
     byId("edges").append(button);
@@ -119,7 +140,10 @@ export class Timeline {
     const span = this.spans[this.chosen];
     if (!span) return; // another finger has chosen none
     const least = 0.02;
-    span[which] = which === "begin" ? Math.min(Math.max(time, this.whole[0]), span.end - least) : Math.max(Math.min(time, this.whole[1]), span.begin + least);
+    span[which] =
+      which === "begin"
+        ? Math.min(Math.max(time, this.whole[0]), span.end - least)
+        : Math.max(Math.min(time, this.whole[1]), span.begin + least);
     this.board.now();
   }
 
@@ -129,7 +153,13 @@ export class Timeline {
       button.hidden = !span || this.x(span[which]) < 0 || this.x(span[which]) > this.board.width;
       if (!span) continue;
       button.style.setProperty("--x", `${this.x(span[which])}px`);
-      const values = { "aria-label": `${which === "begin" ? "Begin" : "End"} of ${span.label ?? "unknown"}`, "aria-valuenow": span[which].toFixed(2), "aria-valuemin": this.whole[0].toFixed(2), "aria-valuemax": this.whole[1].toFixed(2), "aria-valuetext": `${span[which].toFixed(2)} seconds` };
+      const values = {
+        "aria-label": `${which === "begin" ? "Begin" : "End"} of ${span.label ?? "unknown"}`,
+        "aria-valuenow": span[which].toFixed(2),
+        "aria-valuemin": this.whole[0].toFixed(2),
+        "aria-valuemax": this.whole[1].toFixed(2),
+        "aria-valuetext": `${span[which].toFixed(2)} seconds`,
+      };
       for (const [name, value] of Object.entries(values)) button.setAttribute(name, value);
     }
   }
@@ -138,7 +168,8 @@ export class Timeline {
   grab(event) {
     const at = this.time(event.offsetX);
     const hit = this.spans.findIndex((span) => span.begin <= at && at <= span.end);
-    const go = (/** @type {PointerEvent} */ now) => this.pan((-now.movementX / (this.board.width - 2 * SIDE)) * (this.range[1] - this.range[0]));
+    const go = (/** @type {PointerEvent} */ now) =>
+      this.pan((-now.movementX / (this.board.width - 2 * SIDE)) * (this.range[1] - this.range[0]));
     if (drag(this.board.canvas, event, go)) this.page.choose(hit);
   }
 
@@ -162,7 +193,8 @@ export class Timeline {
   wheel(event) {
     const whole = this.range[0] === this.whole[0] && this.range[1] === this.whole[1];
     if (whole && event.deltaY > Math.abs(event.deltaX)) return; // nothing is left to show: the page scrolls
-    if (Math.abs(event.deltaX) > Math.abs(event.deltaY)) this.pan((event.deltaX / this.board.width) * (this.range[1] - this.range[0]));
+    if (Math.abs(event.deltaX) > Math.abs(event.deltaY))
+      this.pan((event.deltaX / this.board.width) * (this.range[1] - this.range[0]));
     else this.zoom(1.0015 ** event.deltaY, this.time(event.offsetX));
     event.preventDefault();
   }
@@ -171,7 +203,10 @@ export class Timeline {
   key(event) {
     if (event.key === "+" || event.key === "=") this.zoom(0.7);
     else if (event.key === "-") this.zoom(1 / 0.7);
-    else if (event.key === "ArrowLeft" || event.key === "ArrowRight") this.page.choose(Math.min(Math.max(this.chosen + (event.key === "ArrowRight" ? 1 : -1), 0), this.spans.length - 1));
+    else if (event.key === "ArrowLeft" || event.key === "ArrowRight")
+      this.page.choose(
+        Math.min(Math.max(this.chosen + (event.key === "ArrowRight" ? 1 : -1), 0), this.spans.length - 1),
+      );
     else return;
     event.preventDefault();
   }

@@ -24,8 +24,14 @@ class Recordings {
     byId("spot").addEventListener("click", () => (this.search ? this.search.abort() : this.spot()));
     byId("add-span").addEventListener("click", () => this.add());
     byId("learn-spans").addEventListener("click", () => this.learn());
-    byId("learn-file").addEventListener("click", () => learnSpans(this.read.recording, { channels: this.chosenChannels() }));
-    for (const [id, factor] of /** @type {[string, number][]} */ ([["zoom-in", 0.6], ["zoom-out", 1 / 0.6]])) byId(id).addEventListener("click", () => this.timeline.zoom(factor));
+    byId("learn-file").addEventListener("click", () =>
+      learnSpans(this.read.recording, { channels: this.chosenChannels() }),
+    );
+    for (const [id, factor] of /** @type {[string, number][]} */ ([
+      ["zoom-in", 0.6],
+      ["zoom-out", 1 / 0.6],
+    ]))
+      byId(id).addEventListener("click", () => this.timeline.zoom(factor));
     byId("tables").addEventListener("change", () => this.table());
     byId("channels").addEventListener("change", () => this.columns());
     onLibrary(() => (this.allow(), this.timeline.board.draw()));
@@ -37,11 +43,20 @@ class Recordings {
     byId("recording").hidden = false;
     byId("drop").classList.add("small-drop");
     byId("recording-name").textContent = name;
-    fill(byId("tables"), ...recording.tables.map((/** @type {any} */ one, /** @type {number} */ k) => make("option", { value: String(k) }, one.name)));
+    fill(
+      byId("tables"),
+      ...recording.tables.map((/** @type {any} */ one, /** @type {number} */ k) =>
+        make("option", { value: String(k) }, one.name),
+      ),
+    );
     const labeled = recording.tables.filter((/** @type {any} */ one) => one.label !== null);
     byId("learn-file").hidden = recording.tables.length < 2 || !labeled.length;
-    byId("learn-file").title = `${counted(recording.tables.length, "movement")}, ${labeled.length} with a label: ${[...new Set(labeled.map((/** @type {any} */ one) => one.label))].slice(0, 8).join(", ")}`;
-    fill(byId("problems"), ...recording.problems.map((/** @type {string} */ one) => make("p", { class: "small" }, one)));
+    byId("learn-file").title =
+      `${counted(recording.tables.length, "movement")}, ${labeled.length} with a label: ${[...new Set(labeled.map((/** @type {any} */ one) => one.label))].slice(0, 8).join(", ")}`;
+    fill(
+      byId("problems"),
+      ...recording.problems.map((/** @type {string} */ one) => make("p", { class: "small" }, one)),
+    );
     this.table();
     byId("spot").focus({ preventScroll: true });
   }
@@ -53,12 +68,24 @@ class Recordings {
     const k = Number(byId("tables").value);
     const table = this.read.tables[k];
     const rate = table.rate ? `, ${Math.round(table.rate)} samples a second` : "";
-    byId("recording-facts").textContent = `${table.duration.toFixed(1)} s, ${counted(table.channels.length, "channel")}${rate}`;
+    byId("recording-facts").textContent =
+      `${table.duration.toFixed(1)} s, ${counted(table.channels.length, "channel")}${rate}`;
     const chosen = fitting(table.channels, library());
     const box = (/** @type {any} */ channel, /** @type {number} */ k) => {
       const key = make("span", { class: "key" });
       key.style.borderColor = `var(${COLORS[columnCount(table.channels.slice(0, k)) % COLORS.length]})`;
-      return make("label", { class: "check" }, make("input", { type: "checkbox", checked: chosen.has(channel.name), value: channel.name }), key, make("span", {}, channel.name, make("span", { class: "soft small says" }, [channel.kind, channel.unit].filter(Boolean).join(", "))));
+      return make(
+        "label",
+        { class: "check" },
+        make("input", { type: "checkbox", checked: chosen.has(channel.name), value: channel.name }),
+        key,
+        make(
+          "span",
+          {},
+          channel.name,
+          make("span", { class: "soft small says" }, [channel.kind, channel.unit].filter(Boolean).join(", ")),
+        ),
+      );
     };
     fill(byId("channels"), make("legend", {}, "Channels"), ...table.channels.map(box));
     this.timeline.spans = table.label === null ? [] : [{ begin: 0, end: table.duration, label: table.label, p: null }];
@@ -76,8 +103,14 @@ class Recordings {
     const k = Number(byId("tables").value);
     const plot = this.read.plots[k];
     const names = new Set(this.chosenChannels());
-    const wanted = new Set(this.read.tables[k].channels.filter((/** @type {any} */ one) => names.has(one.name)).flatMap((/** @type {any} */ one) => one.columns ?? [one.name]));
-    const columns = plot.columns.map((/** @type {any} */ one, /** @type {number} */ at) => ({ ...one, color: COLORS[at % COLORS.length] })).filter((/** @type {any} */ one) => wanted.has(one.name) || names.has(one.name));
+    const wanted = new Set(
+      this.read.tables[k].channels
+        .filter((/** @type {any} */ one) => names.has(one.name))
+        .flatMap((/** @type {any} */ one) => one.columns ?? [one.name]),
+    );
+    const columns = plot.columns
+      .map((/** @type {any} */ one, /** @type {number} */ at) => ({ ...one, color: COLORS[at % COLORS.length] }))
+      .filter((/** @type {any} */ one) => wanted.has(one.name) || names.has(one.name));
     return { ...plot, columns };
   }
 
@@ -105,13 +138,15 @@ class Recordings {
     this.choose(-1);
     this.changed();
     const known = answer.spans.filter((/** @type {any} */ one) => one.label !== null).length;
-    byId("spans-state").textContent = `${counted(known, "known movement")}, ${answer.spans.length - known} unknown.${answer.spans.length ? " Choose one to drag its edges." : ""}`;
+    byId("spans-state").textContent =
+      `${counted(known, "known movement")}, ${answer.spans.length - known} unknown.${answer.spans.length ? " Choose one to drag its edges." : ""}`;
   }
 
   /** How much is searched. @param {string} path @param {AbortController} search */
   async tell(path, search) {
     const told = await get(path).catch(() => null);
-    if (this.search === search && told?.share) byId("spans-state").textContent = `Looking … ${Math.floor(100 * told.share)} %`;
+    if (this.search === search && told?.share)
+      byId("spans-state").textContent = `Looking … ${Math.floor(100 * told.share)} %`;
   }
 
   /** @param {string} text */
@@ -149,7 +184,10 @@ class Recordings {
     if (!this.read) return;
     const table = this.read.tables[Number(byId("tables").value)];
     const names = new Set(this.chosenChannels());
-    const wrong = mismatch(table.channels.filter((/** @type {any} */ one) => names.has(one.name)), library());
+    const wrong = mismatch(
+      table.channels.filter((/** @type {any} */ one) => names.has(one.name)),
+      library(),
+    );
     byId("channels-note").textContent = wrong;
     byId("spot").textContent = this.search ? "Cancel" : "Find movements";
     byId("spot").disabled = wrong !== "" && !this.search;
@@ -158,7 +196,9 @@ class Recordings {
   }
 
   async learn() {
-    const spans = this.timeline.spans.filter((one) => one.label !== null).map(({ begin, end, label }) => ({ begin, end, label }));
+    const spans = this.timeline.spans
+      .filter((one) => one.label !== null)
+      .map(({ begin, end, label }) => ({ begin, end, label }));
     await learnSpans(this.read.recording, { ...this.body(), spans });
   }
 }

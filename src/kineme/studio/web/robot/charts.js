@@ -13,8 +13,14 @@ export function chart(scene, joint, k) {
   const end = scene.times[scene.times.length - 1] || 1;
   const x = (/** @type {number} */ time) => (WIDTH * time) / end;
   const y = (/** @type {number} */ value) => HEIGHT * (1 - (value - low + room) / (high - low + 2 * room));
-  const level = (/** @type {number} */ value) => svg("line", { class: "limit", x1: 0, x2: WIDTH, y1: y(value), y2: y(value) });
-  const path = values.map((/** @type {number} */ value, /** @type {number} */ i) => `${x(scene.times[i]).toFixed(1)} ${y(value).toFixed(1)}`).join("L");
+  const level = (/** @type {number} */ value) =>
+    svg("line", { class: "limit", x1: 0, x2: WIDTH, y1: y(value), y2: y(value) });
+  const path = values
+    .map(
+      (/** @type {number} */ value, /** @type {number} */ i) =>
+        `${x(scene.times[i]).toFixed(1)} ${y(value).toFixed(1)}`,
+    )
+    .join("L");
   const picture = svg(
     "svg",
     { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, preserveAspectRatio: "none", "aria-hidden": "true" },
@@ -23,5 +29,15 @@ export function chart(scene, joint, k) {
     svg("path", { class: "joint", d: `M${path}` }),
     svg("line", { class: "cursor", x1: 0, x2: 0, y1: 0, y2: HEIGHT }),
   );
-  return make("figure", { class: "chart" }, make("figcaption", {}, make("span", { class: "name", title: joint.name }, joint.name), make("output", { "data-unit": "rad" })), picture);
+  return make(
+    "figure",
+    { class: "chart" },
+    make(
+      "figcaption",
+      {},
+      make("span", { class: "name", title: joint.name }, joint.name),
+      make("output", { "data-unit": "rad" }),
+    ),
+    picture,
+  );
 }

@@ -23,17 +23,29 @@ function showArm(scene, joints) {
 }
 
 const TINY = 1e-4; // written with an exponent: no zeros to count
-const written = (/** @type {number} */ value) => (value && Math.abs(value) < TINY ? value.toExponential(1) : String(Number(value.toPrecision(4))));
-const number = (/** @type {number|null|undefined} */ value) => (value === null || value === undefined ? "–" : written(Number(value)));
+const written = (/** @type {number} */ value) =>
+  value && Math.abs(value) < TINY ? value.toExponential(1) : String(Number(value.toPrecision(4)));
+const number = (/** @type {number|null|undefined} */ value) =>
+  value === null || value === undefined ? "–" : written(Number(value));
 
 /** A cell of two lines: a table beside the arm has no room for one. @param {string} tag @param {string} first @param {string} second */
-const cell = (tag, first, second) => make(tag, tag === "th" ? { scope: "row" } : {}, first, " ", make("span", { class: "says soft" }, second));
+const cell = (tag, first, second) =>
+  make(tag, tag === "th" ? { scope: "row" } : {}, first, " ", make("span", { class: "says soft" }, second));
 
 /** @param {any} check */
 function row(check) {
   const at = check.time === null || check.time === undefined ? "" : `at\u00a0${Number(check.time).toFixed(2)}\u00a0s`;
-  const cells = [cell("th", check.what, check.where ?? ""), cell("td", number(check.worst), at), cell("td", number(check.limit), (check.unit ?? "").replace("^2", "²"))];
-  return make("tr", { class: check.passed ? null : "failed" }, ...cells, make("td", {}, check.passed ? "passed" : "FAILED"));
+  const cells = [
+    cell("th", check.what, check.where ?? ""),
+    cell("td", number(check.worst), at),
+    cell("td", number(check.limit), (check.unit ?? "").replace("^2", "²")),
+  ];
+  return make(
+    "tr",
+    { class: check.passed ? null : "failed" },
+    ...cells,
+    make("td", {}, check.passed ? "passed" : "FAILED"),
+  );
 }
 
 /** @param {any} answer */
@@ -44,7 +56,11 @@ function showPreflight(answer) {
   byId("robot-preflight").open = failed > 0;
   fill(byId("robot-checks"), ...checks.map(row));
   byId("robot-verdict").dataset.state = answer.passed ? "passed" : "failed";
-  byId("robot-verdict").textContent = answer.refusal ?? (answer.passed ? `All ${checks.length} checks passed.` : `${failed} of ${checks.length} checks failed: the arm must not execute this.`);
+  byId("robot-verdict").textContent =
+    answer.refusal ??
+    (answer.passed
+      ? `All ${checks.length} checks passed.`
+      : `${failed} of ${checks.length} checks failed: the arm must not execute this.`);
 }
 
 /** @param {Event} event */
@@ -55,7 +71,13 @@ async function move(event) {
   byId("robot-go").disabled = true;
   byId("robot-verdict").dataset.state = "";
   byId("robot-verdict").textContent = "Planning and checking …";
-  const body = { what: { symbol }, robot: byId("robot-arm").value, size: byId("robot-size").valueAsNumber || 0.3, slow_down: byId("robot-slow").checked, displacement: byId("robot-dragged").checked ? draggedGoal(symbol) : null };
+  const body = {
+    what: { symbol },
+    robot: byId("robot-arm").value,
+    size: byId("robot-size").valueAsNumber || 0.3,
+    slow_down: byId("robot-slow").checked,
+    displacement: byId("robot-dragged").checked ? draggedGoal(symbol) : null,
+  };
   const answer = await tried(() => post("/api/robots/move", body));
   byId("robot-go").disabled = false;
   if (!answer) byId("robot-verdict").textContent = "";
@@ -72,7 +94,10 @@ async function shown() {
   const { symbols } = library();
   const id = toMove(symbols);
   const movable = symbols.filter((/** @type {any} */ one) => one.path);
-  fill(byId("robot-what"), ...movable.map((/** @type {any} */ one) => make("option", { value: one.id, selected: one.id === id }, one.name)));
+  fill(
+    byId("robot-what"),
+    ...movable.map((/** @type {any} */ one) => make("option", { value: one.id, selected: one.id === id }, one.name)),
+  );
   offer();
   arms ??= await tried(() => get("/api/robots"));
   if (!arms) return;
@@ -82,7 +107,8 @@ async function shown() {
   byId("robot-empty-title").textContent = arms.available ? "Nothing to move yet" : "No arm here yet";
   byId("robot-why").textContent = arms.why ?? "Draw a movement and give it a name first; then an arm shows it.";
   byId("robot-draw").hidden = !arms.available;
-  if (!byId("robot-arm").children.length) fill(byId("robot-arm"), ...arms.robots.map((/** @type {string} */ name) => make("option", { value: name }, name)));
+  if (!byId("robot-arm").children.length)
+    fill(byId("robot-arm"), ...arms.robots.map((/** @type {string} */ name) => make("option", { value: name }, name)));
 }
 
 export function startRobot() {
