@@ -397,10 +397,12 @@ def test_nothing_is_asked_from_another_host(path):
     assert not re.findall(r"(?:https?:)?//[\w.-]+\.\w+|@import|url\(", path.read_text())
 
 
-def _lines_that_find_elements():
-    """Lines of scripts that name elements by their ids, also as a list; the viewer of arms runs in `arm.html`."""
+def _statements_that_find_elements():
+    """Statements of scripts that name elements by their ids, also as a list; the viewer of arms runs in `arm.html`."""
     viewer = WEB.parents[1] / "robots" / "view" / "page" / "viewer.js"
-    return [line for path in (*SCRIPTS, viewer) for line in path.read_text().splitlines() if "byId" in line]
+    return [
+        statement for path in (*SCRIPTS, viewer) for statement in path.read_text().split(";") if "byId" in statement
+    ]
 
 
 def test_every_id_is_one_elements_and_is_used():
@@ -411,7 +413,7 @@ def test_every_id_is_one_elements_and_is_used():
     assert wanted - {name for one in ids for name in one} <= {"data"}  # made by robot/arm.js
     views = json.loads(re.search(r"VIEWS = (\[.*?\])", (WEB / "parts" / "views.js").read_text())[1])
     used = {f"{part}-{view}" for part in ("tab", "view") for view in views}
-    used |= {name for line in _lines_that_find_elements() for name in re.findall(r'"([\w-]+)"', line)}
+    used |= {name for statement in _statements_that_find_elements() for name in re.findall(r'"([\w-]+)"', statement)}
     used |= {name for path in STYLES for name in re.findall(r"#([\w-]+)", path.read_text())}
     naming = r'\s(?:aria-\w+|for|list)="([^"]+)"'
     used |= {name for page in pages for several in re.findall(naming, page) for name in several.split()}
