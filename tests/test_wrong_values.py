@@ -31,7 +31,7 @@ from kineme import (
     TrimRest,
     kernels,
 )
-from kineme.dmp.control.obstacles import ObstacleAvoidance
+from kineme.dmp.control.options import ObstacleAvoidance
 from kineme.features.random_binning import RandomBinning
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.recognition.early.hypotheses import Early

@@ -22,9 +22,8 @@ from bench.rows import Row
 from kineme import DMP, ExtrapolationWarning, Primitives, Rollout, load_lasa
 from kineme.datasets.lasa import LASA_30
 from kineme.dmp.condition import condition
-from kineme.dmp.discrete.changes import SLACK, changes
-from kineme.dmp.discrete.fits import trajectory_columns
-from kineme.dmp.discrete.operators import decoder, decoder_at, smoothness_factor
+from kineme.dmp.discrete.modulate import SLACK, changes
+from kineme.dmp.discrete.operators import decoder, decoder_at, smoothness_factor, trajectory_columns
 
 DEMONSTRATIONS = 7  # of each set
 STEPS = 480  # of a path, so that even times of 1, 3 and 5 points are among its samples

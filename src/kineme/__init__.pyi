@@ -32,12 +32,12 @@ from kineme.dmp.rhythmic.rhythmic_dmp import RhythmicPrimitives as RhythmicPrimi
 from kineme import orientation as orientation
 from kineme import styles as styles
 from kineme.dmp.discrete.choose import BasisSelection as BasisSelection
-from kineme.dmp.modulation.couple import couple as couple
-from kineme.dmp.modulation.join import join as join
-from kineme.dmp.modulation.blend import blend as blend
-from kineme.dmp.contextual.contextual import Contextual as Contextual
-from kineme.dmp.improvement.improve import improve as improve
-from kineme.dmp.improvement.improve import Improvement as Improvement
+from kineme.dmp.couple import couple as couple
+from kineme.dmp.join import join as join
+from kineme.dmp.join import blend as blend
+from kineme.dmp.contextual import Contextual as Contextual
+from kineme.dmp.improve import improve as improve
+from kineme.dmp.improve import Improvement as Improvement
 
 # Features and kernels
 from kineme.features.dmp_features import DMPFeatures as DMPFeatures

@@ -3,6 +3,6 @@ from kineme.dmp.control.controller import Controller as Controller
 from kineme.dmp.control.options import Options as Options
 from kineme.dmp.control.state import State as State
 from kineme.dmp.control.state import Status as Status
-from kineme.dmp.control.obstacles import ObstacleAvoidance as ObstacleAvoidance
+from kineme.dmp.control.options import ObstacleAvoidance as ObstacleAvoidance
 from kineme.dmp.rhythmic.controller import RhythmicController as RhythmicController
 from kineme.dmp.rhythmic.controller import RhythmicState as RhythmicState

@@ -1,6 +1,6 @@
 # Poses
 from kineme.dmp.pose.pose_dmp import PoseDMP as PoseDMP
-from kineme.dmp.pose.pose_primitives import PosePrimitives as PosePrimitives
+from kineme.dmp.pose.pose_dmp import PosePrimitives as PosePrimitives
 from kineme.dmp.pose.pose_rollout import PoseRollout as PoseRollout
 from kineme.dmp.pose.pose_controller import PoseController as PoseController
 from kineme.dmp.pose.pose_controller import PoseState as PoseState

@@ -7,8 +7,7 @@ import pytest
 
 import kineme
 from kineme import Demonstrations
-from kineme.dmp.discrete_steps import DiscreteSteps
-from kineme.dmp.recorded_as import RecordedAs
+from kineme.dmp.recorded_as import DiscreteSteps, RecordedAs
 from kineme.dmp.rhythmic.rhythmic_dmp import RhythmicPrimitives
 from kineme.movements.channels.channel import Channel
 from kineme.movements.trajectories.channels import of_channels

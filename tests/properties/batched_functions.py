@@ -38,10 +38,9 @@ from kineme import (
     preprocess,
     styles,
 )
-from kineme.dmp.discrete.basis import GATINGS
-from kineme.dmp.discrete.fits import FITS
 from kineme.dmp.discrete.formulations import FORMULATIONS
-from kineme.dmp.modulation.join import laid_out, laid_out_poses
+from kineme.dmp.discrete.specification import FITS, GATINGS
+from kineme.dmp.join import laid_out, laid_out_poses
 from kineme.features.movement_features import FEATURES
 from kineme.features.pose_features import PoseFeatures
 from kineme.features.random_binning import RandomBinning

@@ -15,7 +15,7 @@ from studio_samples import drawing, make_library
 
 from kineme import ActionLibrary, Demonstrations, Trajectory
 from kineme.dmp.discrete.formulations import FORMULATIONS
-from kineme.dmp.styles.learn import learn_styles
+from kineme.dmp.styles.model import learn_styles
 from kineme.movements.channels.channel import Channel
 from kineme.movements.trajectories.channels import of_channels
 from kineme.studio.server import rollouts

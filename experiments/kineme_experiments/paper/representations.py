@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kineme.dmp.discrete.dmp import DMP
-from kineme.dmp.discrete.fits import forcing_target, local_regression
+from kineme.dmp.discrete.operators import forcing_target, local_regression
 from kineme.features.movement_features import features_of
 from kineme.movements.preparation.resample import relative_rows
 from kineme.movements.trajectories.demonstrations import Demonstrations

@@ -85,7 +85,7 @@ def generate(**options: Any) -> None:
 
 
 def _warn_of_bad_fit(learned: Any) -> None:
-    from kineme.dmp.generation.deviation import largest_deviation
+    from kineme.dmp.generation.learned import largest_deviation
 
     off = largest_deviation(learned)
     if off is not None and off.share > _BAD_FIT:

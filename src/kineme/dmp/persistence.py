@@ -10,8 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.dmp.discrete_steps import DiscreteSteps
-from kineme.dmp.recorded_as import RecordedAs
+from kineme.dmp.recorded_as import DiscreteSteps, RecordedAs
 from kineme.errors import DataError, KinemeError
 from kineme.movements.channels.channel import Channels
 from kineme.movements.channels.plain_data import channels_from_data, channels_to_data

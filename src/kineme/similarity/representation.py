@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.dmp.discrete.basis import MOST_BASIS
 from kineme.dmp.discrete.dmp import DMP
 from kineme.dmp.discrete.operators import encoder, forcing_matrix
-from kineme.dmp.discrete.specification import MOST_POINTS
+from kineme.dmp.discrete.specification import MOST_BASIS, MOST_POINTS
 from kineme.errors import SpecificationError
 from kineme.movements.preparation.arc_length import resample_by_arc_length
 from kineme.movements.preparation.spline import spline_matrix

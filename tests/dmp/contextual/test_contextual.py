@@ -9,7 +9,7 @@ from sklearn.exceptions import NotFittedError
 
 import kineme
 from kineme import DMP, Contextual, SpecificationError, Trajectory, TrajectoryError
-from kineme.dmp.contextual.contextual import Smoother, solve
+from kineme.dmp.contextual import Smoother, solve
 from kineme.dmp.discrete.formulations import FORMULATIONS
 
 U = np.linspace(0.0, 1.0, 120)

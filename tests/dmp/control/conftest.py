@@ -7,8 +7,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from kineme import DMP
-from kineme.dmp.discrete.basis import GATINGS
 from kineme.dmp.discrete.formulations import FORMULATIONS
+from kineme.dmp.discrete.specification import GATINGS
 
 TWINS = ("always", "never")
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kineme import DegenerateMovementError, SpecificationError
-from kineme.dmp.control.obstacles import ObstacleAvoidance
+from kineme.dmp.control.options import ObstacleAvoidance
 
 WRONG = {
     "dt zero": ({"dt": 0.0}, r"expected dt to be a number above 0, got 0\.0"),

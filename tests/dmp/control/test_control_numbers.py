@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kineme.dmp.control.moving_goal import MovingGoal
-from kineme.dmp.control.obstacles import ObstacleAvoidance, steering
+from kineme.dmp.control.options import ObstacleAvoidance, steering
+from kineme.dmp.control.plan import MovingGoal
 from kineme.dmp.control.state import Status
 from kineme.dmp.discrete.plan import plan_of
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kineme.dmp.control.obstacles import ObstacleAvoidance
+from kineme.dmp.control.options import ObstacleAvoidance
 from kineme.dmp.discrete.formulations import FORMULATIONS
 
 

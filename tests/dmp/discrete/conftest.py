@@ -7,8 +7,8 @@ from itertools import product
 import pytest
 
 from kineme import DMP
-from kineme.dmp.discrete.basis import GATINGS
 from kineme.dmp.discrete.formulations import FORMULATIONS
+from kineme.dmp.discrete.specification import GATINGS
 
 FITS = (("forcing", "local"), ("forcing", "ridge"), ("trajectory", "local"))
 DMPS = [

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kineme import DMP
-from kineme.dmp.discrete.basis import ExponentialPhase, GaussianBasis
+from kineme.dmp.discrete.specification import ExponentialPhase, GaussianBasis
 
 bases = st.builds(
     lambda n, overlap, gating, end: GaussianBasis(n, overlap, gating, ExponentialPhase(end)),

@@ -10,9 +10,8 @@ import pytest
 import kineme
 from kineme import DMP, SpecificationError, TrajectoryError
 from kineme.dmp.discrete.choose import RIDGES, relative_paths, score
-from kineme.dmp.discrete.fits import trajectory_columns
 from kineme.dmp.discrete.formulations import FORMULATIONS
-from kineme.dmp.discrete.operators import decoder
+from kineme.dmp.discrete.operators import decoder, trajectory_columns
 
 
 def noisy(n=3, n_samples=40, noise=0.01, seed=0):

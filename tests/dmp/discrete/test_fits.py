@@ -12,8 +12,7 @@ from scipy.optimize import minimize_scalar
 from sklearn.linear_model import Ridge
 
 from kineme import DMP
-from kineme.dmp.discrete.fits import local_regression, ridge_regression, trajectory_regression
-from kineme.dmp.discrete.operators import decoder
+from kineme.dmp.discrete.operators import decoder, local_regression, ridge_regression, trajectory_regression
 
 U = np.linspace(0, 1, 70)
 

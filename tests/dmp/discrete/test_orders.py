@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from kineme import DMP
-from kineme.dmp.discrete import response
-from kineme.dmp.discrete.fits import differentiation_matrices
+from kineme.dmp.discrete import operators
+from kineme.dmp.discrete.operators import differentiation_matrices
 
 
 def _orders(errors):
@@ -40,12 +40,12 @@ def test_the_response_converges_with_twice_the_nodes(monkeypatch, n_nodes):
     dmp = DMP("bio-inspired", 6, gating="phase")
 
     def solve(steps_per_basis, nodes):
-        monkeypatch.setattr(response, "_STEPS_PER_BASIS", steps_per_basis)
+        monkeypatch.setattr(operators, "_STEPS_PER_BASIS", steps_per_basis)
         on_both_sides, weights = np.polynomial.legendre.leggauss(nodes)
-        monkeypatch.setattr(response, "NODES", 0.5 * (on_both_sides + 1.0))
-        monkeypatch.setattr(response, "NODE_WEIGHTS", 0.5 * weights)
+        monkeypatch.setattr(operators, "NODES", 0.5 * (on_both_sides + 1.0))
+        monkeypatch.setattr(operators, "NODE_WEIGHTS", 0.5 * weights)
         u = np.linspace(0, 1, 3)
-        return response.spring_damper_response(dmp.basis, dmp.system, dmp.K, dmp.D, u)
+        return operators.spring_damper_response(dmp.basis, dmp.system, dmp.K, dmp.D, u)
 
     exact = solve(200, 8)
     responses = [solve(steps, n_nodes) for steps in (20, 40, 80)]
@@ -58,7 +58,7 @@ def test_the_chosen_quadrature_has_converged():
     """Twice the steps change nothing: the 16th order is at rounding level for any basis."""
     dmp = DMP("bio-inspired", 80)
     coarse, fine = (
-        response.spring_damper_response(dmp.basis, dmp.system, dmp.K, dmp.D, np.linspace(0, 1, n)) for n in (80, 800)
+        operators.spring_damper_response(dmp.basis, dmp.system, dmp.K, dmp.D, np.linspace(0, 1, n)) for n in (80, 800)
     )
     np.testing.assert_allclose(coarse.Phi[:, -1], fine.Phi[:, -1], atol=1e-12)
 

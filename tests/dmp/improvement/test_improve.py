@@ -8,8 +8,7 @@ import pytest
 import kineme
 from kineme import DMP, SpecificationError, improve
 from kineme.dmp.discrete.operators import decoder
-from kineme.dmp.improvement.improve import exploration_factor
-from kineme.dmp.improvement.methods import METHODS, Search
+from kineme.dmp.improve import METHODS, Search, exploration_factor
 
 U = np.linspace(0.0, 1.0, 100)
 MIDDLE = 0.5

@@ -9,9 +9,8 @@ import pytest
 
 import kineme
 from kineme import DMP, SpecificationError
-from kineme.dmp.discrete.basis import GATINGS
-from kineme.dmp.discrete.fits import FITS
 from kineme.dmp.discrete.formulations import FORMULATIONS
+from kineme.dmp.discrete.specification import FITS, GATINGS
 
 
 @pytest.fixture(scope="module")

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 import kineme
 from kineme import DMP, ExtrapolationWarning, Primitives, SpecificationError, TrajectoryError
-from kineme.dmp.discrete.basis import GATINGS
 from kineme.dmp.discrete.formulations import FORMULATIONS
 from kineme.dmp.discrete.operators import decoder, decoder_at, smoothness_factor
+from kineme.dmp.discrete.specification import GATINGS
 
 FITS = (("forcing", "local"), ("forcing", "ridge"), ("trajectory", "local"))
 EVERY = [

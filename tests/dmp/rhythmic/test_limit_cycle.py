@@ -8,8 +8,7 @@ from scipy.integrate import quad_vec, solve_ivp
 from scipy.linalg import expm
 
 from kineme import RhythmicDMP
-from kineme.dmp.rhythmic.harmonics import as_real, waves
-from kineme.dmp.rhythmic.operators import limit_cycle
+from kineme.dmp.rhythmic.operators import as_real, limit_cycle, waves
 from kineme.dmp.spring_damper import transitions
 
 SPECS = [

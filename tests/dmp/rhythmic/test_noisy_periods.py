@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from kineme import RhythmicDMP, Trajectory
-from kineme.dmp.rhythmic import periods
-from kineme.dmp.rhythmic.periods import candidates, find_cycles
+from kineme.dmp.rhythmic import encode
+from kineme.dmp.rhythmic.encode import candidates, find_cycles
 
 
 def _rhythms(shape, n_samples, cycles, noise, count):
@@ -86,6 +86,6 @@ def test_a_valley_is_the_lowest_place_within_a_tenth_of_its_lag(second, n, monke
     distance = np.minimum(lag / 30.0, 1.0)
     for at, depth in ((100, 0.5), (second, 0.6)):
         distance -= depth * np.exp(-0.5 * ((lag - at) / 1.5) ** 2)
-    monkeypatch.setattr(periods, "dissimilarity", lambda rows: distance[None])
+    monkeypatch.setattr(encode, "dissimilarity", lambda rows: distance[None])
     found = candidates(np.zeros((1, 1, 600)), np.array([600]))[0]
     np.testing.assert_allclose(599 / found[np.isfinite(found)], [100, second][2 - n :], atol=1.0)

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kineme import RhythmicDMP, TrajectoryError
-from kineme.dmp.rhythmic.harmonics import as_real, fit_harmonics, waves
-from kineme.dmp.rhythmic.periods import dissimilarity, find_cycles
+from kineme.dmp.rhythmic.encode import dissimilarity, find_cycles
+from kineme.dmp.rhythmic.operators import as_real, fit_harmonics, waves
 
 SEEDS = st.integers(0, 10_000)
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from sklearn.decomposition import PCA
 
 from kineme import DMP
-from kineme.dmp.styles.metrics import METRICS
+from kineme.dmp.styles.model import METRICS
 from kineme.styles import average, learn_styles
 
 any_seed = given(seed=st.integers(0, 10**6))

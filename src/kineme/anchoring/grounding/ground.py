@@ -12,9 +12,7 @@ from numpy.typing import NDArray
 from kineme.anchoring.grounding.prototypes import Prototype, prototype
 from kineme.dmp.discrete.dmp import Primitives
 from kineme.dmp.persistence import specification_to_dict
-from kineme.dmp.styles.learn import learn_styles
-from kineme.dmp.styles.metrics import compared
-from kineme.dmp.styles.model import StyleModel
+from kineme.dmp.styles.model import StyleModel, compared, learn_styles
 from kineme.errors import TrajectoryError
 from kineme.similarity.alignment import moved
 from kineme.similarity.specification import Compares

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from kineme.dmp.control.obstacles import AHEAD
+from kineme.dmp.control.options import AHEAD
 from kineme.dmp.spring_damper import NODE_WEIGHTS, NODES, transition
 from kineme.runtime.compiled import jit
 

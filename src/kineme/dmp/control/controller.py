@@ -11,15 +11,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kineme.dmp.control import inputs
-from kineme.dmp.control.moving_goal import MovingGoal
-from kineme.dmp.control.obstacles import ObstacleAvoidance
-from kineme.dmp.control.options import Options, numbers
-from kineme.dmp.control.plan import SHORTEST, Influences, Plan, ViaPlaces, check_controlled, passed
+from kineme.dmp.control.options import ObstacleAvoidance, Options, numbers
+from kineme.dmp.control.plan import SHORTEST, Influences, MovingGoal, Plan, ViaPlaces, check_controlled, passed
 from kineme.dmp.control.state import State, Status
 from kineme.dmp.control.stepping import stepper
 from kineme.errors import SpecificationError
 from kineme.validation import Array
+
+_LARGEST = 1e150
 
 _NONE = Status(0)
 
@@ -163,14 +162,14 @@ class Controller:
 
     def _pace(self, dt: Any, tempo: Any) -> tuple[float, float]:
         """The time and tempo of this step."""
-        wanted = inputs.number(tempo)
+        wanted = read_number(tempo)
         if wanted >= 0.0 and wanted * self.dt <= self._longest:
             self._tempo = wanted
         else:
             self._events |= Status.TEMPO_REJECTED
         if dt is None:
             return self.dt, self._tempo
-        dt = inputs.number(dt)
+        dt = read_number(dt)
         if self._fits(dt) and dt * self._tempo <= self._longest:
             return dt, self._tempo
         self._events |= Status.DT_REJECTED
@@ -205,20 +204,20 @@ class Controller:
 
     def _read_position(self, value: Any) -> Array | None:
         """A measured position (d,), or None where it cannot be used."""
-        return inputs.vector(value, self._n_dims)
+        return read_vector(value, self._n_dims)
 
     def _read_velocity(self, value: Any, position: Array | None) -> Array | None:
         """A measured velocity (d,), at a measured position if there is one."""
-        return inputs.vector(value, self._n_dims)
+        return read_vector(value, self._n_dims)
 
     def _read_goal(self, value: Any) -> Array | None:
-        return inputs.vector(value, self._n_dims)
+        return read_vector(value, self._n_dims)
 
     def _read_goal_velocity(self, value: Any) -> Array | None:
-        return inputs.vector(value, self._n_dims)
+        return read_vector(value, self._n_dims)
 
     def _read_coupling(self, value: Any) -> Array | None:
-        return inputs.vector(value, self._n_dims)
+        return read_vector(value, self._n_dims)
 
     def _aim(self, goal: Any, velocity: Any = None) -> None:
         """Set a goal, or let the one in force move; what cannot be used of one of them spoils both."""
@@ -235,7 +234,7 @@ class Controller:
             self._obstacles = self._obstacle_velocities = self._nowhere
             return
         n = self._plan.n_positions
-        read = inputs.moving_points(obstacles, velocities, n)
+        read = read_points(obstacles, velocities, n)
         if read is None:
             self._events |= Status.OBSTACLES_REJECTED
         else:
@@ -287,7 +286,7 @@ class Controller:
 
     def _usable(self, motion: Array) -> bool:
         """Whether the movement can go on from there."""
-        return inputs.usable(motion)
+        return is_usable(motion)
 
     def _follow(self, dt: float) -> tuple[Array, Array]:
         """Goal and ratio that act during dt."""
@@ -426,3 +425,53 @@ def _limit(name: str, value: ArrayLike | None, n_dims: int) -> Array | None:
     if array.shape not in ((), (n_dims,)) or not (array > 0).all():
         raise SpecificationError(f"expected {name} to be a number above 0, or {n_dims} of them, got {value!r}")
     return np.broadcast_to(array, n_dims)
+
+
+def read_vector(value: Any, n_dims: int) -> Array | None:
+    """`value` as (d,) finite float64, or None; a number serves one dimension."""
+    array = _read_array(value)
+    if array is not None and array.ndim == 0:
+        array = array[None]
+    return array if array is not None and array.shape == (n_dims,) else None
+
+
+def _read_rows(value: Any, n_dims: int) -> Array | None:
+    """`value` (m, d), or (d,) for one, as contiguous (m, d) finite float64, or None."""
+    array = _read_array(value)
+    if array is not None and array.ndim == 1 and len(array):
+        array = array[None]
+    if array is None or array.ndim not in (1, 2):
+        return None
+    if array.size == 0:
+        return np.zeros((0, n_dims))
+    return np.ascontiguousarray(array) if array.shape[1] == n_dims else None
+
+
+def read_points(positions: Any, velocities: Any, n_dims: int) -> tuple[Array, Array] | None:
+    """Points (m, d) and their velocities, at rest where there are none; None unless d is at least 2."""
+    x = _read_rows(positions, n_dims)
+    v = _read_rows(velocities, n_dims) if velocities is not None or x is None else np.zeros_like(x)
+    if x is None or v is None or x.shape != v.shape or n_dims < 2:
+        return None
+    return x, v
+
+
+def read_number(value: Any) -> float:
+    """`value` as a float; NaN for what is none."""
+    try:
+        return float(value)
+    except Exception:
+        return math.nan
+
+
+def is_usable(array: Array) -> bool:
+    """Whether all numbers are finite, and so far from overflow that their squares are finite too."""
+    return math.hypot(*array.ravel().tolist()) < _LARGEST  # for a few numbers faster than any of NumPy's reductions
+
+
+def _read_array(value: Any) -> Array | None:
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except Exception:  # whatever a driver hands over, the motion goes on
+        return None
+    return array if is_usable(array) else None

@@ -22,8 +22,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 import numpy as np
 
 from kineme.dmp.discrete.encode import check_movement
-from kineme.dmp.discrete.fits import trajectory_columns
-from kineme.dmp.discrete.operators import decoder
+from kineme.dmp.discrete.operators import decoder, trajectory_columns
 from kineme.dmp.discrete.specification import Specification
 from kineme.errors import SpecificationError
 from kineme.movements.preparation.preprocess import preprocess

@@ -17,7 +17,7 @@ from kineme.validation import Array, check_count, check_samples
 
 if TYPE_CHECKING:
     from kineme.dmp.control.controller import Controller
-    from kineme.dmp.control.obstacles import ObstacleAvoidance
+    from kineme.dmp.control.options import ObstacleAvoidance
     from kineme.dmp.discrete.choose import BasisSelection
     from kineme.dmp.discrete.rollout import Rollout
     from kineme.dmp.discrete.via_points import ViaLike
@@ -295,8 +295,7 @@ class Primitives(Learned):
         Via-Movement Primitives with Inter- and Extrapolation Capabilities", IROS 2019.
         """
         from kineme.dmp.discrete.modulate import modulated
-        from kineme.dmp.discrete.rollout import rollout
-        from kineme.dmp.discrete.samples import sampled
+        from kineme.dmp.discrete.rollout import rollout, sampled
 
         movement = modulated(
             rollout(self, start, goal, duration, velocity, goal_velocity), via, end_velocity, position_limits
@@ -314,7 +313,7 @@ class Primitives(Learned):
         SpecificationError
             A rollout with a goal that moves, which a primitive has not.
         """
-        from kineme.dmp.discrete.own_primitives import own_primitives
+        from kineme.dmp.discrete.rollout import own_primitives
 
         own = own_primitives(movement)
         return cls._of_rows(

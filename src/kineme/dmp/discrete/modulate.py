@@ -12,10 +12,16 @@ Source: Y. Zhou, J. Gao, T. Asfour, "Learning Via-Movement Primitives with Inter
 IROS 2019. There Sigma is the covariance of the demonstrations' weights. Our choice where there is one
 demonstration only, and beside those where there are few: Sigma is such that the change of the path has the least mean
 square acceleration (`smoothness_factor`), as a cubic spline has. See docs/guide/modulation.md for what was measured.
+
+The points of a stretch may be more than the basis functions can meet, or noisy: met as closely as possible, the path
+would swing far out beside them. So each has a deviation of its own, of a millionth of what it has under the covariance.
+Where the path swings, larger ones are tried: a stretch may be missed so that the path is led less far away. How far it
+swings with both, `python -m bench --only via_points` measures on the shapes of LASA.
 """
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
@@ -25,15 +31,122 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.dmp.condition import condition
-from kineme.dmp.discrete.changes import SLACK, changes, looks_of, loose_changes
-from kineme.dmp.discrete.extrapolation import MEASURED, Changed, Measured, extents_of, warn_changed, warn_far
 from kineme.dmp.discrete.operators import decoder, decoder_at, smoothness_factor
-from kineme.dmp.discrete.per_movement import broadcast_length, per_movement
 from kineme.dmp.discrete.position_limits import within_limits
 from kineme.dmp.discrete.rollout import Change, Rollout
 from kineme.dmp.discrete.specification import Specification
-from kineme.dmp.discrete.via_points import ViaLike, ViaPoints, via_points
+from kineme.dmp.discrete.via_points import SHARES, Span, ViaLike, ViaPoints, broadcast_length, per_movement, via_points
+from kineme.errors import ExtrapolationWarning, warn
 from kineme.validation import Array
+
+_LOOSE = 1e-3  # of the extent: a stretch that is met less closely is said
+_WIDE = 3.0  # times the extent and what is missing: a change that leads farther away is said
+
+
+class Measured(NamedTuple):
+    """Dimensions of one unit, whose distances are measured together."""
+
+    dims: slice = slice(None)
+    unit: str = ""  # with a space before it
+    least: float = sys.float_info.min  # the extent of movements that hardly move in these dimensions
+
+
+MEASURED = Measured()
+
+
+class Changed(NamedTuple):
+    """What a change of the weights does to movements."""
+
+    change: Change
+    left: Array | None  # (n, d, K) of what it was to make up for; None where nothing is left
+    looks: Array  # (N, T), from weights to the path
+
+
+def warn_far(
+    extents: Array, asked: ViaPoints, errors: Array, measured: Measured = MEASURED, span: Span = SHARES
+) -> None:
+    """Say how far a via point is from the path as it is, if that is farther than the movement is large, `extents` (n,).
+
+    `errors` (n, d, K or more) is what is missing at the points.
+    """
+    distances, unit = _distances(asked, errors, measured), measured.unit
+    far = distances > extents[:, None]
+    if far.any():
+        i, j = np.unravel_index(int(np.argmax(distances / extents[:, None])), far.shape)
+        warn(
+            f"{far.any(axis=1).sum()} of {len(far)} movements have a via point outside what was demonstrated: the one "
+            f"at {span.where.format(asked.times[j] * span.end)} is {distances[i, j]:.3g}{unit} from the path of "
+            f"movement {i} at that time, which is {extents[i]:.3g}{unit} large; check its unit and frame, or "
+            "demonstrate such a movement",
+            ExtrapolationWarning,
+            stacklevel=4,
+        )
+
+
+def warn_changed(
+    extents: Array, asked: ViaPoints, errors: Array, changed: Changed, measured: Measured = MEASURED
+) -> None:
+    """Say how far a movement stays from a stretch that it does not follow, or how far it is led from its path."""
+    unit = measured.unit
+    asked_for = _distances(asked, errors, measured).max(axis=1, initial=0.0)
+    much = _WIDE * np.maximum(extents, asked_for)
+    farthest = _farthest(changed, much, measured)
+    wide = farthest > much
+    missed = np.zeros(len(much)) if changed.left is None else _distances(asked, changed.left, measured).max(axis=1)
+    if (missed > _LOOSE * extents).any():
+        i = int(np.argmax(missed / extents))
+        one = changed.change._replace(coefficients=changed.change.coefficients[[i]])
+        swing = _farthest(changed._replace(change=one), np.full(1, -1.0), measured)
+        message = (
+            f"movement {i} stays {missed[i]:.3g}{unit} from its via stretch, {100 * missed[i] / extents[i]:.2g} % of "
+            f"its extent, and is led away from its path by {swing[0]:.3g}{unit}, where the stretch is "
+            f"{asked_for[i]:.3g}{unit} from it: the stretch bends more than {len(changed.looks)} basis "
+            "functions can; smooth its points, as kineme.Smooth does, give fewer of them, or use more basis functions; "
+            "AveragePrimitive.condition(t, position, std) passes near points that are not exact"
+        )
+    elif wide.any():
+        i = int(np.argmax(np.where(wide, farthest / extents, 0.0)))
+        message = (
+            f"{wide.sum()} of {len(wide)} movements are led far away by their via points or end velocity: movement {i} "
+            f"by {farthest[i]:.3g}{unit}, which is {extents[i]:.3g}{unit} large; different places at almost the same "
+            "time, or close to the start or the end, need high velocities: move their times apart, or ask for a lower "
+            "velocity"
+        )
+    else:
+        return
+    warn(message, ExtrapolationWarning, stacklevel=4)
+
+
+def extents_of(movement: Rollout, measured: Measured) -> Array:
+    """How large each movement is (n,): the diagonal of its bounding box."""
+    between = np.abs(movement.arrivals - movement.starts)
+    sides = np.maximum(movement.primitives.extents, between)[:, measured.dims]
+    return np.maximum(np.sqrt(np.einsum("nd,nd->n", sides, sides)), measured.least)
+
+
+def _distances(asked: ViaPoints, errors: Array, measured: Measured) -> Array:
+    """Of the paths from the via points (n, k), in the dimensions that are not free."""
+    missing = errors[:, measured.dims, : len(asked.times)]
+    missing = np.where(np.isnan(missing), 0.0, missing)
+    return np.asarray(np.sqrt(np.einsum("ndk,ndk->nk", missing, missing)))
+
+
+def _farthest(changed: Changed, much: Array, measured: Measured) -> Array:
+    """How far a change leads each movement away in a coordinate (n,); where it is not `much`, at most so far."""
+    change, effect = changed.change, changed.change.directions @ changed.looks
+    coefficients = change.coefficients[:, measured.dims]
+    farthest = (np.abs(coefficients) @ np.abs(effect).max(axis=1)).max(axis=1)
+    near = np.flatnonzero(farthest > much)
+    farthest[near] = np.abs(coefficients[near] @ effect).max(axis=(1, 2))
+    return np.asarray(farthest)
+
+
+#: Of a row's own deviation: of the points of a stretch, which may be more than can be met.
+SLACK = 1e-6
+_SLACKS = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
+_SWING = 3.0  # times the largest number that is missing: a change that is larger swings
+_PRICE = 0.03  # of a change, beside what it leaves missing
+_PER_BASIS = 3  # samples of a change for each basis function
 
 _WORTH = 10.0  # demonstrations; so much the smoothness of changes counts beside the spread of demonstrations
 
@@ -185,3 +298,50 @@ def path_variance(dmp: Specification, factor: Array) -> float:
     """Mean over time and dimensions of the path's variance, of the weights' covariance by its factor (r, d, N)."""
     paths = factor @ decoder(dmp, dmp.n_points).Phi[0].T
     return float(np.sum(paths**2)) / (paths.shape[1] * paths.shape[2])
+
+
+def changes(factor: Array, observed: Array, errors: Array, slack: Array) -> Array:
+    """The most probable changes (m, p) with ``observed @ change = errors`` (m, k), of which NaN need not be met.
+
+    `slack` (k,) is the deviation of each, as a share of what it is under the covariance ``factor.T @ factor``.
+    """
+    slack = slack * np.linalg.norm(observed @ factor.T, axis=1)
+    known = np.isfinite(errors)
+    if known.all():
+        return np.asarray(errors @ condition(factor, observed, slack).gain)
+    patterns, which = np.unique(known, axis=0, return_inverse=True)
+    found = np.empty((len(errors), observed.shape[1]))
+    for i, pattern in enumerate(patterns):  # of free dimensions: few, however many movements
+        rows = np.flatnonzero(which.ravel() == i)
+        found[rows] = errors[rows][:, pattern] @ condition(factor, observed[pattern], slack[pattern]).gain
+    return found
+
+
+def loose_changes(looks: Array, factor: Array, observed: Array, errors: Array, stretch: Array) -> Array:
+    """The same (m, p), of the weights of one or more dimensions of one movement.
+
+    The rows of a stretch, those where `stretch` (k,) is 1 and not 0, are met so closely that the path does not swing,
+    which `looks` (N, T) shows: from the weights of a dimension to its path.
+    """
+    found = changes(factor, observed, errors, SLACK * stretch)
+    if not stretch.any():
+        return found
+    missing = np.where(np.isnan(errors), 0.0, errors)
+    rows = np.flatnonzero(_swing(looks, found) > _SWING * np.abs(missing).max(axis=1))
+    if len(rows):
+        tried = np.stack([found[rows], *(changes(factor, observed, errors[rows], k * stretch) for k in _SLACKS)])
+        left = np.where(np.isnan(errors[rows]), 0.0, missing[rows] - tried @ observed.T)[:, :, stretch > 0.0]
+        cost = np.abs(left).max(axis=2) + _PRICE * np.stack([_swing(looks, one) for one in tried])
+        found[rows] = tried[cost.argmin(axis=0), np.arange(len(rows))]
+    return found
+
+
+def _swing(looks: Array, changed: Array) -> Array:
+    """The largest change of a coordinate, anywhere along the paths (m,)."""
+    paths = changed.reshape(-1, len(looks)) @ looks
+    return np.asarray(np.abs(paths).max(axis=1).reshape(len(changed), -1).max(axis=1))
+
+
+def looks_of(dmp: Specification) -> Array:
+    """From weights to the path at as many times as show how far a change leads (N, T)."""
+    return decoder(dmp, _PER_BASIS * dmp.n_basis).Phi[0].T

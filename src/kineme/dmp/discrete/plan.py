@@ -9,8 +9,7 @@ from kineme.dmp.control.options import check_one, one_vector
 from kineme.dmp.control.plan import MISSED, Plan, ViaPlaces
 from kineme.dmp.discrete.learned import Learned
 from kineme.dmp.discrete.modulate import modulated
-from kineme.dmp.discrete.own_primitives import own_primitives
-from kineme.dmp.discrete.rollout import Rollout, rollout
+from kineme.dmp.discrete.rollout import Rollout, own_primitives, rollout
 from kineme.dmp.discrete.via_points import ViaLike, ViaPoints, via_points
 from kineme.validation import Array, check_number
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -13,13 +14,21 @@ from kineme.dmp.base_rollout import BaseRollout
 from kineme.dmp.batch import Batch
 from kineme.dmp.discrete.learned import Learned
 from kineme.dmp.discrete.operators import decoder
-from kineme.dmp.discrete.per_movement import broadcast_length, check_durations, per_movement
-from kineme.errors import DegenerateMovementError
+from kineme.dmp.discrete.specification import Specification
+from kineme.dmp.discrete.via_points import broadcast_length, check_durations, per_movement
+from kineme.errors import DegenerateMovementError, SpecificationError
 from kineme.runtime.parallel import for_tiles
 from kineme.validation import (
     Array,
+    check_count,
+    check_number,
+    check_samples,
     describe,
 )
+
+_LONGEST = 10.0  # durations after which a movement that has not settled is given up
+_SETTLING_SAMPLES = 400
+
 
 _TILE_SAMPLES = 100_000  # numbers in one tile of the result
 
@@ -114,7 +123,7 @@ class Rollout(BaseRollout):
             No limit, or one that is not above 0; a rollout that was given a velocity other than 0, initial, at the end
             or of the goal, for its path depends on the duration.
         """
-        from kineme.dmp.discrete.least_duration import least_durations
+        from kineme.dmp.base_rollout import least_durations
 
         finely = self.end * self.primitives.dmp.n_basis, lambda one, n: replace(one, n_samples=n)
         return least_durations(self, self.durations, finely, self.fixed_velocity, (velocity, acceleration))
@@ -231,3 +240,76 @@ def _ratio(primitives: Learned, amplitudes: Array) -> Array:
             '"bio-inspired" or "amplitude-scaled"'
         )
     return ratio
+
+
+def own_primitives(movement: Rollout) -> Learned:
+    """The movements as n primitives of their own: each with this start, goal, velocity, duration and weights.
+
+    Raises
+    ------
+    SpecificationError
+        A goal that moves.
+    """
+    if movement.goal_velocities is not None and movement.goal_velocities.any():
+        raise SpecificationError(
+            "expected movements to goals at rest, got goal_velocity= other than 0: primitives know no goals that move; "
+            "give it to their rollout, or to controller.step, or use end_velocity= to go on at the goal"
+        )
+    some = movement.primitives
+    some = some if len(some) == len(movement) else some[np.zeros(len(movement), dtype=np.intp)]
+    weights = some.scaled_weights * movement.ratio[:, :, None]
+    if movement.change is not None:
+        weights += movement.change.coefficients @ movement.change.directions
+    return replace(
+        some,
+        scaled_weights=weights,
+        starts=movement.starts.copy(),
+        goals=movement.goals.copy(),
+        velocities=movement.velocities_at_start.copy(),
+        durations=movement.durations.copy(),
+    )
+
+
+def sampled(movement: Rollout, rate: float | None, n_samples: int | None, settle: float | None) -> Rollout:
+    """The movement with the samples that the options of `Primitives.rollout` ask for."""
+    dmp = movement.primitives.dmp
+    end = 1.0 if settle is None else settled_end(movement, settle)
+    if rate is not None and n_samples is not None:
+        raise SpecificationError("expected either rate or n_samples, got both")
+    if rate is not None:
+        n_samples = samples_at_rate(rate, movement.durations * end, dmp)
+    elif n_samples is None:
+        n_samples = math.ceil(end * (dmp.n_points - 1)) + 1
+    n_samples = check_samples(check_count("n_samples", n_samples, 2), dmp.n_basis, "n_samples")
+    return replace(movement, n_samples=n_samples, end=end)
+
+
+def samples_at_rate(rate: float, durations: Array, dmp: Specification) -> int:
+    """Samples per movement so that none is sampled more coarsely than `rate` [Hz]."""
+    check_number("rate", rate, above=0.0)
+    wanted = float(durations.max()) * rate * (1 - 1e-12) + 1
+    n_samples = check_samples(wanted, dmp.n_basis, "rate times duration")
+    least = math.ceil(2 * math.sqrt(dmp.K)) + 1
+    if n_samples < least:
+        raise SpecificationError(
+            f"expected a rate of at least {(least - 1) / float(durations.max()):.3g} Hz to follow the dynamics, that "
+            f"is two samples in each time constant duration / sqrt(K) of the spring, got {rate:g} Hz"
+        )
+    return n_samples
+
+
+def settled_end(movement: Rollout, tolerance: float) -> float:
+    """Time, in durations from 1 on, at which every movement stays within `tolerance` of its goal."""
+    check_number("settle", tolerance, above=0.0)
+    far = replace(movement, n_samples=_SETTLING_SAMPLES, end=_LONGEST)
+    goals = (
+        movement.goals[:, None] + np.linspace(0.0, _LONGEST, _SETTLING_SAMPLES)[:, None] * movement.goal_steps[:, None]
+    )
+    outside = (np.abs(far.positions - goals) > tolerance).any(axis=(0, 2))
+    last = int(np.flatnonzero(outside)[-1]) if outside.any() else 0
+    if last == _SETTLING_SAMPLES - 1:
+        raise SpecificationError(
+            f"expected the movement to come within {tolerance:g} of its goal in {_LONGEST:g} durations, it does "
+            "not; raise the tolerance, the stiffness or the damping"
+        )
+    return max(1.0, (last + 1) * _LONGEST / (_SETTLING_SAMPLES - 1))

@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kineme.dmp.control.obstacles import ObstacleAvoidance
+from kineme.dmp.control.options import ObstacleAvoidance
 from kineme.dmp.control.state import State, Status
 from kineme.dmp.discrete.dmp import Primitives
 from kineme.dmp.generation.learned import Learned
-from kineme.dmp.pose.pose_primitives import PosePrimitives
+from kineme.dmp.pose.pose_dmp import PosePrimitives
 from kineme.dmp.recorded_as import in_primitive, in_recording
 from kineme.errors import ExtrapolationWarning, SpecificationError, heard_warnings, warn
 from kineme.io.writing.write_movement import ColumnNames, Columns

@@ -5,12 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kineme.dmp.discrete.extrapolation import Measured
-from kineme.dmp.discrete.modulate import path_at
-from kineme.dmp.discrete.per_movement import broadcast_length, per_movement
+from kineme.dmp.discrete.modulate import Measured, path_at
 from kineme.dmp.discrete.position_limits import as_limits
 from kineme.dmp.discrete.rollout import Rollout
-from kineme.dmp.discrete.via_points import ViaLike, ViaPoints, via_points
+from kineme.dmp.discrete.via_points import ViaLike, ViaPoints, broadcast_length, per_movement, via_points
 from kineme.dmp.pose.rates import rotation_vector_rate
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.rotations.quaternions import conjugate, normalized, product

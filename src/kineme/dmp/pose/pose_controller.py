@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kineme.dmp.control import inputs
-from kineme.dmp.control.controller import Controller
+from kineme.dmp.control.controller import Controller, is_usable, read_vector
 from kineme.dmp.control.options import Options
 from kineme.dmp.control.plan import Plan
 from kineme.dmp.control.state import State, Status
@@ -125,7 +124,7 @@ class PoseController(Controller):
 
     def _as_tangent(self, value: Any, near: Array) -> Array | None:
         """Position and the rotation vector closest to that of `near`; None for what is no pose."""
-        array = inputs.vector(value, self._n_dims + len(self._references))
+        array = read_vector(value, self._n_dims + len(self._references))
         if array is None:
             return None
         columns, close = array.tolist(), near.tolist()
@@ -140,12 +139,12 @@ class PoseController(Controller):
 
     def _as_rates(self, value: Any, x: Array) -> Array | None:
         """Rates of position and rotation vector at x, from linear and angular ones."""
-        array = inputs.vector(value, self._n_dims)
+        array = read_vector(value, self._n_dims)
         if array is None:
             return None
         columns, m = array.tolist(), self._linear
         rates = np.array([*columns[:m], *self._of_each(rate_components, x.tolist(), columns)])
-        return rates if inputs.usable(rates) and np.abs(rates[m:]).max() <= _FASTEST else None
+        return rates if is_usable(rates) and np.abs(rates[m:]).max() <= _FASTEST else None
 
     def _move(self, dt: float, push: Array, last: Array) -> None:
         super()._move(dt, push, last)

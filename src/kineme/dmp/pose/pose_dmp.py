@@ -3,14 +3,32 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
-from kineme.dmp.discrete.dmp import DMP
-from kineme.dmp.pose.pose_primitives import PosePrimitives
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kineme.dmp.batch import Batch
+from kineme.dmp.control.options import ObstacleAvoidance, Options, check_one
+from kineme.dmp.discrete.dmp import DMP, Primitives
+from kineme.dmp.discrete.modulate import modulated
+from kineme.dmp.discrete.plan import plan_along
+from kineme.dmp.discrete.rollout import Rollout, rollout, sampled
+from kineme.dmp.discrete.via_points import ViaLike, broadcast_length
+from kineme.dmp.persistence import Arrays, check_array
+from kineme.dmp.pose.in_tangent import changes_in_tangent, checked_poses, rates_in_tangent
+from kineme.dmp.pose.pose_controller import PoseController
+from kineme.dmp.pose.pose_rollout import PoseRollout
 from kineme.dmp.pose.tangent import to_tangent
-from kineme.dmp.recorded_as import recorded_as
+from kineme.dmp.recorded_as import RecordedAs, recorded_as
 from kineme.errors import SpecificationError
+from kineme.movements.channels.channel import Channels
+from kineme.movements.rotations.quaternions import conjugate, normalized, product
+from kineme.movements.rotations.rotation_vectors import exp, log, nearest
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements import Names
 from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.validation import Array, check_number
 
 
 @dataclass(frozen=True)
@@ -95,3 +113,296 @@ class PoseDMP:
             references,
             about if about is not None and about.orientations else None,
         )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PosePrimitives(Batch):
+    """n primitives of orientations or poses; made by `PoseDMP.learn`.
+
+    Attributes
+    ----------
+    tangent : Primitives
+        Of 3 dimensions, the rotation vector from the goal [rad] in the world frame, or 6, the position before it. Its
+        weights, forcing terms and shape-attractors describe the movements. Of recordings with p positions and angles
+        and k orientations it has p + 3 k.
+    references : ndarray of shape (n, 4), or (n, 4 k) of k orientations
+        The demonstrated goal orientations, where the rotation vectors are 0.
+    recorded_as : RecordedAs or None
+        Channels of the recordings, where they are known; see `channels`.
+    """
+
+    ROWS = Primitives.ROWS | {"references": "nq"}
+    SPECIFICATION = DMP
+    KIND = "pose primitives"
+
+    tangent: Primitives
+    references: Array
+    recorded_as: RecordedAs | None = None
+
+    def __post_init__(self) -> None:
+        view = self.references.view()
+        view.setflags(write=False)
+        object.__setattr__(self, "references", view)
+
+    def __repr__(self) -> str:
+        columns = {4: "orientations", 7: "poses"}.get(self.n_columns, f"{self.n_columns} columns")
+        return f"PosePrimitives({len(self)} movements of {columns}, {self.tangent.dmp})"
+
+    def _row(self, name: str) -> NDArray[Any]:
+        return np.asarray(getattr(self if name == "references" else self.tangent, name))
+
+    @classmethod
+    def _of_rows(
+        cls, dmp: Any, arrays: dict[str, Any], labels: NDArray[Any] | None, names: Names, about: RecordedAs | None
+    ) -> PosePrimitives:
+        rows = {name: arrays[name] for name in Primitives.ROWS}
+        return cls(Primitives(dmp, **rows, labels=labels, names=names), arrays["references"], about)
+
+    @classmethod
+    def _from_file(cls, header: dict[str, Any], arrays: Arrays) -> PosePrimitives:
+        loaded = super()._from_file(header, arrays)
+        k = 1 if loaded.recorded_as is None else len(loaded.recorded_as.orientations)
+        check_array("references", loaded.references, (len(loaded), 4 * k))
+        if loaded.recorded_as is None and loaded.n_dims not in {3, 6}:
+            raise ValueError(f"scaled_weights should have 3 or 6 dimensions, have {loaded.n_dims}")
+        for at in range(0, 4 * k, 4):
+            normalized(
+                loaded.references[:, at : at + 4]
+            )  # refuses what is no rotation; the numbers stay as they were saved
+        return loaded
+
+    @property
+    def moving_channels(self) -> Channels | None:
+        """Those `channels` that are learned, in the order of the columns: the orientations last."""
+        return None if self.recorded_as is None else (*self.recorded_as.plain, *self.recorded_as.orientations)
+
+    @property
+    def to_recording(self) -> RecordedAs | None:
+        """`recorded_as`, if the movements can be written in the columns of the recording; else None."""
+        return self.recorded_as if self.recorded_as is not None and self.recorded_as.has_steps else None
+
+    @property
+    def dmp(self) -> DMP:
+        """The specification of the DMP in the tangent space."""
+        return self.tangent.dmp
+
+    @property
+    def labels(self) -> NDArray[Any] | None:
+        """Labels of the demonstrations, shape (n,), or None."""
+        return self.tangent.labels
+
+    @property
+    def names(self) -> tuple[str | None, ...] | None:
+        """Where each demonstration came from, or None."""
+        return self.tangent.names
+
+    @property
+    def durations(self) -> Array:
+        """Duration tau of each demonstration, shape (n,) [s]."""
+        return self.tangent.durations
+
+    @property
+    def n_orientations(self) -> int:
+        """Number of orientations k."""
+        return self.references.shape[1] // 4
+
+    @property
+    def n_positions(self) -> int:
+        """Number of columns before the orientations: those of a position, or all positions and angles."""
+        return self.tangent.n_dims - 3 * self.n_orientations
+
+    @property
+    def n_columns(self) -> int:
+        """4 for orientations, 7 for poses."""
+        return self.n_positions + 4 * self.n_orientations
+
+    @property
+    def starts(self) -> Array:
+        """Demonstrated starts, shape (n, 4) or (n, 7), with positions first."""
+        return self._poses(self.tangent.starts)
+
+    @property
+    def goals(self) -> Array:
+        """Demonstrated goals, shape (n, 4) or (n, 7), with positions first."""
+        return self._poses(self.tangent.goals)
+
+    def rollout(  # noqa: PLR0913 - an option per parameter
+        self,
+        start: ArrayLike | None = None,
+        goal: ArrayLike | None = None,
+        duration: ArrayLike | None = None,
+        *,
+        velocity: ArrayLike | None = None,
+        via: ViaLike | None = None,
+        end_velocity: ArrayLike | None = None,
+        goal_velocity: ArrayLike | None = None,
+        position_limits: tuple[ArrayLike, ArrayLike] | None = None,
+        rate: float | None = None,
+        n_samples: int | None = None,
+        settle: float | None = None,
+    ) -> PoseRollout:
+        """Move again, as demonstrated or with another start, goal and duration; all movements in one product.
+
+        Parameters
+        ----------
+        start, goal : array_like of shape (d,) or (n, d), optional
+            Orientations (d = 4) or poses (d = 7), as demonstrated; quaternions of either sign. The way from a new
+            start to a new goal is the one nearest to the demonstrated way, the long way round if that was shown.
+            Of other recordings the positions and angles, and after them the orientations, each as (w, x, y, z).
+        duration, rate, n_samples : optional
+            See `Primitives.rollout`.
+        velocity : array_like of shape (d - 1,) or (n, d - 1), optional
+            Initial angular velocity in the world frame [rad/s], for poses after the linear velocity. By default
+            the demonstrated rates of the position and the rotation vector, in proportion to the tempo.
+        via : sequence of (time, point) or ((begin, end), points), optional
+            Where to pass, and when; see `Primitives.rollout`. Points are orientations (d = 4) or poses (d = 7): NaN
+            leaves a position free, NaN in all four numbers an orientation. Each is met the way round that is nearest.
+        end_velocity : array_like of shape (d - 1,) or (n, d - 1), optional
+            As `velocity`, at the goal, at the end of the duration; the goal is then met exactly.
+        goal_velocity : array_like of shape (d - 1,) or (n, d - 1), optional
+            Velocity of the goal, as `velocity`: it is at `goal` at the start, and goes and turns on at that rate.
+        position_limits : (low, high), optional
+            Where the positions stay, each a number or one for each position; see `Primitives.rollout`.
+        settle : float, optional
+            Go on past the duration until every position and every component of the rotation vector [rad] stays within
+            this distance of the goal.
+
+        Raises
+        ------
+        TrajectoryError
+            A start, goal, velocity or via point of the wrong shape, a quaternion not of norm 1, numbers that do not go
+            together.
+        SpecificationError
+            As of `Primitives.rollout`; limits of orientations alone.
+        DegenerateMovementError
+            The original formulation asked to turn about an axis that the demonstration does not turn about.
+
+        Warns
+        -----
+        ExtrapolationWarning
+            As `Primitives.rollout`, in positions or in radians.
+
+        Notes
+        -----
+        All happens in positions and rotation vectors from the goal, where via points and velocities are linear. At the
+        goal the rotation vector is 0, and its rate the angular velocity.
+        """
+        movement, references = self._asked_for(start, goal, duration, velocity, goal_velocity)
+        movement = modulated(movement, *changes_in_tangent(movement, references, via, end_velocity, position_limits))
+        movement = sampled(movement, rate, n_samples, settle)
+        references = np.broadcast_to(references, (len(movement), references.shape[1]))
+        return PoseRollout(movement, references, self.recorded_as)
+
+    @classmethod
+    def from_rollout(cls, movement: PoseRollout) -> PosePrimitives:
+        """The movements of a rollout as primitives of their own; see `Primitives.from_rollout`.
+
+        Raises
+        ------
+        SpecificationError
+            A rollout with a goal that moves, which a primitive has not.
+        """
+        about, n = movement.recorded_as, len(movement)
+        if about is not None and len(movement.tangent.primitives) < n:
+            about = about.take(np.zeros(n, dtype=np.intp))
+        return cls(Primitives.from_rollout(movement.tangent), movement.references.copy(), about)
+
+    def controller(  # noqa: PLR0913 - an option per parameter
+        self,
+        dt: float,
+        *,
+        start: ArrayLike | None = None,
+        goal: ArrayLike | None = None,
+        duration: float | None = None,
+        velocity: ArrayLike | None = None,
+        via: ViaLike | None = None,
+        end_velocity: ArrayLike | None = None,
+        position_limits: tuple[ArrayLike, ArrayLike] | None = None,
+        feedback: str = "state",
+        phase_stopping: float | None = None,
+        goal_filter: float | None = None,
+        velocity_limit: ArrayLike | None = None,
+        acceleration_limit: ArrayLike | None = None,
+        avoidance: ObstacleAvoidance | None = None,
+        settle: float | None = None,
+    ) -> PoseController:
+        """One primitive under live control, in steps of `dt` [s].
+
+        Parameters
+        ----------
+        dt : float
+            Time of a step [s], at most the duration.
+        start, goal, duration, velocity, via, end_velocity, position_limits : optional
+            As in `rollout`, for one movement. Past the duration the goal attracts again, at rest.
+        feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance, settle : optional
+            What to do with measurements, new goals, limits and obstacles; see `kineme.control.Options`. Limits hold for
+            linear and angular velocities and accelerations, as the state reports them; obstacles are points (m, 3) that
+            the position steers around; `settle` holds for positions and the components of the rotation vector [rad].
+
+        Returns
+        -------
+        PoseController
+            At the start, with ``step``, ``reset`` and ``state``.
+
+        Raises
+        ------
+        SpecificationError, TrajectoryError
+            More than one primitive; an option out of its range; a start or goal that is no pose.
+        """
+        if duration is not None:
+            check_number("duration", duration, above=0.0)
+        movement, references = self._asked_for(start, goal, duration, velocity)
+        check_one(len(movement))
+        changes = changes_in_tangent(movement, references, via, end_velocity, position_limits)
+        plan = plan_along(modulated(movement, *changes), self.n_positions, changes[0])
+        options = Options(feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance, settle)
+        return PoseController(plan, dt, options, references[0])
+
+    def in_tangent(
+        self, start: ArrayLike | None, goal: ArrayLike | None, velocity: ArrayLike | None
+    ) -> tuple[Array, Array, Array, Array | None]:
+        """Start, goal, reference orientations and initial velocity of the movements that these options make."""
+        starts, goals, references = self._endpoints(start, goal)
+        return starts, goals, references, rates_in_tangent(velocity, starts, self.n_positions, "velocity")
+
+    def _asked_for(
+        self,
+        start: ArrayLike | None,
+        goal: ArrayLike | None,
+        duration: ArrayLike | None,
+        velocity: ArrayLike | None,
+        goal_velocity: ArrayLike | None = None,
+    ) -> tuple[Rollout, Array]:
+        """The movements in positions and rotation vectors, and the orientations (1 or n, 4 k) that these refer to."""
+        starts, goals, references, velocities = self.in_tangent(start, goal, velocity)
+        return rollout(self.tangent, starts, goals, duration, velocities, goal_velocity), references
+
+    def _endpoints(self, start: ArrayLike | None, goal: ArrayLike | None) -> tuple[Array, Array, Array]:
+        """Start and goal in positions and rotation vectors, and the orientations that the latter refer to."""
+        starts, goals = (
+            checked_poses(*one, self.n_positions, self.n_columns) for one in ((start, "start"), (goal, "goal"))
+        )
+        starts, goals = self.starts if starts is None else starts, self.goals if goals is None else goals
+        n = broadcast_length(len(self), {"start": starts, "goal": goals})
+        m, k = self.n_positions, self.n_orientations
+        learned = self.tangent.starts[:, m:].reshape(len(self), k, 3)
+        vectors = learned
+        if start is not None or goal is not None:
+            q, q_goal = (columns[:, m:].reshape(-1, k, 4) for columns in (starts, goals))
+            vectors = nearest(log(product(q, conjugate(q_goal))), learned)
+
+        def joined(positions: Array, vectors: Array) -> Array:
+            return np.concatenate((np.broadcast_to(positions, (n, m)), np.broadcast_to(vectors, (n, 3 * k))), axis=1)
+
+        flat = vectors.reshape(len(vectors), 3 * k)
+        return joined(starts[:, :m], flat), joined(goals[:, :m], np.zeros((1, 3 * k))), goals[:, m:]
+
+    def _poses(self, tangent: Array) -> Array:
+        m = self.n_positions
+        q = product(exp(tangent[:, m:].reshape(len(self), -1, 3)), self._goals)
+        return np.concatenate((tangent[:, :m], q.reshape(len(self), -1)), axis=1)
+
+    @property
+    def _goals(self) -> Array:
+        """The references (n, k, 4)."""
+        return self.references.reshape(len(self), -1, 4)

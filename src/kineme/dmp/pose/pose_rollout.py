@@ -9,9 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kineme.dmp.base_rollout import BaseRollout
+from kineme.dmp.base_rollout import BaseRollout, least_durations
 from kineme.dmp.batch import Batch
-from kineme.dmp.discrete.least_duration import least_durations
 from kineme.dmp.discrete.rollout import Rollout
 from kineme.dmp.pose.rates import angular_acceleration, angular_velocity
 from kineme.dmp.recorded_as import RecordedAs

@@ -7,11 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kineme.dmp.control import inputs
-from kineme.dmp.control.controller import Controller
-from kineme.dmp.control.moving_goal import FilteredValue
+from kineme.dmp.control.controller import Controller, is_usable, read_number
 from kineme.dmp.control.options import Options
-from kineme.dmp.control.plan import Plan
+from kineme.dmp.control.plan import FilteredValue, Plan
 from kineme.dmp.control.state import State, Status
 from kineme.validation import LARGEST_STAMP, SHORTEST_STEP, Array
 
@@ -114,14 +112,14 @@ class RhythmicController(Controller):
         return self.state.goal.copy()
 
     def _set_amplitude(self, amplitude: Any) -> None:
-        gain = np.array([inputs.number(amplitude) / self._learned_amplitude])
-        if inputs.usable(gain):
+        gain = np.array([read_number(amplitude) / self._learned_amplitude])
+        if is_usable(gain):
             self._gain.set(gain)
         else:
             self._events |= Status.AMPLITUDE_REJECTED
 
     def _set_period(self, period: Any) -> None:
-        period = inputs.number(period)
+        period = read_number(period)
         if not (SHORTEST_STEP <= period <= LARGEST_STAMP and self.dt <= period * self._plan.longest_step):
             self._events |= Status.PERIOD_REJECTED
             return

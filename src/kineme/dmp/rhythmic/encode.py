@@ -1,4 +1,9 @@
-"""Learn a batch of rhythmic movements: resample, estimate the period, fold, align, multiply."""
+"""Learn a batch of rhythmic movements: resample, estimate the period, fold, align, multiply.
+
+The candidates for a period come from the self-similarity of the recording; a harmonic fit chooses and refines. All
+dimensions are used together in the user's unit, so the widest has the largest weight. The unknown is `cycles`, the
+number of periods from the first to the last sample, whole or not.
+"""
 
 from __future__ import annotations
 
@@ -10,17 +15,28 @@ from numpy.typing import NDArray
 
 from kineme.dmp.discrete.encode import check_movement
 from kineme.dmp.recorded_as import RecordedAs
-from kineme.dmp.rhythmic.harmonics import Complex, as_real, fit_harmonics, waves
-from kineme.dmp.rhythmic.operators import encoder, even_phases
-from kineme.dmp.rhythmic.periods import FEWEST_CYCLES, SAMPLES_PER_PERIOD, Periodicity, find_cycles
+from kineme.dmp.rhythmic.operators import Complex, as_real, encoder, even_phases, fit_harmonics, waves
 from kineme.dmp.rhythmic.specification import RhythmicSpecification
 from kineme.errors import TrajectoryError
 from kineme.movements.preparation.preprocess import preprocess
 from kineme.movements.preparation.resample import relative_rows
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements_like import MovementsLike
-from kineme.runtime.parallel import for_tiles
+from kineme.runtime.parallel import for_tiles, single_threaded_blas
 from kineme.validation import Array, describe
+
+FEWEST_CYCLES = 1.5  # with fewer, a period cannot be told from a part of it
+SAMPLES_PER_PERIOD = 4  # fewer cannot show a shape
+_CANDIDATES = 6
+_AVERAGED = 0.02  # of a lag, to either side
+_VALLEY = 0.1  # of a lag, to either side: a valley is the minimum within it
+_RISEN = 0.5  # dissimilarity that must be reached before a period; otherwise noise next to lag 0 gives short ones
+_SLACK = 0.25  # dissimilarity by which a candidate may exceed the best one
+_HARMONICS = 8
+_PER_HARMONIC = 2.5  # samples per period that the highest harmonic needs
+_NEWTON_STEPS = 5
+_MUCH_BETTER = 0.5  # largest share of the unexplained variance of a shorter period that a longer one may leave
+_ROUNDING = 1e-9  # share of the variance below which nothing is left to explain
 
 _RESOLVED = 0.45  # harmonics per sample of a period; one half would be the Nyquist limit
 
@@ -185,3 +201,165 @@ def start_phases(first: Complex) -> Array:
     """
     phases = np.angle(first) % (2 * np.pi)
     return np.where(phases == 2 * np.pi, 0.0, phases)  # the remainder of a tiny negative angle rounds up to 2 pi
+
+
+class Periodicity(NamedTuple):
+    """Estimated periods of n recordings."""
+
+    cycles: Array  # (n,), periods per recording; NaN where there is no candidate
+    explained: Array  # (n,), share of the variance that one repeated cycle explains, corrected for its freedom
+
+
+def dissimilarity(rows: Array) -> Array:
+    """Mean square distance of a recording (n, d, R) from itself, shifted by 0 ... R - 1 samples, shape (n, R).
+
+    Unit: twice the variance, so 0 at a period and 1 on average. Unlike the autocorrelation it needs no mean, which a
+    fractional number of periods makes uncertain. It is the difference function of A. de Cheveigne and H. Kawahara,
+    "YIN, a fundamental frequency estimator", JASA 111(4), 2002, averaged over the overlap.
+    """
+    n_samples = rows.shape[2]
+    centered = rows - rows.mean(axis=2, keepdims=True)
+    spectrum = np.fft.rfft(centered, 2 * n_samples)
+    correlation = np.fft.irfft((spectrum * spectrum.conj()).real.sum(axis=1))[:, :n_samples]
+    energy = np.cumsum((centered**2).sum(axis=1), axis=1)  # of the first j + 1 samples
+    total = energy[:, -1:]
+    early = energy[:, ::-1]  # the first R - lag samples
+    late = total - np.column_stack((np.zeros(len(rows)), energy[:, :-1]))  # the last R - lag samples
+    overlap = n_samples - np.arange(n_samples)
+    return np.asarray((early + late - 2 * correlation) / overlap / (2 * total / n_samples))
+
+
+def candidates(rows: Array, lengths: NDArray[np.intp]) -> Array:
+    """Possible numbers of cycles, descending, (n, C), NaN where there are fewer: valleys of `dissimilarity`.
+
+    Noise makes a small valley every few samples. Values within a share of a lag are therefore averaged, so that more
+    samples per period average more noise, and only the lowest valley within a tenth of a lag counts.
+    """
+    n_samples = rows.shape[2]
+    longest = min(int((n_samples - 1) / FEWEST_CYCLES) + 4, n_samples)
+    distance = _averaged(dissimilarity(rows))[:, :longest]
+    lag = np.arange(1, longest - 1)
+    reach = np.minimum(_share_of(lag, _AVERAGED), np.minimum(lag, longest - 1 - lag))  # to the parabola's outer points
+    reach = np.maximum(reach, 1)
+    left, here, right = distance[:, lag - reach], distance[:, lag], distance[:, lag + reach]
+    resolved = lag * (lengths[:, None] - 1) >= SAMPLES_PER_PERIOD * (n_samples - 1)
+    valley = (here <= distance[:, lag - 1]) & (here < distance[:, lag + 1]) & resolved
+    valley &= here <= _lowest_near(distance, lag)
+    valley &= np.maximum.accumulate(distance, axis=1)[:, lag] >= _RISEN
+    best = np.where(valley, here, np.inf).min(axis=1, keepdims=True)
+    valley &= here <= best + _SLACK
+    valley &= np.cumsum(valley, axis=1) <= _CANDIDATES
+    with np.errstate(invalid="ignore", divide="ignore"):
+        tip = 0.5 * reach * (left - right) / (left - 2 * here + right)  # vertex of the parabola through three points
+        cycles = np.where(valley, (n_samples - 1) / (lag + np.clip(tip, -reach, reach)), np.nan)
+    order = np.argsort(~valley, axis=1, kind="stable")[:, :_CANDIDATES]
+    return np.take_along_axis(cycles, order, axis=1)
+
+
+def _share_of(lag: NDArray[np.intp], share: float) -> NDArray[np.intp]:
+    return np.asarray(share * lag, dtype=np.intp)
+
+
+def _averaged(distance: Array) -> Array:
+    """Each lag's value (n, R) averaged over the lags within a share of it."""
+    lag = np.arange(distance.shape[1])
+    reach = np.minimum(_share_of(lag, _AVERAGED), len(lag) - 1 - lag)
+    sums = np.zeros((len(distance), len(lag) + 1))
+    np.cumsum(distance, axis=1, out=sums[:, 1:])
+    means = (sums[:, lag + reach + 1] - sums[:, lag - reach]) / (2 * reach + 1)
+    return np.where(reach > 0, means, distance)
+
+
+def _lowest_near(distance: Array, lag: NDArray[np.intp]) -> Array:
+    """Least value within a tenth of each lag (n, len(lag)): from minima over 1, 2, 4, ... neighbors."""
+    reach = np.maximum(_share_of(lag, _VALLEY), 1)
+    first = lag - reach
+    count = np.minimum(lag + reach, distance.shape[1] - 1) - first + 1
+    lowest, width, result = distance, 1, np.empty((len(distance), len(lag)))
+    while True:
+        now = (count >= width) & (count < 2 * width)
+        start = first[now]
+        result[:, now] = np.minimum(lowest[:, start], lowest[:, start + count[now] - width])
+        if 2 * width > count.max():
+            return result
+        lowest = np.minimum(lowest[:, :-width], lowest[:, width:])
+        width *= 2
+
+
+def find_cycles(rows: Array, lengths: NDArray[np.intp]) -> Periodicity:
+    """The number of periods of each recording; all candidates are refined and compared.
+
+    The shortest candidate wins that no longer one beats clearly: a multiple of the period explains everything that the
+    period does, and a little of the noise. The residual variance of a fit is divided by its share of residual degrees
+    of freedom, ``1 - 1 / cycles``.
+
+    Parameters
+    ----------
+    rows : ndarray of shape (n, d, R)
+        Even samples.
+    lengths : ndarray of shape (n,)
+        Recorded samples of each; bounds the harmonics that can be seen.
+    """
+    rough = candidates(rows, lengths)
+    chosen = np.isfinite(rough)
+    owner, column = np.nonzero(chosen)
+    result = Periodicity(np.full(len(rows), np.nan), np.zeros(len(rows)))
+    if len(owner) == 0:
+        return result
+    centered = rows - rows.mean(axis=2, keepdims=True)
+    with single_threaded_blas():  # products this small take many times as long in two threads
+        cycles, left = refine(centered[owner], rough[chosen], lengths[owner])
+    residuals, refined = np.full(rough.shape, np.inf), rough.copy()
+    residuals[owner, column] = left / np.maximum(1 - 1 / cycles, 1e-3) + _ROUNDING
+    refined[owner, column] = cycles
+    good = residuals * _MUCH_BETTER <= residuals.min(axis=1, keepdims=True)
+    pick = np.argmax(good, axis=1)[:, None]
+    some = chosen.any(axis=1)
+    result.cycles[some] = np.take_along_axis(refined, pick, axis=1)[some, 0]
+    result.explained[some] = 1 - np.take_along_axis(residuals, pick, axis=1)[some, 0]
+    return result
+
+
+def refine(rows: Array, cycles: Array, lengths: NDArray[np.intp]) -> tuple[Array, Array]:
+    """Improve cycles (m,) known to a sample's width, or to two percent; also the share of the variance left (m,).
+
+    Variable projection (G. H. Golub and V. Pereyra, 1973): the series is eliminated, one nonlinear unknown remains. A
+    scan as fine as the narrowest dip comes first, Gauss-Newton steps follow.
+    """
+    n_harmonics = np.clip((lengths - 1) / cycles / _PER_HARMONIC, 1, _HARMONICS).astype(np.intp)
+    total = (rows**2).sum(axis=(1, 2))
+
+    def unexplained(trial: Array) -> Array:
+        fit = fit_harmonics(rows, trial, n_harmonics)
+        return np.asarray(((rows - fit.fitted) ** 2).sum(axis=(1, 2)) / total)
+
+    # Change of `cycles` when the period changes by half a sample, or by what noise does to a valley.
+    width = np.maximum(0.5 * cycles**2 / (rows.shape[2] - 1), _AVERAGED * cycles)
+    # Steps of the scan, of each recording for itself, whatever others need.
+    n_steps = np.clip(np.ceil(2 * width * n_harmonics), 2, 40).astype(np.intp)
+    best, left = cycles.copy(), unexplained(cycles)
+    for step in range(-int(n_steps.max()), int(n_steps.max()) + 1):
+        trial = cycles + np.clip(step / n_steps, -1, 1) * width
+        value = unexplained(trial)
+        best, left = np.where(value < left, trial, best), np.minimum(value, left)
+    for _ in range(_NEWTON_STEPS):
+        trial = best + np.clip(_newton_step(rows, best, n_harmonics), -width / n_steps, width / n_steps)
+        value = unexplained(trial)
+        best, left = np.where(value < left, trial, best), np.minimum(value, left)
+    return best, left
+
+
+def _newton_step(rows: Array, cycles: Array, n_harmonics: NDArray[np.intp]) -> Array:
+    """Gauss-Newton step of `cycles` on the residual, the series' own freedom projected out."""
+    fit = fit_harmonics(rows, cycles, n_harmonics)
+    position = np.linspace(0.0, 1.0, rows.shape[2])
+    speed = _derivative(fit.coefficients, cycles, position) * position
+    free = speed - fit_harmonics(speed, cycles, n_harmonics).fitted
+    return np.asarray(((rows - fit.fitted) * free).sum(axis=(1, 2)) / (free**2).sum(axis=(1, 2)))
+
+
+def _derivative(coefficients: NDArray[np.complex128], cycles: Array, position: Array) -> Array:
+    """Derivative of the series by `cycles`, per share of the recording passed, shape (n, d, R)."""
+    h = np.arange(coefficients.shape[2])
+    turns = np.exp(2j * np.pi * cycles[:, None, None] * position * h[:, None])  # (n, H + 1, R)
+    return np.asarray(2 * ((2j * np.pi * h * coefficients) @ turns).real)

@@ -14,16 +14,15 @@ from kineme.dmp.control.plan import MISSED, Plan, ViaPlaces
 from kineme.dmp.discrete.via_points import ViaLike, via_points
 from kineme.dmp.rhythmic.encode import encode
 from kineme.dmp.rhythmic.learned import RhythmicLearned
-from kineme.dmp.rhythmic.modulate import PHASES, modulated
 from kineme.dmp.rhythmic.operators import forcing_matrix
-from kineme.dmp.rhythmic.rollout import RhythmicRollout, rollout
+from kineme.dmp.rhythmic.rollout import PHASES, RhythmicRollout, modulated, rollout
 from kineme.dmp.rhythmic.specification import RhythmicSpecification
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.validation import Array, check_count, check_samples
 
 if TYPE_CHECKING:
-    from kineme.dmp.control.obstacles import ObstacleAvoidance
+    from kineme.dmp.control.options import ObstacleAvoidance
     from kineme.dmp.rhythmic.controller import RhythmicController
 
 

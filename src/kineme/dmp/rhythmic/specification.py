@@ -8,9 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from kineme.dmp.discrete.basis import MOST_BASIS
-from kineme.dmp.discrete.fits import FITS
-from kineme.dmp.discrete.specification import MOST_POINTS
+from kineme.dmp.discrete.specification import FITS, MOST_BASIS, MOST_POINTS
 from kineme.dmp.spring_damper import SpringDamper
 from kineme.errors import SpecificationError
 from kineme.movements.preparation.preprocess import check_steps

@@ -23,13 +23,11 @@ from numpy.typing import ArrayLike
 from kineme.dmp.discrete.dmp import Primitives
 from kineme.dmp.discrete.modulate import modulated
 from kineme.dmp.discrete.operators import encoder
-from kineme.dmp.discrete.rollout import Rollout, rollout
-from kineme.dmp.discrete.samples import sampled
+from kineme.dmp.discrete.rollout import Rollout, rollout, sampled
 from kineme.dmp.discrete.specification import Specification
 from kineme.dmp.discrete.via_points import ViaLike
 from kineme.dmp.recorded_as import merged
-from kineme.dmp.styles.conditioning import updated
-from kineme.dmp.styles.observations import as_observation_times, as_observations
+from kineme.dmp.styles.conditioning import as_observation_times, as_observations, updated
 from kineme.dmp.styles.parameters import (
     as_primitives,
     from_numbers,

@@ -9,8 +9,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from kineme.dmp.discrete.dmp import Primitives
-from kineme.dmp.styles.learn import learn_styles
-from kineme.dmp.styles.model import StyleModel
+from kineme.dmp.styles.model import StyleModel, learn_styles
 from kineme.errors import TrajectoryError
 from kineme.reporting.figures import BLUE, GRAY, ORANGE, new_figure
 from kineme.reporting.text import drawable

@@ -4,7 +4,7 @@ Over the phase u = t / tau a movement is linear in ``theta = [W, x0, g, tau v0]`
 
     x(u) = Phi W + (1 - goal) x0 + goal g + velocity tau v0,
 
-with the decode matrices of `kineme.dmp.discrete.response`. So the mean of many theta makes the mean of the
+with the decode matrices of `kineme.dmp.discrete.operators`. So the mean of many theta makes the mean of the
 paths, and a covariance of theta the covariance of the path. This holds for the weights times the formulation's scale,
 W, and not for the weights w themselves: in the original formulation the mean of ``w = W / (g - x0)`` belongs to no mean
 path, and one demonstration with g close to x0 would drown all others. Where the demonstrations are one shape in several
@@ -21,8 +21,7 @@ from numpy.typing import NDArray
 
 from kineme.dmp.batch import Batch
 from kineme.dmp.discrete.dmp import DMP, Primitives
-from kineme.dmp.discrete.operators import decoder
-from kineme.dmp.discrete.response import Response
+from kineme.dmp.discrete.operators import Response, decoder
 from kineme.dmp.discrete.specification import Specification
 from kineme.dmp.recorded_as import RecordedAs
 from kineme.errors import TrajectoryError

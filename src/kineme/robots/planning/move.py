@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
 from kineme.dmp.discrete.dmp import Primitives
-from kineme.dmp.pose.pose_primitives import PosePrimitives
+from kineme.dmp.pose.pose_dmp import PosePrimitives
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.channels.coordinates import as_wxyz
 from kineme.movements.rotations.matrices import quaternion_of

@@ -8,11 +8,10 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from pydantic import BaseModel, Field, model_validator
 
-from kineme.dmp.control.obstacles import ObstacleAvoidance
+from kineme.dmp.control.options import ObstacleAvoidance
 from kineme.dmp.generation.generate import Generated, MovementOptions, generate
 from kineme.dmp.generation.learned import Learned, learn_one
-from kineme.dmp.styles.learn import learn_styles
-from kineme.dmp.styles.model import StyleModel
+from kineme.dmp.styles.model import StyleModel, learn_styles
 from kineme.errors import SpecificationError, heard_warnings
 from kineme.io.writing.write_movement import WRITERS
 from kineme.library.grounding import prototype_of

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.dmp.discrete.dmp import DMP, Primitives
-from kineme.dmp.discrete.fits import trajectory_regression
-from kineme.dmp.discrete.operators import decoder, smoothness_factor
-from kineme.dmp.pose.pose_primitives import PosePrimitives
+from kineme.dmp.discrete.operators import decoder, smoothness_factor, trajectory_regression
+from kineme.dmp.pose.pose_dmp import PosePrimitives
 from kineme.studio.snapshot.snapshot import Snapshot
 
 

@@ -18,13 +18,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import block_diag
 
-from kineme.dmp.discrete.changes import SLACK, changes
 from kineme.dmp.discrete.dmp import DMP, Primitives
-from kineme.dmp.discrete.modulate import mixed_factor, path_variance, smooth_factor
+from kineme.dmp.discrete.modulate import SLACK, changes, mixed_factor, path_variance, smooth_factor
 from kineme.dmp.discrete.operators import decoder_at, smoothness_factor
-from kineme.dmp.discrete.per_movement import per_movement
 from kineme.dmp.discrete.rollout import Rollout
-from kineme.dmp.modulation.parts import moving, within
+from kineme.dmp.discrete.via_points import per_movement
+from kineme.dmp.join import moving, within
 from kineme.dmp.styles.average import AveragePrimitive
 from kineme.errors import ExtrapolationWarning, SpecificationError, TrajectoryError, warn
 from kineme.validation import Array, as_numbers

@@ -1,0 +1,426 @@
+"""Several movements as one: one after another, or one that turns into another on the way.
+
+The paths are laid out over time and learned again as one primitive whose basis functions are as dense in time as those
+of the densest part. They overlap across the transitions, so position, velocity and acceleration are continuous
+everywhere, as in T. Kulvicius, K. Ning, M. Tamosiunaite, F. Worgotter, "Joining Movement Sequences: Modified Dynamic
+Movement Primitives for Robotics Applications Exemplified on Handwriting", IEEE Transactions on Robotics 28(1), 2012,
+which lets the kernels of two movements overlap. Ours are fitted anew, so the path stays near its parts; giving these a
+common velocity and acceleration at each transition, by an exact solve, bends them more. docs/guide/modulation.md holds
+both as `python -m bench --only joining` measures them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple, overload
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from kineme.dmp.condition import condition
+from kineme.dmp.discrete.dmp import DMP, Primitives
+from kineme.dmp.discrete.operators import decoder, trajectory_columns
+from kineme.dmp.discrete.rollout import Rollout
+from kineme.dmp.pose.in_tangent import rates_in_tangent
+from kineme.dmp.pose.pose_dmp import PosePrimitives
+from kineme.dmp.pose.pose_rollout import PoseRollout
+from kineme.dmp.pose.tangent import unwrapped
+from kineme.dmp.recorded_as import DiscreteSteps, RecordedAs, merged
+from kineme.errors import SpecificationError, TrajectoryError
+from kineme.movements.channels.alike import check_alike
+from kineme.movements.rotations.quaternions import conjugate, product
+from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.validation import Array, check_number
+
+_PER_BASIS = 5  # samples of the whole for each basis function
+
+
+_OF_POSES = "; poses are joined with poses, and neither blended nor coupled: learn their positions alone"
+#: What to do with parts that are none.
+_REMEDIES = {
+    "AveragePrimitive": "; pass its primitive, or what it does: average.rollout(via=...)",
+    "RhythmicPrimitives": "; a rhythm has no end: record or generate as much of it as is to be moved, and learn that",
+    "PosePrimitives": _OF_POSES,
+    "PoseRollout": _OF_POSES,
+    "RhythmicRollout": "; a rhythm has no end: learn what was generated, kineme.DMP().learn(rollout)",
+}
+
+_SAMPLES = 2_000  # of each part, between which a straight line is 1e-6 of the extent off
+
+
+@overload
+def join(parts: Sequence[Primitives | Rollout], *, shift: bool = ..., overlap: float = ...) -> Primitives: ...
+@overload
+def join(
+    parts: Sequence[PosePrimitives | PoseRollout], *, shift: bool = ..., overlap: float = ...
+) -> PosePrimitives: ...
+def join(
+    parts: Sequence[Primitives | Rollout] | Sequence[PosePrimitives | PoseRollout],
+    *,
+    shift: bool = False,
+    overlap: float = 0.0,
+) -> Primitives | PosePrimitives:
+    """One movement out of several, one after another; smooth in velocity and acceleration.
+
+    Each part begins where the one before it ends, and goes on to its own goal, or as far as it was shown to go
+    (`shift`). Learned again from the path of all, the result is rolled out, saved, controlled and recognized like any
+    other primitive. Its start, goal and the velocities there are exact; in between it deviates by tenths of a percent
+    of its extent from the parts, near the transitions.
+
+    Parameters
+    ----------
+    parts : sequence of Primitives or Rollout, or of PosePrimitives or PoseRollout
+        Of one movement each, or some of them of n: then n movements come out.
+    shift : bool, default False
+        Move each part to where the one before it ends, goal and all; else its goal stays where it was. Orientations are
+        turned as a tool that is mounted otherwise: angular velocities stay.
+    overlap : float, default 0.0
+        Time [s] for which two neighbors go on together: the end of one fades into the beginning of the next, which
+        begins that much earlier. It cuts the corner instead of slowing down in it.
+
+    Returns
+    -------
+    Primitives, or PosePrimitives of poses
+        With the specification of the first part, ``fit="trajectory"``, and as many basis functions per second as
+        that part which has most; the movements of a batch share one specification, so all have as many as the one that
+        needs most. Labels and names are kept where they are those of all parts, channels if all were recorded as the
+        same; discrete channels step when they did in the parts, those of each part until the next one begins.
+
+    Raises
+    ------
+    TrajectoryError
+        No part, something else than primitives and rollouts, different dimensions or numbers of movements; channels
+        that are known to differ, as joint angles and positions; orientations farther than a full turn from the last.
+    SpecificationError
+        An overlap that is negative or longer than half a part; more than 2,000 basis functions.
+    """
+    movements = moving(parts, poses=True)
+    durations = np.stack([one.durations for one in movements])  # (parts, n)
+    check_number("overlap", overlap, least=0.0)
+    if len(movements) > 1 and overlap > 0.5 * durations.min():
+        raise SpecificationError(
+            f"expected overlap of at most half the shortest part, {0.5 * durations.min():.3g} s, got {overlap:g} s"
+        )
+    plain = [one for one in movements if isinstance(one, Primitives)]
+    turning = [one for one in movements if isinstance(one, PosePrimitives)]
+    laid, references = laid_out_poses(turning, shift) if turning else (laid_out(plain, shift), None)
+    begins = np.vstack((np.zeros(durations.shape[1]), np.cumsum(durations[:-1] - overlap, axis=0)))
+    total = begins[-1] + durations[-1]
+    dmp = fitting_specification(
+        movements, float(total.max() * max(one.dmp.n_basis / one.durations.min() for one in movements))
+    )
+    times = total[:, None] * np.linspace(0.0, 1.0, dmp.n_points)
+    rises = [smooth_rise(times - begin[:, None], overlap) for begin in begins[1:]]
+    shares = [a - b for a, b in zip([np.ones_like(times), *rises], [*rises, np.zeros_like(times)], strict=True)]
+    path = np.zeros((*times.shape, laid[0].positions.shape[2]))
+    for part, begin, share in zip(laid, begins, shares, strict=True):
+        path += share[:, :, None] * _at(part.positions, (times - begin[:, None]) / part.durations[:, None])
+    when = [np.column_stack((a, a + b)) / total[:, None] for a, b in zip(begins, durations, strict=True)]
+    ends = (laid[0].begin_velocities, laid[-1].positions[:, -1], laid[-1].end_velocities)
+    made = carried_over(refitted(dmp, path, times, ends), movements, when, begins[1:] / total)
+    return made if references is None else PosePrimitives(replace(made, recorded_as=None), references, made.recorded_as)
+
+
+def _at(x: Array, u: Array) -> Array:
+    """Positions (n, T, d) at normalized times (n, T), of each movement its own, from even samples (n, S, d)."""
+    place = np.clip(u, 0.0, 1.0) * (x.shape[1] - 1)
+    before = np.minimum(place.astype(np.intp), x.shape[1] - 2)[:, :, None]
+    share = place[:, :, None] - before
+    return np.asarray((1.0 - share) * np.take_along_axis(x, before, 1) + share * np.take_along_axis(x, before + 1, 1))
+
+
+class LaidOut(NamedTuple):
+    """n movements of one part."""
+
+    durations: Array  # (n,)
+    positions: Array  # (n, S, d), at even times
+    begin_velocities: Array  # (n, d)
+    end_velocities: Array  # (n, d)
+
+
+def laid_out(movements: Sequence[Primitives], shift: bool) -> list[LaidOut]:
+    """Each part from where the one before it ends, to its own goal or, shifted, as far as it was shown to go."""
+    laid: list[LaidOut] = []
+    for one in movements:
+        start = laid[-1].positions[:, -1] if laid else one.starts
+        goal = one.goals + (start - one.starts) if shift else one.goals
+        path = one.rollout(start, goal, n_samples=_SAMPLES)
+        laid.append(LaidOut(path.durations, path.positions, path.velocities[:, 0], path.velocities[:, -1]))
+    return laid
+
+
+def laid_out_poses(movements: Sequence[PosePrimitives], shift: bool) -> tuple[list[LaidOut], Array]:
+    """The same of poses, in positions and rotation vectors from the last orientations of all, and these (n, 4 k).
+
+    A shifted part is turned as a tool that is mounted otherwise: its angular velocities stay.
+
+    Raises
+    ------
+    TrajectoryError
+        Orientations farther than a full turn from the last one, about an axis that changes.
+    """
+    rolled: list[PoseRollout] = []
+    for one in movements:
+        start = rolled[-1].positions[:, -1] if rolled else one.starts
+        rolled.append(one.rollout(start, _shifted(one, start) if shift else one.goals, n_samples=_SAMPLES))
+    m = movements[0].n_positions
+    turned = np.concatenate([path.orientations for path in rolled], axis=1)
+    references = turned[:, -1].copy()
+    vectors = _vectors(turned, references)
+    laid = []
+    for i, (one, path) in enumerate(zip(movements, rolled, strict=True)):
+        here = vectors[:, i * _SAMPLES : (i + 1) * _SAMPLES]
+        places = np.concatenate((path.positions[:, :, :m], here), axis=2)
+        begin, end = (rates_in_tangent(path.velocities[:, k], places[:, k], m, "velocity") for k in (0, -1))
+        assert begin is not None
+        assert end is not None
+        laid.append(LaidOut(one.durations, places, begin, end))
+    return laid, references
+
+
+def _shifted(one: PosePrimitives, starts: Array) -> Array:
+    """The goals of poses that begin elsewhere."""
+    m, own, goals = one.n_positions, one.starts, one.goals
+    q, q_own, q_goal = (columns[:, m:].reshape(len(columns), -1, 4) for columns in (starts, own, goals))
+    turned = product(q_goal, product(conjugate(q_own), q))
+    return np.concatenate((goals[:, :m] + starts[:, :m] - own[:, :m], turned.reshape(len(turned), -1)), axis=1)
+
+
+def _vectors(turned: Array, references: Array) -> Array:
+    """Rotation vectors (n, T, 3 k) of orientations (n, T, 4 k) from the references, continuous along each movement."""
+    n, n_samples, width = turned.shape
+    offsets = np.arange(n + 1) * n_samples
+
+    def where(row: int) -> str:
+        return f"part {row % n_samples // _SAMPLES} of movement {row // n_samples}"
+
+    parts = []
+    for at in range(0, width, 4):
+        relative = product(turned[:, :, at : at + 4], conjugate(references[:, None, at : at + 4]))
+        parts.append(unwrapped(relative.reshape(-1, 4), offsets, where).reshape(n, n_samples, 3))
+    vectors = np.concatenate(parts, axis=2)
+    vectors[:, -1] = 0.0  # but for rounding they are
+    return vectors
+
+
+@overload
+def moving(parts: Sequence[Primitives | Rollout]) -> list[Primitives]: ...
+@overload
+def moving(parts: Sequence[Any], poses: bool) -> list[Primitives] | list[PosePrimitives]: ...
+def moving(parts: Sequence[Any], poses: bool = False) -> list[Primitives] | list[PosePrimitives]:
+    """All parts as primitives of the same number of movements; all of poses where that is possible and the first is."""
+    if (
+        isinstance(parts, (Primitives, Rollout, PosePrimitives, PoseRollout))
+        or not isinstance(parts, Sequence)
+        or not len(parts)
+    ):
+        raise TrajectoryError(f"expected several movements, as [reach, pour], got {parts!r}")
+    poses = poses and isinstance(parts[0], (PosePrimitives, PoseRollout))
+    expected = (PosePrimitives, PoseRollout) if poses else (Primitives, Rollout)
+    for i, one in enumerate(parts):
+        if not isinstance(one, expected):
+            what, remedy = type(one).__name__, _REMEDIES.get(type(one).__name__, "")
+            names = " or ".join(known.__name__ for known in expected)
+            raise TrajectoryError(f"expected {names} as part {i}, got {what}{remedy}")
+    own: Any = PosePrimitives if poses else Primitives
+    moving: Any = [one if isinstance(one, own) else own.from_rollout(one) for one in parts]
+    n = max(len(one) for one in moving)
+    for i, one in enumerate(moving):
+        if one.n_dims != moving[0].n_dims:
+            raise TrajectoryError(f"part {i}: expected {moving[0].n_dims} dimensions as in part 0, got {one.n_dims}")
+        if len(one) not in (1, n):
+            raise TrajectoryError(f"part {i}: expected one movement or {n}, got {len(one)}")
+    check_alike([one.moving_channels for one in moving])
+    return [one if len(one) == n else one[np.zeros(n, dtype=np.intp)] for one in moving]
+
+
+def within(stretch: tuple[float, float], name: str) -> tuple[float, float]:
+    """A stretch (begin, end) as shares of the duration."""
+    try:
+        begin, end = (float(one) for one in stretch)
+    except (TypeError, ValueError) as error:
+        raise SpecificationError(f"expected {name}=(begin, end), shares of the duration, got {stretch!r}") from error
+    if not 0.0 <= begin < end <= 1.0:
+        raise SpecificationError(
+            f"expected {name} to be 0 <= begin < end <= 1, shares of the duration, got {stretch!r}"
+        )
+    return begin, end
+
+
+def fitting_specification(parts: Sequence[Primitives | PosePrimitives], n_basis: float) -> DMP:
+    """The specification of the first part, with which a path that was generated is fitted as it is.
+
+    Raises
+    ------
+    SpecificationError
+        More than 2,000 basis functions.
+    """
+    first = parts[0].dmp
+    least = max(one.dmp.n_points for one in parts)
+    n = math.ceil(n_basis - 1e-9)
+    ridge = first.ridge if first.fit == "trajectory" else None
+    return replace(
+        first,
+        n_basis=n,
+        n_points=max(least, min(10_000, _PER_BASIS * n)),
+        fit="trajectory",
+        ridge=ridge,
+        preprocessing=(),
+    )
+
+
+def smooth_rise(passed: Array, length: float) -> Array:
+    """From 0 to 1 over a length, ``10 z^3 - 15 z^4 + 6 z^5`` with z = passed / length; a step if the length is 0.
+
+    Its first two derivatives are 0 at both ends.
+    """
+    if length == 0.0:
+        return np.asarray(np.where(passed >= 0.0, 1.0, 0.0))
+    z = np.clip(passed / length, 0.0, 1.0)
+    return np.asarray(z**3 * (10.0 - 15.0 * z + 6.0 * z**2))
+
+
+def refitted(dmp: DMP, path: Array, times: Array, ends: tuple[Array, Array, Array]) -> Primitives:
+    """Learn paths (n, T, d) at times (n, T), under the condition that their ends are exactly those that are given.
+
+    `ends` are the velocities at the start (n, d), the positions at the end, and the velocities there.
+    """
+    made = dmp.learn(Demonstrations.from_arrays(path, times=list(times)))
+    movement = made.rollout(n_samples=2)
+    asked = np.stack(ends, axis=2)
+    reached = np.stack((made.velocities, movement.positions[:, -1], movement.velocities[:, -1]), axis=2)
+    errors = (asked - reached) * np.stack((made.durations, np.ones(len(made)), made.durations), axis=1)[:, None]
+    change = errors @ _end_gain(dmp)  # (n, d, N + 1)
+    return replace(
+        made,
+        scaled_weights=made.scaled_weights + change[:, :, :-1] * dmp.K,
+        velocities=made.velocities + change[:, :, -1] / made.durations[:, None],
+    )
+
+
+def _end_gain(dmp: DMP) -> Array:
+    """From initial velocity, goal and end velocity that are missing to W / K and v0 (3, N + 1), at the least cost.
+
+    The cost is what the fit minimizes, so the result is the fit under these conditions. The inverse of its second
+    derivatives is the covariance of `condition`; it keeps the path where it is, but near the ends.
+    """
+    response = decoder(dmp, dmp.n_points)
+    columns, curvature = trajectory_columns(response, dmp.K)
+    R = np.linalg.qr(np.vstack((columns, math.sqrt(dmp.ridge_strength) * curvature)), mode="r")
+    factor = solve_triangular(R, np.eye(len(R))).T
+    start = np.eye(1, dmp.n_basis + 1, dmp.n_basis)
+    ends = np.column_stack((response.Phi[:2, -1] * dmp.K, response.velocity[:2, -1]))
+    return condition(factor, np.vstack((start, ends))).gain
+
+
+def carried_over(
+    made: Primitives, parts: Sequence[Primitives | PosePrimitives], when: Sequence[Array], switches: Array
+) -> Primitives:
+    """The movements with the labels and names that all their parts have in common, and with their channels.
+
+    Parameters
+    ----------
+    made : Primitives
+        n movements.
+    parts : sequence of Primitives or PosePrimitives
+        The p parts, each of n movements.
+    when : sequence of ndarray of shape (n, 2 or more)
+        Of each part, at even shares of its duration: when that is, as a share of the duration of the whole.
+    switches : ndarray of shape (p - 1, n)
+        From when on discrete channels are those of the next part.
+    """
+    labels, names = [one.labels for one in parts], [one.names for one in parts]
+    first = labels[0]
+    same = first is not None and all(one is not None and np.array_equal(one, first) for one in labels)
+    about = merged([one.recorded_as for one in parts])
+    steps = [one.recorded_as.steps for one in parts if one.recorded_as is not None]
+    known = [one for one in steps if one is not None]
+    if about is not None:
+        whole = len(known) == len(parts)
+        about = RecordedAs(about.channels, _one_after_another(known, when, switches) if whole else None)
+    return replace(
+        made,
+        labels=first if same else None,
+        names=names[0] if all(one == names[0] for one in names) else None,
+        recorded_as=about,
+    )
+
+
+def _one_after_another(parts: Sequence[DiscreteSteps], when: Sequence[Array], switches: Array) -> DiscreteSteps:
+    """The steps of all parts at their new times, each part from one switch to the next."""
+    n = len(when[0])
+    begins = np.vstack((np.zeros((1, n)), switches))
+    ends = np.vstack((switches, np.full((1, n), np.inf)))
+    values, shares, lengths = [], [], []
+    for i in range(n):
+        rows = [
+            _within(one, i, at[i], (begins[k, i], ends[k, i]))
+            for k, (one, at) in enumerate(zip(parts, when, strict=True))
+        ]
+        value, share = (np.concatenate([row[k] for row in rows]) for k in (0, 1))
+        kept = np.append(True, (value[1:] != value[:-1]).any(axis=1))
+        values.append(value[kept])
+        shares.append(share[kept])
+        lengths.append(int(kept.sum()))
+    return DiscreteSteps(np.concatenate(values), np.concatenate(shares), np.concatenate(([0], np.cumsum(lengths))))
+
+
+def _within(part: DiscreteSteps, i: int, when: Array, stretch: tuple[float, float]) -> tuple[Array, Array]:
+    """Values (m, c) and times (m,) of movement i: what is in force where the stretch begins, and all steps in it."""
+    rows = slice(part.offsets[i], part.offsets[i + 1])
+    times = np.interp(part.shares[rows], np.linspace(0.0, 1.0, len(when)), when)
+    begin, end = stretch
+    first = max(0, int(np.searchsorted(times, begin, side="right")) - 1)
+    last = max(first + 1, int(np.searchsorted(times, end, side="left")))
+    return part.values[rows][first:last], np.append(begin, times[first + 1 : last])
+
+
+def blend(first: Primitives | Rollout, second: Primitives | Rollout, stretch: tuple[float, float]) -> Primitives:
+    """One movement that begins as the first and ends as the second, and changes from one to the other over a stretch.
+
+    Both go on at the same phase t / tau, ``x = (1 - b) x_first + b x_second``, with b rising from 0 to 1 over the
+    stretch, with its first two derivatives: so position, velocity and acceleration are continuous. The tempo changes
+    in the same way.
+
+    Parameters
+    ----------
+    first, second : Primitives or Rollout
+        Of one movement or of n.
+    stretch : tuple of float
+        Where the change begins and where it ends, as shares of the duration.
+
+    Returns
+    -------
+    Primitives
+        As of `join`, with the larger number of basis functions. Discrete channels are those of the second movement
+        from the middle of the stretch on.
+
+    Raises
+    ------
+    TrajectoryError
+        Something else than primitives and rollouts, different dimensions or numbers of movements; channels
+        that are known to differ, as joint angles and positions.
+    SpecificationError
+        A stretch that is not within the movement.
+    """
+    movements = moving([first, second])
+    begin, end = within(stretch, "stretch")
+    dmp = fitting_specification(movements, max(one.dmp.n_basis for one in movements))
+    laid = [one.rollout(n_samples=dmp.n_points) for one in movements]
+    u = np.linspace(0.0, 1.0, dmp.n_points)
+    share = smooth_rise(u - begin, end - begin)
+    path = (1.0 - share)[:, None] * laid[0].positions + share[:, None] * laid[1].positions
+    pace = np.outer(movements[0].durations, 1.0 - share) + np.outer(movements[1].durations, share)  # dt / du
+    steps = 0.5 * (pace[:, 1:] + pace[:, :-1]) / (dmp.n_points - 1)
+    times = np.concatenate((np.zeros((len(path), 1)), np.cumsum(steps, axis=1)), axis=1)
+    shares = times / times[:, -1:]
+    switch = _at_phase(shares, 0.5 * (begin + end))
+    ends = (laid[0].velocities[:, 0], laid[1].positions[:, -1], laid[1].velocities[:, -1])
+    return carried_over(refitted(dmp, path, times, ends), movements, [shares, shares], switch[None])
+
+
+def _at_phase(shares: Array, u: float) -> Array:
+    """The columns (n,) of numbers at even phases (n, T) at phase u."""
+    return np.array([np.interp(u, np.linspace(0.0, 1.0, shares.shape[1]), one) for one in shares])

@@ -1,1 +1,0 @@
-"""New movements out of learned ones: one after another, one turning into another."""
