@@ -6,5 +6,5 @@ nothing.
 
 from kineme._lazy import lazy_names as _lazy_names
 
-__version__ = "0.1.0"  # the one place: pyproject.toml takes it from here
+__version__ = "0.2.0"  # the one place: pyproject.toml takes it from here
 __getattr__, __dir__, __all__ = _lazy_names(__name__)
