@@ -52,12 +52,10 @@ class Plan:
 
     Attributes
     ----------
-    K, D : float
-        Stiffness and damping.
-    shape : callable
-        At normalized times u (T,): scale f of each dimension, then the coupling; shape (T, d + 1).
-    n_gaps : int
-        Gaps between the centers of basis functions in [0, 1]: how finely `shape` is to be sampled.
+    dmp : DMP or RhythmicDMP
+        The specification: stiffness, damping, and the terms from which `shape` is mixed.
+    mixing : ndarray of shape (N + 1, d + 1)
+        From the terms of the specification, its basis functions and the coupling, to `shape`.
     ratio : callable
         What scale f is multiplied by for a goal (d,); not finite where the formulation cannot go.
     origin : ndarray of shape (d,)
@@ -82,10 +80,8 @@ class Plan:
         Its via points, which obstacles, goals and measurements may lead it away from.
     """
 
-    K: float
-    D: float
-    shape: Callable[[Array], Array]
-    n_gaps: int
+    dmp: Any
+    mixing: Array
     ratio: Callable[[Array], Array]
     origin: Array
     goal: Array
@@ -97,6 +93,25 @@ class Plan:
     periodic: bool = False
     longest_step: float = 1.0
     via: ViaPlaces | None = None
+
+    @cached_property
+    def K(self) -> float:
+        """Stiffness."""
+        return float(self.dmp.K)
+
+    @cached_property
+    def D(self) -> float:
+        """Damping."""
+        return float(self.dmp.D)
+
+    @property
+    def n_gaps(self) -> int:
+        """Gaps between the centers of basis functions in [0, 1]: how finely `shape` is to be sampled."""
+        return int(self.dmp.n_basis) - (not self.periodic)
+
+    def shape(self, u: Array) -> Array:
+        """Scale f of each dimension, then the coupling, at normalized times u (T,); shape (T, d + 1)."""
+        return np.asarray(self.dmp.terms(u) @ self.mixing)
 
     @property
     def n_dims(self) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import lru_cache, partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -19,6 +19,9 @@ from kineme.validation import Array
 _N_TERMS = 12
 _TOLERANCE = 1e-13  # of each column's largest number
 _MOST_HALVINGS = 12
+_MOST_CACHED = 100  # basis functions; the table of their terms takes up to 5 MB
+_PER_GAP = 8  # intervals of one size for each gap: terms that need more differ from polynomials by rounding
+_CANCELED = 10.0  # times the shape: a larger sum of weighted terms loses more than a digit
 _VANISHED = 1e-18
 _LAST = 2.0**20  # durations after which a forcing term that has not faded is cut
 
@@ -70,17 +73,49 @@ class ShapeTable(NamedTuple):
 
 
 def shape_table(plan: Plan) -> ShapeTable:
-    """Tabulate `Plan.shape`: halve intervals until the polynomials agree with it between their nodes."""
-    scale = np.abs(plan.shape(np.linspace(0.0, 1.0, 4 * (plan.n_gaps + 1)))).max(axis=0)
+    """Tabulate `Plan.shape`, which is linear in the terms of its specification: from their table, where it is exact.
+
+    It is not where large weights cancel, and magnify the errors of the terms.
+    """
+    if plan.dmp.n_basis <= _MOST_CACHED and (terms := _terms_table(plan.dmp, plan.n_gaps, plan.periodic)) is not None:
+        coefficients = terms.coefficients @ plan.mixing
+        means = np.abs(terms.coefficients[:, 0]) @ np.abs(plan.mixing)
+        if (means.max(axis=0) <= _CANCELED * np.abs(coefficients[:, 0]).max(axis=0)).all():
+            return terms._replace(coefficients=coefficients)
+    table = _tabulated(plan.shape, plan.n_gaps, plan.periodic, math.inf)
+    assert table is not None
+    return table
+
+
+@lru_cache(maxsize=8)
+def _terms_table(dmp: Any, n_gaps: int, periodic: bool) -> ShapeTable | None:
+    """Tabulate the terms of a specification; None where rounding hides whether the polynomials agree with them."""
+    return _tabulated(dmp.terms, n_gaps, periodic, _PER_GAP * (n_gaps + 1))
+
+
+def _tabulated(
+    shape: Callable[[Array], Array], n_gaps: int, periodic: bool, most_intervals: float
+) -> ShapeTable | None:
+    """Halve intervals until the polynomials agree with `shape` between their nodes; None with too many intervals."""
+    scale = np.abs(shape(np.linspace(0.0, 1.0, 4 * (n_gaps + 1)))).max(axis=0)
     scale = np.where(scale > 0, scale, 1.0)
-    grid = np.linspace(0.0, 1.0, plan.n_gaps + 1)
-    if not plan.periodic:
-        grid = np.append(grid, _tail(plan, scale))
+    grid = np.linspace(0.0, 1.0, n_gaps + 1)
+    if not periodic:
+        times = [2.0]  # doubling times past 1 until everything has faded
+        while times[-1] < _LAST and (np.abs(shape(np.array(times[-1:]))) > _VANISHED * scale).any():
+            times.append(2.0 * times[-1])
+        grid = np.append(grid, times)
+
+    def at(intervals: Array, points: Array) -> Array:
+        """Evaluate `shape` at points of [-1, 1] mapped into intervals (m, 2), shape (m, points, columns)."""
+        u = intervals.mean(axis=1)[:, None] + 0.5 * np.diff(intervals, axis=1) * points
+        return shape(u.ravel()).reshape(*u.shape, -1)
+
     pending = np.column_stack((grid[:-1], grid[1:]))
     done: list[tuple[Array, Array]] = []
     for halving in range(_MOST_HALVINGS + 1):
-        coefficients = _FIT @ _at(plan, pending, _POINTS)  # (m, terms, d + 1)
-        error = np.abs(_AT_BETWEEN @ coefficients - _at(plan, pending, _BETWEEN)).max(axis=1)
+        coefficients = _FIT @ at(pending, _POINTS)  # (m, terms, columns)
+        error = np.abs(_AT_BETWEEN @ coefficients - at(pending, _BETWEEN)).max(axis=1)
         fits = (error <= _TOLERANCE * scale).all(axis=1) | (halving == _MOST_HALVINGS)
         done.append((pending[fits], coefficients[fits]))
         middle = pending[~fits].mean(axis=1)
@@ -89,25 +124,12 @@ def shape_table(plan: Plan) -> ShapeTable:
         )
         if not len(pending):
             break
+        if len(pending) > most_intervals:
+            return None
     intervals, table = (np.concatenate(parts) for parts in zip(*done, strict=True))
     order = np.argsort(intervals[:, 0])
     breaks = np.append(intervals[order, 0], intervals[:, 1].max())
-    return ShapeTable(breaks, np.ascontiguousarray(table[order]), plan.periodic)
-
-
-def _tail(plan: Plan, scale: Array) -> Array:
-    """Doubling times past 1 until everything has faded."""
-    times = [2.0]
-    while times[-1] < _LAST and (np.abs(plan.shape(np.array(times[-1:]))) > _VANISHED * scale).any():
-        times.append(2.0 * times[-1])
-    return np.array(times)
-
-
-def _at(plan: Plan, intervals: Array, points: Array) -> Array:
-    """`Plan.shape` at points of [-1, 1] mapped into intervals (m, 2), shape (m, points, d + 1)."""
-    middle, half = intervals.mean(axis=1), 0.5 * np.diff(intervals, axis=1)
-    u = middle[:, None] + half * points
-    return plan.shape(u.ravel()).reshape(*u.shape, -1)
+    return ShapeTable(breaks, np.ascontiguousarray(table[order]), periodic)
 
 
 def advance(

@@ -50,16 +50,12 @@ def plan_along(movement: Rollout, n_positions: int, via: ViaPoints | None) -> Pl
     dmp, d = primitive.dmp, primitive.n_dims
     x0, tau = movement.starts[0].copy(), float(movement.durations[0])
     learned, extents = primitive.goals - primitive.starts, primitive.extents
-
-    def shape(u: Array) -> Array:
-        forcing = dmp.basis.design(u) @ primitive.scaled_weights[0].T
-        return np.column_stack((forcing, dmp.system.coupling(dmp.K, dmp.basis.phase(u))))
+    mixing = np.zeros((dmp.n_basis + 1, d + 1))
+    mixing[:-1, :-1], mixing[-1, -1] = primitive.scaled_weights[0].T, 1.0
 
     return Plan(
-        dmp.K,
-        dmp.D,
-        shape,
-        n_gaps=dmp.n_basis - 1,
+        dmp,
+        mixing,
         ratio=lambda goal: np.array(dmp.system.ratio(goal[None], learned, extents)[0]),
         origin=x0,
         goal=movement.goals[0] - x0,

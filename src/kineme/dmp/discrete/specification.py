@@ -57,6 +57,10 @@ class Specification(SpringDamper):
         """Basis functions over the shared canonical system."""
         return GaussianBasis(self.n_basis, self.overlap, self.gating, ExponentialPhase(self.phase_end))
 
+    def terms(self, u: Array) -> Array:
+        """Return basis functions and coupling at normalized times u (T,), shape (T, N + 1)."""
+        return np.column_stack((self.basis.design(u), self.system.coupling(self.K, self.basis.phase(u))))
+
     @property
     def system(self) -> Formulation:
         """The formulation's row in the table."""

@@ -311,16 +311,11 @@ def plan_of(
     size = 2.0 * abs(gain) * float(primitive.amplitudes[0])
     if movement.change is not None:
         weights = weights + movement.change[0] / gain  # a new amplitude scales the whole cycle
-
-    def shape(u: Array) -> Array:
-        forcing = dmp.basis.design(2 * np.pi * u) @ weights.T
-        return np.column_stack((forcing, np.zeros(len(u))))
-
+    mixing = np.zeros((dmp.n_basis + 1, d + 1))
+    mixing[:-1, :-1] = weights.T
     plan = Plan(
-        dmp.K,
-        dmp.D,
-        shape,
-        n_gaps=dmp.n_basis,
+        dmp,
+        mixing,
         ratio=lambda goal: ones,
         origin=origin,
         goal=np.zeros(d),

@@ -53,6 +53,10 @@ class RhythmicSpecification(SpringDamper):
         """Basis functions over the phase."""
         return VonMisesBasis(self.n_basis, self.overlap)
 
+    def terms(self, u: Array) -> Array:
+        """Return basis functions and coupling, which a rhythm has not, at times u (T,) in periods, shape (T, N + 1)."""
+        return np.column_stack((self.basis.design(2 * np.pi * u), np.zeros(len(u))))
+
     @property
     def n_harmonics(self) -> int:
         """Number of harmonics of the folded cycle: twice as many as the basis functions can represent."""
