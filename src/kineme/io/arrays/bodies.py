@@ -165,7 +165,9 @@ def _robot(arrays: Mapping[str, Any]) -> Body | None:
     names = _texts(arrays, _JOINT_NAMES)
     if turn is not None and q is not None:
         columns |= {f"{turn}.{k}": q[:, k] for k in range(q.shape[1])}
-    if name == "qpos" and _is_free(x) and len(names) != x.shape[1]:
+    # MuJoCo's positions of a free joint are x, y, z and a unit quaternion w, x, y, z.
+    is_free = x.shape[1] >= 7 and bool((np.abs(np.linalg.norm(x[:, 3:7], axis=1) - 1.0) <= _OF_A_TURN).all())
+    if name == "qpos" and is_free and len(names) != x.shape[1]:
         root = names[0] if len(names) == x.shape[1] - 6 else "root"
         columns |= {f"{root}.position.{axis}": x[:, k] for k, axis in enumerate("xyz")}
         columns |= {f"{root}.orientation.{part}": x[:, k] for k, part in enumerate("wxyz", 3)}
@@ -173,11 +175,6 @@ def _robot(arrays: Mapping[str, Any]) -> Body | None:
     heads = names if len(names) == x.shape[1] else [f"{name}.{k}" for k in range(x.shape[1])]
     columns |= dict(zip(distinct(heads), x.T, strict=True))
     return Body("joints of a robot", columns, tuple(used))
-
-
-def _is_free(qpos: Array) -> bool:
-    """Whether MuJoCo's positions begin with those of a free joint: x, y, z and a unit quaternion w, x, y, z."""
-    return qpos.shape[1] >= 7 and bool((np.abs(np.linalg.norm(qpos[:, 3:7], axis=1) - 1.0) <= _OF_A_TURN).all())
 
 
 def _named_points(arrays: Mapping[str, Any]) -> Body | None:

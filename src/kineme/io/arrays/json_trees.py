@@ -167,7 +167,9 @@ def as_tree(value: Any) -> Any:
         raise DataError("expected a list of samples or of movements, got objects beside other values")
     if all(isinstance(one, list) and one and all(isinstance(cell, str) for cell in one) for one in value):
         return None  # pairs of names, as of the bones between joints
-    if all(isinstance(one, list) for one in value) and not _is_matrix(value):
+    if all(isinstance(one, list) for one in value) and not all(
+        not isinstance(cell, (list, Mapping)) for row in value for cell in row[:1]
+    ):
         return [as_tree(one) for one in value]
     return _array(value)
 
@@ -194,7 +196,13 @@ def _is_sample(entry: Mapping[str, Any]) -> bool:
     for name, value in entry.items():
         if is_time(name) or counts_samples(name):
             return not isinstance(value, list)
-    if any(_are_parts(value) for value in entry.values()):
+    if any(  # objects that each have a name and numbers: the points of a body at one time
+        isinstance(value, list)
+        and bool(value)
+        and all(isinstance(one, Mapping) and _name(one, _PARTS) for one in value)
+        and not any(isinstance(cell, list) or is_time(key) for one in value for key, cell in one.items())
+        for value in entry.values()
+    ):
         return True
     if any(name.lower() in _AXES and isinstance(value, list) for name, value in entry.items()):  # x over time
         return False
@@ -202,23 +210,9 @@ def _is_sample(entry: Mapping[str, Any]) -> bool:
     return len(lists) < len(entry) and not any(isinstance(one, (list, Mapping)) for value in lists for one in value[:1])
 
 
-def _are_parts(value: Any) -> bool:
-    """Whether a value is a list of objects that each have a name and numbers: the points of a body at one time."""
-    return (
-        isinstance(value, list)
-        and bool(value)
-        and all(isinstance(one, Mapping) and _name(one, _PARTS) for one in value)
-        and not any(isinstance(cell, list) or is_time(key) for one in value for key, cell in one.items())
-    )
-
-
 def _name(part: Mapping[str, Any], keys: Sequence[str] = _NAMES) -> str | None:
     name = next((part[key] for key in keys if key in part), None)
     return str(name) if isinstance(name, (str, int)) else None
-
-
-def _is_matrix(rows: Sequence[list[Any]]) -> bool:
-    return all(not isinstance(cell, (list, Mapping)) for row in rows for cell in row[:1])
 
 
 def _columns(samples: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -289,7 +283,25 @@ def json_messages(path: Path, layout: Layout) -> Parsed:
     DataError
         The package mcap is not installed, the file is damaged, no topic in JSON, or several of which none is chosen.
     """
-    topics, encodings = _messages(path, set(layout.topics))
+    from mcap.records import Channel, Message
+
+    wanted = set(layout.topics)
+    channels: dict[int, Any] = {}
+    topics: dict[str, list[tuple[int, bytes]]] = {}
+    n = n_bytes = 0
+    with refused("expected an MCAP file that can be read", REMEDIES[".mcap"]):
+        for record in _records(path):
+            if isinstance(record, Channel):
+                channels[record.id] = record
+            elif isinstance(record, Message) and channels[record.channel_id].message_encoding == "json":
+                if wanted and channels[record.channel_id].topic not in wanted:
+                    continue
+                topics.setdefault(channels[record.channel_id].topic, []).append((record.log_time, record.data))
+                n, n_bytes = n + 1, n_bytes + size_of_objects(record.data)
+                if n % _CHECKED == 0:
+                    check_expanded(n_bytes, "messages in JSON")
+    check_expanded(n_bytes, "messages in JSON")
+    encodings = {one.message_encoding for one in channels.values()}
     if len(topics) != 1:
         got = f"the topics {listed(topics)}; say which with topic=, in the shell --topic" if topics else ""
         none = f"messages in {listed(sorted(encodings))}; write a topic as CSV or JSON lines"
@@ -306,28 +318,6 @@ def json_messages(path: Path, layout: Layout) -> Parsed:
         samples.append(sample if any(map(is_time, sample)) else {_RECORDED: recorded / _PER_SECOND} | sample)
     parsed = tree_movements(as_tree(samples), replace(layout, topic=None), "MCAP", many="take")
     return parsed._replace(detected=parsed.detected._replace(layout=f"topic {name} in JSON"))
-
-
-def _messages(path: Path, wanted: set[str]) -> tuple[dict[str, list[tuple[int, bytes]]], set[str]]:
-    """Topic -> when each of its messages in JSON was recorded [ns], and its bytes; and the encodings of all topics."""
-    from mcap.records import Channel, Message
-
-    channels: dict[int, Any] = {}
-    topics: dict[str, list[tuple[int, bytes]]] = {}
-    n = n_bytes = 0
-    with refused("expected an MCAP file that can be read", REMEDIES[".mcap"]):
-        for record in _records(path):
-            if isinstance(record, Channel):
-                channels[record.id] = record
-            elif isinstance(record, Message) and channels[record.channel_id].message_encoding == "json":
-                if wanted and channels[record.channel_id].topic not in wanted:
-                    continue
-                topics.setdefault(channels[record.channel_id].topic, []).append((record.log_time, record.data))
-                n, n_bytes = n + 1, n_bytes + size_of_objects(record.data)
-                if n % _CHECKED == 0:
-                    check_expanded(n_bytes, "messages in JSON")
-    check_expanded(n_bytes, "messages in JSON")
-    return topics, {one.message_encoding for one in channels.values()}
 
 
 def _records(path: Path) -> Iterator[Any]:

@@ -190,11 +190,6 @@ def _read(path: Path) -> tuple[dict[str, Any], Mapping[str, NDArray[Any]]]:
         header = json.loads(arrays[_HEADER].tobytes())
     except (ValueError, KeyError, RecursionError) as error:
         raise DataError(f"expected {path} to be a file saved by kineme, got another program's archive") from error
-    _check_header(path, header)
-    return header, arrays
-
-
-def _check_header(path: Path, header: Any) -> None:
     if not isinstance(header, dict) or header.get("format") != FORMAT:
         raise DataError(f"expected {path} to be a file saved by kineme, got another program's archive")
     if not isinstance(header.get("version"), int) or header["version"] > VERSION:
@@ -202,3 +197,4 @@ def _check_header(path: Path, header: Any) -> None:
             f"expected {path} to have format version {VERSION} or earlier, got {header.get('version')!r}; "
             "upgrade kineme"
         )
+    return header, arrays

@@ -72,7 +72,14 @@ def _draw_label(axes: Any, recordings: Recordings, label: str | None, unlike: se
     name = name if len(name) <= _NAME else name[: _NAME - 1] + "…"
     axes.set_title(f"{drawable(name)} ({len(chosen)})", pad=3)
     if paths[0].shape[1] > 2:
-        _tidy_space(axes)
+        # Equal scales, no tick labels, and faint background planes.
+        axes.set_aspect("equal")
+        for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+            axis.set_major_formatter(NullFormatter())  # Matplotlib 3.9 and 3.10.0 reserve space for empty labels
+            axis.set_pane_color((0.97, 0.97, 0.97, 1.0))
+            axis._axinfo["grid"].update(color="#DDDDDD", linewidth=0.5)
+            axis._axinfo["tick"].update(inward_factor=0.0, outward_factor=0.0)
+            axis.line.set_color(GRAY)
         points = np.concatenate(paths)
         sides = " × ".join(f"{side:.2g}" for side in np.ptp(points, axis=0))
         axes.text2D(0.5, -0.02, sides, transform=axes.transAxes, ha="center", fontsize=6.5, color=GRAY)
@@ -83,17 +90,6 @@ def _draw_label(axes: Any, recordings: Recordings, label: str | None, unlike: se
         axes.set_aspect("equal", adjustable="datalim")
         width = np.ptp(np.concatenate(paths)[:, 0])
         axes.set_xlabel(f"{width:.3g} wide", fontsize=6.5, color=GRAY, labelpad=2)
-
-
-def _tidy_space(axes: Any) -> None:
-    """Equal scales, no tick labels, and faint background planes."""
-    axes.set_aspect("equal")
-    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
-        axis.set_major_formatter(NullFormatter())  # Matplotlib 3.9 and 3.10.0 reserve space for empty labels
-        axis.set_pane_color((0.97, 0.97, 0.97, 1.0))
-        axis._axinfo["grid"].update(color="#DDDDDD", linewidth=0.5)
-        axis._axinfo["tick"].update(inward_factor=0.0, outward_factor=0.0)
-        axis.line.set_color(GRAY)
 
 
 def _path(one: Trajectory) -> Any:

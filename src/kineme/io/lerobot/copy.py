@@ -151,7 +151,16 @@ def write_shard(source: Path, target: Path, motions: Mapping[int, Sequence[Motio
             schema = file.schema_arrow
             kind = column.type_in(schema)
             with _reading():
-                rows = _snapped(file, motions)
+                # The texts of the episodes of a shard, each at the stamp of a frame, in the order of time.
+                known = file.read(columns=["episode_index", "timestamp"], use_threads=False)
+                episodes, stamps = (known.column(name).to_numpy() for name in ("episode_index", "timestamp"))
+                found: dict[int, list[Motion]] = {}
+                for episode in np.unique(episodes).tolist():
+                    own = stamps[episodes == episode] if episode in motions else stamps[:0]
+                    nearest = [float(own[np.abs(own - one.start).argmin()]) for one in motions.get(episode, ())]
+                    some = zip(nearest, motions.get(episode, ()), strict=True)
+                    found[episode] = sorted(one._replace(start=stamp) for stamp, one in some)
+                rows = found
             if column.name not in schema.names:
                 schema = schema.append(pa.field(column.name, kind))
             packed = _compression(file.metadata, column.leaves(kind))
@@ -193,19 +202,6 @@ def _compression(metadata: Any, leaves: Sequence[str]) -> str | dict[str, str]:
     known = {one.path_in_schema: str(one.compression) for one in columns}
     known = dict.fromkeys(leaves, str(columns[0].compression)) | known
     return {path: "NONE" if name == "UNCOMPRESSED" else name for path, name in known.items()}
-
-
-def _snapped(file: Any, motions: Mapping[int, Sequence[Motion]]) -> dict[int, list[Motion]]:
-    """The texts of the episodes of a shard, each at the stamp of a frame, in the order of time."""
-    known = file.read(columns=["episode_index", "timestamp"], use_threads=False)
-    episodes, stamps = (known.column(name).to_numpy() for name in ("episode_index", "timestamp"))
-    found: dict[int, list[Motion]] = {}
-    for episode in np.unique(episodes).tolist():
-        own = stamps[episodes == episode] if episode in motions else stamps[:0]
-        nearest = [float(own[np.abs(own - one.start).argmin()]) for one in motions.get(episode, ())]
-        some = zip(nearest, motions.get(episode, ()), strict=True)
-        found[episode] = sorted(one._replace(start=stamp) for stamp, one in some)
-    return found
 
 
 def _extended(table: Any, motions: Mapping[int, list[Motion]], column: Column, kind: Any, schema: Any) -> Any:

@@ -175,27 +175,22 @@ def read_episodes(folder: Path, info: Info) -> Episodes:
         first = f"; the first problem: {problems[0]}" if problems else ""
         raise DataError(f"expected episodes in a LeRobot data set, got none in its meta folder{first}")
     order = np.argsort(numbers, kind="stable")
-    shards = _shards(info.data_path, names, [place[order] for place in places])
-    return Episodes(numbers[order], lengths[order], shards, problems)
-
-
-def _shards(data_path: str, names: Sequence[str], places: Sequence[NDArray[np.int64]]) -> list[str]:
-    """The file of each episode; several episodes of one file share its text."""
+    # The file of each episode; several episodes of one file share its text.
     paths: dict[tuple[int, ...], str] = {}
     n_bytes = 0
     shards = []
-    for place in zip(*(one.tolist() for one in places), strict=True):
+    for place in zip(*(one.tolist() for one in [place[order] for place in places]), strict=True):
         if place not in paths:
             try:
-                paths[place] = data_path.format(**dict(zip(names, place, strict=True)))
+                paths[place] = info.data_path.format(**dict(zip(names, place, strict=True)))
             except (KeyError, IndexError, ValueError, AttributeError) as error:
                 raise DataError(
-                    f"expected a data_path such as data/chunk-000/file-000.parquet, got {data_path!r}"
+                    f"expected a data_path such as data/chunk-000/file-000.parquet, got {info.data_path!r}"
                 ) from error
             n_bytes += len(paths[place])
             check_expanded(n_bytes, "a set of names of shards")
         shards.append(paths[place])
-    return shards
+    return Episodes(numbers[order], lengths[order], shards, problems)
 
 
 def read_tasks(folder: Path) -> tuple[dict[int, str], list[str]]:

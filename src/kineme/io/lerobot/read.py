@@ -50,7 +50,15 @@ def lerobot_movements(folder: Path, layout: Layout) -> Parsed:
         import pyarrow  # noqa: F401
     except ImportError as error:
         raise DataError("expected the package pyarrow to read Parquet; pip install 'kineme[parquet]'") from error
-    _check_choices(layout)
+    # Refuse a choice of times, movements or labels that the data set has already made otherwise.
+    named = {"label": (layout.label, ("task", "task_index")), "time": (layout.time, ("timestamp",))}
+    for what, (given, known) in named.items():
+        if given is not None and given not in known:
+            raise DataError(f"expected {known[0]!r} as {what} of a LeRobot data set, which declares it, got {given!r}")
+    if layout.keys is not None and not set(layout.keys) <= {"episode_index", "episode"}:
+        raise DataError(
+            f"expected 'episode_index' as movement of a LeRobot data set, got {listed(map(str, layout.keys))}"
+        )
     info = read_info(folder)
     features, heads, chosen = _chosen(info, layout)
     declared, (tasks, unsaid) = read_episodes(folder, info), read_tasks(folder)
@@ -70,18 +78,6 @@ def lerobot_movements(folder: Path, layout: Layout) -> Parsed:
     parsed = table_movements(table, roles, plain, f"v{info.version}")
     ignored = (*(name for name in info.heads if name not in features), *info.others)
     return parsed._replace(detected=parsed.detected._replace(ignored=ignored), left_out=tuple(left_out))
-
-
-def _check_choices(layout: Layout) -> None:
-    """Refuse a choice of times, movements or labels that the data set has already made otherwise."""
-    named = {"label": (layout.label, ("task", "task_index")), "time": (layout.time, ("timestamp",))}
-    for what, (given, known) in named.items():
-        if given is not None and given not in known:
-            raise DataError(f"expected {known[0]!r} as {what} of a LeRobot data set, which declares it, got {given!r}")
-    if layout.keys is not None and not set(layout.keys) <= {"episode_index", "episode"}:
-        raise DataError(
-            f"expected 'episode_index' as movement of a LeRobot data set, got {listed(map(str, layout.keys))}"
-        )
 
 
 def _chosen(info: Info, layout: Layout) -> tuple[dict[str, int], tuple[str, ...], list[int]]:
@@ -186,7 +182,14 @@ def whole_episodes(
         f"{f'episode {k}' if k >= 0 else 'frames without an episode_index'}: {reason}"
         for k, reason in sorted(wrong.items())
     ]
-    left_out += _absent(numbers, declared, unread)
+    # Episodes without frames in shards that were read.
+    absent = set(np.setdiff1d(declared.numbers, numbers).tolist())
+    places = zip(declared.numbers.tolist(), declared.shards, strict=True) if absent else ()
+    left_out += [
+        f"episode {k}: expected frames in {shard}, got none"
+        for k, shard in places
+        if k in absent and shard not in unread
+    ]
     left_out += [
         f"episode {after}: its frames stand behind those of episode {before}; it is read all the same"
         for before, after in pairwise(numbers[~bad].tolist())
@@ -236,17 +239,6 @@ def _miscounted(numbers: NDArray[np.int64], lengths: NDArray[np.intp], declared:
         int(numbers[i]): f"expected {counted(int(declared.lengths[where[i]]), 'frame')} as declared, got {lengths[i]}"
         for i in np.flatnonzero(odd).tolist()
     }
-
-
-def _absent(found: NDArray[np.int64], declared: Episodes, unread: Collection[str]) -> list[str]:
-    """Episodes without frames in shards that were read."""
-    absent = set(np.setdiff1d(declared.numbers, found).tolist())
-    places = zip(declared.numbers.tolist(), declared.shards, strict=True) if absent else ()
-    return [
-        f"episode {k}: expected frames in {shard}, got none"
-        for k, shard in places
-        if k in absent and shard not in unread
-    ]
 
 
 def _taken(frames: Frames, kept: NDArray[np.bool_]) -> Frames:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -63,7 +63,10 @@ def write_episode(
         import pyarrow  # noqa: F401 - so that the message names the extra
     except ImportError as error:
         raise DataError("expected the package pyarrow to write LeRobot; pip install 'kineme[parquet]'") from error
-    entry = _declared(features, entries)
+    vector = {"dtype": "float32", "shape": [len(entries)], "names": list(entries), "units": list(entries.values())}
+    counter = {"dtype": "int64", "shape": [1], "names": None}
+    stamp = {"timestamp": {"dtype": "float32", "shape": [1], "names": None}}
+    entry = {**dict.fromkeys(features, vector), **stamp, **dict.fromkeys(_COUNTERS, counter)}
     if (folder / MARKER).is_file():
         info = read_json(folder / MARKER, MARKER)
         _check(info, entry, fps)
@@ -76,13 +79,6 @@ def write_episode(
     }  # fmt: skip
     with whole_folder(folder) as hidden:
         return _append(hidden, info, features, task)
-
-
-def _declared(features: Features, entries: Mapping[str, str | None]) -> dict[str, Any]:
-    vector = {"dtype": "float32", "shape": [len(entries)], "names": list(entries), "units": list(entries.values())}
-    counter = {"dtype": "int64", "shape": [1], "names": None}
-    stamp = {"timestamp": {"dtype": "float32", "shape": [1], "names": None}}
-    return {**dict.fromkeys(features, vector), **stamp, **dict.fromkeys(_COUNTERS, counter)}
 
 
 def _check(info: Any, entry: Mapping[str, Any], fps: float) -> None:
@@ -109,7 +105,16 @@ def _append(folder: Path, info: dict[str, Any], features: Features, task: str) -
     tasks = _tasks(folder)
     known = task in tasks
     tasks = tasks if known else [*tasks, task]
-    place = _next_place(folder, number)
+    from pyarrow import parquet
+
+    last = -1  # the file behind all that hold an earlier episode; one that was never counted is written over
+    for path in (folder / "meta" / "episodes").glob("chunk-*/file-*.parquet"):
+        table = parquet.read_table(path, columns=["episode_index", "data/chunk_index", "data/file_index"]).to_pydict()
+        for episode, *numbers in zip(*table.values(), strict=True):
+            if episode < number:
+                own = (int(path.parent.name.removeprefix("chunk-")), int(path.stem.removeprefix("file-")))
+                last = max([last, *(chunk * _IN_CHUNK + file for chunk, file in (own, numbers))])
+    place = {"chunk_index": (last + 1) // _IN_CHUNK, "file_index": (last + 1) % _IN_CHUNK}
     frame = np.arange(length)
     columns: dict[str, NDArray[Any]] = {
         **{name: np.asarray(values, dtype=np.float32) for name, values in features.items()},
@@ -122,7 +127,16 @@ def _append(folder: Path, info: dict[str, Any], features: Features, task: str) -
     found = {name: statistics_of(values) for name, values in columns.items()}
     _write(folder / _DATA.format(**place), {name: _column(values) for name, values in columns.items()})
     if not known:
-        _write_tasks(folder, tasks)
+        # The texts are the index, as pandas and LeRobot read it.
+        index = {
+            "index_columns": ["task"], "column_indexes": [], "pandas_version": "2.2.3",
+            "columns": [
+                {"name": name, "field_name": name, "pandas_type": kind, "numpy_type": numpy, "metadata": None}
+                for name, kind, numpy in (("task_index", "int64", "int64"), ("task", "unicode", "object"))
+            ],
+        }  # fmt: skip
+        rows = {"task_index": np.arange(len(tasks)), "task": list(tasks)}
+        _write(folder / _TASKS, rows, {"pandas": json.dumps(index)})
     row: dict[str, Any] = {
         "episode_index": number, "tasks": [task], "length": length, "data/chunk_index": place["chunk_index"],
         "data/file_index": place["file_index"], "dataset_from_index": start, "dataset_to_index": start + length,
@@ -137,23 +151,6 @@ def _append(folder: Path, info: dict[str, Any], features: Features, task: str) -
     return number
 
 
-def _next_place(folder: Path, number: int) -> dict[str, int]:
-    """Where the files of an episode stand: behind all that hold an earlier one.
-
-    What an episode that was never counted left there is written over.
-    """
-    from pyarrow import parquet
-
-    last = -1
-    for path in (folder / "meta" / "episodes").glob("chunk-*/file-*.parquet"):
-        table = parquet.read_table(path, columns=["episode_index", "data/chunk_index", "data/file_index"]).to_pydict()
-        for episode, *place in zip(*table.values(), strict=True):
-            if episode < number:
-                own = (int(path.parent.name.removeprefix("chunk-")), int(path.stem.removeprefix("file-")))
-                last = max([last, *(chunk * _IN_CHUNK + file for chunk, file in (own, place))])
-    return {"chunk_index": (last + 1) // _IN_CHUNK, "file_index": (last + 1) % _IN_CHUNK}
-
-
 def _tasks(folder: Path) -> list[str]:
     """Texts of the tasks in the order of their numbers."""
     from pyarrow import parquet
@@ -165,19 +162,6 @@ def _tasks(folder: Path) -> list[str]:
     if texts is None or sorted(table["task_index"]) != list(range(len(texts))):
         raise DataError(f"expected {_TASKS} with a text for each task from 0 on, got another one")
     return [text for _, text in sorted(zip(table["task_index"], texts, strict=True))]
-
-
-def _write_tasks(folder: Path, tasks: Sequence[str]) -> None:
-    """The texts are the index, as pandas and LeRobot read it."""
-    index = {
-        "index_columns": ["task"], "column_indexes": [], "pandas_version": "2.2.3",
-        "columns": [
-            {"name": name, "field_name": name, "pandas_type": kind, "numpy_type": numpy, "metadata": None}
-            for name, kind, numpy in (("task_index", "int64", "int64"), ("task", "unicode", "object"))
-        ],
-    }  # fmt: skip
-    columns = {"task_index": np.arange(len(tasks)), "task": list(tasks)}
-    _write(folder / _TASKS, columns, {"pandas": json.dumps(index)})
 
 
 def _column(values: NDArray[Any]) -> Any:

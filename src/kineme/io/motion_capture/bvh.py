@@ -48,12 +48,7 @@ def read_bvh_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
     numbered = [k for k in range(first, len(lines)) if lines[k].strip()]
     table = Table(heads, columns, len(values), lambda row: numbered[row] + 1, faults, measured_in=units, maker="")
     roles = choose_roles(heads, ("number",) * len(heads), layout)
-    _check_order(heads, roles)
-    return table, roles
-
-
-def _check_order(heads: Sequence[str], roles: Roles) -> None:
-    """Refuse rotations of a joint in another order than that of the file, which says which axis turns first."""
+    # Refuse rotations of a joint in another order than that of the file, which says which axis turns first.
     chosen, of_file = (
         Columns(tuple(heads[k] for k in places), ()).rotations for places in (roles.positions, sorted(roles.positions))
     )
@@ -63,6 +58,7 @@ def _check_order(heads: Sequence[str], roles: Roles) -> None:
                 f"expected the rotations of {joint!r} in the order {of_file[joint]}, as the file has them, got {axes}, "
                 "which are other angles of the same turns; export all files in one order"
             )
+    return table, roles
 
 
 def _channels(lines: Sequence[str]) -> list[str]:

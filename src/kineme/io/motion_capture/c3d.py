@@ -84,7 +84,24 @@ def _content(reader: Any, data: bytes) -> tuple[list[str], Any, list[str], float
             f"expected points over time in a C3D file, got {count} points and {n_frames} frames at {rate:g} Hz"
         )
     check_expanded(40 * count * n_frames)
-    points = _points(reader, data, count, n_frames)
+    # Points (T, n, 3), NaN where one was not found. A frame is four words for each point, then its analog samples.
+    # The package refuses files whose analog offsets are not whole numbers; so the frames are not read by it.
+    is_float = reader.point_scale < 0
+    dtype = np.dtype(reader._dtypes.float32 if is_float else reader._dtypes.int16)
+    if reader._dtypes.is_dec and is_float:
+        raise DataError(
+            "expected a C3D file of Intel or MIPS numbers, got one of DEC; save it anew with a newer program"
+        )
+    wide = 4 * count + int(reader.header.analog_count)
+    start, size = (int(reader.header.data_block) - 1) * 512, n_frames * wide * dtype.itemsize
+    if not 0 < start <= len(data) - size:
+        raise DataError(
+            f"expected {n_frames} frames of {count} points in a C3D file, got fewer bytes: a truncated file"
+        )
+    words = np.frombuffer(data, dtype, n_frames * wide, start).reshape(n_frames, wide)[:, : 4 * count]
+    values = words.reshape(n_frames, count, 4).astype(np.float64)
+    lost = (values[:, :, 3] < 0) | ~np.isfinite(values).all(axis=2) | (values[:, :, :3] == 0).all(axis=2)
+    points = np.where(lost[:, :, None], np.nan, values[:, :, :3] * (1.0 if is_float else abs(reader.point_scale)))
     names = without_common_subject(_names(_labels(reader, "POINT"), count, "point"))
     heads = [f"{name}.{axis}" for name in names for axis in "xyz"]
     return heads, points.reshape(n_frames, -1), [length] * len(heads), rate
@@ -164,26 +181,3 @@ def _rotations(reader: Any, data: bytes, n_frames: int, length: str) -> tuple[li
     ends = [*(f"position.{axis}" for axis in "xyz"), *(f"orientation.{axis}" for axis in "wxyz")]
     heads = [f"{name}.{end}" for name in names for end in ends]
     return heads, values.reshape(n_samples, -1), [*[length] * 3, *[""] * 4] * count, rate
-
-
-def _points(reader: Any, data: bytes, count: int, n_frames: int) -> Any:
-    """Points (T, n, 3), NaN where one was not found. A frame is four words for each point, then its analog samples.
-
-    The frames are not read by the package: it refuses files whose analog offsets are not whole numbers.
-    """
-    is_float = reader.point_scale < 0
-    dtype = np.dtype(reader._dtypes.float32 if is_float else reader._dtypes.int16)
-    if reader._dtypes.is_dec and is_float:
-        raise DataError(
-            "expected a C3D file of Intel or MIPS numbers, got one of DEC; save it anew with a newer program"
-        )
-    wide = 4 * count + int(reader.header.analog_count)
-    start, size = (int(reader.header.data_block) - 1) * 512, n_frames * wide * dtype.itemsize
-    if not 0 < start <= len(data) - size:
-        raise DataError(
-            f"expected {n_frames} frames of {count} points in a C3D file, got fewer bytes: a truncated file"
-        )
-    words = np.frombuffer(data, dtype, n_frames * wide, start).reshape(n_frames, wide)[:, : 4 * count]
-    values = words.reshape(n_frames, count, 4).astype(np.float64)
-    lost = (values[:, :, 3] < 0) | ~np.isfinite(values).all(axis=2) | (values[:, :, :3] == 0).all(axis=2)
-    return np.where(lost[:, :, None], np.nan, values[:, :, :3] * (1.0 if is_float else abs(reader.point_scale)))

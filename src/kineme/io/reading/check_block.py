@@ -123,21 +123,17 @@ def _unusable(block: Block, skip: str) -> Flags:
     step[block.offsets[:-1][np.diff(block.offsets) > 0]] = np.inf
     late = ~(step >= SHORTEST_STEP)
     if skip == "sample" and (odd | late).any():
-        return odd | _late_after_leaving_out(block.times, block.offsets, odd, late)
+        # Samples not later than all usable ones before them, in the movements that have a fault.
+        result = np.zeros_like(odd)
+        owners = np.unique(np.searchsorted(block.offsets, np.flatnonzero(odd | late), side="right") - 1)
+        for i in owners:
+            rows = slice(block.offsets[i], block.offsets[i + 1])
+            usable = np.where(odd[rows], -np.inf, block.times[rows])
+            before = np.maximum.accumulate(np.concatenate(([-np.inf], usable[:-1])))
+            with np.errstate(invalid="ignore"):  # dropped samples may be NaN or infinite
+                result[rows] = ~odd[rows] & ~(usable - before >= SHORTEST_STEP)
+        return odd | result
     return odd | late
-
-
-def _late_after_leaving_out(times: Array, offsets: NDArray[np.intp], odd: Flags, late: Flags) -> Flags:
-    """Samples not later than all usable ones before them, in the movements that have a fault."""
-    result = np.zeros_like(odd)
-    owners = np.unique(np.searchsorted(offsets, np.flatnonzero(odd | late), side="right") - 1)
-    for i in owners:
-        rows = slice(offsets[i], offsets[i + 1])
-        usable = np.where(odd[rows], -np.inf, times[rows])
-        before = np.maximum.accumulate(np.concatenate(([-np.inf], usable[:-1])))
-        with np.errstate(invalid="ignore"):  # dropped samples may be NaN or infinite
-            result[rows] = ~odd[rows] & ~(usable - before >= SHORTEST_STEP)
-    return result
 
 
 def _problem(block: Block, file: str, i: int, k: int, odd: tuple[int, str]) -> Problem:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -176,13 +176,10 @@ def data_set_of(folder: Path) -> DataSet | None:
 def _is_marked(folder: Path, data_set: DataSet) -> bool:
     try:
         marker = folder / data_set.marker
-        if not marker.is_file() or not (not data_set.beside or any(_matches(folder, data_set.beside))):
+        others = (path for pattern in data_set.beside for path in folder.glob(pattern))
+        if not marker.is_file() or (data_set.beside and not any(others)):
             return False
         with marker.open("rb") as file:
             return data_set.says in file.read(_HEAD)
     except OSError:
         return False
-
-
-def _matches(folder: Path, patterns: tuple[str, ...]) -> Iterator[Path]:
-    return (path for pattern in patterns for path in folder.glob(pattern))

@@ -15,7 +15,7 @@ from kineme.io.reading.entries import Entry, as_text, name_of
 from kineme.io.reading.read_file import FileRead, select_columns
 from kineme.io.records import Problem
 from kineme.io.ros.rotations import interpolated
-from kineme.movements.channels.channel import Channels, recorded_names
+from kineme.movements.channels.channel import recorded_names
 from kineme.movements.channels.column_match import Columns, numbers_by_name
 from kineme.movements.channels.coordinates import canonical, columns_of, in_order, off_norm
 from kineme.movements.channels.detect import Given, find_channels
@@ -57,7 +57,18 @@ def join_files(files: Sequence[Placed], layout: Layout) -> list[Placed]:
         if len(_together(timed)) < 2:
             result += members
             continue
-        chosen = _with_chosen_columns(timed, layout)
+        # The files that have columns which are asked for, or those of the movements to compare with; all if none has.
+        heads = [_heads(read) for read in timed]
+        known = layout.known.columns if layout.known is not None else ()
+        of_all = [name for names in heads for name in names]
+        wanted = layout.coordinates or (known if None not in numbers_by_name(of_all, known) else ())
+        kept = [
+            read
+            for read, names in zip(timed, heads, strict=True)
+            if (not wanted or excluded_numbers(names, wanted))
+            and len(excluded_numbers(names, layout.excluded)) < len(names)
+        ]
+        chosen = kept or list(timed)
         together = _together(chosen) or [chosen[0].path]
         joined = [member for member in members if member[0].path in together]
         recording, place = _joined(joined, together, layout.kinds or {})
@@ -83,21 +94,6 @@ def join_files(files: Sequence[Placed], layout: Layout) -> list[Placed]:
             else:
                 result.append((read, entry))
     return result
-
-
-def _with_chosen_columns(files: Sequence[FileRead], layout: Layout) -> list[FileRead]:
-    """The files that have columns which are asked for, or those of the movements to compare with; all if none has."""
-    heads = [_heads(read) for read in files]
-    known = layout.known.columns if layout.known is not None else ()
-    of_all = [name for names in heads for name in names]
-    wanted = layout.coordinates or (known if None not in numbers_by_name(of_all, known) else ())
-    kept = [
-        read
-        for read, names in zip(files, heads, strict=True)
-        if (not wanted or excluded_numbers(names, wanted))
-        and len(excluded_numbers(names, layout.excluded)) < len(names)
-    ]
-    return kept or list(files)
 
 
 def _heads(read: FileRead) -> list[str]:
@@ -259,25 +255,8 @@ def _part(read: FileRead, at: Array, given: Given) -> tuple[list[str], list[str]
         columns = canonical(columns, block.offsets, channels)
     units = dict(zip(detected.columns, detected.measured_in or [""] * len(detected.columns), strict=True))
     names = recorded_names(channels)
-    return (
-        [f"{stem}.{name}" for name in names],
-        [units[name] for name in names],
-        [f"{stem}.{name}" for name in detected.ignored],
-        _values_at(at, _times(read), columns, channels),
-    )
-
-
-def _own(given: Given, stem: str, heads: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """The kinds that are given for columns of a file, by its own heads."""
-    for key, kind in given.items():
-        names = [name.strip() for name in key.split(",")]
-        plain = [name.removeprefix(f"{stem}.") for name in names]
-        if all(name.startswith(f"{stem}.") for name in names) and {*plain} <= {*heads}:
-            yield ",".join(plain), kind
-
-
-def _values_at(at: Array, times: Array, columns: Array, channels: Channels) -> Array:
-    """Columns (T, m) of channels at times `at` within their own `times`."""
+    # Columns (T, m) of channels at times `at` within their own `times`.
+    times = _times(read)
     values = np.empty((len(at), columns.shape[1]))
     before = np.searchsorted(times, at, side="right") - 1
     for channel, where in zip(channels, columns_of(channels), strict=True):
@@ -289,4 +268,18 @@ def _values_at(at: Array, times: Array, columns: Array, channels: Channels) -> A
             values[:, where] = columns[before, where]
         else:
             values[:, where.start] = np.interp(at, times, columns[:, where.start])
-    return values
+    return (
+        [f"{stem}.{name}" for name in names],
+        [units[name] for name in names],
+        [f"{stem}.{name}" for name in detected.ignored],
+        values,
+    )
+
+
+def _own(given: Given, stem: str, heads: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """The kinds that are given for columns of a file, by its own heads."""
+    for key, kind in given.items():
+        names = [name.strip() for name in key.split(",")]
+        plain = [name.removeprefix(f"{stem}.") for name in names]
+        if all(name.startswith(f"{stem}.") for name in names) and {*plain} <= {*heads}:
+            yield ",".join(plain), kind

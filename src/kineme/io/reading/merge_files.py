@@ -196,30 +196,15 @@ def merge_files(
         Source(one.path, one.sha256, one.size, one.mtime, place, label, person or one.person, *repair)
         for one in full
         for place, label, person, repair in zip(
-            _block(one).places, _block(one).labels, _people(one), _repairs(one), strict=True
+            _block(one).places,
+            _block(one).labels,
+            _people(one),
+            _block(one).repairs or [Repair()] * len(_block(one).labels),
+            strict=True,
         )
     )
     detected = Counter(how for one in full if (how := understood[one.path]))
-    return Recordings(_demonstrations(full, sources, channels), sources, tuple(reported), tuple(detected.most_common()))
-
-
-def _people(one: FileRead) -> Sequence[str | None]:
-    """Who showed each movement, as the file says it."""
-    return _block(one).people or [None] * len(_block(one).labels)
-
-
-def _repairs(one: FileRead) -> Sequence[Repair]:
-    """What was done about missing values of each movement."""
-    return _block(one).repairs or [Repair()] * len(_block(one).labels)
-
-
-def _block(one: FileRead) -> Block:
-    assert one.block is not None
-    return one.block
-
-
-def _demonstrations(files: Sequence[FileRead], sources: Sequence[Source], channels: Channels | None) -> Demonstrations:
-    blocks = [_block(one) for one in files]
+    blocks = [_block(one) for one in full]
     lengths = np.concatenate([np.diff(block.offsets) for block in blocks])
     offsets = np.concatenate(([0], np.cumsum(lengths)))
     positions = _concatenated([block.positions for block in blocks])
@@ -229,7 +214,22 @@ def _demonstrations(files: Sequence[FileRead], sources: Sequence[Source], channe
     durations = times[offsets[1:] - 1] - times[offsets[:-1]]
     labeled = None if None in labels else label_array(labels, len(labels), names)
     merged = Movements(positions, offsets, durations, times, labeled, names)
-    return Demonstrations.of_movements(merged if channels is None else of_channels(merged, channels))
+    return Recordings(
+        Demonstrations.of_movements(merged if channels is None else of_channels(merged, channels)),
+        sources,
+        tuple(reported),
+        tuple(detected.most_common()),
+    )
+
+
+def _people(one: FileRead) -> Sequence[str | None]:
+    """Who showed each movement, as the file says it."""
+    return _block(one).people or [None] * len(_block(one).labels)
+
+
+def _block(one: FileRead) -> Block:
+    assert one.block is not None
+    return one.block
 
 
 def _concatenated(arrays: Sequence[Any]) -> Any:

@@ -314,7 +314,21 @@ def labeled_pieces(recordings: Recordings, table: LabelTable) -> Recordings:
     sources: list[Source] = []
     paths = {source.path for source in recordings.sources}
     meant = {name: _paths_of(name, paths) for name in dict.fromkeys(row.recording for row in rows)}
-    problems = [*recordings.problems, *_of_none(table, recordings.sources, meant), *_of_several(table, meant)]
+    # The rows of which several recordings may be meant, one problem for each name.
+    first = {row.recording: row.line for row in reversed(table.rows)}
+    problems = [
+        *recordings.problems,
+        *_of_none(table, recordings.sources, meant),
+        *[
+            Problem(
+                table.name,
+                first[name],
+                f"expected one recording {name}, got {', '.join(paths)}; write its folder in the column recording too",
+            )
+            for name, paths in meant.items()
+            if name and len(paths) > 1
+        ],
+    ]
     for i, source in enumerate(recordings.sources):
         first, last = demos.offsets[i : i + 2]
         own = [
@@ -355,20 +369,6 @@ def _of_none(table: LabelTable, sources: Sequence[Source], meant: Mapping[str, S
     more = f", and {counted(len(lost) - 1, 'row')} more" if len(lost) > 1 else ""
     return [
         Problem(table.name, lost[0].line, f"expected a recording {wanted} among those that are read, found none{more}")
-    ]
-
-
-def _of_several(table: LabelTable, meant: Mapping[str, Sequence[str]]) -> list[Problem]:
-    """The rows of which several recordings may be meant, one problem for each name."""
-    first = {row.recording: row.line for row in reversed(table.rows)}
-    return [
-        Problem(
-            table.name,
-            first[name],
-            f"expected one recording {name}, got {', '.join(paths)}; write its folder in the column recording too",
-        )
-        for name, paths in meant.items()
-        if name and len(paths) > 1
     ]
 
 

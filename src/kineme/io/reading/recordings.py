@@ -184,22 +184,18 @@ def read_paths(  # noqa: PLR0913 - those of `read_recordings`, in records
     read += [rule.apply(one, entry.path) for one, entry in files]
     recordings = merge_files(read, in_words(where), problems, layout.kinds, layout.skip, layout.by_number)
     recordings = replace(recordings, notes=notes)
-    _check_excluded(recordings, layout)
+    # Refuse a column to exclude that no file has: it is most likely misspelled.
+    left_aside = sorted({name for how, _ in recordings.detected for name in how.ignored})
+    for column in layout.excluded:
+        if not isinstance(column, int) and not column.isdecimal() and not excluded_numbers(left_aside, [column]):
+            others = sorted({name for how, _ in recordings.detected for name in how.columns})
+            raise DataError(f"expected columns like {column!r} to exclude, got none but {listed(others)}")
     if layout.person is not None and recordings.people is None:
         raise DataError(
             f"expected a column {layout.person!r} of a table that names people, found none in {in_words(where)}; "
             "say who showed them with label_pattern=, in the shell also with --by-person or --person"
         )
     return trimmed(recordings) if trim else recordings
-
-
-def _check_excluded(recordings: Recordings, layout: Layout) -> None:
-    """Refuse a column to exclude that no file has: it is most likely misspelled."""
-    left_aside = sorted({name for how, _ in recordings.detected for name in how.ignored})
-    for column in layout.excluded:
-        if not isinstance(column, int) and not column.isdecimal() and not excluded_numbers(left_aside, [column]):
-            others = sorted({name for how, _ in recordings.detected for name in how.columns})
-            raise DataError(f"expected columns like {column!r} to exclude, got none but {listed(others)}")
 
 
 def read_recordings_from_bytes(data: bytes, name: str, layout: Layout) -> Recordings:

@@ -98,7 +98,12 @@ def open_bag(path: Path) -> Iterator[Bag]:
     bound_chunks_of_mcap()
     with ExitStack() as stack:
         folder = stack.enter_context(expanded_folder(path)) if not ending else Folder(path, (path,), "")
-        _check_files(folder, path)
+        for one in folder.files:
+            if one.suffix.lower() == ".mcap" or one == path:
+                try:
+                    check_records(one)
+                except DataError as error:
+                    raise DataError(str(error) if one == path else f"{one.name}: {error}") from error
         plain = stack.enter_context(plain_name(folder.path, ending))
         with refused("expected a bag of ROS that can be opened", remedy):
             reader: Any = (Reader1 if ending == ".bag" else Reader2)(plain)
@@ -128,15 +133,6 @@ def _read_any_order(reader: Any) -> None:
         read(at, indexes)
 
     reader.read_index_data = read_anew
-
-
-def _check_files(folder: Folder, path: Path) -> None:
-    for one in folder.files:
-        if one.suffix.lower() == ".mcap" or one == path:
-            try:
-                check_records(one)
-            except DataError as error:
-                raise DataError(str(error) if one == path else f"{one.name}: {error}") from error
 
 
 def messages_of(bag: Bag, topics: Sequence[Topic]) -> Iterator[tuple[int, int, bytes]]:

@@ -182,10 +182,21 @@ def expanded_folder(path: Path) -> Iterator[Folder]:
     if mode != "file" or about.get("compression_format") != "zstd" or not is_whole:
         yield Folder(path, files if is_whole else (), mode)
         return
+    from rosbags.rosbag2.storage_mcap import zstd
+
     with TemporaryDirectory() as name:
         folder = Path(name)
         for one in files:
-            _expand_file(one, folder / one.stem)
+            most = max(max_file_bytes(), _MOST_RATIO * one.stat().st_size)
+            with one.open("rb") as start:
+                declared = zstd.get_frame_info(start.read(64)).decompressed_size or 0
+            _check(declared, most, one)
+            n_bytes = 0
+            with zstd.open(one, "rb") as old, (folder / one.stem).open("wb") as new:
+                while some := old.read(_AT_ONCE):
+                    n_bytes += len(some)
+                    _check(n_bytes, most, one)
+                    new.write(some)
         plain = {**about, "compression_mode": "", "relative_file_paths": [one.stem for one in files]}
         _write(folder / METADATA, {INFORMATION: plain})
         yield Folder(folder, tuple(folder / one.stem for one in files), mode)
@@ -207,21 +218,6 @@ def _write(path: Path, whole: Any) -> None:
 
     with path.open("w", encoding="utf-8") as file:
         YAML(typ="safe").dump(whole, file)
-
-
-def _expand_file(source: Path, target: Path) -> None:
-    from rosbags.rosbag2.storage_mcap import zstd
-
-    most = max(max_file_bytes(), _MOST_RATIO * source.stat().st_size)
-    with source.open("rb") as start:
-        declared = zstd.get_frame_info(start.read(64)).decompressed_size or 0
-    _check(declared, most, source)
-    n_bytes = 0
-    with zstd.open(source, "rb") as old, target.open("wb") as new:
-        while some := old.read(_AT_ONCE):
-            n_bytes += len(some)
-            _check(n_bytes, most, source)
-            new.write(some)
 
 
 def _check(n_bytes: int, most: int, source: Path) -> None:

@@ -241,24 +241,19 @@ def number_fields(bag: Bag, topic: Topic) -> NumberFields:
     (text, definition), *_ = definitions.items()
     if len(text) > _LONGEST:
         raise DataError(f"{where} of at most {_LONGEST:,} characters, got {len(text):,}; convert the topic to CSV")
-    from rosbags.typesys import get_types_from_idl, get_types_from_msg
+    from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
     with refused(where, "convert the topic to CSV"):
         parse = (
             get_types_from_idl if definition.format.name == "IDL" else lambda text: get_types_from_msg(text, topic.type)
         )
-        types = {**_standard(bag.version), **(parse(text) if text.strip() else {})}
+        standard = get_typestore(Stores.ROS1_NOETIC if bag.version == 1 else Stores.LATEST).fielddefs
+        types = {**standard, **(parse(text) if text.strip() else {})}
         steps = tuple(_steps(types, topic.type, "", bag.version, _DEEPEST))
     fields = NumberFields(topic.type, bag.version, steps)
     if not fields.heads:
         raise DataError(f"topic {topic.name}: expected numbers in messages of {topic.type}, got none")
     return fields
-
-
-def _standard(version: int) -> Mapping[str, Any]:
-    from rosbags.typesys import Stores, get_typestore
-
-    return dict(get_typestore(Stores.ROS1_NOETIC if version == 1 else Stores.LATEST).fielddefs)
 
 
 def _steps(types: Mapping[str, Any], name: str, prefix: str, version: int, deep: int) -> list[Step]:
@@ -345,7 +340,13 @@ def decoder_of(bag: Bag, topic: Topic) -> Callable[[bytes], Any]:
         The bag holds the type in another version than the standard one.
     """
     store = standard_types(bag.version)
-    _check_version(store, bag.version, topic)
+    expected = _digest(store, bag.version, topic.type)
+    for one in topic.connections:
+        if one.digest and one.digest not in (expected, "*"):
+            raise DataError(
+                f"topic {topic.name}: expected messages of the standard type {topic.type}, got another version of it, "
+                "by its checksum; convert the topic to CSV where that type is installed"
+            )
     known = store.get_msgdef(topic.type)
     is_1, cls = bag.version == 1, known.cls
     parse = known.deserialize_ros1 if is_1 else None
@@ -381,16 +382,6 @@ def standard_types(version: int) -> Any:
         if name not in store.types:
             store.register(get_types_from_msg(_TF_DEFINITION, name))
     return store
-
-
-def _check_version(store: Any, version: int, topic: Topic) -> None:
-    expected = _digest(store, version, topic.type)
-    for one in topic.connections:
-        if one.digest and one.digest not in (expected, "*"):
-            raise DataError(
-                f"topic {topic.name}: expected messages of the standard type {topic.type}, got another version of it, "
-                "by its checksum; convert the topic to CSV where that type is installed"
-            )
 
 
 @cache

@@ -15,13 +15,12 @@ from numpy.typing import NDArray
 from kineme.errors import DataError
 from kineme.io.limits import check_expanded
 from kineme.io.ros.bags import Bag, Topic, logs_beside, messages_of, open_bag
-from kineme.io.ros.choose import Choice, Edge, Step, chain, choose, connected_graph, edge_of, transforms_in
+from kineme.io.ros.choose import Edge, Step, chain, choose, connected_graph, edge_of, transforms_in
 from kineme.io.ros.number_fields import POSE, TYPES, Heads, decoder_of, nanoseconds_of, transform_row
 from kineme.io.ros.rotations import are_rotations, from_ros, to_ros
 from kineme.io.ros.streams import (
     SECOND,
     Samples,
-    Stamps,
     Stream,
     check_kept,
     clock_of,
@@ -61,7 +60,28 @@ def read_bag(path: Path, layout: Layout) -> Parsed:
         choice = choose(bag, layout)
         paths = [one for one in choice.topics if one.type in TYPES and TYPES[one.type].path]
         if not paths:
-            parsed = _streamed(bag, choice, layout)
+            streams: list[Stream] = []
+            left_out: list[str] = []
+            if choice.frames:
+                streams, left_out = read_transforms(bag, choice.transforms, choice.frames, layout.skip)
+            if choice.topics:
+                others, lost = read_streams(bag, choice.topics, layout.skip, layout.coordinates)
+                streams, left_out = [*streams, *others], [*left_out, *lost]
+            of_headers, reason = clock_of(streams)
+            if str(layout.time) in _CLOCKS:
+                of_headers = layout.time == _CLOCKS[0]
+            one, lost = merge_streams(streams, of_headers)
+            stamps = [one.recorded if one.stamped is None else one.stamped, one.recorded]
+            columns = [*(each / SECOND for each in stamps), *one.values.T]
+            what = [f"frames {parent}:{child}" for parent, child in choice.frames]
+            what += [f"topic {topic.name} of {topic.type}" for topic in choice.topics]
+            said_what = ", ".join(what) + (AS_KNOWN if choice.as_known else "")
+            heads = (*_CLOCKS, *one.heads)
+            of_joints = any(topic.type.endswith("/JointState") for topic in choice.topics)
+            roles = _roles(heads, 0 if of_headers else 1, layout, of_joints)
+            table = Table(heads, columns, len(one.values), no_lines, dates_in="s")
+            said = "stamps of headers" if of_headers else f"time of recording: {reason}" if reason else "as asked for"
+            parsed = _parsed(table, roles, layout, (bag.kind, said_what, said), [*left_out, *lost])
             return parsed._replace(left_out=(*parsed.left_out, *logs_beside(path)))
         if len(choice.topics) > 1 or choice.frames:
             raise DataError(
@@ -69,31 +89,6 @@ def read_bag(path: Path, layout: Layout) -> Parsed:
                 "topics or frames beside it"
             )
         return _whole(bag, read_paths(bag, paths[0], layout.skip), layout)
-
-
-def _streamed(bag: Bag, choice: Choice, layout: Layout) -> Parsed:
-    streams: list[Stream] = []
-    left_out: list[str] = []
-    if choice.frames:
-        streams, left_out = read_transforms(bag, choice.transforms, choice.frames, layout.skip)
-    if choice.topics:
-        others, lost = read_streams(bag, choice.topics, layout.skip, layout.coordinates)
-        streams, left_out = [*streams, *others], [*left_out, *lost]
-    of_headers, reason = clock_of(streams)
-    if str(layout.time) in _CLOCKS:
-        of_headers = layout.time == _CLOCKS[0]
-    one, lost = merge_streams(streams, of_headers)
-    stamps = [one.recorded if one.stamped is None else one.stamped, one.recorded]
-    columns = [*(each / SECOND for each in stamps), *one.values.T]
-    what = [f"frames {parent}:{child}" for parent, child in choice.frames]
-    what += [f"topic {topic.name} of {topic.type}" for topic in choice.topics]
-    said_what = ", ".join(what) + (AS_KNOWN if choice.as_known else "")
-    heads = (*_CLOCKS, *one.heads)
-    of_joints = any(topic.type.endswith("/JointState") for topic in choice.topics)
-    roles = _roles(heads, 0 if of_headers else 1, layout, of_joints)
-    table = Table(heads, columns, len(one.values), no_lines, dates_in="s")
-    said = "stamps of headers" if of_headers else f"time of recording: {reason}" if reason else "as asked for"
-    return _parsed(table, roles, layout, (bag.kind, said_what, said), [*left_out, *lost])
 
 
 def _whole(bag: Bag, paths: Paths, layout: Layout) -> Parsed:
@@ -222,21 +217,7 @@ def _composed(name: str, way: Sequence[Step], edges: dict[Edge, Stream], left_ou
     if not moving:
         raise DataError(f"frames {name}: expected a frame that moves in the other, got transforms that never change")
     of_headers, reason = clock_of(moving)
-    at = _common_stamps(name, moving, of_headers, left_out)
-    start = int(at[0])
-    seconds = (at - start) / SECOND
-    p, q = np.zeros((len(at), 3)), np.tile([1.0, 0.0, 0.0, 0.0], (len(at), 1))
-    for step in way:
-        p, q = _then(p, q, _at(seconds, start, edges[step.edge], of_headers), step.forward)
-    return Stream(name, POSE, np.hstack((p, to_ros(continuous(q)))), at, at if of_headers else None, reason)
-
-
-def _is_fixed(stream: Stream) -> bool:
-    return bool((stream.values == stream.values[0]).all())
-
-
-def _common_stamps(name: str, moving: Sequence[Stream], of_headers: bool, left_out: list[str]) -> Stamps:
-    """The stamps of the transform that has most of them, within the time in which all others are known too."""
+    # The stamps of the transform that has most of them, within the time in which all others are known too.
     stamps = [np.unique(stamps_of(one, of_headers)) for one in moving]
     first, last = max(one[0] for one in stamps), min(one[-1] for one in stamps)
     inside = [one[(one >= first) & (one <= last)] for one in stamps]
@@ -249,7 +230,22 @@ def _common_stamps(name: str, moving: Sequence[Stream], of_headers: bool, left_o
         )
     if n_lost := len(stamps[k]) - len(most):
         left_out.append(f"frames {name}: {counted(n_lost, 'stamp')} of {moving[k].name}, at which others are not known")
-    return most
+    start = int(most[0])
+    seconds = (most - start) / SECOND
+    p, q = np.zeros((len(most), 3)), np.tile([1.0, 0.0, 0.0, 0.0], (len(most), 1))
+    for step in way:
+        # The pose (p, q) followed by transforms (n, 7), or by their inverses.
+        transform = _at(seconds, start, edges[step.edge], of_headers)
+        x, r = transform[:, :3], from_ros(transform[:, 3:])
+        if not step.forward:
+            r = conjugate(r)
+            x = -rotated(r, x)
+        p, q = p + rotated(q, x), product(q, r)
+    return Stream(name, POSE, np.hstack((p, to_ros(continuous(q)))), most, most if of_headers else None, reason)
+
+
+def _is_fixed(stream: Stream) -> bool:
+    return bool((stream.values == stream.values[0]).all())
 
 
 def _at(seconds: Array, start: int, stream: Stream, of_headers: bool) -> Array:
@@ -258,15 +254,6 @@ def _at(seconds: Array, start: int, stream: Stream, of_headers: bool) -> Array:
         return np.repeat(stream.values[:1], len(seconds), axis=0)
     stamps, values = in_order(stream, of_headers)
     return values_at(seconds, (stamps - start) / SECOND, stream, values)
-
-
-def _then(p: Array, q: Array, transform: Array, forward: bool) -> tuple[Array, Array]:
-    """The pose (p, q) followed by transforms (n, 7), or by their inverses."""
-    x, r = transform[:, :3], from_ros(transform[:, 3:])
-    if not forward:
-        r = conjugate(r)
-        x = -rotated(r, x)
-    return p + rotated(q, x), product(q, r)
 
 
 class Paths(NamedTuple):

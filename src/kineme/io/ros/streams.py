@@ -111,7 +111,23 @@ def read_streams(
         left_out.append(about)
     streams: list[Stream] = []
     for topic, one in zip(topics, opened, strict=True):
-        left_out += _losses(topic, one, skip)
+        # What was not read of a topic, or an error where that costs the movement.
+        n, without = one.counts
+        losses = []
+        if one.bad:
+            more = f"; {len(one.bad) - 1} more like this" if len(one.bad) > 1 else ""
+            reason = f"topic {topic.name}: {one.bad[0]}{more}"
+            if skip == "movement":
+                raise DataError(f"{reason}{_TO_KEEP if one.groups else ''}")
+            losses.append(reason)
+        if without and without < n:
+            losses.append(f"topic {topic.name}: {counted(without, 'message')} without positions")
+        if n < topic.n_messages:
+            losses.append(f"topic {topic.name}: expected {counted(topic.n_messages, 'message')}, got {n:,}")
+        if not one.groups:
+            what = f"{counted(n, 'message')} without positions" if without else "no messages"
+            raise DataError(f"topic {topic.name}: expected samples of {topic.type}, got {what}")
+        left_out += losses
         streams += [
             with_rotations(stream, f"topic {topic.name}: ", skip, left_out, columns)
             for stream in _streams(topic, one, left_out)
@@ -170,26 +186,6 @@ def _group(one: _Open, heads: Heads) -> tuple[Samples, list[int] | None]:
         place = {head: k for k, head in enumerate(heads)}
         one.groups[heads] = one.groups[first][0], [place[head] for head in first]
     return one.groups[heads]
-
-
-def _losses(topic: Topic, one: _Open, skip: str) -> list[str]:
-    """What was not read of a topic, or an error where that costs the movement."""
-    n, without = one.counts
-    losses = []
-    if one.bad:
-        more = f"; {len(one.bad) - 1} more like this" if len(one.bad) > 1 else ""
-        reason = f"topic {topic.name}: {one.bad[0]}{more}"
-        if skip == "movement":
-            raise DataError(f"{reason}{_TO_KEEP if one.groups else ''}")
-        losses.append(reason)
-    if without and without < n:
-        losses.append(f"topic {topic.name}: {counted(without, 'message')} without positions")
-    if n < topic.n_messages:
-        losses.append(f"topic {topic.name}: expected {counted(topic.n_messages, 'message')}, got {n:,}")
-    if not one.groups:
-        what = f"{counted(n, 'message')} without positions" if without else "no messages"
-        raise DataError(f"topic {topic.name}: expected samples of {topic.type}, got {what}")
-    return losses
 
 
 def _streams(topic: Topic, one: _Open, left_out: list[str]) -> list[Stream]:

@@ -146,7 +146,8 @@ def detect_dialect(text: Iterable[str]) -> Dialect:
     kept, cells = kept[n_heads - 1 :], [_joined(cells[:n_heads]), *cells[n_heads:]]
     named = not _is_sample(cells, comma)
     heads, first = cells[0] if named else _commented_head(lines[: kept[0]], separator, len(cells[0])), kept[0] + named
-    numbered = not named and _counts_columns(cells)
+    numbers = [str(k) for k in range(len(cells[0]))]  # above fractions, as data frames without heads are written
+    numbered = not named and cells[0] == numbers and any("." in cell for cell in cells[-1])
     first += numbered
     units = units_in(cells[1]) if named and len(cells) > 2 and len(cells[1]) <= len(cells[0]) else ()
     if units:
@@ -264,11 +265,6 @@ def _is_sample(cells: Sequence[list[str]], comma: bool) -> bool:
     """Whether the first line holds a sample, not heads: it has as many numbers as the next, and at least one."""
     counts = [sum(is_number(cell, comma) for cell in row) for row in cells[:2]]
     return counts[0] > 0 and counts[0] >= counts[-1]
-
-
-def _counts_columns(cells: Sequence[list[str]]) -> bool:
-    """Whether the first line only numbers the columns, 0, 1, 2, above fractions, as data frames without heads do."""
-    return cells[0] == [str(k) for k in range(len(cells[0]))] and any("." in cell for cell in cells[-1])
 
 
 def _commented_head(lines: Sequence[str], separator: str | None, n_columns: int) -> list[str]:

@@ -97,7 +97,17 @@ def export_table(head: ExportHead, table: Table) -> Table:
         even = columns[k][0] + (frames - frames[0]) / head.rate
         columns[k] = np.where(np.abs(columns[k] - even) <= _ROUNDED, even, columns[k])
     if head.zeros_are_gaps:
-        _mark_zeros(table.heads, columns)
+        # NaN in place of the zeros that stand for a marker or a body that was not found.
+        groups: dict[str, list[int]] = {}
+        for k, name in enumerate(table.heads[: len(columns)]):
+            if name[-2:] in (".x", ".y", ".z"):
+                groups.setdefault(name[:-2].removesuffix(".position"), []).append(k)
+        for name, members in groups.items():
+            lost = np.all([columns[k] == 0 for k in members], axis=0)
+            if lost.any():
+                angles = [k for k, head in enumerate(table.heads[: len(columns)]) if head.startswith(f"{name}.")]
+                for k in chain(members, angles):
+                    columns[k] = np.where(lost, np.nan, columns[k])
     return Table(
         table.heads, columns, table.n_rows, table.line_of, table.faults, None, table.measured_in, None, head.maker
     )
@@ -110,17 +120,3 @@ def _stamps(table: Table, columns: Sequence[Any], rate: float) -> Any:
     if frames is None or (parts is not None and parts.any()):
         return np.arange(table.n_rows) / rate
     return (frames - frames[0]) / rate
-
-
-def _mark_zeros(heads: Sequence[str], columns: list[Any]) -> None:
-    """NaN in place of the zeros that stand for a marker or a body that was not found."""
-    groups: dict[str, list[int]] = {}
-    for k, name in enumerate(heads[: len(columns)]):
-        if name[-2:] in (".x", ".y", ".z"):
-            groups.setdefault(name[:-2].removesuffix(".position"), []).append(k)
-    for name, members in groups.items():
-        lost = np.all([columns[k] == 0 for k in members], axis=0)
-        if lost.any():
-            angles = [k for k, head in enumerate(heads[: len(columns)]) if head.startswith(f"{name}.")]
-            for k in chain(members, angles):
-                columns[k] = np.where(lost, np.nan, columns[k])

@@ -59,13 +59,24 @@ def read_parquet_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
                 f"expected samples that move, got {file.metadata.num_rows:,} rows in {len(data):,} bytes, which cannot "
                 "differ; write the rows that were recorded"
             )
-        _refuse_twins(names, needed)
+        counts = Counter(names)
+        if twins := [names[k] for k in needed if counts[names[k]] > 1]:
+            raise DataError(f"expected columns of different names, got {twins[0]!r} {counts[twins[0]]} times")
         texts = {owners[k] for k in (*roles.movement, roles.label) if k is not None}
         if nested := [k for k in needed if k in texts and pa.types.is_nested(types[k])]:
             raise DataError(f"expected names in {names[nested[0]]!r}, got {types[nested[0]]}")
         named = [names[k] for k in needed if k in texts]  # kept as dictionaries: few different texts in many rows
         file = parquet.ParquetFile(io.BytesIO(data), read_dictionary=named)
-        table = pa.Table.from_batches(_batches(file, [names[k] for k in needed]))
+        # Some rows at a time, refused once they take more memory than the limit. The metadata about the pages of
+        # columns are not used: pyarrow ends the process if they are damaged.
+        batches, n_bytes = [], 0
+        for batch in file.iter_batches(_ROWS, columns=[names[k] for k in needed]):
+            n_bytes += batch.nbytes
+            check_expanded(n_bytes)
+            batches.append(batch)
+        if not batches:
+            raise DataError("expected samples, got a table without rows")
+        table = pa.Table.from_batches(batches)
         faults: dict[int, str] = {}
         read = {k: _read(table.column(names[k]), names[k], k in texts, (owners.count(k), faults)) for k in needed}
     except (pa.ArrowException, OSError) as error:
@@ -151,27 +162,6 @@ def _kind(pa: Any, kind: Any) -> str:
     if of.is_timestamp(kind) or of.is_date(kind) or of.is_duration(kind):
         return "date"
     return "number" if of.is_integer(kind) or of.is_floating(kind) or of.is_decimal(kind) else "text"
-
-
-def _batches(file: Any, needed: Sequence[str]) -> list[Any]:
-    """The columns, some rows at a time; refused once they take more memory than the limit.
-
-    The metadata about the pages of columns are not used: pyarrow ends the process if they are damaged.
-    """
-    batches, n_bytes = [], 0
-    for batch in file.iter_batches(_ROWS, columns=list(needed)):
-        n_bytes += batch.nbytes
-        check_expanded(n_bytes)
-        batches.append(batch)
-    if not batches:
-        raise DataError("expected samples, got a table without rows")
-    return batches
-
-
-def _refuse_twins(heads: Sequence[str], needed: Sequence[int]) -> None:
-    counts = Counter(heads)
-    if twins := [heads[k] for k in needed if counts[heads[k]] > 1]:
-        raise DataError(f"expected columns of different names, got {twins[0]!r} {counts[twins[0]]} times")
 
 
 def _texts(column: Any, head: str) -> Any:

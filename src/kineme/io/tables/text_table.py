@@ -45,7 +45,7 @@ _GROUPED = re.compile(r"[-+]?[1-9]\d{0,2}[.,]\d{3}")  # a number that may be tho
 _NUMBER, _TEXT, _COLUMN = 8, 64, 1000  # bytes of a number, a text and a column
 
 
-def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
+def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:  # noqa: PLR0912 - one check after the other
     """Read a table of samples by lines.
 
     Separated by comma, semicolon, tab or blanks; with a head line or without; quoted or not; with decimal commas
@@ -70,7 +70,16 @@ def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
         dialect = dialect._replace(names_rows=True)
     rows, faults = _rows(data, encoding, dialect, texts)
     if roles.time is None and layout.every is None and _EMPTY_LINE.search(data):
-        _check_one_block([line for line, _ in _samples(data, encoding, dialect)])
+        # Refuse samples without times that empty lines part, of which nobody said that they are one movement.
+        numbers = [line for line, _ in _samples(data, encoding, dialect)]
+        sizes = np.diff([0, *(np.flatnonzero(np.diff(numbers) > 1) + 1), len(numbers)])
+        if len(sizes) > 1 and sizes.min() >= MIN_SAMPLES:
+            alike = f"say every={sizes[0]}, in the shell --every {sizes[0]}"
+            remedy = alike if (sizes == sizes[0]).all() else "save each in a file of its own"
+            raise DataError(
+                f"expected one movement, got {len(sizes)} blocks of {sizes.min()} to {sizes.max()} samples between "
+                f"lines that are left out; {remedy}, or remove those lines"
+            )
     columns = [rows[name] for name in rows.dtype.names or ()]
     if long := [k for k in roles.positions if (np.abs(columns[k]) >= _EXACT_TO).any()]:
         faults |= _rounded(_samples(data, encoding, dialect), dialect, long)
@@ -80,7 +89,9 @@ def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
         if b"." in data and b"," in data and (grouped := [k for k in roles.positions if _may_be_thousands(columns[k])]):
             _check_marks(_samples(data, encoding, dialect), dialect, grouped)
         for k in roles.positions:
-            if _may_be_grouped(columns[k]):
+            x = columns[k][np.isfinite(columns[k])]
+            n_integers = int((x == np.rint(x)).sum())
+            if 0 < n_integers < len(x) and _may_be_thousands(x):  # 999, 1.002
                 split_lines = (split(line, dialect.separator) for _, line in _samples(data, encoding, dialect))
                 _check_grouped((row[k] for row in split_lines if k < len(row)), dialect.heads[k])
     if dated and roles.time is not None:
@@ -91,7 +102,15 @@ def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
         } | faults
     line_of = _line_numbers(data, encoding, dialect)
     dates_in = "s" if dated else None
-    heads = _with_names_of_joints(dialect.heads, columns)
+    # Heads with the names of joints in place of ``field.position0`` where the column ``field.name0`` says one name.
+    renamed = list(dialect.heads)
+    place = {head: k for k, head in enumerate(dialect.heads)}
+    for head, k in place.items():
+        match = _POSITION.fullmatch(head)
+        beside = None if match is None else place.get(f"{match[1]}name{match[2]}")
+        if beside is not None and columns[beside].dtype.kind == "O" and len(names := {*columns[beside].tolist()}) == 1:
+            renamed[k] = next(iter(names)) or head
+    heads = tuple(renamed) if len({*renamed}) == len(renamed) else dialect.heads
     return Table(heads, columns, len(rows), line_of, faults, dates_in, dialect.measured_in), roles
 
 
@@ -107,31 +126,10 @@ def _check_written(samples: Iterator[tuple[int, str]], dialect: Dialect, columns
                 )
 
 
-def _check_one_block(numbers: Sequence[int]) -> None:
-    """Refuse samples without times that empty lines part, of which nobody said that they are one movement."""
-    sizes = np.diff([0, *(np.flatnonzero(np.diff(numbers) > 1) + 1), len(numbers)])
-    if len(sizes) > 1 and sizes.min() >= MIN_SAMPLES:
-        every = (
-            f"say every={sizes[0]}, in the shell --every {sizes[0]}"
-            if (sizes == sizes[0]).all()
-            else "save each in a file of its own"
-        )
-        raise DataError(
-            f"expected one movement, got {len(sizes)} blocks of {sizes.min()} to {sizes.max()} samples between lines "
-            f"that are left out; {every}, or remove those lines"
-        )
-
-
 def _may_be_thousands(x: Array) -> bool:
     """Whether all numbers have at most three digits before the mark and three behind it, which may be thousands."""
     x = x[np.isfinite(x)]
     return len(x) > 0 and bool((np.abs(x) < 1000).all() and (np.abs(1000 * x - np.rint(1000 * x)) < 1e-6).all())
-
-
-def _may_be_grouped(x: Array) -> bool:
-    """Whether some of such numbers are whole: 999, 1.002."""
-    n_whole = int((x[np.isfinite(x)] == np.rint(x[np.isfinite(x)])).sum())
-    return 0 < n_whole < np.isfinite(x).sum() and _may_be_thousands(x)
 
 
 def _check_marks(samples: Iterator[tuple[int, str]], dialect: Dialect, columns: Sequence[int]) -> None:
@@ -193,21 +191,6 @@ def _rounded(samples: Iterator[tuple[int, str]], dialect: Dialect, columns: Sequ
                     f"expected a number in {dialect.heads[k]!r} that a float can hold, got {cells[k]}{ROUNDED}"
                 )
     return faults
-
-
-def _with_names_of_joints(heads: tuple[str, ...], columns: Sequence[Any]) -> tuple[str, ...]:
-    """Heads with the names of joints in place of ``field.position0`` where the column ``field.name0`` says one name.
-
-    So rostopic writes the state of joints; a bag has them under their names too.
-    """
-    renamed = list(heads)
-    place = {head: k for k, head in enumerate(heads)}
-    for head, k in place.items():
-        match = _POSITION.fullmatch(head)
-        beside = None if match is None else place.get(f"{match[1]}name{match[2]}")
-        if beside is not None and columns[beside].dtype.kind == "O" and len(names := {*columns[beside].tolist()}) == 1:
-            renamed[k] = next(iter(names)) or head
-    return tuple(renamed) if len({*renamed}) == len(renamed) else heads
 
 
 def _read_export(data: bytes, encoding: str, export: tuple[ExportHead, Dialect], layout: Layout) -> tuple[Table, Roles]:
@@ -349,12 +332,29 @@ def _read_stretch(lines: list[str], dialect: Dialect, dtype: np.dtype[Any]) -> t
             return read, {}
         if not quoted and not any(texts) and dialect.separator:  # an empty cell is usual
             text = "\n".join(line.rstrip("\r\n") for line in plain)
-            if (read := try_rows(_filled(text, dialect.separator).split("\n"), dialect, dtype)) is not None:
+            # Lines with nan in their empty cells.
+            mark = dialect.separator
+            for _ in range(2):  # of three separators in a row, the first replacement finds one empty cell
+                text = text.replace(mark + mark, f"{mark}nan{mark}")
+            text = f"\n{text}\n".replace(f"\n{mark}", f"\nnan{mark}").replace(f"{mark}\n", f"{mark}nan\n")
+            if (read := try_rows(text[1:-1].split("\n"), dialect, dtype)) is not None:
                 return read, {}
     rows = np.empty(len(lines), dtype)
     faults = {}
     for k, line in enumerate(lines):
-        rows[k], wrong = _read_line(line, dialect, texts)
+        check_line(line)
+        cells, wrong = split(line, dialect.separator), ""
+        if len(cells) != len(texts):
+            wrong = f"expected {len(texts)} columns, got {len(cells)}"
+            cells = (cells + [""] * len(texts))[: len(texts)]
+        row: list[Any] = []
+        for cell, is_text, head in zip(cells, texts, dialect.heads, strict=True):
+            row.append(cell if is_text else _number(cell, dialect.decimal_comma))
+            if row[-1] is None:
+                row[-1] = np.nan
+                expected = f"expected a number in {head!r}{marks_within(cell)}"
+                wrong = wrong or ("" if is_missing(cell) else f"{expected}, got {cell!r}")
+        rows[k] = tuple(row)
         if wrong:
             faults[k] = wrong
     return rows, faults
@@ -384,31 +384,6 @@ def quotes_are_plain(text: bytes, dialect: Dialect) -> bool:
     beside = np.concatenate((marks[first - 1], marks[last + 1]))
     in_one_line = np.searchsorted(ends, first) == np.searchsorted(ends, last)
     return bool(np.isin(beside, [*b"\r\n", ord(dialect.separator)]).all() and in_one_line.all())
-
-
-def _filled(text: str, separator: str) -> str:
-    """Lines with nan in their empty cells."""
-    empty = separator + separator
-    if empty in text:  # twice: of three separators in a row, the first replacement finds one empty cell
-        text = text.replace(empty, f"{separator}nan{separator}").replace(empty, f"{separator}nan{separator}")
-    text = f"\n{text}\n".replace(f"\n{separator}", f"\nnan{separator}").replace(f"{separator}\n", f"{separator}nan\n")
-    return text[1:-1]
-
-
-def _read_line(line: str, dialect: Dialect, texts: list[bool]) -> tuple[tuple[Any, ...], str]:
-    check_line(line)
-    cells, wrong = split(line, dialect.separator), ""
-    if len(cells) != len(texts):
-        wrong = f"expected {len(texts)} columns, got {len(cells)}"
-        cells = (cells + [""] * len(texts))[: len(texts)]
-    row: list[Any] = []
-    for cell, text, head in zip(cells, texts, dialect.heads, strict=True):
-        row.append(cell if text else _number(cell, dialect.decimal_comma))
-        if row[-1] is None:
-            row[-1] = np.nan
-            expected = f"expected a number in {head!r}{marks_within(cell)}"
-            wrong = wrong or ("" if is_missing(cell) else f"{expected}, got {cell!r}")
-    return tuple(row), wrong
 
 
 def _number(cell: str, comma: bool) -> float | None:

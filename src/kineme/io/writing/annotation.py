@@ -92,9 +92,8 @@ def _cell(value: Any) -> str:
 
 def write_audacity(path: Path, annotations: Sequence[Annotation], source: Path | None) -> Path:
     """Write ``start TAB end TAB label`` lines, in seconds since the first sample, as File > Import > Labels reads."""
-    lines = [f"{one.span[0]:.6f}\t{one.span[1]:.6f}\t{_on_one_line(one.symbol)}\n" for one in annotations]
+    lines = [
+        f"{one.span[0]:.6f}\t{one.span[1]:.6f}\t{UNKNOWN if one.symbol is None else ' '.join(one.symbol.split())}\n"
+        for one in annotations
+    ]
     return write_atomically(path, "".join(lines).encode("utf-8", "backslashreplace"))
-
-
-def _on_one_line(symbol: str | None) -> str:
-    return UNKNOWN if symbol is None else " ".join(symbol.split())

@@ -55,7 +55,14 @@ def write_elan(path: Path, annotations: Sequence[Annotation], source: Path | Non
     order = SubElement(root, "TIME_ORDER")
     tier = SubElement(root, "TIER", LINGUISTIC_TYPE_REF="symbol", TIER_ID="symbol")
     for k, one in enumerate(annotations, 1):
-        start, end = _milliseconds(one)
+        # Start and end, at least a millisecond apart.
+        start, end = (round(1000 * time) for time in one.span)
+        if start < 0:
+            raise DataError(
+                f"expected annotations that start after the first sample of {one.recording}, got one at "
+                f"{start / 1000} s"
+            )
+        end = max(end, start + 1)
         slots = {f"TIME_SLOT_REF{i}": f"ts{2 * k - 2 + i}" for i in (1, 2)}
         for slot, value in zip(slots.values(), (start, end), strict=True):
             SubElement(order, "TIME_SLOT", TIME_SLOT_ID=slot, TIME_VALUE=str(value))
@@ -68,27 +75,13 @@ def write_elan(path: Path, annotations: Sequence[Annotation], source: Path | Non
             ids = {"ANNOTATION_ID": f"a{number * len(annotations) + k}", "ANNOTATION_REF": f"a{k}"}
             referring = SubElement(SubElement(below, "ANNOTATION"), "REF_ANNOTATION", ids)
             SubElement(referring, "ANNOTATION_VALUE").text = text(one)
-    _types(root)
-    indent(root, " ")
-    return write_atomically(path, tostring(root, "UTF-8", xml_declaration=True) + b"\n")
-
-
-def _types(root: Element) -> None:
     plain = {"GRAPHIC_REFERENCES": "false"}
     SubElement(root, "LINGUISTIC_TYPE", plain, LINGUISTIC_TYPE_ID="symbol", TIME_ALIGNABLE="true")
-    below = {"CONSTRAINTS": _ASSOCIATION, "LINGUISTIC_TYPE_ID": "number", "TIME_ALIGNABLE": "false"}
-    SubElement(root, "LINGUISTIC_TYPE", plain | below)
+    by_number = {"CONSTRAINTS": _ASSOCIATION, "LINGUISTIC_TYPE_ID": "number", "TIME_ALIGNABLE": "false"}
+    SubElement(root, "LINGUISTIC_TYPE", plain | by_number)
     SubElement(root, "CONSTRAINT", DESCRIPTION=_MEANING, STEREOTYPE=_ASSOCIATION)
-
-
-def _milliseconds(one: Annotation) -> tuple[int, int]:
-    """Start and end, at least a millisecond apart."""
-    start, end = (round(1000 * time) for time in one.span)
-    if start < 0:
-        raise DataError(
-            f"expected annotations that start after the first sample of {one.recording}, got one at {start / 1000} s"
-        )
-    return start, max(end, start + 1)
+    indent(root, " ")
+    return write_atomically(path, tostring(root, "UTF-8", xml_declaration=True) + b"\n")
 
 
 TOPIC = "/kineme/annotations"
