@@ -41,10 +41,10 @@ class Problem(NamedTuple):
 
 def note_on_missing(problems: Sequence[Problem]) -> list[str]:
     """Say which columns keep several movements from being read, if there are such, and how to leave them out."""
-    lacking = [one for one in problems if one.missing]
+    lacking = [problem for problem in problems if problem.missing]
     if len(lacking) < 2:
         return []
-    counts = Counter(name for one in lacking for name in one.missing)
+    counts = Counter(name for problem in lacking for name in problem.missing)
     names = [name for name, _ in counts.most_common()]
     shown = first_names([f"{name} in {counts[name]}" for name in names], _SHOWN)
     return [

@@ -87,18 +87,18 @@ def parsed_arrays(
         odd = next(i for i, (t, x) in enumerate(zip(ts, xs, strict=True)) if len(t) != len(x))
         raise DataError(f"expected one time stamp per sample, got {len(ts[odd])} for {len(xs[odd])} in movement {odd}")
     offsets = np.concatenate(([0], np.cumsum([len(x) for x in xs]))).astype(np.intp)
-    units, known = layout.units, "given"
+    units, said_by = layout.units, "given"
     stamps = None
     if ts is not None:
         stamps = np.concatenate(ts)
         if units is None:
             named_in = unit_in_head(time)
-            units, known = (named_in, "head") if named_in else unit_by_size(stamps, time)
+            units, said_by = (named_in, "head") if named_in else unit_by_size(stamps, time)
         stamps = in_seconds(stamps, units)
     elif isinstance(units, float | int):
         stamps = np.concatenate([np.arange(len(x)) * float(units) for x in xs])
     else:
-        units, known = "s", "no times: one second each"
+        units, said_by = "s", "no times: one second each"
         if detected[1] != ROWS:  # a line says which of its numbers are one sample
             check_first_axis([x.shape for x in xs])
     positions = np.concatenate(xs)
@@ -112,7 +112,7 @@ def parsed_arrays(
     if places is None:
         places = [""] if detected[1] == "single" else [str(i) for i in range(len(xs))]
     block = Block(positions, stamps, offsets, list(labels), places)
-    how = Detected(detected[0], detected[1], columns, None if ts is None else time, units, known, named=is_named)
+    how = Detected(detected[0], detected[1], columns, None if ts is None else time, units, said_by, named=is_named)
     return Parsed(how, block)
 
 
@@ -179,11 +179,15 @@ def has_known_names(names: Collection[str]) -> bool:
 
     They have not where their times go by another name, such as ``stamp``.
     """
-    known = any(name in names or f"{name}_0" in names for name in POSITIONS)
-    if known and not {*TIMES, "offsets"} & set(names) and any(is_time(name) or is_header_stamp(name) for name in names):
+    has_positions = any(name in names or f"{name}_0" in names for name in POSITIONS)
+    if (
+        has_positions
+        and not {*TIMES, "offsets"} & set(names)
+        and any(is_time(name) or is_header_stamp(name) for name in names)
+    ):
         return False
     others = set(names) - {*TIMES, *LABELS, "offsets"}
-    return known or all(seconds_named(name) is not None for name in others)
+    return has_positions or all(seconds_named(name) is not None for name in others)
 
 
 def _axes_stacked(arrays: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -236,11 +240,11 @@ def numbers_of(values: Any, of_time: bool = False) -> Array:
 
 def _no_number(array: NDArray[Any]) -> Any:
     """The first entry that is not a number."""
-    for one in array.ravel().tolist():
+    for number in array.ravel().tolist():
         try:
-            float(np.float64(one))
+            float(np.float64(number))
         except (ValueError, TypeError):
-            return one
+            return number
     return array.dtype.name
 
 
@@ -283,7 +287,7 @@ def _of_one(arrays: Mapping[str, Any], x: Array, layout: Layout) -> tuple[list[A
 
 
 def _numbered(arrays: Mapping[str, Any]) -> tuple[list[Array], list[Array] | None, str]:
-    prefix = next((one for one in POSITIONS if f"{one}_0" in arrays), None)
+    prefix = next((name for name in POSITIONS if f"{name}_0" in arrays), None)
     if prefix is None:
         raise DataError(f"expected arrays times and positions, got no entry 'positions' but {listed(arrays)}")
     count = next(k for k in range(len(arrays) + 1) if f"{prefix}_{k}" not in arrays)
@@ -291,7 +295,7 @@ def _numbered(arrays: Mapping[str, Any]) -> tuple[list[Array], list[Array] | Non
     xs = [x[:, None] if x.ndim == 1 else x for x in xs]
     if odd := [x.shape for x in xs if x.ndim != 2]:
         raise DataError(f"expected positions of shape (T, d), got {odd[0]}")
-    clock = next((one for one in TIMES if f"{one}_0" in arrays), None)
+    clock = next((name for name in TIMES if f"{name}_0" in arrays), None)
     if clock is None:
         return xs, None, "numbered"
     try:
@@ -312,13 +316,13 @@ def _labels(arrays: Mapping[str, Any], n: int) -> list[str | None]:
         shape = (len(labels),)
     if shape != (n,):
         raise DataError(f"expected one label for each of the {n} movements, got labels of shape {shape}")
-    return [_label(one) for one in labels]
+    return [_label(label) for label in labels]
 
 
-def _label(one: Any) -> str | None:
+def _label(value: Any) -> str | None:
     """A label as text; None where there is none."""
-    if isinstance(one, (list, dict, tuple)) or one != one:  # noqa: PLR0124 - only NaN differs from itself
-        raise DataError(f"expected labels that are texts or numbers, got {one!r}")
-    if isinstance(one, bytes):
-        return one.decode("utf-8", "replace") or None
-    return None if one is None else str(one) or None
+    if isinstance(value, (list, dict, tuple)) or value != value:  # noqa: PLR0124 - only NaN differs from itself
+        raise DataError(f"expected labels that are texts or numbers, got {value!r}")
+    if isinstance(value, bytes):
+        return value.decode("utf-8", "replace") or None
+    return None if value is None else str(value) or None

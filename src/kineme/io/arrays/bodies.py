@@ -183,13 +183,13 @@ def _named_points(arrays: Mapping[str, Any]) -> Body | None:
     x = None if name is None else _values(arrays, name)
     if name is None or x is None or np.ndim(arrays[name]) != 3 or np.shape(arrays[name])[2] not in (2, 3):
         return None
-    timed = any(is_time(one) and np.shape(arrays[one]) == x.shape[:1] for one in arrays)
+    timed = any(is_time(key) and np.shape(arrays[key]) == x.shape[:1] for key in arrays)
     if not timed and rate_of(arrays) is None:
         return None
     n_points, width = np.shape(arrays[name])[1:]
     names = _texts(arrays, _POINT_NAMES)
     names = names if len(names) == n_points else [f"{name}.{k}" for k in range(n_points)]
-    heads = [f"{one}.{axis}" for one in distinct(names) for axis in "xyz"[:width]]
+    heads = [f"{name}.{axis}" for name in distinct(names) for axis in "xyz"[:width]]
     return Body("points", dict(zip(heads, x.T, strict=True)), (name,))
 
 
@@ -240,7 +240,7 @@ def _texts(arrays: Mapping[str, Any], names: Sequence[str]) -> list[str]:
             except DataError:  # of Python objects
                 continue
             if texts.ndim == 1 and texts.dtype.kind in "US":
-                return [one.decode("utf-8", "replace") if isinstance(one, bytes) else one for one in texts.tolist()]
+                return [text.decode("utf-8", "replace") if isinstance(text, bytes) else text for text in texts.tolist()]
     return []
 
 

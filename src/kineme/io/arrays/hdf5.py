@@ -65,24 +65,24 @@ def _tree(group: Any, h5py: Any, counted: list[int], depth: int = 0, unit: Any =
             raise DataError(f"expected an HDF5 file of at most {_MOST:,} groups and data sets, got more")
         if not isinstance(group.get(name, getlink=True), h5py.HardLink):
             continue
-        one = group[name]
-        if isinstance(one, Mapping):
+        member = group[name]
+        if isinstance(member, Mapping):
             if depth < _DEEPEST:
-                tree[name] = _tree(one, h5py, counted, depth + 1, unit)
-        elif isinstance(one, h5py.Dataset) and not one.external and not one.is_virtual:
-            names = tuple(one.attrs)
-            rate = rate_of(_said(one, names)) if names else None
-            if one.shape == ():
-                tree[name] = _single(one[()])
+                tree[name] = _tree(member, h5py, counted, depth + 1, unit)
+        elif isinstance(member, h5py.Dataset) and not member.external and not member.is_virtual:
+            names = tuple(member.attrs)
+            rate = rate_of(_said(member, names)) if names else None
+            if member.shape == ():
+                tree[name] = _single(member[()])
                 tree |= {} if rate is None else {"rate": rate.hertz}  # as of NWB's starting_time
-            elif one.shape and one.dtype.kind in "biuf":
-                tree[name] = _Stored(one, (_unit_in(one, names) if names else None) or unit, rate, names)
-            elif one.dtype.names and len(one.shape) == 1:
-                check_expanded(one.shape[0] * one.dtype.itemsize)
-                records = _Stored(one, None, None)[()]
-                tree[name] = {head: records[head] for head in one.dtype.names if one.dtype[head].kind in "biuf"}
-            elif len(one.shape) == 1 and one.dtype.kind in "SO" and is_label(name):
-                tree[name] = _labels(one)
+            elif member.shape and member.dtype.kind in "biuf":
+                tree[name] = _Stored(member, (_unit_in(member, names) if names else None) or unit, rate, names)
+            elif member.dtype.names and len(member.shape) == 1:
+                check_expanded(member.shape[0] * member.dtype.itemsize)
+                records = _Stored(member, None, None)[()]
+                tree[name] = {head: records[head] for head in member.dtype.names if member.dtype[head].kind in "biuf"}
+            elif len(member.shape) == 1 and member.dtype.kind in "SO" and is_label(name):
+                tree[name] = _labels(member)
     return tree
 
 
@@ -110,8 +110,8 @@ def _unit_in(stored: Any, names: Iterable[str]) -> Any:
     for name in names:
         if name.lower() in _UNITS:
             value = stored.attrs[name]
-            units = [_single(one) for one in np.ravel(value)] if np.ndim(value) else [_single(value)]
-            if units and all(isinstance(one, str) for one in units):
+            units = [_single(element) for element in np.ravel(value)] if np.ndim(value) else [_single(value)]
+            if units and all(isinstance(unit, str) for unit in units):
                 return units[0] if len({*units}) == 1 else units
     return None
 

@@ -49,7 +49,7 @@ def json_movements(data: bytes, layout: Layout) -> Parsed:
             return tree_movements(_columns_of(frame), layout, "JSON", many="take")
         if has_known_names(entries):
             return arrays_movements(entries, layout, "JSON")
-    elif not isinstance(entries, list) or not any(isinstance(one, (Mapping, list)) for one in entries[:1]):
+    elif not isinstance(entries, list) or not any(isinstance(entry, (Mapping, list)) for entry in entries[:1]):
         raise DataError(f"expected an object with times and positions, got a {type(entries).__name__}")
     return tree_movements(as_tree(entries), layout, "JSON", many="take")
 
@@ -78,7 +78,7 @@ def _frame(entries: Mapping[str, Any]) -> dict[str, list[Any]] | None:
     if {*entries} == {"columns", "index", "data"}:
         if any(not isinstance(row, list) or len(row) != len(entries["columns"]) for row in entries["data"]):
             raise DataError("expected a row of data with a number for each of the columns, got another one")
-        heads = ["_".join(map(str, one)) if isinstance(one, list) else str(one) for one in entries["columns"]]
+        heads = ["_".join(map(str, head)) if isinstance(head, list) else str(head) for head in entries["columns"]]
         return _with_index(
             entries["index"], dict(zip(heads, map(list, zip(*entries["data"], strict=True)), strict=True))
         )
@@ -100,12 +100,12 @@ def _counts(names: Iterable[str]) -> bool:
 
 
 def _with_index(index: list[Any], columns: dict[str, list[Any]]) -> dict[str, list[Any]]:
-    texts = [str(one) for one in index]
+    texts = [str(entry) for entry in index]
     head = "time" if all(map(is_date, texts)) else "index"
     if head in columns:
         return columns
     return {
-        head: texts if head == "time" else [float(one) if is_number(one, False) else one for one in texts]
+        head: texts if head == "time" else [float(text) if is_number(text, False) else text for text in texts]
     } | columns
 
 
@@ -113,8 +113,8 @@ def _columns_of(frame: Mapping[str, list[Any]]) -> dict[str, Any]:
     """Columns as arrays; of times that are texts the seconds, which their head says."""
     tree = {}
     for head, cells in frame.items():
-        if is_time(head) and any(isinstance(one, str) for one in cells):
-            seconds, others = seconds_of_dates([str(one) for one in cells])
+        if is_time(head) and any(isinstance(cell, str) for cell in cells):
+            seconds, others = seconds_of_dates([str(cell) for cell in cells])
             if others:
                 raise DataError(f"expected dates or durations in {head!r}, got {next(iter(others.values()))!r:.80}")
             tree[f"{head} (s)"] = seconds
@@ -137,7 +137,7 @@ def size_of_objects(data: bytes) -> int:
 def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     entries = dict(pairs)
     if len(entries) < len(pairs):
-        twice = next(name for name in entries if sum(one == name for one, _ in pairs) > 1)
+        twice = next(name for name in entries if sum(key == name for key, _ in pairs) > 1)
         raise DataError(f"expected each entry once, got {twice!r} several times")
     return entries
 
@@ -153,24 +153,27 @@ def as_tree(value: Any) -> Any:
         if any(
             name.lower() == "name" for name in value
         ):  # strokes of what has one name are one, as of the $N recognizer
-            value = {name: _drawn(one) if name.lower() == "strokes" else one for name, one in value.items()}
-        stamped = {len(one) for name, one in value.items() if is_time(name) and isinstance(one, list)}
-        tree = {name: as_tree(one) for name, one in value.items()}
+            value = {name: _drawn(entry) if name.lower() == "strokes" else entry for name, entry in value.items()}
+        stamped = {len(entry) for name, entry in value.items() if is_time(name) and isinstance(entry, list)}
+        tree = {name: as_tree(entry) for name, entry in value.items()}
         return {
-            name: _stacked(one) if isinstance(one, list) and len(one) in stamped else one for name, one in tree.items()
+            name: _stacked(entry) if isinstance(entry, list) and len(entry) in stamped else entry
+            for name, entry in tree.items()
         }
     if not isinstance(value, list) or not value:
         return value
-    if all(isinstance(one, Mapping) for one in value):
-        return _columns(value) if all(map(_is_sample, value[:2])) else [as_tree(one) for one in value]
-    if any(isinstance(one, Mapping) for one in value):
+    if all(isinstance(element, Mapping) for element in value):
+        return _columns(value) if all(map(_is_sample, value[:2])) else [as_tree(element) for element in value]
+    if any(isinstance(element, Mapping) for element in value):
         raise DataError("expected a list of samples or of movements, got objects beside other values")
-    if all(isinstance(one, list) and one and all(isinstance(cell, str) for cell in one) for one in value):
+    if all(
+        isinstance(element, list) and element and all(isinstance(cell, str) for cell in element) for element in value
+    ):
         return None  # pairs of names, as of the bones between joints
-    if all(isinstance(one, list) for one in value) and not all(
+    if all(isinstance(row, list) for row in value) and not all(
         not isinstance(cell, (list, Mapping)) for row in value for cell in row[:1]
     ):
-        return [as_tree(one) for one in value]
+        return [as_tree(element) for element in value]
     return _array(value)
 
 
@@ -183,12 +186,12 @@ def _drawn(strokes: Any) -> Any:
 
 def _stacked(rows: list[Any]) -> Any:
     """Points (T, J, d) over time as one array, of a list of arrays (J, d)."""
-    alike = all(isinstance(one, np.ndarray) and one.ndim == 2 and one.shape == rows[0].shape for one in rows)
+    alike = all(isinstance(row, np.ndarray) and row.ndim == 2 and row.shape == rows[0].shape for row in rows)
     return np.stack(rows) if alike and rows[0].dtype.kind == "f" else rows
 
 
 def _are_objects(value: Any) -> bool:
-    return isinstance(value, list) and bool(value) and all(isinstance(one, Mapping) for one in value)
+    return isinstance(value, list) and bool(value) and all(isinstance(element, Mapping) for element in value)
 
 
 def _is_sample(entry: Mapping[str, Any]) -> bool:
@@ -199,15 +202,17 @@ def _is_sample(entry: Mapping[str, Any]) -> bool:
     if any(  # objects that each have a name and numbers: the points of a body at one time
         isinstance(value, list)
         and bool(value)
-        and all(isinstance(one, Mapping) and _name(one, _PARTS) for one in value)
-        and not any(isinstance(cell, list) or is_time(key) for one in value for key, cell in one.items())
+        and all(isinstance(part, Mapping) and _name(part, _PARTS) for part in value)
+        and not any(isinstance(cell, list) or is_time(key) for part in value for key, cell in part.items())
         for value in entry.values()
     ):
         return True
     if any(name.lower() in _AXES and isinstance(value, list) for name, value in entry.items()):  # x over time
         return False
-    lists = [one for one in entry.values() if isinstance(one, list)]
-    return len(lists) < len(entry) and not any(isinstance(one, (list, Mapping)) for value in lists for one in value[:1])
+    lists = [entry for entry in entry.values() if isinstance(entry, list)]
+    return len(lists) < len(entry) and not any(
+        isinstance(cell, (list, Mapping)) for value in lists for cell in value[:1]
+    )
 
 
 def _name(part: Mapping[str, Any], keys: Sequence[str] = _NAMES) -> str | None:
@@ -217,35 +222,35 @@ def _name(part: Mapping[str, Any], keys: Sequence[str] = _NAMES) -> str | None:
 
 def _columns(samples: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Samples with names as one array for each name, NaN where it is missing; parts of a sample by name or number."""
-    flat = [_flat(one) for one in samples]
-    names = dict.fromkeys(name for one in flat for name in one)
+    flat = [_flat(sample) for sample in samples]
+    names = dict.fromkeys(name for cells in flat for name in cells)
     for name in [name for name in names if name.endswith(f".{_COUNT}")]:
         del names[name]
-        if len(counts := {one[name] for one in flat if name in one}) > 1:
+        if len(counts := {cells[name] for cells in flat if name in cells}) > 1:
             raise DataError(
                 f"expected as many {name.removesuffix(f'.{_COUNT}')!r} in each sample, since nothing names them, got "
                 f"{min(counts)} to {max(counts)}; give each a name"
             )
     check_expanded(8 * len(flat) * len(names))
-    return _columns_of({name: [one.get(name) for one in flat] for name in names})
+    return _columns_of({name: [cells.get(name) for cells in flat] for name in names})
 
 
 def _flat(sample: Mapping[str, Any]) -> dict[str, Any]:
     plain: dict[str, Any] = {}
     for name, value in sample.items():
         if isinstance(value, list) and value and all(map(_are_objects, value)):  # hands, each of many points
-            if not any("categoryName" in one for hand in value for one in hand):  # what MediaPipe holds them for
+            if not any("categoryName" in part for hand in value for part in hand):  # what MediaPipe holds them for
                 hands = _flat({str(k): hand for k, hand in enumerate(value)})
-                plain |= {f"{name}.{inner}": one for inner, one in hands.items()} | {f"{name}.{_COUNT}": len(value)}
+                plain |= {f"{name}.{inner}": cell for inner, cell in hands.items()} | {f"{name}.{_COUNT}": len(value)}
         elif isinstance(value, Mapping):
-            plain |= {f"{name}.{inner}": one for inner, one in _flat(value).items()}
+            plain |= {f"{name}.{inner}": cell for inner, cell in _flat(value).items()}
         elif _are_objects(value):
-            parts = [_name(one) for one in value]
+            parts = [_name(part) for part in value]
             if None not in parts and len({*parts}) < len(parts):
                 raise DataError(f"expected parts of {name!r} with different names in each sample, got {parts!r:.80}")
             count = None if len({*parts} - {None}) == len(parts) else len(value)
-            for k, one in enumerate(value):
-                cells = {inner: cell for inner, cell in _flat(one).items() if count or inner not in _NAMES}
+            for k, part in enumerate(value):
+                cells = {inner: cell for inner, cell in _flat(part).items() if count or inner not in _NAMES}
                 plain |= {f"{name}.{k if count else parts[k]}.{inner}": cell for inner, cell in cells.items()}
             if count:
                 plain[f"{name}.{_COUNT}"] = count
@@ -259,14 +264,16 @@ def _array(values: list[Any]) -> Any:
 
     Nulls alone say nothing of numbers: they are empty texts, which are left aside.
     """
-    nothing = all(one is None or (isinstance(one, list) and all(cell is None for cell in one)) for one in values)
-    if nothing or any(isinstance(one, str) for one in values):
+    nothing = all(
+        value is None or (isinstance(value, list) and all(cell is None for cell in value)) for value in values
+    )
+    if nothing or any(isinstance(value, str) for value in values):
         texts = np.empty(len(values), dtype=object)
-        texts[:] = ["" if nothing or one is None else str(one) for one in values]
+        texts[:] = ["" if nothing or value is None else str(value) for value in values]
         return texts
-    width = max((len(one) for one in values if isinstance(one, list)), default=0)
+    width = max((len(value) for value in values if isinstance(value, list)), default=0)
     if width:
-        values = [[np.nan] * width if one is None else one for one in values]
+        values = [[np.nan] * width if value is None else value for value in values]
     try:
         return np.array(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
@@ -301,14 +308,14 @@ def json_messages(path: Path, layout: Layout) -> Parsed:
                 if n % _CHECKED == 0:
                     check_expanded(n_bytes, "messages in JSON")
     check_expanded(n_bytes, "messages in JSON")
-    encodings = {one.message_encoding for one in channels.values()}
+    encodings = {channel.message_encoding for channel in channels.values()}
     if len(topics) != 1:
         got = f"the topics {listed(topics)}; say which with topic=, in the shell --topic" if topics else ""
         none = f"messages in {listed(sorted(encodings))}; write a topic as CSV or JSON lines"
         raise DataError(f"expected an MCAP file of ROS 2, or one topic with messages in JSON, got {got or none}")
     ((name, messages),) = topics.items()
     samples = []
-    for recorded, raw in sorted(messages, key=lambda one: one[0]):
+    for recorded, raw in sorted(messages, key=lambda message: message[0]):
         try:
             sample = json.loads(raw)
         except ValueError as error:

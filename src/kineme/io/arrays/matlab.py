@@ -68,7 +68,7 @@ def read_demos(data: bytes) -> Demos:
         pairs = list(_pairs(variables["demos"], order))
         if not pairs:
             raise ValueError("none in it")
-        check_expanded(sum(8 * math.prod(one.dims) for pair in pairs for one in pair))
+        check_expanded(sum(8 * math.prod(matrix.dims) for pair in pairs for matrix in pair))
         demos = [_arrays(numbers(t, order), numbers(x, order)) for t, x in pairs]
         name = text(variables["name"], order) if "name" in variables else None
     except (ValueError, struct.error, zlib.error) as error:
@@ -100,10 +100,10 @@ def _of_structures(demos: Matrix, order: str) -> Iterator[tuple[Matrix, Matrix]]
 
 
 def _next(parts: Iterator[Element], order: str) -> Matrix:
-    one = next(parts, None)
-    if one is None:
+    part = next(parts, None)
+    if part is None:
         raise ValueError("fewer elements than it says")
-    return as_matrix(one, order)
+    return as_matrix(part, order)
 
 
 def _arrays(t: Array, x: Array) -> tuple[Array, Array]:
@@ -134,7 +134,7 @@ def mat_movements(data: bytes, layout: Layout) -> Parsed:
     except (ValueError, struct.error) as error:
         raise DataError(f"expected a MATLAB file of arrays, got {error}") from error
     if not has_times(tree) and not isinstance(layout.units, float | int):  # matrices on their own may be anything
-        tree = {name: one for name, one in tree.items() if isinstance(one, (dict, list))}
+        tree = {name: node for name, node in tree.items() if isinstance(node, (dict, list))}
     if not tree:
         got = listed(variables)
         raise DataError(
@@ -175,11 +175,11 @@ def _node(matrix: Matrix, order: str, taken: list[int], depth: int = 0) -> Any:
     if matrix.kind == TEXT:
         return text(matrix, order)
     if matrix.kind == CELL:
-        return [_node(one, order, taken, depth + 1) for one in _children(matrix, order, math.prod(matrix.dims), 0)]
+        return [_node(child, order, taken, depth + 1) for child in _children(matrix, order, math.prod(matrix.dims), 0)]
     if matrix.kind == STRUCT:
         fields = field_names(matrix, order)
         values = _children(matrix, order, math.prod(matrix.dims) * len(fields), 2)
-        nodes = [_node(one, order, taken, depth + 1) for one in values]
+        nodes = [_node(value, order, taken, depth + 1) for value in values]
         rows = [dict(zip(fields, nodes[k : k + len(fields)], strict=True)) for k in range(0, len(nodes), len(fields))]
         return rows[0] if len(rows) == 1 else rows
     return None
@@ -191,23 +191,23 @@ def _children(matrix: Matrix, order: str, count: int, skipped: int) -> Iterator[
     for _ in range(skipped):
         next(parts, None)
     for _ in range(count):
-        if (one := next(parts, None)) is None:
+        if (part := next(parts, None)) is None:
             raise ValueError("fewer elements than it says")
-        yield as_matrix(one, order)
+        yield as_matrix(part, order)
 
 
 def _upright(tree: Any) -> Any:
     """Matrices with their samples along the first axis: as many as there are times, else the longer axis."""
     if isinstance(tree, list):
-        return [_upright(one) for one in tree if one is not None]
+        return [_upright(node) for node in tree if node is not None]
     if not isinstance(tree, dict):
         return _turned(tree, None) if isinstance(tree, np.ndarray) else tree
-    stamps = [one for name, one in tree.items() if is_time(name) and isinstance(one, np.ndarray) and one.ndim == 1]
+    stamps = [node for name, node in tree.items() if is_time(name) and isinstance(node, np.ndarray) and node.ndim == 1]
     length = len(stamps[0]) if stamps else None
     return {
-        name: _turned(one, length) if isinstance(one, np.ndarray) else _upright(one)
-        for name, one in tree.items()
-        if one is not None
+        name: _turned(node, length) if isinstance(node, np.ndarray) else _upright(node)
+        for name, node in tree.items()
+        if node is not None
     }
 
 
@@ -294,10 +294,10 @@ def _expanded(packed: memoryview, order: str, wanted: Container[str]) -> Matrix:
     if matrix.name not in wanted:
         return matrix
     check_expanded(size)
-    whole = head + stream.decompress(stream.unconsumed_tail, max(1, 8 + size + 1 - len(head)))
-    if len(whole) != 8 + size or not stream.eof:
+    content = head + stream.decompress(stream.unconsumed_tail, max(1, 8 + size + 1 - len(head)))
+    if len(content) != 8 + size or not stream.eof:
         raise ValueError("a truncated or damaged compressed variable")
-    return _matrix(memoryview(whole)[8:], order)
+    return _matrix(memoryview(content)[8:], order)
 
 
 def as_matrix(element: Element, order: str) -> Matrix:

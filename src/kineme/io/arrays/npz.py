@@ -55,8 +55,8 @@ class Npz(Mapping[str, NDArray[Any]]):
             self._archive = zipfile.ZipFile(io.BytesIO(data))
         except Exception as error:  # zipfile raises many exceptions on damaged files
             raise self._damaged(error) from error
-        listed = [one for one in self._archive.infolist() if one.filename.endswith(_ENDING)]
-        self._members = {one.filename.removesuffix(_ENDING): one for one in listed}
+        listed = [member for member in self._archive.infolist() if member.filename.endswith(_ENDING)]
+        self._members = {member.filename.removesuffix(_ENDING): member for member in listed}
         if len(self._members) < len(listed):
             raise self._damaged("two entries of one name")
 

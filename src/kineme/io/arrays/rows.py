@@ -192,7 +192,7 @@ def _head(data: bytes) -> tuple[dict[str, str], list[tuple[int, str]]]:
     for _, line in lines:
         text = line.strip()
         if text.lower() == "@data":
-            body = [(number, one.strip()) for number, one in lines if one.strip() and not one.startswith(("#", "%"))]
+            body = [(number, row.strip()) for number, row in lines if row.strip() and not row.startswith(("#", "%"))]
             if not body:
                 break
             return flags, body
@@ -246,14 +246,14 @@ def _parsed(series: _Series, names: Sequence[str], layout: Layout, kind: str, ti
         reason = f"; {series.left_out[0]}" if series.left_out else ""
         raise DataError(f"expected a movement in each line, got none{reason}")
     fits = [x.shape[1] == len(names) for x in series.positions]
-    kept = [k for k, fit in enumerate(fits) if fit]
+    numbers = [k for k, fit in enumerate(fits) if fit]
     left_out = [
         f"line {series.lines[k]}: expected {len(names)} columns, got {series.positions[k].shape[1]}"
         for k, fit in enumerate(fits)
         if not fit
     ]
-    xs = [series.positions[k] for k in kept]
-    places = [f"line {series.lines[k]}" for k in kept]
-    named = Named([series.labels[k] for k in kept], "times", places, names)
-    parsed = parsed_arrays(xs, [series.times[k] for k in kept] if timed else None, named, layout, (kind, ROWS))
+    xs = [series.positions[k] for k in numbers]
+    places = [f"line {series.lines[k]}" for k in numbers]
+    named = Named([series.labels[k] for k in numbers], "times", places, names)
+    parsed = parsed_arrays(xs, [series.times[k] for k in numbers] if timed else None, named, layout, (kind, ROWS))
     return parsed._replace(left_out=(*series.left_out, *left_out))

@@ -47,21 +47,21 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: Style = NAMES, m
     DataError
         No movements; several arrays, none of them chosen; or no times where they are needed.
     """
-    found = [one for one in movements_in(tree, style) if one.entries]
-    if not found:
+    movements = [movement for movement in movements_in(tree, style) if movement.entries]
+    if not movements:
         got = f"no entry 'positions' but {listed(tree)}" if isinstance(tree, Mapping) else "none of numbers"
         raise DataError(f"expected arrays times and positions, got {got}")
-    found = _of_one_array(found, layout)
-    stamped = any(len(one.entries) > 1 or one.rate is not None for one in found)
+    movements = _of_one_array(movements, layout)
+    stamped = any(len(movement.entries) > 1 or movement.rate is not None for movement in movements)
     if not stamped:
-        return _bare(found, layout, kind)
-    found = [_plainly_named(one) for one in found]
-    reference = Counter(tuple(one.entries) for one in found).most_common(1)[0][0]
-    first = next(one for one in found if tuple(one.entries) == reference)
+        return _bare(movements, layout, kind)
+    movements = [_plainly_named(movement) for movement in movements]
+    reference = Counter(tuple(movement.entries) for movement in movements).most_common(1)[0][0]
+    first = next(movement for movement in movements if tuple(movement.entries) == reference)
     names = [name for name, entry in first.entries.items() if entry.shape[0] == first.length]
     heads, owners = _heads(first, names)
     if first.rate is not None and not any(map(is_time, names)) and not isinstance(layout.units, float | int):
-        check_first_axis([one.entries[""].shape for one in found if "" in one.entries])
+        check_first_axis([movement.entries[""].shape for movement in movements if "" in movement.entries])
         layout = replace(layout, units=None)  # the rate is in Hz, whatever stamps are in
         heads, owners = (*heads, STAMP), (*owners, STAMP)
     kinds = ["text" if owner != STAMP and _is_text(first.entries[owner]) else "number" for owner in owners]
@@ -74,84 +74,93 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: Style = NAMES, m
     roles = choose_roles(heads, kinds, layout)
     others = [roles.time, roles.nanoseconds, roles.label, *roles.clocks]
     needed = {owners[k]: k in roles.positions for k in chain(roles.movement, others, roles.positions) if k is not None}
-    parsed = table_movements(_table(found, first, (heads, owners), needed), roles, layout, kind)
+    parsed = table_movements(_table(movements, first, (heads, owners), needed), roles, layout, kind)
     static = tuple(name for name in first.entries if name not in names)
     return parsed._replace(detected=parsed.detected._replace(ignored=(*parsed.detected.ignored, *static)))
 
 
-def _of_one_array(found: list[Found], layout: Layout) -> list[Found]:
+def _of_one_array(movements: list[Found], layout: Layout) -> list[Found]:
     """Movements that may be the points of one, as `sets_or_points` tells them; others as they are.
 
     They are one array (n, T, d), or n lists of points with names for their coordinates, and have no times.
     """
-    names = [*found[0].entries]
-    if any([*one.entries] != names for one in found) or any(map(is_time, names)):
-        return found
-    if not _are_numbered([one.place for one in found]) or len({one.label for one in found}) > 1:
-        return found
-    if any(_is_text(entry) or (names != [""] and len(entry.shape) > 1) for entry in found[0].entries.values()):
-        return found
-    check_expanded(8 * sum(int(np.prod(entry.shape)) for one in found for entry in one.entries.values()))
-    several = [[numbers_of(np.asarray(entry)) for entry in one.entries.values()] for one in found]
+    names = [*movements[0].entries]
+    if any([*movement.entries] != names for movement in movements) or any(map(is_time, names)):
+        return movements
+    if (
+        not _are_numbered([movement.place for movement in movements])
+        or len({movement.label for movement in movements}) > 1
+    ):
+        return movements
+    if any(_is_text(entry) or (names != [""] and len(entry.shape) > 1) for entry in movements[0].entries.values()):
+        return movements
+    check_expanded(8 * sum(int(np.prod(entry.shape)) for movement in movements for entry in movement.entries.values()))
+    several = [[numbers_of(np.asarray(entry)) for entry in movement.entries.values()] for movement in movements]
     if any(len({len(x) for x in xs}) > 1 for xs in several):
-        return found
+        return movements
     x = sets_or_points([xs[0] if names == [""] else np.column_stack(xs) for xs in several], layout.every)
-    if len(x) == len(found):
-        return found
+    if len(x) == len(movements):
+        return movements
     n_points, *width = np.shape(several[0][0])
     heads = (
         point_names(n_points, *width) if names == [""] else [f"{k}.{name}" for k in range(n_points) for name in names]
     )
-    return [found[0]._replace(place="", entries=dict(zip(heads, x[0].T, strict=True)))]
+    return [movements[0]._replace(place="", entries=dict(zip(heads, x[0].T, strict=True)))]
 
 
 def _are_numbered(places: Sequence[str]) -> bool:
     """Whether places differ in one number alone, that counts them: frames/0/landmarks, frames/1/landmarks."""
     parts = [place.split("/") for place in places]
     differing = [[*column] for column in zip(*parts, strict=False) if len({*column}) > 1]
-    return len({len(one) for one in parts}) == 1 and differing == [[str(k) for k in range(len(places))]]
+    return len({len(part) for part in parts}) == 1 and differing == [[str(k) for k in range(len(places))]]
 
 
-def _bare(found: Sequence[Found], layout: Layout, kind: str) -> Parsed:
+def _bare(movements: Sequence[Found], layout: Layout, kind: str) -> Parsed:
     """Movements that are arrays alone, without times."""
-    if len(found) == 1 and not isinstance(layout.units, float | int):
+    if len(movements) == 1 and not isinstance(layout.units, float | int):
         raise DataError(
             "expected times beside the positions, got one array alone; say the seconds between two samples with "
             "units=, in the shell --units"
         )
-    check_expanded(8 * sum(int(np.prod(one.entries[""].shape)) for one in found if "" in one.entries))
-    xs = [numbers_of(np.asarray(next(iter(one.entries.values())))) for one in found]
+    check_expanded(
+        8 * sum(int(np.prod(movement.entries[""].shape)) for movement in movements if "" in movement.entries)
+    )
+    xs = [numbers_of(np.asarray(next(iter(movement.entries.values())))) for movement in movements]
     xs = [x[:, None] if x.ndim == 1 else x for x in xs]
     width = Counter(x.shape[1] for x in xs).most_common(1)[0][0]
     odd = tuple(
-        f"movement {one.place}: {x.shape[1]} dimensions where most have {width}"
-        for one, x in zip(found, xs, strict=True)
+        f"movement {movement.place}: {x.shape[1]} dimensions where most have {width}"
+        for movement, x in zip(movements, xs, strict=True)
         if x.shape[1] != width
     )
-    found = [one for one, x in zip(found, xs, strict=True) if x.shape[1] == width]
+    movements = [movement for movement, x in zip(movements, xs, strict=True) if x.shape[1] == width]
     xs = [x for x in xs if x.shape[1] == width]
-    labels = [one.label for one in found]
-    units = {tuple(_units_of(next(iter(one.entries.values())), width)) for one in found}
+    labels = [movement.label for movement in movements]
+    units = {tuple(_units_of(next(iter(movement.entries.values())), width)) for movement in movements}
     if len(units) > 1:
         raise DataError(f"expected movements in one unit, got {sorted(units)}; read them apart")
-    parsed = parsed_arrays(xs, None, Named(labels, TIMES[0], [one.place for one in found]), layout, (kind, "keyed"))
+    parsed = parsed_arrays(
+        xs, None, Named(labels, TIMES[0], [movement.place for movement in movements]), layout, (kind, "keyed")
+    )
     measured_in = next(iter(units)) if any(next(iter(units))) and layout.coordinates is None else ()
     return parsed._replace(detected=parsed.detected._replace(measured_in=measured_in), left_out=odd)
 
 
-def _plainly_named(one: Found) -> Found:
+def _plainly_named(movement: Found) -> Found:
     """The only array of several columns that means positions loses its name: its coordinates are x, y, z."""
-    wide = [name for name, entry in one.entries.items() if len(entry.shape) > 1]
+    wide = [name for name, entry in movement.entries.items() if len(entry.shape) > 1]
     if len(wide) == 1 and wide[0] in POSITIONS:
-        return one._replace(entries={"" if name == wide[0] else name: entry for name, entry in one.entries.items()})
-    return one
+        return movement._replace(
+            entries={"" if name == wide[0] else name: entry for name, entry in movement.entries.items()}
+        )
+    return movement
 
 
-def _heads(one: Found, names: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def _heads(movement: Found, names: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """A head for each column, and the array that it is of."""
     heads, owners = [], []
     for name in names:
-        shape = one.entries[name].shape
+        shape = movement.entries[name].shape
         width = int(np.prod(shape[1:]))
         ends: Sequence[Any] = range(width)
         if len(shape) == 3:
@@ -179,14 +188,14 @@ def _units_of(array: Any, width: int) -> list[str]:
 
 
 def _table(
-    found: Sequence[Found], first: Found, columns: tuple[Sequence[str], Sequence[str]], needed: Mapping[str, bool]
+    movements: Sequence[Found], first: Found, columns: tuple[Sequence[str], Sequence[str]], needed: Mapping[str, bool]
 ) -> Table:
     """The arrays that are needed, one movement after the other; what a movement lacks is a fault of its first row.
 
     `needed` says of each whether it holds coordinates, which are not rounded.
     """
     heads, owners = columns
-    lengths = [one.length for one in found]
+    lengths = [movement.length for movement in movements]
     widths = Counter(owners)
     check_expanded(8 * sum(lengths) * sum(widths[name] for name in needed))
     offsets = np.concatenate(([0], np.cumsum(lengths))).astype(np.intp)
@@ -195,9 +204,9 @@ def _table(
     for name, is_coordinate in needed.items():
         parts = []
         of_texts = name in first.entries and _is_text(first.entries[name])
-        for one, length, start in zip(found, lengths, offsets, strict=False):
-            part, fault = _part(one, name, length, (widths[name], of_texts, not is_coordinate))
-            here, there = (_units_of(each.entries.get(name), widths[name]) for each in (one, first))
+        for movement, length, start in zip(movements, lengths, offsets, strict=False):
+            part, fault = _part(movement, name, length, (widths[name], of_texts, not is_coordinate))
+            here, there = (_units_of(each.entries.get(name), widths[name]) for each in (movement, first))
             if here != there and not fault:
                 fault = f"expected {name!r} in {', '.join(there)}, as in the first movement, got {', '.join(here)}"
             parts.append(part)
@@ -209,19 +218,19 @@ def _table(
     for owner in owners:
         filled.append(arrays[owner][:, numbers[owner]] if owner in arrays else None)
         numbers[owner] += 1
-    segments = Segments(offsets, [one.place for one in found], [one.label for one in found])
+    segments = Segments(offsets, [movement.place for movement in movements], [movement.label for movement in movements])
     units = [unit for name in dict.fromkeys(owners) for unit in _units_of(first.entries.get(name), widths[name])]
-    whole = None if len(found) == 1 and not found[0].place and found[0].label is None else segments
-    return Table(tuple(heads), filled, int(offsets[-1]), no_lines, faults, None, units, whole)
+    movement_parts = None if len(movements) == 1 and not movements[0].place and movements[0].label is None else segments
+    return Table(tuple(heads), filled, int(offsets[-1]), no_lines, faults, None, units, movement_parts)
 
 
-def _part(one: Found, name: str, length: int, kind: tuple[int, bool, bool]) -> tuple[Any, str]:
+def _part(movement: Found, name: str, length: int, kind: tuple[int, bool, bool]) -> tuple[Any, str]:
     """An array of a movement as columns (T, d), of numbers or of texts, and what is wrong with it."""
     width, of_texts, of_time = kind
     if name == STAMP:
-        stamps = np.full(length, np.nan) if one.rate is None else one.rate.stamps(length)
-        return stamps[:, None], "" if one.rate else "expected a rate as others have, got none"
-    entry = one.entries.get(name)
+        stamps = np.full(length, np.nan) if movement.rate is None else movement.rate.stamps(length)
+        return stamps[:, None], "" if movement.rate else "expected a rate as others have, got none"
+    entry = movement.entries.get(name)
     if entry is None:
         return np.full((length, width), np.nan), f"expected an array {name!r} as others have, got none"
     if _is_text(entry) and not of_texts:  # of nulls alone

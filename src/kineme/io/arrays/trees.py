@@ -101,7 +101,7 @@ class Found(NamedTuple):
     def length(self) -> int:
         """Number of samples: that of the times, else that which most arrays have."""
         of_times = [entry for name, entry in self.entries.items() if is_time(name) and len(entry.shape) == 1]
-        counts = Counter(one.shape[0] for one in of_times[:1] or self.entries.values())
+        counts = Counter(entry.shape[0] for entry in of_times[:1] or self.entries.values())
         return counts.most_common(1)[0][0]
 
 
@@ -120,13 +120,13 @@ def movements_in(
     if place.count("/") > _DEEPEST:
         return
     if is_array(tree):
-        for found in _of_array(tree, place, label):
-            yield found._replace(rate=rate)
+        for movement in _of_array(tree, place, label):
+            yield movement._replace(rate=rate)
     elif isinstance(tree, Mapping):
         yield from _of_group(tree, style, place, label, rate)
     elif isinstance(tree, (list, tuple)):
-        for k, one in enumerate(tree):
-            yield from movements_in(one, style, f"{place}/{k}" if place else str(k), label, rate)
+        for k, branch in enumerate(tree):
+            yield from movements_in(branch, style, f"{place}/{k}" if place else str(k), label, rate)
 
 
 def is_array(tree: Any) -> bool:
@@ -149,42 +149,44 @@ def _of_group(
     labels = _labels_of_sets(tree)
     of_labels = {name for name, _ in labels.values()}
     arrays = {
-        name: one
-        for name, one in tree.items()
-        if is_array(one) and one.dtype.kind != "O" and name not in of_labels and not _is_rate(name, tree)
+        name: branch
+        for name, branch in tree.items()
+        if is_array(branch) and branch.dtype.kind != "O" and name not in of_labels and not _is_rate(name, tree)
     }
-    groups = {name: one for name, one in tree.items() if isinstance(one, (Mapping, list)) and name not in of_labels}
-    said = {one.rate for one in arrays.values() if getattr(one, "rate", None) is not None}
+    groups = {
+        name: branch for name, branch in tree.items() if isinstance(branch, (Mapping, list)) and name not in of_labels
+    }
+    said = {array.rate for array in arrays.values() if getattr(array, "rate", None) is not None}
     rate = rate_of(tree) or (said.pop() if len(said) == 1 else rate)
-    times = {match[1] or match[2]: one for name, one in arrays.items() if (match := _TIMES_OF.fullmatch(name))}
+    times = {match[1] or match[2]: array for name, array in arrays.items() if (match := _TIMES_OF.fullmatch(name))}
     own_times = all(name in times or _is_stamp_of(name, arrays) for name in arrays)
     if arrays and not own_times and not labels and (_are_columns(arrays, style, rate) or _continues(arrays, groups)):
-        entries = {inner: one for inner, one in _flat(tree, style.separator) if _fits(one)}
-        yield Found(place, label, {k: one for k, one in entries.items() if not _is_rate(k, entries)}, rate)
+        entries = {inner: entry for inner, entry in _flat(tree, style.separator) if _fits(entry)}
+        yield Found(place, label, {k: entry for k, entry in entries.items() if not _is_rate(k, entries)}, rate)
         return
-    for name, one in arrays.items():
+    for name, array in arrays.items():
         if _is_stamp_of(name, arrays):
             continue
         own = f"{place}/{name}" if place else name
-        for found in _of_array(one, own, label or label_of(name), labels.get(name, ("", ()))[1]):
+        for movement in _of_array(array, own, label or label_of(name), labels.get(name, ("", ()))[1]):
             stamps = {"time": times[name]} if name in times else {}
-            yield found._replace(entries=stamps | found.entries, rate=getattr(one, "rate", None) or rate)
-    for name, one in groups.items():
-        yield from movements_in(one, style, f"{place}/{name}" if place else name, label or label_of(name), rate)
+            yield movement._replace(entries=stamps | movement.entries, rate=getattr(array, "rate", None) or rate)
+    for name, array in groups.items():
+        yield from movements_in(array, style, f"{place}/{name}" if place else name, label or label_of(name), rate)
 
 
 def _labels_of_sets(tree: Mapping[str, Any]) -> dict[str, tuple[str, list[str]]]:
     """For arrays of movements (n, T, d) the array that labels them, ``y`` of ``X``, ``y_train`` of ``X_train``."""
     labels = {}
-    for name, one in tree.items():
-        if not is_array(one) or len(one.shape) != 3:
+    for name, array in tree.items():
+        if not is_array(array) or len(array.shape) != 3:
             continue
         ending = words_of(name)[1:]
         for other, values in tree.items():
             shape = np.shape(values)
             if not is_label(other) or words_of(other)[1:] not in {ending, ()}:
                 continue
-            if math.prod(shape) == one.shape[0] == max(shape, default=0):
+            if math.prod(shape) == array.shape[0] == max(shape, default=0):
                 texts = ["" if text is None else text for text in map(as_label, np.asarray(values).ravel().tolist())]
                 labels[name] = (other, texts)
     return labels
@@ -215,9 +217,9 @@ def _are_columns(arrays: Mapping[str, Any], style: Style, rate: Rate | None) -> 
 
     Where a rate is given, most of them need to be so: the others do not change over time.
     """
-    if any(is_time(name) and len(one.shape) == 1 for name, one in arrays.items()):
+    if any(is_time(name) and len(array.shape) == 1 for name, array in arrays.items()):
         return True
-    flat = [one.shape for one in arrays.values()]
+    flat = [array.shape for array in arrays.values()]
     lengths = Counter(shape[0] for shape in flat)
     if len(lengths) > 1:
         length, count = lengths.most_common(1)[0]
@@ -227,17 +229,19 @@ def _are_columns(arrays: Mapping[str, Any], style: Style, rate: Rate | None) -> 
 
 def _continues(arrays: Mapping[str, Any], groups: Mapping[str, Any]) -> bool:
     """Whether the groups beside arrays hold arrays of the same length: further columns of one movement."""
-    lengths = {one.shape[0] for one in arrays.values()}
-    inner = {one.shape[0] for group in groups.values() if isinstance(group, Mapping) for _, one in _flat(group, "/")}
+    lengths = {array.shape[0] for array in arrays.values()}
+    inner = {
+        array.shape[0] for group in groups.values() if isinstance(group, Mapping) for _, array in _flat(group, "/")
+    }
     return len(lengths) == 1 and lengths <= inner
 
 
 def _flat(tree: Mapping[str, Any], separator: str, depth: int = 0) -> Iterator[tuple[str, Any]]:
-    for name, one in tree.items():
-        if is_array(one):
-            yield name, one
-        elif isinstance(one, Mapping) and depth < _DEEPEST:
-            yield from ((f"{name}{separator}{inner}", leaf) for inner, leaf in _flat(one, separator, depth + 1))
+    for name, branch in tree.items():
+        if is_array(branch):
+            yield name, branch
+        elif isinstance(branch, Mapping) and depth < _DEEPEST:
+            yield from ((f"{name}{separator}{inner}", leaf) for inner, leaf in _flat(branch, separator, depth + 1))
 
 
 def _fits(array: Any) -> bool:
@@ -258,8 +262,8 @@ def rate_of(tree: Mapping[str, Any]) -> Rate | None:
         if seconds == 1.0 and "s" not in words_of(name):
             seconds /= PER_SECOND[unit_by_size(number * np.arange(3.0))[0]]
         rates.append(Rate(name, 1.0 / (number * seconds) if seconds else number))
-    if any(not math.isclose(rates[0].hertz, one.hertz, rel_tol=1e-3) for one in rates):
-        return Rate(", ".join(f"{one.name} ({one.hertz:g} Hz)" for one in rates), math.nan)
+    if any(not math.isclose(rates[0].hertz, rate.hertz, rel_tol=1e-3) for rate in rates):
+        return Rate(", ".join(f"{rate.name} ({rate.hertz:g} Hz)" for rate in rates), math.nan)
     return rates[0] if rates else None
 
 
@@ -278,14 +282,14 @@ def _is_rate(name: str, tree: Mapping[str, Any]) -> bool:
 
 def _own_label(tree: Mapping[str, Any]) -> str | None:
     """The label that a group says; beside points or strokes its name is one, as of the $1 recognizer."""
-    drawn = any(name.lower() in _DRAWN and isinstance(one, (Mapping, list)) for name, one in tree.items())
-    for name, one in tree.items():
-        if not isinstance(one, str) or not one:
+    drawn = any(name.lower() in _DRAWN and isinstance(branch, (Mapping, list)) for name, branch in tree.items())
+    for name, branch in tree.items():
+        if not isinstance(branch, str) or not branch:
             continue
         if name.lower() in LABEL_WORDS | {"task"}:
-            return one
+            return branch
         if drawn and name.lower() == "name":
-            return label_of(one)
+            return label_of(branch)
     return None
 
 

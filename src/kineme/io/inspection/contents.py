@@ -24,15 +24,19 @@ def contents_of_all(paths: Sequence[Path], follow_links: bool = False) -> list[C
         entries, _ = entries_of(paths, follow_links) if paths else ([], [])
     except (DataError, OSError):  # reading gives the reason
         return []
-    listed = {entry.name: found for entry in entries if (found := contents_of(entry.path))}
+    listed = {entry.name: contents for entry in entries if (contents := contents_of(entry.path))}
     if len(listed) < 2:
         return next(iter(listed.values()), [])
     merged: dict[tuple[str, tuple[str, ...]], Contents] = {}
     for name, several in listed.items():
-        for one in several:
-            before = merged.get((one.name, one.heads), Contents(one.name, (_FILE, *one.heads), (), one.note))
-            rows = tuple((name, *row) for row in one.rows)
-            merged[one.name, one.heads] = before._replace(rows=before.rows + rows, note=before.note or one.note)
+        for content in several:
+            before = merged.get(
+                (content.name, content.heads), Contents(content.name, (_FILE, *content.heads), (), content.note)
+            )
+            rows = tuple((name, *row) for row in content.rows)
+            merged[content.name, content.heads] = before._replace(
+                rows=before.rows + rows, note=before.note or content.note
+            )
     return list(merged.values())
 
 
@@ -54,37 +58,37 @@ def contents_of(path: Path) -> list[Contents]:
 
 def contents_as_data(contents: list[Contents]) -> dict[str, Any]:
     """A list of dictionaries under each name."""
-    return {one.name: [dict(zip(one.heads, row, strict=True)) for row in one.rows] for one in contents}
+    return {content.name: [dict(zip(content.heads, row, strict=True)) for row in content.rows] for content in contents}
 
 
 def contents_as_words(contents: list[Contents]) -> list[str]:
     """A table of each: what several files have alike once, and of a long list only what holds movements."""
-    return [_in_words(_once(one)) for one in contents]
+    return [_in_words(_once(content)) for content in contents]
 
 
-def _in_words(one: Contents) -> str:
-    title = f"{one.name}{f' {one.note}' if one.note else ''}"
-    rows = one.rows
+def _in_words(content: Contents) -> str:
+    title = f"{content.name}{f' {content.note}' if content.note else ''}"
+    rows = content.rows
     if len(rows) > _SHOWN:
         rows = tuple(row for row in rows if not any(str(cell).startswith(_IDLE) for cell in row[-2:]))
-    n_idle = len(one.rows) - len(rows)
-    more = f"\nand {n_idle} {one.name} that hold no movement; --json lists them" if n_idle else ""
-    return to_text(Table(title, one.heads, [_row(row) for row in rows])) + more
+    n_idle = len(content.rows) - len(rows)
+    more = f"\nand {n_idle} {content.name} that hold no movement; --json lists them" if n_idle else ""
+    return to_text(Table(title, content.heads, [_row(row) for row in rows])) + more
 
 
-def _once(one: Contents) -> Contents:
+def _once(content: Contents) -> Contents:
     """Rows that several files have alike but for their counts, once: the range of these, and in how many files."""
-    if one.heads[0] != _FILE:
-        return one
-    n_files = len({file for file, *_ in one.rows})
+    if content.heads[0] != _FILE:
+        return content
+    n_files = len({file for file, *_ in content.rows})
     groups: dict[tuple[str, ...], list[list[str | int]]] = {}
-    for _, *cells in one.rows:
+    for _, *cells in content.rows:
         groups.setdefault(tuple(cell for cell in cells if isinstance(cell, str)), []).append(cells)
     rows = tuple(
-        (*(_range([row[k] for row in alike]) for k in range(len(one.heads) - 1)), f"{len(alike)} of {n_files}")
+        (*(_range([row[k] for row in alike]) for k in range(len(content.heads) - 1)), f"{len(alike)} of {n_files}")
         for alike in groups.values()
     )
-    return one._replace(heads=(*one.heads[1:], "files"), rows=rows)
+    return content._replace(heads=(*content.heads[1:], "files"), rows=rows)
 
 
 def _range(cells: list[str | int]) -> str:

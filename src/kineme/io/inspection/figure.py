@@ -57,7 +57,7 @@ def draw_recordings(recordings: Recordings, unlike: Collection[int] = ()) -> Fig
 
 
 def _draw_label(axes: Any, recordings: Recordings, label: str | None, unlike: set[int]) -> None:
-    chosen = [i for i, one in enumerate(recordings.labels) if one == label]
+    chosen = [i for i, other in enumerate(recordings.labels) if other == label]
     odd = [i for i in chosen if i in unlike][:_OVERLAID]
     drawn = [chosen[k] for k in evenly_spaced(len(chosen), _OVERLAID) if chosen[k] not in unlike] + odd
     paths = [_path(recordings.demonstrations[i]) for i in drawn]
@@ -92,11 +92,11 @@ def _draw_label(axes: Any, recordings: Recordings, label: str | None, unlike: se
         axes.set_xlabel(f"{width:.3g} wide", fontsize=6.5, color=GRAY, labelpad=2)
 
 
-def _path(one: Trajectory) -> Any:
+def _path(movement: Trajectory) -> Any:
     """The points of a movement that are drawn, (points, 2 or 3)."""
-    kept = evenly_spaced(len(one), _POINTS)
-    x = one.positions[kept, :3]
-    return x if x.shape[1] > 1 else np.column_stack((one.times[kept] - one.times[0], x))
+    drawn = evenly_spaced(len(movement), _POINTS)
+    x = movement.positions[drawn, :3]
+    return x if x.shape[1] > 1 else np.column_stack((movement.times[drawn] - movement.times[0], x))
 
 
 def _key(across: str, unlike: bool) -> list[Any]:

@@ -119,9 +119,9 @@ def inspect(recordings: Recordings) -> Inspection:
 
 def labels_in_order(recordings: Recordings) -> list[str | None]:
     """Each label once, in alphabetic order, None last."""
-    known = set(recordings.labels)
-    named = sorted(label for label in known if label is not None)
-    return [*named, *([None] if None in known else [])]
+    labels = set(recordings.labels)
+    named = sorted(label for label in labels if label is not None)
+    return [*named, *([None] if None in labels else [])]
 
 
 def _summaries(recordings: Recordings, sampling: Sampling) -> tuple[LabelSummary, ...]:
@@ -164,10 +164,10 @@ def _notes(recordings: Recordings, labels: tuple[LabelSummary, ...]) -> list[str
         notes.append("LeRobot does not declare the units of joints: they are taken as they are stored")
     notes += notes_on_aside(how for how, _ in recordings.detected)
     notes += notes_on_order((how for how, _ in recordings.detected), columns_recorded(demos.channels or ()))
-    single = [str(one.label) for one in labels if one.label is not None and one.movements == 1]
+    single = [str(summary.label) for summary in labels if summary.label is not None and summary.movements == 1]
     if single:
         notes.append(f"only one movement labeled {', '.join(single[:5])}{' and others' if len(single) > 5 else ''}")
-    unlabeled = sum(one.movements for one in labels if one.label is None)
+    unlabeled = sum(summary.movements for summary in labels if summary.label is None)
     if 0 < unlabeled < len(recordings):
         notes.append(f"{unlabeled} movements have no label: their files lie in no folder of their own")
     notes += notes_on_gaps(recordings) + notes_on_sampling(recordings) + notes_on_sizes(demos)
@@ -177,10 +177,10 @@ def _notes(recordings: Recordings, labels: tuple[LabelSummary, ...]) -> list[str
 def _notes_on_channels(demos: Demonstrations) -> list[str]:
     """Columns whose values do not fit their kind, and those that never change."""
     notes = _notes_on_still_columns(demos)
-    for one, columns in zip(demos.channels or (), columns_of(demos.channels or ()), strict=True):
+    for channel, columns in zip(demos.channels or (), columns_of(demos.channels or ()), strict=True):
         values = demos.recorded[:, columns.start]
-        if one.kind == "position" and values.min() < values.max() and ((values == 0) | (values == 1)).all():
-            notes.append(f"{one.name} is 0 or 1 throughout; if it is a switch, say --kind {one.name}=discrete")
+        if channel.kind == "position" and values.min() < values.max() and ((values == 0) | (values == 1)).all():
+            notes.append(f"{channel.name} is 0 or 1 throughout; if it is a switch, say --kind {channel.name}=discrete")
     return notes
 
 
@@ -191,8 +191,8 @@ def _notes_on_still_columns(demos: Demonstrations) -> list[str]:
         return []
     still = (np.maximum.reduceat(x, starts, axis=0) == np.minimum.reduceat(x, starts, axis=0)).all(axis=0)
     quiet = [
-        one.name
-        for one, columns in zip(demos.channels or (), columns_of(demos.channels or ()), strict=True)
+        channel.name
+        for channel, columns in zip(demos.channels or (), columns_of(demos.channels or ()), strict=True)
         if still[columns].all()
     ]
     if not quiet:
@@ -232,9 +232,9 @@ def _equal(demonstrations: Demonstrations, alike: list[int]) -> list[list[int]]:
 
 
 def _are_equal(demonstrations: Demonstrations, i: int, k: int) -> bool:
-    one, other = demonstrations[i], demonstrations[k]
-    since = np.abs((one.times - one.times[0]) - (other.times - other.times[0])).max()
-    return np.array_equal(one.recorded, other.recorded) and bool(since <= _STAMP * one.duration)
+    movement, other = demonstrations[i], demonstrations[k]
+    since = np.abs((movement.times - movement.times[0]) - (other.times - other.times[0])).max()
+    return np.array_equal(movement.recorded, other.recorded) and bool(since <= _STAMP * movement.duration)
 
 
 def extents_of(demos: Demonstrations) -> Array:
@@ -252,10 +252,10 @@ def notes_on_extents(demos: Demonstrations) -> list[str]:
     greatest = extents_of(demos).max(axis=0, initial=0.0)
     groups: dict[str, dict[str, float]] = {}
     at = 0
-    for one in demos.channels or ():
-        if one.kind in ("position", "angle"):
-            groups.setdefault(_group(one), {})[one.name] = float(greatest[at])
-        at += len(one.coordinates)
+    for channel in demos.channels or ():
+        if channel.kind in ("position", "angle"):
+            groups.setdefault(_group(channel), {})[channel.name] = float(greatest[at])
+        at += len(channel.coordinates)
     if len(groups) < 2:
         return []
     *_, second, widest = sorted(groups.values(), key=lambda group: max(group.values()))
@@ -282,11 +282,11 @@ def notes_on_sizes(demos: Demonstrations) -> list[str]:
     return []
 
 
-def _group(one: Channel) -> str:
+def _group(channel: Channel) -> str:
     """The same of columns that count in one unit: it is known, or their names are those of axes or joints."""
-    if one.unit or one.kind == "angle":
-        return one.unit or "an angle"
-    stem = _END.sub("", one.name).lower()
+    if channel.unit or channel.kind == "angle":
+        return channel.unit or "an angle"
+    stem = _END.sub("", channel.name).lower()
     return "an axis" if stem.endswith(("x", "y", "z")) else stem
 
 
@@ -305,20 +305,22 @@ def as_data(inspection: Inspection) -> dict[str, Any]:
         "files": inspection.files,
         "dimensions": inspection.dimensions,
         "labels": [
-            {name: value._asdict() if isinstance(value, Range) else value for name, value in one._asdict().items()}
-            for one in inspection.labels
+            {name: value._asdict() if isinstance(value, Range) else value for name, value in summary._asdict().items()}
+            for summary in inspection.labels
         ],
         "detected": [{**how._asdict(), "files": n} for how, n in inspection.detected],
-        "channels": [one._asdict() for one in inspection.channels or ()],
+        "channels": [channel._asdict() for channel in inspection.channels or ()],
         "duplicates": [list(group) for group in inspection.duplicates],
-        "problems": [{"file": one.file, "line": one.line, "reason": one.reason} for one in inspection.problems],
+        "problems": [
+            {"file": problem.file, "line": problem.line, "reason": problem.reason} for problem in inspection.problems
+        ],
         "notes": list(inspection.notes),
     }
 
 
 def as_words(inspection: Inspection) -> str:
     """A table of labels, how files were read, duplicates, and what could not be read."""
-    rows = [_row(one) for one in inspection.labels]
+    rows = [_row(summary) for summary in inspection.labels]
     title = (
         f"{counted(inspection.movements, 'movement')} of {counted(inspection.dimensions, 'dimension')} "
         f"in {counted(inspection.files, 'file')}"
@@ -329,8 +331,8 @@ def as_words(inspection: Inspection) -> str:
     channels = inspection.channels or ()
     parts += _listed("kinds", _kinds(channels))
     parts += _listed("the same movement more than once", [" = ".join(group) for group in inspection.duplicates])
-    parts += _listed("not read", _once([one for one in inspection.problems if not one.samples]))
-    parts += _listed("read but for samples", _once([one for one in inspection.problems if one.samples]))
+    parts += _listed("not read", _once([problem for problem in inspection.problems if not problem.samples]))
+    parts += _listed("read but for samples", _once([problem for problem in inspection.problems if problem.samples]))
     parts += _listed("note", list(inspection.notes))
     return "\n\n".join(parts)
 
@@ -353,12 +355,12 @@ def _once(problems: Sequence[Problem]) -> list[str]:
     ]
 
 
-def _row(one: LabelSummary) -> tuple[str, ...]:
-    gaps = f"{one.gaps} (to {one.longest_gap:.3g} s)" if one.gaps else "-"
-    jitter = f"{100 * one.jitter:.2g} %" if one.jitter >= 1e-6 else "-"
-    ranges = [_rate_range(values) for values in (one.samples, one.duration, one.rate)]
-    label = "(no label)" if one.label is None else printable(one.label)
-    return (label, f"{one.movements}", *ranges, jitter, gaps, _rate_range(one.extent))
+def _row(summary: LabelSummary) -> tuple[str, ...]:
+    gaps = f"{summary.gaps} (to {summary.longest_gap:.3g} s)" if summary.gaps else "-"
+    jitter = f"{100 * summary.jitter:.2g} %" if summary.jitter >= 1e-6 else "-"
+    ranges = [_rate_range(values) for values in (summary.samples, summary.duration, summary.rate)]
+    label = "(no label)" if summary.label is None else printable(summary.label)
+    return (label, f"{summary.movements}", *ranges, jitter, gaps, _rate_range(summary.extent))
 
 
 def _rate_range(values: Range) -> str:
@@ -370,12 +372,12 @@ def _rate_range(values: Range) -> str:
 def _kinds(channels: Channels) -> list[str]:
     """A line for each channel that is no position; of many, a line for each kind."""
     lever = lever_of(channels)
-    others = [(one, _kind(one, lever)) for one in channels if one.kind != "position"]
+    others = [(channel, _kind(channel, lever)) for channel in channels if channel.kind != "position"]
     if len(others) <= _CHANNELS:
-        return [f"{', '.join(one.columns)}: {kind}" for one, kind in others]
+        return [f"{', '.join(channel.columns)}: {kind}" for channel, kind in others]
     names: dict[str, list[str]] = {}
-    for one, kind in others:
-        names.setdefault(kind, []).append(one.name)
+    for channel, kind in others:
+        names.setdefault(kind, []).append(channel.name)
     return [f"{first_names(alike, _CHANNELS)}: {kind}" for kind, alike in names.items()]
 
 
@@ -393,7 +395,7 @@ def _understood(how: Detected) -> str:
     times = "no times" if how.time is None else f"time {how.time!r} in {how.units} ({how.units_from})"
     parts = [f"{how.format}, {how.layout}: {times}", f"coordinates {_coordinates(how)}"]
     for what, columns in (
-        ("movement", [one for one in how.movement if one not in how.person]),
+        ("movement", [column for column in how.movement if column not in how.person]),
         ("label", how.label),
         ("person", how.person),
         ("left aside", how.ignored),
@@ -405,8 +407,8 @@ def _understood(how: Detected) -> str:
 
 def _coordinates(how: Detected) -> str:
     """The coordinates with their units, once if they have the same."""
-    known = set(how.measured_in)
-    if len(known) == 1:
-        return f"{first_names(how.columns, _COLUMNS)} in {known.pop()}"
+    units = set(how.measured_in)
+    if len(units) == 1:
+        return f"{first_names(how.columns, _COLUMNS)} in {units.pop()}"
     named = zip(how.columns, how.measured_in or [""] * len(how.columns), strict=True)
     return first_names([f"{name} [{unit}]" if unit else name for name, unit in named], _COLUMNS)

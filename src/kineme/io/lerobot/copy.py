@@ -99,8 +99,8 @@ def copy_with_motions(source: Path, target: Path, motions: Mapping[int, Sequence
         raise DataError(f"expected a whole data set to copy: {declared.problems[0]}")
     if unknown := set(motions) - set(declared.numbers.tolist()):
         raise DataError(f"expected an episode of the data set, got {min(unknown)}")
-    shards = [one for one in dict.fromkeys(declared.shards) if (source / one).is_file()]
-    changed = {(source / one) for one in (*shards, MARKER)}
+    shards = [shard for shard in dict.fromkeys(declared.shards) if (source / shard).is_file()]
+    changed = {(source / file) for file in (*shards, MARKER)}
     shutil.copytree(
         source, target, dirs_exist_ok=True, copy_function=lambda old, new: _take(source, Path(old), Path(new), changed)
     )
@@ -124,12 +124,12 @@ def _take(source: Path, old: Path, new: Path, changed: set[Path]) -> None:
 
 
 def _declare(source: Path, target: Path, column: Column) -> None:
-    known = read_json(source, MARKER)
-    if column.name in known["features"]:
+    info = read_json(source, MARKER)
+    if column.name in info["features"]:
         shutil.copy2(source, target)
         return
-    known["features"][column.name] = column.feature
-    target.write_text(json.dumps(known, indent=4, ensure_ascii=False), encoding="utf-8")
+    info["features"][column.name] = column.feature
+    target.write_text(json.dumps(info, indent=4, ensure_ascii=False), encoding="utf-8")
 
 
 def write_shard(source: Path, target: Path, motions: Mapping[int, Sequence[Motion]], column: Column) -> None:
@@ -152,15 +152,15 @@ def write_shard(source: Path, target: Path, motions: Mapping[int, Sequence[Motio
             kind = column.type_in(schema)
             with _reading():
                 # The texts of the episodes of a shard, each at the stamp of a frame, in the order of time.
-                known = file.read(columns=["episode_index", "timestamp"], use_threads=False)
-                episodes, stamps = (known.column(name).to_numpy() for name in ("episode_index", "timestamp"))
-                found: dict[int, list[Motion]] = {}
+                columns = file.read(columns=["episode_index", "timestamp"], use_threads=False)
+                episodes, stamps = (columns.column(name).to_numpy() for name in ("episode_index", "timestamp"))
+                snapped: dict[int, list[Motion]] = {}
                 for episode in np.unique(episodes).tolist():
                     own = stamps[episodes == episode] if episode in motions else stamps[:0]
-                    nearest = [float(own[np.abs(own - one.start).argmin()]) for one in motions.get(episode, ())]
+                    nearest = [float(own[np.abs(own - motion.start).argmin()]) for motion in motions.get(episode, ())]
                     some = zip(nearest, motions.get(episode, ()), strict=True)
-                    found[episode] = sorted(one._replace(start=stamp) for stamp, one in some)
-                rows = found
+                    snapped[episode] = sorted(motion._replace(start=stamp) for stamp, motion in some)
+                rows = snapped
             if column.name not in schema.names:
                 schema = schema.append(pa.field(column.name, kind))
             packed = _compression(file.metadata, column.leaves(kind))
@@ -199,20 +199,20 @@ def _compression(metadata: Any, leaves: Sequence[str]) -> str | dict[str, str]:
         return "snappy"
     group = metadata.row_group(0)
     columns = [group.column(k) for k in range(group.num_columns)]
-    known = {one.path_in_schema: str(one.compression) for one in columns}
-    known = dict.fromkeys(leaves, str(columns[0].compression)) | known
-    return {path: "NONE" if name == "UNCOMPRESSED" else name for path, name in known.items()}
+    compressions = {column.path_in_schema: str(column.compression) for column in columns}
+    compressions = dict.fromkeys(leaves, str(columns[0].compression)) | compressions
+    return {path: "NONE" if name == "UNCOMPRESSED" else name for path, name in compressions.items()}
 
 
 def _extended(table: Any, motions: Mapping[int, list[Motion]], column: Column, kind: Any, schema: Any) -> Any:
     """Rows of a shard with the column, new or longer."""
     import pyarrow as pa
 
-    known, episode_of = np.unique(table.column("episode_index").to_numpy(), return_inverse=True)
+    numbers, episode_of = np.unique(table.column("episode_index").to_numpy(), return_inverse=True)
     old = table.column(column.name) if column.name in table.column_names else None
     if old is not None:
         old = pa.concat_arrays(old.chunks) if old.num_chunks else pa.nulls(0, kind)
-    new = column.extended(old, [motions.get(int(k), []) for k in known], episode_of, kind)
+    new = column.extended(old, [motions.get(int(k), []) for k in numbers], episode_of, kind)
     columns = [new if name == column.name else table.column(name) for name in schema.names]
     return pa.Table.from_arrays(columns, schema=schema)
 
@@ -223,8 +223,8 @@ def language_type(schema: Any) -> Any:
 
     if LANGUAGE in schema.names:
         kind = schema.field(LANGUAGE).type
-        known = {one.name for one in kind.value_type} if _is_list_of_language_rows(kind) else set()
-        if not {"role", "content", "style", "timestamp"} <= known:
+        names = {field.name for field in kind.value_type} if _is_list_of_language_rows(kind) else set()
+        if not {"role", "content", "style", "timestamp"} <= names:
             raise DataError(f"expected rows with role, content, style, timestamp in {LANGUAGE}, got {kind}")
         return kind
     fields = [
@@ -246,7 +246,7 @@ def _is_list_of_language_rows(kind: Any) -> bool:
 
 def language_leaves(kind: Any) -> list[str]:
     """Paths of the parts of the column in a Parquet file."""
-    leaves = [f"{LANGUAGE}.list.element.{one.name}" for one in kind.value_type]
+    leaves = [f"{LANGUAGE}.list.element.{field.name}" for field in kind.value_type]
     return [*leaves, *(f"{leaf}.list.element" for leaf in leaves)]
 
 
@@ -266,7 +266,7 @@ def with_language(old: Any, motions: Sequence[Sequence[Motion]], episode_of: NDA
     """
     import pyarrow as pa
 
-    added = _language_rows([one for some in motions for one in some], kind.value_type)
+    added = _language_rows([motion for some in motions for motion in some], kind.value_type)
     counts = np.array([len(some) for some in motions], dtype=np.int64)
     if old is None:
         return _lengthened(pa.nulls(len(episode_of), kind), added, counts, episode_of, kind, False)
@@ -302,24 +302,24 @@ def _lists_of_others(old: Any) -> tuple[Any, NDArray[np.int64]]:
     counts = pc.fill_null(pc.list_value_length(old), 0).to_numpy(zero_copy_only=False).astype(np.int64)
     style, content = (pc.cast(pc.struct_field(flat, name), pa.string()) for name in ("style", "content"))
     ours = pc.and_(pc.equal(style, STYLE), pc.starts_with(content, OWN))
-    kept = ~pc.fill_null(ours, False).to_numpy(zero_copy_only=False)
-    until = np.concatenate(([0], np.cumsum(kept)))[np.concatenate(([0], np.cumsum(counts)))]
-    return flat.take(np.flatnonzero(kept)), np.diff(until).astype(np.int64)
+    are_others = ~pc.fill_null(ours, False).to_numpy(zero_copy_only=False)
+    until = np.concatenate(([0], np.cumsum(are_others)))[np.concatenate(([0], np.cumsum(counts)))]
+    return flat.take(np.flatnonzero(are_others)), np.diff(until).astype(np.int64)
 
 
 def _language_rows(motions: Sequence[Motion], kind: Any) -> Any:
     import pyarrow as pa
 
-    known: dict[str, list[Any]] = {
+    values: dict[str, list[Any]] = {
         "role": [ROLE] * len(motions),
-        "content": [one.content for one in motions],
+        "content": [motion.content for motion in motions],
         "style": [STYLE] * len(motions),
-        "timestamp": [one.start for one in motions],
+        "timestamp": [motion.start for motion in motions],
     }
     fields = list(kind)
     arrays = [
-        pa.array(known[one.name], type=one.type) if one.name in known else pa.nulls(len(motions), one.type)
-        for one in fields
+        pa.array(values[field.name], type=field.type) if field.name in values else pa.nulls(len(motions), field.type)
+        for field in fields
     ]
     return pa.StructArray.from_arrays(arrays, fields=fields)
 
@@ -343,14 +343,14 @@ def with_texts(old: Any, motions: Sequence[Sequence[Motion]], episode_of: NDArra
     """The column of some rows, see `with_language`."""
     import pyarrow as pa
 
-    known, text_of = [""], np.zeros(len(episode_of), dtype=np.intp)
+    contents, text_of = [""], np.zeros(len(episode_of), dtype=np.intp)
     if old is not None:
         coded = old.dictionary_encode()
-        known = [text or "" for text in coded.dictionary.to_pylist()] + [""]
-        text_of = coded.indices.fill_null(len(known) - 1).to_numpy(zero_copy_only=False).astype(np.intp)
+        contents = [text or "" for text in coded.dictionary.to_pylist()] + [""]
+        text_of = coded.indices.fill_null(len(contents) - 1).to_numpy(zero_copy_only=False).astype(np.intp)
     both, which = np.unique(np.column_stack((text_of, episode_of)), axis=0, return_inverse=True)
     texts = [
-        json.dumps(_texts_of_others(known[t]) + _text_rows(motions[e]), ensure_ascii=False) for t, e in both.tolist()
+        json.dumps(_texts_of_others(contents[t]) + _text_rows(motions[e]), ensure_ascii=False) for t, e in both.tolist()
     ]
     return pa.array(texts, kind).take(pa.array(which.ravel()))
 
@@ -365,12 +365,12 @@ def _texts_of_others(text: str) -> list[Any]:
         rows = None
     if not isinstance(rows, list):
         raise DataError(f"expected lists in JSON in {MOTION_TEXTS}, got {text[:40]!r}")
-    return [one for one in rows if not (isinstance(one, dict) and str(one.get("content")).startswith(OWN))]
+    return [row for row in rows if not (isinstance(row, dict) and str(row.get("content")).startswith(OWN))]
 
 
 def _text_rows(motions: Sequence[Motion]) -> list[dict[str, Any]]:
     plain = {"role": ROLE, "style": STYLE, "camera": None, "tool_calls": None}
-    return [{**plain, "content": one.content, "timestamp": one.start} for one in motions]
+    return [{**plain, "content": motion.content, "timestamp": motion.start} for motion in motions]
 
 
 #: Version -> its column.

@@ -85,22 +85,22 @@ def read_info(folder: Path) -> Info:
         It is damaged, of another program, or of a version that is not read.
     """
     info = read_json(folder / MARKER, MARKER)
-    known = info if isinstance(info, Mapping) else {}
-    said, features = str(known.get("codebase_version", "")), known.get("features")
+    description = info if isinstance(info, Mapping) else {}
+    said, features = str(description.get("codebase_version", "")), description.get("features")
     if not said or not isinstance(features, Mapping):
         raise DataError(f"expected {MARKER} of a LeRobot data set with codebase_version and features, got another one")
     major = said.lstrip("v").partition(".")[0]
     if major not in ("2", "3"):
         raise DataError(f"expected a LeRobot data set of version 2 or 3, got {said}; convert it with LeRobot")
-    fps, path = known.get("fps"), known.get("data_path")
+    fps, path = description.get("fps"), description.get("data_path")
     if isinstance(fps, bool) or not isinstance(fps, (int, float)) or not 0 < fps < math.inf:
         raise DataError(f"expected fps above 0 in {MARKER}, got {fps!r}")
     if not isinstance(path, str) or len(path) > _LONGEST_PATH:
         raise DataError(f"expected a data_path of at most {_LONGEST_PATH} characters in {MARKER}, got {path!r:.80}")
     if Path(path).is_absolute() or ".." in Path(path).parts or _WIDE_FIELD.search(path):
         raise DataError(f"expected a data_path within the data set in {MARKER}, got {path!r}")
-    total, chunk = known.get("total_episodes"), known.get("chunks_size")
-    heads = {name: entries for name, one in features.items() if (entries := _entries(name, one))}
+    total, chunk = description.get("total_episodes"), description.get("chunks_size")
+    heads = {name: entries for name, feature in features.items() if (entries := _entries(name, feature))}
     others = tuple(name for name in features if name not in heads and name not in COUNTERS)
     return Info(
         int(major), float(fps), heads, others, path, total if isinstance(total, int) else None,
@@ -113,7 +113,7 @@ def _entries(name: str, feature: Any) -> tuple[str, ...]:
     if name in COUNTERS or not isinstance(feature, Mapping) or not str(feature.get("dtype")).startswith(_NUMBERS):
         return ()
     shape = feature.get("shape")
-    if not isinstance(shape, list) or not all(isinstance(one, int) and one > 0 for one in shape):
+    if not isinstance(shape, list) or not all(isinstance(size, int) and size > 0 for size in shape):
         return ()
     width = math.prod(shape)
     names, units = _names(feature.get("names")), feature.get("units")
@@ -131,7 +131,7 @@ def _entries(name: str, feature: Any) -> tuple[str, ...]:
 def _names(names: Any) -> list[str]:
     """Names as a flat list; they stand in a list or below words such as motors or axes."""
     if isinstance(names, Mapping):
-        return [name for one in names.values() for name in _names(one)]
+        return [name for group in names.values() for name in _names(group)]
     return [str(name) for name in names] if isinstance(names, list) else []
 
 
@@ -179,7 +179,7 @@ def read_episodes(folder: Path, info: Info) -> Episodes:
     paths: dict[tuple[int, ...], str] = {}
     n_bytes = 0
     shards = []
-    for place in zip(*(one.tolist() for one in [place[order] for place in places]), strict=True):
+    for place in zip(*(column.tolist() for column in [place[order] for place in places]), strict=True):
         if place not in paths:
             try:
                 paths[place] = info.data_path.format(**dict(zip(names, place, strict=True)))
@@ -210,7 +210,7 @@ def read_tasks(folder: Path) -> tuple[dict[int, str], list[str]]:
     return tasks, problems
 
 
-def _lines(path: Path, whole: Sequence[str], problems: list[str], text: str = "") -> Iterator[dict[str, Any]]:
+def _lines(path: Path, integers: Sequence[str], problems: list[str], text: str = "") -> Iterator[dict[str, Any]]:
     """Objects that have whole numbers, and the text if one is named; other lines are problems."""
     try:
         check_expanded(10 * path.stat().st_size)
@@ -226,11 +226,11 @@ def _lines(path: Path, whole: Sequence[str], problems: list[str], text: str = ""
             row = json.loads(line)
         except (ValueError, RecursionError):
             row = None
-        numbers = [row.get(name) for name in whole] if isinstance(row, dict) else [None]
-        if all(type(one) is int and abs(one) < _LARGEST for one in numbers) and (not text or row.get(text)):
+        numbers = [row.get(name) for name in integers] if isinstance(row, dict) else [None]
+        if all(type(number) is int and abs(number) < _LARGEST for number in numbers) and (not text or row.get(text)):
             yield row
         else:
-            wanted = ", ".join([*whole, *([text] if text else [])])
+            wanted = ", ".join([*integers, *([text] if text else [])])
             problems.append(f"meta/{path.name}, line {k}: expected an object with {wanted}, got {line[:40]!r}")
 
 
@@ -266,17 +266,19 @@ def _texts_of_tasks(path: Path) -> dict[int, str]:
 
     with _damage_named(path):
         schema = parquet.read_schema(path)
-    values = [(one.name, one.type.value_type if pa.types.is_dictionary(one.type) else one.type) for one in schema]
+    values = [
+        (field.name, field.type.value_type if pa.types.is_dictionary(field.type) else field.type) for field in schema
+    ]
     texts = [name for name, kind in values if pa.types.is_string(kind) or pa.types.is_large_string(kind)]
-    name = next((one for one in ("task", "__index_level_0__", *texts) if one in texts), None)
+    name = next((column for column in ("task", "__index_level_0__", *texts) if column in texts), None)
     table = _rows(path, ("task_index", *([name] if name else [])), _A_TASK, texts=texts)
     if name is None or not pa.types.is_integer(table.column("task_index").type):
         return {}
     tasks: dict[int, str] = {}
     for numbers, codes in zip(table.column("task_index").chunks, table.column(name).chunks, strict=True):
-        known = codes.dictionary.to_pylist()  # each text once, in however many rows it stands
+        dictionary = codes.dictionary.to_pylist()  # each text once, in however many rows it stands
         rows = zip(numbers.to_pylist(), codes.indices.to_pylist(), strict=True)
-        tasks |= {k: known[code] for k, code in rows if k is not None and code is not None}
+        tasks |= {k: dictionary[code] for k, code in rows if k is not None and code is not None}
     return tasks
 
 

@@ -52,9 +52,9 @@ def lerobot_movements(folder: Path, layout: Layout) -> Parsed:
         raise DataError("expected the package pyarrow to read Parquet; pip install 'kineme[parquet]'") from error
     # Refuse a choice of times, movements or labels that the data set has already made otherwise.
     named = {"label": (layout.label, ("task", "task_index")), "time": (layout.time, ("timestamp",))}
-    for what, (given, known) in named.items():
-        if given is not None and given not in known:
-            raise DataError(f"expected {known[0]!r} as {what} of a LeRobot data set, which declares it, got {given!r}")
+    for what, (given, names) in named.items():
+        if given is not None and given not in names:
+            raise DataError(f"expected {names[0]!r} as {what} of a LeRobot data set, which declares it, got {given!r}")
     if layout.keys is not None and not set(layout.keys) <= {"episode_index", "episode"}:
         raise DataError(
             f"expected 'episode_index' as movement of a LeRobot data set, got {listed(map(str, layout.keys))}"
@@ -86,7 +86,7 @@ def _chosen(info: Info, layout: Layout) -> tuple[dict[str, int], tuple[str, ...]
         only = f"only {listed(info.others)}" if info.others else "none"
         raise DataError(f"expected features of numbers in a LeRobot data set, got {only}")
     owners = [name for name, entries in info.heads.items() for _ in entries]
-    entries = [entry for one in info.heads.values() for entry in one]
+    entries = [entry for entries_of_head in info.heads.values() for entry in entries_of_head]
     full = [f"{name}.{entry}" if entry else name for name, entry in zip(owners, entries, strict=True)]
     vectors = info.vectors
     name = STATE if STATE in info.heads else next(iter(vectors)) if len(vectors) == 1 else None
@@ -140,7 +140,7 @@ def _all_frames(folder: Path, declared: Episodes, features: dict[str, int]) -> t
             unread[shard] = f"{error}; left out {episode_names(episodes)}"
             continue
         parts += part
-        taken += 8 * (width + 4) * sum(len(one.values) for one in part)
+        taken += 8 * (width + 4) * sum(len(frames.values) for frames in part)
     if not parts:
         raise DataError(
             f"expected shards that can be read, got none; the first: {next(iter(unread.values()), 'without frames')}"
@@ -160,8 +160,8 @@ def _labels(frames: Frames, offsets: NDArray[np.intp], tasks: dict[int, str]) ->
     first = frames.tasks[offsets[:-1]]
     mixed = np.add.reduceat(frames.tasks != np.repeat(first, np.diff(offsets)), offsets[:-1]) > 0
     for i in np.flatnonzero(mixed).tolist():
-        known, counts = np.unique(frames.tasks[offsets[i] : offsets[i + 1]], return_counts=True)
-        first[i] = known[counts.argmax()]
+        numbers, counts = np.unique(frames.tasks[offsets[i] : offsets[i + 1]], return_counts=True)
+        first[i] = numbers[counts.argmax()]
     return [tasks.get(k) or None for k in first.tolist()]
 
 
@@ -210,11 +210,11 @@ def episode_names(numbers: Sequence[int]) -> str:
 
 def _divided(numbers: NDArray[np.int64]) -> dict[int, str]:
     """Episodes whose frames stand in several places."""
-    known, counts = np.unique(numbers, return_counts=True)
+    episodes, counts = np.unique(numbers, return_counts=True)
     several = counts > 1
     return {
         k: f"expected its frames in one place, got them in {count} places"
-        for k, count in zip(known[several].tolist(), counts[several].tolist(), strict=True)
+        for k, count in zip(episodes[several].tolist(), counts[several].tolist(), strict=True)
     }
 
 
@@ -232,21 +232,21 @@ def _disordered(frames: Frames, offsets: NDArray[np.intp], numbers: NDArray[np.i
 def _miscounted(numbers: NDArray[np.int64], lengths: NDArray[np.intp], declared: Episodes) -> dict[int, str]:
     """Episodes that are not declared, or with another length."""
     where = np.searchsorted(declared.numbers, numbers).clip(max=len(declared.numbers) - 1)
-    known = declared.numbers[where] == numbers
-    wrong = dict.fromkeys(numbers[~known].tolist(), "expected an episode that the meta folder declares")
-    odd = known & (declared.lengths[where] != lengths)
+    is_declared = declared.numbers[where] == numbers
+    wrong = dict.fromkeys(numbers[~is_declared].tolist(), "expected an episode that the meta folder declares")
+    odd = is_declared & (declared.lengths[where] != lengths)
     return wrong | {
         int(numbers[i]): f"expected {counted(int(declared.lengths[where[i]]), 'frame')} as declared, got {lengths[i]}"
         for i in np.flatnonzero(odd).tolist()
     }
 
 
-def _taken(frames: Frames, kept: NDArray[np.bool_]) -> Frames:
+def _taken(frames: Frames, mask: NDArray[np.bool_]) -> Frames:
     """The kept frames; what is wrong with them keeps its rows."""
-    row = np.cumsum(kept) - 1
-    faults = {int(row[k]): reason for k, reason in frames.faults.items() if kept[k]}
+    row = np.cumsum(mask) - 1
+    faults = {int(row[k]): reason for k, reason in frames.faults.items() if mask[k]}
     values, episodes, numbers, tasks, stamps, _ = frames
-    return Frames(values[kept], episodes[kept], numbers[kept], tasks[kept], stamps[kept], faults)
+    return Frames(values[mask], episodes[mask], numbers[mask], tasks[mask], stamps[mask], faults)
 
 
 class Frames(NamedTuple):
@@ -293,13 +293,13 @@ def read_shard(folder: Path, shard: str, features: Mapping[str, int], taken: int
         raise DataError(f"expected the shard {shard}, found none")
     try:
         with parquet.ParquetFile(path) as file:
-            known = set(file.schema_arrow.names)
+            names_of_columns = set(file.schema_arrow.names)
             needed = [*features, "episode_index", "frame_index", "timestamp"]
-            if missing := [name for name in needed if name not in known]:
+            if missing := [name for name in needed if name not in names_of_columns]:
                 raise DataError(f"expected the column {missing[0]!r}, got none")
             width = sum(features.values()) + len(_OF_FRAMES)
             check_expanded(taken + 8 * width * max(file.metadata.num_rows, 0), "a data set")
-            columns = [*needed, *(["task_index"] if "task_index" in known else [])]
+            columns = [*needed, *(["task_index"] if "task_index" in names_of_columns else [])]
             parts, n_rows = [], 0
             for batch in file.iter_batches(_ROWS, columns=columns, use_threads=False):
                 parts.append(_frames(batch, features))

@@ -83,18 +83,18 @@ def write_episode(
 
 def _check(info: Any, entry: Mapping[str, Any], fps: float) -> None:
     """Refuse a data set that the episode does not fit into."""
-    version, known = info.get("codebase_version"), info.get("features")
+    version, declared = info.get("codebase_version"), info.get("features")
     if not str(version).startswith("v3."):
         raise DataError(f"expected a LeRobot data set of version 3 to append to, got {version}")
     if info.get("fps") != fps:
         raise DataError(f"expected the {info.get('fps')} frames per second of the data set, got {fps:g}")
     if info.get("data_path") != _DATA:
         raise DataError(f"expected a data set with the data_path {_DATA}, got {info.get('data_path')}")
-    if known != entry:
-        differing = sorted(name for name in {*known, *entry} if known.get(name) != entry.get(name))
+    if declared != entry:
+        differing = sorted(name for name in {*declared, *entry} if declared.get(name) != entry.get(name))
         raise DataError(
             f"expected the features of the data set to append to it; they differ in {', '.join(differing)}: "
-            f"{known.get(differing[0])} there, {entry.get(differing[0])} here"
+            f"{declared.get(differing[0])} there, {entry.get(differing[0])} here"
         )
 
 
@@ -103,8 +103,8 @@ def _append(folder: Path, info: dict[str, Any], features: Features, task: str) -
     number, start = int(info["total_episodes"]), int(info["total_frames"])
     length = len(next(iter(features.values())))
     tasks = _tasks(folder)
-    known = task in tasks
-    tasks = tasks if known else [*tasks, task]
+    has_task = task in tasks
+    tasks = tasks if has_task else [*tasks, task]
     from pyarrow import parquet
 
     last = -1  # the file behind all that hold an earlier episode; one that was never counted is written over
@@ -124,9 +124,9 @@ def _append(folder: Path, info: dict[str, Any], features: Features, task: str) -
         "index": start + frame,
         "task_index": np.full(length, tasks.index(task)),
     }
-    found = {name: statistics_of(values) for name, values in columns.items()}
+    statistics = {name: statistics_of(values) for name, values in columns.items()}
     _write(folder / _DATA.format(**place), {name: _column(values) for name, values in columns.items()})
-    if not known:
+    if not has_task:
         # The texts are the index, as pandas and LeRobot read it.
         index = {
             "index_columns": ["task"], "column_indexes": [], "pandas_version": "2.2.3",
@@ -140,12 +140,14 @@ def _append(folder: Path, info: dict[str, Any], features: Features, task: str) -
     row: dict[str, Any] = {
         "episode_index": number, "tasks": [task], "length": length, "data/chunk_index": place["chunk_index"],
         "data/file_index": place["file_index"], "dataset_from_index": start, "dataset_to_index": start + length,
-        **{f"stats/{name}/{key}": value for name, one in found.items() for key, value in one.items()},
+        **{f"stats/{name}/{key}": value for name, values in statistics.items() for key, value in values.items()},
         "meta/episodes/chunk_index": place["chunk_index"], "meta/episodes/file_index": place["file_index"],
     }  # fmt: skip
     _write(folder / _EPISODES.format(**place), {name: [value] for name, value in row.items()})
     before = read_json(folder / _STATISTICS, _STATISTICS) if number else {}
-    _write_json(folder / _STATISTICS, {name: merged_statistics(before.get(name), one) for name, one in found.items()})
+    _write_json(
+        folder / _STATISTICS, {name: merged_statistics(before.get(name), values) for name, values in statistics.items()}
+    )
     counts = {"total_episodes": number + 1, "total_frames": start + length, "total_tasks": len(tasks)}
     _write_json(folder / MARKER, info | counts | {"splits": {"train": f"0:{number + 1}"}})
     return number
@@ -189,12 +191,12 @@ def _write_json(path: Path, content: Any) -> None:
 def statistics_of(values: NDArray[Any]) -> Statistics:
     """Statistics of one feature over the frames of an episode, values of shape (T,) or (T, d)."""
     rows = np.asarray(values, dtype=np.float64).reshape(len(values), -1)
-    found = {"min": rows.min(axis=0), "max": rows.max(axis=0), "mean": rows.mean(axis=0), "std": rows.std(axis=0)}
+    statistics = {"min": rows.min(axis=0), "max": rows.max(axis=0), "mean": rows.mean(axis=0), "std": rows.std(axis=0)}
     quantiles = dict(zip(_QUANTILES, np.quantile(rows, list(_QUANTILES.values()), axis=0), strict=True))
     return {
-        **{name: one.tolist() for name, one in found.items()},
+        **{name: values.tolist() for name, values in statistics.items()},
         "count": [len(rows)],
-        **{name: one.tolist() for name, one in quantiles.items()},
+        **{name: values.tolist() for name, values in quantiles.items()},
     }
 
 
@@ -202,7 +204,10 @@ def merged_statistics(first: Statistics | None, second: Statistics) -> Statistic
     """Statistics of all frames from those of two parts; the quantiles are weighted means, as LeRobot takes them."""
     if first is None:
         return second
-    a, b = ({name: np.asarray(values, dtype=np.float64) for name, values in one.items()} for one in (first, second))
+    a, b = (
+        {name: np.asarray(values, dtype=np.float64) for name, values in statistics.items()}
+        for statistics in (first, second)
+    )
     n = a["count"] + b["count"]
     share = b["count"] / n
     mean = a["mean"] + share * (b["mean"] - a["mean"])
@@ -212,4 +217,4 @@ def merged_statistics(first: Statistics | None, second: Statistics) -> Statistic
         "std": np.sqrt(variance),
     }  # fmt: skip
     merged |= {name: a[name] + share * (b[name] - a[name]) for name in _QUANTILES if name in a}
-    return {**{name: one.tolist() for name, one in merged.items()}, "count": [int(n[0])]}
+    return {**{name: values.tolist() for name, values in merged.items()}, "count": [int(n[0])]}

@@ -65,7 +65,7 @@ def read_c3d_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
         raise DataError(f"expected a C3D file, got a truncated or damaged one ({error})") from error
     heads = (_STAMP, *names)
     is_read = is_point if layout.coordinates is None and any(is_point) else [True] * len(names)
-    kinds = ("number", *("number" if one else "text" for one in is_read))
+    kinds = ("number", *("number" if is_number else "text" for is_number in is_read))
     roles = choose_roles(heads, kinds, layout)
     columns = [np.arange(len(values)) / rate, *values.T]
     return Table(heads, columns, len(values), no_lines, measured_in=("s", *units)), roles
@@ -144,8 +144,8 @@ def _labels(reader: Any, group: str, kind: str = "LABELS") -> list[str]:
 
 def _names(labels: Any, count: int, what: str) -> list[str]:
     """A name for each of so many points or segments, numbered where the file has none."""
-    known = [label.strip() for label in labels][:count]
-    return [label or f"{what} {k}" for k, label in enumerate([*known, *[""] * (count - len(known))], 1)]
+    names = [label.strip() for label in labels][:count]
+    return [label or f"{what} {k}" for k, label in enumerate([*names, *[""] * (count - len(names))], 1)]
 
 
 def _rotations(reader: Any, data: bytes, n_frames: int, length: str) -> tuple[list[str], Any, list[str], float]:
@@ -167,13 +167,13 @@ def _rotations(reader: Any, data: bytes, n_frames: int, length: str) -> tuple[li
     turns = poses[:, :3, :3]
     with np.errstate(invalid="ignore", over="ignore"):
         off = np.abs(turns @ turns.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2))
-        known = (words[:, 16] >= 0) & (off < _OFF) & (np.linalg.det(turns) > 0)
+        is_rotation = (words[:, 16] >= 0) & (off < _OFF) & (np.linalg.det(turns) > 0)
     values = np.full((len(poses), 7), np.nan)
-    if known.any():
+    if is_rotation.any():
         from scipy.spatial.transform import Rotation
 
-        values[known, :3] = poses[known, :3, 3]
-        values[known, 3:] = Rotation.from_matrix(turns[known]).as_quat(scalar_first=True)
+        values[is_rotation, :3] = poses[is_rotation, :3, 3]
+        values[is_rotation, 3:] = Rotation.from_matrix(turns[is_rotation]).as_quat(scalar_first=True)
     names = [
         name.removesuffix("_4X4")
         for name in without_common_subject(_names(_labels(reader, "ROTATION"), count, "segment"))

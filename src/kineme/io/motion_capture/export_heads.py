@@ -173,10 +173,10 @@ def optitrack_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str
     rows with the type, the name, the id and, since version 1.25, the parent of each column, then one with what it
     holds, and the row of heads ``Frame,Time (Seconds),X``.
     """
-    known = cells_of(lines[0], ",") if lines else []
-    if not known or known[0].lower() != "format version":
+    cells = cells_of(lines[0], ",") if lines else []
+    if not cells or cells[0].lower() != "format version":
         return None
-    said = dict(zip((cell.lower() for cell in known[::2]), known[1::2], strict=False))
+    said = dict(zip((cell.lower() for cell in cells[::2]), cells[1::2], strict=False))
     rows = [cells_of(line, ",") for line in lines]
     at = next((k for k, row in enumerate(rows) if [cell.lower() for cell in row[:1]] == ["frame"]), None)
     if at is None:
@@ -254,13 +254,13 @@ def _columns(names: Sequence[str], bodies: bool) -> tuple[list[str], list[str]]:
     """Heads and units; residuals and the rotation matrix beside the angles are left aside."""
     if not bodies:
         return [f"{name}.{axis}" for name in names for axis in "xyz"], ["mm"] * 3 * len(names)
-    one = [("position.", "mm")] * 3 + [("", "deg")] * 3 + [("", "")] * 10
+    groups = [("position.", "mm")] * 3 + [("", "deg")] * 3 + [("", "")] * 10
     heads = [
         f"{name}.{group}{what}" if unit else ""
         for name in names
-        for what, (group, unit) in zip(_POSES, one, strict=True)
+        for what, (group, unit) in zip(_POSES, groups, strict=True)
     ]
-    return heads, [unit for _ in names for _, unit in one]
+    return heads, [unit for _ in names for _, unit in groups]
 
 
 def _is_number(cell: str) -> bool:
@@ -284,7 +284,7 @@ def trc_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) ->
     first = lines[0].lstrip("\ufeff") if lines else ""
     if not first.startswith(_FIRST):
         return None
-    separator = next((one for one in ",;" if first[len(_FIRST) :].startswith(one)), "\t")
+    separator = next((mark for mark in ",;" if first[len(_FIRST) :].startswith(mark)), "\t")
     if len(lines) < 6:
         raise DataError(f"expected a TRC file with keys, names and samples, got {len(lines)} lines")
     keys, values, names, axes = (cells_of(line, separator) for line in lines[1:5])
@@ -316,11 +316,11 @@ def vicon_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) 
     first = next((k for k, line in enumerate(lines) if line.strip(" \t\r\n,")), None)
     if first is None or _name(lines[first]) not in (*_SECTIONS, *_OTHERS):
         return None
-    found = {_name(line): k for k, line in reversed(list(enumerate(lines))) if _name(line) in _SECTIONS}
-    section = next((one for one in _SECTIONS if one in found), None)
+    starts = {_name(line): k for k, line in reversed(list(enumerate(lines))) if _name(line) in _SECTIONS}
+    section = next((name for name in _SECTIONS if name in starts), None)
     if section is None:
         raise DataError("expected a Vicon export with trajectories, segments or joints, got events alone")
-    at = found[section]
+    at = starts[section]
     if len(lines) < at + 5:
         raise DataError(f"expected samples below the section {section!r} of a Vicon export, got its head alone")
     separator = "\t" if "\t" in lines[at + 3] else ","
@@ -331,7 +331,7 @@ def vicon_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) 
     n = len(heads)
     plain = without_common_subject(filled((names + [""] * n)[:n]))
     turned = _quaternions(heads[:n])
-    columns = [_head(section, *one) for one in zip(plain, heads[:n], turned, strict=True)]
+    columns = [_head(section, *column) for column in zip(plain, heads[:n], turned, strict=True)]
     columns[0] = "frame"
     columns[1] = "sub frame" if n > 1 and heads[1].lower() == "sub frame" else columns[1]
     end = next((k for k in range(at + 5, len(lines)) if not lines[k].strip(" \t\r\n,")), None)

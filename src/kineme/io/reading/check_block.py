@@ -140,10 +140,10 @@ def _problem(block: Block, file: str, i: int, k: int, odd: tuple[int, str]) -> P
     row, (n_odd, skip) = block.row(k), odd
     samples = f"{n_odd} samples like this" if n_odd > 1 else "this sample"
     effect = f"; {samples} left out" if skip == "sample" else f"; {n_odd - 1} more like this" if n_odd > 1 else ""
-    known = (block.faults or {}).get(row)
-    reason = movement_of(block, i) + (known or _reason(block, i, k)) + effect
+    fault = (block.faults or {}).get(row)
+    reason = movement_of(block, i) + (fault or _reason(block, i, k)) + effect
     left_out = n_odd if skip == "sample" and block.offsets[i + 1] - block.offsets[i] - n_odd >= MIN_SAMPLES else 0
-    return Problem(file, block.line_of(row), reason, DataError if known else TrajectoryError, left_out)
+    return Problem(file, block.line_of(row), reason, DataError if fault else TrajectoryError, left_out)
 
 
 def movement_of(block: Block, i: int) -> str:
@@ -172,25 +172,25 @@ def _reason(block: Block, i: int, k: int) -> str:
     return f"expected strictly increasing times, got {what} stamps {before:.9g} and {times[k]:.9g} s{at}"
 
 
-def _keep(block: Block, kept: Flags) -> Block:
+def _keep(block: Block, mask: Flags) -> Block:
     """The kept samples of every movement."""
-    offsets = np.concatenate(([0], np.cumsum(kept)))[block.offsets].astype(np.intp)
-    rows = np.flatnonzero(kept) if block.rows is None else block.rows[kept]
-    times = None if block.times is None else block.times[kept]
-    return replace(block, positions=block.positions[kept], times=times, offsets=offsets, rows=rows)
+    offsets = np.concatenate(([0], np.cumsum(mask)))[block.offsets].astype(np.intp)
+    rows = np.flatnonzero(mask) if block.rows is None else block.rows[mask]
+    times = None if block.times is None else block.times[mask]
+    return replace(block, positions=block.positions[mask], times=times, offsets=offsets, rows=rows)
 
 
 def take_movements(block: Block, chosen: Flags) -> Block:
     """The chosen movements of a block."""
     if chosen.all():
         return block
-    kept = _keep(block, np.repeat(chosen, np.diff(block.offsets)))
-    ends = kept.offsets[np.concatenate(([True], chosen))]
-    labels = [label for label, one in zip(block.labels, chosen, strict=True) if one]
-    places = [place for place, one in zip(block.places, chosen, strict=True) if one]
-    people = block.people and [person for person, one in zip(block.people, chosen, strict=True) if one]
-    repairs = block.repairs and [repair for repair, one in zip(block.repairs, chosen, strict=True) if one]
-    return replace(kept, offsets=ends, labels=labels, places=places, people=people, repairs=repairs)
+    taken = _keep(block, np.repeat(chosen, np.diff(block.offsets)))
+    ends = taken.offsets[np.concatenate(([True], chosen))]
+    labels = [label for label, is_chosen in zip(block.labels, chosen, strict=True) if is_chosen]
+    places = [place for place, is_chosen in zip(block.places, chosen, strict=True) if is_chosen]
+    people = block.people and [person for person, is_chosen in zip(block.people, chosen, strict=True) if is_chosen]
+    repairs = block.repairs and [repair for repair, is_chosen in zip(block.repairs, chosen, strict=True) if is_chosen]
+    return replace(taken, offsets=ends, labels=labels, places=places, people=people, repairs=repairs)
 
 
 class Spans(NamedTuple):
@@ -258,8 +258,8 @@ def fill_gaps(block: Block, columns: Sequence[str], layout: Layout) -> Block:
     positions, outside = block.positions.copy(), np.zeros(len(block.positions), dtype=bool)
     number = {name: k for k, name in enumerate(columns)}
     channels = [
-        (one, [number[name] for name in one.columns])
-        for one in _channels(block, columns, layout, np.asarray(~missing.any(axis=1)))
+        (channel, [number[name] for name in channel.columns])
+        for channel in _channels(block, columns, layout, np.asarray(~missing.any(axis=1)))
     ]
     repairs = [Repair()] * len(block.labels)
     for i in np.flatnonzero(np.diff(lacking)).tolist():
@@ -272,14 +272,14 @@ def fill_gaps(block: Block, columns: Sequence[str], layout: Layout) -> Block:
         ends = times[[0, -1]] - times[inside][[0, -1]]
         filled = filled[inside]
         repairs[i] = Repair(int(np.count_nonzero(filled)), float(filled.max()), float(np.abs(ends).sum()))
-    kept = ~outside
-    offsets = np.concatenate(([0], np.cumsum(kept)))[block.offsets].astype(np.intp)
+    samples_kept = ~outside
+    offsets = np.concatenate(([0], np.cumsum(samples_kept)))[block.offsets].astype(np.intp)
     return replace(
         block,
-        positions=positions[kept],
-        times=block.times[kept],
+        positions=positions[samples_kept],
+        times=block.times[samples_kept],
         offsets=offsets,
-        rows=np.flatnonzero(kept) if block.rows is None else block.rows[kept],
+        rows=np.flatnonzero(samples_kept) if block.rows is None else block.rows[samples_kept],
         repairs=repairs,
     )
 
@@ -290,8 +290,8 @@ def _span_of_all(missing: Flags, skip: str) -> slice:
     complete = np.flatnonzero(~missing.any(axis=1))
     if len(complete) and complete[-1] + 1 - complete[0] >= max(MIN_SAMPLES, 0 if skip == "sample" else _LEAST * n):
         return slice(int(complete[0]), int(complete[-1]) + 1)
-    known = ~missing
-    ends = np.where(missing.all(axis=0), n, known.argmax(axis=0) + known[::-1].argmax(axis=0))
+    present = ~missing
+    ends = np.where(missing.all(axis=0), n, present.argmax(axis=0) + present[::-1].argmax(axis=0))
     complete = np.flatnonzero(~missing[:, ends < _EDGE * n].any(axis=1))
     if len(complete) and complete[-1] + 1 - complete[0] >= max(MIN_SAMPLES, _LEAST * n):
         return slice(int(complete[0]), int(complete[-1]) + 1)
@@ -314,7 +314,7 @@ def _channels(block: Block, columns: Sequence[str], layout: Layout, complete: Fl
 def _fill(values: Array, times: Array, most: float, channels: Sequence[tuple[Channel, list[int]]]) -> Array:
     """Fill the short gaps of one movement (T, d) in place; the longest gap in which each sample lay, 0 for none [s]."""
     longest = np.zeros(len(values))
-    for one, columns in channels:
+    for channel, columns in channels:
         missing: Flags = np.asarray(np.isnan(values[:, columns]).any(axis=1))
         spans = spans_of(missing, times)
         short = spans.seconds <= most * (1.0 + _ROUNDING)
@@ -323,15 +323,15 @@ def _fill(values: Array, times: Array, most: float, channels: Sequence[tuple[Cha
         lengths = (spans.stop - spans.first)[short]
         begun = np.repeat(spans.first[short] - np.cumsum(lengths) + lengths, lengths)
         chosen = begun + np.arange(len(begun))
-        known = times[~missing], values[~missing][:, columns]
-        values[chosen[:, None], columns] = _between(one, known, times[chosen])
+        samples = times[~missing], values[~missing][:, columns]
+        values[chosen[:, None], columns] = _between(channel, samples, times[chosen])
         longest[chosen] = np.maximum(longest[chosen], np.repeat(spans.seconds[short], lengths))
     return longest
 
 
-def _between(channel: Channel, known: tuple[Array, Array], times: Array) -> Array:
+def _between(channel: Channel, samples: tuple[Array, Array], times: Array) -> Array:
     """Values (m, c) of a channel at m times between those at which (n, c) are known."""
-    stamps, values = known
+    stamps, values = samples
     after = np.searchsorted(stamps, times)
     if channel.kind == "discrete":
         return np.asarray(values[after - 1])

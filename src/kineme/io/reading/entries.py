@@ -47,11 +47,11 @@ def entries_of(paths: Sequence[Path], follow_links: bool = False) -> tuple[list[
     entries: dict[Path, Entry] = {}
     problems: list[Problem] = []
     alone = is_alone(paths)
-    for path in (one for given in paths for one in expanded(given)):
+    for path in (path for given in paths for path in expanded(given)):
         if _is_folder_of_files(path):
             files, odd = files_under(path, follow_links)
-            new = [(one, one.relative_to(path)) for one in files]
-            problems += odd if alone else [one._replace(file=as_text(path / one.file)) for one in odd]
+            new = [(file, file.relative_to(path)) for file in files]
+            problems += odd if alone else [problem._replace(file=as_text(path / problem.file)) for problem in odd]
         elif path.exists() or path.is_symlink():
             new = [(path, name_of(path))]
         elif len(paths) == 1:
@@ -59,8 +59,8 @@ def entries_of(paths: Sequence[Path], follow_links: bool = False) -> tuple[list[
         else:
             problems.append(Problem(as_text(path), None, "expected a file or folder of recordings, found nothing"))
             continue
-        for one, relative in new:
-            entries.setdefault(one, Entry(one, relative, as_text(relative if alone else one)))
+        for file, relative in new:
+            entries.setdefault(file, Entry(file, relative, as_text(relative if alone else file)))
     return list(entries.values()), problems
 
 
@@ -68,7 +68,7 @@ def expanded(path: Path) -> list[Path]:
     """What a pattern matches, sorted, or itself; a file that has the name of a pattern is meant itself."""
     if not has_magic(str(path)) or path.exists() or path.is_symlink():
         return [path]
-    return [Path(one) for one in sorted(glob(str(path), recursive=True))] or [path]
+    return [Path(match) for match in sorted(glob(str(path), recursive=True))] or [path]
 
 
 def is_alone(paths: Sequence[Path]) -> bool:
@@ -115,14 +115,16 @@ def files_under(folder: Path, follow_links: bool = False) -> tuple[list[Path], l
     while folders or links:
         here = folders.popleft() if folders else links.popleft()
         try:
-            known = here.stat()
-            if (known.st_dev, known.st_ino) in visited:
+            status = here.stat()
+            if (status.st_dev, status.st_ino) in visited:
                 continue
-            visited.add((known.st_dev, known.st_ino))
+            visited.add((status.st_dev, status.st_ino))
             if here != folder and data_set_of(here) is not None:
                 files.append(here)
                 continue
-            entries = sorted((one for one in os.scandir(here) if not one.name.startswith(".")), key=lambda e: e.name)
+            entries = sorted(
+                (entry for entry in os.scandir(here) if not entry.name.startswith(".")), key=lambda e: e.name
+            )
         except OSError as error:
             problems.append(Problem(as_text(here.relative_to(folder)), None, f"the folder cannot be listed, {error}"))
             continue

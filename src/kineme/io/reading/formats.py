@@ -79,9 +79,9 @@ class DataSet(NamedTuple):
 
     def files(self, folder: Path) -> list[Path]:
         """The files that are read, sorted; hidden ones are passed over."""
-        found = {path for pattern in (self.marker, *self.parts) for path in folder.glob(pattern) if path.is_file()}
-        relative = sorted(path.relative_to(folder) for path in found)
-        return [folder / one for one in relative if not any(part.startswith(".") for part in one.parts)]
+        paths = {path for pattern in (self.marker, *self.parts) for path in folder.glob(pattern) if path.is_file()}
+        relative = sorted(path.relative_to(folder) for path in paths)
+        return [folder / path for path in relative if not any(part.startswith(".") for part in path.parts)]
 
 
 def _read_text(data: bytes, layout: Layout) -> Parsed:
@@ -170,7 +170,7 @@ DATA_SETS: tuple[DataSet, ...] = (
 
 def data_set_of(folder: Path) -> DataSet | None:
     """The row of `DATA_SETS` for a folder; None for a folder of files and for what is no folder."""
-    return next((one for one in DATA_SETS if _is_marked(folder, one)), None)
+    return next((data_set for data_set in DATA_SETS if _is_marked(folder, data_set)), None)
 
 
 def _is_marked(folder: Path, data_set: DataSet) -> bool:

@@ -59,16 +59,16 @@ def join_files(files: Sequence[Placed], layout: Layout) -> list[Placed]:
             continue
         # The files that have columns which are asked for, or those of the movements to compare with; all if none has.
         heads = [_heads(read) for read in timed]
-        known = layout.known.columns if layout.known is not None else ()
+        columns = layout.known.columns if layout.known is not None else ()
         of_all = [name for names in heads for name in names]
-        wanted = layout.coordinates or (known if None not in numbers_by_name(of_all, known) else ())
-        kept = [
+        wanted = layout.coordinates or (columns if None not in numbers_by_name(of_all, columns) else ())
+        having = [
             read
             for read, names in zip(timed, heads, strict=True)
             if (not wanted or excluded_numbers(names, wanted))
             and len(excluded_numbers(names, layout.excluded)) < len(names)
         ]
-        chosen = kept or list(timed)
+        chosen = having or list(timed)
         together = _together(chosen) or [chosen[0].path]
         joined = [member for member in members if member[0].path in together]
         recording, place = _joined(joined, together, layout.kinds or {})
@@ -232,8 +232,8 @@ def _joined(members: Sequence[Placed], together: Sequence[str], given: Given) ->
     )  # fmt: skip
     repairs = [repair for read in reads for repair in (read.block and read.block.repairs) or ()]
     repair = Repair(
-        sum(one.filled for one in repairs), max((one.longest for one in repairs), default=0.0),
-        max((one.cropped for one in repairs), default=0.0),
+        sum(repair.filled for repair in repairs), max((repair.longest for repair in repairs), default=0.0),
+        max((repair.cropped for repair in repairs), default=0.0),
     )  # fmt: skip
     labels = {read.block.labels[0] for read in reads if read.block} - {as_text(entry.relative.parent.name), None}
     label = labels.pop() if len(labels) == 1 else as_text(place.relative.parent.name) or None

@@ -172,39 +172,39 @@ def merge_files(
     DataError
         There is none.
     """
-    reported = [*problems, *(problem for one in files for problem in one.problems)]
-    full = [one for one in files if one.block is not None and len(one.block.labels)]
+    reported = [*problems, *(problem for file in files for problem in file.problems)]
+    full = [file for file in files if file.block is not None and len(file.block.labels)]
     if not full:
         if len(reported) == 1 and reported[0].file == Path(where).name:  # one file alone: it is named once
             raise DataError(str(reported[0]._replace(file=where)))
         first = f"; {len(reported)} could not be read, the first {reported[0]}" if reported else ""
         raise DataError("; ".join([f"expected recordings in {where}, found none{first}", *note_on_missing(reported)]))
     dims: Counter[int] = Counter()
-    for one in full:
-        dims[_block(one).positions.shape[1]] += len(_block(one).labels)
+    for file in full:
+        dims[_block(file).positions.shape[1]] += len(_block(file).labels)
     n_dims = dims.most_common(1)[0][0]
-    odd = [one for one in full if _block(one).positions.shape[1] != n_dims]
-    full = [one for one in full if _block(one).positions.shape[1] == n_dims]
+    odd = [file for file in full if _block(file).positions.shape[1] != n_dims]
+    full = [file for file in full if _block(file).positions.shape[1] == n_dims]
     reported += dimensions_unlike(odd, full)
-    understood = {one.path: one.detected for one in full}
+    understood = {file.path: file.detected for file in full}
     full, channels, odd_channels = with_channels(full, kinds or {}, skip, by_number)
     reported += odd_channels
-    if not any(len(_block(one).labels) for one in full):
-        none = next((one for one in reported if not one.samples), reported[0])
+    if not any(len(_block(file).labels) for file in full):
+        none = next((problem for problem in reported if not problem.samples), reported[0])
         raise DataError(f"expected recordings in {where}, found none; the first that is none: {none}")
     sources = tuple(
-        Source(one.path, one.sha256, one.size, one.mtime, place, label, person or one.person, *repair)
-        for one in full
+        Source(file.path, file.sha256, file.size, file.mtime, place, label, person or file.person, *repair)
+        for file in full
         for place, label, person, repair in zip(
-            _block(one).places,
-            _block(one).labels,
-            _people(one),
-            _block(one).repairs or [Repair()] * len(_block(one).labels),
+            _block(file).places,
+            _block(file).labels,
+            _people(file),
+            _block(file).repairs or [Repair()] * len(_block(file).labels),
             strict=True,
         )
     )
-    detected = Counter(how for one in full if (how := understood[one.path]))
-    blocks = [_block(one) for one in full]
+    detected = Counter(how for file in full if (how := understood[file.path]))
+    blocks = [_block(file) for file in full]
     lengths = np.concatenate([np.diff(block.offsets) for block in blocks])
     offsets = np.concatenate(([0], np.cumsum(lengths)))
     positions = _concatenated([block.positions for block in blocks])
@@ -222,14 +222,14 @@ def merge_files(
     )
 
 
-def _people(one: FileRead) -> Sequence[str | None]:
+def _people(file: FileRead) -> Sequence[str | None]:
     """Who showed each movement, as the file says it."""
-    return _block(one).people or [None] * len(_block(one).labels)
+    return _block(file).people or [None] * len(_block(file).labels)
 
 
-def _block(one: FileRead) -> Block:
-    assert one.block is not None
-    return one.block
+def _block(file: FileRead) -> Block:
+    assert file.block is not None
+    return file.block
 
 
 def _concatenated(arrays: Sequence[Any]) -> Any:
@@ -265,20 +265,24 @@ def with_channels(
     same, nameless, problems = in_one_set(files, by_number)
     channels = _channels_of(same, given)
     if nameless and is_plain(channels):
-        place = {one.path: k for k, one in enumerate(files)}
-        return _without_wraps(sorted([*same, *nameless], key=lambda one: place[one.path]), given), None, problems
+        place = {file.path: k for k, file in enumerate(files)}
+        return _without_wraps(sorted([*same, *nameless], key=lambda file: place[file.path]), given), None, problems
     heads = list(recorded_names(channels))
     problems += [
-        Problem(one.path, None, f"no names of columns where most files have {heads}; name them as these are")
-        for one in nameless
+        Problem(file.path, None, f"no names of columns where most files have {heads}; name them as these are")
+        for file in nameless
     ]
-    checked = [_check_orientations(_in_order(one, channels), channels, skip) for one in same]
-    return [one for one, _ in checked], channels, [*problems, *(one for _, several in checked for one in several)]
+    checked = [_check_orientations(_in_order(file, channels), channels, skip) for file in same]
+    return (
+        [file for file, _ in checked],
+        channels,
+        [*problems, *(problem for _, several in checked for problem in several)],
+    )
 
 
 def _channels_of(files: Sequence[FileRead], given: Given) -> Channels:
     """The channels of files that all have the same heads."""
-    blocks, detected = [_block(one) for one in files], files[0].detected
+    blocks, detected = [_block(file) for file in files], files[0].detected
     assert detected is not None
     return find_channels(
         detected.columns,
@@ -292,34 +296,34 @@ def _channels_of(files: Sequence[FileRead], given: Given) -> Channels:
 def _without_wraps(files: Sequence[FileRead], given: Given) -> list[FileRead]:
     """Files of several heads, in the columns of each the angles continuous."""
     groups: dict[tuple[str, ...], list[FileRead]] = {}
-    for one in files:
-        groups.setdefault(one.detected.columns if one.detected else (), []).append(one)
-    known = {}
+    for file in files:
+        groups.setdefault(file.detected.columns if file.detected else (), []).append(file)
+    channels_of_heads = {}
     for heads, group in groups.items():
         here = {
             key: kind
             for key, kind in given.items()
             if key in heads or {name.strip() for name in key.split(",")} <= {*heads}
         }
-        known[heads] = _channels_of(group, here)
+        channels_of_heads[heads] = _channels_of(group, here)
     result = []
-    for one in files:
-        block, channels = _block(one), known[one.detected.columns if one.detected else ()]
+    for file in files:
+        block, channels = _block(file), channels_of_heads[file.detected.columns if file.detected else ()]
         if is_plain(channels):
             block = replace(block, positions=canonical(block.positions, block.offsets, channels))
-        result.append(one._replace(block=block))
+        result.append(file._replace(block=block))
     return result
 
 
-def _in_order(one: FileRead, channels: Channels) -> FileRead:
+def _in_order(file: FileRead, channels: Channels) -> FileRead:
     """A file with the columns of each of its channels side by side."""
-    block, heads = _block(one), one.detected.columns if one.detected else ()
-    return one._replace(block=replace(block, positions=in_order(block.positions, heads, channels)))
+    block, heads = _block(file), file.detected.columns if file.detected else ()
+    return file._replace(block=replace(block, positions=in_order(block.positions, heads, channels)))
 
 
-def _check_orientations(one: FileRead, channels: Channels, skip: str) -> tuple[FileRead, list[Problem]]:
+def _check_orientations(file: FileRead, channels: Channels, skip: str) -> tuple[FileRead, list[Problem]]:
     """A file without the movements, or the samples alone, in which a quaternion is not of norm 1."""
-    block, problems, faults = _block(one), [], dict[int, str]()
+    block, problems, faults = _block(file), [], dict[int, str]()
     good = np.ones(len(block.labels), dtype=bool)
     for channel, odd, norms in off_norm(block.positions, channels):
         owners = np.searchsorted(block.offsets, odd, side="right") - 1
@@ -331,12 +335,12 @@ def _check_orientations(one: FileRead, channels: Channels, skip: str) -> tuple[F
         faults |= dict(zip((block.row(k) for k in odd.tolist()), reasons, strict=True))
         for i, first in zip(*map(np.ndarray.tolist, np.unique(owners, return_index=True)), strict=True):
             line = block.line_of(block.row(int(odd[first])))
-            problems.append(Problem(one.path, line, movement_of(block, i) + reasons[first], TrajectoryError))
+            problems.append(Problem(file.path, line, movement_of(block, i) + reasons[first], TrajectoryError))
         good[owners] = False
     if faults and skip == "sample":
-        block, problems = check_block(replace(block, faults=faults), one.path, Layout(skip=skip), ())
-        return one._replace(block=block), problems
-    return one._replace(block=take_movements(block, good)), problems
+        block, problems = check_block(replace(block, faults=faults), file.path, Layout(skip=skip), ())
+        return file._replace(block=block), problems
+    return file._replace(block=take_movements(block, good)), problems
 
 
 def people_of(path: Path, sources: Sequence[Source]) -> NDArray[Any] | None:
@@ -386,5 +390,5 @@ def _people_in(file: Path) -> list[str] | None:
     if file.suffix.lower() != ".npz":
         return None
     arrays = Npz(file.read_bytes(), file)
-    name = next((one for one in NAMES if one in arrays), None)
-    return None if name is None else [str(one) for one in np.atleast_1d(arrays[name]).tolist()]
+    name = next((name for name in NAMES if name in arrays), None)
+    return None if name is None else [str(person) for person in np.atleast_1d(arrays[name]).tolist()]

@@ -149,8 +149,8 @@ def _folder(path: Path, level: str | int | None) -> str | None:
 
 def _parts(path: Path, n: int) -> list[str]:
     """The names of a path; of as much of the whole path as has n of them."""
-    parts = [one for one in path.parts if one not in {path.anchor, ".", ".."}]
+    parts = [part for part in path.parts if part not in {path.anchor, ".", ".."}]
     if len(parts) < n or ".." in path.parts:
-        whole = Path(os.path.abspath(path))
-        parts = [one for one in whole.parts if one != whole.anchor]
-    return [as_text(one) for one in parts]
+        absolute = Path(os.path.abspath(path))
+        parts = [part for part in absolute.parts if part != absolute.anchor]
+    return [as_text(part) for part in parts]

@@ -72,18 +72,18 @@ def read_file(path: Path, relative: Path, layout: Layout, follow_links: bool = F
     name = as_text(relative)
     try:
         parts, form = _parts(path, relative, follow_links)
-        known = [os.stat(part) for part in parts]
-        if not all(stat.S_ISREG(one.st_mode) for one in known):  # reading a pipe would wait forever
+        statuses = [os.stat(part) for part in parts]
+        if not all(stat.S_ISREG(status.st_mode) for status in statuses):  # reading a pipe would wait forever
             raise DataError("expected a file, got a pipe or a device")
         if form.read_path is None:
-            check_expanded(known[0].st_size)
+            check_expanded(statuses[0].st_size)
             data = path.read_bytes()
     except (OSError, MemoryError, DataError) as error:
         reason = _NOWHERE if path.is_symlink() and not os.path.exists(path) else _plainly(error)
         return FileRead(name, "", 0, 0.0, None, None, [Problem(name, None, reason)])
     if form.read_path is None:
-        return read_bytes(data, relative, layout, known[0].st_mtime)
-    size, mtime = sum(one.st_size for one in known), max(one.st_mtime for one in known)
+        return read_bytes(data, relative, layout, statuses[0].st_mtime)
+    size, mtime = sum(status.st_size for status in statuses), max(status.st_mtime for status in statuses)
     read = _parsed(partial(form.read_path, path), form, relative, layout)
     if read.block is None:
         return read._replace(size=size, mtime=mtime)
@@ -125,8 +125,8 @@ def _parsed(parse: Callable[[Layout], Parsed], form: Format, relative: Path, lay
     except _UNREADABLE as error:
         return FileRead(name, "", 0, 0.0, None, None, [Problem(name, None, _plainly(error))])
     label = as_text(relative.stem) if form.label_is_stem else as_text(relative.parent.name) or None
-    labels = [label if one is None else _storable(one) for one in block.labels]
-    people = block.people and [None if one is None else _storable(one) for one in block.people]
+    labels = [label if own is None else _storable(own) for own in block.labels]
+    people = block.people and [None if person is None else _storable(person) for person in block.people]
     bare = Block(block.positions, block.times, block.offsets, labels, block.places)  # releases the bytes of the file
     block = replace(bare, people=people, repairs=block.repairs)
     problems += [Problem(name, None, _storable(" ".join(reason.splitlines()))) for reason in left_out]
@@ -147,14 +147,14 @@ def _parts(path: Path, relative: Path, follow_links: bool) -> tuple[list[Path], 
 
 def _sha256(parts: Sequence[Path], path: Path) -> str:
     """Of the bytes of a file; of a data set, of the names of its files and of their checksums."""
-    known = []
+    checksums = []
     for part in parts:
         with part.open("rb") as file:
-            known.append(hashlib.file_digest(file, "sha256").hexdigest())
+            checksums.append(hashlib.file_digest(file, "sha256").hexdigest())
     if parts == [path]:
-        return known[0]
+        return checksums[0]
     names = [as_text(part.relative_to(path)) for part in parts]
-    lines = [f"{one}  {name}\n" for one, name in zip(known, names, strict=True)]
+    lines = [f"{checksum}  {name}\n" for checksum, name in zip(checksums, names, strict=True)]
     return hashlib.sha256("".join(lines).encode()).hexdigest()
 
 
@@ -274,25 +274,25 @@ def _kept(parsed: Parsed, layout: Layout) -> Parsed:
         dropped |= {*nothing[np.isnan(block.positions[:, nothing]).all(axis=0)].tolist()}
     if not dropped:
         return parsed
-    kept = [k for k in range(len(heads)) if k not in dropped]
-    if not kept:
+    columns = [k for k in range(len(heads)) if k not in dropped]
+    if not columns:
         raise DataError(
             f"expected columns with numbers besides those that are excluded, got {listed(heads)}; exclude fewer"
             if layout.excluded
             else f"expected numbers in the columns {listed(heads)}, got none"
         )
     detected = detected._replace(
-        columns=_at(heads, kept),
-        measured_in=detected.measured_in and _at(detected.measured_in, kept),
+        columns=_at(heads, columns),
+        measured_in=detected.measured_in and _at(detected.measured_in, columns),
         ignored=(*detected.ignored, *(heads[k] for k in sorted(dropped))),
     )
-    return parsed._replace(detected=detected, block=replace(block, positions=block.positions[:, kept]))
+    return parsed._replace(detected=detected, block=replace(block, positions=block.positions[:, columns]))
 
 
-def _named_as(parsed: Parsed, known: Known) -> Parsed:
+def _named_as(parsed: Parsed, others: Known) -> Parsed:
     """A file with the names of as many columns of the movements to compare with, in its own units."""
     detected = parsed.detected
-    names = next((heads for heads in (known.columns, known.moving) if len(heads) == len(detected.columns)), None)
+    names = next((heads for heads in (others.columns, others.moving) if len(heads) == len(detected.columns)), None)
     if names is None:
         return parsed
     units = detected.measured_in or tuple(unit_of(head) or "" for head in detected.columns)

@@ -95,7 +95,7 @@ def heads_of(cells: Sequence[str]) -> Heads | None:
         No column of labels; or a start and an end in another unit than of time, as frames.
     """
     names = [cell.strip().strip('"#').strip().lower() for cell in cells]
-    either = [[k for k, one in enumerate(names) if wanted.match(one)] for wanted in (_START, _END)]
+    either = [[k for k, name in enumerate(names) if wanted.match(name)] for wanted in (_START, _END)]
     starts, ends = ([k for k in some if _is_time(names[k])] for some in either)
     if all(either) and not (starts and ends):
         odd = next(k for some in either for k in some if not _is_time(names[k]))
@@ -106,18 +106,18 @@ def heads_of(cells: Sequence[str]) -> Heads | None:
     if not starts or not ends:
         return None
     start, end = (min(some, key=lambda k: "hh:mm" in names[k]) for some in (starts, ends))
-    known = [k for k, one in enumerate(names) if one in _LABELS]
-    others = [k for k, one in enumerate(names) if k not in {*starts, *ends} and not one.startswith("duration")]
+    labeled = [k for k, name in enumerate(names) if name in _LABELS]
+    others = [k for k, name in enumerate(names) if k not in {*starts, *ends} and not name.startswith("duration")]
     aside = _RECORDINGS | _PLACES
-    labels = known or [k for k in others if names[k] and names[k] not in aside]
-    if len(labels) != 1 and not known:
+    labels = labeled or [k for k in others if names[k] and names[k] not in aside]
+    if len(labels) != 1 and not labeled:
         raise DataError(f"expected one column of labels beside start and end, got {list(cells)}; call it label")
     return Heads(
         start,
         end,
         labels[0],
-        next((k for k, one in enumerate(names) if one in _RECORDINGS), None),
-        next((k for k, one in enumerate(names) if one in _PLACES), None),
+        next((k for k, name in enumerate(names) if name in _RECORDINGS), None),
+        next((k for k, name in enumerate(names) if name in _PLACES), None),
         (_unit_of(names[start]), _unit_of(names[end])),
         "time - " in names[start],
     )
@@ -243,7 +243,7 @@ def read_labels(path: Path) -> LabelTable:
 
 def _table(data: bytes) -> tuple[list[LabelRow], bool]:
     text = data.decode("utf-8-sig")
-    first = next((one for one in text.splitlines() if one.strip() and not one.startswith(_SKIPPED)), "")
+    first = next((line for line in text.splitlines() if line.strip() and not line.startswith(_SKIPPED)), "")
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=max("\t;,", key=first.count))
     cells = [(reader.line_num, row) for row in reader if any(row) and not row[0].startswith(("\\", "#"))]
     if not cells:
@@ -258,13 +258,13 @@ def _table(data: bytes) -> tuple[list[LabelRow], bool]:
 
 def _json(data: bytes) -> tuple[list[LabelRow], bool]:
     rows = json.loads(data)
-    if not isinstance(rows, list) or not all(isinstance(one, dict) for one in rows):
+    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
         raise DataError("expected a list of objects with start, end and label, got something else")
-    names = list(dict.fromkeys(str(name) for one in rows for name in one))
+    names = list(dict.fromkeys(str(name) for row in rows for name in row))
     heads = heads_of(names)
     if heads is None:
         raise DataError(f"expected objects with start, end and label, got {names[:20]}")
-    return [row_of([_text(one.get(name)) for name in names], heads, k) for k, one in enumerate(rows, 1)], False
+    return [row_of([_text(row.get(name)) for name in names], heads, k) for k, row in enumerate(rows, 1)], False
 
 
 def _text(value: Any) -> str:
@@ -273,9 +273,9 @@ def _text(value: Any) -> str:
 
 def _elan(data: bytes) -> tuple[list[LabelRow], bool]:
     root = ElementTree.fromstring(data)
-    slots = {one.get("TIME_SLOT_ID"): one.get("TIME_VALUE", "") for one in root.iter("TIME_SLOT")}
-    tiers = {one.get("TIER_ID", ""): one.findall(".//ALIGNABLE_ANNOTATION") for one in root.iter("TIER")}
-    aligned = {name: found for name, found in tiers.items() if found}
+    slots = {slot.get("TIME_SLOT_ID"): slot.get("TIME_VALUE", "") for slot in root.iter("TIME_SLOT")}
+    tiers = {tier.get("TIER_ID", ""): tier.findall(".//ALIGNABLE_ANNOTATION") for tier in root.iter("TIER")}
+    aligned = {name: annotations for name, annotations in tiers.items() if annotations}
     name = "symbol" if "symbol" in aligned else next(iter(aligned), None)
     if name is None:
         return [], True
@@ -283,7 +283,7 @@ def _elan(data: bytes) -> tuple[list[LabelRow], bool]:
         raise DataError(
             f"expected one tier with annotations, or one named symbol, got {list(aligned)}; delete the others"
         )
-    return [row_of(_cells(one, slots), _MILLISECONDS, k) for k, one in enumerate(aligned[name], 1)], True
+    return [row_of(_cells(annotation, slots), _MILLISECONDS, k) for k, annotation in enumerate(aligned[name], 1)], True
 
 
 def _cells(annotation: Any, slots: dict[str | None, str]) -> Sequence[str]:
@@ -415,12 +415,14 @@ def _too_short(row: LabelRow, source: Source, times: Array, since: bool) -> str:
 
 def _cut(demos: Demonstrations, stretches: Sequence[tuple[int, int]], sources: Sequence[Source]) -> Demonstrations:
     """The stretches of samples as movements; what is learned of orientations and angles begins anew in each."""
-    whole, kept = demos.movements, np.concatenate([np.arange(*one) for one in stretches])
+    movements, samples = demos.movements, np.concatenate([np.arange(*stretch) for stretch in stretches])
     offsets = np.concatenate(([0], np.cumsum([stop - start for start, stop in stretches])))
-    times, labels = whole.stamps[kept], [one.label for one in sources]
-    names = tuple(f"{one.path}#{one.place}" for one in sources)
-    positions = np.ascontiguousarray((demos.positions if whole.channels is None else demos.recorded)[kept])
+    times, labels = movements.stamps[samples], [source.label for source in sources]
+    names = tuple(f"{source.path}#{source.place}" for source in sources)
+    positions = np.ascontiguousarray((demos.positions if movements.channels is None else demos.recorded)[samples])
     labeled = None if None in labels else label_array(labels, len(labels), names)
     durations = times[offsets[1:] - 1] - times[offsets[:-1]]
-    pieces = Movements(positions, offsets, durations, times, labeled, names, whole.dimensions)
-    return Demonstrations.of_movements(pieces if whole.channels is None else of_channels(pieces, whole.channels))
+    pieces = Movements(positions, offsets, durations, times, labeled, names, movements.dimensions)
+    return Demonstrations.of_movements(
+        pieces if movements.channels is None else of_channels(pieces, movements.channels)
+    )

@@ -23,17 +23,17 @@ _PAUSE = 1.0  # s without samples from which on a movement may be several
 def notes_on_gaps(recordings: Recordings) -> list[str]:
     """Say which numbers count as no value, what is converted, what was filled and cropped, what lacks values."""
     sources, notes = recordings.sources, []
-    if sentinels := [*dict.fromkeys(one for how, _ in recordings.detected for one in how.sentinels)]:
+    if sentinels := [*dict.fromkeys(sentinel for how, _ in recordings.detected for sentinel in how.sentinels)]:
         notes.append(f"{first_names(sentinels, _NAMED)} counts as no value, far from all others")
-    if converted := [*dict.fromkeys(one for how, _ in recordings.detected for one in how.converted)]:
+    if converted := [*dict.fromkeys(unit for how, _ in recordings.detected for unit in how.converted)]:
         notes.append(f"units are converted to those of most columns: {first_names(converted, _NAMED)}")
-    if filled := [one for one in sources if one.filled]:
-        samples, longest = sum(one.filled for one in filled), max(one.longest_gap for one in filled)
+    if filled := [source for source in sources if source.filled]:
+        samples, longest = sum(source.filled for source in filled), max(source.longest_gap for source in filled)
         notes.append(
             f"gaps of up to {longest:.3g} s were filled in {counted(len(filled), 'movement')}, "
             f"{counted(samples, 'sample')} in all; --fill-gaps 0 fills none"
         )
-    if cropped := [one.cropped for one in sources if one.cropped]:
+    if cropped := [source.cropped for source in sources if source.cropped]:
         notes.append(
             f"{counted(len(cropped), 'movement')} cropped to where all columns have values, by up to "
             f"{max(cropped):.3g} s, {sum(cropped):.3g} s in all"

@@ -131,7 +131,7 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
         exclude=exclude, fill_gaps=fill_gaps, rows=rows, every=every,
     )  # fmt: skip
     rule = NameRule(label_pattern, label_by)
-    paths = [Path(path)] if isinstance(path, (str, Path)) else [Path(one) for one in path]
+    paths = [Path(path)] if isinstance(path, (str, Path)) else [Path(each) for each in path]
     return read_paths(paths, layout, rule, follow_links=follow_links, trim=trim, join=join_files, progress=progress)
 
 
@@ -161,15 +161,15 @@ def read_paths(  # noqa: PLR0913 - those of `read_recordings`, in records
     by_path = {entry.path: entry for entry in entries}
     parts = layout
     if join:  # their columns are chosen when they are side by side
-        known = layout.known and replace(layout.known, columns=())
-        parts = replace(layout, columns=None, exclude=None, known=known)
+        known_columns = layout.known and replace(layout.known, columns=())
+        parts = replace(layout, columns=None, exclude=None, known=known_columns)
 
     def placed(path: Path, layout: Layout) -> Placed:
         entry = by_path[path]
         relative = Path(entry.relative.name) if rule.label_by == TASK else entry.relative
-        one = read_file(path, relative, layout, follow_links)
-        one = one._replace(path=entry.name, problems=[each._replace(file=entry.name) for each in one.problems])
-        return one, entry._replace(relative=relative)
+        read = read_file(path, relative, layout, follow_links)
+        read = read._replace(path=entry.name, problems=[each._replace(file=entry.name) for each in read.problems])
+        return read, entry._replace(relative=relative)
 
     files = [placed(path, parts) for path in (by_path if progress is None else progress(list(by_path)))]
     notes = () if join else notes_on_clocks(files)
@@ -178,10 +178,10 @@ def read_paths(  # noqa: PLR0913 - those of `read_recordings`, in records
         beside = {entry.path for _, entry in joined} - {*by_path}  # folders that are one recording
         alone = {entry.path for _, entry in joined if entry.path in by_path and entry.path.parent not in beside}
         files = [
-            placed(entry.path, layout) if parts != layout and entry.path in alone else (one, entry)
-            for one, entry in joined
+            placed(entry.path, layout) if parts != layout and entry.path in alone else (file, entry)
+            for file, entry in joined
         ]
-    read += [rule.apply(one, entry.path) for one, entry in files]
+    read += [rule.apply(file, entry.path) for file, entry in files]
     recordings = merge_files(read, in_words(where), problems, layout.kinds, layout.skip, layout.by_number)
     recordings = replace(recordings, notes=notes)
     # Refuse a column to exclude that no file has: it is most likely misspelled.
@@ -228,14 +228,14 @@ def read_recording(path: str | Path) -> Trajectory:
     read = read_file(path, name_of(path), Layout())
     for problem in read.problems:
         raise problem.error(str(problem._replace(file=str(path))))
-    one = merge_files([read], str(path))
-    for problem in one.problems:
+    recordings = merge_files([read], str(path))
+    for problem in recordings.problems:
         raise problem.error(str(problem._replace(file=str(path))))
-    if len(one) > 1:
-        raise DataError(f"expected one movement in {path}, got {len(one)}; read them with read_recordings")
-    for note in notes_on_gaps(one):
+    if len(recordings) > 1:
+        raise DataError(f"expected one movement in {path}, got {len(recordings)}; read them with read_recordings")
+    for note in notes_on_gaps(recordings):
         warn(f"{path}: {note}", UserWarning, 2)
-    named = replace(one.demonstrations.movements, names=(str(name_of(path)),), labels=None)
+    named = replace(recordings.demonstrations.movements, names=(str(name_of(path)),), labels=None)
     return Demonstrations.of_movements(named)[0]
 
 

@@ -67,10 +67,10 @@ def _copy_folder(bag: Bag, source: Path, target: Path, added: AddedTopic) -> Non
     if bag.compression == "message":
         added = added._replace(messages=tuple((stamp, _compressed(raw)) for stamp, raw in added.messages))
     with refused(f"expected {METADATA} of a bag of ROS 2", "run ros2 bag reindex"):
-        whole = yaml.load((source / METADATA).read_text(encoding="utf-8"))
-        about = whole[INFORMATION]
-        names = [PurePath(one).name for one in about["relative_file_paths"]]
-        parts = _divided(added, [one.metadata.start_time for one in storages_of(bag)])
+        metadata = yaml.load((source / METADATA).read_text(encoding="utf-8"))
+        about = metadata[INFORMATION]
+        names = [PurePath(file).name for file in about["relative_file_paths"]]
+        parts = _divided(added, [storage.metadata.start_time for storage in storages_of(bag)])
         changed = {names[k]: part for k, part in parts.items()}
         if added.messages:
             _count(about, added)
@@ -80,11 +80,11 @@ def _copy_folder(bag: Bag, source: Path, target: Path, added: AddedTopic) -> Non
     shutil.copytree(
         source, target, dirs_exist_ok=True, ignore=lambda folder, _: changed if Path(folder) == source else ()
     )
-    for one, part in changed.items():
-        _copy_file(source / one, target / one, part, storages_of(bag)[names.index(one)])
+    for name, part in changed.items():
+        _copy_file(source / name, target / name, part, storages_of(bag)[names.index(name)])
     if changed:
         with (target / METADATA).open("w", encoding="utf-8") as file:
-            yaml.dump(whole, file)
+            yaml.dump(metadata, file)
 
 
 def _copy_file(source: Path, target: Path, added: AddedTopic, storage: Any) -> None:
@@ -190,14 +190,21 @@ def copy_bag(bag: Bag, target: Path, added: AddedTopic) -> None:
         writer.compressor = _compressed_by_lz4
     copies: dict[tuple[Any, ...], Any] = {}  # a node that began anew has connections that are equal
     with writer:
-        for one in bag.reader.connections:
-            about = (one.topic, one.msgtype, one.msgdef.data, one.digest, one.ext.callerid, one.ext.latching)
+        for existing in bag.reader.connections:
+            about = (
+                existing.topic,
+                existing.msgtype,
+                existing.msgdef.data,
+                existing.digest,
+                existing.ext.callerid,
+                existing.ext.latching,
+            )
             if about not in copies:
-                extra = {"callerid": one.ext.callerid, "latching": one.ext.latching}
+                extra = {"callerid": existing.ext.callerid, "latching": existing.ext.latching}
                 copies[about] = writer.add_connection(*about[:2], msgdef=about[2], md5sum=about[3], **extra)
-            copies[one.id,] = copies[about]
+            copies[existing.id,] = copies[about]
         copies[()] = writer.add_connection(added.name, TEXT, msgdef=added.definition, md5sum=added.digest)
-        recorded = ((stamp, (one.id,), raw) for one, stamp, raw in bag.reader.messages())
+        recorded = ((stamp, (connection.id,), raw) for connection, stamp, raw in bag.reader.messages())
         texts = ((stamp, (), raw) for stamp, raw in added.messages)
         for stamp, connection, raw in merge(recorded, texts, key=lambda message: message[0]):
             writer.write(copies[connection], stamp, raw)
@@ -236,19 +243,23 @@ def copy_mcap(source: Path, target: Path, added: AddedTopic, compression: str) -
                 stamp, raw = texts.popleft()
                 writer.add_message(topic, stamp, raw, stamp, len(added.messages) - len(texts) - 1)
 
-        for one in parts:
-            if isinstance(one, records.Schema) and one.id not in schemas:
-                schemas[one.id] = writer.register_schema(one.name, one.encoding, one.data)
-            elif isinstance(one, records.Channel) and one.id not in channels:
-                schema = schemas[one.schema_id]
-                channels[one.id] = writer.register_channel(one.topic, one.message_encoding, schema, one.metadata)
-            elif isinstance(one, records.Message):
-                write_texts(one.log_time)
-                writer.add_message(channels[one.channel_id], one.log_time, one.data, one.publish_time, one.sequence)
-            elif isinstance(one, records.Attachment):
-                writer.add_attachment(**vars(one))
-            elif isinstance(one, records.Metadata):
-                writer.add_metadata(one.name, one.metadata)
+        for record in parts:
+            if isinstance(record, records.Schema) and record.id not in schemas:
+                schemas[record.id] = writer.register_schema(record.name, record.encoding, record.data)
+            elif isinstance(record, records.Channel) and record.id not in channels:
+                schema = schemas[record.schema_id]
+                channels[record.id] = writer.register_channel(
+                    record.topic, record.message_encoding, schema, record.metadata
+                )
+            elif isinstance(record, records.Message):
+                write_texts(record.log_time)
+                writer.add_message(
+                    channels[record.channel_id], record.log_time, record.data, record.publish_time, record.sequence
+                )
+            elif isinstance(record, records.Attachment):
+                writer.add_attachment(**vars(record))
+            elif isinstance(record, records.Metadata):
+                writer.add_metadata(record.name, record.metadata)
         write_texts(inf)
         writer.finish()
 
@@ -258,14 +269,14 @@ def _records_of_mcap(file: BinaryIO) -> Iterator[Any]:
     from mcap.records import Chunk, DataEnd
     from mcap.stream_reader import StreamReader, breakup_chunk
 
-    for one in StreamReader(file, emit_chunks=True, validate_crcs=True).records:
-        if isinstance(one, DataEnd):
+    for record in StreamReader(file, emit_chunks=True, validate_crcs=True).records:
+        if isinstance(record, DataEnd):
             return
-        if not isinstance(one, Chunk):
-            yield one
+        if not isinstance(record, Chunk):
+            yield record
             continue
-        data = expand(one.compression, one.data, one.uncompressed_size) if one.compression else one.data
-        yield from breakup_chunk(replace(one, data=data, compression=""), validate_crc=True)
+        data = expand(record.compression, record.data, record.uncompressed_size) if record.compression else record.data
+        yield from breakup_chunk(replace(record, data=data, compression=""), validate_crc=True)
 
 
 def copy_sqlite(source: Path, target: Path, added: AddedTopic) -> None:

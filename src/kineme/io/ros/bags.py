@@ -98,12 +98,12 @@ def open_bag(path: Path) -> Iterator[Bag]:
     bound_chunks_of_mcap()
     with ExitStack() as stack:
         folder = stack.enter_context(expanded_folder(path)) if not ending else Folder(path, (path,), "")
-        for one in folder.files:
-            if one.suffix.lower() == ".mcap" or one == path:
+        for file in folder.files:
+            if file.suffix.lower() == ".mcap" or file == path:
                 try:
-                    check_records(one)
+                    check_records(file)
                 except DataError as error:
-                    raise DataError(str(error) if one == path else f"{one.name}: {error}") from error
+                    raise DataError(str(error) if file == path else f"{file.name}: {error}") from error
         plain = stack.enter_context(plain_name(folder.path, ending))
         with refused("expected a bag of ROS that can be opened", remedy):
             reader: Any = (Reader1 if ending == ".bag" else Reader2)(plain)
@@ -145,10 +145,10 @@ def messages_of(bag: Bag, topics: Sequence[Topic]) -> Iterator[tuple[int, int, b
     DataError
         The bag is damaged from here on.
     """
-    connections = [one for topic in topics for one in topic.connections]
+    connections = [connection for topic in topics for connection in topic.connections]
     if not connections:  # none would mean all to rosbags
         return
-    index_of = {id(one): k for k, topic in enumerate(topics) for one in topic.connections}
+    index_of = {id(connection): k for k, topic in enumerate(topics) for connection in topic.connections}
     with refused("expected messages to the end", bag.remedy):
         for storage in storages_of(bag):
             check_overlaps(storage, [topic.name for topic in topics])
@@ -166,11 +166,13 @@ def storages_of(bag: Bag) -> Sequence[Any]:
 
 
 def _topics(connections: Sequence[Any]) -> tuple[Topic, ...]:
-    def key(one: Any) -> tuple[str, str]:
-        return str(one.topic), _type_name(str(one.msgtype))
+    def key(connection: Any) -> tuple[str, str]:
+        return str(connection.topic), _type_name(str(connection.msgtype))
 
     groups = [(name, list(some)) for name, some in groupby(sorted(connections, key=key), key)]
-    return tuple(Topic(*name, sum(int(one.msgcount) for one in some), tuple(some)) for name, some in groups)
+    return tuple(
+        Topic(*name, sum(int(connection.msgcount) for connection in some), tuple(some)) for name, some in groups
+    )
 
 
 def _type_name(name: str) -> str:
@@ -227,20 +229,20 @@ def _check_mcap(file: BinaryIO, at: int) -> bytes:
 @contextmanager
 def plain_name(path: Path, ending: str) -> Iterator[Path]:
     """The path, or a link to it: the name of a database is an address to SQLite, where these characters mean more."""
-    files = [one for kind in ("*.db3*", "*.mcap*") for one in path.glob(kind)] if not ending else [path]
+    files = [file for kind in ("*.db3*", "*.mcap*") for file in path.glob(kind)] if not ending else [path]
     if ending not in ("", ".db3") or not _MEAN_MORE & set("".join(map(str, files))):
         yield path
         return
     plain = str.maketrans(dict.fromkeys(_MEAN_MORE, "_"))
     with TemporaryDirectory() as folder:
-        for one in files:
-            (Path(folder) / one.name.translate(plain)).symlink_to(one.resolve())
+        for file in files:
+            (Path(folder) / file.name.translate(plain)).symlink_to(file.resolve())
         if ending:
             yield Path(folder) / path.name.translate(plain)
             return
         about = (path / "metadata.yaml").read_text(encoding="utf-8")
-        for one in files:
-            about = about.replace(one.name, one.name.translate(plain))
+        for file in files:
+            about = about.replace(file.name, file.name.translate(plain))
         (Path(folder) / "metadata.yaml").write_text(about, encoding="utf-8")
         yield Path(folder)
 
@@ -248,10 +250,10 @@ def plain_name(path: Path, ending: str) -> Iterator[Path]:
 def logs_beside(path: Path) -> list[str]:
     """What is left out of a bag in SQLite: the log of a recording that was cut off, which holds its last messages."""
     files = sorted(path.glob("*.db3")) if path.is_dir() else [path] if path.suffix.lower() == ".db3" else []
-    logs = [(one, one.with_name(f"{one.name}-wal")) for one in files]
+    logs = [(file, file.with_name(f"{file.name}-wal")) for file in files]
     return [
-        f"{log.name}: messages that are not in the database yet; to add them, open it once: sqlite3 {one.name} "
+        f"{log.name}: messages that are not in the database yet; to add them, open it once: sqlite3 {file.name} "
         "'PRAGMA wal_checkpoint(TRUNCATE)'"
-        for one, log in logs
+        for file, log in logs
         if log.is_file() and log.stat().st_size
     ]

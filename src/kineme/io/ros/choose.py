@@ -52,19 +52,19 @@ def choose(bag: Bag, layout: Layout) -> Choice:
         A topic that is not there or cannot be read; nothing that can be read; or several topics where none is named.
         The message lists the topics.
     """
-    frames = tuple(pair_of(one) for one in layout.frames)
+    frames = tuple(pair_of(frame) for frame in layout.frames)
     named = [_named(bag, name) for name in layout.topics]
-    topics = tuple(one for one in named if one.type not in TRANSFORMS)
-    transforms = _transforms(bag, {one.name for one in named if one.type in TRANSFORMS})
+    topics = tuple(topic for topic in named if topic.type not in TRANSFORMS)
+    transforms = _transforms(bag, {topic.name for topic in named if topic.type in TRANSFORMS})
     if not frames and len(topics) < len(named):
         frames = (_only_frames(bag, transforms),)
     if topics or frames:
         return Choice(topics, frames, transforms)
-    candidates = [one for one in bag.topics if can_be_read(one)]
+    candidates = [topic for topic in bag.topics if can_be_read(topic)]
     if len(candidates) == 1 and not transforms:
         return Choice((candidates[0],))
-    if layout.known is not None and (known := _as_known(bag, layout.known, candidates)):
-        return known._replace(as_known=True)
+    if layout.known is not None and (choice := _as_known(bag, layout.known, candidates)):
+        return choice._replace(as_known=True)
     if not candidates and not transforms and len(others := _topics_of_numbers(bag)) == 1:
         return Choice((others[0],))
     if transforms and not candidates:
@@ -79,10 +79,10 @@ def choose(bag: Bag, layout: Layout) -> Choice:
     raise DataError(f"expected a topic of movements, got {listed_topics(bag.topics)}{say}")
 
 
-def _as_known(bag: Bag, known: Known, candidates: Sequence[Topic]) -> Choice | None:
+def _as_known(bag: Bag, movements: Known, candidates: Sequence[Topic]) -> Choice | None:
     """What the movements to compare with were read from, or the only topic with such columns; None if that is open."""
     choices = []
-    for topics, frames in known.choices:
+    for topics, frames in movements.choices:
         try:
             choice = choose(bag, Layout(topic=topics, frame=frames))
         except DataError:
@@ -90,19 +90,19 @@ def _as_known(bag: Bag, known: Known, candidates: Sequence[Topic]) -> Choice | N
         if choice.transforms or not choice.frames:
             choices.append(choice)
     if not choices:
-        choices = [Choice((one,)) for one in fitting_topics(bag, candidates, known)]
+        choices = [Choice((topic,)) for topic in fitting_topics(bag, candidates, movements)]
     return choices[0] if len(choices) == 1 else None
 
 
 def _topics_of_numbers(bag: Bag) -> list[Topic]:
     """Topics of other types with numbers, which are read if they are asked for or alone; not those of ROS itself."""
-    topics = [one for one in bag.topics if one.type not in (*TYPES, *TRANSFORMS) and holds_samples(one)]
-    found = []
-    for one in topics:
+    topics = [topic for topic in bag.topics if topic.type not in (*TYPES, *TRANSFORMS) and holds_samples(topic)]
+    readable = []
+    for topic in topics:
         with suppress(DataError):
-            if one.type.partition("/")[0] not in _OF_ROS and number_fields(bag, one):
-                found.append(one)
-    return found
+            if topic.type.partition("/")[0] not in _OF_ROS and number_fields(bag, topic):
+                readable.append(topic)
+    return readable
 
 
 def holds_samples(topic: Topic) -> bool:
@@ -120,7 +120,7 @@ def listed_topics(topics: Sequence[Topic]) -> str:
     """Topics with their types and numbers of messages, for a message."""
     if not topics:
         return "none"
-    shown = [f"{one.name} ({one.type}, {counted(one.n_messages, 'message')})" for one in topics]
+    shown = [f"{topic.name} ({topic.type}, {counted(topic.n_messages, 'message')})" for topic in topics]
     return first_names(shown, _SHOWN)
 
 
@@ -135,21 +135,25 @@ def pair_of(text: str) -> Edge:
 
 
 def _named(bag: Bag, name: str) -> Topic:
-    same = [one for one in bag.topics if one.name == name] or [one for one in bag.topics if one.name == f"/{name}"]
+    same = [topic for topic in bag.topics if topic.name == name] or [
+        topic for topic in bag.topics if topic.name == f"/{name}"
+    ]
     if not same:
-        alike = get_close_matches(name, [one.name for one in bag.topics], 3)
+        alike = get_close_matches(name, [topic.name for topic in bag.topics], 3)
         meant = f" (did you mean {' or '.join(alike)}?)" if alike else ""
         raise DataError(f"expected a topic {name!r}{meant}, got {listed_topics(bag.topics)}")
-    known = [one for one in same if one.type in TYPES or one.type in TRANSFORMS] or same
-    if not (full := [one for one in known if one.n_messages]):
-        raise DataError(f"topic {same[0].name}: expected samples of {known[0].type}, got no messages")
-    return max(full, key=lambda one: one.n_messages)
+    candidates = [topic for topic in same if topic.type in TYPES or topic.type in TRANSFORMS] or same
+    if not (full := [topic for topic in candidates if topic.n_messages]):
+        raise DataError(f"topic {same[0].name}: expected samples of {candidates[0].type}, got no messages")
+    return max(full, key=lambda topic: topic.n_messages)
 
 
 def _transforms(bag: Bag, named: set[str]) -> tuple[Topic, ...]:
     """The topics of transforms: all, or those that are named, each with that of its transforms that never change."""
-    known = transform_topics(bag)
-    return tuple(one for one in known if not named or one.name in named or one.name.removesuffix("_static") in named)
+    topics = transform_topics(bag)
+    return tuple(
+        topic for topic in topics if not named or topic.name in named or topic.name.removesuffix("_static") in named
+    )
 
 
 def _only_frames(bag: Bag, transforms: Sequence[Topic]) -> Edge:
@@ -163,14 +167,14 @@ def _only_frames(bag: Bag, transforms: Sequence[Topic]) -> Edge:
     )
 
 
-def fitting_topics(bag: Bag, topics: Sequence[Topic], known: Known) -> list[Topic]:
+def fitting_topics(bag: Bag, topics: Sequence[Topic], movements: Known) -> list[Topic]:
     """The topics with columns of the same names; if there are none, with as many columns, of the same kinds."""
-    if not known.columns:
+    if not movements.columns:
         return []
-    columns = {one.name: _first_sample(bag, one) for one in topics}
-    same = [one for one in topics if sorted(columns[one.name][0]) == sorted(known.columns)]
-    wanted = len(known.columns), known.n_orientations
-    return same or [one for one in topics if _numbers(*columns[one.name]) == wanted]
+    columns = {topic.name: _first_sample(bag, topic) for topic in topics}
+    same = [topic for topic in topics if sorted(columns[topic.name][0]) == sorted(movements.columns)]
+    wanted = len(movements.columns), movements.n_orientations
+    return same or [topic for topic in topics if _numbers(*columns[topic.name]) == wanted]
 
 
 def _first_sample(bag: Bag, topic: Topic) -> tuple[Heads, Sequence[float]]:
@@ -194,7 +198,7 @@ def _numbers(heads: Heads, row: Sequence[float]) -> tuple[int, int]:
     if not heads:
         return 0, 0
     channels = find_channels(heads, np.array([row], dtype=float), np.array([0, 1]), {})
-    return len(heads), sum(one.kind == "orientation" for one in channels)
+    return len(heads), sum(channel.kind == "orientation" for channel in channels)
 
 
 class Step(NamedTuple):
@@ -217,7 +221,7 @@ class Graph(NamedTuple):
 
 def transform_topics(bag: Bag) -> list[Topic]:
     """The topics with transforms between frames."""
-    return [one for one in bag.topics if one.type in TRANSFORMS and one.n_messages]
+    return [topic for topic in bag.topics if topic.type in TRANSFORMS and topic.n_messages]
 
 
 def transforms_in(bag: Bag, topics: Sequence[Topic], bad: list[str]) -> Iterator[tuple[int, int, Any]]:
@@ -242,13 +246,13 @@ def connected_graph(bag: Bag, topics: Sequence[Topic], wanted: Sequence[Edge], m
     """The frames, read until all wanted pairs are connected, or `most` transforms, or to the end."""
     graph = Graph({})
     open_pairs = list(wanted)
-    known: set[Edge] = set()
+    edges: set[Edge] = set()
     try:
         for n, (_, _, transform) in enumerate(transforms_in(bag, topics, [])):
             edge = edge_of(transform)
             graph.parents.setdefault(edge[1], Counter())[edge[0]] += 1
-            if edge not in known:
-                known.add(edge)
+            if edge not in edges:
+                edges.add(edge)
                 open_pairs = [pair for pair in open_pairs if _way(graph.edges, *pair) is None]
                 if wanted and not open_pairs:
                     break
@@ -281,8 +285,8 @@ def chain(graph: Graph, parent: str, child: str) -> list[Step]:
         others = sorted(_reached(edges, child))
         raise DataError(
             f"expected transforms that lead from {parent!r} to {child!r}, got none; {parent!r} is connected with "
-            f"{listed(one for one in mine if one != parent)}, {child!r} with "
-            f"{listed(one for one in others if one != child)}"
+            f"{listed(frame for frame in mine if frame != parent)}, {child!r} with "
+            f"{listed(frame for frame in others if frame != child)}"
         )
     return way
 
@@ -328,7 +332,7 @@ def bag_contents(path: Path) -> list[Contents]:
         The bag cannot be opened.
     """
     with open_bag(path) as bag:
-        rows = tuple((one.name, one.type, one.n_messages, _read_as(bag, one)) for one in bag.topics)
+        rows = tuple((topic.name, topic.type, topic.n_messages, _read_as(bag, topic)) for topic in bag.topics)
         topics = Contents("topics", ("topic", "type", "messages", "read as"), rows)
         return [topics, _frames(bag)] if transform_topics(bag) else [topics]
 

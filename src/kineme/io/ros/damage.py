@@ -68,14 +68,14 @@ def expand(compression: str, data: bytes, size: int, what: str = "a chunk") -> b
     check_in_passing(size, what)
     parts, n_bytes = [], 0
     while True:
-        one = _decompressor(compression)()
-        parts.append(one.decompress(data, max_length=size + 1 - n_bytes))
+        decompressor = _decompressor(compression)()
+        parts.append(decompressor.decompress(data, max_length=size + 1 - n_bytes))
         n_bytes += len(parts[-1])
         if n_bytes > size:
             raise DataError(f"expected {what} that expands to {size:,} bytes, got one that expands to more")
-        if not one.eof:
+        if not decompressor.eof:
             raise DataError(f"expected {what} in {compression}, got one that is cut off")
-        data = one.unused_data
+        data = decompressor.unused_data
         if not data:
             return b"".join(parts)
 
@@ -146,10 +146,10 @@ def check_overlaps(storage: Any, topics: Sequence[str]) -> None:
     DataError
         All chunks of a time with messages of these topics take more than a file may.
     """
-    ids = [one.id for one in storage.connections if one.topic in topics]
-    chunks = [one for one in getattr(storage, "chunks", ()) if any(one.channel_count.get(k, 0) for k in ids)]
-    begins = [(one.message_start_time, 0, max(one.uncompressed_size, one.compressed_size)) for one in chunks]
-    ends = [(one.message_end_time, 1, -max(one.uncompressed_size, one.compressed_size)) for one in chunks]
+    ids = [connection.id for connection in storage.connections if connection.topic in topics]
+    chunks = [chunk for chunk in getattr(storage, "chunks", ()) if any(chunk.channel_count.get(k, 0) for k in ids)]
+    begins = [(chunk.message_start_time, 0, max(chunk.uncompressed_size, chunk.compressed_size)) for chunk in chunks]
+    ends = [(chunk.message_end_time, 1, -max(chunk.uncompressed_size, chunk.compressed_size)) for chunk in chunks]
     n_bytes = 0
     for _, _, change in sorted(begins + ends):
         n_bytes += change
@@ -177,8 +177,8 @@ def expanded_folder(path: Path) -> Iterator[Folder]:
     """
     about = _information(path)
     mode = str(about.get("compression_mode", "")).lower().replace("none", "")
-    files = tuple(path / PurePath(str(one)).name for one in about.get("relative_file_paths") or ())
-    is_whole = all(one.is_file() for one in files)
+    files = tuple(path / PurePath(str(file)).name for file in about.get("relative_file_paths") or ())
+    is_whole = all(file.is_file() for file in files)
     if mode != "file" or about.get("compression_format") != "zstd" or not is_whole:
         yield Folder(path, files if is_whole else (), mode)
         return
@@ -186,20 +186,20 @@ def expanded_folder(path: Path) -> Iterator[Folder]:
 
     with TemporaryDirectory() as name:
         folder = Path(name)
-        for one in files:
-            most = max(max_file_bytes(), _MOST_RATIO * one.stat().st_size)
-            with one.open("rb") as start:
+        for file in files:
+            most = max(max_file_bytes(), _MOST_RATIO * file.stat().st_size)
+            with file.open("rb") as start:
                 declared = zstd.get_frame_info(start.read(64)).decompressed_size or 0
-            _check(declared, most, one)
+            _check(declared, most, file)
             n_bytes = 0
-            with zstd.open(one, "rb") as old, (folder / one.stem).open("wb") as new:
+            with zstd.open(file, "rb") as old, (folder / file.stem).open("wb") as new:
                 while some := old.read(_AT_ONCE):
                     n_bytes += len(some)
-                    _check(n_bytes, most, one)
+                    _check(n_bytes, most, file)
                     new.write(some)
-        plain = {**about, "compression_mode": "", "relative_file_paths": [one.stem for one in files]}
+        plain = {**about, "compression_mode": "", "relative_file_paths": [file.stem for file in files]}
         _write(folder / METADATA, {INFORMATION: plain})
-        yield Folder(folder, tuple(folder / one.stem for one in files), mode)
+        yield Folder(folder, tuple(folder / file.stem for file in files), mode)
 
 
 def _information(path: Path) -> dict[str, Any]:
@@ -207,17 +207,17 @@ def _information(path: Path) -> dict[str, Any]:
     from ruamel.yaml import YAML
 
     try:
-        whole = YAML(typ="safe").load((path / METADATA).read_text(encoding="utf-8"))
-        return dict(whole[INFORMATION])
+        metadata = YAML(typ="safe").load((path / METADATA).read_text(encoding="utf-8"))
+        return dict(metadata[INFORMATION])
     except Exception:
         return {}
 
 
-def _write(path: Path, whole: Any) -> None:
+def _write(path: Path, content: Any) -> None:
     from ruamel.yaml import YAML
 
     with path.open("w", encoding="utf-8") as file:
-        YAML(typ="safe").dump(whole, file)
+        YAML(typ="safe").dump(content, file)
 
 
 def _check(n_bytes: int, most: int, source: Path) -> None:

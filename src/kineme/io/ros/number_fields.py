@@ -234,7 +234,7 @@ def number_fields(bag: Bag, topic: Topic) -> NumberFields:
     DataError
         No definition, a damaged one, one with texts of wide characters, or several that differ; or no numbers.
     """
-    definitions = {one.msgdef.data: one.msgdef for one in topic.connections}
+    definitions = {connection.msgdef.data: connection.msgdef for connection in topic.connections}
     where = f"topic {topic.name}: expected the definition of {topic.type}"
     if len(definitions) > 1:
         raise DataError(f"{where}, got several that differ; convert the topic to CSV")
@@ -262,11 +262,11 @@ def _steps(types: Mapping[str, Any], name: str, prefix: str, version: int, deep:
         raise DataError(f"expected types within types at most {_DEEPEST} deep, got more")
     steps: list[Step] = []
     for field, described in types[name][1]:
-        for one in _steps_of_field(types, described, f"{prefix}{field}", version, deep):
-            if one.formats and steps and steps[-1].formats:
-                steps[-1] = Step(steps[-1].formats + one.formats, steps[-1].heads + one.heads)
+        for step in _steps_of_field(types, described, f"{prefix}{field}", version, deep):
+            if step.formats and steps and steps[-1].formats:
+                steps[-1] = Step(steps[-1].formats + step.formats, steps[-1].heads + step.heads)
             else:
-                steps.append(one)
+                steps.append(step)
     return steps
 
 
@@ -323,10 +323,10 @@ def _read(steps: tuple[Step, ...], raw: bytes, at: int, order: str, aligned: boo
 def _layout(formats: str, phase: int, order: str) -> struct.Struct:
     """Numbers in a row from an offset modulo 8 on, each at a multiple of its size; without padding for phase -1."""
     offset, padded = max(phase, 0), order
-    for one in formats:
-        size = struct.calcsize(f"={one}")
+    for code in formats:
+        size = struct.calcsize(f"={code}")
         gap = 0 if phase < 0 else -offset % size
-        padded += "x" * gap + one
+        padded += "x" * gap + code
         offset += gap + size
     return struct.Struct(padded)
 
@@ -341,16 +341,16 @@ def decoder_of(bag: Bag, topic: Topic) -> Callable[[bytes], Any]:
     """
     store = standard_types(bag.version)
     expected = _digest(store, bag.version, topic.type)
-    for one in topic.connections:
-        if one.digest and one.digest not in (expected, "*"):
+    for connection in topic.connections:
+        if connection.digest and connection.digest not in (expected, "*"):
             raise DataError(
                 f"topic {topic.name}: expected messages of the standard type {topic.type}, got another version of it, "
                 "by its checksum; convert the topic to CSV where that type is installed"
             )
-    known = store.get_msgdef(topic.type)
-    is_1, cls = bag.version == 1, known.cls
-    parse = known.deserialize_ros1 if is_1 else None
-    little, big = known.deserialize_cdr_le, known.deserialize_cdr_be
+    definition = store.get_msgdef(topic.type)
+    is_1, cls = bag.version == 1, definition.cls
+    parse = definition.deserialize_ros1 if is_1 else None
+    little, big = definition.deserialize_cdr_le, definition.deserialize_cdr_be
 
     def decode(raw: bytes) -> Any:
         try:

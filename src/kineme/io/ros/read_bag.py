@@ -58,7 +58,7 @@ def read_bag(path: Path, layout: Layout) -> Parsed:
     """
     with open_bag(path) as bag:
         choice = choose(bag, layout)
-        paths = [one for one in choice.topics if one.type in TYPES and TYPES[one.type].path]
+        paths = [topic for topic in choice.topics if topic.type in TYPES and TYPES[topic.type].path]
         if not paths:
             streams: list[Stream] = []
             left_out: list[str] = []
@@ -70,16 +70,16 @@ def read_bag(path: Path, layout: Layout) -> Parsed:
             of_headers, reason = clock_of(streams)
             if str(layout.time) in _CLOCKS:
                 of_headers = layout.time == _CLOCKS[0]
-            one, lost = merge_streams(streams, of_headers)
-            stamps = [one.recorded if one.stamped is None else one.stamped, one.recorded]
-            columns = [*(each / SECOND for each in stamps), *one.values.T]
+            merged, lost = merge_streams(streams, of_headers)
+            stamps = [merged.recorded if merged.stamped is None else merged.stamped, merged.recorded]
+            columns = [*(each / SECOND for each in stamps), *merged.values.T]
             what = [f"frames {parent}:{child}" for parent, child in choice.frames]
             what += [f"topic {topic.name} of {topic.type}" for topic in choice.topics]
             said_what = ", ".join(what) + (AS_KNOWN if choice.as_known else "")
-            heads = (*_CLOCKS, *one.heads)
+            heads = (*_CLOCKS, *merged.heads)
             of_joints = any(topic.type.endswith("/JointState") for topic in choice.topics)
             roles = _roles(heads, 0 if of_headers else 1, layout, of_joints)
-            table = Table(heads, columns, len(one.values), no_lines, dates_in="s")
+            table = Table(heads, columns, len(merged.values), no_lines, dates_in="s")
             said = "stamps of headers" if of_headers else f"time of recording: {reason}" if reason else "as asked for"
             parsed = _parsed(table, roles, layout, (bag.kind, said_what, said), [*left_out, *lost])
             return parsed._replace(left_out=(*parsed.left_out, *logs_beside(path)))
@@ -150,16 +150,16 @@ def read_transforms(
     bad: list[str] = []
     needed = {step.edge for way in steps for step in way}
     try:
-        found, parents = _collect(bag, topics, needed, bad)
+        samples_of_edges, parents = _collect(bag, topics, needed, bad)
     except DataError as error:
-        raise DataError(f"{', '.join(f'topic {one.name}' for one in topics)}: {error}") from error
+        raise DataError(f"{', '.join(f'topic {topic.name}' for topic in topics)}: {error}") from error
     left_out = [f"{bad[0]}{f'; {len(bad) - 1} more like this' if len(bad) > 1 else ''}"] if bad else []
     if bad and skip == "movement":
         raise DataError(f"{left_out[0]}; to keep the others, say skip='sample', in the shell --skip sample")
-    edges = {edge: _usable(edge, samples, left_out) for edge, samples in found.items()}
+    edges = {edge: _usable(edge, samples, left_out) for edge, samples in samples_of_edges.items()}
     for child, counts in parents.items():
-        kept = next(edge[0] for edge in needed if edge[1] == child)
-        for parent in sorted(set(counts) - {kept}):
+        own = next(edge[0] for edge in needed if edge[1] == child)
+        for parent in sorted(set(counts) - {own}):
             left_out.append(f"frame {child!r}: {counted(counts[parent], 'transform')} from another parent, {parent!r}")
     pairs = zip(wanted, steps, strict=True)
     return [_composed(f"{parent}:{child}", way, edges, left_out) for (parent, child), way in pairs], left_out
@@ -169,7 +169,7 @@ def _collect(
     bag: Bag, topics: Sequence[Topic], needed: set[Edge], bad: list[str]
 ) -> tuple[dict[Edge, Samples], dict[str, Counter[str]]]:
     """The needed transforms, and for their children how often each parent occurs."""
-    found = {edge: Samples.empty() for edge in needed}
+    samples_of_edges = {edge: Samples.empty() for edge in needed}
     children = {child for _, child in needed}
     counts: Counter[Edge] = Counter()  # by names as they are in messages, of which there are few
     samples_of: dict[Edge, Samples | None] = {}
@@ -178,19 +178,19 @@ def _collect(
         names = header.frame_id, transform.child_frame_id
         counts[names] += 1
         if names not in samples_of:
-            samples_of[names] = found.get(edge_of(transform))
+            samples_of[names] = samples_of_edges.get(edge_of(transform))
         if (samples := samples_of[names]) is not None:
             samples.values.extend(transform_row(transform.transform))
             samples.recorded.append(recorded)
             samples.stamped.append(nanoseconds_of(header.stamp))
         if not n % _CHECKED:
-            check_kept(list(found.values()))
+            check_kept(list(samples_of_edges.values()))
     parents: dict[str, Counter[str]] = {child: Counter() for child in children}
     for names, n in counts.items():
         parent, child = (name.removeprefix("/") for name in names)
         if child in children:
             parents[child][parent] += n
-    return found, parents
+    return samples_of_edges, parents
 
 
 def _usable(edge: Edge, samples: Samples, left_out: list[str]) -> Stream:
@@ -205,11 +205,11 @@ def _usable(edge: Edge, samples: Samples, left_out: list[str]) -> Stream:
         left_out.append(f"{where}: expected rotations of norm 1, got {norm:.3g} in {counted(n_bad, 'transform')}")
         if not good.any():
             raise DataError(left_out[-1])
-    kept = np.flatnonzero(good)
-    kept = kept[np.diff(stream.stamped[kept], prepend=stream.stamped[kept[0]] - 1) != 0]
-    if len(kept) == len(good):
+    rows = np.flatnonzero(good)
+    rows = rows[np.diff(stream.stamped[rows], prepend=stream.stamped[rows[0]] - 1) != 0]
+    if len(rows) == len(good):
         return stream
-    return replace(stream, values=stream.values[kept], recorded=stream.recorded[kept], stamped=stream.stamped[kept])
+    return replace(stream, values=stream.values[rows], recorded=stream.recorded[rows], stamped=stream.stamped[rows])
 
 
 def _composed(name: str, way: Sequence[Step], edges: dict[Edge, Stream], left_out: list[str]) -> Stream:
@@ -218,15 +218,15 @@ def _composed(name: str, way: Sequence[Step], edges: dict[Edge, Stream], left_ou
         raise DataError(f"frames {name}: expected a frame that moves in the other, got transforms that never change")
     of_headers, reason = clock_of(moving)
     # The stamps of the transform that has most of them, within the time in which all others are known too.
-    stamps = [np.unique(stamps_of(one, of_headers)) for one in moving]
-    first, last = max(one[0] for one in stamps), min(one[-1] for one in stamps)
-    inside = [one[(one >= first) & (one <= last)] for one in stamps]
+    stamps = [np.unique(stamps_of(stream, of_headers)) for stream in moving]
+    first, last = max(stamps_of_one[0] for stamps_of_one in stamps), min(times[-1] for times in stamps)
+    inside = [times[(times >= first) & (times <= last)] for times in stamps]
     k = max(range(len(inside)), key=lambda i: len(inside[i]))
     most = inside[k]
     if len(most) < MIN_SAMPLES:
         raise DataError(
             f"frames {name}: expected transforms that are known at the same time, at least {MIN_SAMPLES} times, got "
-            f"{len(most)}, of {', '.join(one.name for one in moving)}"
+            f"{len(most)}, of {', '.join(stream.name for stream in moving)}"
         )
     if n_lost := len(stamps[k]) - len(most):
         left_out.append(f"frames {name}: {counted(n_lost, 'stamp')} of {moving[k].name}, at which others are not known")
@@ -306,20 +306,20 @@ def read_paths(bag: Bag, topic: Topic, skip: str) -> Paths:
     if not groups:
         reason = f": {left_out[0]}" if left_out else ", got messages without points"
         raise DataError(f"topic {topic.name}: expected movements of {topic.type}{reason}")
-    heads, one = max(groups.items(), key=lambda group: len(group[1].lengths))
+    heads, movements = max(groups.items(), key=lambda group: len(group[1].lengths))
     for other, group in groups.items():
         if other != heads:
             n = counted(len(group.lengths), "message")
             left_out.append(f"topic {topic.name}: {n} with other columns {listed(other)}")
-    values = np.frombuffer(one.values, np.float64).reshape(-1, len(heads))
-    stamps = np.frombuffer(one.stamps, np.int64)
+    values = np.frombuffer(movements.values, np.float64).reshape(-1, len(heads))
+    stamps = np.frombuffer(movements.stamps, np.int64)
     stream = with_rotations(Stream(topic.name, heads, values, stamps, None), f"topic {topic.name}: ", skip, left_out)
     if len(stream.values) < len(values):
         raise DataError(left_out[-1])
     is_planned = topic.type.endswith("JointTrajectory")
-    times = stamps / _SECOND if is_planned or _increase(stamps, one.lengths) else None
+    times = stamps / _SECOND if is_planned or _increase(stamps, movements.lengths) else None
     time = "time_from_start" if is_planned else "header.stamp"
-    return Paths(topic, stream.heads, stream.values, times, time, one.lengths, one.places, left_out)
+    return Paths(topic, stream.heads, stream.values, times, time, movements.lengths, movements.places, left_out)
 
 
 def _collect_path(bag: Bag, topic: Topic, groups: dict[Heads, _Group], left_out: list[str]) -> None:

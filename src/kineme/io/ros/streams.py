@@ -104,33 +104,33 @@ def read_streams(
     try:
         _collect(bag, topics, opened)
     except DataError as error:
-        n = sum(one.counts[0] for one in opened)
-        about = f"{', '.join(f'topic {one.name}' for one in topics)}: after {counted(n, 'message')}: {error}"
+        n = sum(reading.counts[0] for reading in opened)
+        about = f"{', '.join(f'topic {topic.name}' for topic in topics)}: after {counted(n, 'message')}: {error}"
         if skip == "movement" or not n:
             raise DataError(f"{about}{_TO_KEEP if n else ''}") from error
         left_out.append(about)
     streams: list[Stream] = []
-    for topic, one in zip(topics, opened, strict=True):
+    for topic, reading in zip(topics, opened, strict=True):
         # What was not read of a topic, or an error where that costs the movement.
-        n, without = one.counts
+        n, without = reading.counts
         losses = []
-        if one.bad:
-            more = f"; {len(one.bad) - 1} more like this" if len(one.bad) > 1 else ""
-            reason = f"topic {topic.name}: {one.bad[0]}{more}"
+        if reading.bad:
+            more = f"; {len(reading.bad) - 1} more like this" if len(reading.bad) > 1 else ""
+            reason = f"topic {topic.name}: {reading.bad[0]}{more}"
             if skip == "movement":
-                raise DataError(f"{reason}{_TO_KEEP if one.groups else ''}")
+                raise DataError(f"{reason}{_TO_KEEP if reading.groups else ''}")
             losses.append(reason)
         if without and without < n:
             losses.append(f"topic {topic.name}: {counted(without, 'message')} without positions")
         if n < topic.n_messages:
             losses.append(f"topic {topic.name}: expected {counted(topic.n_messages, 'message')}, got {n:,}")
-        if not one.groups:
+        if not reading.groups:
             what = f"{counted(n, 'message')} without positions" if without else "no messages"
             raise DataError(f"topic {topic.name}: expected samples of {topic.type}, got {what}")
         left_out += losses
         streams += [
             with_rotations(stream, f"topic {topic.name}: ", skip, left_out, columns)
-            for stream in _streams(topic, one, left_out)
+            for stream in _streams(topic, reading, left_out)
         ]
     return streams, left_out
 
@@ -169,38 +169,40 @@ def _collect(bag: Bag, topics: Sequence[Topic], opened: Sequence[_Open]) -> None
             samples.stamped.append(stamp_of(message))
         n += 1
         if not n % _CHECKED:
-            check_kept([one for each in opened for one, _ in each.groups.values()])
+            check_kept([samples for each in opened for samples, _ in each.groups.values()])
 
 
 def check_kept(some: Sequence[Samples]) -> None:
     """Refuse to keep more numbers than the limit of memory allows; samples may occur several times."""
-    check_expanded(_COPIES * sum(one.n_bytes for one in {id(one): one for one in some}.values()), "a topic")
+    check_expanded(
+        _COPIES * sum(samples.n_bytes for samples in {id(samples): samples for samples in some}.values()), "a topic"
+    )
 
 
-def _group(one: _Open, heads: Heads) -> tuple[Samples, list[int] | None]:
+def _group(reading: _Open, heads: Heads) -> tuple[Samples, list[int] | None]:
     """The samples with these columns, in whatever order they came first."""
-    first = one.first.setdefault(tuple(sorted(heads)), heads)
+    first = reading.first.setdefault(tuple(sorted(heads)), heads)
     if first == heads:
-        one.groups[heads] = Samples.empty(), None
+        reading.groups[heads] = Samples.empty(), None
     else:
         place = {head: k for k, head in enumerate(heads)}
-        one.groups[heads] = one.groups[first][0], [place[head] for head in first]
-    return one.groups[heads]
+        reading.groups[heads] = reading.groups[first][0], [place[head] for head in first]
+    return reading.groups[heads]
 
 
-def _streams(topic: Topic, one: _Open, left_out: list[str]) -> list[Stream]:
+def _streams(topic: Topic, reading: _Open, left_out: list[str]) -> list[Stream]:
     """Streams of one topic, the longest first."""
-    whole = [(heads, samples) for heads, (samples, order) in one.groups.items() if order is None]
-    whole.sort(key=lambda group: -len(group[1].recorded))
+    groups = [(heads, samples) for heads, (samples, order) in reading.groups.items() if order is None]
+    groups.sort(key=lambda group: -len(group[1].recorded))
     streams: list[Stream] = []
     taken: set[str] = set()
-    for heads, samples in whole:
+    for heads, samples in groups:
         if shared := taken & set(heads):
             n = counted(len(samples.recorded), "message")
             left_out.append(f"topic {topic.name}: {n} with other columns {listed(heads)}, which share {min(shared)!r}")
             continue
         taken |= set(heads)
-        streams.append(stream_of(topic.name, heads, samples, one.stamp is not None))
+        streams.append(stream_of(topic.name, heads, samples, reading.stamp is not None))
     return streams
 
 
@@ -256,8 +258,8 @@ def _without(stream: Stream, rotations: Sequence[int]) -> Stream:
     if not rotations:
         return stream
     dropped = {k + i for k in rotations for i in range(4)}
-    kept = [k for k in range(len(stream.heads)) if k not in dropped]
-    return replace(stream, heads=tuple(stream.heads[k] for k in kept), values=stream.values[:, kept])
+    columns = [k for k in range(len(stream.heads)) if k not in dropped]
+    return replace(stream, heads=tuple(stream.heads[k] for k in columns), values=stream.values[:, columns])
 
 
 def _is_asked(stream: Stream, numbers: Iterable[int], columns: Sequence[Column] | None) -> bool:
@@ -265,10 +267,10 @@ def _is_asked(stream: Stream, numbers: Iterable[int], columns: Sequence[Column] 
 
     A column that is asked for by its number may be any.
     """
-    if columns is None or any(not isinstance(one, str) or one.isdecimal() for one in columns):
+    if columns is None or any(not isinstance(column, str) or column.isdecimal() for column in columns):
         return True
     names = [name for k in numbers for name in (stream.heads[k], f"{stream.name}.{stream.heads[k]}")]
-    return any(fnmatchcase(name, str(one)) or name.startswith(f"{one}.") for name in names for one in columns)
+    return any(fnmatchcase(name, str(column)) or name.startswith(f"{column}.") for name in names for column in columns)
 
 
 def clock_of(streams: Sequence[Stream]) -> tuple[bool, str]:
@@ -276,16 +278,16 @@ def clock_of(streams: Sequence[Stream]) -> tuple[bool, str]:
 
     They are where every message has one and they increase in every stream. Otherwise it is the time of recording.
     """
-    for one in streams:
-        if one.stamped is None:
-            return False, one.why or f"{one.name} has no stamps in headers"
-        if not one.stamped.any():
-            return False, f"the stamps in the headers of {one.name} are 0"
-        steps = np.diff(one.stamped)
+    for stream in streams:
+        if stream.stamped is None:
+            return False, stream.why or f"{stream.name} has no stamps in headers"
+        if not stream.stamped.any():
+            return False, f"the stamps in the headers of {stream.name} are 0"
+        steps = np.diff(stream.stamped)
         if len(steps) and steps.min() <= 0:
             k = int(np.argmax(steps <= 0)) + 1
             what = "repeats the one" if steps[k - 1] == 0 else "is earlier than that"
-            return False, f"the stamp in the header of message {k} of {one.name} {what} before"
+            return False, f"the stamp in the header of message {k} of {stream.name} {what} before"
     return True, ""
 
 
@@ -312,11 +314,11 @@ def merge_streams(streams: Sequence[Stream], of_headers: bool) -> tuple[Stream, 
     if len(streams) == 1:
         return first, []
     at = stamps_of(first, of_headers)
-    others = [(one, in_order(one, of_headers)) for one in streams[1:]]
+    others = [(stream, in_order(stream, of_headers)) for stream in streams[1:]]
     inside = np.ones(len(at), dtype=bool)
     for _, (stamps, _) in others:
         inside &= (at >= stamps[0]) & (at <= stamps[-1])
-    names = ", ".join(one.name for one in streams[1:])
+    names = ", ".join(stream.name for stream in streams[1:])
     if not inside.any():
         raise DataError(
             f"expected samples of {first.name} and of {names} at the same time, got none: {_spans(streams, of_headers)}"
@@ -325,8 +327,8 @@ def merge_streams(streams: Sequence[Stream], of_headers: bool) -> tuple[Stream, 
     start = int(at[inside][0])
     seconds = (at[inside] - start) / SECOND
     values = [first.values[inside]]
-    values += [values_at(seconds, (stamps - start) / SECOND, one, x) for one, (stamps, x) in others]
-    kept = replace(
+    values += [values_at(seconds, (stamps - start) / SECOND, stream, x) for stream, (stamps, x) in others]
+    merged = replace(
         first,
         heads=_heads(streams),
         values=np.hstack(values),
@@ -335,11 +337,11 @@ def merge_streams(streams: Sequence[Stream], of_headers: bool) -> tuple[Stream, 
     )
     n_lost = int(len(at) - inside.sum())
     lost = f"{counted(n_lost, 'sample')} of {first.name} before {names} begins or after it ends"
-    return kept, [lost] if n_lost else []
+    return merged, [lost] if n_lost else []
 
 
 def _spans(streams: Sequence[Stream], of_headers: bool) -> str:
-    spans = ((one.name, stamps_of(one, of_headers)) for one in streams)
+    spans = ((stream.name, stamps_of(stream, of_headers)) for stream in streams)
     return ", ".join(f"{name} from {at.min() / SECOND:.12g} to {at.max() / SECOND:.12g} s" for name, at in spans)
 
 
@@ -353,13 +355,15 @@ def values_at(at: Array, times: Array, stream: Stream, values: Array) -> Array:
 
 def in_order(stream: Stream, of_headers: bool) -> tuple[Stamps, Array]:
     """Stamps that increase strictly, and the samples."""
-    known = stamps_of(stream, of_headers)
-    if (np.diff(known) > 0).all():
-        return known, stream.values
+    ticks = stamps_of(stream, of_headers)
+    if (np.diff(ticks) > 0).all():
+        return ticks, stream.values
     stamps, where = np.unique(stamps_of(stream, of_headers), return_index=True)
     return stamps, stream.values[where]
 
 
 def _heads(streams: Sequence[Stream]) -> tuple[str, ...]:
-    twice = {head for head, n in Counter(head for one in streams for head in one.heads).items() if n > 1}
-    return tuple(f"{one.name}.{head}" if twice & set(one.heads) else head for one in streams for head in one.heads)
+    twice = {head for head, n in Counter(head for stream in streams for head in stream.heads).items() if n > 1}
+    return tuple(
+        f"{stream.name}.{head}" if twice & set(stream.heads) else head for stream in streams for head in stream.heads
+    )

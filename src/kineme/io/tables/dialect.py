@@ -124,34 +124,34 @@ def _quoted_cells(line: str, separator: str | None) -> list[str]:
 
 def detect_dialect(text: Iterable[str]) -> Dialect:
     """The dialect of a table, from its first lines; no more lines are read than needed."""
-    lines, kept = [], []
+    lines, rows = [], []
     for line in islice(text, _HEAD):
         check_line(line)
         lines.append(line)
         if not is_skipped(line):
-            kept.append(len(lines) - 1)
-        if len(kept) == _PEEK:
+            rows.append(len(lines) - 1)
+        if len(rows) == _PEEK:
             break
-    if not kept:
+    if not rows:
         more = len(lines) == _HEAD
         raise DataError(f"expected samples, got {f'none in the first {_HEAD:,} lines' if more else 'an empty file'}")
-    kept = _with_names_like_comments(lines, kept)
-    separator = separator_of([lines[k] for k in kept[:2]])
-    cells = [split(lines[k], separator) for k in kept]
-    if (below := _below_preamble(lines, kept, cells)) != kept:
-        kept, separator = below, separator_of([lines[k] for k in below[:2]])
-        cells = [split(lines[k], separator) for k in kept]
+    rows = _with_names_like_comments(lines, rows)
+    separator = separator_of([lines[k] for k in rows[:2]])
+    cells = [split(lines[k], separator) for k in rows]
+    if (below := _below_preamble(lines, rows, cells)) != rows:
+        rows, separator = below, separator_of([lines[k] for k in below[:2]])
+        cells = [split(lines[k], separator) for k in rows]
     comma = separator != "," and any(COMMA_NUMBER.fullmatch(cell) for row in cells for cell in row)
     n_heads = _n_heads(cells, comma)
-    kept, cells = kept[n_heads - 1 :], [_joined(cells[:n_heads]), *cells[n_heads:]]
+    rows, cells = rows[n_heads - 1 :], [_joined(cells[:n_heads]), *cells[n_heads:]]
     named = not _is_sample(cells, comma)
-    heads, first = cells[0] if named else _commented_head(lines[: kept[0]], separator, len(cells[0])), kept[0] + named
+    heads, first = cells[0] if named else _commented_head(lines[: rows[0]], separator, len(cells[0])), rows[0] + named
     numbers = [str(k) for k in range(len(cells[0]))]  # above fractions, as data frames without heads are written
     numbered = not named and cells[0] == numbers and any("." in cell for cell in cells[-1])
     first += numbered
     units = units_in(cells[1]) if named and len(cells) > 2 and len(cells[1]) <= len(cells[0]) else ()
     if units:
-        units, first = (*units, *[""] * (len(cells[0]) - len(units))), kept[1] + 1
+        units, first = (*units, *[""] * (len(cells[0]) - len(units))), rows[1] + 1
     body = cells[named + bool(units) or numbered :]
     kinds = tuple(_kind([row[k] for row in body if k < len(row)], comma) for k in range(len(cells[0])))
     for k, (kind, cell) in enumerate(zip(kinds, body[0] if body else (), strict=False)):
@@ -188,45 +188,45 @@ def units_in(cells: Sequence[str]) -> tuple[str, ...]:
     """The units in a row that holds nothing but units, without brackets; empty if it is no such row."""
     plain = tuple(cell.strip("[]() ") for cell in cells)
     letters = [cell.lower() in _LETTERS for cell in plain]
-    known = sum(unit_named(cell) is not None for cell, letter in zip(plain, letters, strict=True) if not letter)
+    n_units = sum(unit_named(cell) is not None for cell, letter in zip(plain, letters, strict=True) if not letter)
     others = sum(unit_named(cell) is None for cell, letter in zip(plain, letters, strict=True) if cell and not letter)
-    return plain if known and not others and 2 * sum(map(bool, plain)) >= len(plain) else ()
+    return plain if n_units and not others and 2 * sum(map(bool, plain)) >= len(plain) else ()
 
 
-def _below_preamble(lines: Sequence[str], kept: list[int], cells: Sequence[list[str]]) -> list[int]:
+def _below_preamble(lines: Sequence[str], own: list[int], cells: Sequence[list[str]]) -> list[int]:
     """The lines from the heads on, where lines of other lengths without rows of numbers stand above them.
 
     So loggers write the device, the rate and the time. Below the heads all lines have as many cells.
     """
     widths = {*map(len, cells)}
     if len(widths) == 1 and widths != {1}:
-        return kept
-    separator = separator_of([lines[k] for k in kept[-2:]])
-    rows = [split(lines[k], separator) for k in kept]
+        return own
+    separator = separator_of([lines[k] for k in own[-2:]])
+    rows = [split(lines[k], separator) for k in own]
     width, comma = len(rows[-1]), separator != ","
     first = next(k for k, row in enumerate(rows) if len(row) == width)
     numbers = [sum(is_number(cell, comma) for cell in row) for row in rows]
     is_preamble = all(n < max(2, len(row)) for n, row in zip(numbers[:first], rows[:first], strict=True))
     below = rows[first:]
     if width < 2 or len(below) < 3 or numbers[first] or not is_preamble or any(len(row) != width for row in below):
-        return kept
-    return kept[first:]
+        return own
+    return own[first:]
 
 
-def _with_names_like_comments(lines: Sequence[str], kept: list[int]) -> list[int]:
-    """Add the lines below the first kept one that begin like comments but are rows: ``#1,0.0,0.25,0.75``.
+def _with_names_like_comments(lines: Sequence[str], numbers: list[int]) -> list[int]:
+    """Add the lines below the first of them that begin like comments but are rows: ``#1,0.0,0.25,0.75``.
 
     Only if the first cells of all other rows are not numbers; otherwise such a line is a row that was commented out.
     """
-    separator = separator_of([lines[kept[0]]])
-    if separator is None or len(kept) == len(lines) - kept[0]:  # no line below was skipped
-        return kept
-    rows = [split(lines[k], separator) for k in kept]
+    separator = separator_of([lines[numbers[0]]])
+    if separator is None or len(numbers) == len(lines) - numbers[0]:  # no line below was skipped
+        return numbers
+    rows = [split(lines[k], separator) for k in numbers]
     if any(is_number(row[0], separator != ",") for row in rows):
-        return kept
-    below = (k for k in range(kept[0] + 1, len(lines)) if lines[k].strip() and is_skipped(lines[k]))
+        return numbers
+    below = (k for k in range(numbers[0] + 1, len(lines)) if lines[k].strip() and is_skipped(lines[k]))
     marked = (k for k in below if _is_row(split(lines[k], separator), len(rows[0]), separator))
-    return sorted({*kept, *islice(marked, _PEEK)})[:_PEEK]
+    return sorted({*numbers, *islice(marked, _PEEK)})[:_PEEK]
 
 
 def _is_row(cells: Sequence[str], n_columns: int, separator: str) -> bool:

@@ -42,9 +42,9 @@ def export_head(lines: Iterable[str], n_bytes: int) -> tuple[ExportHead, Dialect
     some = list(islice(lines, _FIRST))
     for line in some:
         check_line(line)
-    if (known := _head(some, probe=True)) is None:
+    if (maker := _head(some, probe=True)) is None:
         return None
-    if known == "Vicon":  # the section that is read may stand anywhere
+    if maker == "Vicon":  # the section that is read may stand anywhere
         check_expanded(2 * n_bytes + _LINE)
         some += list(lines)
     else:
@@ -67,13 +67,13 @@ def _head(lines: Sequence[str], probe: bool = False) -> Any:
     """The head of an export, or None; with `probe` the name of its maker from the first lines alone."""
     for maker, find in _MAKERS.items():
         try:
-            found = find(lines, split)
+            head = find(lines, split)
         except DataError:
             if not probe:
                 raise
             return maker  # the head is longer than the first lines
-        if found is not None:
-            return maker if probe else found
+        if head is not None:
+            return maker if probe else head
     return None
 
 

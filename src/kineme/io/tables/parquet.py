@@ -172,20 +172,20 @@ def _texts(column: Any, head: str) -> Any:
         column = column.dictionary_encode()
     parts = [np.empty(0, dtype=object)]
     for chunk in column.chunks:
-        known = np.array([*(_text(one, head) for one in chunk.dictionary.to_pylist()), ""], dtype=object)
-        which = chunk.indices.cast(pa.int64()).fill_null(len(known) - 1).to_numpy()
-        if len(which) and not 0 <= which.min() <= which.max() < len(known):  # pyarrow does not check the indices
+        texts = np.array([*(_text(value, head) for value in chunk.dictionary.to_pylist()), ""], dtype=object)
+        which = chunk.indices.cast(pa.int64()).fill_null(len(texts) - 1).to_numpy()
+        if len(which) and not 0 <= which.min() <= which.max() < len(texts):  # pyarrow does not check the indices
             raise DataError(f"expected names in {head!r}, got numbers of names that are not there: damaged bytes")
-        parts.append(known[which])
+        parts.append(texts[which])
     return np.concatenate(parts)
 
 
-def _text(one: Any, head: str) -> str:
-    if isinstance(one, bytes):
-        return one.decode("utf-8", "replace")
-    if one != one:  # noqa: PLR0124 - only NaN differs from itself
-        raise DataError(f"expected names in {head!r}, got {one!r}")
-    return "" if one is None else str(one)
+def _text(value: Any, head: str) -> str:
+    if isinstance(value, bytes):
+        return value.decode("utf-8", "replace")
+    if value != value:  # noqa: PLR0124 - only NaN differs from itself
+        raise DataError(f"expected names in {head!r}, got {value!r}")
+    return "" if value is None else str(value)
 
 
 def _numbers(column: Any, head: str) -> Any:
@@ -259,11 +259,11 @@ def _rows(array: Any, width: int, head: str) -> tuple[Array, dict[int, str]]:
     values = flat.to_numpy(zero_copy_only=False).astype(np.float64)
     inner = len(values) // max(int(lengths[valid].sum()), 1)  # numbers in each entry of the outer list
     good = valid & (lengths * inner == width)
-    kept = values if good.all() else values[np.repeat(good, np.where(valid, lengths, 0) * inner)[: len(values)]]
+    numbers = values if good.all() else values[np.repeat(good, np.where(valid, lengths, 0) * inner)[: len(values)]]
     rows = np.full((len(array), width), np.nan)
-    if kept.size != int(good.sum()) * width:
+    if numbers.size != int(good.sum()) * width:
         raise DataError(f"expected lists of {width} numbers in {head!r}, got lists within lists that differ in length")
-    rows[good] = kept.reshape(-1, width)
+    rows[good] = numbers.reshape(-1, width)
     return rows, {
         row: f"expected {width} numbers in {head!r}, got {int(lengths[row]) * inner if valid[row] else 'nothing'}"
         for row in np.flatnonzero(~good)[:_SHOWN].tolist()

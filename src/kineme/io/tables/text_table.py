@@ -327,8 +327,8 @@ def _read_stretch(lines: list[str], dialect: Dialect, dtype: np.dtype[Any]) -> t
     if not (dialect.decimal_comma and any(texts)):
         plain = [line.replace(",", ".") for line in lines] if dialect.decimal_comma else lines
         quoted = any('"' in line for line in plain)
-        known = not quoted or quotes_are_plain("".join(plain).encode(), dialect)
-        if known and (read := try_rows(plain, dialect, dtype)) is not None:
+        are_plain = not quoted or quotes_are_plain("".join(plain).encode(), dialect)
+        if are_plain and (read := try_rows(plain, dialect, dtype)) is not None:
             return read, {}
         if not quoted and not any(texts) and dialect.separator:  # an empty cell is usual
             text = "\n".join(line.rstrip("\r\n") for line in plain)

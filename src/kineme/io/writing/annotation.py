@@ -59,9 +59,9 @@ class Annotation:
         return self.start - self.origin, self.end - self.origin
 
 
-def as_row(one: Annotation) -> dict[str, Any]:
+def as_row(annotation: Annotation) -> dict[str, Any]:
     """An annotation as plain data, in the order of `HEADS`."""
-    return {head: getattr(one, head) for head in HEADS}
+    return {head: getattr(annotation, head) for head in HEADS}
 
 
 def to_csv(annotations: Sequence[Annotation]) -> bytes:
@@ -69,7 +69,7 @@ def to_csv(annotations: Sequence[Annotation]) -> bytes:
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow(HEADS)
-    table.writerows([_cell(value) for value in as_row(one).values()] for one in annotations)
+    table.writerows([_cell(value) for value in as_row(annotation).values()] for annotation in annotations)
     return text.getvalue().encode("utf-8", "backslashreplace")
 
 
@@ -80,7 +80,7 @@ def write_csv(path: Path, annotations: Sequence[Annotation], source: Path | None
 
 def write_json(path: Path, annotations: Sequence[Annotation], source: Path | None) -> Path:
     """Write a list of objects, one for each annotation; the symbol of unknown motion is null."""
-    text = json.dumps([as_row(one) for one in annotations], ensure_ascii=False, allow_nan=False, indent=1)
+    text = json.dumps([as_row(annotation) for annotation in annotations], ensure_ascii=False, allow_nan=False, indent=1)
     return write_atomically(path, (text + "\n").encode("utf-8", "backslashreplace"))
 
 
@@ -92,8 +92,6 @@ def _cell(value: Any) -> str:
 
 def write_audacity(path: Path, annotations: Sequence[Annotation], source: Path | None) -> Path:
     """Write ``start TAB end TAB label`` lines, in seconds since the first sample, as File > Import > Labels reads."""
-    lines = [
-        f"{one.span[0]:.6f}\t{one.span[1]:.6f}\t{UNKNOWN if one.symbol is None else ' '.join(one.symbol.split())}\n"
-        for one in annotations
-    ]
+    rows = [(*note.span, UNKNOWN if note.symbol is None else " ".join(note.symbol.split())) for note in annotations]
+    lines = [f"{start:.6f}\t{end:.6f}\t{symbol}\n" for start, end, symbol in rows]
     return write_atomically(path, "".join(lines).encode("utf-8", "backslashreplace"))

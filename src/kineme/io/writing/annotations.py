@@ -31,8 +31,8 @@ _MEANING = "1-1 association with a parent annotation"
 
 #: Tiers below that of the symbols: one annotation each for every annotation of it.
 _DEPENDENT: dict[str, Callable[[Annotation], str]] = {
-    "p-value": lambda one: f"{one.p_value:.3g}",
-    "confidence": lambda one: f"{one.confidence:.3g}",
+    "p-value": lambda annotation: f"{annotation.p_value:.3g}",
+    "confidence": lambda annotation: f"{annotation.confidence:.3g}",
 }
 
 
@@ -54,12 +54,12 @@ def write_elan(path: Path, annotations: Sequence[Annotation], source: Path | Non
     SubElement(root, "HEADER", MEDIA_FILE="", TIME_UNITS="milliseconds")
     order = SubElement(root, "TIME_ORDER")
     tier = SubElement(root, "TIER", LINGUISTIC_TYPE_REF="symbol", TIER_ID="symbol")
-    for k, one in enumerate(annotations, 1):
+    for k, annotation in enumerate(annotations, 1):
         # Start and end, at least a millisecond apart.
-        start, end = (round(1000 * time) for time in one.span)
+        start, end = (round(1000 * time) for time in annotation.span)
         if start < 0:
             raise DataError(
-                f"expected annotations that start after the first sample of {one.recording}, got one at "
+                f"expected annotations that start after the first sample of {annotation.recording}, got one at "
                 f"{start / 1000} s"
             )
         end = max(end, start + 1)
@@ -68,13 +68,15 @@ def write_elan(path: Path, annotations: Sequence[Annotation], source: Path | Non
             SubElement(order, "TIME_SLOT", TIME_SLOT_ID=slot, TIME_VALUE=str(value))
         ids = {"ANNOTATION_ID": f"a{k}"} | slots
         aligned = SubElement(SubElement(tier, "ANNOTATION"), "ALIGNABLE_ANNOTATION", ids)
-        SubElement(aligned, "ANNOTATION_VALUE").text = UNKNOWN if one.symbol is None else printable(one.symbol)
+        SubElement(aligned, "ANNOTATION_VALUE").text = (
+            UNKNOWN if annotation.symbol is None else printable(annotation.symbol)
+        )
     for number, (name, text) in enumerate(_DEPENDENT.items(), 1):
         below = SubElement(root, "TIER", LINGUISTIC_TYPE_REF="number", PARENT_REF="symbol", TIER_ID=name)
-        for k, one in enumerate(annotations, 1):
+        for k, annotation in enumerate(annotations, 1):
             ids = {"ANNOTATION_ID": f"a{number * len(annotations) + k}", "ANNOTATION_REF": f"a{k}"}
             referring = SubElement(SubElement(below, "ANNOTATION"), "REF_ANNOTATION", ids)
-            SubElement(referring, "ANNOTATION_VALUE").text = text(one)
+            SubElement(referring, "ANNOTATION_VALUE").text = text(annotation)
     plain = {"GRAPHIC_REFERENCES": "false"}
     SubElement(root, "LINGUISTIC_TYPE", plain, LINGUISTIC_TYPE_ID="symbol", TIME_ALIGNABLE="true")
     by_number = {"CONSTRAINTS": _ASSOCIATION, "LINGUISTIC_TYPE_ID": "number", "TIME_ALIGNABLE": "false"}
@@ -93,16 +95,16 @@ _LEFT_OUT = ("recording",)  # of a row: the copy is the recording
 def is_bag(source: Path) -> bool:
     """Whether it is a bag of ROS, a file or a folder."""
     if source.is_dir():
-        known = data_set_of(source)
-        return known is not None and known.format.contents is bag_contents
+        data_set = data_set_of(source)
+        return data_set is not None and data_set.format.contents is bag_contents
     known_ending = FORMATS.get(source.suffix.lower())
     return known_ending is not None and known_ending.contents is bag_contents
 
 
 def is_lerobot(source: Path) -> bool:
     """Whether it is the folder of a data set of LeRobot."""
-    known = data_set_of(source) if source.is_dir() else None
-    return known is not None and known.marker == MARKER
+    data_set = data_set_of(source) if source.is_dir() else None
+    return data_set is not None and data_set.marker == MARKER
 
 
 def write_bag(path: Path, annotations: Sequence[Annotation], source: Path | None) -> Path:
@@ -121,10 +123,12 @@ def write_bag(path: Path, annotations: Sequence[Annotation], source: Path | None
     check_bag(path, source)
 
     def texts(first: int, last: int) -> list[tuple[int, str]]:
-        inside = all(first - _SECOND <= one.end * _SECOND <= last + _SECOND for one in annotations)
-        spans = [(one.end, 0) if inside else (one.end - one.origin, first) for one in annotations]
+        inside = all(first - _SECOND <= annotation.end * _SECOND <= last + _SECOND for annotation in annotations)
+        spans = [
+            (annotation.end, 0) if inside else (annotation.end - annotation.origin, first) for annotation in annotations
+        ]
         stamps = [max(0, shift + round(time * _SECOND)) for time, shift in spans]
-        return [(stamp, _json(one)) for stamp, one in zip(stamps, annotations, strict=True)]
+        return [(stamp, _json(annotation)) for stamp, annotation in zip(stamps, annotations, strict=True)]
 
     with whole_folder(path) if source.is_dir() else whole_file(path) as beside:
         copy_with_topic(source, beside, TOPIC, texts)
@@ -145,11 +149,11 @@ def write_lerobot(path: Path, annotations: Sequence[Annotation], source: Path | 
     source = _of_one(path, source)
     check_lerobot(path, source)
     motions: dict[int, list[Motion]] = {}
-    for one in annotations:
-        number = one.place.removeprefix(_EPISODE)
+    for annotation in annotations:
+        number = annotation.place.removeprefix(_EPISODE)
         if not number.isdecimal():
-            raise DataError(f"expected annotations of episodes, got one of {one.place!r}")
-        motions.setdefault(int(number), []).append(Motion(one.start, OWN + ", " + _json(one)[1:]))
+            raise DataError(f"expected annotations of episodes, got one of {annotation.place!r}")
+        motions.setdefault(int(number), []).append(Motion(annotation.start, OWN + ", " + _json(annotation)[1:]))
     with whole_folder(path) as beside:
         copy_with_motions(source, beside, motions)
     return path
@@ -181,8 +185,8 @@ def _of_one(path: Path, source: Path | None) -> Path:
 
 
 def _check_apart(path: Path, source: Path) -> None:
-    whole = source.resolve()
-    if path.resolve() == whole or whole in path.resolve().parents:
+    data = source.resolve()
+    if path.resolve() == data or data in path.resolve().parents:
         raise DataError(f"expected another path for the copy than the recording {source} or one inside, got {path}")
 
 
@@ -194,8 +198,8 @@ def _check_new_folder(path: Path, source: Path) -> None:
         raise DataError(f"expected a new folder for the copy of {source}, {path} is there; name another, or remove it")
 
 
-def _json(one: Annotation) -> str:
-    row = {head: value for head, value in as_row(one).items() if head not in _LEFT_OUT}
+def _json(annotation: Annotation) -> str:
+    row = {head: value for head, value in as_row(annotation).items() if head not in _LEFT_OUT}
     plain = {
         head: None if isinstance(value, float) and not math.isfinite(value) else value for head, value in row.items()
     }
@@ -252,22 +256,22 @@ def writer_of(path: Path, name: str | None, sources: Sequence[Path]) -> Writer:
         Nothing says what to write, or a copy of several recordings is asked for.
     """
     if name is not None:
-        found = WRITERS[name]
+        writer = WRITERS[name]
     else:
-        fitting = [one for one in WRITERS.values() if _fits(one, path, sources)]
+        fitting = [writer for writer in WRITERS.values() if _fits(writer, path, sources)]
         if not fitting:
-            endings = ", ".join(end for one in WRITERS.values() for end in one.endings)
+            endings = ", ".join(end for writer in WRITERS.values() for end in writer.endings)
             raise DataError(
                 f"expected a path ending in one of {endings}, got {str(path)!r}; or name the format, one of "
                 f"{', '.join(WRITERS)}"
             )
-        found = fitting[0]
-    if found.copies is not None and not (len(sources) == 1 and found.copies(sources[0])):
+        writer = fitting[0]
+    if writer.copies is not None and not (len(sources) == 1 and writer.copies(sources[0])):
         raise DataError(
             f"expected one recording that can be copied with its annotations to {str(path)!r}, got "
             f"{', '.join(map(str, sources))}; write a table: .csv or .json"
         )
-    return found
+    return writer
 
 
 def _fits(writer: Writer, path: Path, sources: Sequence[Path]) -> bool:
@@ -337,10 +341,13 @@ def write_annotations(
         A file that cannot be written.
     """
     groups: dict[Movement, list[Annotation]] = {key: [] for key in movements or ()}
-    for one in annotations:
-        groups.setdefault((one.recording, one.place), []).append(one)
+    for annotation in annotations:
+        groups.setdefault((annotation.recording, annotation.place), []).append(annotation)
     targets = targets_of(path, sources, list(groups), name)
     if any(target.parent != path.parent for target in targets):
         path.mkdir(parents=True, exist_ok=True)
     write, source = writer_of(path, name, sources).write, sources[0] if len(sources) == 1 else None
-    return [write(target, [one for key in keys for one in groups[key]], source) for target, keys in targets.items()]
+    return [
+        write(target, [annotation for key in keys for annotation in groups[key]], source)
+        for target, keys in targets.items()
+    ]

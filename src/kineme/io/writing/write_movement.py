@@ -106,14 +106,14 @@ def _checked(columns: Mapping[str, ArrayLike], names: ColumnNames | None) -> Col
 
 
 def _columns_of(movement: MovementsLike) -> tuple[Columns, ColumnNames | None]:
-    one = as_recording(movement)
+    trajectory = as_recording(movement)
     derivatives = {name: np.asarray(getattr(movement, name)[0]) for name in _DERIVATIVES if hasattr(movement, name)}
     rates: Any = getattr(movement, "rate_names", None)  # of rollouts
-    if one.channels is not None:
-        named = ColumnNames(recorded_names(one.channels), tuple(rates or learned_names(one.channels)))
-        return {"times": one.times, "positions": one.recorded, **derivatives}, named
+    if trajectory.channels is not None:
+        named = ColumnNames(recorded_names(trajectory.channels), tuple(rates or learned_names(trajectory.channels)))
+        return {"times": trajectory.times, "positions": trajectory.recorded, **derivatives}, named
     of_rollout = None if rates is None else ColumnNames(tuple(getattr(movement, "axis_names", ())), tuple(rates))
-    return {"times": one.times, "positions": one.positions, **derivatives}, of_rollout
+    return {"times": trajectory.times, "positions": trajectory.positions, **derivatives}, of_rollout
 
 
 def _heads(columns: Columns, names: ColumnNames | None) -> list[str]:
