@@ -4,15 +4,15 @@
 from kineme.movements.trajectories.trajectory import Trajectory as Trajectory
 from kineme.movements.trajectories.demonstrations import Demonstrations as Demonstrations
 from kineme.movements.channels.channel import Channel as Channel
-from kineme.movements.trajectories.movements_like import MovementLike as MovementLike
-from kineme.movements.trajectories.movements_like import MovementsLike as MovementsLike
-from kineme.movements.preparation.preprocess import preprocess as preprocess
+from kineme.movements.trajectories.trajectory import MovementLike as MovementLike
+from kineme.movements.trajectories.trajectory import MovementsLike as MovementsLike
+from kineme.movements.preparation.trim import preprocess as preprocess
 from kineme.movements.preparation.trim import TrimRest as TrimRest
 from kineme.movements.preparation.smooth import Smooth as Smooth
 from kineme.movements.preparation.resample import Resample as Resample
 from kineme.movements.preparation.perturbations import Perturbation as Perturbation
 from kineme.movements.segmentation.segment import segment as segment
-from kineme.movements.segmentation.segmentation import Segmentation as Segmentation
+from kineme.movements.segmentation.segment import Segmentation as Segmentation
 
 # Recordings in files, and data sets
 from kineme.io.reading.recordings import read_recordings as read_recordings

@@ -10,7 +10,7 @@ from kineme import Demonstrations
 from kineme.dmp.recorded_as import DiscreteSteps, RecordedAs
 from kineme.dmp.rhythmic.rhythmic_dmp import RhythmicPrimitives
 from kineme.movements.channels.channel import Channel
-from kineme.movements.trajectories.channels import of_channels
+from kineme.movements.trajectories.movements import of_channels
 from kineme.orientation import PoseDMP, PosePrimitives, exp, product
 
 GRIPPER = Channel("gripper", "discrete", ("gripper",))

@@ -12,7 +12,7 @@ from kineme.io.reading import formats
 from kineme.io.reading.entries import files_under, root_of
 from kineme.io.reading.formats import DataSet, Format, data_set_of
 from kineme.io.reading.recordings import read_recording, read_recordings
-from kineme.movements.tables.parsed import Block, Detected, Parsed
+from kineme.movements.tables.layout import Block, Detected, Parsed
 
 X = np.sin(np.arange(24.0)).reshape(12, 2)
 

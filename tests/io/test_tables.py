@@ -13,8 +13,7 @@ import kineme
 from kineme.io.reading.check_block import SENTINELS
 from kineme.io.reading.recordings import read_recordings, read_recordings_from_bytes
 from kineme.movements.tables.columns import choose_roles, is_time
-from kineme.movements.tables.layout import Layout
-from kineme.movements.tables.parsed import distinct
+from kineme.movements.tables.layout import Layout, distinct
 
 SIX = [(k, 10.0 + k, 20.0 - k * k) for k in range(6)]
 

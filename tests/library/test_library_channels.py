@@ -21,7 +21,7 @@ from kineme.library.storage.channels import channels_of_text, other_columns
 from kineme.library.storage.connection import FILE
 from kineme.library.storage.read import movements
 from kineme.movements.channels.channel import Channel
-from kineme.movements.trajectories.channels import of_channels
+from kineme.movements.trajectories.movements import of_channels
 from kineme.orientation import PoseDMP, exp, product
 
 CHANNELS = (

@@ -49,11 +49,10 @@ from kineme.kernels.pair_distances import listed_distances, pair_bounds, pair_di
 from kineme.kernels.procrustes import Procrustes
 from kineme.kernels.shapes import shapes_of
 from kineme.movements.channels.channel import Channel
-from kineme.movements.preparation.arc_length import resample_by_arc_length
-from kineme.movements.rotations.matrices import matrices_of
-from kineme.movements.rotations.quaternions import rotated
+from kineme.movements.preparation.resample import resample_by_arc_length
+from kineme.movements.rotations import matrices_of, rotated
 from kineme.movements.trajectories.as_learned import as_learned
-from kineme.movements.trajectories.channels import of_channels
+from kineme.movements.trajectories.movements import of_channels
 from kineme.orientation import PoseDMP, continuous, from_tangent, normalized, to_tangent
 from kineme.recognition.answer import Answer
 from kineme.recognition.early.early import cut

@@ -14,7 +14,7 @@ import kineme
 from kineme import Demonstrations, Recognizer, Trajectory
 from kineme.errors import TrajectoryError
 from kineme.movements.channels.channel import Channel
-from kineme.movements.trajectories.channels import of_channels
+from kineme.movements.trajectories.movements import of_channels
 from kineme.orientation import PoseDMP, exp, product
 from kineme.recognition.early.live_state import LiveStatus
 

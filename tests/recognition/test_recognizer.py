@@ -17,8 +17,8 @@ import kineme
 from kineme import Demonstrations, Recognizer, SpecificationError, Trajectory, TrajectoryError
 from kineme.datasets.lasa import PAPER_LETTERS
 from kineme.kernels.soft_rotation import RotationPrior
-from kineme.movements.preparation.arc_length import arc_length_phase
 from kineme.movements.preparation.perturbations import Perturbation
+from kineme.movements.preparation.resample import arc_length_phase
 from kineme.similarity import scores as module
 from movement_samples import draw_shapes, turn
 

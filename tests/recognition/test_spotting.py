@@ -15,7 +15,7 @@ import pytest
 import kineme
 from kineme import Demonstrations, Recognizer, SpecificationError, Trajectory, TrajectoryError
 from kineme.movements.segmentation.motion import observe
-from kineme.movements.segmentation.segmentation import pieces_of
+from kineme.movements.segmentation.segment import pieces_of
 from kineme.recognition import compared_windows
 from kineme.recognition.candidate_windows import Durations, candidate_windows, resampled
 from kineme.recognition.compared_windows import (

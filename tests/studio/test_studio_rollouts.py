@@ -17,7 +17,7 @@ from kineme import ActionLibrary, Demonstrations, Trajectory
 from kineme.dmp.discrete.formulations import FORMULATIONS
 from kineme.dmp.styles.model import learn_styles
 from kineme.movements.channels.channel import Channel
-from kineme.movements.trajectories.channels import of_channels
+from kineme.movements.trajectories.movements import of_channels
 from kineme.studio.server import rollouts
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from kineme.movements.preparation.arc_length import resample_by_arc_length
-from kineme.movements.preparation.resample import relative_rows
+from kineme.movements.preparation.resample import relative_rows, resample_by_arc_length
 from kineme.movements.preparation.smooth import Smooth
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.similarity.normalization import Normalization

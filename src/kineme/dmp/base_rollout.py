@@ -17,7 +17,7 @@ from kineme.dmp.recorded_as import RecordedAs, with_recorded
 from kineme.errors import SpecificationError
 from kineme.movements.channels.channel import Channels, recorded_names
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.movements.trajectories.indexing import as_indices
+from kineme.movements.trajectories.labels import as_indices
 from kineme.movements.trajectories.movements import axis_names
 from kineme.movements.trajectories.presented import Presented, Samples, with_units
 from kineme.movements.trajectories.trajectory import Trajectory

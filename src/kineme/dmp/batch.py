@@ -12,10 +12,8 @@ from numpy.typing import NDArray
 
 from kineme.dmp.recorded_as import RecordedAs, merged
 from kineme.errors import SpecificationError, TrajectoryError
-from kineme.movements.channels.alike import check_alike
-from kineme.movements.channels.channel import Channels
-from kineme.movements.trajectories.indexing import as_indices
-from kineme.movements.trajectories.labels import label_array
+from kineme.movements.channels.channel import Channels, check_alike
+from kineme.movements.trajectories.labels import as_indices, label_array
 from kineme.movements.trajectories.movements import Names
 
 if TYPE_CHECKING:

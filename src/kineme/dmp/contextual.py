@@ -34,7 +34,7 @@ from kineme.dmp.styles.parameters import (
     to_numbers,
 )
 from kineme.errors import SpecificationError, TrajectoryError
-from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.validation import LARGEST, Array, as_numbers, check_choice, check_number
 
 _SLACK = 1e-9  # of the range: a demonstrated parameter is inside, whatever the rounding

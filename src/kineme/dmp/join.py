@@ -29,8 +29,8 @@ from kineme.dmp.pose.pose_rollout import PoseRollout
 from kineme.dmp.pose.tangent import unwrapped
 from kineme.dmp.recorded_as import DiscreteSteps, RecordedAs, merged
 from kineme.errors import SpecificationError, TrajectoryError
-from kineme.movements.channels.alike import check_alike
-from kineme.movements.rotations.quaternions import conjugate, product
+from kineme.movements.channels.channel import check_alike
+from kineme.movements.rotations import conjugate, product
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.validation import Array, check_number
 

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from kineme.dmp.recorded_as import DiscreteSteps, RecordedAs
 from kineme.errors import DataError, KinemeError
-from kineme.movements.channels.channel import Channels
-from kineme.movements.channels.plain_data import channels_from_data, channels_to_data
+from kineme.movements.channels.channel import Channels, channels_from_data, channels_to_data
 from kineme.movements.preparation.resample import Resample
 from kineme.movements.preparation.smooth import Smooth
 from kineme.movements.preparation.trim import TrimRest

@@ -16,11 +16,9 @@ from numpy.typing import NDArray
 
 from kineme.movements.channels.channel import Channels, is_plain, learned_names, same_columns
 from kineme.movements.channels.coordinates import as_wxyz, columns_of, from_wxyz
-from kineme.movements.preparation.preprocess import Step, preprocess
-from kineme.movements.preparation.trim import TrimRest
-from kineme.movements.trajectories.channels import of_channels
+from kineme.movements.preparation.trim import Step, TrimRest, preprocess
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.movements.trajectories.movements import Movements
+from kineme.movements.trajectories.movements import Movements, of_channels
 from kineme.validation import Array
 
 _ROUNDING = 1e-9  # of a duration: shares that are equal but for rounding

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Self
 from kineme.dmp.discrete.dmp import DMP
 from kineme.features.movement_features import MovementFeatures
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.trajectory import MovementsLike
 
 
 class DMPFeatures(MovementFeatures[DMP]):

@@ -16,7 +16,7 @@ from kineme.dmp.rhythmic.rhythmic_dmp import RhythmicDMP, RhythmicPrimitives
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import axis_names
-from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.validation import check_choice, check_count
 
 #: Feature name -> (primitives, S) -> array (n, size, d).

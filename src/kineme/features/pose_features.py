@@ -14,7 +14,7 @@ from kineme.dmp.pose.tangent import as_poses, to_tangent
 from kineme.errors import TrajectoryError
 from kineme.features.dmp_features import DMPFeatures
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.validation import check_number
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from kineme.dmp.rhythmic.rhythmic_dmp import RhythmicDMP
 from kineme.features.movement_features import MovementFeatures
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.trajectory import MovementsLike
 
 
 class RhythmicFeatures(MovementFeatures[RhythmicDMP]):

@@ -36,12 +36,11 @@ from kineme.movements.channels.channel import (
     same_columns,
 )
 from kineme.movements.channels.column_match import columns_recorded, may_be
-from kineme.movements.tables.parsed import listed
+from kineme.movements.tables.layout import listed
 from kineme.movements.trajectories.as_learned import as_recorded, by_names, of_columns
-from kineme.movements.trajectories.channels import in_coordinates
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.movements.trajectories.movements import Movements
-from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.movements import Movements, in_coordinates
+from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.validation import Array
 from kineme.validation import describe as name_of
 

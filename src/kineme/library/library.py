@@ -17,7 +17,7 @@ from kineme.library.storage.connection import FILE, as_folder
 from kineme.library.storage.read import Ids
 from kineme.library.storage.specification import Specification
 from kineme.library.storage.store import Store, history
-from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.trajectory import MovementsLike
 
 if TYPE_CHECKING:
     from kineme.anchoring.grounding.space import Between, Near
@@ -33,8 +33,7 @@ if TYPE_CHECKING:
     from kineme.library.storage.verify import Problem
     from kineme.movements.channels.channel import Channels
     from kineme.movements.trajectories.demonstrations import Demonstrations
-    from kineme.movements.trajectories.movements_like import HasDemonstrations
-    from kineme.movements.trajectories.trajectory import Trajectory
+    from kineme.movements.trajectories.trajectory import HasDemonstrations, Trajectory
     from kineme.recognition.answer import Answer
     from kineme.recognition.early.hypotheses import Early
     from kineme.recognition.early.stream import Live

@@ -17,8 +17,7 @@ from kineme.library.reduced_features_cache import ReducedMovements, open_cache, 
 from kineme.library.storage import read
 from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store
-from kineme.movements.trajectories.movements_like import MovementsLike
-from kineme.movements.trajectories.trajectory import Trajectory
+from kineme.movements.trajectories.trajectory import MovementsLike, Trajectory
 from kineme.recognition.answer import Answer, Neighbor, is_one
 from kineme.recognition.conformal import calibrate
 from kineme.recognition.early.decision import Decision

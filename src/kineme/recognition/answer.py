@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import Label
-from kineme.movements.trajectories.movements_like import MovementLike, MovementsLike
-from kineme.movements.trajectories.trajectory import Trajectory
+from kineme.movements.trajectories.trajectory import MovementLike, MovementsLike, Trajectory
 from kineme.recognition.certainty import Certainty, certainty, in_words
 from kineme.recognition.classifiers import Classifier, NearestEach
 from kineme.recognition.confidence import class_probabilities

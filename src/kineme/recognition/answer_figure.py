@@ -13,7 +13,7 @@ from kineme.errors import SpecificationError
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.figure import Paths, draw_movements_beside
 from kineme.movements.trajectories.labels import Label
-from kineme.movements.trajectories.movements_like import MovementLike, MovementsLike
+from kineme.movements.trajectories.trajectory import MovementLike, MovementsLike
 from kineme.recognition.transform import Transform
 from kineme.reporting.figures import BLUE, GRAY, figure_to_show
 from kineme.reporting.text import drawable, shortened

@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
-from kineme.movements.segmentation.bouts import Rows
-from kineme.movements.segmentation.motion import Motion, observe
-from kineme.movements.segmentation.rest import Rest
+from kineme.movements.segmentation.motion import Motion, Rows, observe
 from kineme.movements.segmentation.segment import moving
+from kineme.movements.segmentation.table import Rest
 from kineme.movements.trajectories.movements import Movements
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.runtime.compiled import compiled_module, use_compiled

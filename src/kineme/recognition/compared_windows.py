@@ -14,8 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.movements.segmentation.bouts import Rows
-from kineme.movements.segmentation.motion import Motion
+from kineme.movements.segmentation.motion import Motion, Rows
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.recognition.candidate_windows import N_POINTS, resampled
 from kineme.recognition.conformal import Calibration

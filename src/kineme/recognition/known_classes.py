@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
-from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.recognition.answer import Answer, answers, known_labels
 from kineme.recognition.classifiers import Classifier, fit_classifier
 from kineme.recognition.conformal import Calibration, calibrate, check_error_rate

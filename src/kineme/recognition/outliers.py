@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from kineme.errors import TrajectoryError
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import Label
-from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.recognition.conformal import check_error_rate
 from kineme.recognition.left_out import LEAST, distances
 from kineme.sampling import evenly_spaced

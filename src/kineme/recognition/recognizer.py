@@ -14,8 +14,7 @@ from sklearn.utils.validation import check_is_fitted
 from kineme.kernels.soft_rotation import RotationPrior
 from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
-from kineme.movements.trajectories.movements_like import HasDemonstrations, MovementLike, MovementsLike
-from kineme.movements.trajectories.trajectory import Trajectory
+from kineme.movements.trajectories.trajectory import HasDemonstrations, MovementLike, MovementsLike, Trajectory
 from kineme.recognition.answer import Answer, answers, is_one, known_labels
 from kineme.recognition.classifiers import CLASSIFIERS, SupportVectors, fit_classifier
 from kineme.recognition.confidence import class_probabilities

@@ -11,14 +11,11 @@ from numpy.typing import NDArray
 
 from kineme.errors import TrajectoryError
 from kineme.movements.preparation.resample import relative_rows
-from kineme.movements.segmentation.bouts import Rows
-from kineme.movements.segmentation.motion import Motion, observe
-from kineme.movements.segmentation.segment import as_recording
-from kineme.movements.segmentation.segmentation import pieces_of
+from kineme.movements.segmentation.motion import Motion, Rows, observe
+from kineme.movements.segmentation.segment import as_recording, pieces_of
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import Label
-from kineme.movements.trajectories.movements_like import MovementsLike
-from kineme.movements.trajectories.trajectory import Trajectory
+from kineme.movements.trajectories.trajectory import MovementsLike, Trajectory
 from kineme.recognition.candidate_windows import (
     MIN_SAMPLES,
     N_POINTS,

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.recognition.answer import Answer, Verdict, verdicts_of, with_transforms
 from kineme.recognition.classifiers import Nearest
 from kineme.recognition.conformal import Calibration, check_error_rate

@@ -13,7 +13,7 @@ from kineme.kernels.soft_rotation import RotationPrior
 from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.as_learned import as_learned
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.similarity.describe import prepare
 from kineme.similarity.described import Described
 from kineme.similarity.normalization import Normalization

@@ -15,7 +15,7 @@ from kineme.movements.preparation.pauses import without_pauses
 from kineme.movements.preparation.resample import relative_rows
 from kineme.movements.preparation.smooth import smooth_rows
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.runtime.parallel import for_tiles
 from kineme.similarity.described import Described, Pairs
 from kineme.similarity.representation import PAIR_QUANTITIES, rotating

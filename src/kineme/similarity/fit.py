@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from kineme.errors import SpecificationError
 from kineme.movements.channels.channel import Channels
 from kineme.movements.channels.coordinates import with_periods
-from kineme.movements.trajectories.channels import in_coordinates
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements import in_coordinates
 from kineme.runtime.parallel import single_threaded_blas
 from kineme.similarity.comparison import Comparison
 from kineme.similarity.describe import feature_rows, prepare

@@ -13,8 +13,8 @@ from kineme.dmp.discrete.dmp import DMP
 from kineme.dmp.discrete.operators import encoder, forcing_matrix
 from kineme.dmp.discrete.specification import MOST_BASIS, MOST_POINTS
 from kineme.errors import SpecificationError
-from kineme.movements.preparation.arc_length import resample_by_arc_length
-from kineme.movements.preparation.spline import spline_matrix
+from kineme.movements.preparation.resample import resample_by_arc_length
+from kineme.movements.preparation.smooth import spline_matrix
 from kineme.similarity.normalization import Normalization
 from kineme.validation import Array, check_choice, check_count, check_number
 

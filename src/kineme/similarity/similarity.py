@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from kineme.errors import SpecificationError
 from kineme.kernels.procrustes import Procrustes
-from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.similarity.describe import describe
 from kineme.similarity.described import Described
 from kineme.similarity.distances import squared_distances

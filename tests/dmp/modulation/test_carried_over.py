@@ -7,7 +7,7 @@ import pytest
 
 from kineme import DMP, Demonstrations, Primitives, TrajectoryError, blend, join
 from kineme.movements.channels.channel import Channel
-from kineme.movements.trajectories.channels import of_channels
+from kineme.movements.trajectories.movements import of_channels
 
 CHANNELS = (
     *(Channel(name, "position", (name,), "mm") for name in ("elbow", "wrist")),

@@ -11,7 +11,7 @@ from kineme import DMP, Demonstrations, TrajectoryError, blend, couple, join
 from kineme.dmp.discrete.formulations import FORMULATIONS
 from kineme.dmp.discrete.specification import GATINGS
 from kineme.movements.channels.channel import Channel
-from kineme.movements.trajectories.channels import of_channels
+from kineme.movements.trajectories.movements import of_channels
 from kineme.orientation import PoseDMP, PosePrimitives, conjugate, exp, log, product
 from soaking import examples
 

@@ -9,9 +9,8 @@ from hypothesis import strategies as st
 
 import kineme
 from kineme import DMP, Demonstrations, Primitives, TrajectoryError, blend, couple, join
-from kineme.movements.channels.alike import check_alike
-from kineme.movements.channels.channel import Channel
-from kineme.movements.trajectories.channels import of_channels
+from kineme.movements.channels.channel import Channel, check_alike
+from kineme.movements.trajectories.movements import of_channels
 from kineme.orientation import PoseDMP, PosePrimitives, exp
 from kineme.styles import average, learn_styles
 

@@ -13,8 +13,8 @@ from kineme.dmp.recorded_as import RecordedAs
 from kineme.movements.channels.channel import Channel
 from kineme.movements.channels.coordinates import as_wxyz, canonical, from_wxyz, learned
 from kineme.movements.preparation.trim import TrimRest
-from kineme.movements.trajectories.channels import of_channels
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements import of_channels
 from kineme.orientation import PoseDMP, exp, product
 
 Q = Channel("q", "orientation", ("qx", "qy", "qz", "qw"), None, "xyzw")

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kineme.movements.channels.wraps import period_of, without_wraps, wrap_period
+from kineme.movements.channels.coordinates import period_of, without_wraps, wrap_period
 
 
 @given(

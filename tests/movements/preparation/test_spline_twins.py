@@ -11,10 +11,13 @@ from scipy.interpolate import CubicSpline
 from scipy.interpolate import make_smoothing_spline as smoothing_spline_of_numbers
 
 from kineme import Demonstrations, Resample, Smooth, preprocess
-from kineme.movements.preparation.arc_length import arc_length_phase, resample_by_arc_length, resample_by_phase
-from kineme.movements.preparation.resample import relative_rows
-from kineme.movements.preparation.smooth import smooth_rows
-from kineme.movements.preparation.spline import spline_matrix, spline_rows
+from kineme.movements.preparation.resample import (
+    arc_length_phase,
+    relative_rows,
+    resample_by_arc_length,
+    resample_by_phase,
+)
+from kineme.movements.preparation.smooth import smooth_rows, spline_matrix, spline_rows
 from soaking import examples
 
 CHOICES = ("always", "never")
@@ -151,7 +154,7 @@ def test_smoothing_splines_between_the_samples_are_those_of_scipy(compiled, seed
 def test_movements_too_long_to_be_worked_on_side_by_side_are_the_same(compiled, monkeypatch):
     demos = _demonstrations(_ragged(0, least=5))
     before = relative_rows(demos, 0, 6, 33), smooth_rows(demos, 0, 6, 8.0, 33), Smooth(8.0).apply(demos).positions
-    monkeypatch.setattr("kineme.movements.preparation.spline._LONGEST", 20)
+    monkeypatch.setattr("kineme.movements.preparation.smooth._LONGEST", 20)
     after = relative_rows(demos, 0, 6, 33), smooth_rows(demos, 0, 6, 8.0, 33), Smooth(8.0).apply(demos).positions
     for one, other in zip(before, after, strict=True):
         np.testing.assert_allclose(one, other, atol=1e-9)

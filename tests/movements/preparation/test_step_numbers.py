@@ -7,7 +7,7 @@ import pytest
 
 from kineme import Resample, Smooth, Trajectory, TrimRest, preprocess
 from kineme.features.random_binning import RandomBinning
-from kineme.movements.preparation.arc_length import arc_length_phase
+from kineme.movements.preparation.resample import arc_length_phase
 
 
 @pytest.mark.parametrize(("cycles", "left"), [(20, 0.5), (10, 16 / 17), (40, 1 / 17)])

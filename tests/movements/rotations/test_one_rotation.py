@@ -5,9 +5,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kineme.movements.rotations.one_rotation import exp_one, log_one, matrix_one
-from kineme.movements.rotations.quaternions import product, product_components
-from kineme.movements.rotations.rotation_vectors import exp, log, nearest
+from kineme.movements.rotations import (
+    exp,
+    exp_one,
+    log,
+    log_one,
+    matrix_one,
+    nearest,
+    product,
+    product_components,
+)
 from rotation_samples import as_rotation, random_quaternions, seeds
 
 SIZES = [0.0, 1e-160, 1e-9, 2e-7, 0.3, 3.1, np.pi, 4.0, 2 * np.pi, 100.0]

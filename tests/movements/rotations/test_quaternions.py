@@ -8,9 +8,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from kineme import KinemeError, orientation
 from kineme.errors import TrajectoryError
-from kineme.movements.rotations.matrices import matrices_of, quaternion_of
-from kineme.movements.rotations.quaternions import rotated
-from kineme.movements.rotations.rotation_vectors import nearest
+from kineme.movements.rotations import matrices_of, nearest, quaternion_of, rotated
 from kineme.orientation import angle_between, conjugate, continuous, exp, log, normalized, product, slerp
 from rotation_samples import as_rotation, random_quaternions, seeds
 

@@ -12,7 +12,7 @@ import pytest
 
 import kineme
 from kineme import SpecificationError, Trajectory, TrajectoryError
-from kineme.movements.segmentation.rest import Rest
+from kineme.movements.segmentation.table import Rest
 
 T = np.linspace(0, 2, 200)
 X = np.column_stack((np.cos(T), np.sin(T)))

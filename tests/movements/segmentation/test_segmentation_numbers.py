@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from kineme import Trajectory, TrajectoryError, segment
-from kineme.movements.segmentation.motion import Motion, noise_variance, observe
-from kineme.movements.segmentation.onset import onset_rows
+from kineme.movements.segmentation.motion import Motion, noise_variance, observe, onset_rows
 
 
 @pytest.mark.parametrize("noise", [0.002, 0.01])

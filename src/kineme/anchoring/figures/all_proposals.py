@@ -12,7 +12,7 @@ from kineme.anchoring.figures.proposal import overlay, shown_paths
 from kineme.anchoring.proposals.proposals import Proposals, check_members
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.reporting.figures import GRAY, ORANGE, new_figure
 from kineme.similarity.alignment import paths_of
 from kineme.similarity.specification import Compares

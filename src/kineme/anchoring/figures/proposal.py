@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from kineme.anchoring.figures.drawing import bare, flat, mark_start, plot_paths
 from kineme.anchoring.proposals.proposals import Proposal, check_members
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.reporting.figures import BLUE, GRAY, ORANGE, new_figure
 from kineme.reporting.text import drawable
 from kineme.similarity.alignment import maps_onto, paths_of

@@ -10,7 +10,7 @@ from kineme.anchoring.grounding.space import ConceptualSpace
 from kineme.dmp.discrete.dmp import Primitives
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.reporting.figures import BLUE, GRAY, ORANGE, new_figure
 from kineme.reporting.text import drawable
 from kineme.similarity.alignment import paths_of

@@ -10,7 +10,7 @@ from kineme.dmp.discrete.dmp import Primitives
 from kineme.dmp.styles.average import AveragePrimitive, average
 from kineme.dmp.styles.parameters import check_primitives
 from kineme.errors import SpecificationError
-from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.similarity.alignment import Maps, maps_onto, moved, paths_of
 from kineme.similarity.describe import describe
 from kineme.similarity.described import Described

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import SpecificationError
-from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.similarity.describe import describe
 from kineme.similarity.described import Described
 from kineme.similarity.similarity import averaged

@@ -12,7 +12,7 @@ from kineme.anchoring.clustering.stability import stabilities
 from kineme.anchoring.proposals.proposals import Proposals, describe_clusters
 from kineme.anchoring.proposals.propose import own_order
 from kineme.anchoring.proposals.subsample import extend, largest_clustered, subsample
-from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.recognition.known_classes import FittedRecognizer, KnownClasses, known_classes, open_set_labels
 from kineme.recognition.left_out import distances as in_widths
 from kineme.sampling import evenly_spaced

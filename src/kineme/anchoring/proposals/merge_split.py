@@ -12,7 +12,7 @@ from kineme.anchoring.clustering.stability import stabilities
 from kineme.anchoring.proposals.propose import own_order
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.labels import label_array
-from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.sampling import evenly_spaced
 from kineme.similarity.describe import describe
 from kineme.similarity.described import Described

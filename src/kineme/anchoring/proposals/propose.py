@@ -13,7 +13,7 @@ from kineme.anchoring.clustering.stability import stabilities
 from kineme.anchoring.proposals.proposals import Proposals, describe_clusters
 from kineme.anchoring.proposals.subsample import extend, largest_clustered, subsample
 from kineme.errors import SpecificationError
-from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.recognition.left_out import check_groups, comparable_groups
 from kineme.similarity.describe import describe
 from kineme.similarity.described import Described

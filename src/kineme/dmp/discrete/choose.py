@@ -25,10 +25,10 @@ from kineme.dmp.discrete.encode import check_movement
 from kineme.dmp.discrete.operators import decoder, trajectory_columns
 from kineme.dmp.discrete.specification import Specification
 from kineme.errors import SpecificationError
-from kineme.movements.preparation.preprocess import preprocess
 from kineme.movements.preparation.resample import extents_of, relative_rows
+from kineme.movements.preparation.trim import preprocess
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.sampling import evenly_spaced
 from kineme.validation import Array, check_count, check_number
 

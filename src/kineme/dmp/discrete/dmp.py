@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from kineme.dmp.discrete.choose import BasisSelection
     from kineme.dmp.discrete.rollout import Rollout
     from kineme.dmp.discrete.via_points import ViaLike
-    from kineme.movements.trajectories.movements_like import MovementsLike
+    from kineme.movements.trajectories.trajectory import MovementsLike
 
 
 @dataclass(frozen=True)

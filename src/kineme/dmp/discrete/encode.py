@@ -10,10 +10,10 @@ from kineme.dmp.discrete.operators import encoder
 from kineme.dmp.discrete.specification import Specification
 from kineme.dmp.recorded_as import recorded_as
 from kineme.errors import TrajectoryError
-from kineme.movements.preparation.preprocess import preprocess
 from kineme.movements.preparation.resample import even_rows, extents_of, relative_rows
+from kineme.movements.preparation.trim import preprocess
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.runtime.parallel import for_tiles
 from kineme.validation import Array, describe
 

@@ -15,7 +15,7 @@ import numpy as np
 from kineme.dmp.discrete.formulations import Formulation
 from kineme.dmp.discrete.specification import GaussianBasis, Specification
 from kineme.dmp.spring_damper import NODE_WEIGHTS, NODES, transitions
-from kineme.movements.preparation.spline import spline_matrix
+from kineme.movements.preparation.smooth import spline_matrix
 from kineme.validation import Array
 
 _NUMBERS_AT_ONCE = 500_000  # of the forcing term at a time; a limit on memory

@@ -11,7 +11,7 @@ import numpy as np
 from kineme.dmp.discrete.formulations import FORMULATIONS, Formulation
 from kineme.dmp.spring_damper import SpringDamper
 from kineme.errors import SpecificationError
-from kineme.movements.preparation.preprocess import check_steps
+from kineme.movements.preparation.trim import check_steps
 from kineme.validation import Array, check_choice, check_count, check_number
 
 FITS = ("forcing", "trajectory")

@@ -16,7 +16,7 @@ from kineme.dmp.recorded_as import in_primitive, in_recording
 from kineme.errors import ExtrapolationWarning, SpecificationError, heard_warnings, warn
 from kineme.io.writing.write_movement import ColumnNames, Columns
 from kineme.movements.channels.coordinates import columns_of
-from kineme.movements.rotations.quaternions import NORM_TOLERANCE
+from kineme.movements.rotations import NORM_TOLERANCE
 from kineme.validation import LARGEST, Array
 
 _LONGEST = 10.0  # durations after which a movement around obstacles is given up

@@ -14,7 +14,7 @@ from kineme.dmp.pose.pose_dmp import PoseDMP, PosePrimitives
 from kineme.io.arrays.npz import kind_of
 from kineme.movements.channels.channel import learned_names, recorded_names
 from kineme.movements.channels.coordinates import as_wxyz, columns_of
-from kineme.movements.rotations.quaternions import angle_between
+from kineme.movements.rotations import angle_between
 from kineme.movements.trajectories.movements import axis_names
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.validation import Array

@@ -11,8 +11,7 @@ from kineme.dmp.discrete.rollout import Rollout
 from kineme.dmp.discrete.via_points import ViaLike, ViaPoints, broadcast_length, per_movement, via_points
 from kineme.dmp.pose.rates import rotation_vector_rate
 from kineme.errors import SpecificationError, TrajectoryError
-from kineme.movements.rotations.quaternions import conjugate, normalized, product
-from kineme.movements.rotations.rotation_vectors import log, nearest
+from kineme.movements.rotations import conjugate, log, nearest, normalized, product
 from kineme.validation import Array
 
 _RADIAN = 1.0  # an orientation within it is no mistake of unit or frame, however little the movement turns

@@ -13,8 +13,7 @@ from kineme.dmp.control.options import Options
 from kineme.dmp.control.plan import Plan
 from kineme.dmp.control.state import State, Status
 from kineme.dmp.pose.rates import Components, acceleration_components, rate_components, velocity_components
-from kineme.movements.rotations.one_rotation import exp_one, log_one
-from kineme.movements.rotations.quaternions import conjugate, product_components
+from kineme.movements.rotations import conjugate, exp_one, log_one, product_components
 from kineme.validation import Array
 
 _MOST_TURNED = 1e6  # rad; quaternions of longer rotation vectors are rounding errors

@@ -23,11 +23,10 @@ from kineme.dmp.pose.tangent import to_tangent
 from kineme.dmp.recorded_as import RecordedAs, recorded_as
 from kineme.errors import SpecificationError
 from kineme.movements.channels.channel import Channels
-from kineme.movements.rotations.quaternions import conjugate, normalized, product
-from kineme.movements.rotations.rotation_vectors import exp, log, nearest
+from kineme.movements.rotations import conjugate, exp, log, nearest, normalized, product
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import Names
-from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.validation import Array, check_number
 
 

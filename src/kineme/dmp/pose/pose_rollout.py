@@ -15,8 +15,7 @@ from kineme.dmp.discrete.rollout import Rollout
 from kineme.dmp.pose.rates import angular_acceleration, angular_velocity
 from kineme.dmp.recorded_as import RecordedAs
 from kineme.movements.channels.channel import Channel, Channels
-from kineme.movements.rotations.quaternions import product
-from kineme.movements.rotations.rotation_vectors import exp
+from kineme.movements.rotations import exp, product
 from kineme.runtime.parallel import for_tiles
 from kineme.validation import Array
 

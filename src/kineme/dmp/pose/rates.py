@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kineme.movements.rotations.rotation_vectors import as_vectors
+from kineme.movements.rotations import as_vectors
 from kineme.validation import Array
 
 #: x, y and z: arrays of one shape, or floats.

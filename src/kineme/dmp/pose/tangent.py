@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 from kineme.errors import TrajectoryError
 from kineme.movements.channels.channel import Channels, is_plain, learned_names
 from kineme.movements.channels.coordinates import as_wxyz, columns_of
-from kineme.movements.preparation.preprocess import Step, preprocess
-from kineme.movements.rotations.quaternions import angle_between, conjugate, normalized_rows, product
-from kineme.movements.rotations.rotation_vectors import TINY, exp, logarithm_factor
+from kineme.movements.preparation.trim import Step, preprocess
+from kineme.movements.rotations import TINY, angle_between, conjugate, exp, logarithm_factor, normalized_rows, product
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.runtime.parallel import for_tiles
 from kineme.validation import Array, describe
 

@@ -18,10 +18,10 @@ from kineme.dmp.recorded_as import RecordedAs
 from kineme.dmp.rhythmic.operators import Complex, as_real, encoder, even_phases, fit_harmonics, waves
 from kineme.dmp.rhythmic.specification import RhythmicSpecification
 from kineme.errors import TrajectoryError
-from kineme.movements.preparation.preprocess import preprocess
 from kineme.movements.preparation.resample import relative_rows
+from kineme.movements.preparation.trim import preprocess
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.runtime.parallel import for_tiles, single_threaded_blas
 from kineme.validation import Array, describe
 

@@ -18,7 +18,7 @@ from kineme.dmp.rhythmic.operators import forcing_matrix
 from kineme.dmp.rhythmic.rollout import PHASES, RhythmicRollout, modulated, rollout
 from kineme.dmp.rhythmic.specification import RhythmicSpecification
 from kineme.errors import SpecificationError
-from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.validation import Array, check_count, check_samples
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ import numpy as np
 from kineme.dmp.discrete.specification import FITS, MOST_BASIS, MOST_POINTS
 from kineme.dmp.spring_damper import SpringDamper
 from kineme.errors import SpecificationError
-from kineme.movements.preparation.preprocess import check_steps
+from kineme.movements.preparation.trim import check_steps
 from kineme.validation import Array, check_choice, check_count, check_number
 
 _PER_GAP = 128  # samples between two centers; resolves overlaps down to 1e-6

@@ -33,9 +33,8 @@ from kineme.dmp.styles.parameters import (
     to_numbers,
 )
 from kineme.errors import SpecificationError, TrajectoryError
-from kineme.movements.channels.alike import check_alike
-from kineme.movements.channels.channel import Channels
-from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.channels.channel import Channels, check_alike
+from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.validation import Array, as_numbers, check_choice, check_count, check_number
 
 

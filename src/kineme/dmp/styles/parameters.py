@@ -26,7 +26,7 @@ from kineme.dmp.discrete.specification import Specification
 from kineme.dmp.recorded_as import RecordedAs
 from kineme.errors import TrajectoryError
 from kineme.movements.trajectories.labels import label_array
-from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.validation import Array
 
 

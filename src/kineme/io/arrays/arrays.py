@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from kineme.errors import DataError
 from kineme.io.arrays.trees import STAMP, rate_of, seconds_named
 from kineme.movements.tables.columns import column_numbers, is_header_stamp, is_time
-from kineme.movements.tables.layout import Layout
-from kineme.movements.tables.parsed import Block, Detected, Parsed, distinct, listed
+from kineme.movements.tables.layout import Block, Detected, Layout, Parsed, distinct, listed
 from kineme.movements.tables.time_stamps import in_seconds, nanoseconds, unit_by_size, unit_in_head
 from kineme.movements.trajectories.movements import axis_names
 from kineme.validation import MIN_SAMPLES, ROUNDED, Array, too_long_integer

@@ -17,10 +17,9 @@ import numpy as np
 from kineme.errors import DataError
 from kineme.io.arrays.arrays import numbers_of
 from kineme.io.arrays.trees import STAMP, Rate, rate_of
-from kineme.movements.rotations.rotation_vectors import exp
+from kineme.movements.rotations import exp
 from kineme.movements.tables.columns import choose_roles, is_time
-from kineme.movements.tables.layout import Layout
-from kineme.movements.tables.parsed import Parsed, distinct, no_lines
+from kineme.movements.tables.layout import Layout, Parsed, distinct, no_lines
 from kineme.movements.tables.table import Segments, Table, table_movements
 from kineme.movements.trajectories.movements import axis_names
 from kineme.validation import Array

@@ -14,8 +14,7 @@ from kineme.errors import DataError
 from kineme.io.arrays.tree_movements import tree_movements
 from kineme.io.arrays.trees import GROUPS, Rate, is_label, rate_of, seconds_named
 from kineme.io.limits import check_expanded
-from kineme.movements.tables.layout import Layout
-from kineme.movements.tables.parsed import Parsed
+from kineme.movements.tables.layout import Layout, Parsed
 
 _SMALL, _CHUNKS = 2**20, 1000  # bytes and chunks that need not be written
 _EXPANDED = 1100  # times as many bytes gzip, which packs best, gives at most

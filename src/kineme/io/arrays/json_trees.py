@@ -21,8 +21,7 @@ from kineme.io.limits import check_expanded
 from kineme.io.ros.damage import REMEDIES, expand, refused
 from kineme.io.tables.dialect import is_number
 from kineme.movements.tables.columns import counts_samples, is_time
-from kineme.movements.tables.layout import Layout
-from kineme.movements.tables.parsed import Parsed, listed
+from kineme.movements.tables.layout import Layout, Parsed, listed
 from kineme.movements.tables.time_stamps import is_date, seconds_of_dates
 
 _RECORDED = "timestamp [s]"  # head of the times of the recording

@@ -21,8 +21,7 @@ from kineme.io.arrays.tree_movements import tree_movements
 from kineme.io.arrays.trees import has_times
 from kineme.io.limits import check_expanded
 from kineme.movements.tables.columns import is_time
-from kineme.movements.tables.layout import Layout
-from kineme.movements.tables.parsed import Parsed, listed
+from kineme.movements.tables.layout import Layout, Parsed, listed
 from kineme.validation import Array
 
 HEADER = 128  # bytes

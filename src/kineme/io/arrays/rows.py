@@ -15,8 +15,7 @@ from kineme.io.limits import check_expanded
 from kineme.io.tables.dialect import is_number, is_skipped, separator_of, split
 from kineme.io.tables.text_table import lines_of
 from kineme.movements.tables.columns import LABEL_WORDS, column_numbers
-from kineme.movements.tables.layout import Layout
-from kineme.movements.tables.parsed import Parsed, listed
+from kineme.movements.tables.layout import Layout, Parsed, listed
 from kineme.movements.tables.time_stamps import is_date, seconds_of_dates, words_of
 from kineme.movements.trajectories.movements import axis_names
 from kineme.validation import Array

@@ -24,8 +24,7 @@ from kineme.io.arrays.arrays import (
 from kineme.io.arrays.trees import NAMES, STAMP, Found, Style, listed_shapes, movements_in
 from kineme.io.limits import check_expanded
 from kineme.movements.tables.columns import choose_roles, is_time
-from kineme.movements.tables.layout import Layout
-from kineme.movements.tables.parsed import Parsed, listed, no_lines
+from kineme.movements.tables.layout import Layout, Parsed, listed, no_lines
 from kineme.movements.tables.table import Segments, Table, table_movements
 from kineme.movements.tables.time_stamps import words_of
 from kineme.movements.trajectories.movements import axis_names

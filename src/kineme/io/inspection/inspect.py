@@ -16,7 +16,7 @@ from kineme.io.records import Problem
 from kineme.movements.channels.channel import Channel, Channels
 from kineme.movements.channels.column_match import columns_recorded
 from kineme.movements.channels.coordinates import columns_of, lever_of
-from kineme.movements.tables.parsed import Detected
+from kineme.movements.tables.layout import Detected
 from kineme.movements.tables.time_stamps import GUESSED
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.reporting.table import Table, to_text

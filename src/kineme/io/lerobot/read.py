@@ -18,8 +18,7 @@ from kineme.io.lerobot.info import Episodes, Info, read_episodes, read_info, rea
 from kineme.io.limits import check_expanded
 from kineme.io.tables.parquet import is_list, rows_of_lists
 from kineme.movements.tables.columns import choose_roles, column_numbers
-from kineme.movements.tables.layout import Column, Layout
-from kineme.movements.tables.parsed import Parsed, listed, no_lines
+from kineme.movements.tables.layout import Column, Layout, Parsed, listed, no_lines
 from kineme.movements.tables.table import Segments, Table, table_movements
 from kineme.reporting.text import counted, first_names
 from kineme.validation import Array

@@ -17,8 +17,7 @@ from kineme.errors import DataError
 from kineme.io.limits import check_expanded
 from kineme.io.motion_capture.export_heads import without_common_subject
 from kineme.movements.tables.columns import Roles, choose_roles
-from kineme.movements.tables.layout import Layout
-from kineme.movements.tables.parsed import no_lines
+from kineme.movements.tables.layout import Layout, no_lines
 from kineme.movements.tables.table import Table
 
 _STAMP = "time [s]"

@@ -15,12 +15,10 @@ from numpy.typing import NDArray
 from kineme.errors import DataError, TrajectoryError
 from kineme.io.records import Problem, in_shell
 from kineme.movements.channels.channel import Channel, Channels
-from kineme.movements.channels.coordinates import period_of_channel
+from kineme.movements.channels.coordinates import period_of_channel, without_wraps
 from kineme.movements.channels.detect import find_channels
-from kineme.movements.channels.wraps import without_wraps
-from kineme.movements.rotations.rotation_vectors import slerp
-from kineme.movements.tables.layout import Layout
-from kineme.movements.tables.parsed import Block, Repair
+from kineme.movements.rotations import slerp
+from kineme.movements.tables.layout import Block, Layout, Repair
 from kineme.reporting.text import counted
 from kineme.validation import (
     LARGEST_POSITION,

@@ -14,7 +14,7 @@ from kineme.io.records import Problem, in_shell
 from kineme.movements.channels.column_match import Columns, columns_like
 from kineme.movements.channels.detect import unit_of
 from kineme.movements.tables.columns import beside_positions
-from kineme.movements.tables.parsed import Detected, listed
+from kineme.movements.tables.layout import Detected, listed
 from kineme.movements.tables.time_stamps import words_of
 from kineme.reporting.text import first_names
 from kineme.units import unit_named

@@ -25,8 +25,7 @@ from kineme.io.ros.choose import bag_contents
 from kineme.io.ros.read_bag import read_bag
 from kineme.io.tables.parquet import read_parquet_table
 from kineme.io.tables.text_table import read_text_table
-from kineme.movements.tables.layout import Layout
-from kineme.movements.tables.parsed import Parsed
+from kineme.movements.tables.layout import Layout, Parsed
 from kineme.movements.tables.table import table_movements
 
 

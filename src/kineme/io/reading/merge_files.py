@@ -21,13 +21,10 @@ from kineme.io.records import Problem, note_on_missing
 from kineme.movements.channels.channel import Channels, is_plain, recorded_names
 from kineme.movements.channels.coordinates import canonical, in_order, off_norm
 from kineme.movements.channels.detect import Given, find_channels
-from kineme.movements.tables.layout import Layout
-from kineme.movements.tables.parsed import Block, Detected, Repair
-from kineme.movements.trajectories.channels import of_channels
-from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.tables.layout import Block, Detected, Layout, Repair
+from kineme.movements.trajectories.demonstrations import Demonstrations, MovementSequence
 from kineme.movements.trajectories.labels import label_array
-from kineme.movements.trajectories.movement_sequence import MovementSequence
-from kineme.movements.trajectories.movements import Movements
+from kineme.movements.trajectories.movements import Movements, of_channels
 from kineme.reporting.text import counted
 
 #: Names of an array (n,) of people in an npz archive, one for each of its n movements.

@@ -19,12 +19,10 @@ from kineme.io.reading.check_block import check_block, sentinels_as_missing
 from kineme.io.reading.entries import OUTSIDE, as_text, leads_out
 from kineme.io.reading.formats import FORMATS, Format, data_set_of
 from kineme.io.records import Problem
-from kineme.movements.channels.column_match import numbers_by_name
+from kineme.movements.channels.column_match import in_one_unit, numbers_by_name
 from kineme.movements.channels.detect import unit_of
-from kineme.movements.channels.one_unit import in_one_unit
 from kineme.movements.tables.columns import excluded_numbers
-from kineme.movements.tables.layout import Known, Layout
-from kineme.movements.tables.parsed import Block, Detected, Parsed, listed
+from kineme.movements.tables.layout import Block, Detected, Known, Layout, Parsed, listed
 
 #: Exceptions of readers on invalid files; RecursionError is too deep nesting.
 _UNREADABLE = (

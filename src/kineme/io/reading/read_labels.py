@@ -23,10 +23,9 @@ from kineme.io.limits import check_expanded, read_limited
 from kineme.io.reading.merge_files import Recordings, Source
 from kineme.io.records import UNKNOWN, Problem
 from kineme.movements.tables.time_stamps import TIME_UNITS
-from kineme.movements.trajectories.channels import of_channels
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import label_array
-from kineme.movements.trajectories.movements import Movements
+from kineme.movements.trajectories.movements import Movements, of_channels
 from kineme.reporting.text import counted, text_in
 from kineme.units import UNITS, converted, split_head, unit_named
 from kineme.validation import MIN_SAMPLES, Array

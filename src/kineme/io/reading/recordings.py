@@ -17,8 +17,7 @@ from kineme.io.reading.read_file import format_of, read_bytes, read_file
 from kineme.io.reading.recording_gaps import notes_on_gaps
 from kineme.movements.preparation.trim import TrimRest
 from kineme.movements.tables.columns import excluded_numbers
-from kineme.movements.tables.layout import FILL_GAPS, Column, Layout
-from kineme.movements.tables.parsed import listed
+from kineme.movements.tables.layout import FILL_GAPS, Column, Layout, listed
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.trajectory import Trajectory
 

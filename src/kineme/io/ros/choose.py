@@ -16,8 +16,7 @@ from kineme.io.records import Contents
 from kineme.io.ros.bags import Bag, Topic, messages_of, open_bag
 from kineme.io.ros.number_fields import TRANSFORMS, TYPES, Heads, Row, decoder_of, number_fields, transform_row
 from kineme.movements.channels.detect import find_channels
-from kineme.movements.tables.layout import Known, Layout
-from kineme.movements.tables.parsed import listed
+from kineme.movements.tables.layout import Known, Layout, listed
 from kineme.reporting.text import counted, first_names
 from kineme.validation import MIN_SAMPLES
 

@@ -17,7 +17,6 @@ from kineme.io.limits import check_expanded
 from kineme.io.ros.bags import Bag, Topic, logs_beside, messages_of, open_bag
 from kineme.io.ros.choose import Edge, Step, chain, choose, connected_graph, edge_of, transforms_in
 from kineme.io.ros.number_fields import POSE, TYPES, Heads, decoder_of, nanoseconds_of, transform_row
-from kineme.io.ros.rotations import are_rotations, from_ros, to_ros
 from kineme.io.ros.streams import (
     SECOND,
     Samples,
@@ -32,10 +31,17 @@ from kineme.io.ros.streams import (
     values_at,
     with_rotations,
 )
-from kineme.movements.rotations.quaternions import conjugate, continuous, product, rotated
+from kineme.movements.rotations import (
+    are_rotations,
+    conjugate,
+    continuous,
+    from_ros,
+    product,
+    rotated,
+    to_ros,
+)
 from kineme.movements.tables.columns import Roles, column_numbers, is_no_coordinate
-from kineme.movements.tables.layout import AS_KNOWN, Layout
-from kineme.movements.tables.parsed import Parsed, listed, no_lines
+from kineme.movements.tables.layout import AS_KNOWN, Layout, Parsed, listed, no_lines
 from kineme.movements.tables.table import Table, table_movements
 from kineme.reporting.text import counted
 from kineme.validation import MIN_SAMPLES, Array

@@ -16,9 +16,8 @@ from kineme.errors import DataError
 from kineme.io.limits import check_expanded
 from kineme.io.ros.bags import Bag, Topic, messages_of
 from kineme.io.ros.number_fields import TYPES, Heads, decoder_of, nanoseconds_of, number_fields
-from kineme.io.ros.rotations import are_rotations, interpolated
-from kineme.movements.tables.layout import Column
-from kineme.movements.tables.parsed import listed
+from kineme.movements.rotations import are_rotations, interpolated
+from kineme.movements.tables.layout import Column, listed
 from kineme.reporting.text import counted
 from kineme.validation import Array
 

@@ -15,8 +15,7 @@ import numpy as np
 from kineme.errors import DataError
 from kineme.io.limits import check_expanded
 from kineme.movements.tables.columns import Roles, choose_roles
-from kineme.movements.tables.layout import Layout
-from kineme.movements.tables.parsed import no_lines
+from kineme.movements.tables.layout import Layout, no_lines
 from kineme.movements.tables.table import Table
 from kineme.movements.tables.time_stamps import nanoseconds
 from kineme.validation import ROUNDED, Array, too_long_integer

@@ -16,7 +16,7 @@ from kineme.io.arrays.arrays import COLUMNS, RATES
 from kineme.movements.channels.channel import learned_names, recorded_names
 from kineme.movements.segmentation.segment import as_recording
 from kineme.movements.trajectories.movements import axis_names
-from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.reporting.atomic import write_atomically
 from kineme.reporting.text import as_cell
 from kineme.units import split_head

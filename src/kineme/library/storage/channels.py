@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 
 from kineme.errors import DataError
 from kineme.library.storage.rows import Row, strange
-from kineme.movements.channels.channel import Channels, is_plain, learned_names
+from kineme.movements.channels.channel import Channels, channels_from_data, channels_to_data, is_plain, learned_names
 from kineme.movements.channels.coordinates import canonical, columns_of
-from kineme.movements.channels.plain_data import channels_from_data, channels_to_data
 from kineme.movements.trajectories.movements import Movements
 from kineme.validation import Array
 

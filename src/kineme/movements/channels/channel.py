@@ -1,9 +1,14 @@
-"""What a channel of a recording is, and the kinds of channels."""
+"""The record of a channel of a recording, its kinds, and channels as plain data for headers of files."""
 
 from __future__ import annotations
 
+import math
 from collections import Counter
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from kineme.errors import TrajectoryError
+from kineme.units import Unit, unit_named
 
 #: Kind -> number of coordinates that a movement primitive learns from one such channel.
 KINDS = {"position": 1, "angle": 1, "orientation": 3, "discrete": 0}
@@ -91,3 +96,83 @@ def in_words(channels: Channels | None) -> str:
         return ", ".join(f"{n} {kind} channels" for kind, n in Counter(one.kind for one in channels).items())
     columns = [f" in {', '.join(one.columns)}" if one.kind == "orientation" else "" for one in channels]
     return ", ".join(f"{one.name} ({one.kind}{where})" for one, where in zip(channels, columns, strict=True))
+
+
+def check_alike(several: Sequence[Channels | None], what: str = "part") -> None:
+    """Refuse channels whose columns do not mean the same, where that is known.
+
+    Columns of equal names are the same, whatever their kinds were guessed to be. Those of other names may be the other
+    hand's: they need the same kinds, and not the same names in another order. Units that are known are equal.
+
+    Parameters
+    ----------
+    several : sequence of Channels or None
+        Of each part those that are learned, in the order of its columns; None where they are not known.
+    what : str, default "part"
+        What the message calls one of them.
+
+    Raises
+    ------
+    TrajectoryError
+        Channels that differ from those of the first part whose channels are known.
+    """
+    known = [(i, channels) for i, channels in enumerate(several) if channels is not None]
+    for i, channels in known[1:]:
+        first, ours = known[0]
+        if (wrong := _difference(ours, channels)) is not None:
+            raise TrajectoryError(
+                f"{what} {i}: expected movements of {in_words(ours)}, as {what} {first}, got {in_words(channels)}: "
+                f"{wrong}; read the columns that belong together, in the same order and unit"
+            )
+
+
+def _difference(ours: Channels, theirs: Channels) -> str | None:
+    """What keeps channels from being the same columns, or None."""
+    names, others = learned_names(ours), learned_names(theirs)
+    if names != others:
+        if [one.kind for one in ours] != [one.kind for one in theirs]:
+            return "their kinds differ"
+        if sorted(names) == sorted(others):
+            return "their order differs"
+    for one, other in zip(ours, theirs, strict=False):
+        if one.unit is not None and other.unit is not None and _measure(one) != _measure(other):
+            return f"{one.name} is in {one.unit}, {other.name} in {other.unit}"
+    return None
+
+
+def _measure(channel: Channel) -> Unit | str:
+    """The same for all spellings of a unit."""
+    return unit_named(channel.unit or "") or (channel.unit or "").lower()
+
+
+def channels_to_data(channels: Channels) -> list[dict[str, Any]]:
+    """A list of objects with the fields of `Channel`, as JSON can hold them."""
+    return [one._asdict() | {"columns": list(one.columns)} for one in channels]
+
+
+def channels_from_data(data: Any, n_dims: int) -> Channels:
+    """The inverse, of movements of so many dimensions.
+
+    Raises
+    ------
+    ValueError, TypeError, KeyError, AttributeError
+        What is no list of channels of so many coordinates; callers name the file.
+    """
+    channels = tuple(_channel(one) for one in data)
+    if sum(len(one.coordinates) for one in channels) != n_dims:
+        raise ValueError(f"channels should have {n_dims} coordinates")
+    return channels
+
+
+def _channel(one: dict[str, Any]) -> Channel:
+    columns, unit = tuple(one["columns"]), one["unit"]
+    period = one.get("period", 0.0)  # earlier versions did not say it
+    channel = Channel(one["name"], one["kind"], columns, unit, one["order"], period)
+    texts = [channel.name, *columns, *([] if unit is None else [unit])]
+    sized = len(columns) == (4 if channel.kind == "orientation" else 1)
+    ordered = channel.order in ORDERS if channel.kind == "orientation" else channel.order == ""
+    periodic = period is None or (isinstance(period, float) and math.isfinite(period) and period >= 0)
+    told = periodic and all(isinstance(text, str) for text in texts)
+    if channel.kind not in KINDS or not (sized and ordered and told):
+        raise ValueError("channels should have a name, a kind, columns, a unit, an order and a period")
+    return channel

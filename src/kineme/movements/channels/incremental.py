@@ -14,8 +14,8 @@ from kineme.movements.channels.coordinates import (
     off_norm,
     period_of_channel,
     rotation_steps,
+    turns_of,
 )
-from kineme.movements.channels.wraps import turns_of
 from kineme.validation import Array
 
 

@@ -8,10 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kineme.errors import SpecificationError
-from kineme.movements.preparation.arc_length import resample_by_phase
-from kineme.movements.preparation.resample import relative_rows
+from kineme.movements.preparation.resample import relative_rows, resample_by_phase
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.validation import Array, check_number, check_seed
 
 N_POINTS = 200  # samples afterwards

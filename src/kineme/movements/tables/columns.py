@@ -9,8 +9,7 @@ from fnmatch import fnmatchcase
 from typing import NamedTuple
 
 from kineme.errors import DataError
-from kineme.movements.tables.layout import Column, Layout
-from kineme.movements.tables.parsed import listed
+from kineme.movements.tables.layout import Column, Layout, listed
 from kineme.movements.tables.time_stamps import TIME_UNITS, words_of
 from kineme.units import UNITS, is_unit_of, split_head
 

@@ -19,11 +19,10 @@ from kineme.movements.channels.channel import (
 )
 from kineme.movements.channels.column_match import columns_like, columns_recorded, conversion, may_be
 from kineme.movements.channels.coordinates import lever_of
-from kineme.movements.tables.parsed import listed
-from kineme.movements.trajectories.channels import in_coordinates, of_channels
+from kineme.movements.tables.layout import listed
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.movements.trajectories.movements_like import MovementsLike
-from kineme.movements.trajectories.trajectory import Trajectory
+from kineme.movements.trajectories.movements import in_coordinates, of_channels
+from kineme.movements.trajectories.trajectory import MovementsLike, Trajectory
 from kineme.units import converted
 
 _SELECT = "select the dimensions by columns= of read_recordings, in the shell --columns"

@@ -13,9 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from kineme.errors import TrajectoryError
 from kineme.movements.channels.channel import Channels, is_plain, learned_names, recorded_names
 from kineme.movements.channels.column_match import Columns, columns_like, columns_recorded
-from kineme.movements.trajectories.channels import of_channels
 from kineme.movements.trajectories.labels import label_array
-from kineme.movements.trajectories.movements import Movements, Names
+from kineme.movements.trajectories.movements import Movements, Names, of_channels
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.validation import (
     MIN_SAMPLES,

@@ -11,18 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import DataError, TrajectoryError, warn
 from kineme.movements.channels.channel import Channels, recorded_names
+from kineme.movements.channels.column_match import in_one_unit
 from kineme.movements.channels.coordinates import in_order
 from kineme.movements.channels.detect import find_channels
-from kineme.movements.channels.one_unit import in_one_unit
-from kineme.movements.tables.parsed import Parsed
-from kineme.movements.trajectories.channels import of_channels
+from kineme.movements.tables.layout import Parsed
 from kineme.movements.trajectories.collect import collect_arrays, collect_trajectories
-from kineme.movements.trajectories.indexing import as_indices
-from kineme.movements.trajectories.labels import label_array
-from kineme.movements.trajectories.movements import Movements, axis_names
-from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.labels import as_indices, label_array
+from kineme.movements.trajectories.movements import Movements, axis_names, of_channels
 from kineme.movements.trajectories.presented import Presented, Samples, with_units
-from kineme.movements.trajectories.trajectory import Trajectory
+from kineme.movements.trajectories.trajectory import MovementsLike, Trajectory
 from kineme.validation import Array, describe
 
 if TYPE_CHECKING:
@@ -404,7 +401,7 @@ def collect_data_frames(frames: Sequence[Any], layout: Layout) -> Movements:
 
 
 def _parse(frame: Any, i: int, layout: Layout) -> Parsed:
-    from kineme.movements.tables.data_frame import parse_data_frame  # what columns mean loads with the first frame
+    from kineme.movements.tables.table import parse_data_frame  # what columns mean loads with the first frame
 
     if not is_data_frame(frame):
         raise TrajectoryError(f"expected data frames, got {type(frame).__name__} at index {i}; pass them one by one")
@@ -414,3 +411,29 @@ def _parse(frame: Any, i: int, layout: Layout) -> Parsed:
     except DataError as error:
         raise TrajectoryError(f"data frame {i}: {error} (of Demonstrations.from_dataframe)") from error
     return Parsed(detected, block, left_out)
+
+
+class MovementSequence(Presented):
+    """A sequence of the movements in `demonstrations`, a field or property of the subclass."""
+
+    if TYPE_CHECKING:  # read-only here
+
+        @property
+        def demonstrations(self) -> Demonstrations:
+            """The movements."""
+            ...
+
+    @property
+    def _samples(self) -> Samples:
+        return self.demonstrations._samples
+
+    def __iter__(self) -> Iterator[Trajectory]:
+        return iter(self.demonstrations)
+
+    @overload
+    def __getitem__(self, index: int) -> Trajectory: ...
+    @overload
+    def __getitem__(self, index: slice | Sequence[int] | NDArray[Any]) -> Demonstrations: ...
+    def __getitem__(self, index: Any) -> Trajectory | Demonstrations:
+        """One `Trajectory` for an integer; `Demonstrations` for a slice, a mask or a list of indices."""
+        return self.demonstrations[index]

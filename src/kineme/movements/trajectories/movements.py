@@ -1,4 +1,7 @@
-"""The block behind `Demonstrations`: many movements of unequal length and sampling, one after the other."""
+"""The block behind `Demonstrations`: many movements of unequal length and sampling, one after the other.
+
+Recorded columns become the positions that are learned.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import TrajectoryError
-from kineme.movements.channels.channel import Channels
+from kineme.movements.channels.channel import Channels, is_plain, learned_names
+from kineme.movements.channels.coordinates import canonical, learned, off_norm
 from kineme.runtime.compiled import compiled_module, use_compiled
-from kineme.validation import MIN_SAMPLES, Array
+from kineme.validation import MIN_SAMPLES, Array, describe
 
 #: Samples are close when less than this share of the movement's usual step lies between them. Of 0.05, 0.1, 0.2 and 0.5
 #: the largest that leaves stamps with a jitter of up to 80 % of a step as they are, however few. At random stamps, with
@@ -232,3 +236,41 @@ def _usual_steps(times: Array, offsets: NDArray[np.intp]) -> Array:
         own = gaps[offsets[i] : offsets[i + 1] - 1]
         steps[i] = np.partition(own, k := int(_QUANTILE * len(own)))[k]
     return steps
+
+
+def of_channels(recorded: Movements, channels: Channels) -> Movements:
+    """Movements whose positions are the recorded columns, as movements of these channels.
+
+    Raises
+    ------
+    TrajectoryError
+        A quaternion that is not of norm 1; the message names the movement and the sample.
+    """
+    for channel, rows, norms in off_norm(recorded.positions, channels):
+        raise TrajectoryError(
+            f"{_place(recorded, int(rows[0]))}: expected unit quaternions in {', '.join(channel.columns)}, got norm "
+            f"{norms[rows[0]]:.6g}; check the order of the columns, or divide the quaternions by their norms"
+        )
+    columns = canonical(recorded.positions, recorded.offsets, channels)
+    plain = is_plain(channels)
+    return replace(
+        recorded,
+        positions=columns if plain else learned(columns, recorded.offsets, channels),
+        recorded=None if plain else columns,
+        dimensions=learned_names(channels),
+        channels=channels,
+    )
+
+
+def in_coordinates(movements: Movements) -> Movements:
+    """Movements as they are learned; generated ones have their recorded columns as positions until then."""
+    channels = movements.channels
+    if channels is None or movements.positions.shape[1] == len(learned_names(channels)):
+        return movements
+    return of_channels(replace(movements, recorded=None), channels)
+
+
+def _place(movements: Movements, row: int) -> str:
+    """The movement and the sample of a row."""
+    i = int(np.searchsorted(movements.offsets, row, side="right")) - 1
+    return f"{describe(i, movements.names)}: sample {row - movements.offsets[i]}"

@@ -1,11 +1,13 @@
-"""One demonstrated movement."""
+"""One demonstrated movement, and what is taken for one and for many: the types of public signatures."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from kineme.errors import TrajectoryError
 from kineme.movements.channels.channel import Channels
@@ -87,3 +89,22 @@ class Trajectory:
         label = "" if self.label is None else f", label={self.label!r}"
         name = "" if self.name is None else f", name={self.name!r}"
         return f"Trajectory({len(self)} samples, {self.n_dims} dims, {self.duration:.3g} s{label}{name})"
+
+
+@runtime_checkable
+class HasDemonstrations(Protocol):
+    """Whatever holds movements and hands them out: recordings that were read, a segmentation, a rollout."""
+
+    @property
+    def demonstrations(self) -> Sequence[Trajectory]:
+        """The movements, as `Demonstrations`."""
+        ...
+
+
+#: One movement: a `Trajectory`, or positions of shape (T, d) or (T,), evenly sampled over one second.
+MovementLike = Trajectory | ArrayLike
+
+#: Whatever `Demonstrations.of` takes: Demonstrations, recordings that were read, a segmentation, a rollout; one
+#: movement; one array of shape (n, T, d); a data frame; or a list of any of these. A list is typed as one of objects:
+#: to a type checker that is what a list of a rollout and recordings holds.
+MovementsLike = HasDemonstrations | MovementLike | Sequence[object]

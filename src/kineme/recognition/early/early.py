@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import SpecificationError
-from kineme.movements.preparation.arc_length import arc_length_phase
 from kineme.movements.preparation.pauses import without_pauses
-from kineme.movements.preparation.resample import relative_rows
+from kineme.movements.preparation.resample import arc_length_phase, relative_rows
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
-from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.recognition.early.evidence import describe_begun, log_evidence
 from kineme.recognition.early.hypotheses import Hypotheses
 from kineme.similarity.comparison import Comparison

@@ -10,7 +10,7 @@ import numpy as np
 
 from kineme.kernels.procrustes import Procrustes
 from kineme.kernels.shapes import ElasticSpec, shapes_of
-from kineme.movements.preparation.arc_length import arc_length_phase
+from kineme.movements.preparation.resample import arc_length_phase
 from kineme.movements.preparation.smooth import Smooth
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.similarity.describe import N_POINTS, even_paths

@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 
 from kineme.errors import SpecificationError, TrajectoryError
-from kineme.movements.rotations.matrices import matrices_of
+from kineme.movements.rotations import matrices_of
 from kineme.validation import Array, as_numbers
 
 #: Planes in which a two-dimensional movement is executed: its axes in the frame of the robot.

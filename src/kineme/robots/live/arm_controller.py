@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike
 from kineme.dmp.control.controller import Controller
 from kineme.dmp.control.state import State
 from kineme.errors import SpecificationError, TrajectoryError
-from kineme.movements.rotations.matrices import matrices_of
-from kineme.movements.rotations.one_rotation import matrix_one
+from kineme.movements.rotations import matrices_of, matrix_one
 from kineme.robots.checks.tracking import TRACKED, TURNED
 from kineme.robots.execution.timing import Torques
 from kineme.robots.kinematics.reach import point_in_words, reaching_postures

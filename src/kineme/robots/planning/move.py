@@ -14,7 +14,7 @@ from kineme.dmp.discrete.dmp import Primitives
 from kineme.dmp.pose.pose_dmp import PosePrimitives
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.channels.coordinates import as_wxyz
-from kineme.movements.rotations.matrices import quaternion_of
+from kineme.movements.rotations import quaternion_of
 from kineme.movements.segmentation.segment import as_recording
 from kineme.robots.checks.tracking import TRACKED
 from kineme.robots.kinematics.choose import choose_place, choose_posture

@@ -12,7 +12,7 @@ from kineme.errors import TrajectoryError, warn
 from kineme.movements.channels.channel import Channel, Channels
 from kineme.movements.channels.coordinates import columns_of
 from kineme.movements.channels.detect import name_of
-from kineme.movements.rotations.quaternions import NORM_TOLERANCE
+from kineme.movements.rotations import NORM_TOLERANCE
 from kineme.movements.tables.time_stamps import words_of
 from kineme.robots.models.robot import Robot
 from kineme.units import split_head, unit_named

@@ -17,10 +17,9 @@ from kineme.errors import DataError, KinemeError
 from kineme.io.reading.merge_files import Recordings, Source
 from kineme.io.reading.recordings import read_recordings
 from kineme.io.records import Problem
-from kineme.movements.channels.plain_data import channels_from_data, channels_to_data
-from kineme.movements.trajectories.channels import of_channels
+from kineme.movements.channels.channel import channels_from_data, channels_to_data
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.movements.trajectories.movements import Movements
+from kineme.movements.trajectories.movements import Movements, of_channels
 
 REFUSED = 3  # exit code
 

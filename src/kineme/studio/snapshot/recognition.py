@@ -12,7 +12,7 @@ from kineme.errors import SpecificationError
 from kineme.kernels.procrustes import Procrustes
 from kineme.kernels.shapes import Shapes
 from kineme.movements.preparation.pauses import without_pauses
-from kineme.movements.preparation.spline import spline_matrix
+from kineme.movements.preparation.smooth import spline_matrix
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.recognition.certainty import LEAST_CONFIDENCE
 from kineme.recognition.classifiers import Classifier, Nearest, NearestEach, Prototype

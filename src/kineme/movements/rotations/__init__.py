@@ -1,1 +1,0 @@
-"""Unit quaternions, rotation vectors and rotation matrices."""
