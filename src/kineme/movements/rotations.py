@@ -8,7 +8,7 @@ A rotation vector p is the axis times the angle in radians, as `scipy.spatial.tr
 quaternion logarithm of the papers is half of it: ``p = 2 log(q)``.
 
 `exp_one` and its kin do to one rotation in Python's floats what `exp`, `log` and `nearest` do to arrays, for steps of
-live control: NumPy needs a microsecond for each operation however small, ten times what these functions take altogether.
+live control: NumPy needs a microsecond for each operation, ten times what these functions take altogether.
 """
 
 from __future__ import annotations

@@ -63,29 +63,29 @@ _LISTED = 12  # channels that a message names one by one
 
 def learned_names(channels: Channels) -> tuple[str, ...]:
     """Names of all coordinates that are learned, in order."""
-    return tuple(name for one in channels for name in one.coordinates)
+    return tuple(name for channel in channels for name in channel.coordinates)
 
 
 def recorded_names(channels: Channels) -> tuple[str, ...]:
     """Heads of all columns, channel after channel."""
-    return tuple(name for one in channels for name in one.columns)
+    return tuple(name for channel in channels for name in channel.columns)
 
 
 def is_plain(channels: Channels) -> bool:
     """Whether every column is learned as it was recorded, but for wraps of angles."""
-    return all(one.kind in ("position", "angle") for one in channels)
+    return all(channel.kind in ("position", "angle") for channel in channels)
 
 
 def moving_kinds(channels: Channels) -> tuple[str, ...]:
     """Kinds of the channels that are learned, in order; names are free, and so is what is discrete."""
-    return tuple(one.kind for one in channels if one.coordinates)
+    return tuple(channel.kind for channel in channels if channel.coordinates)
 
 
 def same_columns(channels: Channels | None, others: Channels | None) -> bool:
     """Whether channels are equal, but for the periods that were told by values."""
     if channels is None or others is None or channels == others:
         return channels == others
-    return [one._replace(period=None) for one in channels] == [one._replace(period=None) for one in others]
+    return [channel._replace(period=None) for channel in channels] == [other._replace(period=None) for other in others]
 
 
 def in_words(channels: Channels | None) -> str:
@@ -93,9 +93,11 @@ def in_words(channels: Channels | None) -> str:
     if channels is None:
         return "plain coordinates"
     if len(channels) > _LISTED:
-        return ", ".join(f"{n} {kind} channels" for kind, n in Counter(one.kind for one in channels).items())
-    columns = [f" in {', '.join(one.columns)}" if one.kind == "orientation" else "" for one in channels]
-    return ", ".join(f"{one.name} ({one.kind}{where})" for one, where in zip(channels, columns, strict=True))
+        return ", ".join(f"{n} {kind} channels" for kind, n in Counter(channel.kind for channel in channels).items())
+    columns = [f" in {', '.join(channel.columns)}" if channel.kind == "orientation" else "" for channel in channels]
+    return ", ".join(
+        f"{channel.name} ({channel.kind}{where})" for channel, where in zip(channels, columns, strict=True)
+    )
 
 
 def check_alike(several: Sequence[Channels | None], what: str = "part") -> None:
@@ -116,9 +118,9 @@ def check_alike(several: Sequence[Channels | None], what: str = "part") -> None:
     TrajectoryError
         Channels that differ from those of the first part whose channels are known.
     """
-    known = [(i, channels) for i, channels in enumerate(several) if channels is not None]
-    for i, channels in known[1:]:
-        first, ours = known[0]
+    detected = [(i, channels) for i, channels in enumerate(several) if channels is not None]
+    for i, channels in detected[1:]:
+        first, ours = detected[0]
         if (wrong := _difference(ours, channels)) is not None:
             raise TrajectoryError(
                 f"{what} {i}: expected movements of {in_words(ours)}, as {what} {first}, got {in_words(channels)}: "
@@ -130,13 +132,13 @@ def _difference(ours: Channels, theirs: Channels) -> str | None:
     """What keeps channels from being the same columns, or None."""
     names, others = learned_names(ours), learned_names(theirs)
     if names != others:
-        if [one.kind for one in ours] != [one.kind for one in theirs]:
+        if [channel.kind for channel in ours] != [channel.kind for channel in theirs]:
             return "their kinds differ"
         if sorted(names) == sorted(others):
             return "their order differs"
-    for one, other in zip(ours, theirs, strict=False):
-        if one.unit is not None and other.unit is not None and _measure(one) != _measure(other):
-            return f"{one.name} is in {one.unit}, {other.name} in {other.unit}"
+    for channel, other in zip(ours, theirs, strict=False):
+        if channel.unit is not None and other.unit is not None and _measure(channel) != _measure(other):
+            return f"{channel.name} is in {channel.unit}, {other.name} in {other.unit}"
     return None
 
 
@@ -147,7 +149,7 @@ def _measure(channel: Channel) -> Unit | str:
 
 def channels_to_data(channels: Channels) -> list[dict[str, Any]]:
     """A list of objects with the fields of `Channel`, as JSON can hold them."""
-    return [one._asdict() | {"columns": list(one.columns)} for one in channels]
+    return [channel._asdict() | {"columns": list(channel.columns)} for channel in channels]
 
 
 def channels_from_data(data: Any, n_dims: int) -> Channels:
@@ -158,21 +160,21 @@ def channels_from_data(data: Any, n_dims: int) -> Channels:
     ValueError, TypeError, KeyError, AttributeError
         What is no list of channels of so many coordinates; callers name the file.
     """
-    channels = tuple(_channel(one) for one in data)
-    if sum(len(one.coordinates) for one in channels) != n_dims:
+    channels = tuple(_channel(fields) for fields in data)
+    if sum(len(channel.coordinates) for channel in channels) != n_dims:
         raise ValueError(f"channels should have {n_dims} coordinates")
     return channels
 
 
-def _channel(one: dict[str, Any]) -> Channel:
-    columns, unit = tuple(one["columns"]), one["unit"]
-    period = one.get("period", 0.0)  # earlier versions did not say it
-    channel = Channel(one["name"], one["kind"], columns, unit, one["order"], period)
+def _channel(fields: dict[str, Any]) -> Channel:
+    columns, unit = tuple(fields["columns"]), fields["unit"]
+    period = fields.get("period", 0.0)  # earlier versions did not say it
+    channel = Channel(fields["name"], fields["kind"], columns, unit, fields["order"], period)
     texts = [channel.name, *columns, *([] if unit is None else [unit])]
     sized = len(columns) == (4 if channel.kind == "orientation" else 1)
     ordered = channel.order in ORDERS if channel.kind == "orientation" else channel.order == ""
     periodic = period is None or (isinstance(period, float) and math.isfinite(period) and period >= 0)
-    told = periodic and all(isinstance(text, str) for text in texts)
-    if channel.kind not in KINDS or not (sized and ordered and told):
+    texts_only = periodic and all(isinstance(text, str) for text in texts)
+    if channel.kind not in KINDS or not (sized and ordered and texts_only):
         raise ValueError("channels should have a name, a kind, columns, a unit, an order and a period")
     return channel

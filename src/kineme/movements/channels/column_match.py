@@ -69,13 +69,13 @@ class Columns(NamedTuple):
 
 def columns_recorded(channels: Channels) -> Columns:
     """The columns of channels."""
-    return Columns(recorded_names(channels), tuple(one.unit for one in channels for _ in one.columns))
+    return Columns(recorded_names(channels), tuple(channel.unit for channel in channels for _ in channel.columns))
 
 
 def may_be(channels: Channels, others: Channels) -> bool:
     """Whether channels of other names may be those: x, y, z without any other name may be those of a hand."""
-    names = [Columns(tuple(one.name for one in several), ()).names for several in (channels, others)]
-    kinds = [tuple(one.kind for one in several) for several in (channels, others)]
+    names = [Columns(tuple(channel.name for channel in several), ()).names for several in (channels, others)]
+    kinds = [tuple(channel.kind for channel in several) for several in (channels, others)]
     is_bare = any(all(len(words_of(name)) == 1 for name in each) for each in names)
     return any(columns_recorded(several).are_nameless for several in (channels, others)) or (
         is_bare

@@ -29,8 +29,8 @@ _ROUNDING = 1e-15  # deviation from norm 1 that is that of the last digit
 
 def columns_of(channels: Channels) -> list[slice]:
     """The columns of each channel."""
-    ends = np.cumsum([len(one.columns) for one in channels]).tolist()
-    return [slice(end - len(one.columns), end) for end, one in zip(ends, channels, strict=True)]
+    ends = np.cumsum([len(channel.columns) for channel in channels]).tolist()
+    return [slice(end - len(channel.columns), end) for end, channel in zip(ends, channels, strict=True)]
 
 
 def in_order(columns: Array, heads: Sequence[str], channels: Channels) -> Array:
@@ -42,11 +42,11 @@ def in_order(columns: Array, heads: Sequence[str], channels: Channels) -> Array:
 
 def off_norm(columns: Array, channels: Channels) -> Iterator[tuple[Channel, NDArray[np.intp], Array]]:
     """Each orientation with the rows where it is no unit quaternion, if there are any, and all norms (total,)."""
-    for one, some in zip(channels, columns_of(channels), strict=True):
-        if one.kind == "orientation":
+    for channel, some in zip(channels, columns_of(channels), strict=True):
+        if channel.kind == "orientation":
             norms = np.linalg.norm(columns[:, some], axis=1)
             if len(rows := np.flatnonzero(~(np.abs(norms - 1.0) <= NORM_TOLERANCE))):
-                yield one, rows, norms
+                yield channel, rows, norms
 
 
 def canonical(columns: Array, offsets: NDArray[np.intp], channels: Channels) -> Array:
@@ -60,11 +60,11 @@ def canonical(columns: Array, offsets: NDArray[np.intp], channels: Channels) -> 
     channels : Channels
     """
     result = np.array(columns, dtype=np.float64, order="C")
-    for one, rows in zip(channels, columns_of(channels), strict=True):
-        if one.kind == "angle":
+    for channel, rows in zip(channels, columns_of(channels), strict=True):
+        if channel.kind == "angle":
             angles = result[:, rows.start]
-            result[:, rows.start] = without_wraps(angles, offsets, period_of_channel(one, angles))
-        elif one.kind == "orientation":
+            result[:, rows.start] = without_wraps(angles, offsets, period_of_channel(channel, angles))
+        elif channel.kind == "orientation":
             result[:, rows] = continuous_signs(result[:, rows], offsets)
     return result
 
@@ -72,10 +72,10 @@ def canonical(columns: Array, offsets: NDArray[np.intp], channels: Channels) -> 
 def with_periods(channels: Channels, columns: Array) -> Channels:
     """Channels that say what their angles wrap by; where units do not, by the values of recorded columns (total, m)."""
     return tuple(
-        one._replace(period=_finite(period_of_channel(one, columns[:, rows.start])))
-        if one.kind == "angle" and period_by_unit(one.unit) is None
-        else one
-        for one, rows in zip(channels, columns_of(channels), strict=True)
+        channel._replace(period=_finite(period_of_channel(channel, columns[:, rows.start])))
+        if channel.kind == "angle" and period_by_unit(channel.unit) is None
+        else channel
+        for channel, rows in zip(channels, columns_of(channels), strict=True)
     )
 
 
@@ -104,16 +104,19 @@ def learned(columns: Array, offsets: NDArray[np.intp], channels: Channels) -> Ar
     SpecificationError
         Discrete channels alone: nothing moves.
     """
-    if all(one.kind == "discrete" for one in channels):
+    if all(channel.kind == "discrete" for channel in channels):
         raise SpecificationError(
-            f"expected a channel that moves, got {', '.join(one.name for one in channels)}, all discrete; "
+            f"expected a channel that moves, got {', '.join(channel.name for channel in channels)}, all discrete; "
             "read other columns too, or say that one is a position"
         )
     parts, lever = [], lever_of(channels)
-    for one, rows in zip(channels, columns_of(channels), strict=True):
-        if one.kind == "orientation":
-            parts.append(lever * _integrated(as_wxyz(columns[:, rows], one), offsets))
-        elif one.coordinates:
+    for channel, rows in zip(channels, columns_of(channels), strict=True):
+        if channel.kind == "orientation":
+            turned = np.concatenate(
+                (np.zeros((1, 3)), np.cumsum(rotation_steps(as_wxyz(columns[:, rows], channel)), axis=0))
+            )
+            parts.append(lever * np.asarray(turned - np.repeat(turned[offsets[:-1]], np.diff(offsets), axis=0)))
+        elif channel.coordinates:
             parts.append(columns[:, rows])
     return np.ascontiguousarray(np.concatenate(parts, axis=1))
 
@@ -123,7 +126,7 @@ def lever_of(channels: Channels) -> float:
 
     It is about the length of a hand or a tool: a rotation counts as much as the way of the tip.
     """
-    units = [one.unit for one in channels if one.kind == "position"]
+    units = [channel.unit for channel in channels if channel.kind == "position"]
     if not units:
         return 1.0
     unit = unit_named(units[0] or "m")
@@ -148,11 +151,6 @@ def continuous_signs(q: Array, offsets: NDArray[np.intp]) -> Array:
     norms = np.linalg.norm(q, axis=1, keepdims=True)
     norms[np.abs(norms - 1.0) < _ROUNDING] = 1.0  # every bit as recorded
     return np.asarray(np.where(odd[:, None], -q, q) / norms)
-
-
-def _integrated(q: Array, offsets: NDArray[np.intp]) -> Array:
-    turned = np.concatenate((np.zeros((1, 3)), np.cumsum(rotation_steps(q), axis=0)))
-    return np.asarray(turned - np.repeat(turned[offsets[:-1]], np.diff(offsets), axis=0))
 
 
 def rotation_steps(q: Array) -> Array:

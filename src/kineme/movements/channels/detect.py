@@ -101,10 +101,14 @@ def find_channels(
         one is its scalar.
     """
     kinds, orientations = _given(heads, given)
-    free = [k for k in range(len(heads)) if k not in kinds and not any(k in one.columns for one in orientations)]
+    free = [
+        k
+        for k in range(len(heads))
+        if k not in kinds and not any(k in orientation.columns for orientation in orientations)
+    ]
     orientations += find_quaternions(heads, free, columns, offsets)
-    first = {min(one.columns): one for one in orientations}
-    inside = {k for one in orientations for k in one.columns}
+    first = {min(orientation.columns): orientation for orientation in orientations}
+    inside = {k for orientation in orientations for k in orientation.columns}
     numbered = find_numbered_joints(heads, [k for k in range(len(heads)) if k not in inside], columns)
     channels: list[Channel] = []
     for k, head in enumerate(heads):
@@ -116,8 +120,8 @@ def find_channels(
             unit = (units[k] if units else "") or unit_of(head)
             kind = kinds.get(k) or _kind(head, unit, columns[:, k], offsets, k in numbered)
             channels.append(Channel(head, kind, (head,), unit))
-    if all(one.kind == "discrete" for one in channels):  # then they are what moves
-        return tuple(one if k in kinds else one._replace(kind="position") for k, one in enumerate(channels))
+    if all(channel.kind == "discrete" for channel in channels):  # then they are what moves
+        return tuple(channel if k in kinds else channel._replace(kind="position") for k, channel in enumerate(channels))
     return with_periods(tuple(channels), in_order(columns, heads, tuple(channels)))
 
 
@@ -130,7 +134,7 @@ def unit_of(head: str) -> str | None:
     words = words_of(head)
     if _IN_METERS.fullmatch(head):
         return "m"
-    return None if _PER_TIME & {*words} else next((_UNIT_WORDS[one] for one in words if one in _UNIT_WORDS), None)
+    return None if _PER_TIME & {*words} else next((_UNIT_WORDS[word] for word in words if word in _UNIT_WORDS), None)
 
 
 def name_of(head: str) -> str:
@@ -151,7 +155,7 @@ def _given(heads: Sequence[str], given: Given) -> tuple[dict[int, str], list[Qua
     orientations: list[Quaternion] = []
     for key, kind in given.items():
         columns = _columns_named(heads, key)
-        taken = {*kinds, *(k for one in orientations for k in one.columns)}
+        taken = {*kinds, *(k for orientation in orientations for k in orientation.columns)}
         if twice := [heads[k] for k in columns if k in taken or columns.count(k) > 1]:
             raise SpecificationError(f"expected one kind of each column, got several of {twice[0]!r}; say one")
         if kind in ORDERS and len(columns) == len(kind):
@@ -236,15 +240,15 @@ def find_quaternions(
     SpecificationError
         Numbered ones that may begin or end with the scalar; see `_order_of`.
     """
-    found = []
+    quaternions = []
     for (stem, _), parts in _groups(_COMPONENT, heads, free).items():
-        if {*parts} == {*"wxyz"} and _is_quaternion(stem, columns[:, [*parts.values()]]):
-            found.append(quaternion_of([*parts.values()], "".join(parts)))
+        if {*parts} == {*"wxyz"} and (bool(_NAMES & {*words_of(stem)}) or _unit_norms(columns[:, [*parts.values()]])):
+            quaternions.append(quaternion_of([*parts.values()], "".join(parts)))
     for (stem, _), parts in _groups(_NUMBERED, heads, free).items():
         four = [parts[part] for part in sorted(parts)]
         if "".join(sorted(parts)) in _NUMBERINGS and _NAMES & {*words_of(stem)} and _unit_norms(columns[:, four]):
-            found.append(quaternion_of(four, _order_of([heads[k] for k in four], columns[:, four], offsets)))
-    return found
+            quaternions.append(quaternion_of(four, _order_of([heads[k] for k in four], columns[:, four], offsets)))
+    return quaternions
 
 
 def shared_name(heads: Sequence[str]) -> str:
@@ -268,11 +272,6 @@ def _groups(
 
 def _plain(head: str) -> str:
     return _UNIT_BESIDE_PART.sub("", head).strip()
-
-
-def _is_quaternion(stem: str, q: Array) -> bool:
-    """Whether columns w, x, y, z are a quaternion: by their name, or, without one, by the norms of most samples."""
-    return bool(_NAMES & {*words_of(stem)}) or _unit_norms(q)
 
 
 def _unit_norms(q: Array) -> bool:

@@ -33,7 +33,7 @@ class IncrementalCoordinates:
     def clear(self) -> None:
         """Forget the samples; the next one begins a movement."""
         lever = lever_of(self._channels)
-        self._parts = [_part_of(one, lever) for one in self._channels]
+        self._parts = [_part_of(channel, lever) for channel in self._channels]
 
     def usable(self, columns: Array) -> NDArray[np.bool_]:
         """Which samples (k, m) have quaternions of norm 1, (k,)."""
@@ -100,9 +100,9 @@ class _Orientation:
         return np.asarray(self._lever * turned[n_before:])
 
 
-def _part_of(one: Channel, lever: float) -> _Position | _Discrete | _Angle | _Orientation:
-    if one.kind == "orientation":
-        return _Orientation(one, lever)
-    if one.kind == "angle":
-        return _Angle(period_of_channel(one, np.full(1, np.inf)))  # of one that says no period nothing is unwrapped
-    return _Discrete() if one.kind == "discrete" else _Position()
+def _part_of(channel: Channel, lever: float) -> _Position | _Discrete | _Angle | _Orientation:
+    if channel.kind == "orientation":
+        return _Orientation(channel, lever)
+    if channel.kind == "angle":
+        return _Angle(period_of_channel(channel, np.full(1, np.inf)))  # of one that says no period nothing is unwrapped
+    return _Discrete() if channel.kind == "discrete" else _Position()

@@ -26,7 +26,7 @@ def fill_cut(samples, offsets, cut, ends):  # type: ignore[no-untyped-def]
     """Movements with their pauses cut short, one after the other from 0 on; whether any had one, see `cut_pauses`."""
     times, positions = samples
     cut_times, cut_positions = cut
-    steps, kept, changes = np.empty(len(times)), np.empty(len(times), np.bool_), False
+    steps, moving, changes = np.empty(len(times)), np.empty(len(times), np.bool_), False
     ends[0] = 0
     for i in range(len(offsets) - 1):
         begin, n = ends[i], offsets[i + 1] - offsets[i]
@@ -36,11 +36,11 @@ def fill_cut(samples, offsets, cut, ends):  # type: ignore[no-untyped-def]
             for k in range(positions.shape[1]):
                 own[j, k] = positions[offsets[i] + j, k]
         for _ in range(ROUNDS):
-            if not _fill_shortened(own_times[:n], own[:n], steps[:n], kept[:n]):
+            if not _fill_shortened(own_times[:n], own[:n], steps[:n], moving[:n]):
                 break
             changes, elapsed, left = True, 0.0, 0
             for j in range(n):
-                if kept[j]:
+                if moving[j]:
                     own_times[left] = elapsed
                     for k in range(positions.shape[1]):
                         own[left, k] = own[j, k]
@@ -52,16 +52,16 @@ def fill_cut(samples, offsets, cut, ends):  # type: ignore[no-untyped-def]
 
 
 @jit
-def _fill_shortened(times, positions, steps, kept):  # type: ignore[no-untyped-def]
+def _fill_shortened(times, positions, steps, moving):  # type: ignore[no-untyped-def]
     """Steps of one movement, as far as they count, and which samples are left; whether anything changes."""
     last = len(times) - 1
     usual = _fill_steps(times, steps)
-    reach, rests = _fill_resting(positions, kept)
+    reach, rests = _fill_resting(positions, moving)
     if not rests and not _may_have_gaps(steps, usual):
         return False
     motion, path = 0.0, 0.0
     for j in range(last):
-        if kept[j]:
+        if moving[j]:
             motion += min(steps[j], usual)
             path += np.sqrt(_squared_distance(positions, j, j + 1))
     pace = motion / path if path > 0 else 0.0  # seconds for a unit of length
@@ -75,7 +75,7 @@ def _fill_shortened(times, positions, steps, kept):  # type: ignore[no-untyped-d
             changes |= step > EQUAL * max(usual, most)
             steps[j] = min(step, max(usual, most))
         before = step
-    return _shorten_rests(steps, kept, motion, REST * reach * pace) or changes
+    return _shorten_rests(steps, moving, motion, REST * reach * pace) or changes
 
 
 @jit
@@ -110,7 +110,7 @@ def _may_have_gaps(steps, usual):  # type: ignore[no-untyped-def]
 
 
 @jit
-def _fill_resting(positions, kept):  # type: ignore[no-untyped-def]
+def _fill_resting(positions, moving):  # type: ignore[no-untyped-def]
     """Mark the samples of one movement after which it rests as not kept, for now; its reach; whether it rests."""
     n, window, size = len(positions), SHORTEST, 0.0
     while 2 * WINDOWS * window <= n:
@@ -122,19 +122,19 @@ def _fill_resting(positions, kept):  # type: ignore[no-untyped-def]
     for j in range(n):
         if j + window <= n and _is_still(positions, j, window, most_apart):
             until, rests = j + window - 1, True
-        kept[j] = j >= until
+        moving[j] = j >= until
     return np.sqrt(size), rests
 
 
 @jit
-def _shorten_rests(steps, kept, motion, most):  # type: ignore[no-untyped-def]
+def _shorten_rests(steps, moving, motion, most):  # type: ignore[no-untyped-def]
     """Shorten the rests of one movement, and tell which samples are left; whether there are long rests."""
     n, changes, j = len(steps), False, 0
     while j < n:
         begin, total = j, 0.0
-        while not kept[j]:  # the last sample is kept
+        while not moving[j]:  # the last sample is kept
             total += steps[j]
-            kept[j] = True
+            moving[j] = True
             j += 1
         limit = PAUSE * motion if begin == 0 else min(PAUSE * motion, most)
         if j == n - 1:
@@ -144,7 +144,7 @@ def _shorten_rests(steps, kept, motion, most):  # type: ignore[no-untyped-def]
             left = max(FEWEST, int(np.ceil(share * count - WHOLE)))
             for p in range(count):
                 steps[begin + p] *= share
-                kept[begin + p] = p == 0 or p * left // count != (p - 1) * left // count
+                moving[begin + p] = p == 0 or p * left // count != (p - 1) * left // count
         j += 1
     return changes
 

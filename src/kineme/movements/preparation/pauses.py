@@ -79,18 +79,18 @@ def cut_pauses(times: Array, positions: Array, offsets: NDArray[np.intp]) -> Par
         return cut_times[: ends[-1]], cut_positions[: ends[-1]], ends
     cut: Parts | None = None
     for _ in range(ROUNDS):
-        steps, kept = np.empty(len(times)), np.ones(len(times), dtype=np.bool_)
-        if not _fill_shortened(times, positions, offsets, steps, kept):
+        steps, moving = np.empty(len(times)), np.ones(len(times), dtype=np.bool_)
+        if not _fill_shortened(times, positions, offsets, steps, moving):
             break
         elapsed = np.append(0.0, np.cumsum(steps)[:-1])
         elapsed -= np.repeat(elapsed[offsets[:-1]], np.diff(offsets))
-        ends = np.append(0, np.cumsum(np.add.reduceat(kept, offsets[:-1], dtype=np.intp)))
-        times, positions, offsets = cut = elapsed[kept], positions[kept], ends
+        ends = np.append(0, np.cumsum(np.add.reduceat(moving, offsets[:-1], dtype=np.intp)))
+        times, positions, offsets = cut = elapsed[moving], positions[moving], ends
     return cut
 
 
 def _fill_shortened(
-    times: Array, positions: Array, offsets: NDArray[np.intp], steps: Array, kept: NDArray[np.bool_]
+    times: Array, positions: Array, offsets: NDArray[np.intp], steps: Array, moving: NDArray[np.bool_]
 ) -> bool:
     """Write the time that each step counts, 0 after last samples, and which samples are kept; whether any changes."""
     first, last, lengths = offsets[:-1], offsets[1:] - 1, np.diff(offsets)
@@ -128,7 +128,7 @@ def _fill_shortened(
     left = np.maximum(FEWEST, np.ceil(shares * n_steps - WHOLE).astype(np.intp))
     at = begins[run] + place
     steps[at] *= shares[run]
-    kept[at] = (place == 0) | (place * left[run] // n_steps[run] != (place - 1) * left[run] // n_steps[run])
+    moving[at] = (place == 0) | (place * left[run] // n_steps[run] != (place - 1) * left[run] // n_steps[run])
     return changes or bool(long.any())
 
 

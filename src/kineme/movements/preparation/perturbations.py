@@ -90,7 +90,13 @@ class Perturbation:
         paths += self.shift * extents * random["shift"].uniform(-1, 1, (n, d, 1))
         paths += self.noise * extents * random["noise"].normal(size=paths.shape)
         paths += demos.positions[demos.offsets[:-1]][:, :, None]
-        return _with_paths(demos, paths)
+        # The same movements along other, evenly sampled paths (n, d, T).
+        n, d, n_samples = paths.shape
+        old = demos.movements.positions_only
+        positions = np.ascontiguousarray(paths.transpose(0, 2, 1)).reshape(-1, d)
+        offsets = np.arange(n + 1) * n_samples
+        new = replace(old, positions=positions, offsets=offsets, times=None)
+        return Demonstrations.of_movements(new, demos.steps)
 
     def _warped(self, demonstrations: Demonstrations, random: np.random.Generator) -> Array:
         """Paths (n, d, 200) relative to their start, at even values of the warped time."""
@@ -123,13 +129,3 @@ def _rotations(n: int, d: int, angle: float, random: np.random.Generator) -> Arr
     axes = random.normal(size=(n, 3))
     axes *= (angles / np.linalg.norm(axes, axis=1))[:, None]
     return np.asarray(Rotation.from_rotvec(axes).as_matrix())
-
-
-def _with_paths(demonstrations: Demonstrations, paths: Array) -> Demonstrations:
-    """The same movements along other, evenly sampled paths (n, d, T)."""
-    n, d, n_samples = paths.shape
-    old = demonstrations.movements.positions_only
-    positions = np.ascontiguousarray(paths.transpose(0, 2, 1)).reshape(-1, d)
-    offsets = np.arange(n + 1) * n_samples
-    new = replace(old, positions=positions, offsets=offsets, times=None)
-    return Demonstrations.of_movements(new, demonstrations.steps)

@@ -97,9 +97,9 @@ def _fill_smoothed(demonstrations: Demonstrations, start: int, stop: int, cutoff
 
 def _compiled(demonstrations: Demonstrations, offsets: NDArray[np.intp]) -> bool:
     """Whether to run compiled, decided for all movements together although they are smoothed in tiles."""
-    whole, now = demonstrations.positions.size, demonstrations.n_dims * int(offsets[-1] - offsets[0])
+    total, now = demonstrations.positions.size, demonstrations.n_dims * int(offsets[-1] - offsets[0])
     return fits_lanes(demonstrations.offsets) and use_compiled(
-        _OPERATIONS_PER_SAMPLE * whole, _OPERATIONS_PER_SAMPLE * now
+        _OPERATIONS_PER_SAMPLE * total, _OPERATIONS_PER_SAMPLE * now
     )
 
 
@@ -174,7 +174,7 @@ def even_rows_of_spline(v: Array, x: Array, m: Array, offsets: NDArray[np.intp],
     r, sixth = 1.0 - s, gap**2 / 6.0
     weights = r, s, sixth * (r**3 - r), sixth * (s**3 - s)
     values = (x[left], x[left + 1], m[left], m[left + 1])
-    rows = np.sum([w[:, :, None] * one for w, one in zip(weights, values, strict=True)], axis=0)
+    rows = np.sum([w[:, :, None] * value for w, value in zip(weights, values, strict=True)], axis=0)
     return np.ascontiguousarray(rows.transpose(0, 2, 1))
 
 
@@ -221,25 +221,21 @@ def spline_rows(parameter: Array, positions: Array, offsets: NDArray[np.intp], n
     n, n_dims = len(offsets) - 1, positions.shape[1]
     rows = np.empty((n, n_dims, n_points))
     # Decided for the whole block, although callers pass one tile at a time.
-    whole, now = (_SPLINE_OPERATIONS * n_dims * n_samples for n_samples in (len(positions), offsets[-1] - offsets[0]))
-    if fits_lanes(offsets) and use_compiled(whole, now):
+    total, now = (_SPLINE_OPERATIONS * n_dims * n_samples for n_samples in (len(positions), offsets[-1] - offsets[0]))
+    if fits_lanes(offsets) and use_compiled(total, now):
         compiled_module("kineme.movements.preparation._splines").fill_spline_rows(parameter, positions, offsets, rows)
     else:
-        _fill_spline_rows(parameter, positions, offsets, rows)
+        # The plain twin of the compiled loop: SciPy's spline, movement by movement.
+        from scipy.interpolate import CubicSpline
+
+        for i in range(len(rows)):
+            movement = slice(offsets[i], offsets[i + 1])
+            u = parameter[movement]
+            spline = CubicSpline(u - u[0], positions[movement] - positions[offsets[i]])
+            rows[i] = spline(np.linspace(0.0, u[-1] - u[0], rows.shape[2])).T
     return rows
 
 
 def fits_lanes(offsets: NDArray[np.intp]) -> bool:
     """Whether all movements are short enough for the compiled splines, which need much memory per sample."""
     return bool(np.diff(offsets).max() <= _LONGEST)
-
-
-def _fill_spline_rows(parameter: Array, positions: Array, offsets: NDArray[np.intp], rows: Array) -> None:
-    """The plain twin of the compiled loop: SciPy's spline, movement by movement."""
-    from scipy.interpolate import CubicSpline
-
-    for i in range(len(rows)):
-        movement = slice(offsets[i], offsets[i + 1])
-        u = parameter[movement]
-        spline = CubicSpline(u - u[0], positions[movement] - positions[offsets[i]])
-        rows[i] = spline(np.linspace(0.0, u[-1] - u[0], rows.shape[2])).T

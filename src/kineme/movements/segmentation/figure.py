@@ -32,54 +32,18 @@ def draw_segmentations(segmentations: Sequence[Segmentation]) -> Figure:
         axes = figure.subplots(len(panels), 1, squeeze=False, sharex=True).ravel()
         owners = [shown[0]] * len(panels)
     else:
-        panels = [_speed(one, drawable(shortened(one.recording.name or "recording", _NAME))) for one in shown]
+        panels = [
+            _speed(segmentation, drawable(shortened(segmentation.recording.name or "recording", _NAME)))
+            for segmentation in shown
+        ]
         figure = new_figure(7.2, 0.7 + 1.1 * len(panels))
         axes = figure.subplots(len(panels), 1, squeeze=False).ravel()
         owners = list(shown)
-    for one, owner, (name, values) in zip(axes, owners, panels, strict=True):
-        _draw(one, owner, name, values)
-    for one, owner in zip(axes[:1] if len(segmentations) == 1 else axes, owners, strict=False):
-        _number(one, owner)
-    axes[-1].set_xlabel(_axis(segmentations, len(shown)))
-    return figure
-
-
-def _channels(one: Segmentation) -> list[tuple[str, Array]]:
-    """Names and values of the columns that are drawn."""
-    recording = one.recording
-    named = recording.channels
-    names = axis_names(recording.n_dims) if named is None else [c for channel in named for c in channel.columns]
-    values = recording.positions if named is None else recording.recorded
-    return [(drawable(shortened(name, _NAME)), values[:, k]) for k, name in enumerate(names[:_CHANNELS])]
-
-
-def _speed(one: Segmentation, name: str) -> tuple[str, Array]:
-    """The speed that the recording is cut by, in shares of its peak."""
-    motion = observe(one.recording, one.method.resolution)
-    return name, motion.speed / motion.peak
-
-
-def _draw(axes: Any, one: Segmentation, name: str, values: Array) -> None:
-    times = one.recording.times - one.recording.times[0]
-    kept = evenly_spaced(len(times), _POINTS)
-    for k, (start, end) in enumerate((one.cuts - one.recording.times[0]).tolist()):
-        axes.axvspan(start, end, color=BLUE if k % 2 else ORANGE, alpha=0.18, linewidth=0)
-    axes.plot(times[kept], values[kept], color=GRAY, linewidth=0.8)
-    axes.set_ylabel(name, rotation=0, ha="right", va="center")
-    axes.tick_params(labelsize=6.5, length=2)
-    axes.locator_params(axis="y", nbins=3)
-    axes.margins(x=0.0)
-
-
-def _number(axes: Any, one: Segmentation) -> None:
-    """Write the numbers of the pieces above the panel."""
-    middles = one.cuts.mean(axis=1) - one.recording.times[0]
-    for k in evenly_spaced(len(middles), _NUMBERED).tolist() if len(middles) else []:
-        at = (float(middles[k]), 1.02)
-        axes.annotate(str(k + 1), at, xycoords=("data", "axes fraction"), ha="center", fontsize=6.5, color=GRAY)
-
-
-def _axis(segmentations: Sequence[Segmentation], n_shown: int) -> str:
+    for panel, owner, (name, values) in zip(axes, owners, panels, strict=True):
+        _draw(panel, owner, name, values)
+    for panel, owner in zip(axes[:1] if len(segmentations) == 1 else axes, owners, strict=False):
+        _number(panel, owner)
+    n_shown = len(shown)
     parts = ["time since the first sample [s]; speeds in shares of the peak speed"]
     if len(segmentations) == 1:
         recording = segmentations[0].recording
@@ -88,4 +52,40 @@ def _axis(segmentations: Sequence[Segmentation], n_shown: int) -> str:
             parts.append(f"the first {_CHANNELS} of {n} channels")
     elif n_shown < len(segmentations):
         parts.append(f"the first {n_shown} of {len(segmentations)} recordings")
-    return "; ".join(parts)
+    axes[-1].set_xlabel("; ".join(parts))
+    return figure
+
+
+def _channels(segmentation: Segmentation) -> list[tuple[str, Array]]:
+    """Names and values of the columns that are drawn."""
+    recording = segmentation.recording
+    named = recording.channels
+    names = axis_names(recording.n_dims) if named is None else [c for channel in named for c in channel.columns]
+    values = recording.positions if named is None else recording.recorded
+    return [(drawable(shortened(name, _NAME)), values[:, k]) for k, name in enumerate(names[:_CHANNELS])]
+
+
+def _speed(segmentation: Segmentation, name: str) -> tuple[str, Array]:
+    """The speed that the recording is cut by, in shares of its peak."""
+    motion = observe(segmentation.recording, segmentation.method.resolution)
+    return name, motion.speed / motion.peak
+
+
+def _draw(axes: Any, segmentation: Segmentation, name: str, values: Array) -> None:
+    times = segmentation.recording.times - segmentation.recording.times[0]
+    drawn = evenly_spaced(len(times), _POINTS)
+    for k, (start, end) in enumerate((segmentation.cuts - segmentation.recording.times[0]).tolist()):
+        axes.axvspan(start, end, color=BLUE if k % 2 else ORANGE, alpha=0.18, linewidth=0)
+    axes.plot(times[drawn], values[drawn], color=GRAY, linewidth=0.8)
+    axes.set_ylabel(name, rotation=0, ha="right", va="center")
+    axes.tick_params(labelsize=6.5, length=2)
+    axes.locator_params(axis="y", nbins=3)
+    axes.margins(x=0.0)
+
+
+def _number(axes: Any, segmentation: Segmentation) -> None:
+    """Write the numbers of the pieces above the panel."""
+    middles = segmentation.cuts.mean(axis=1) - segmentation.recording.times[0]
+    for k in evenly_spaced(len(middles), _NUMBERED).tolist() if len(middles) else []:
+        at = (float(middles[k]), 1.02)
+        axes.annotate(str(k + 1), at, xycoords=("data", "axes fraction"), ha="center", fontsize=6.5, color=GRAY)

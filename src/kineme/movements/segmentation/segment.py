@@ -60,11 +60,11 @@ def segment(
     """
     check_switch("cover", cover)
     method = as_segmenter(by, parameters)
-    whole = as_recording(recording)
-    motion = observe(whole, method.resolution)
+    trajectory = as_recording(recording)
+    motion = observe(trajectory, method.resolution)
     if cover:
-        return Segmentation(whole, method, enough_samples(consecutive(method.inner_cuts(motion), len(whole))))
-    return Segmentation(whole, method, moving(motion, method.pieces(motion), method.resolution))
+        return Segmentation(trajectory, method, enough_samples(consecutive(method.inner_cuts(motion), len(trajectory))))
+    return Segmentation(trajectory, method, moving(motion, method.pieces(motion), method.resolution))
 
 
 def as_segmenter(by: str | Segmenter, parameters: dict[str, Any]) -> Segmenter:
@@ -77,10 +77,10 @@ def as_segmenter(by: str | Segmenter, parameters: dict[str, Any]) -> Segmenter:
             )
         return by
     check_choice("by", by, list(SEGMENTERS))
-    known = [field.name for field in fields(SEGMENTERS[by])]
-    unknown = [name for name in parameters if name not in known]
+    names = [field.name for field in fields(SEGMENTERS[by])]
+    unknown = [name for name in parameters if name not in names]
     if unknown:
-        raise SpecificationError(f"expected parameters of by={by!r} among {known}, got {unknown[0]!r}")
+        raise SpecificationError(f"expected parameters of by={by!r} among {names}, got {unknown[0]!r}")
     chosen: Segmenter = SEGMENTERS[by](**parameters)
     return chosen
 
@@ -162,19 +162,19 @@ class Segmentation(MovementSequence):
 def pieces_of(recording: Trajectory, rows: Rows) -> Demonstrations:
     """Samples rows[i, 0]:rows[i, 1] of a recording as movements; they may overlap."""
     name = recording.name or "recording"
-    whole = [slice(first, stop) for first, stop in rows.tolist()]
-    spans = [(recording.times[one][0], recording.times[one][-1]) for one in whole]
+    slices = [slice(first, stop) for first, stop in rows.tolist()]
+    spans = [(recording.times[piece][0], recording.times[piece][-1]) for piece in slices]
     pieces = Demonstrations.from_arrays(
-        [recording.positions[one] for one in whole],
-        None if recording.label is None else [recording.label] * len(whole),
-        [recording.times[one] for one in whole],
+        [recording.positions[piece] for piece in slices],
+        None if recording.label is None else [recording.label] * len(slices),
+        [recording.times[piece] for piece in slices],
         [f"{name}[{_seconds(start)}-{_seconds(end)} s]" for start, end in spans],
     )
     if (channels := recording.channels) is None:
         return pieces
-    recorded = None if is_plain(channels) else np.concatenate([recording.recorded[one] for one in whole])
-    known = replace(pieces.movements, dimensions=learned_names(channels), channels=channels, recorded=recorded)
-    return Demonstrations.of_movements(known)
+    recorded = None if is_plain(channels) else np.concatenate([recording.recorded[piece] for piece in slices])
+    movements = replace(pieces.movements, dimensions=learned_names(channels), channels=channels, recorded=recorded)
+    return Demonstrations.of_movements(movements)
 
 
 def _seconds(time: float) -> str:

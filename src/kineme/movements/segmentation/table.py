@@ -198,10 +198,10 @@ def turning(motion: Motion, span: float) -> Array:
 
 def _apart(cuts: Rows, strength: Array, distance: float) -> Rows:
     """Keep the strongest cuts, none closer than `distance` samples to a stronger one."""
-    kept = np.zeros(len(cuts), dtype=bool)
+    is_far = np.zeros(len(cuts), dtype=bool)
     for i in np.argsort(-strength, kind="stable"):
-        kept[i] = not (np.abs(cuts[kept] - cuts[i]) < distance).any()
-    return cuts[kept]
+        is_far[i] = not (np.abs(cuts[is_far] - cuts[i]) < distance).any()
+    return cuts[is_far]
 
 
 _MOST_POINTS = 10_000
@@ -259,7 +259,14 @@ class ChangePoints:
         even = np.linspace(0.0, t[-1], self.n_points)
         velocity = np.gradient(motion.positions, t, axis=0) / motion.peak
         signal = np.column_stack([np.interp(even, t, column) for column in velocity.T])
-        detector = _ruptures().KernelCPD(kernel="rbf", min_size=_MIN_POINTS, params={"gamma": 1.0}).fit(signal)
+        try:
+            import ruptures  # type: ignore[import-untyped, import-not-found, unused-ignore]
+        except ImportError:
+            raise SpecificationError(
+                'expected the library ruptures for by="change-points", found none; '
+                'pip install "kineme[segmentation]", or choose by="rest" or by="speed"'
+            ) from None
+        detector = ruptures.KernelCPD(kernel="rbf", min_size=_MIN_POINTS, params={"gamma": 1.0}).fit(signal)
         if self.n_pieces == 1:
             return np.zeros(0, dtype=np.intp)
         if self.n_pieces is not None:
@@ -276,17 +283,6 @@ class ChangePoints:
         pieces = consecutive(self.inner_cuts(motion), len(motion.times))
         fast = motion.speed > 2.0 * max(self.resolution * motion.peak, 2.0 * motion.noise)
         return pieces[2 * np.add.reduceat(fast, pieces[:, 0], dtype=np.intp) > pieces[:, 1] - pieces[:, 0]]
-
-
-def _ruptures() -> Any:
-    try:
-        import ruptures  # type: ignore[import-untyped, import-not-found, unused-ignore]
-    except ImportError:
-        raise SpecificationError(
-            'expected the library ruptures for by="change-points", found none; '
-            'pip install "kineme[segmentation]", or choose by="rest" or by="speed"'
-        ) from None
-    return ruptures
 
 
 class Segmenter(Protocol):

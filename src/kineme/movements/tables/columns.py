@@ -150,7 +150,14 @@ def column_numbers(
         elif group := [k for k, head in enumerate(heads) if head.startswith(f"{column}.")]:
             numbers += group
         elif is_pattern:
-            matching = _matching(heads, column)
+            # The columns whose heads match, with or without their units; brackets stand for themselves.
+            literal = column.replace("[", "[[]")
+            bare = (_BRACKETS.sub("", head).strip() for head in heads)
+            matching = [
+                k
+                for k, (head, name) in enumerate(zip(heads, bare, strict=True))
+                if head and (fnmatchcase(head, literal) or fnmatchcase(name, literal))
+            ]
             free = matching if among is None else [k for k in matching if k in among]
             if not free:
                 raise DataError(f"expected columns like {column!r}, got {_listed(heads)}")
@@ -170,17 +177,6 @@ def excluded_numbers(heads: Sequence[str], columns: Sequence[Column]) -> set[int
         with suppress(DataError):
             numbers |= {*column_numbers(heads, [column])}
     return numbers
-
-
-def _matching(heads: Sequence[str], pattern: str) -> list[int]:
-    """The columns whose heads match, with or without their units; brackets stand for themselves."""
-    literal = pattern.replace("[", "[[]")
-    bare = (_BRACKETS.sub("", head).strip() for head in heads)
-    return [
-        k
-        for k, (head, name) in enumerate(zip(heads, bare, strict=True))
-        if head and (fnmatchcase(head, literal) or fnmatchcase(name, literal))
-    ]
 
 
 def _places(heads: Iterable[str]) -> dict[str, list[int]]:
@@ -259,7 +255,7 @@ def _of_time(heads: Sequence[str], kinds: Sequence[str], free: Sequence[int]) ->
 def _nanoseconds(heads: Sequence[str], kinds: Sequence[str]) -> dict[int, int]:
     """Columns of whole seconds -> those of the nanoseconds beside them: ``stamp.sec`` and ``stamp.nanosec``."""
     plain = {head.lower(): k for k, head in enumerate(heads)}
-    found = {}
+    beside_seconds = {}
     for k, head in enumerate(heads):
         match = _WHOLE_SECONDS.fullmatch(head) if kinds[k] == "number" else None
         if match is None or match[1][-1:].isalpha():
@@ -267,8 +263,8 @@ def _nanoseconds(heads: Sequence[str], kinds: Sequence[str]) -> dict[int, int]:
         names = [f"{match[1]}{name}".lower() for name in TIME_UNITS if UNITS[name].symbol == "ns"]
         beside = [plain[name] for name in names if name in plain and kinds[plain[name]] == "number"]
         if len(beside) == 1:
-            found[k] = beside[0]
-    return found
+            beside_seconds[k] = beside[0]
+    return beside_seconds
 
 
 def is_time(head: str) -> bool:

@@ -122,7 +122,7 @@ class Layout:
         check_number("fill_gaps", self.fill_gaps, least=0)
         if self.every is not None:
             check_count("every", self.every, MIN_SAMPLES)
-        if self.rows and any(one is not None for one in (self.every, self.time, self.movement, self.person)):
+        if self.rows and any(choice is not None for choice in (self.every, self.time, self.movement, self.person)):
             raise SpecificationError(
                 "expected rows without every, time, movement and person, since each line is a whole movement, got both"
             )
@@ -146,7 +146,7 @@ class Layout:
     @property
     def by_number(self) -> bool:
         """Whether the columns of the coordinates are chosen by their numbers."""
-        return bool(self.coordinates) and all(str(one).isdecimal() for one in self.coordinates or ())
+        return bool(self.coordinates) and all(str(column).isdecimal() for column in self.coordinates or ())
 
     @property
     def keys(self) -> tuple[Column, ...] | None:

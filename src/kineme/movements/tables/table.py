@@ -95,7 +95,13 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Pa
     """
     positions = np.column_stack([table.columns[k] for k in roles.positions])
     times, units, units_from = _times(table, roles, layout)
-    _check_clocks(table, roles, times)
+    # Refuse several columns of times that do not show the same clock.
+    for k in roles.clocks:
+        named = _unit_of_times(table, k)
+        if not any(
+            same_clock(times, in_seconds(table.columns[k], unit)) for unit in ([named] if named else PER_SECOND)
+        ):
+            raise no_time(table.heads, [column for column in (roles.time, *roles.clocks) if column is not None])
     codes, keys, labels = _split(table, roles, times)
     n = len(keys)
     people = None if roles.person is None else _people(table.columns[roles.person], codes)
@@ -141,8 +147,8 @@ def _times(table: Table, roles: Roles, layout: Layout) -> tuple[Any, str | float
     if layout.units is not None:
         return in_seconds(stamps, layout.units), layout.units, "given"
     named = _unit_of_times(table, roles.time)
-    units, known = (named, "head") if named else _unit_by_clocks(table, roles) or unit_by_size(stamps, head)
-    return in_seconds(stamps, units), units, known
+    units, said_by = (named, "head") if named else _unit_by_clocks(table, roles) or unit_by_size(stamps, head)
+    return in_seconds(stamps, units), units, said_by
 
 
 def _unit_of_times(table: Table, k: int) -> str | None:
@@ -159,14 +165,6 @@ def _unit_by_clocks(table: Table, roles: Roles) -> tuple[str, str] | None:
             if same_clock(in_seconds(table.columns[roles.time], units), in_seconds(table.columns[k], named or "s")):
                 return units, f"as {table.heads[k]!r}"
     return None
-
-
-def _check_clocks(table: Table, roles: Roles, times: Array) -> None:
-    """Refuse several columns of times that do not show the same clock."""
-    for k in roles.clocks:
-        named = _unit_of_times(table, k)
-        if not any(same_clock(times, in_seconds(table.columns[k], one)) for one in ([named] if named else PER_SECOND)):
-            raise no_time(table.heads, [one for one in (roles.time, *roles.clocks) if one is not None])
 
 
 def _in_turns(roles: Roles) -> bool:
@@ -191,8 +189,8 @@ def _split(table: Table, roles: Roles, times: Array) -> tuple[NDArray[np.intp], 
     labels = [None] * n_rows if label is None else table.columns[label].tolist()
     columns: Sequence[list[str]] = [table.columns[k].tolist() for k in roles.movement]
     if _in_turns(roles):
-        told = list(zip(labels, *columns, strict=True))
-        changes = np.array([before != one for before, one in pairwise(told)], dtype=bool)
+        rows = list(zip(labels, *columns, strict=True))
+        changes = np.array([before != row for before, row in pairwise(rows)], dtype=bool)
         codes = np.append(0, np.cumsum(changes | (times[1:] < times[:-1])))
         firsts = np.flatnonzero(np.diff(codes, prepend=-1))
         return codes, [str(k) for k in range(len(firsts))], [labels[k] or None for k in firsts]
@@ -250,11 +248,31 @@ def parse_data_frame(frame: Any, layout: Layout) -> Parsed:
     if not heads or not len(arrays[0]):
         raise DataError("expected samples, got a data frame without rows")
     roles = choose_roles(heads, kinds, layout)
-    columns, dates_in = _by_role(heads, arrays, roles)
+    # Columns as `table_movements` takes them, and the unit of times that are dates.
+    columns: list[Any] = list(arrays)
+    for k in (*roles.movement, *(() if roles.label is None else (roles.label,))):
+        columns[k] = _texts(arrays[k].tolist())
+    for k in (*roles.positions, *roles.clocks, *(() if roles.nanoseconds is None else (roles.nanoseconds,))):
+        columns[k] = _numbers(heads[k], arrays[k])
+        if k in roles.positions and (integer := too_long_integer(arrays[k])) is not None:
+            raise DataError(f"expected numbers in the column {heads[k]!r} that floats can hold, got {integer}{ROUNDED}")
+    dates_in, k = None, roles.time
+    if k is not None and arrays[k].dtype.kind in "Mm":
+        columns[k], dates_in = nanoseconds(arrays[k]), "ns"
+    elif k is not None and arrays[k].dtype.kind == "O":
+        columns[k], others = seconds_of_dates(_texts(arrays[k].tolist()).tolist())
+        if others:
+            raise DataError(
+                f"expected numbers or dates in the column of times {heads[k]!r}, got the text "
+                f"{next(iter(others.values()))!r}; if it is a number, write frame.astype({{{heads[k]!r}: float}})"
+            )
+        dates_in = "s"
+    elif k is not None:
+        columns[k] = _numbers(heads[k], arrays[k])
     parsed = table_movements(Table(heads, columns, len(arrays[0]), no_lines, dates_in=dates_in), roles, layout, "frame")
     if roles.label is not None and (kind := arrays[roles.label].dtype.kind) in "iuf":  # numbers stay numbers
         number = float if kind == "f" else int
-        numbers = [None if one is None else number(one) for one in parsed.block.labels]
+        numbers = [None if label is None else number(label) for label in parsed.block.labels]
         parsed.block.labels[:] = numbers  # type: ignore[assignment]
     return parsed
 
@@ -276,15 +294,15 @@ def _values(series: Any) -> NDArray[Any]:
     values: NDArray[Any] = np.asarray(series.to_numpy())
     if values.dtype.kind != "O":
         return values if values.dtype.kind in _KINDS or values.dtype.kind == "c" else _texts(values.tolist())
-    known = [one for one in values.tolist() if not _is_missing(one)]
-    if known and all(isinstance(one, datetime) for one in known):
+    present = [value for value in values.tolist() if not _is_missing(value)]
+    if present and all(isinstance(value, datetime) for value in present):
         return np.asarray(series.to_numpy(dtype="datetime64[ns]"))
-    if known and all(isinstance(one, timedelta) for one in known):
+    if present and all(isinstance(value, timedelta) for value in present):
         return np.asarray(series.to_numpy(dtype="timedelta64[ns]"))
-    if known and all(map(_is_number, known)):
-        return np.array([np.nan if _is_missing(one) else float(one) for one in values.tolist()])
+    if present and all(map(_is_number, present)):
+        return np.array([np.nan if _is_missing(value) else float(value) for value in values.tolist()])
     texts = _texts(values.tolist())
-    texts[:] = [one if _is_number(one) else text for one, text in zip(values.tolist(), texts, strict=True)]
+    texts[:] = [value if _is_number(value) else text for value, text in zip(values.tolist(), texts, strict=True)]
     return texts
 
 
@@ -296,55 +314,31 @@ def _kind(values: NDArray[Any]) -> str:
 
 def _are_decimals(texts: list[str]) -> bool:
     """Whether texts are measured numbers, such as "0.25", and not codes, such as "07"."""
-    known = [text for text in texts if text]
+    filled = [text for text in texts if text]
     try:
-        return any("." in text for text in known) and all(map(isfinite, map(float, known)))
+        return any("." in text for text in filled) and all(map(isfinite, map(float, filled)))
     except ValueError:
         return False
 
 
-def _is_number(one: Any) -> bool:
-    return isinstance(one, _NUMBERS) and not isinstance(one, bool) and not _is_missing(one)
+def _is_number(value: Any) -> bool:
+    return isinstance(value, _NUMBERS) and not isinstance(value, bool) and not _is_missing(value)
 
 
 def _texts(values: list[Any]) -> NDArray[Any]:
     texts = np.empty(len(values), dtype=object)
-    texts[:] = ["" if _is_missing(one) else str(one) for one in values]
+    texts[:] = ["" if _is_missing(value) else str(value) for value in values]
     return texts
 
 
-def _is_missing(one: Any) -> bool:
-    return one is None or type(one).__name__ in ("NAType", "NaTType") or (isinstance(one, float) and one != one)  # noqa: PLR0124
-
-
-def _by_role(heads: tuple[str, ...], arrays: list[NDArray[Any]], roles: Roles) -> tuple[list[Any], str | None]:
-    """Columns as `table_movements` takes them, and the unit of times that are dates."""
-    columns: list[Any] = list(arrays)
-    for k in (*roles.movement, *(() if roles.label is None else (roles.label,))):
-        columns[k] = _texts(arrays[k].tolist())
-    for k in (*roles.positions, *roles.clocks, *(() if roles.nanoseconds is None else (roles.nanoseconds,))):
-        columns[k] = _numbers(heads[k], arrays[k])
-        if k in roles.positions and (integer := too_long_integer(arrays[k])) is not None:
-            raise DataError(f"expected numbers in the column {heads[k]!r} that floats can hold, got {integer}{ROUNDED}")
-    dates_in, k = None, roles.time
-    if k is not None and arrays[k].dtype.kind in "Mm":
-        columns[k], dates_in = nanoseconds(arrays[k]), "ns"
-    elif k is not None and arrays[k].dtype.kind == "O":
-        columns[k], others = seconds_of_dates(_texts(arrays[k].tolist()).tolist())
-        if others:
-            raise DataError(
-                f"expected numbers or dates in the column of times {heads[k]!r}, got the text "
-                f"{next(iter(others.values()))!r}; if it is a number, write frame.astype({{{heads[k]!r}: float}})"
-            )
-        dates_in = "s"
-    elif k is not None:
-        columns[k] = _numbers(heads[k], arrays[k])
-    return columns, dates_in
+def _is_missing(value: Any) -> bool:
+    is_nan = isinstance(value, float) and value != value  # noqa: PLR0124
+    return value is None or type(value).__name__ in ("NAType", "NaTType") or is_nan
 
 
 def _numbers(head: str, values: NDArray[Any]) -> NDArray[np.float64]:
     if _KINDS.get(values.dtype.kind) != "number":
-        i, got = next(((i, one) for i, one in enumerate(values.tolist()) if not _is_number(one)), (0, values[0]))
+        i, got = next(((i, value) for i, value in enumerate(values.tolist()) if not _is_number(value)), (0, values[0]))
         raise DataError(
             f"expected numbers in the column {head!r}, got {got!r} in row {i}; repair it, as by "
             f"frame.astype({{{head!r}: float}}), or say columns="

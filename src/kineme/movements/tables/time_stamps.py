@@ -169,7 +169,7 @@ def _in_whole_days(cell: str) -> str:
 
 def _duration(cell: str) -> float | None:
     """The seconds of a time of day or of a duration: ``12:30:01.5``, ``0 days 00:00:00.01``, ``P0DT0H0M0.01S``."""
-    match = next(filter(None, (one.fullmatch(cell) for one in _DURATIONS)), None)
+    match = next(filter(None, (pattern.fullmatch(cell) for pattern in _DURATIONS)), None)
     if match is None:
         return None
     parts = match.groupdict()
@@ -192,7 +192,7 @@ def nanoseconds(stamps: NDArray[Any]) -> Array:
     except OverflowError:
         counted = False
     if not counted:
-        known = stamps[~missing]
-        farthest = known[np.abs(known.astype(np.int64).astype(np.float64)).argmax()]
+        present = stamps[~missing]
+        farthest = present[np.abs(present.astype(np.int64).astype(np.float64)).argmax()]
         raise DataError(f"expected dates from 1678 to 2262 or durations of that size, got {farthest}")
     return np.where(missing, np.nan, counts.astype(np.int64))

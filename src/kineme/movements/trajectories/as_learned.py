@@ -68,18 +68,20 @@ def as_learned(
 
 def _of_several_channels(movements: Sequence[Any]) -> bool:
     """Whether channels differ in a list: of all its movements together nothing would be known."""
-    every = {id(channels): channels for channels in (getattr(one, "channels", None) for one in movements)}
+    every = {id(channels): channels for channels in (getattr(movement, "channels", None) for movement in movements)}
     return len(every) > 1 and len({*every.values()}) > 1
 
 
 def _one_by_one(movements: Sequence[Any], learned: Channels | None, n_dims: int, what: str) -> Demonstrations:
-    found: list[Trajectory] = []
-    for i, one in enumerate(movements):
+    trajectories: list[Trajectory] = []
+    for i, movement in enumerate(movements):
         try:
-            found += as_learned(one if hasattr(one, "demonstrations") else [one], learned, n_dims, what)
+            trajectories += as_learned(
+                movement if hasattr(movement, "demonstrations") else [movement], learned, n_dims, what
+            )
         except TrajectoryError as error:
             raise TrajectoryError(f"index {i} of the list: {error}") from error
-    return Demonstrations(found)
+    return Demonstrations(trajectories)
 
 
 def _of_kinds(demos: Demonstrations, learned: Channels | None, n_dims: int, what: str) -> Demonstrations:
@@ -92,7 +94,7 @@ def _of_kinds(demos: Demonstrations, learned: Channels | None, n_dims: int, what
         raise TrajectoryError(_of_width(demos, learned, n_dims, what))
     if same_columns(channels, learned):
         return Demonstrations.of_movements(in_coordinates(demos.movements), demos.steps)
-    moving = tuple(one for one in learned if one.coordinates)
+    moving = tuple(channel for channel in learned if channel.coordinates)
     if {*columns_recorded(moving).names} <= {*columns_recorded(channels).names}:
         return by_names(demos, moving, known_units=False)
     if moving_kinds(channels) == moving_kinds(learned):
@@ -120,7 +122,7 @@ def _of_width(demos: Demonstrations, learned: Channels | None, n_dims: int, what
 
 def of_columns(demos: Demonstrations, learned: Channels) -> Demonstrations:
     """Movements whose positions are recorded columns, by what these are."""
-    if all(one.kind == "position" for one in learned):
+    if all(channel.kind == "position" for channel in learned):
         return demos
     raw = replace(demos.movements, channels=None, recorded=None)
     return Demonstrations.of_movements(of_channels(raw, learned), demos.steps)
@@ -153,10 +155,10 @@ def _check_lacking(channels: Channels, moving: Channels, what: str) -> None:
 
 def _check_names(channels: Channels, moving: Channels, what: str) -> None:
     """Refuse to compare columns in their order that have other names, or a name that was learned in another place."""
-    asked = tuple(one for one in channels if one.coordinates)
-    ours, wanted = columns_recorded(asked), columns_recorded(moving)
+    recorded = tuple(channel for channel in channels if channel.coordinates)
+    ours, wanted = columns_recorded(recorded), columns_recorded(moving)
     place = {name: k for k, name in enumerate(wanted.names)}
-    if not may_be(asked, moving) or any(place.get(name, k) != k for k, name in enumerate(ours.names)):
+    if not may_be(recorded, moving) or any(place.get(name, k) != k for k, name in enumerate(ours.names)):
         raise TrajectoryError(
             f"expected {what} of the columns {listed(wanted.heads)}, as those that were learned, got "
             f"{listed(ours.heads)}; choose the columns of these names with columns= of read_recordings, in the shell "
@@ -177,15 +179,19 @@ def _in_units(demos: Demonstrations, learned: Channels) -> Demonstrations:
     Rotations beside positions of another unit, or of one that is not known, count as they do beside those learned.
     """
     channels = demos.channels or ()
-    moving = [[one for one in some if one.coordinates] for some in (channels, learned)]
+    moving = [[channel for channel in some if channel.coordinates] for some in (channels, learned)]
     positions, k = demos.positions, 0
-    ours = next((one.unit for one in channels if one.kind == "position"), None)
-    theirs = next((one.unit for one in learned if one.kind == "position"), None)
+    ours = next((channel.unit for channel in channels if channel.kind == "position"), None)
+    theirs = next((channel.unit for channel in learned if channel.kind == "position"), None)
     ratio = 1.0 if ours is not None and theirs is None else lever_of(learned) / lever_of(channels)
-    for one, other in zip(*moving, strict=True):
-        columns = slice(k, k := k + len(one.coordinates))
-        sizes = None if one.kind == "orientation" else conversion(one.name, one.unit, other.unit, known_units=False)
-        if sizes is None and (one.kind != "orientation" or ratio == 1.0):
+    for channel, other in zip(*moving, strict=True):
+        columns = slice(k, k := k + len(channel.coordinates))
+        sizes = (
+            None
+            if channel.kind == "orientation"
+            else conversion(channel.name, channel.unit, other.unit, known_units=False)
+        )
+        if sizes is None and (channel.kind != "orientation" or ratio == 1.0):
             continue
         positions = np.array(positions) if positions is demos.positions else positions
         positions[:, columns] = (

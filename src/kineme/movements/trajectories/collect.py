@@ -41,17 +41,17 @@ _EACH = "transpose the array, as by [x.T for x in arrays]"
 def collect_trajectories(trajectories: Sequence[Trajectory]) -> Movements:
     """Concatenate trajectories, each of which has been checked already."""
     trajectories = list(trajectories)
-    for i, one in enumerate(trajectories):
-        if not isinstance(one, Trajectory):
+    for i, trajectory in enumerate(trajectories):
+        if not isinstance(trajectory, Trajectory):
             raise TrajectoryError(
-                f"expected a sequence of Trajectory, got {type(one).__name__} at index {i}; "
+                f"expected a sequence of Trajectory, got {type(trajectory).__name__} at index {i}; "
                 "use Demonstrations.from_arrays for arrays"
             )
     trajectories = _in_columns_of_first(trajectories)
-    names = tuple(one.name for one in trajectories)
-    positions, offsets = _concatenate([one.positions for one in trajectories], names)
-    times = np.concatenate([one.times for one in trajectories])
-    labels = [one.label for one in trajectories]
+    names = tuple(trajectory.name for trajectory in trajectories)
+    positions, offsets = _concatenate([trajectory.positions for trajectory in trajectories], names)
+    times = np.concatenate([trajectory.times for trajectory in trajectories])
+    labels = [trajectory.label for trajectory in trajectories]
     labeled = any(label is not None for label in labels)
     channels, recorded = _channels_of(trajectories)
     return Movements(
@@ -75,25 +75,34 @@ def _in_columns_of_first(trajectories: list[Trajectory]) -> list[Trajectory]:
     TrajectoryError
         Columns of the same names in units that cannot be converted.
     """
-    every = {id(one.channels): one.channels for one in trajectories}
+    every = {id(trajectory.channels): trajectory.channels for trajectory in trajectories}
     channels = trajectories[0].channels if trajectories else None
     if len(every) < 2 or channels is None:
         return trajectories
     wanted = columns_recorded(channels)
     ours = {key: columns_recorded(other or ()) for key, other in every.items()}
-    other = {key for key, one in ours.items() if one != wanted and {*one.names} == {*wanted.names}}
+    other = {key for key, columns in ours.items() if columns != wanted and {*columns.names} == {*wanted.names}}
     return [
-        _as_first(one, ours[id(one.channels)], channels, wanted) if id(one.channels) in other else one
-        for one in trajectories
+        _as_first(trajectory, ours[id(trajectory.channels)], channels, wanted)
+        if id(trajectory.channels) in other
+        else trajectory
+        for trajectory in trajectories
     ]
 
 
-def _as_first(one: Trajectory, ours: Columns, channels: Channels, wanted: Columns) -> Trajectory:
-    columns = np.ascontiguousarray(columns_like(one.recorded, ours, wanted, known_units=False))
-    made = of_channels(Movements(columns, np.array([0, len(columns)]), np.array([one.duration]), one.times), channels)
+def _as_first(trajectory: Trajectory, ours: Columns, channels: Channels, wanted: Columns) -> Trajectory:
+    columns = np.ascontiguousarray(columns_like(trajectory.recorded, ours, wanted, known_units=False))
+    movement = of_channels(
+        Movements(columns, np.array([0, len(columns)]), np.array([trajectory.duration]), trajectory.times), channels
+    )
     new = object.__new__(Trajectory)
-    values = {"times": one.times, "positions": made.positions, "label": one.label, "name": one.name}
-    recorded = made.positions if made.recorded is None else made.recorded
+    values = {
+        "times": trajectory.times,
+        "positions": movement.positions,
+        "label": trajectory.label,
+        "name": trajectory.name,
+    }
+    recorded = movement.positions if movement.recorded is None else movement.recorded
     for name, value in (values | {"channels": channels, "recorded": recorded}).items():
         object.__setattr__(new, name, value)
     return new
@@ -108,9 +117,11 @@ def _names_of(channels: Channels, n_dims: int) -> tuple[str, ...]:
 def _channels_of(trajectories: Sequence[Trajectory]) -> tuple[Channels | None, Array | None]:
     """The channels that all share, and what was recorded; (None, None) if they differ."""
     channels = trajectories[0].channels if trajectories else None
-    if channels is None or any(one.channels != channels for one in trajectories):
+    if channels is None or any(trajectory.channels != channels for trajectory in trajectories):
         return None, None
-    return channels, None if is_plain(channels) else np.concatenate([one.recorded for one in trajectories])
+    return channels, None if is_plain(channels) else np.concatenate(
+        [trajectory.recorded for trajectory in trajectories]
+    )
 
 
 def collect_arrays(
@@ -132,7 +143,16 @@ def collect_arrays(
         raise TrajectoryError(f"expected one name for each of the {n} movements, got {len(names)}")
     if times is None:
         way = _TIME_LAST if is_block and arrays.ndim == 3 else "transpose the array" if is_block else _EACH
-        _refuse_transposed(offsets, positions.shape[1], names, way)
+        # Refuse a movement without time stamps that has more dimensions than samples; stamps say which axis is time.
+        n_dims = positions.shape[1]
+        lengths = np.diff(offsets)
+        if (wide := lengths < n_dims).any():
+            i = int(np.argmax(wide))
+            raise TrajectoryError(
+                f"{describe(i, names)}: expected samples along the first axis and dimensions along the last, got shape "
+                f"({lengths[i]}, {n_dims}), more dimensions than samples; {way}, or, if it is right, pass "
+                "its time stamps: kineme.Trajectory(times, array), or times= of Demonstrations.from_arrays"
+            )
     check_finite(positions, offsets, names, "positions")
     check_extents(positions, offsets, names)
     stamps = None if times is None else _concatenate_times(times, offsets, names)
@@ -173,25 +193,13 @@ def _from_block(block: NDArray[Any], copy: bool) -> tuple[Array, NDArray[np.intp
     return flat.reshape(-1, n_dims), np.arange(n + 1) * n_samples
 
 
-def _refuse_transposed(offsets: NDArray[np.intp], n_dims: int, names: Sequence[str | None] | None, way: str) -> None:
-    """Refuse a movement without time stamps that has more dimensions than samples; stamps say which axis is time."""
-    lengths = np.diff(offsets)
-    if (wide := lengths < n_dims).any():
-        i = int(np.argmax(wide))
-        raise TrajectoryError(
-            f"{describe(i, names)}: expected samples along the first axis and dimensions along the last, got shape "
-            f"({lengths[i]}, {n_dims}), more dimensions than samples; {way}, or, if it is right, pass "
-            "its time stamps: kineme.Trajectory(times, array), or times= of Demonstrations.from_arrays"
-        )
-
-
 def _from_list(arrays: Sequence[ArrayLike], names: Sequence[str | None] | None) -> tuple[Array, NDArray[np.intp]]:
     arrays = list(arrays)
     plain = plain_block(arrays)
     if plain is not None:
         return plain
-    known = tuple(names) if names is not None and len(names) == len(arrays) else None
-    return _concatenate(_check_each(as_positions, (arrays,), known), known)
+    names_of_arrays = tuple(names) if names is not None and len(names) == len(arrays) else None
+    return _concatenate(_check_each(as_positions, (arrays,), names_of_arrays), names_of_arrays)
 
 
 def _check_sized(value: Any, expected: str) -> None:
@@ -220,8 +228,8 @@ def _check_each(check: Callable[..., Array], columns: tuple[Iterable[Any], ...],
     try:
         return list(map(check, *columns))
     except TrajectoryError:
-        for i, one in enumerate(zip(*columns, strict=True)):
-            check(*one, who=describe(i, names))
+        for i, values in enumerate(zip(*columns, strict=True)):
+            check(*values, who=describe(i, names))
         raise
 
 

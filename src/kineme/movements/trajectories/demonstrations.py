@@ -270,14 +270,14 @@ class Demonstrations(Presented, Sequence[Trajectory]):
     def _trajectory(self, i: int) -> Trajectory:
         """Movement i; built without checking again, and sharing this block's memory."""
         rows = slice(self.offsets[i], self.offsets[i + 1])
-        one = object.__new__(Trajectory)
-        object.__setattr__(one, "times", self.times[rows])
-        object.__setattr__(one, "positions", self.positions[rows])
-        object.__setattr__(one, "label", None if self.labels is None else self.labels[i : i + 1].tolist()[0])
-        object.__setattr__(one, "name", None if self.names is None else self.names[i])
-        object.__setattr__(one, "channels", self.channels)
-        object.__setattr__(one, "recorded", self.recorded[rows])
-        return one
+        trajectory = object.__new__(Trajectory)
+        object.__setattr__(trajectory, "times", self.times[rows])
+        object.__setattr__(trajectory, "positions", self.positions[rows])
+        object.__setattr__(trajectory, "label", None if self.labels is None else self.labels[i : i + 1].tolist()[0])
+        object.__setattr__(trajectory, "name", None if self.names is None else self.names[i])
+        object.__setattr__(trajectory, "channels", self.channels)
+        object.__setattr__(trajectory, "recorded", self.recorded[rows])
+        return trajectory
 
     def __repr__(self) -> str:
         n_labels = "" if self.labels is None else f", {len(np.unique(self.labels))} labels"
@@ -308,12 +308,12 @@ def _held_by(movements: Any) -> Any:
 
 def _held_by_each(several: Sequence[Any]) -> list[Any] | None:
     """The movements of a list with trajectories or what holds them, one by one; None of a list of arrays."""
-    if not any(isinstance(one, Trajectory) or hasattr(one, "demonstrations") for one in several):
+    if not any(isinstance(movement, Trajectory) or hasattr(movement, "demonstrations") for movement in several):
         return None
     held: list[Any] = []
-    for i, one in enumerate(several):
+    for i, movement in enumerate(several):
         try:
-            held += [one] if isinstance(one, Trajectory) else Demonstrations.of(one)
+            held += [movement] if isinstance(movement, Trajectory) else Demonstrations.of(movement)
         except TrajectoryError as error:
             raise TrajectoryError(f"index {i} of the list: {error}") from error
     return held
@@ -365,7 +365,7 @@ def frames_of(value: Any) -> list[Any] | None:
     if not hasattr(value, "get_group") and not isinstance(value, list):
         return None
     pairs = list(value)
-    if pairs and all(isinstance(one, tuple) and len(one) == 2 and is_data_frame(one[1]) for one in pairs):
+    if pairs and all(isinstance(pair, tuple) and len(pair) == 2 and is_data_frame(pair[1]) for pair in pairs):
         return [frame for _, frame in pairs]
     return None
 
@@ -375,16 +375,16 @@ def collect_data_frames(frames: Sequence[Any], layout: Layout) -> Movements:
     if not frames:
         raise TrajectoryError("expected at least one data frame, got none")
     parsed = [_parse(frame, i, layout) for i, frame in enumerate(frames)]
-    if converted := [*dict.fromkeys(said for one in parsed for said in one.detected.converted)]:
+    if converted := [*dict.fromkeys(said for frame in parsed for said in frame.detected.converted)]:
         warn(f"units are converted to those of most columns: {', '.join(converted)}", UserWarning, 3)
     dimensions = parsed[0].detected.columns
-    for i, one in enumerate(parsed):
-        if one.detected.columns != dimensions:
+    for i, frame in enumerate(parsed):
+        if frame.detected.columns != dimensions:
             raise TrajectoryError(
                 f"data frame {i}: expected the coordinates {list(dimensions)} as in data frame 0, got "
-                f"{list(one.detected.columns)}; say which with columns= of Demonstrations.from_dataframe"
+                f"{list(frame.detected.columns)}; say which with columns= of Demonstrations.from_dataframe"
             )
-    blocks = [one.block for one in parsed]
+    blocks = [frame.block for frame in parsed]
     pieces = [(block, slice(*rows)) for block in blocks for rows in zip(block.offsets, block.offsets[1:], strict=False)]
     labels: Any = [label for block in blocks for label in block.labels]
     places = [place or None for block in blocks for place in block.places]

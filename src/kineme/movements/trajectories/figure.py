@@ -86,7 +86,14 @@ def _draw(figure: Figure | SubFigure, drawn: _Drawn) -> None:
 
 def _key(drawn: _Drawn) -> list[Any]:
     """Entries of the legend."""
-    return drawn.key + (_ends() if len(drawn.axis_names) in (2, 3) else [])
+    return drawn.key + (
+        [
+            _entry(name, GRAY, marker=marker, markersize=size, linestyle="none")
+            for name, (marker, size) in (("start", _START), ("end", _END))
+        ]
+        if len(drawn.axis_names) in (2, 3)
+        else []
+    )
 
 
 def draw_movements_into(axes: Axes, paths: Paths) -> None:
@@ -126,8 +133,8 @@ def _choose(paths: Paths) -> _Drawn:
     of_label = dict(zip(distinct, palette, strict=False))
     colors = [palette[0]] * len(chosen) if labels is None else [of_label[label] for label in labels[chosen].tolist()]
     return _Drawn(
-        [paths.times[one] for one in rows],
-        [paths.positions[one] for one in rows],
+        [paths.times[samples] for samples in rows],
+        [paths.positions[samples] for samples in rows],
         list(map(drawable, paths.axis_names)),
         colors,
         1.0 if len(chosen) < 10 else 0.5,
@@ -180,14 +187,6 @@ def set_equal_scales(axes: Any, points: Array) -> None:
     extents = np.ptp(points, axis=0)
     axes.set_box_aspect(np.maximum(extents, 0.2 * extents.max() or 1.0), zoom=0.8)  # also where nothing moves
     axes.locator_params(nbins=4)
-
-
-def _ends() -> list[Any]:
-    """Entries of the legend for the ends of paths."""
-    return [
-        _entry(name, GRAY, marker=marker, markersize=size, linestyle="none")
-        for name, (marker, size) in (("start", _START), ("end", _END))
-    ]
 
 
 def _entry(name: str, color: Any, **how: Any) -> Any:

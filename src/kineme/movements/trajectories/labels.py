@@ -42,28 +42,25 @@ def label_array(labels: Any, n: int | None = None, names: Sequence[str | None] |
         Another number of labels, a missing one (None, NaN), or texts and numbers together; the message names the
         movement.
     """
-    array = labels if isinstance(labels, np.ndarray) else _as_objects(labels)
+    if not isinstance(labels, np.ndarray):  # `np.asarray` of a list would convert numbers beside texts to texts
+        labels = np.asarray(labels) if hasattr(labels, "__array__") else np.array(labels, dtype=object)
+    array: NDArray[Any] = labels
     if array.ndim != 1 or (n is not None and len(array) != n):
         many = "each movement" if n is None else "the one movement" if n == 1 else f"each of the {n} movements"
         raise TrajectoryError(
             f"expected one label for {many}, got labels of shape {array.shape}"
             + ("; one array (T, d) is one movement: pass many as a list or as one array (n, T, d)" if n == 1 else "")
         )
-    known = array.tolist() if array.dtype.kind in "USTOfc" else []  # other dtypes have no missing values
-    kinds = set(map(type, known))
+    present = array.tolist() if array.dtype.kind in "USTOfc" else []  # other dtypes have no missing values
+    kinds = set(map(type, present))
     if kinds == {str}:
-        return _objects(known)
-    _check_each(known, names)
+        return _objects(present)
+    _check_each(present, names)
     if kinds and issubclass(next(iter(kinds)), str):
-        return _objects([str.__str__(label) for label in known])  # str itself, not a subclass
+        return _objects([str.__str__(label) for label in present])  # str itself, not a subclass
     if array.dtype != object:
         return array.copy()
-    return np.array(known) if known and isinstance(known[0], _NUMBERS) else _objects(known)
-
-
-def _as_objects(labels: Any) -> NDArray[Any]:
-    """Labels as an array of objects; `np.asarray` would convert numbers beside texts to texts."""
-    return np.asarray(labels) if hasattr(labels, "__array__") else np.array(labels, dtype=object)
+    return np.array(present) if present and isinstance(present[0], _NUMBERS) else _objects(present)
 
 
 def _objects(texts: Sequence[Any]) -> NDArray[Any]:

@@ -176,8 +176,8 @@ def merge_close(
     away = np.add.reduceat(positions - np.repeat(positions[heads], counts, axis=0), heads)
     merged_positions = positions[heads] + away / counts[:, None]
     merged_offsets = np.searchsorted(heads, offsets)
-    for kept, of in ((merged_offsets[:-1], offsets[:-1]), (merged_offsets[1:] - 1, offsets[1:] - 1)):
-        merged_times[kept], merged_positions[kept] = times[of], positions[of]
+    for ends, of in ((merged_offsets[:-1], offsets[:-1]), (merged_offsets[1:] - 1, offsets[1:] - 1)):
+        merged_times[ends], merged_positions[ends] = times[of], positions[of]
     return merged_times, merged_positions, merged_offsets
 
 

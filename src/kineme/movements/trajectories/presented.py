@@ -122,7 +122,12 @@ class Presented:
 
 def with_units(names: tuple[str, ...], channels: Channels | None) -> tuple[str, ...]:
     """Put the units of the channels behind the names of their columns, as ``x [mm]``, where only they say them."""
-    units = {name: one.unit for one in channels or () for name in one.columns if one.unit and unit_of(name) is None}
+    units = {
+        name: channel.unit
+        for channel in channels or ()
+        for name in channel.columns
+        if channel.unit and unit_of(name) is None
+    }
     return tuple(f"{name} [{units[name]}]" if name in units else name for name in names)
 
 

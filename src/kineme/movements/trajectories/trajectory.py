@@ -61,11 +61,11 @@ class Trajectory:
         who = f"trajectory {self.name!r}" if self.name else "trajectory"
         x = as_positions(self.positions, who)
         t = as_times(self.times, len(x), who)
-        whole = np.array([0, len(x)])
+        ends = np.array([0, len(x)])
         names = [self.name] if self.name else None
-        check_finite(x, whole, names, "positions")
-        check_extents(x, whole, names)
-        check_times(t, whole, names)
+        check_finite(x, ends, names, "positions")
+        check_extents(x, ends, names)
+        check_times(t, ends, names)
         for name, values in (("times", t), ("positions", x)):
             own = values.copy()
             own.setflags(write=False)
