@@ -103,7 +103,7 @@ EXEMPT = {
     "dmp.styles.model.learn_styles": "what differs within the batch; see test_order_of_training.py",
     "movements.trajectories.collect.collect_trajectories": "joins arrays that the table's movements are made of",
     "movements.trajectories.demonstrations.require_labels": "hands out labels, or raises",
-    "movements.preparation.preprocess.Step.apply": "a protocol; the steps are in the table",
+    "movements.preparation.trim.Step.apply": "a protocol; the steps are in the table",
     "movements.trajectories.trajectory.Trajectory.n_dims": "of one movement; its length counts samples",
 }
 

@@ -2,7 +2,7 @@
 
 A quaternion q turns a vector given in the tool frame into the world frame, so ``product(c, q)`` turns the world and
 ``product(q, c)`` turns the tool. q and -q are the same orientation. ROS and SciPy write (x, y, z, w) by default:
-``q[..., [3, 0, 1, 2]]`` converts, and `from_ros` reads rows of that order.
+``q[..., [3, 0, 1, 2]]`` converts.
 
 A rotation vector p is the axis times the angle in radians, as `scipy.spatial.transform.Rotation.as_rotvec` has it. The
 quaternion logarithm of the papers is half of it: ``p = 2 log(q)``.
@@ -23,10 +23,6 @@ from scipy.spatial.transform import Rotation
 
 from kineme.errors import TrajectoryError
 from kineme.validation import Array, as_numbers
-
-#: A quaternion whose norm differs from 1 by more than this is no rotation: zeros, or another quantity.
-TOLERANCE = 0.1
-
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -268,31 +264,3 @@ def log_one(quaternion: Sequence[float], near: Sequence[float]) -> Vector | None
     along = x * near[0] + y * near[1] + z * near[2]
     angle += round((along - angle) / _TURN) * _TURN
     return angle * x, angle * y, angle * z
-
-
-def are_rotations(q: Array) -> NDArray[np.bool_]:
-    """Whether each quaternion (n, 4), of any order, has the norm 1, up to `TOLERANCE`, shape (n,)."""
-    return np.asarray(np.abs(np.linalg.norm(q, axis=1) - 1.0) <= TOLERANCE)
-
-
-def from_ros(q: Array) -> Array:
-    """Quaternions (n, 4) with w last as ones of norm 1 with w first."""
-    return np.asarray(np.roll(q, 1, axis=1) / np.linalg.norm(q, axis=1, keepdims=True))
-
-
-def to_ros(q: Array) -> Array:
-    """Quaternions (n, 4) with w first as ones of norm 1 with w last."""
-    return np.asarray(np.roll(q, -1, axis=1) / np.linalg.norm(q, axis=1, keepdims=True))
-
-
-def interpolated(at: Array, times: Array, q: Array) -> Array:
-    """Rotations (m, 4) at other times (m,), by spherical linear interpolation between rows of q (n, 4) at times (n,).
-
-    Before the first time and after the last one the rotation stays.
-    """
-    rotations = continuous(from_ros(q))
-    if len(times) == 1:
-        return np.repeat(to_ros(rotations), len(at), axis=0)
-    k = np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(times) - 2)
-    share = np.clip((at - times[k]) / (times[k + 1] - times[k]), 0.0, 1.0)
-    return to_ros(slerp(rotations[k], rotations[k + 1], share))

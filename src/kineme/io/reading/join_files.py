@@ -14,11 +14,11 @@ from kineme.io.reading.column_order import sensors_of
 from kineme.io.reading.entries import Entry, as_text, name_of
 from kineme.io.reading.read_file import FileRead, select_columns
 from kineme.io.records import Problem
+from kineme.io.ros.streams import interpolated
 from kineme.movements.channels.channel import recorded_names
 from kineme.movements.channels.column_match import Columns, in_one_unit, numbers_by_name
 from kineme.movements.channels.coordinates import canonical, columns_of, in_order, off_norm
 from kineme.movements.channels.detect import Given, find_channels
-from kineme.movements.rotations import interpolated
 from kineme.movements.tables.columns import column_numbers, excluded_numbers
 from kineme.movements.tables.layout import Block, Detected, Layout, Parsed, Repair
 from kineme.reporting.text import counted, first_names

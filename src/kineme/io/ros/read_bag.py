@@ -21,25 +21,20 @@ from kineme.io.ros.streams import (
     SECOND,
     Samples,
     Stream,
+    are_rotations,
     check_kept,
     clock_of,
+    from_ros,
     in_order,
     merge_streams,
     read_streams,
     stamps_of,
     stream_of,
+    to_ros,
     values_at,
     with_rotations,
 )
-from kineme.movements.rotations import (
-    are_rotations,
-    conjugate,
-    continuous,
-    from_ros,
-    product,
-    rotated,
-    to_ros,
-)
+from kineme.movements.rotations import conjugate, continuous, product, rotated
 from kineme.movements.tables.columns import Roles, column_numbers, is_no_coordinate
 from kineme.movements.tables.layout import AS_KNOWN, Layout, Parsed, listed, no_lines
 from kineme.movements.tables.table import Table, table_movements

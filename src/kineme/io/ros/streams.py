@@ -16,7 +16,7 @@ from kineme.errors import DataError
 from kineme.io.limits import check_expanded
 from kineme.io.ros.bags import Bag, Topic, messages_of
 from kineme.io.ros.number_fields import TYPES, Heads, decoder_of, nanoseconds_of, number_fields
-from kineme.movements.rotations import are_rotations, interpolated
+from kineme.movements.rotations import continuous, slerp
 from kineme.movements.tables.layout import Column, listed
 from kineme.reporting.text import counted
 from kineme.validation import Array
@@ -27,6 +27,9 @@ Stamps = NDArray[np.int64]
 
 _CHECKED = 2**14  # messages between two looks at the memory
 _COPIES = 3  # of the numbers, until they are movements
+
+#: A quaternion whose norm differs from 1 by more than this is no rotation: zeros, or another quantity.
+TOLERANCE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -366,3 +369,34 @@ def _heads(streams: Sequence[Stream]) -> tuple[str, ...]:
     return tuple(
         f"{stream.name}.{head}" if twice & set(stream.heads) else head for stream in streams for head in stream.heads
     )
+
+
+# Unit quaternions in rows as ROS orders them, (x, y, z, w); `kineme.movements.rotations` has w first.
+
+
+def are_rotations(q: Array) -> NDArray[np.bool_]:
+    """Whether each quaternion (n, 4), of any order, has the norm 1, up to `TOLERANCE`, shape (n,)."""
+    return np.asarray(np.abs(np.linalg.norm(q, axis=1) - 1.0) <= TOLERANCE)
+
+
+def from_ros(q: Array) -> Array:
+    """Quaternions (n, 4) with w last as ones of norm 1 with w first."""
+    return np.asarray(np.roll(q, 1, axis=1) / np.linalg.norm(q, axis=1, keepdims=True))
+
+
+def to_ros(q: Array) -> Array:
+    """Quaternions (n, 4) with w first as ones of norm 1 with w last."""
+    return np.asarray(np.roll(q, -1, axis=1) / np.linalg.norm(q, axis=1, keepdims=True))
+
+
+def interpolated(at: Array, times: Array, q: Array) -> Array:
+    """Rotations (m, 4) at other times (m,), by spherical linear interpolation between rows of q (n, 4) at times (n,).
+
+    Before the first time and after the last one the rotation stays.
+    """
+    rotations = continuous(from_ros(q))
+    if len(times) == 1:
+        return np.repeat(to_ros(rotations), len(at), axis=0)
+    k = np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(times) - 2)
+    share = np.clip((at - times[k]) / (times[k + 1] - times[k]), 0.0, 1.0)
+    return to_ros(slerp(rotations[k], rotations[k + 1], share))
