@@ -110,7 +110,7 @@ def unit_named(text: str) -> Unit | None:
 
 
 def is_unit_of(text: str | None, quantity: str) -> bool:
-    """Whether a text spells a unit of this quantity."""
+    """Tell whether a text spells a unit of this quantity."""
     unit = unit_named(text or "")
     return unit is not None and unit.quantity == quantity
 

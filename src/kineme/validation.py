@@ -33,13 +33,13 @@ _STAMPS_AT_ONCE = 16_384  # temporaries stay in the cache
 
 
 def describe(index: int, names: Sequence[str | None] | None) -> str:
-    """How error messages refer to one movement: its index and, where it has one, its name."""
+    """Name one movement for error messages: by its index and, where it has one, its name."""
     name = names[index] if names else None
     return f"trajectory {index}" + (f" ({name!r})" if name else "")
 
 
 def _is_float64(values: Any) -> TypeGuard[Array]:
-    """Whether this is an array that needs no conversion: the usual case, asked once per movement."""
+    """Tell whether this is an array that needs no conversion: the usual case, asked once per movement."""
     return type(values) is np.ndarray and values.dtype is _FLOAT64
 
 
@@ -167,7 +167,7 @@ def check_times(times: Array, offsets: NDArray[np.intp], names: Sequence[str | N
 
 
 def _count_short_steps(times: Array) -> int:
-    """How many stamps (total,) follow the one before by less than `SHORTEST_STEP`."""
+    """Count the stamps (total,) that follow the one before by less than `SHORTEST_STEP`."""
     blocks = (times[i : i + _STAMPS_AT_ONCE + 1] for i in range(0, len(times), _STAMPS_AT_ONCE))
     return sum(int(np.count_nonzero(np.diff(one) < SHORTEST_STEP)) for one in blocks)
 

@@ -1,4 +1,4 @@
-"""What is wrong with a file, and what a recording holds besides the movements that are read of it."""
+"""Records of problems with a file, and of what a recording holds besides its movements."""
 
 from __future__ import annotations
 

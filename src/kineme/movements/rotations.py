@@ -244,7 +244,7 @@ def matrix_one(quaternion: Sequence[float]) -> tuple[Vector, Vector, Vector]:
 
 
 def log_one(quaternion: Sequence[float], near: Sequence[float]) -> Vector | None:
-    """Of the rotation vectors of one quaternion that nearest to `near` [rad]; None unless its norm is about 1.
+    """Return the rotation vector of a quaternion that is nearest to `near` [rad]; None unless its norm is about 1.
 
     ``(t + 2 pi k) axis``; where it is no rotation, its axis is that of `near`.
     """

@@ -66,7 +66,7 @@ def arrays_movements(arrays: Mapping[str, Any], layout: Layout, kind: str) -> Pa
 
 
 class Named(NamedTuple):
-    """What movements of arrays are called: labels, the array of time stamps, which movement each is, coordinates."""
+    """Names of movements of arrays: labels, the array of time stamps, the place of each movement, coordinates."""
 
     labels: Sequence[str | None]
     time: str
@@ -174,7 +174,7 @@ def _column_names(arrays: Mapping[str, Any]) -> list[str] | None:
 
 
 def has_known_names(names: Collection[str]) -> bool:
-    """Whether arrays have the names of `arrays_movements`, or none that could be other movements.
+    """Tell whether arrays have the names of `arrays_movements`, or none that could be other movements.
 
     They have not where their times go by another name, such as ``stamp``.
     """

@@ -94,7 +94,7 @@ def _frame(entries: Mapping[str, Any]) -> dict[str, list[Any]] | None:
 
 
 def _counts(names: Iterable[str]) -> bool:
-    """Whether names are those of the rows of a frame: numbers or dates."""
+    """Tell whether names are those of the rows of a frame: numbers or dates."""
     return all(is_number(name, False) or is_date(name) for name in names)
 
 
@@ -194,7 +194,7 @@ def _are_objects(value: Any) -> bool:
 
 
 def _is_sample(entry: Mapping[str, Any]) -> bool:
-    """Whether an object is one sample, not a movement whose entries are lists over time."""
+    """Tell whether an object is one sample, not a movement whose entries are lists over time."""
     for name, value in entry.items():
         if is_time(name) or counts_samples(name):
             return not isinstance(value, list)

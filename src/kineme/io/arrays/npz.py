@@ -162,7 +162,7 @@ def write_container(path: Path, kind: str, header: dict[str, Any], arrays: dict[
 
 
 def kind_of(path: Path) -> str:
-    """What a file of `write_container` holds; raises as `read_container`."""
+    """Return the kind of content of a file of `write_container`; raise as `read_container`."""
     return str(_read(path)[0].get("kind"))
 
 

@@ -108,7 +108,7 @@ def _of_one_array(movements: list[Found], layout: Layout) -> list[Found]:
 
 
 def _are_numbered(places: Sequence[str]) -> bool:
-    """Whether places differ in one number alone, that counts them: frames/0/landmarks, frames/1/landmarks."""
+    """Tell whether places differ in one number alone, that counts them: frames/0/landmarks, frames/1/landmarks."""
     parts = [place.split("/") for place in places]
     differing = [[*column] for column in zip(*parts, strict=False) if len({*column}) > 1]
     return len({len(part) for part in parts}) == 1 and differing == [[str(k) for k in range(len(places))]]

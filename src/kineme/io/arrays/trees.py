@@ -46,7 +46,7 @@ _DEEPEST = 12  # groups within groups
 
 
 class Style(NamedTuple):
-    """What arrays side by side mean, and what joins the names of groups and arrays within a movement."""
+    """The meaning of arrays side by side, and the separator of names of groups and arrays within a movement."""
 
     separator: str
     alike_are_columns: bool  # arrays of one length and one width: columns of one movement, or movements each
@@ -56,7 +56,7 @@ NAMES, GROUPS = Style(".", False), Style("/", True)
 
 
 class Rate(NamedTuple):
-    """How often a file says that it was sampled, and the name under which it says so."""
+    """The sampling rate that a file states, and the name under which it does."""
 
     name: str
     hertz: float  # NaN where the file says several that differ, which are named
@@ -130,7 +130,7 @@ def movements_in(
 
 
 def is_array(tree: Any) -> bool:
-    """Whether a tree is an array of numbers with at least two samples' worth of structure, or of dates."""
+    """Tell whether a tree is an array of numbers with at least two samples' worth of structure, or of dates."""
     return hasattr(tree, "dtype") and hasattr(tree, "shape") and len(tree.shape) > 0 and tree.dtype.kind in "biufmMO"
 
 
@@ -193,7 +193,7 @@ def _labels_of_sets(tree: Mapping[str, Any]) -> dict[str, tuple[str, list[str]]]
 
 
 def is_label(name: str) -> bool:
-    """Whether an array may label movements by its name: ``y``, ``labels``, ``y_train``."""
+    """Tell whether an array may label movements by its name: ``y``, ``labels``, ``y_train``."""
     return {*words_of(name)[:1]} <= LABEL_WORDS | {"y"} and bool(words_of(name))
 
 
@@ -207,13 +207,13 @@ def as_label(value: Any) -> str | None:
 
 
 def _is_stamp_of(name: str, arrays: Mapping[str, Any]) -> bool:
-    """Whether an array is the times of another one: ``wave_t`` of ``wave``."""
+    """Tell whether an array is the times of another one: ``wave_t`` of ``wave``."""
     match = _TIMES_OF.fullmatch(name)
     return match is not None and (match[1] or match[2]) in arrays
 
 
 def _are_columns(arrays: Mapping[str, Any], style: Style, rate: Rate | None) -> bool:
-    """Whether arrays are the columns of one movement: with times, or of one length but not of one width.
+    """Tell whether arrays are the columns of one movement: with times, or of one length but not of one width.
 
     Where a rate is given, most of them need to be so: the others do not change over time.
     """
@@ -228,7 +228,7 @@ def _are_columns(arrays: Mapping[str, Any], style: Style, rate: Rate | None) -> 
 
 
 def _continues(arrays: Mapping[str, Any], groups: Mapping[str, Any]) -> bool:
-    """Whether the groups beside arrays hold arrays of the same length: further columns of one movement."""
+    """Tell whether the groups beside arrays hold arrays of the same length: further columns of one movement."""
     lengths = {array.shape[0] for array in arrays.values()}
     inner = {
         array.shape[0] for group in groups.values() if isinstance(group, Mapping) for _, array in _flat(group, "/")
@@ -245,7 +245,7 @@ def _flat(tree: Mapping[str, Any], separator: str, depth: int = 0) -> Iterator[t
 
 
 def _fits(array: Any) -> bool:
-    """Whether an array can be coordinates: no images."""
+    """Tell whether an array can be coordinates: no images."""
     width = int(np.prod(array.shape[1:]))
     return 0 < width <= _WIDEST and not (len(array.shape) > 2 and array.dtype == np.uint8)
 
@@ -276,7 +276,7 @@ def _number(value: Any) -> float | None:
 
 
 def _is_rate(name: str, tree: Mapping[str, Any]) -> bool:
-    """Whether an entry is one number with the name of a rate."""
+    """Tell whether an entry is one number with the name of a rate."""
     return seconds_named(name) is not None and np.shape(tree[name]) in ((), (1,), (1, 1))
 
 
@@ -294,7 +294,7 @@ def _own_label(tree: Mapping[str, Any]) -> str | None:
 
 
 def has_times(names: Iterable[str]) -> bool:
-    """Whether any name means times, the times of another array, or a rate."""
+    """Tell whether any name means times, the times of another array, or a rate."""
     return any(is_time(name) or seconds_named(name) is not None or _TIMES_OF.fullmatch(name) for name in names)
 
 

@@ -1,4 +1,4 @@
-"""What a file or a data set holds, where its format can tell."""
+"""The contents of a file or a data set, where its format can tell them."""
 
 from __future__ import annotations
 

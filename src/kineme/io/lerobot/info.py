@@ -136,7 +136,7 @@ def _names(names: Any) -> list[str]:
 
 
 class Episodes(NamedTuple):
-    """What is declared of the episodes, in their order.
+    """The declarations of the episodes, in their order.
 
     Attributes
     ----------

@@ -106,7 +106,7 @@ def _chosen(info: Info, layout: Layout) -> tuple[dict[str, int], tuple[str, ...]
 
 
 def _numbers_of(full: Sequence[str], short: Sequence[str], columns: Sequence[Column]) -> list[int]:
-    """Where columns stand that are called by feature and entry or, of the feature read by default, by entry alone."""
+    """Find columns that are called by feature and entry or, of the feature read by default, by entry alone."""
     numbers: list[int] = []
     for column in columns:
         try:

@@ -118,7 +118,7 @@ def _beside(
 
 
 def _computed(reader: Any, count: int) -> list[str | None]:
-    """Of each point the unit of what it holds instead of a place: an angle, a force, a moment, a power; None of places.
+    """Return the unit of each point that holds an angle, a force, a moment or a power; None of places.
 
     Source: Vicon's Plug-in Gait, which lists the points of each kind in parameters such as POINT:ANGLES.
     """

@@ -40,7 +40,7 @@ STAMP = "time [s]"  # head of the times
 
 
 class ExportHead(NamedTuple):
-    """What stands above the samples of an export.
+    """The head of an export, above its samples.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ class ExportHead(NamedTuple):
 
     @property
     def is_timed(self) -> bool:
-        """Whether a column has the times."""
+        """True if a column has the times."""
         return STAMP in self.heads
 
 

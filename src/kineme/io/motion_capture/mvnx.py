@@ -41,7 +41,7 @@ _QUANTITIES = {
 
 
 class _Content:
-    """What is gathered while the XML is parsed."""
+    """The content that is gathered while the XML is parsed."""
 
     def __init__(self) -> None:
         self.rate = ""

@@ -297,7 +297,7 @@ def _span_of_all(missing: Flags, skip: str) -> slice:
 
 
 def _channels(block: Block, columns: Sequence[str], layout: Layout, complete: Flags) -> Channels:
-    """What the columns are, by the samples in which no value is missing; a step across a gap tells nothing."""
+    """Find the channels by the samples in which no value is missing; a step across a gap tells nothing."""
     if np.count_nonzero(complete) < MIN_SAMPLES:
         return tuple(Channel(name, "position", (name,)) for name in columns)
     kinds = layout.kinds if isinstance(layout.kinds, Mapping) else {}
@@ -395,7 +395,7 @@ def missing_values(block: Block, columns: Sequence[str], i: int) -> Missing:
 
 
 def in_words(missing: Missing, skip: str) -> str:
-    """What a movement lacks, and the options that read it nevertheless."""
+    """Say what a movement lacks, and the options that read it nevertheless."""
     first, *others = missing.names
     shares = [f"{100 * share:.2g}" if share < 0.1 else f"{100 * share:.0f}" for share in missing.shares]
     more = [f"{share} % of {name!r}" for name, share in zip(others, shares[1:], strict=True)]

@@ -121,7 +121,7 @@ def _as(file: FileRead, own: Columns, ours: Columns) -> FileRead:
 
 
 def _otherness(path: str, own: Columns, ours: Columns, most: tuple[frozenset[str], frozenset[str]]) -> str:
-    """What keeps a file from having the columns of most."""
+    """Say what keeps a file from having the columns of most."""
     if {*own.names} != most[0]:
         return _differences(own, ours)
     here, there = (" ".join(sorted(sensors)) or "no sensor" for sensors in (sensors_of(path), most[1]))
@@ -153,7 +153,7 @@ def _differences(own: Columns, ours: Columns) -> str:
 
 
 def _stem(head: str, others: Sequence[str]) -> str:
-    """What a head begins with before a dot, where no other one begins so: M30 of M30.x."""
+    """Return the beginning of a head before a dot, where no other one begins so: M30 of M30.x."""
     stem, dot, _ = head.rpartition(".")
     return head if not dot or any(other.startswith(f"{stem}.") for other in others) else stem
 

@@ -65,14 +65,14 @@ def entries_of(paths: Sequence[Path], follow_links: bool = False) -> tuple[list[
 
 
 def expanded(path: Path) -> list[Path]:
-    """What a pattern matches, sorted, or itself; a file that has the name of a pattern is meant itself."""
+    """List the matches of a pattern, sorted, or itself; a file that has the name of a pattern is meant itself."""
     if not has_magic(str(path)) or path.exists() or path.is_symlink():
         return [path]
     return [Path(match) for match in sorted(glob(str(path), recursive=True))] or [path]
 
 
 def is_alone(paths: Sequence[Path]) -> bool:
-    """Whether one file or folder is given, so that names are those in it."""
+    """Tell whether one file or folder is given, so that names are those in it."""
     return len(paths) == 1 and expanded(paths[0]) == [paths[0]]
 
 
@@ -140,13 +140,13 @@ def files_under(folder: Path, follow_links: bool = False) -> tuple[list[Path], l
 
 
 def leads_out(link: Path, folder: Path) -> bool:
-    """Whether the target of a link exists and lies outside the folder."""
+    """Tell whether the target of a link exists and lies outside the folder."""
     target, top = os.path.realpath(link), os.path.realpath(folder)
     return os.path.exists(target) and os.path.commonpath([target, top]) != top
 
 
 def _is_folder(entry: os.DirEntry[str]) -> bool:
-    """Whether a path is a folder; False if unknown, as for a link to itself: reading it as a file reports why."""
+    """Tell whether a path is a folder; False if unknown, as for a link to itself: reading it as a file reports why."""
     try:
         return entry.is_dir()
     except OSError:

@@ -148,7 +148,7 @@ def _folders(files: Sequence[Placed]) -> Mapping[Path, list[Placed]]:
 
 
 def _is_timed(read: FileRead) -> bool:
-    """Whether a file holds one movement with time stamps."""
+    """Tell whether a file holds one movement with time stamps."""
     return read.block is not None and read.block.times is not None and len(read.block.labels) == 1
 
 
@@ -180,7 +180,7 @@ def _together(files: Sequence[FileRead]) -> list[str]:
 
 
 def _are_sensors(files: Sequence[FileRead]) -> bool:
-    """Whether files that overlap are parts of one recording, and not repetitions that all begin at 0."""
+    """Tell whether files that overlap are parts of one recording, and not repetitions that all begin at 0."""
     spans = np.array([_span(read) for read in files])
     if spans[:, 0].min() > _SINCE_1970:
         return True

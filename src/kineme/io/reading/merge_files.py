@@ -111,7 +111,7 @@ class Recordings(MovementSequence):
 
     @property
     def people(self) -> list[str | None] | None:
-        """Who showed each movement, by a column, or ``{person}`` in ``label_pattern``; None where these say nothing."""
+        """Person of each movement, by a column, or ``{person}`` in ``label_pattern``; None where these say nothing."""
         people = [source.person for source in self.sources]
         return people if any(people) else None
 
@@ -220,7 +220,7 @@ def merge_files(
 
 
 def _people(file: FileRead) -> Sequence[str | None]:
-    """Who showed each movement, as the file says it."""
+    """Return the person who showed each movement, as the file says it."""
     return _block(file).people or [None] * len(_block(file).labels)
 
 
@@ -341,7 +341,7 @@ def _check_orientations(file: FileRead, channels: Channels, skip: str) -> tuple[
 
 
 def people_of(path: Path, sources: Sequence[Source]) -> NDArray[Any] | None:
-    """As `each_person`, shape (n,); None where any is unknown, or all are one, so that nothing tells people apart."""
+    """Return `each_person`, shape (n,); None where any is unknown, or all are the same person."""
     people = each_person(path, sources)
     if None in people or len(set(people)) < 2:
         return None

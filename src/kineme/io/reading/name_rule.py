@@ -30,7 +30,7 @@ class Part(NamedTuple):
 
 @dataclass(frozen=True)
 class NameRule:
-    """Where labels come from, if not from the recording or its innermost folder.
+    """The origin of labels, if not the recording or its innermost folder.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ class NameRule:
 
     @property
     def names_person(self) -> bool:
-        """Whether the pattern says who showed the movements."""
+        """True if the pattern says who showed the movements."""
         return PERSON in {part.field for part in self.parts}
 
     def apply(self, read: FileRead, path: Path) -> FileRead:

@@ -109,7 +109,7 @@ def _expanded(read: Callable[[bytes, Layout], Parsed], data: bytes, layout: Layo
 
 
 def _parsed(parse: Callable[[Layout], Parsed], form: Format, relative: Path, layout: Layout) -> FileRead:
-    """What a reader returns, checked, or the problem with it."""
+    """Check what a reader returns, or return the problem with it."""
     name = as_text(relative)
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # overflow gives infinity, which is reported later
@@ -144,7 +144,7 @@ def _parts(path: Path, relative: Path, follow_links: bool) -> tuple[list[Path], 
 
 
 def _sha256(parts: Sequence[Path], path: Path) -> str:
-    """Of the bytes of a file; of a data set, of the names of its files and of their checksums."""
+    """Return the checksum of a file; of a data set, that of the names and the checksums of its files."""
     checksums = []
     for part in parts:
         with part.open("rb") as file:

@@ -123,7 +123,7 @@ def heads_of(cells: Sequence[str]) -> Heads | None:
 
 
 def _is_time(name: str) -> bool:
-    """Whether a head of a start or an end says no other unit than of time."""
+    """Tell whether a head of a start or an end says no other unit than of time."""
     unit = unit_named(split_head(name)[1] or "")
     return _COUNTED.search(name) is None if unit is None else unit.quantity == "time"
 
@@ -386,7 +386,7 @@ def _is_of(row: LabelRow, source: Source, meant: Mapping[str, Sequence[str]]) ->
 
 
 def _counts_from_start(rows: Sequence[LabelRow], times: Array) -> bool:
-    """Whether no stretch is within the recording by its clock, and all are counted from its first sample."""
+    """Tell whether no stretch is within the recording by its clock, and all are counted from its first sample."""
     duration = float(times[-1] - times[0])
     outside = all(row.end < times[0] or row.start > times[-1] for row in rows)
     return outside and all(row.start >= 0.0 and row.end <= duration * (1.0 + 1e-6) for row in rows)

@@ -145,7 +145,7 @@ def read_paths(  # noqa: PLR0913 - those of `read_recordings`, in records
     progress: Progress | None = None,
     standard_input: tuple[str, bytes] | None = None,
 ) -> Recordings:
-    """As `read_recordings`, and what a file of some name would hold, from the standard input."""
+    """Read recordings as `read_recordings` does, and the standard input as a file of some name."""
     max_file_bytes()
     if rule.label_by is not None and layout.label is not None:
         raise SpecificationError("expected label or label_by, not both")

@@ -158,7 +158,7 @@ def messages_of(bag: Bag, topics: Sequence[Topic]) -> Iterator[tuple[int, int, b
 
 
 def storages_of(bag: Bag) -> Sequence[Any]:
-    """What rosbags reads each file of a bag of ROS 2 with; none for ROS 1."""
+    """Return the objects with which rosbags reads the files of a bag of ROS 2; none for ROS 1."""
     if bag.version == 1:
         return ()
     storage = bag.reader.storage
@@ -248,7 +248,7 @@ def plain_name(path: Path, ending: str) -> Iterator[Path]:
 
 
 def logs_beside(path: Path) -> list[str]:
-    """What is left out of a bag in SQLite: the log of a recording that was cut off, which holds its last messages."""
+    """Name the logs beside a bag in SQLite: a recording that was cut off has its last messages there."""
     files = sorted(path.glob("*.db3")) if path.is_dir() else [path] if path.suffix.lower() == ".db3" else []
     logs = [(file, file.with_name(f"{file.name}-wal")) for file in files]
     return [

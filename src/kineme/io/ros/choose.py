@@ -43,7 +43,7 @@ class Choice(NamedTuple):
 
 
 def choose(bag: Bag, layout: Layout) -> Choice:
-    """What to read.
+    """Choose the topics and frames to read.
 
     Raises
     ------
@@ -79,7 +79,7 @@ def choose(bag: Bag, layout: Layout) -> Choice:
 
 
 def _as_known(bag: Bag, movements: Known, candidates: Sequence[Topic]) -> Choice | None:
-    """What the movements to compare with were read from, or the only topic with such columns; None if that is open."""
+    """Choose what the movements to compare with were read from, or the only topic with such columns; else None."""
     choices = []
     for topics, frames in movements.choices:
         try:
@@ -105,12 +105,12 @@ def _topics_of_numbers(bag: Bag) -> list[Topic]:
 
 
 def holds_samples(topic: Topic) -> bool:
-    """Whether a topic has as many messages as a movement needs samples."""
+    """Tell whether a topic has as many messages as a movement needs samples."""
     return topic.n_messages >= MIN_SAMPLES
 
 
 def can_be_read(topic: Topic) -> bool:
-    """Whether a topic by itself holds a movement."""
+    """Tell whether a topic by itself holds a movement."""
     kind = TYPES.get(topic.type)
     return kind is not None and (topic.n_messages >= 1 if kind.path else holds_samples(topic))
 
@@ -193,7 +193,7 @@ def _first_sample(bag: Bag, topic: Topic) -> tuple[Heads, Sequence[float]]:
 
 
 def _numbers(heads: Heads, row: Sequence[float]) -> tuple[int, int]:
-    """How many columns there are, and how many quaternions among them."""
+    """Count the columns, and the quaternions among them."""
     if not heads:
         return 0, 0
     channels = find_channels(heads, np.array([row], dtype=float), np.array([0, 1]), {})
@@ -208,7 +208,7 @@ class Step(NamedTuple):
 
 
 class Graph(NamedTuple):
-    """What is known of the frames: for each child how many transforms each of its parents has."""
+    """The transforms between frames: for each child the number of transforms of each of its parents."""
 
     parents: dict[str, Counter[str]]
 

@@ -114,7 +114,7 @@ def bound_chunks_of_ros_1(reader: Any) -> None:
 
 
 def compression_of_ros_1(file: Any, at: int) -> tuple[str, int]:
-    """How the chunk at a byte of a bag of ROS 1 is compressed, and the size [bytes] that it expands to."""
+    """Return the compression of the chunk at a byte of a bag of ROS 1, and its expanded size [bytes]."""
     from rosbags.rosbag1.reader import Header, RecordType
 
     file.seek(at)
@@ -203,7 +203,7 @@ def expanded_folder(path: Path) -> Iterator[Folder]:
 
 
 def _information(path: Path) -> dict[str, Any]:
-    """What the folder says of itself, or nothing: rosbags reads it too, and says why it cannot."""
+    """Read the description of the folder, or nothing: rosbags reads it too, and says why it cannot."""
     from ruamel.yaml import YAML
 
     try:

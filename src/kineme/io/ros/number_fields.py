@@ -30,7 +30,7 @@ TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 
 
 class MessageType(NamedTuple):
-    """How messages of a type are read.
+    """The way in which messages of a type are read.
 
     Attributes
     ----------
@@ -151,7 +151,7 @@ _ORIGIN = 4  # bytes in front of a message of ROS 2, from which on it is aligned
 
 
 class Step(NamedTuple):
-    """What stands next in a message: numbers of some formats, or a text, or elements that are no columns."""
+    """The next part of a message: numbers of some formats, or a text, or elements that are no columns."""
 
     formats: str = ""
     heads: tuple[str, ...] = ()
@@ -168,7 +168,7 @@ class Numbers(NamedTuple):
 
 @dataclass(frozen=True)
 class NumberFields:
-    """Where the numbers of a type stand: columns by the path of their field, as ``angular_velocity.x``.
+    """The places of the numbers of a type: columns by the path of their field, as ``angular_velocity.x``.
 
     Arrays of fixed size are columns as well, ``ranges.0``; texts and sequences of any length are passed over. The
     header is no column: it is the stamp.
@@ -193,7 +193,7 @@ class NumberFields:
 
     @property
     def has_header(self) -> bool:
-        """Whether messages tell their own time."""
+        """True if messages tell their own time."""
         return self._stamp is not None
 
     @cached_property
@@ -332,7 +332,7 @@ def _layout(formats: str, phase: int, order: str) -> struct.Struct:
 
 
 def decoder_of(bag: Bag, topic: Topic) -> Callable[[bytes], Any]:
-    """What makes a message of the bytes of one; it raises `ValueError` if they are none.
+    """Return the function that decodes the bytes of a message; it raises `ValueError` if they are none.
 
     Raises
     ------

@@ -349,7 +349,7 @@ def _collect_path(bag: Bag, topic: Topic, groups: dict[Heads, _Group], left_out:
 
 
 def _increase(stamps: NDArray[np.int64], lengths: list[int]) -> bool:
-    """Whether the stamps increase within every movement."""
+    """Tell whether the stamps increase within every movement."""
     inner = np.ones(max(len(stamps) - 1, 0), dtype=bool)
     inner[np.cumsum(lengths)[:-1] - 1] = False
     return bool((np.diff(stamps)[inner] > 0).all())

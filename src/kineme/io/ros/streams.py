@@ -77,7 +77,7 @@ class Samples(NamedTuple):
 
 
 class _Open(NamedTuple):
-    """What is collected of one topic."""
+    """The samples collected of one topic."""
 
     decode: Any
     row: Any
@@ -209,7 +209,7 @@ def _streams(topic: Topic, reading: _Open, left_out: list[str]) -> list[Stream]:
 
 
 def stream_of(name: str, heads: Heads, samples: Samples, has_header: bool = True) -> Stream:
-    """What was collected, as arrays."""
+    """Return the collected samples as arrays."""
     values = np.frombuffer(samples.values, np.float64).reshape(-1, len(heads))
     stamped = np.frombuffer(samples.stamped, np.int64) if has_header else None
     return Stream(name, heads, values, np.frombuffer(samples.recorded, np.int64), stamped)
@@ -265,7 +265,7 @@ def _without(stream: Stream, rotations: Sequence[int]) -> Stream:
 
 
 def _is_asked(stream: Stream, numbers: Iterable[int], columns: Sequence[Column] | None) -> bool:
-    """Whether one of the columns with these numbers is asked for: by its name, the beginning of it, or a pattern.
+    """Tell whether one of the columns with these numbers is asked for: by its name, the beginning of it, or a pattern.
 
     A column that is asked for by its number may be any.
     """
@@ -276,7 +276,7 @@ def _is_asked(stream: Stream, numbers: Iterable[int], columns: Sequence[Column] 
 
 
 def clock_of(streams: Sequence[Stream]) -> tuple[bool, str]:
-    """Whether the stamps in the headers are the time, and else why they are not.
+    """Tell whether the stamps in the headers are the time, and else why they are not.
 
     They are where every message has one and they increase in every stream. Otherwise it is the time of recording.
     """
@@ -375,7 +375,7 @@ def _heads(streams: Sequence[Stream]) -> tuple[str, ...]:
 
 
 def are_rotations(q: Array) -> NDArray[np.bool_]:
-    """Whether each quaternion (n, 4), of any order, has the norm 1, up to `TOLERANCE`, shape (n,)."""
+    """Tell whether each quaternion (n, 4), of any order, has the norm 1, up to `TOLERANCE`, shape (n,)."""
     return np.asarray(np.abs(np.linalg.norm(q, axis=1) - 1.0) <= TOLERANCE)
 
 

@@ -37,7 +37,7 @@ _COMMA_NUMBERS = re.compile(rf"\s*{COMMA_NUMBER.pattern}(\s+{COMMA_NUMBER.patter
 
 
 class Dialect(NamedTuple):
-    """How a table is written: its separator (None: blanks), decimal comma, heads, and where the numbers begin."""
+    """The notation of a table: its separator (None: blanks), decimal comma, heads, and where the numbers begin."""
 
     separator: str | None
     decimal_comma: bool
@@ -50,7 +50,7 @@ class Dialect(NamedTuple):
     names_rows: bool = False  # whether the first column tells movements or labels apart, be these numbers
 
     def is_sample(self, line: str) -> bool:
-        """Whether a line holds a sample. A comment does not, but a name may begin like a comment.
+        """Tell whether a line holds a sample. A comment does not, but a name may begin like a comment.
 
         A line that begins with one of `COMMENTS` is a sample where the first column holds names, the line has as many
         cells as there are columns, and those of numbers hold numbers. Where most of the names are numbers, as 1 and
@@ -71,7 +71,7 @@ class Dialect(NamedTuple):
 
 
 def is_skipped(line: str) -> bool:
-    """Whether a line is empty, begins as a comment, or says the separator to Excel: ``sep=;``."""
+    """Tell whether a line is empty, begins as a comment, or says the separator to Excel: ``sep=;``."""
     stripped = line.strip()
     return not stripped or stripped.startswith(COMMENTS) or _SEPARATOR_LINE.fullmatch(stripped) is not None
 
@@ -242,17 +242,17 @@ def separator_of(lines: Sequence[str]) -> str | None:
 
 
 def is_missing(cell: str) -> bool:
-    """Whether a cell says that there is no value: it is empty, ``NA``, ``null``."""
+    """Tell whether a cell says that there is no value: it is empty, ``NA``, ``null``."""
     return cell.lower() in _MISSING
 
 
 def is_number(cell: str, comma: bool) -> bool:
-    """Whether a cell reads as a number."""
+    """Tell whether a cell reads as a number."""
     return bool(_NUMBER.fullmatch(cell) or (comma and COMMA_NUMBER.fullmatch(cell)))
 
 
 def marks_within(cell: str) -> str:
-    """How a number is to be written that nobody can read for its marks; empty where a cell is no such number.
+    """Say how to write a number that nobody can read for its marks; nothing where a cell is no such number.
 
     Those between thousands would have to be told from decimal marks anew in each column.
     """
@@ -262,7 +262,7 @@ def marks_within(cell: str) -> str:
 
 
 def _is_sample(cells: Sequence[list[str]], comma: bool) -> bool:
-    """Whether the first line holds a sample, not heads: it has as many numbers as the next, and at least one."""
+    """Tell whether the first line holds a sample, not heads: it has as many numbers as the next, and at least one."""
     counts = [sum(is_number(cell, comma) for cell in row) for row in cells[:2]]
     return counts[0] > 0 and counts[0] >= counts[-1]
 

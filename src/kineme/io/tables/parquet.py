@@ -198,7 +198,7 @@ def _numbers(column: Any, head: str) -> Any:
 
 
 def is_list(kind: Any) -> bool:
-    """Whether a type of Arrow is a list of numbers, or of lists of them."""
+    """Tell whether a type of Arrow is a list of numbers, or of lists of them."""
     import pyarrow as pa
 
     of = pa.types
@@ -209,7 +209,7 @@ def is_list(kind: Any) -> bool:
 
 
 def width_of(kind: Any, file: Any, name: str) -> int:
-    """How many numbers each row of a list column has: by its type, else by its first row."""
+    """Count the numbers in each row of a list column: by its type, else by its first row."""
     import pyarrow as pa
 
     width, inner = 1, kind

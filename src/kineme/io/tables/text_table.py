@@ -127,7 +127,7 @@ def _check_written(samples: Iterator[tuple[int, str]], dialect: Dialect, columns
 
 
 def _may_be_thousands(x: Array) -> bool:
-    """Whether all numbers have at most three digits before the mark and three behind it, which may be thousands."""
+    """Tell whether all numbers have at most three digits before the mark and behind it, which may be thousands."""
     x = x[np.isfinite(x)]
     return len(x) > 0 and bool((np.abs(x) < 1000).all() and (np.abs(1000 * x - np.rint(1000 * x)) < 1e-6).all())
 
@@ -373,7 +373,7 @@ def try_rows(lines: Iterable[str], dialect: Dialect, dtype: np.dtype[Any]) -> An
 
 
 def quotes_are_plain(text: bytes, dialect: Dialect) -> bool:
-    """Whether all quotes enclose whole cells within one line, which all parsers read in the same way."""
+    """Tell whether all quotes enclose whole cells within one line, which all parsers read in the same way."""
     if dialect.separator is None:
         return False
     marks = np.frombuffer(b"\n" + text + b"\n", np.uint8)

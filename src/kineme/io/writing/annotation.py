@@ -50,7 +50,7 @@ class Annotation:
 
     @property
     def unknown(self) -> bool:
-        """Whether the motion is like no symbol."""
+        """True if the motion is like no symbol."""
         return self.symbol is None
 
     @property

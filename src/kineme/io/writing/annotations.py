@@ -93,7 +93,7 @@ _LEFT_OUT = ("recording",)  # of a row: the copy is the recording
 
 
 def is_bag(source: Path) -> bool:
-    """Whether it is a bag of ROS, a file or a folder."""
+    """Tell whether it is a bag of ROS, a file or a folder."""
     if source.is_dir():
         data_set = data_set_of(source)
         return data_set is not None and data_set.format.contents is bag_contents
@@ -102,7 +102,7 @@ def is_bag(source: Path) -> bool:
 
 
 def is_lerobot(source: Path) -> bool:
-    """Whether it is the folder of a data set of LeRobot."""
+    """Tell whether it is the folder of a data set of LeRobot."""
     data_set = data_set_of(source) if source.is_dir() else None
     return data_set is not None and data_set.marker == MARKER
 

@@ -32,7 +32,7 @@ Columns = dict[str, Array]  # times (T,), positions (T, d), velocities and accel
 
 
 class ColumnNames(NamedTuple):
-    """What the columns of positions are called, and those of velocities and accelerations."""
+    """Names of the columns of positions, and of those of velocities and accelerations."""
 
     positions: tuple[str, ...]
     rates: tuple[str, ...]
@@ -117,7 +117,7 @@ def _columns_of(movement: MovementsLike) -> tuple[Columns, ColumnNames | None]:
 
 
 def _heads(columns: Columns, names: ColumnNames | None) -> list[str]:
-    """What the columns of a table are called: time, the positions, ``v_`` and ``a_`` before names of the others."""
+    """Name the columns of a table: time, the positions, ``v_`` and ``a_`` before names of the others."""
     axes = {name: axis_names(array.shape[-1]) for name, array in columns.items()}
     if names is not None:
         axes |= {

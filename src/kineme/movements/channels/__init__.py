@@ -1,1 +1,1 @@
-"""What the columns of a recording are: positions, angles, orientations, discrete values."""
+"""The columns of a recording as positions, angles, orientations and discrete values."""

@@ -72,7 +72,7 @@ def recorded_names(channels: Channels) -> tuple[str, ...]:
 
 
 def is_plain(channels: Channels) -> bool:
-    """Whether every column is learned as it was recorded, but for wraps of angles."""
+    """Tell whether every column is learned as it was recorded, but for wraps of angles."""
     return all(channel.kind in ("position", "angle") for channel in channels)
 
 
@@ -82,7 +82,7 @@ def moving_kinds(channels: Channels) -> tuple[str, ...]:
 
 
 def same_columns(channels: Channels | None, others: Channels | None) -> bool:
-    """Whether channels are equal, but for the periods that were told by values."""
+    """Tell whether channels are equal, but for the periods that were told by values."""
     if channels is None or others is None or channels == others:
         return channels == others
     return [channel._replace(period=None) for channel in channels] == [other._replace(period=None) for other in others]
@@ -129,7 +129,7 @@ def check_alike(several: Sequence[Channels | None], what: str = "part") -> None:
 
 
 def _difference(ours: Channels, theirs: Channels) -> str | None:
-    """What keeps channels from being the same columns, or None."""
+    """Say what keeps channels from being the same columns, or None."""
     names, others = learned_names(ours), learned_names(theirs)
     if names != others:
         if [channel.kind for channel in ours] != [channel.kind for channel in theirs]:

@@ -63,7 +63,7 @@ class Columns(NamedTuple):
 
     @property
     def are_nameless(self) -> bool:
-        """Whether the heads only count the columns: x1, x2, x3."""
+        """True if the heads only count the columns: x1, x2, x3."""
         return all(_NAMELESS.fullmatch(head.strip()) for head in self.heads)
 
 
@@ -73,7 +73,7 @@ def columns_recorded(channels: Channels) -> Columns:
 
 
 def may_be(channels: Channels, others: Channels) -> bool:
-    """Whether channels of other names may be those: x, y, z without any other name may be those of a hand."""
+    """Tell whether channels of other names may be those: x, y, z without any other name may be those of a hand."""
     names = [Columns(tuple(channel.name for channel in several), ()).names for several in (channels, others)]
     kinds = [tuple(channel.kind for channel in several) for several in (channels, others)]
     is_bare = any(all(len(words_of(name)) == 1 for name in each) for each in names)

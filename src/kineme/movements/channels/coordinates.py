@@ -80,7 +80,7 @@ def with_periods(channels: Channels, columns: Array) -> Channels:
 
 
 def period_of_channel(channel: Channel, angles: Array) -> float:
-    """What an angle wraps by: by its unit, by what its channel says, or else by these values."""
+    """Return the period of an angle: by its unit, by what its channel says, or else by these values."""
     if channel.period is None or period_by_unit(channel.unit) is not None:
         return period_of(angles, channel.unit)
     return channel.period or np.inf
@@ -122,7 +122,7 @@ def learned(columns: Array, offsets: NDArray[np.intp], channels: Channels) -> Ar
 
 
 def lever_of(channels: Channels) -> float:
-    """What a radian counts as beside positions: 0.2 m in their unit, meters if it is not known; without positions, 1.
+    """Return the length of a radian beside positions: 0.2 m in their unit, meters if unknown; without positions, 1.
 
     It is about the length of a hand or a tool: a rotation counts as much as the way of the tip.
     """
@@ -218,7 +218,7 @@ def without_wraps(angles: Array, offsets: NDArray[np.intp], period: float) -> Ar
 
 
 def turns_of(steps: Array, period: float) -> Array:
-    """How many turns, with their sign, are jumps in each of some steps."""
+    """Count the turns, with their sign, that are jumps in each of some steps."""
     return np.asarray(np.sign(steps) * np.floor(np.abs(steps) / period + (1.0 - _JUMP)))
 
 

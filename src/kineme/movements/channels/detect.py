@@ -209,7 +209,7 @@ def find_numbered_joints(heads: Sequence[str], free: Sequence[int], columns: Arr
 
 
 def _count_joints(group: dict[int, int], columns: Array) -> bool:
-    """Whether the numbers of a group, and the values in its columns, are those of joints."""
+    """Tell whether the numbers of a group, and the values in its columns, are those of joints."""
     numbers = sorted(group)
     counts = len(numbers) > 1 and numbers[0] in (0, 1) and numbers[-1] - numbers[0] == len(numbers) - 1
     return counts and all(np.isfinite(period_of(columns[:, k], None)) for k in group.values())
@@ -252,7 +252,7 @@ def find_quaternions(
 
 
 def shared_name(heads: Sequence[str]) -> str:
-    """What the heads of a quaternion's columns share: "pose.orientation" of pose.orientation.x and so on."""
+    """Return what the heads of a quaternion's columns share: "pose.orientation" of pose.orientation.x and so on."""
     head = _plain(heads[0])
     match = _COMPONENT.fullmatch(head) or _NUMBERED.fullmatch(head)
     return ((match[1] if match else "") or "orientation") + ((match[3] or "") if match and match.re.groups > 2 else "")
@@ -261,7 +261,7 @@ def shared_name(heads: Sequence[str]) -> str:
 def _groups(
     pattern: re.Pattern[str], heads: Sequence[str], free: Sequence[int]
 ) -> Mapping[tuple[str, str], dict[str, int]]:
-    """What heads begin and end with -> their components -> the columns."""
+    """Group columns: beginning and end of their heads -> their components -> the columns."""
     groups: dict[tuple[str, str], dict[str, int]] = {}
     for k in free:
         if match := pattern.fullmatch(_plain(heads[k])):

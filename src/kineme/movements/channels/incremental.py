@@ -36,7 +36,7 @@ class IncrementalCoordinates:
         self._parts = [_part_of(channel, lever) for channel in self._channels]
 
     def usable(self, columns: Array) -> NDArray[np.bool_]:
-        """Which samples (k, m) have quaternions of norm 1, (k,)."""
+        """Find the samples (k, m) that have quaternions of norm 1, (k,)."""
         good = np.ones(len(columns), dtype=bool)
         with np.errstate(over="ignore", invalid="ignore"):
             for _, rows, _ in off_norm(columns, self._channels):

@@ -96,7 +96,7 @@ def _fill_steps(times, steps):  # type: ignore[no-untyped-def]
 
 @jit
 def _may_have_gaps(steps, usual):  # type: ignore[no-untyped-def]
-    """Whether a step may be a gap in a movement without rests, before its path is measured, which takes longest."""
+    """Tell whether a step may be a gap in a movement without rests, before its path, which takes longest, is measured."""
     if usual == np.inf:
         return False
     motion, before = 0.0, 0.0
@@ -151,7 +151,7 @@ def _shorten_rests(steps, moving, motion, most):  # type: ignore[no-untyped-def]
 
 @jit
 def _is_still(positions, begin, window, most_apart):  # type: ignore[no-untyped-def]
-    """Whether the samples of a window stay near its first; its last settles it for most windows."""
+    """Tell whether the samples of a window stay near its first; its last settles it for most windows."""
     for j in range(begin + window - 1, begin, -1):  # noqa: SIM110 - Numba compiles no generators
         if _squared_distance(positions, begin, j) > most_apart:
             return False

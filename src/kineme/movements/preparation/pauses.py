@@ -133,7 +133,7 @@ def _fill_shortened(
 
 
 def _resting(positions: Array, offsets: NDArray[np.intp], radius: Array) -> NDArray[np.bool_]:
-    """Whether the step after each sample belongs to a window of samples that stays within a radius of its first."""
+    """Tell whether the step after each sample lies in a window of samples that stays within a radius of its first."""
     first, last, total = offsets[:-1], offsets[1:] - 1, len(positions)
     owner = np.repeat(np.arange(len(first)), np.diff(offsets))
     windows = np.full(len(first), SHORTEST)

@@ -96,7 +96,7 @@ def _fill_smoothed(demonstrations: Demonstrations, start: int, stop: int, cutoff
 
 
 def _compiled(demonstrations: Demonstrations, offsets: NDArray[np.intp]) -> bool:
-    """Whether to run compiled, decided for all movements together although they are smoothed in tiles."""
+    """Tell whether to run compiled, decided for all movements together although they are smoothed in tiles."""
     total, now = demonstrations.positions.size, demonstrations.n_dims * int(offsets[-1] - offsets[0])
     return fits_lanes(demonstrations.offsets) and use_compiled(
         _OPERATIONS_PER_SAMPLE * total, _OPERATIONS_PER_SAMPLE * now
@@ -237,5 +237,5 @@ def spline_rows(parameter: Array, positions: Array, offsets: NDArray[np.intp], n
 
 
 def fits_lanes(offsets: NDArray[np.intp]) -> bool:
-    """Whether all movements are short enough for the compiled splines, which need much memory per sample."""
+    """Tell whether all movements are short enough for the compiled splines, which need much memory per sample."""
     return bool(np.diff(offsets).max() <= _LONGEST)

@@ -24,7 +24,7 @@ _NAME = 24
 
 
 def draw_segmentations(segmentations: Sequence[Segmentation]) -> Figure:
-    """Of one recording its channels and its speed over time, of several the speed of each; pieces are shaded."""
+    """Draw the channels and the speed of one recording over time, or the speed of each of several; shade the pieces."""
     shown = segmentations[:_RECORDINGS]
     if len(segmentations) == 1:
         panels = [*_channels(shown[0]), _speed(shown[0], "speed")]

@@ -268,7 +268,7 @@ def _nanoseconds(heads: Sequence[str], kinds: Sequence[str]) -> dict[int, int]:
 
 
 def is_time(head: str) -> bool:
-    """Whether a head names time: ``t``, ``Time [ms]``, ``timestamp_ns``, ``sec``."""
+    """Tell whether a head names time: ``t``, ``Time [ms]``, ``timestamp_ns``, ``sec``."""
     stem, unit = split_head(head)
     words = words_of(stem if stem and is_unit_of(unit, "time") else head)
     if len(words) <= 1 and words != ("s",) and set(words) & TIME_UNITS:
@@ -277,18 +277,18 @@ def is_time(head: str) -> bool:
 
 
 def _is_stamp(head: str) -> bool:
-    """Whether a head can name nothing but times: ``time`` beside ``seconds_elapsed``, but neither ``t`` nor ``s``."""
+    """Tell whether a head names nothing but times: ``time`` beside ``seconds_elapsed``, but neither ``t`` nor ``s``."""
     return is_time(head) and bool(set(words_of(head)) & (TIME_WORDS - {"t"}))
 
 
 def _is_clock(head: str) -> bool:
-    """Whether a head names the time of another clock: ``ros_time``, ``sensor_timestamp_ns``."""
+    """Tell whether a head names the time of another clock: ``ros_time``, ``sensor_timestamp_ns``."""
     words = [word for word in words_of(split_head(head)[0]) if word not in TIME_UNITS | _BEGINS]
     return len(words) > 1 and words[-1] in _STAMPS
 
 
 def is_header_stamp(head: str) -> bool:
-    """Whether a head names the stamp in the header of a message: ``.header.stamp``, ``header.stamp.sec``."""
+    """Tell whether a head names the stamp in the header of a message: ``.header.stamp``, ``header.stamp.sec``."""
     return _ROS_STAMP.fullmatch(head) is not None
 
 
@@ -354,24 +354,24 @@ def _without(words: tuple[str, ...], others: Collection[str]) -> tuple[str, ...]
 
 
 def is_no_coordinate(head: str) -> bool:
-    """Whether the last part of a field's path names a stamp or the number of a thing: ``state.timestamp``."""
+    """Tell whether the last part of a field's path names a stamp or the number of a thing: ``state.timestamp``."""
     last = head.rpartition(".")[2]
     return _is_stamp(last) or _is_number_of_thing(last)
 
 
 def _is_number_of_thing(head: str) -> bool:
-    """Whether a head names the number that a thing has, which does not move: ``id``, ``tracking_id``."""
+    """Tell whether a head names the number that a thing has, which does not move: ``id``, ``tracking_id``."""
     return words_of(head)[-1:] == ("id",)
 
 
 def counts_samples(head: str) -> bool:
-    """Whether a head names a counter of samples: ``frame``, ``Sample No.``."""
+    """Tell whether a head names a counter of samples: ``frame``, ``Sample No.``."""
     words = {word for word in words_of(head) if not word.isdecimal()}
     return bool(words & _COUNTERS) and words <= _COUNTERS | _BESIDE_COUNTERS
 
 
 def _says_nothing_new(head: str, plain: set[str]) -> bool:
-    """Whether a column is redundant: a counter, a stamp beside the times, a marker that nobody named, a turning."""
+    """Tell whether a column is redundant: a counter, a stamp beside the times, an unnamed marker, a turning."""
     if (
         counts_samples(head)
         or _is_number_of_thing(head)

@@ -33,7 +33,7 @@ AS_KNOWN = ", as the movements to compare with"
 
 @dataclass(frozen=True)
 class Known:
-    """What movements that were read before were read from, for recordings that are compared with them.
+    """The origin of movements that were read before, for recordings that are compared with them.
 
     Attributes
     ----------
@@ -145,7 +145,7 @@ class Layout:
 
     @property
     def by_number(self) -> bool:
-        """Whether the columns of the coordinates are chosen by their numbers."""
+        """True if the columns of the coordinates are chosen by their numbers."""
         return bool(self.coordinates) and all(str(column).isdecimal() for column in self.coordinates or ())
 
     @property
@@ -176,7 +176,7 @@ def _texts(names: str | Sequence[str] | None) -> tuple[str, ...]:
 
 
 class Detected(NamedTuple):
-    """How a file was understood.
+    """The interpretation of a file.
 
     Attributes
     ----------
@@ -225,7 +225,7 @@ class Detected(NamedTuple):
 
 
 class Repair(NamedTuple):
-    """What was done about values that one movement lacks.
+    """The repair of values that one movement lacks.
 
     Attributes
     ----------

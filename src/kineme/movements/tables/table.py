@@ -130,7 +130,7 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Pa
 
 
 def _people(column: NDArray[Any], codes: NDArray[np.intp]) -> list[str | None]:
-    """Who showed each movement."""
+    """Return the person who showed each movement."""
     _, firsts = np.unique(codes, return_index=True)
     return [str(name) or None for name in column[firsts].tolist()]
 
@@ -168,7 +168,7 @@ def _unit_by_clocks(table: Table, roles: Roles) -> tuple[str, str] | None:
 
 
 def _in_turns(roles: Roles) -> bool:
-    """Whether no column tells movements apart but those of labels and of people, which change from time to time."""
+    """Tell whether no column tells movements apart but labels and people, which change from time to time."""
     return not roles.movement or roles.movement == (roles.person,)
 
 
@@ -307,13 +307,13 @@ def _values(series: Any) -> NDArray[Any]:
 
 
 def _kind(values: NDArray[Any]) -> str:
-    """What a column holds; one with a number among texts is one of numbers, and refused where it is a coordinate."""
+    """Find the kind of a column; one with a number among texts has numbers, and is refused where it is a coordinate."""
     mixed = values.dtype.kind == "O" and (any(map(_is_number, values.tolist())) or _are_decimals(values.tolist()))
     return "number" if mixed or values.dtype.kind == "c" else _KINDS.get(values.dtype.kind, "text")
 
 
 def _are_decimals(texts: list[str]) -> bool:
-    """Whether texts are measured numbers, such as "0.25", and not codes, such as "07"."""
+    """Tell whether texts are measured numbers, such as "0.25", and not codes, such as "07"."""
     filled = [text for text in texts if text]
     try:
         return any("." in text for text in filled) and all(map(isfinite, map(float, filled)))

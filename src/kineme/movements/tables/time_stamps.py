@@ -115,7 +115,7 @@ def unit_by_size(stamps: Array, head: str = "") -> tuple[str, str]:
 
 
 def same_clock(times: Array, others: Array) -> bool:
-    """Whether two columns of times [s] (total,) show the same clock: they run alike but for half a step."""
+    """Tell whether two columns of times [s] (total,) show the same clock: they run alike but for half a step."""
     both = np.isfinite(times) & np.isfinite(others)
     a, b = (each[both] - each[both][:1] for each in (times, others))
     step = float(np.median(np.abs(np.diff(a)))) if len(a) > 1 else 0.0
@@ -130,7 +130,7 @@ def in_seconds(stamps: Array, units: str | float) -> Array:
 
 
 def is_date(cell: str) -> bool:
-    """Whether a cell reads as a date with a time of day, after ISO 8601, as a time of day, or as a duration."""
+    """Tell whether a cell reads as a date with a time of day, after ISO 8601, as a time of day, or as a duration."""
     cell = _in_whole_days(cell)
     return _DATE.fullmatch(cell) is not None or _duration(cell) is not None
 

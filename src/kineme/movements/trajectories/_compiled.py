@@ -103,7 +103,7 @@ def fill_usual_steps(times, offsets, share, quantile, steps):  # type: ignore[no
 
 @jit
 def any_closer(times, offsets, share):  # type: ignore[no-untyped-def]
-    """Whether two stamps of any movement are closer than a share of its mean step; see `spread_close`."""
+    """Tell whether two stamps of any movement are closer than a share of its mean step; see `spread_close`."""
     n_close = 0
     for i in range(len(offsets) - 1):
         first, last = offsets[i], offsets[i + 1] - 1

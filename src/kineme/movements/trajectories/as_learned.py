@@ -67,7 +67,7 @@ def as_learned(
 
 
 def _of_several_channels(movements: Sequence[Any]) -> bool:
-    """Whether channels differ in a list: of all its movements together nothing would be known."""
+    """Tell whether channels differ in a list: of all its movements together nothing would be known."""
     every = {id(channels): channels for channels in (getattr(movement, "channels", None) for movement in movements)}
     return len(every) > 1 and len({*every.values()}) > 1
 
@@ -110,7 +110,7 @@ def _of_kinds(demos: Demonstrations, learned: Channels | None, n_dims: int, what
 
 
 def _of_width(demos: Demonstrations, learned: Channels | None, n_dims: int, what: str) -> str:
-    """What is wrong with movements of another width."""
+    """Say what is wrong with movements of another width."""
     if learned is None or is_plain(learned):
         learned_of = "" if learned is None else f", where those that were learned are {in_words(learned)}"
         return f"expected {what} of {n_dims} dimensions as in fit, got {demos.n_dims}{learned_of}; {_SELECT}"

@@ -213,7 +213,7 @@ def _check_sized(value: Any, expected: str) -> None:
 
 
 def _instead_of(value: Any) -> str:
-    """What to pass instead of something that is no list and no array."""
+    """Say what to pass instead of something that is no list and no array."""
     if isinstance(value, (str, PurePath)):
         return "; read files with kineme.read_recordings(path)"
     if isinstance(value, dict):
@@ -295,7 +295,7 @@ def plain_stamps(times: list[Any], lengths: NDArray[np.intp]) -> Array | None:
 
 
 def _are_plain(arrays: list[Any], n_axes: int) -> bool:
-    """Whether there are arrays, and all are float64 with that many axes."""
+    """Tell whether there are arrays, and all are float64 with that many axes."""
     return (
         set(map(type, arrays)) == {np.ndarray}
         and set(map(attrgetter("dtype"), arrays)) == {_FLOAT64}

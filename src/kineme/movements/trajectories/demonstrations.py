@@ -198,12 +198,12 @@ class Demonstrations(Presented, Sequence[Trajectory]):
 
     @property
     def dimensions(self) -> tuple[str, ...] | None:
-        """What the d dimensions are called, where they come from named columns."""
+        """Names of the d dimensions, where they come from named columns."""
         return self.movements.dimensions
 
     @property
     def channels(self) -> Channels | None:
-        """What was recorded, where that is known: positions, angles, orientations, discrete values, with their names.
+        """Recorded quantities, where they are known: positions, angles, orientations, discrete values, with their names.
 
         An orientation is learned as three coordinates of `positions`, a discrete channel is none of them.
         """
@@ -293,7 +293,7 @@ def _listed(names: tuple[str, ...] | None) -> str:
 
 
 def _held_by(movements: Any) -> Any:
-    """What holds movements, without the records around it; anything else as it is."""
+    """Take movements out of the records around them; return anything else as it is."""
     inner = movements
     for _ in range(_NESTED):
         held = getattr(inner, "demonstrations", None)
@@ -354,7 +354,7 @@ def check_labels(demos: Demonstrations, y: Any) -> NDArray[Any]:
 
 
 def is_data_frame(value: Any) -> bool:
-    """Whether this is a data frame, of pandas, of polars, or of another package with their names."""
+    """Tell whether this is a data frame, of pandas, of polars, or of another package with their names."""
     return hasattr(value, "columns") and hasattr(value, "to_numpy") and hasattr(value, "__getitem__")
 
 

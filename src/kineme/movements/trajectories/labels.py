@@ -91,7 +91,7 @@ def _kind(label: Any) -> str:
 
 
 def as_indices(index: Any, n: int) -> NDArray[np.intp]:
-    """What chooses some of n movements, as indices from 0: of shape () for an integer, else (k,).
+    """Return a choice among n movements as indices from 0: of shape () for an integer, else (k,).
 
     Parameters
     ----------

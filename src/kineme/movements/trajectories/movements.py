@@ -87,7 +87,7 @@ class Movements:
         return n_samples if all(map(self._is_even, tiles)) else None
 
     def _is_even(self, some: slice) -> bool:
-        """Whether the stamps of some movements, all of one length, are evenly spaced."""
+        """Tell whether the stamps of some movements, all of one length, are evenly spaced."""
         assert self.times is not None
         t = self.times.reshape(len(self.durations), -1)[some]
         step = self.durations[some, None] / (t.shape[1] - 1)
@@ -205,7 +205,7 @@ def spread_close(times: Array, offsets: NDArray[np.intp]) -> Array:
 
 
 def _merged(times: Array, offsets: NDArray[np.intp], steps: Array) -> NDArray[np.bool_]:
-    """Whether each sample belongs to the group of the one before; `steps` are 0 for movements without close samples."""
+    """Tell whether each sample belongs to the group of the one before; `steps` are 0 where no samples are close."""
     lengths, total = np.diff(offsets), len(times)
     step = np.repeat(steps, lengths)
     is_merged = np.zeros(total, dtype=bool)

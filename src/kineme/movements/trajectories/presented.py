@@ -1,4 +1,4 @@
-"""What holds movements as a table of pandas, as a picture, and as notebooks show it."""
+"""Movements as a table of pandas, as a picture, and as notebooks show them."""
 
 from __future__ import annotations
 
