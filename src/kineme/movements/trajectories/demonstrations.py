@@ -203,7 +203,7 @@ class Demonstrations(Presented, Sequence[Trajectory]):
 
     @property
     def channels(self) -> Channels | None:
-        """Recorded quantities, where they are known: positions, angles, orientations, discrete values, with their names.
+        """Recorded quantities, where known: positions, angles, orientations, discrete values, with their names.
 
         An orientation is learned as three coordinates of `positions`, a discrete channel is none of them.
         """
