@@ -190,7 +190,7 @@ def test_columns_of_a_joined_recording_are_those_that_are_chosen_or_known(folder
     alone = tmp_path / "alone" / "nod.csv"
     table(alone, ["x", "y", "z"], clock(50, 0, 2), spatial(clock(50, 0, 2)).tolist())
     assert columns(alone, columns=["y", "x"]) == ["y", "x"]
-    layout = Layout(known=Known(columns=("Gyroscope.y", "Accelerometer.x")))
+    layout = Layout(reference=Known(columns=("Gyroscope.y", "Accelerometer.x")))
     (one,) = read_paths([folder / "nod"], layout, NameRule(), join=True).demonstrations
     assert [channel.name for channel in one.channels] == ["Gyroscope.y", "Accelerometer.x"]
 

@@ -173,7 +173,7 @@ def read(paths: Path | Sequence[Path], options: dict[str, Any], library: Any = N
     if library is not None:
         from kineme.library.storage.source import known_sources
 
-        known["known"] = known_sources(library.store)
+        known["reference"] = known_sources(library.store)
     known["kinds"] = dict(known.get("kinds") or ()) or None
     several = [paths] if isinstance(paths, Path) else list(paths)
     files = [one for one in several if str(one) != "-"]

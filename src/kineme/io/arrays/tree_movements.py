@@ -86,8 +86,13 @@ def _of_one_array(movements: list[Found], layout: Layout) -> list[Found]:
     names = [*movements[0].entries]
     if any([*movement.entries] != names for movement in movements) or any(map(is_time, names)):
         return movements
+    # The places differ in one number alone, that counts them: frames/0/landmarks, frames/1/landmarks.
+    places = [movement.place for movement in movements]
+    parts = [place.split("/") for place in places]
+    differing = [[*column] for column in zip(*parts, strict=False) if len({*column}) > 1]
     if (
-        not _are_numbered([movement.place for movement in movements])
+        len({len(part) for part in parts}) != 1
+        or differing != [[str(k) for k in range(len(places))]]
         or len({movement.label for movement in movements}) > 1
     ):
         return movements
@@ -105,13 +110,6 @@ def _of_one_array(movements: list[Found], layout: Layout) -> list[Found]:
         point_names(n_points, *width) if names == [""] else [f"{k}.{name}" for k in range(n_points) for name in names]
     )
     return [movements[0]._replace(place="", entries=dict(zip(heads, x[0].T, strict=True)))]
-
-
-def _are_numbered(places: Sequence[str]) -> bool:
-    """Tell whether places differ in one number alone, that counts them: frames/0/landmarks, frames/1/landmarks."""
-    parts = [place.split("/") for place in places]
-    differing = [[*column] for column in zip(*parts, strict=False) if len({*column}) > 1]
-    return len({len(part) for part in parts}) == 1 and differing == [[str(k) for k in range(len(places))]]
 
 
 def _bare(movements: Sequence[Found], layout: Layout, kind: str) -> Parsed:

@@ -147,7 +147,9 @@ def write_shard(source: Path, target: Path, motions: Mapping[int, Sequence[Motio
     from pyarrow import parquet
 
     try:
-        with _opened(source) as file:
+        with _reading():
+            file = parquet.ParquetFile(source)
+        with file:
             schema = file.schema_arrow
             kind = column.type_in(schema)
             with _reading():
@@ -175,13 +177,6 @@ def write_shard(source: Path, target: Path, motions: Mapping[int, Sequence[Motio
         raise DataError(f"{source.name}: {error}") from error
     except (pa.ArrowException, ValueError, KeyError) as error:
         raise DataError(f"expected the shard {source.name} to take the column {column.name}, got: {error}") from error
-
-
-def _opened(source: Path) -> Any:
-    from pyarrow import parquet
-
-    with _reading():
-        return parquet.ParquetFile(source)
 
 
 @contextmanager
@@ -223,7 +218,8 @@ def language_type(schema: Any) -> Any:
 
     if LANGUAGE in schema.names:
         kind = schema.field(LANGUAGE).type
-        names = {field.name for field in kind.value_type} if _is_list_of_language_rows(kind) else set()
+        is_list_of_rows = pa.types.is_list(kind) and pa.types.is_struct(kind.value_type)
+        names = {field.name for field in kind.value_type} if is_list_of_rows else set()
         if not {"role", "content", "style", "timestamp"} <= names:
             raise DataError(f"expected rows with role, content, style, timestamp in {LANGUAGE}, got {kind}")
         return kind
@@ -236,12 +232,6 @@ def language_type(schema: Any) -> Any:
         pa.field("tool_calls", pa.list_(pa.string())),
     ]
     return pa.list_(pa.struct(fields))
-
-
-def _is_list_of_language_rows(kind: Any) -> bool:
-    import pyarrow as pa
-
-    return bool(pa.types.is_list(kind) and pa.types.is_struct(kind.value_type))
 
 
 def language_leaves(kind: Any) -> list[str]:

@@ -117,7 +117,8 @@ def opensim_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]
     at = next((k for k, line in enumerate(lines) if line.strip().lower() == _END), None)
     if at is None:
         raise DataError(f"expected {_END!r} at the end of the head of an OpenSim file, got none")
-    said = dict(_pair(line) for line in lines[:at] if "=" in line)
+    pairs = [line.partition("=") for line in lines[:at] if "=" in line]
+    said = {key.strip().lower(): value.strip() for key, _, value in pairs}
     named = next((k for k in range(at + 1, len(lines)) if lines[k].strip()), None)
     sample = None if named is None else next((k for k in range(named + 1, len(lines)) if lines[k].strip()), None)
     if named is None or sample is None:
@@ -142,11 +143,6 @@ def opensim_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]
         heads += names[1:]
         units += [_unit(name, said.get("indegrees", ""), lines[0]) for name in names[1:]]
     return ExportHead("OpenSim", separator, tuple(heads), tuple(units), named + 1, packed=packed)
-
-
-def _pair(line: str) -> tuple[str, str]:
-    key, _, value = line.partition("=")
-    return key.strip().lower(), value.strip()
 
 
 def _unit(name: str, in_degrees: str, title: str) -> str:

@@ -62,7 +62,13 @@ def in_one_set(files: Sequence[FileRead], by_number: bool = False) -> ColumnSet:
         if key[0] != most[0] and (by_number or _is_nameless(file, own)):
             result.nameless.append(file)
         elif key != most and not by_number:
-            result.problems.append(Problem(file.path, None, _otherness(file.path, own, ours, most)))
+            here, there = (" ".join(sorted(sensors)) or "no sensor" for sensors in (key[1], most[1]))
+            unlike = (
+                _differences(own, ours)
+                if key[0] != most[0]
+                else f"the file of another sensor by its name, {here} where most files are of {there}; read them apart"
+            )
+            result.problems.append(Problem(file.path, None, unlike))
         else:
             try:
                 result.same.append(_as(file, own, ours))
@@ -118,14 +124,6 @@ def _as(file: FileRead, own: Columns, ours: Columns) -> FileRead:
     positions = columns_like(file.block.positions, own, ours)
     detected = file.detected._replace(columns=ours.heads, measured_in=tuple(unit or "" for unit in ours.units))
     return file._replace(detected=detected, block=replace(file.block, positions=positions))
-
-
-def _otherness(path: str, own: Columns, ours: Columns, most: tuple[frozenset[str], frozenset[str]]) -> str:
-    """Say what keeps a file from having the columns of most."""
-    if {*own.names} != most[0]:
-        return _differences(own, ours)
-    here, there = (" ".join(sorted(sensors)) or "no sensor" for sensors in (sensors_of(path), most[1]))
-    return f"the file of another sensor by its name, {here} where most files are of {there}; read them apart"
 
 
 def _differences(own: Columns, ours: Columns) -> str:

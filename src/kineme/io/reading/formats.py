@@ -25,8 +25,9 @@ from kineme.io.ros.choose import bag_contents
 from kineme.io.ros.read_bag import read_bag
 from kineme.io.tables.parquet import read_parquet_table
 from kineme.io.tables.text_table import read_text_table
+from kineme.movements.tables.columns import Roles
 from kineme.movements.tables.layout import Layout, Parsed
-from kineme.movements.tables.table import table_movements
+from kineme.movements.tables.table import Table, table_movements
 
 
 class Format(NamedTuple):
@@ -89,8 +90,8 @@ def _read_text(data: bytes, layout: Layout) -> Parsed:
     return table_movements(*read_text_table(data, layout), layout, "CSV")
 
 
-def _read_parquet(data: bytes, layout: Layout) -> Parsed:
-    return table_movements(*read_parquet_table(data, layout), layout, "Parquet")
+def _of_tables(read: Callable[[bytes, Layout], tuple[Table, Roles]], kind: str) -> Callable[[bytes, Layout], Parsed]:
+    return lambda data, layout: table_movements(*read(data, layout), layout, kind)
 
 
 def _read_npz(data: bytes, layout: Layout) -> Parsed:
@@ -109,18 +110,6 @@ def _read_npy(data: bytes, layout: Layout) -> Parsed:
     return arrays_movements({POSITIONS[0]: array}, layout, "NPY")
 
 
-def _read_bvh(data: bytes, layout: Layout) -> Parsed:
-    return table_movements(*read_bvh_table(data, layout), layout, "BVH")
-
-
-def _read_c3d(data: bytes, layout: Layout) -> Parsed:
-    return table_movements(*read_c3d_table(data, layout), layout, "C3D")
-
-
-def _read_mvnx(data: bytes, layout: Layout) -> Parsed:
-    return table_movements(*read_mvnx_table(data, layout), layout, "MVNX")
-
-
 def _read_mcap(path: Path, layout: Layout) -> Parsed:
     return read_bag(path, layout) if check_records(path) == b"ros2" else json_messages(path, layout)
 
@@ -137,17 +126,17 @@ FORMATS: dict[str, Format] = {
     ".jsonl": Format(json_lines_movements),
     ".ndjson": Format(json_lines_movements),
     ".npy": Format(_read_npy),
-    ".parquet": Format(_read_parquet),
+    ".parquet": Format(_of_tables(read_parquet_table, "Parquet")),
     ".mat": Format(mat_movements, label_is_stem=True),
     ".h5": Format(read_path=hdf5_movements),
     ".hdf5": Format(read_path=hdf5_movements),
     ".ts": Format(series_movements, has_lines=True),
-    ".bvh": Format(_read_bvh),
-    ".c3d": Format(_read_c3d),
+    ".bvh": Format(_of_tables(read_bvh_table, "BVH")),
+    ".c3d": Format(_of_tables(read_c3d_table, "C3D")),
     ".trc": Format(_read_text),
     ".mot": Format(_read_text),
     ".sto": Format(_read_text),
-    ".mvnx": Format(_read_mvnx),
+    ".mvnx": Format(_of_tables(read_mvnx_table, "MVNX")),
     ".bag": _BAG,
     ".db3": _BAG,
     ".mcap": Format(read_path=_read_mcap, contents=bag_contents),

@@ -57,7 +57,7 @@ def join_files(files: Sequence[Placed], layout: Layout) -> list[Placed]:
             continue
         # The files that have columns which are asked for, or those of the movements to compare with; all if none has.
         heads = [_heads(read) for read in timed]
-        columns = layout.known.columns if layout.known is not None else ()
+        columns = layout.reference.columns if layout.reference is not None else ()
         of_all = [name for names in heads for name in names]
         wanted = layout.coordinates or (columns if None not in numbers_by_name(of_all, columns) else ())
         having = [

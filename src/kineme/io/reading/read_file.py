@@ -239,15 +239,15 @@ def select_columns(parse: Callable[[Layout], Parsed], layout: Layout) -> Parsed:
     DataError
         Some columns of the movements to compare with are there, others are not; or no column is left.
     """
-    names = layout.known.columns if layout.known is not None and layout.coordinates is None else ()
+    names = layout.reference.columns if layout.reference is not None and layout.coordinates is None else ()
     if names and not any(name.isdecimal() for name in names):
         try:
             return _kept(parse(replace(layout, columns=names)), layout)
         except KinemeError:
             pass  # it has other columns, which may be compared in their order
     parsed = parse(layout)
-    if layout.known is not None and layout.by_number:
-        return _named_as(_kept(parsed, layout), layout.known)
+    if layout.reference is not None and layout.by_number:
+        return _named_as(_kept(parsed, layout), layout.reference)
     heads = parsed.detected.columns
     places = numbers_by_name(heads, names)
     lost = [name for name, place in zip(names, places, strict=True) if place is None]

@@ -160,8 +160,8 @@ def read_paths(  # noqa: PLR0913 - those of `read_recordings`, in records
     by_path = {entry.path: entry for entry in entries}
     parts = layout
     if join:  # their columns are chosen when they are side by side
-        known_columns = layout.known and replace(layout.known, columns=())
-        parts = replace(layout, columns=None, exclude=None, known=known_columns)
+        reference = layout.reference and replace(layout.reference, columns=())
+        parts = replace(layout, columns=None, exclude=None, reference=reference)
 
     def placed(path: Path, layout: Layout) -> Placed:
         entry = by_path[path]

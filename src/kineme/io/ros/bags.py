@@ -167,18 +167,14 @@ def storages_of(bag: Bag) -> Sequence[Any]:
 
 def _topics(connections: Sequence[Any]) -> tuple[Topic, ...]:
     def key(connection: Any) -> tuple[str, str]:
-        return str(connection.topic), _type_name(str(connection.msgtype))
+        package, _, rest = str(connection.msgtype).partition("/")  # some writers leave out the middle part
+        name = f"{package}/msg/{rest}" if rest and "/" not in rest else str(connection.msgtype)
+        return str(connection.topic), name
 
     groups = [(name, list(some)) for name, some in groupby(sorted(connections, key=key), key)]
     return tuple(
         Topic(*name, sum(int(connection.msgcount) for connection in some), tuple(some)) for name, some in groups
     )
-
-
-def _type_name(name: str) -> str:
-    """The name of a type as in ROS 2: some writers leave out its middle part."""
-    package, _, rest = name.partition("/")
-    return f"{package}/msg/{rest}" if rest and "/" not in rest else name
 
 
 def check_records(path: Path) -> bytes:

@@ -62,7 +62,7 @@ def choose(bag: Bag, layout: Layout) -> Choice:
     candidates = [topic for topic in bag.topics if can_be_read(topic)]
     if len(candidates) == 1 and not transforms:
         return Choice((candidates[0],))
-    if layout.known is not None and (choice := _as_known(bag, layout.known, candidates)):
+    if layout.reference is not None and (choice := _as_known(bag, layout.reference, candidates)):
         return choice._replace(as_known=True)
     if not candidates and not transforms and len(others := _topics_of_numbers(bag)) == 1:
         return Choice((others[0],))

@@ -322,8 +322,10 @@ def merge_streams(streams: Sequence[Stream], of_headers: bool) -> tuple[Stream, 
         inside &= (at >= stamps[0]) & (at <= stamps[-1])
     names = ", ".join(stream.name for stream in streams[1:])
     if not inside.any():
+        spans = ((stream.name, stamps_of(stream, of_headers)) for stream in streams)
+        times = [f"{name} from {x.min() / SECOND:.12g} to {x.max() / SECOND:.12g} s" for name, x in spans]
         raise DataError(
-            f"expected samples of {first.name} and of {names} at the same time, got none: {_spans(streams, of_headers)}"
+            f"expected samples of {first.name} and of {names} at the same time, got none: {', '.join(times)}"
             + ("; if their headers are of two clocks, say time='recorded', in the shell --time recorded" * of_headers)
         )
     start = int(at[inside][0])
@@ -340,11 +342,6 @@ def merge_streams(streams: Sequence[Stream], of_headers: bool) -> tuple[Stream, 
     n_lost = int(len(at) - inside.sum())
     lost = f"{counted(n_lost, 'sample')} of {first.name} before {names} begins or after it ends"
     return merged, [lost] if n_lost else []
-
-
-def _spans(streams: Sequence[Stream], of_headers: bool) -> str:
-    spans = ((stream.name, stamps_of(stream, of_headers)) for stream in streams)
-    return ", ".join(f"{name} from {at.min() / SECOND:.12g} to {at.max() / SECOND:.12g} s" for name, at in spans)
 
 
 def values_at(at: Array, times: Array, stream: Stream, values: Array) -> Array:

@@ -96,7 +96,7 @@ def _fill_steps(times, steps):  # type: ignore[no-untyped-def]
 
 @jit
 def _may_have_gaps(steps, usual):  # type: ignore[no-untyped-def]
-    """Tell whether a step may be a gap in a movement without rests, before its path, which takes longest, is measured."""
+    """Tell whether a step may be a gap in a movement without rests, before its path is measured, which takes long."""
     if usual == np.inf:
         return False
     motion, before = 0.0, 0.0

@@ -27,7 +27,7 @@ SKIP = ("movement", "sample")
 #: Longest gap [s] that is filled unless the caller says otherwise.
 FILL_GAPS = 0.2
 
-#: What the layout of a file ends with if nobody asked for its topic or frame, see `Layout.known`.
+#: What the layout of a file ends with if nobody asked for its topic or frame, see `Layout.reference`.
 AS_KNOWN = ", as the movements to compare with"
 
 
@@ -82,7 +82,7 @@ class Layout:
     person : str or int, optional
         Column that names who showed a movement; another movement begins where it changes.
 
-    known : Known, optional
+    reference : Known, optional
         What the movements to compare with were read from: the default of topic and frame where a bag has several.
     exclude : str or int or sequence of them, optional
         Columns that are left aside, whatever else chooses them; one that a file does not have is no matter to it.
@@ -111,7 +111,7 @@ class Layout:
     topic: str | Sequence[str] | None = None
     frame: str | Sequence[str] | None = None
     person: Column | None = None
-    known: Known | None = None
+    reference: Known | None = None
     exclude: Column | Sequence[Column] | None = None
     fill_gaps: float = FILL_GAPS
     rows: bool = False
