@@ -84,7 +84,7 @@ def test_transforms_at_other_rates_are_interpolated_on_the_sphere(tmp_path, kind
 
 
 def test_interpolation_is_that_of_scipy():
-    from kineme.movements.rotations import interpolated
+    from kineme.io.ros.streams import interpolated
 
     rng = np.random.default_rng(3)
     times = np.cumsum(rng.uniform(0.1, 1, 20))
