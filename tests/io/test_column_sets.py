@@ -199,7 +199,7 @@ def test_a_library_of_converted_columns_recognizes_files_that_have_more(tmp_path
         known = known_sources(library.store)
     assert known.columns == ("x_mm", "y [mm]", "z_mm")
     table(tmp_path / "asked.csv", [*IN_WORDS, "volt"], np.column_stack([PATH, T]))
-    recordings = read_paths([tmp_path / "asked.csv"], Layout(known=known), NameRule())
+    recordings = read_paths([tmp_path / "asked.csv"], Layout(reference=known), NameRule())
     assert recordings.demonstrations.dimensions == known.columns
     assert recordings.demonstrations[0].positions[-1, 1] == pytest.approx(1000.0)
 
