@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from shlex import quote
 from typing import NamedTuple
 
@@ -75,3 +76,12 @@ class Contents(NamedTuple):
     heads: tuple[str, ...]
     rows: tuple[tuple[str | int, ...], ...]
     note: str = ""
+
+
+@contextmanager
+def needs(package: str, purpose: str, extra: str) -> Iterator[None]:
+    """Raise a `DataError` that names the extra to install, where an import of a package fails."""
+    try:
+        yield
+    except ImportError as error:
+        raise DataError(f"expected the package {package} to {purpose}; pip install 'kineme[{extra}]'") from error

@@ -14,6 +14,7 @@ from kineme.errors import DataError
 from kineme.io.arrays.tree_movements import tree_movements
 from kineme.io.arrays.trees import GROUPS, Rate, is_label, rate_of, seconds_named
 from kineme.io.limits import check_expanded
+from kineme.io.records import needs
 from kineme.movements.tables.layout import Layout, Parsed
 
 _SMALL, _CHUNKS = 2**20, 1000  # bytes and chunks that need not be written
@@ -37,10 +38,8 @@ def hdf5_movements(path: Path, layout: Layout) -> Parsed:
         Not such a file, damaged, without movements, with several vectors of which none is chosen, or the package that
         reads it is not installed; the message names the extra.
     """
-    try:
+    with needs("h5py", "read HDF5", "hdf5"):
         import h5py
-    except ImportError as error:
-        raise DataError("expected the package h5py to read HDF5; pip install 'kineme[hdf5]'") from error
     try:
         with h5py.File(os.fspath(path), "r") as file:
             return tree_movements(_tree(file, h5py, [0]), layout, "HDF5", GROUPS)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,8 @@ from kineme.errors import DataError
 from kineme.io.arrays.arrays import arrays_movements, has_known_names
 from kineme.io.arrays.tree_movements import tree_movements
 from kineme.io.limits import check_expanded
-from kineme.io.ros.damage import REMEDIES, expand, refused
+from kineme.io.records import needs
+from kineme.io.ros.damage import REMEDIES, records_of_mcap, refused
 from kineme.io.tables.dialect import is_number
 from kineme.movements.tables.columns import counts_samples, is_time
 from kineme.movements.tables.layout import Layout, Parsed, listed
@@ -289,14 +290,15 @@ def json_messages(path: Path, layout: Layout) -> Parsed:
     DataError
         The package mcap is not installed, the file is damaged, no topic in JSON, or several of which none is chosen.
     """
-    from mcap.records import Channel, Message
+    with needs("mcap", "read MCAP", "ros"):
+        from mcap.records import Channel, Message
 
     wanted = set(layout.topics)
     channels: dict[int, Any] = {}
     topics: dict[str, list[tuple[int, bytes]]] = {}
     n = n_bytes = 0
-    with refused("expected an MCAP file that can be read", REMEDIES[".mcap"]):
-        for record in _records(path):
+    with refused("expected an MCAP file that can be read", REMEDIES[".mcap"]), path.open("rb") as file:
+        for record in records_of_mcap(file):
             if isinstance(record, Channel):
                 channels[record.id] = record
             elif isinstance(record, Message) and channels[record.channel_id].message_encoding == "json":
@@ -324,20 +326,3 @@ def json_messages(path: Path, layout: Layout) -> Parsed:
         samples.append(sample if any(map(is_time, sample)) else {_RECORDED: recorded / _PER_SECOND} | sample)
     parsed = tree_movements(as_tree(samples), replace(layout, topic=None), "MCAP", many="take")
     return parsed._replace(detected=parsed.detected._replace(layout=f"topic {name} in JSON"))
-
-
-def _records(path: Path) -> Iterator[Any]:
-    """The records of a file and of its chunks, which expand no further than they say."""
-    try:
-        from mcap.records import Chunk
-        from mcap.stream_reader import StreamReader, breakup_chunk
-    except ImportError as error:
-        raise DataError("expected the package mcap to read MCAP; pip install 'kineme[ros]'") from error
-    with path.open("rb") as file:
-        for record in StreamReader(file, emit_chunks=True).records:
-            if isinstance(record, Chunk):
-                how, data = record.compression, record.data
-                plain = expand(how, data, record.uncompressed_size) if how else data
-                yield from breakup_chunk(replace(record, compression="", data=plain))
-            else:
-                yield record

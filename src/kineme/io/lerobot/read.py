@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from kineme.errors import DataError
 from kineme.io.lerobot.info import Episodes, Info, read_episodes, read_info, read_tasks
 from kineme.io.limits import check_expanded
+from kineme.io.records import needs
 from kineme.io.tables.parquet import is_list, rows_of_lists
 from kineme.movements.tables.columns import choose_roles, column_numbers
 from kineme.movements.tables.layout import Column, Layout, Parsed, listed, no_lines
@@ -45,10 +46,8 @@ def lerobot_movements(folder: Path, layout: Layout) -> Parsed:
     DataError
         No such data set or a damaged description; no feature to choose, or none of that name; pyarrow is not installed.
     """
-    try:
+    with needs("pyarrow", "read Parquet", "parquet"):
         import pyarrow  # noqa: F401
-    except ImportError as error:
-        raise DataError("expected the package pyarrow to read Parquet; pip install 'kineme[parquet]'") from error
     # Refuse a choice of times, movements or labels that the data set has already made otherwise.
     named = {"label": (layout.label, ("task", "task_index")), "time": (layout.time, ("timestamp",))}
     for what, (given, names) in named.items():

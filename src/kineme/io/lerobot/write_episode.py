@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from kineme.errors import DataError
 from kineme.io.lerobot.info import MARKER, read_json
+from kineme.io.records import needs
 from kineme.reporting.atomic import whole_folder, write_atomically
 from kineme.validation import Array
 
@@ -59,10 +60,8 @@ def write_episode(
     DataError
         The extra ``parquet`` is not installed; or a data set of another version, with other features or another rate.
     """
-    try:
+    with needs("pyarrow", "write LeRobot", "parquet"):
         import pyarrow  # noqa: F401 - so that the message names the extra
-    except ImportError as error:
-        raise DataError("expected the package pyarrow to write LeRobot; pip install 'kineme[parquet]'") from error
     vector = {"dtype": "float32", "shape": [len(entries)], "names": list(entries), "units": list(entries.values())}
     counter = {"dtype": "int64", "shape": [1], "names": None}
     stamp = {"timestamp": {"dtype": "float32", "shape": [1], "names": None}}

@@ -16,6 +16,7 @@ import numpy as np
 from kineme.errors import DataError
 from kineme.io.limits import check_expanded
 from kineme.io.motion_capture.export_heads import without_common_subject
+from kineme.io.records import needs
 from kineme.movements.tables.columns import Roles, choose_roles
 from kineme.movements.tables.layout import Layout, no_lines
 from kineme.movements.tables.table import Table
@@ -38,10 +39,8 @@ def read_c3d_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
         Not a C3D file, damaged, without points, or the package that reads it is not installed; the message names the
         extra.
     """
-    try:
+    with needs("c3d", "read C3D files", "mocap"):
         import c3d
-    except ImportError as error:
-        raise DataError("expected the package c3d to read C3D files; pip install 'kineme[mocap]'") from error
     if data[1:2] != b"\x50":
         raise DataError("expected a C3D file, got something foreign")
     try:

@@ -5,18 +5,18 @@ from __future__ import annotations
 import shutil
 import sqlite3
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import replace
 from heapq import merge
 from math import inf
 from pathlib import Path, PurePath
 from shutil import copyfile
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, NamedTuple
 
 from kineme.errors import DataError
+from kineme.io.records import needs
 from kineme.io.ros.bags import Bag, open_bag, storages_of
-from kineme.io.ros.damage import INFORMATION, METADATA, compression_of_ros_1, expand, refused
+from kineme.io.ros.damage import INFORMATION, METADATA, compression_of_ros_1, records_of_mcap, refused
 from kineme.io.ros.number_fields import standard_types
 
 TEXT = "std_msgs/msg/String"  # every version of ROS knows it
@@ -224,14 +224,12 @@ def copy_mcap(source: Path, target: Path, added: AddedTopic, compression: str) -
     DataError
         The package mcap is not installed, or the file is damaged.
     """
-    try:
+    with needs("mcap", "copy MCAP files", "ros"):
         from mcap import records
         from mcap.writer import CompressionType, Writer
-    except ImportError as error:
-        raise DataError("expected the package mcap to copy MCAP files; pip install 'kineme[ros]'") from error
     schemas, channels, texts = {0: 0}, dict[int, int](), deque(added.messages)
     with source.open("rb") as old, target.open("wb") as new:
-        parts = _records_of_mcap(old)
+        parts = records_of_mcap(old, validate_crcs=True)
         header = next(parts)
         writer: Any = Writer(new, compression=CompressionType[compression.upper() or "NONE"])
         writer.start(header.profile, header.library)
@@ -260,23 +258,10 @@ def copy_mcap(source: Path, target: Path, added: AddedTopic, compression: str) -
                 writer.add_attachment(**vars(record))
             elif isinstance(record, records.Metadata):
                 writer.add_metadata(record.name, record.metadata)
+            elif isinstance(record, records.DataEnd):  # the summary is written anew
+                break
         write_texts(inf)
         writer.finish()
-
-
-def _records_of_mcap(file: BinaryIO) -> Iterator[Any]:
-    """The records of an MCAP file up to its summary; chunks are expanded up to the size that they declare."""
-    from mcap.records import Chunk, DataEnd
-    from mcap.stream_reader import StreamReader, breakup_chunk
-
-    for record in StreamReader(file, emit_chunks=True, validate_crcs=True).records:
-        if isinstance(record, DataEnd):
-            return
-        if not isinstance(record, Chunk):
-            yield record
-            continue
-        data = expand(record.compression, record.data, record.uncompressed_size) if record.compression else record.data
-        yield from breakup_chunk(replace(record, data=data, compression=""), validate_crc=True)
 
 
 def copy_sqlite(source: Path, target: Path, added: AddedTopic) -> None:

@@ -16,6 +16,7 @@ from typing import Any, BinaryIO, NamedTuple
 
 from kineme.errors import DataError
 from kineme.io.limits import check_in_passing
+from kineme.io.records import needs
 from kineme.io.ros.damage import (
     REMEDIES,
     Folder,
@@ -88,11 +89,9 @@ def open_bag(path: Path) -> Iterator[Bag]:
     DataError
         No bag, damaged, of a kind that rosbags does not read, or rosbags is not installed; the message names the extra.
     """
-    try:
+    with needs("rosbags", "read bags of ROS", "ros"):
         from rosbags.rosbag1 import Reader as Reader1
         from rosbags.rosbag2 import Reader as Reader2
-    except ImportError as error:
-        raise DataError("expected the package rosbags to read bags of ROS; pip install 'kineme[ros]'") from error
     ending = "" if path.is_dir() else path.suffix.lower()
     remedy = REMEDIES[ending]
     bound_chunks_of_mcap()

@@ -9,10 +9,11 @@ from __future__ import annotations
 from bz2 import BZ2Decompressor
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path, PurePath
 from tempfile import TemporaryDirectory
-from typing import Any, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 from kineme.errors import DataError, KinemeError
 from kineme.io.limits import VARIABLE, check_in_passing, max_file_bytes, most_in_passing
@@ -111,6 +112,20 @@ def bound_chunks_of_ros_1(reader: Any) -> None:
     for at, chunk in reader.chunks.items():
         check_in_passing(chunk.datasize, f"a chunk at byte {at:,}")
         reader.chunks[at] = chunk._replace(decompressor=partial(_expand_of_ros_1, reader.bio, at))
+
+
+def records_of_mcap(file: BinaryIO, validate_crcs: bool = False) -> Iterator[Any]:
+    """Yield the records of an MCAP file and of its chunks, which expand no further than they say."""
+    from mcap.records import Chunk
+    from mcap.stream_reader import StreamReader, breakup_chunk
+
+    for record in StreamReader(file, emit_chunks=True, validate_crcs=validate_crcs).records:
+        if isinstance(record, Chunk):
+            how, data = record.compression, record.data
+            plain = expand(how, data, record.uncompressed_size) if how else data
+            yield from breakup_chunk(replace(record, data=plain, compression=""), validate_crc=validate_crcs)
+        else:
+            yield record
 
 
 def compression_of_ros_1(file: Any, at: int) -> tuple[str, int]:

@@ -14,6 +14,7 @@ import numpy as np
 
 from kineme.errors import DataError
 from kineme.io.limits import check_expanded
+from kineme.io.records import needs
 from kineme.movements.tables.columns import Roles, choose_roles
 from kineme.movements.tables.layout import Layout, no_lines
 from kineme.movements.tables.table import Table
@@ -41,11 +42,9 @@ def read_parquet_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
     DataError
         Not a Parquet file, damaged, or the package that reads it is not installed; the message names the extra.
     """
-    try:
+    with needs("pyarrow", "read Parquet", "parquet"):
         import pyarrow as pa
         from pyarrow import parquet
-    except ImportError as error:
-        raise DataError("expected the package pyarrow to read Parquet; pip install 'kineme[parquet]'") from error
     try:
         file = parquet.ParquetFile(io.BytesIO(data))
         names, types = tuple(file.schema_arrow.names), file.schema_arrow.types

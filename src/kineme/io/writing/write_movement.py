@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from kineme.errors import DataError, TrajectoryError
 from kineme.io.arrays.arrays import COLUMNS, RATES
+from kineme.io.records import needs
 from kineme.movements.channels.channel import learned_names, recorded_names
 from kineme.movements.segmentation.segment import as_recording
 from kineme.movements.trajectories.movements import axis_names
@@ -165,11 +166,9 @@ def _json(columns: Columns, names: ColumnNames | None) -> bytes:
 
 
 def _parquet(columns: Columns, names: ColumnNames | None) -> bytes:
-    try:
+    with needs("pyarrow", "write Parquet", "parquet"):
         import pyarrow as pa
         from pyarrow import parquet
-    except ImportError as error:
-        raise DataError("expected the package pyarrow to write Parquet; pip install 'kineme[parquet]'") from error
     buffer = io.BytesIO()
     arrays = [np.ascontiguousarray(column) for column in _table(columns).T]
     parquet.write_table(pa.Table.from_arrays([*map(pa.array, arrays)], names=_heads(columns, names)), buffer)
