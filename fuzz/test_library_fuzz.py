@@ -14,7 +14,7 @@ MODULES = (
     "kineme",
     "library_mutants",
     "sklearn.svm",
-    "kineme.anchoring.proposals.propose",
+    "kineme.anchoring.propose",
     "kineme.recognition.recognizer",
 )
 

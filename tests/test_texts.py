@@ -19,8 +19,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import kineme
-from kineme.anchoring.figures.symbol_map import draw_map
-from kineme.anchoring.grounding.space import ConceptualSpace
+from kineme.anchoring.figures import draw_map
+from kineme.anchoring.space import ConceptualSpace
 from kineme.cli.main import main
 from kineme.cli.output import say, write
 from kineme.reporting.figures import FORMATS, encode_figure, new_figure

@@ -69,7 +69,7 @@ def _formats() -> Iterator[str]:
 
 
 def _schemas() -> Iterator[str]:
-    text = files("kineme.anchoring.grounding").joinpath("grounding.schema.json").read_text(encoding="utf-8")
+    text = files("kineme.anchoring").joinpath("grounding.schema.json").read_text(encoding="utf-8")
     schema = json.loads(text)
     yield "# JSON schemas\n\n## Grounding of a symbol\n"
     yield f"{schema['description']}\n\nWritten by `kineme library ground`; the schema itself by"

@@ -9,13 +9,13 @@ import pytest
 from sklearn.utils import Bunch
 
 from kineme import DMP, Demonstrations, Recognizer
-from kineme.anchoring.clustering import number_of_clusters
-from kineme.anchoring.grounding.morph import morph
-from kineme.anchoring.grounding.space import ConceptualSpace, conceptual_space
-from kineme.anchoring.proposals import merge_split
-from kineme.anchoring.proposals.assign import agreement
-from kineme.anchoring.proposals.merge_split import Split, suggest_merges, suggest_splits
-from kineme.anchoring.proposals.subsample import largest_clustered, radii, subsample
+from kineme.anchoring import clustering, merge_split
+from kineme.anchoring.assignment import agreement
+from kineme.anchoring.clustering import count_clusters
+from kineme.anchoring.merge_split import Split, suggest_merges, suggest_splits
+from kineme.anchoring.morphing import morph
+from kineme.anchoring.proposals import largest_clustered, radii, subsample
+from kineme.anchoring.space import ConceptualSpace, conceptual_space
 from kineme.similarity.describe import describe
 from unlabeled_samples import draw_kinds
 
@@ -103,11 +103,11 @@ def test_of_numbers_of_kinds_as_stable_as_the_most_stable_the_best_fit_is_taken(
     """As stable: within 0.05 of the adjusted Rand index."""
     stable, fitting = {2: 1.0, 3: stability, 4: 0.5}, {2: 0.4, 3: 0.6, 4: 0.9}
     monkeypatch.setattr(
-        number_of_clusters, "mean_silhouettes", lambda _, whole: np.array([fitting[one.max() + 1] for one in whole])
+        clustering, "mean_silhouettes", lambda _, clusterings: np.array([fitting[c.max() + 1] for c in clusterings])
     )
-    monkeypatch.setattr(number_of_clusters, "_agreement", lambda *given: np.array([stable[c] for c in given[2]]))
+    monkeypatch.setattr(clustering, "_agreement", lambda *given: np.array([stable[c] for c in given[2]]))
     points = np.random.default_rng(0).uniform(size=8)
-    assert number_of_clusters.count_clusters(np.abs(points[:, None] - points)) == found
+    assert count_clusters(np.abs(points[:, None] - points)) == found
 
 
 @pytest.mark.parametrize(("stability", "n"), [(0.74, 0), (0.76, 1)])
@@ -140,7 +140,7 @@ def _similar(within, between, sizes=(3, 3)):
 def test_symbols_agree_up_to_half_way_from_their_own_members_to_the_nearest_other(monkeypatch):
     known = Recognizer().fit(draw_kinds([3, 3, 3]), list("aaabbbccc"))
     K = _similar([0.9, 0.8, 0.6], 0.2, (3, 3, 3))
-    monkeypatch.setattr(import_module("kineme.anchoring.proposals.assign"), "compare", lambda *_: K.copy())
+    monkeypatch.setattr(import_module("kineme.anchoring.assignment"), "compare", lambda *_: K.copy())
     assert agreement(known.comparison_, known.references_) == pytest.approx(0.5 * (0.8 + 0.2))
 
 

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import kineme
-from kineme.anchoring.proposals.assign import assign
-from kineme.anchoring.proposals.merge_split import suggest_merges, suggest_splits
+from kineme.anchoring.assignment import assign
+from kineme.anchoring.merge_split import suggest_merges, suggest_splits
 from kineme.recognition.recognizer import Recognizer
 from unlabeled_samples import ALL_TOGETHER, draw_kinds
 
@@ -65,7 +65,7 @@ def test_too_few_that_agree_stay_unknown():
 
 
 def test_many_unknown_are_gathered_through_a_sample(monkeypatch):
-    monkeypatch.setattr(import_module("kineme.anchoring.proposals.assign"), "largest_clustered", lambda n_dims: 40)
+    monkeypatch.setattr(import_module("kineme.anchoring.assignment"), "largest_clustered", lambda n_dims: 40)
     demos = draw_kinds([6, 6, 6, 40, 60], 2, 0, spread=0.03)
     assignment = assign(demos[18:], demos[:18])
     found = [demos.labels[18 + one.members] for one in assignment.proposals.proposals]
@@ -127,7 +127,7 @@ def test_one_symbol_or_one_member():
 
 
 def test_many_members_speak_through_some(monkeypatch):
-    monkeypatch.setattr("kineme.anchoring.proposals.merge_split._LARGEST", 2000)  # 400 of one symbol
+    monkeypatch.setattr("kineme.anchoring.merge_split._LARGEST", 2000)  # 400 of one symbol
     demos = draw_kinds([1300, 900], 2, 0, spread=0.03)
     labels = np.where(np.arange(2200) % 2, "a", "b")
     (merge,) = suggest_merges(demos[:1300], labels[:1300])

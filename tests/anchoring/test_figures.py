@@ -8,12 +8,9 @@ from matplotlib import image
 
 import kineme
 import kineme.anchoring
-from kineme.anchoring.figures.all_proposals import draw_proposals
-from kineme.anchoring.figures.drawing import flat, principal_axes
-from kineme.anchoring.figures.proposal import draw_proposal
-from kineme.anchoring.figures.symbol_map import draw_map
-from kineme.anchoring.grounding.space import ConceptualSpace, conceptual_space
-from kineme.anchoring.proposals.propose import propose
+from kineme.anchoring.figures import draw_map, draw_proposal, draw_proposals, flat, principal_axes
+from kineme.anchoring.space import ConceptualSpace, conceptual_space
+from kineme.anchoring.unlabeled import propose
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.reporting.figures import save_figure
 from kineme.similarity.alignment import paths_of

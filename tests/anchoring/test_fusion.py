@@ -9,10 +9,8 @@ from hypothesis import strategies as st
 from sklearn.metrics import adjusted_rand_score
 
 from kineme import Demonstrations, TrajectoryError
-from kineme.anchoring.clustering import fusion
-from kineme.anchoring.clustering.fusion import components, fuse, set_apart
-from kineme.anchoring.clustering.spectral import count_by_eigengap, spectral
-from kineme.anchoring.proposals.propose import by_shape, link_people, propose
+from kineme.anchoring.clustering import NEIGHBORS, components, count_by_eigengap, fuse, set_apart, spectral
+from kineme.anchoring.unlabeled import by_shape, link_people, propose
 from kineme.similarity.describe import describe
 from kineme.similarity.distances import squared_distances
 from kineme.similarity.representation import ROW_REPRESENTATIONS
@@ -266,6 +264,6 @@ def test_digits_of_one_person_are_ten_clusters(digits):
 
 def test_neighborhoods_are_few_and_many():
     """Few alone split people, and many alone merge small classes; the page of `fuse` names the numbers."""
-    assert fusion.NEIGHBORS == (7, 15)
+    assert NEIGHBORS == (7, 15)
     squares = squared_distances(*(2 * (by_shape(describe(draw_kinds([4, 5, 3]))),)))
     assert fuse(squares).shape == (12, 12)

@@ -12,9 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import kineme
-from kineme.anchoring.grounding.ground import SymbolName, ground
-from kineme.anchoring.grounding.grounding_io import grounding_schema, primitive_from
-from kineme.anchoring.grounding.prototypes import medoid_of
+from kineme.anchoring.grounding import SymbolName, ground, grounding_schema, medoid_of, primitive_from
 from kineme.dmp.discrete.formulations import FORMULATIONS
 from unlabeled_samples import draw_kinds
 
@@ -101,7 +99,7 @@ def test_styles_move_as_the_demonstrations_did(seed):
 
 
 def test_styles_are_found_again_from_their_movements():
-    from kineme.anchoring.grounding.ground import style_model
+    from kineme.anchoring.grounding import style_model
 
     grounding = ground(WAVE, _learn(6, 2, 1, spread=0.3))
     model = style_model(grounding["styles"], primitive_from(grounding).dmp)

@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 from sklearn.cluster import AgglomerativeClustering
 
 import kineme
-from kineme.anchoring.proposals.proposals import describe_clusters
-from kineme.anchoring.proposals.propose import propose
-from kineme.anchoring.proposals.subsample import extend
+from kineme.anchoring.proposals import describe_clusters, extend
+from kineme.anchoring.unlabeled import propose
 from kineme.errors import SpecificationError
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.recognition.recognizer import Recognizer

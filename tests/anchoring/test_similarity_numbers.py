@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from sklearn.utils import Bunch
 
-from kineme.anchoring.proposals.assign import agreement
-from kineme.anchoring.proposals.merge_split import suggest_merges
+from kineme.anchoring.assignment import agreement
+from kineme.anchoring.merge_split import suggest_merges
 from kineme.kernels.procrustes import Procrustes
 from kineme.similarity.described import Described
 from kineme.similarity.references import References

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from scipy.spatial.distance import pdist, squareform
 
 import kineme
-from kineme.anchoring.figures.symbol_map import apart, classical_scaling
-from kineme.anchoring.grounding.morph import morph
-from kineme.anchoring.grounding.space import ConceptualSpace, conceptual_space
+from kineme.anchoring.figures import apart, classical_scaling
+from kineme.anchoring.morphing import morph
+from kineme.anchoring.space import ConceptualSpace, conceptual_space
 from kineme.recognition.recognizer import Recognizer
 from kineme.similarity.specification import ComparisonSpecification
 from unlabeled_samples import draw_kinds

@@ -13,7 +13,7 @@ import pytest
 from commands import answer, run, start
 
 import kineme
-from kineme.anchoring.grounding.grounding_io import grounding_schema, primitive_from
+from kineme.anchoring.grounding import grounding_schema, primitive_from
 from kineme.io.reading.recordings import read_recording
 from kineme.io.writing.write_movement import write_movement
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme.anchoring.proposals.proposals import Proposal, Proposals
+from kineme.anchoring.proposals import Proposal, Proposals
 from kineme.library.proposals import _without
 
 MIXED = {"CShape": "round", "GShape": "gee", "NShape": "mixed", "Sine": "mixed"}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kineme import Recognizer, Trajectory
-from kineme.anchoring.proposals.assign import assign
+from kineme.anchoring.assignment import assign
 from kineme.similarity import describe
 from movement_samples import draw_shapes
 

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import kineme
-from kineme.anchoring.grounding.morph import morph
-from kineme.anchoring.grounding.prototypes import medoid_of, prototype
+from kineme.anchoring.grounding import medoid_of, prototype
+from kineme.anchoring.morphing import morph
 from kineme.recognition.recognizer import Recognizer
 from kineme.similarity.alignment import maps_onto, moved, paths_of
 from kineme.similarity.describe import N_POINTS

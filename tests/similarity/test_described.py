@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme.anchoring.proposals.propose import by_shape
+from kineme.anchoring.unlabeled import by_shape
 from kineme.kernels.procrustes import Procrustes
 from kineme.similarity.describe import describe
 from kineme.similarity.distances import squared_distances

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
-from kineme.anchoring import propose
+from kineme.anchoring.unlabeled import propose
 from kineme.kernels.point_cloud import matched_sums
 from kineme.movements.trajectories.demonstrations import Demonstrations, require_labels
 from kineme.movements.trajectories.trajectory import Trajectory

@@ -135,8 +135,7 @@ def _names(path: Path | None) -> dict[int, str]:
 
 def _draw(library: Any, proposals: Any, folder: Path) -> list[Path]:
     """Draw an overview of all proposals, then a picture of each."""
-    from kineme.anchoring.figures.all_proposals import draw_proposals
-    from kineme.anchoring.figures.proposal import draw_proposal
+    from kineme.anchoring.figures import draw_proposal, draw_proposals
     from kineme.reporting.figures import save_figure
 
     if not len(proposals):

@@ -36,7 +36,7 @@ def ground(symbol: str, folder: Path, by: str, units: str | None, output: Path) 
 @click.command()
 def schema() -> None:
     """Print the JSON Schema of the output of ground."""
-    text = files("kineme").joinpath("anchoring/grounding/grounding.schema.json").read_text(encoding="utf-8")
+    text = files("kineme").joinpath("anchoring/grounding.schema.json").read_text(encoding="utf-8")
     say(True, json.loads(text), str)  # kineme.anchoring.grounding_schema() would load all of anchoring
 
 
@@ -74,7 +74,7 @@ def between(first: str, second: str, folder: Path, as_json: bool) -> None:
 @json_option
 def draw(path: Path, folder: Path, as_json: bool) -> None:
     """Draw a map of the symbols, similar ones near each other: a .png, .svg or .pdf file."""
-    from kineme.anchoring.figures.symbol_map import draw_map
+    from kineme.anchoring.figures import draw_map
     from kineme.library.grounding import prototype_of, space_of
     from kineme.reporting.figures import save_figure
 

@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kineme.anchoring.grounding.ground import SymbolName, ground
-from kineme.anchoring.grounding.morph import morph
-from kineme.anchoring.grounding.prototypes import medoid_of
-from kineme.anchoring.grounding.space import ConceptualSpace, conceptual_space
+from kineme.anchoring.grounding import SymbolName, ground, medoid_of
+from kineme.anchoring.morphing import morph
+from kineme.anchoring.space import ConceptualSpace, conceptual_space
 from kineme.dmp.discrete.dmp import Primitives
 from kineme.dmp.generation.learned import Learned, has_orientation, learn_one
 from kineme.dmp.recorded_as import recorded_as

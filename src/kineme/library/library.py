@@ -20,8 +20,8 @@ from kineme.library.storage.store import Store, history
 from kineme.movements.trajectories.trajectory import MovementsLike
 
 if TYPE_CHECKING:
-    from kineme.anchoring.grounding.space import Between, Near
-    from kineme.anchoring.proposals.proposals import Proposal
+    from kineme.anchoring.proposals import Proposal
+    from kineme.anchoring.space import Between, Near
     from kineme.dmp.discrete.dmp import DMP, Primitives
     from kineme.library.learn import LearnReport
     from kineme.library.proposals import LibraryProposals, Review
@@ -460,8 +460,8 @@ class ActionLibrary:
     def ground(self, who: str, by: str = "medoid", units: str | Sequence[str] | None = None) -> dict[str, Any]:
         """A symbol for a planner: its prototype as a primitive, and the demonstrated ranges of its parameters.
 
-        Plain data, as `kineme.anchoring.grounding.grounding_io.grounding_schema` describes it;
-        `kineme.anchoring.grounding.grounding_io.primitive_from` makes it move again.
+        Plain data, as `kineme.anchoring.grounding.grounding_schema` describes it;
+        `kineme.anchoring.grounding.primitive_from` makes it move again.
 
         Parameters
         ----------
@@ -477,7 +477,7 @@ class ActionLibrary:
         return ground_symbol(self.store, who, by, units)
 
     def nearest(self, who: str, k: int = 3) -> tuple[Near, ...]:
-        """The symbols most similar to one, nearest first; see `kineme.anchoring.grounding.space.ConceptualSpace`."""
+        """The symbols most similar to one, nearest first; see `kineme.anchoring.space.ConceptualSpace`."""
         from kineme.library.grounding import space_of
 
         return space_of(self.store).nearest(self[who].name, k)

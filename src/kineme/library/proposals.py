@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kineme.anchoring.proposals.assign import assign_described
-from kineme.anchoring.proposals.merge_split import Merge, Split, suggest_merges, suggest_splits
-from kineme.anchoring.proposals.proposals import Proposal, Proposals
-from kineme.anchoring.proposals.propose import DEFAULT_METHOD
-from kineme.anchoring.proposals.propose import propose as propose_clusters
+from kineme.anchoring.assignment import assign_described
+from kineme.anchoring.merge_split import Merge, Split, suggest_merges, suggest_splits
+from kineme.anchoring.proposals import Proposal, Proposals
+from kineme.anchoring.unlabeled import DEFAULT_METHOD
+from kineme.anchoring.unlabeled import propose as propose_clusters
 from kineme.errors import SpecificationError
 from kineme.library.members import described, described_references, groups_of
 from kineme.library.storage import changes, read

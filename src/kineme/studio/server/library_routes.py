@@ -11,8 +11,8 @@ import numpy as np
 from fastapi import APIRouter, Query, Request, Response
 from pydantic import BaseModel
 
-from kineme.anchoring.figures.symbol_map import classical_scaling
-from kineme.anchoring.grounding.space import conceptual_space
+from kineme.anchoring.figures import classical_scaling
+from kineme.anchoring.space import conceptual_space
 from kineme.dmp.discrete.formulations import FORMULATIONS
 from kineme.io.writing.write_movement import WRITERS
 from kineme.library.members import described

@@ -9,7 +9,7 @@ import numpy as np
 from fastapi import APIRouter
 from pydantic import BaseModel
 
-from kineme.anchoring.proposals.proposals import Proposal
+from kineme.anchoring.proposals import Proposal
 from kineme.library import proposals as stored
 from kineme.library.storage import read
 from kineme.studio.server.records import (

@@ -7,9 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kineme.anchoring.clustering.clustering import Clusters, average_linkage, cuts
-from kineme.anchoring.clustering.stability import stabilities
-from kineme.anchoring.proposals.propose import own_order
+from kineme.anchoring.clustering import Clusters, average_linkage, cuts, stabilities
+from kineme.anchoring.unlabeled import own_order
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.labels import label_array
 from kineme.movements.trajectories.trajectory import MovementsLike
@@ -89,7 +88,7 @@ def suggest_merges(
     overlap = means / np.sqrt(np.outer(within, within))
     pairs = np.argwhere(np.triu(overlap >= least, 1))
     merges = [Merge(names[i], names[j], float(overlap[i, j])) for i, j in pairs]
-    return tuple(sorted(merges, key=lambda one: -one.overlap))
+    return tuple(sorted(merges, key=lambda merge: -merge.overlap))
 
 
 def suggest_splits(
@@ -128,8 +127,10 @@ def suggest_splits(
         indices = np.flatnonzero(member == k)
         if len(indices) >= 2 * min_members and len(indices) > 3:
             splits.append(_in_two(name, described.take(indices), indices, sigma))
-    kept = (s for s in splits if s.overlap <= most and s.stability >= _STABLE and min(map(len, s.parts)) >= min_members)
-    return tuple(sorted(kept, key=lambda one: one.overlap))
+    clear = (
+        s for s in splits if s.overlap <= most and s.stability >= _STABLE and min(map(len, s.parts)) >= min_members
+    )
+    return tuple(sorted(clear, key=lambda split: split.overlap))
 
 
 def _in_two(name: Any, described: Described, indices: NDArray[np.intp], widths: Array) -> Split:
@@ -149,10 +150,10 @@ def _in_two(name: Any, described: Described, indices: NDArray[np.intp], widths: 
     parts = np.empty(len(some), dtype=np.intp)
     parts[order] = halves
     nearest = compare(averaged(described, widths), described, described.take(some)).argmax(axis=1)
-    whole = parts[nearest]
-    whole[some] = parts
+    parent = parts[nearest]
+    parent[some] = parts
     overlap = between / float(np.sqrt(max(within, np.finfo(float).tiny)))
-    return Split(name, (indices[whole == 0], indices[whole == 1]), overlap, stability)
+    return Split(name, (indices[parent == 0], indices[parent == 1]), overlap, stability)
 
 
 def _mean_within(K: Array) -> float:
@@ -164,12 +165,12 @@ def _mean_within(K: Array) -> float:
 def _labeled(
     movements: MovementsLike | Described, labels: ArrayLike, like: Compares | None
 ) -> tuple[Described, NDArray[np.intp], list[Any]]:
-    described, known = describe(movements, like), label_array(labels)
-    if len(known) != len(described):
+    described, label_values = describe(movements, like), label_array(labels)
+    if len(label_values) != len(described):
         raise SpecificationError(
-            f"expected one label for each of the {len(described)} movements, got shape {known.shape}"
+            f"expected one label for each of the {len(described)} movements, got shape {label_values.shape}"
         )
-    names, member = np.unique(known, return_inverse=True)
+    names, member = np.unique(label_values, return_inverse=True)
     return described, np.asarray(member, dtype=np.intp), names.tolist()
 
 
@@ -180,5 +181,5 @@ def _some_of_each(member: NDArray[np.intp], most: int) -> NDArray[np.intp]:
     rank = np.arange(len(member)) - np.repeat(np.cumsum(counts) - counts, counts)
     total = np.repeat(counts, counts)
     # The k-th of m is kept where floor(k most / m) steps up: exactly `most` of them, evenly spaced.
-    kept = (total <= most) | (((rank + 1) * most) // total > (rank * most) // total)
-    return np.sort(order[kept])
+    chosen = (total <= most) | (((rank + 1) * most) // total > (rank * most) // total)
+    return np.sort(order[chosen])

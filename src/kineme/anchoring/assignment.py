@@ -7,11 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.anchoring.clustering.clustering import Clusters, average_linkage, cut_at, without_small
-from kineme.anchoring.clustering.stability import stabilities
-from kineme.anchoring.proposals.proposals import Proposals, describe_clusters
-from kineme.anchoring.proposals.propose import own_order
-from kineme.anchoring.proposals.subsample import extend, largest_clustered, subsample
+from kineme.anchoring.clustering import Clusters, average_linkage, cut_at, stabilities, without_small
+from kineme.anchoring.proposals import Proposals, describe_clusters, extend, largest_clustered, subsample
+from kineme.anchoring.unlabeled import own_order
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.recognition.known_classes import FittedRecognizer, KnownClasses, known_classes, open_set_labels
 from kineme.recognition.left_out import distances as in_widths
@@ -92,31 +90,31 @@ def assign(
         Symbols without labels, or movements of another number of dimensions.
     """
     check_count("min_members", min_members, 2)
-    known = known_classes(symbols)
-    described = describe(known.comparison.checked(movements), known.comparison)
-    return assign_described(described, known, error_rate, min_members)
+    classes = known_classes(symbols)
+    described = describe(classes.comparison.checked(movements), classes.comparison)
+    return assign_described(described, classes, error_rate, min_members)
 
 
 def assign_described(
-    described: Described, known: KnownClasses, error_rate: float = 0.05, min_members: int = 3
+    described: Described, classes: KnownClasses, error_rate: float = 0.05, min_members: int = 3
 ) -> Assignment:
     """As `assign`, of movements that are described in the representations of what is known."""
-    labels, p_values = open_set_labels(known, described, error_rate)
+    labels, p_values = open_set_labels(classes, described, error_rate)
     unknown = np.flatnonzero([label is None for label in labels])
-    proposals = _among_unknown(known, described.take(unknown), min_members)
+    proposals = _among_unknown(classes, described.take(unknown), min_members)
     return Assignment(labels, p_values.max(axis=1), _at(unknown, proposals, len(described)))
 
 
-def _among_unknown(known: KnownClasses, unknown: Described, min_members: int) -> Proposals:
+def _among_unknown(classes: KnownClasses, unknown: Described, min_members: int) -> Proposals:
     """Clusters among the unknown; where they are many, of a subsample, extended by their nearest neighbors."""
-    n, similarity = len(unknown), known.comparison.similarity
+    n, similarity = len(unknown), classes.comparison.similarity
     if n < min_members:
         return describe_clusters(np.eye(n), np.full(n, -1, dtype=np.intp), np.empty(0), similarity.widths)
-    limit, height = largest_clustered(unknown.n_dims), 1.0 - agreement(known.comparison, known.references)
+    limit, height = largest_clustered(unknown.n_dims), 1.0 - agreement(classes.comparison, classes.references)
     if n <= limit:
-        return _clustered(known.comparison, unknown, height, min_members)[1]
+        return _clustered(classes.comparison, unknown, height, min_members)[1]
     sample, _ = subsample(unknown, limit)
-    K, proposals = _clustered(known.comparison, unknown.take(sample), height, min_members)
+    K, proposals = _clustered(classes.comparison, unknown.take(sample), height, min_members)
     return extend(unknown, sample, K, proposals, similarity)
 
 
@@ -168,5 +166,8 @@ def _at(indices: NDArray[np.intp], proposals: Proposals, n: int) -> Proposals:
     """The same proposals, of movements with these indices among n."""
     clusters = np.full(n, -1, dtype=np.intp)
     clusters[indices] = proposals.clusters
-    moved = (replace(one, members=indices[one.members], medoid=int(indices[one.medoid])) for one in proposals.proposals)
+    moved = (
+        replace(proposal, members=indices[proposal.members], medoid=int(indices[proposal.medoid]))
+        for proposal in proposals.proposals
+    )
     return Proposals(tuple(moved), clusters, proposals.widths)

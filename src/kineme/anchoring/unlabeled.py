@@ -5,13 +5,19 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kineme.anchoring.clustering.clustering import METHODS, Clusters
-from kineme.anchoring.clustering.fusion import components, fuse, local_similarities, set_apart
-from kineme.anchoring.clustering.number_of_clusters import count_clusters
-from kineme.anchoring.clustering.spectral import count_by_eigengap, spectral
-from kineme.anchoring.clustering.stability import stabilities
-from kineme.anchoring.proposals.proposals import Proposals, describe_clusters
-from kineme.anchoring.proposals.subsample import extend, largest_clustered, subsample
+from kineme.anchoring.clustering import (
+    METHODS,
+    Clusters,
+    components,
+    count_by_eigengap,
+    count_clusters,
+    fuse,
+    local_similarities,
+    set_apart,
+    spectral,
+    stabilities,
+)
+from kineme.anchoring.proposals import Proposals, describe_clusters, extend, largest_clustered, subsample
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.recognition.left_out import check_groups, comparable_groups
@@ -45,7 +51,7 @@ def propose(  # noqa: PLR0913 - what is asked, and how it is compared
     """Cluster movements without labels.
 
     By default (``method="spectral"``) movements are similar whose neighbors are similar, in several representations
-    together and at the scale of each neighborhood: see `kineme.anchoring.clustering.fusion.fuse`. So movements of
+    together and at the scale of each neighborhood: see `kineme.anchoring.clustering.fuse`. So movements of
     several people connect, of whom each repeats the own way more closely than that of others. Name who made each
     movement by `groups` where that is known: it is the better the more similar classes are. The other methods take
     distances ``1 - K`` of the averaged kernel at `gap_widths`: bounded, so that what is far is just far.
@@ -65,7 +71,7 @@ def propose(  # noqa: PLR0913 - what is asked, and how it is compared
     groups : array_like of shape (n,), optional
         Who made each movement; the other methods ignore it. Movements of two people are linked if they are among each
         other's nearest: classes that each draws in an own way are found together, and classes that are alike apart. See
-        `kineme.anchoring.proposals.propose.link_people`.
+        `kineme.anchoring.unlabeled.link_people`.
     min_members : int, default 3
         Movements of a proposal, at least; smaller clusters are left over.
     like : Recognizer, Comparison or ComparisonSpecification, optional
@@ -97,8 +103,8 @@ def propose(  # noqa: PLR0913 - what is asked, and how it is compared
         return _propose(described, averaged(described), method, n_clusters, min_members, people)[1]
     sample, similarity = subsample(described, limit)
     people = None if people is None else people[sample]
-    K, found = _propose(described.take(sample), similarity, method, n_clusters, min_members, people)
-    return extend(described, sample, K, found, similarity)
+    K, clusters = _propose(described.take(sample), similarity, method, n_clusters, min_members, people)
+    return extend(described, sample, K, clusters, similarity)
 
 
 def _largest(method: str, n_dims: int) -> int:
@@ -130,10 +136,10 @@ def _propose(
     clusters = np.empty(len(K), dtype=np.intp)
     if method == _SPECTRAL:
         ordered = None if people is None else people[order]
-        found, stable = _by_neighbors(described.take(order), n_clusters, min_members, ordered)
+        in_order, stable = _by_neighbors(described.take(order), n_clusters, min_members, ordered)
     else:
-        found, stable = _by_distances(1.0 - K[np.ix_(order, order)], method, n_clusters, min_members)
-    clusters[order] = found
+        in_order, stable = _by_distances(1.0 - K[np.ix_(order, order)], method, n_clusters, min_members)
+    clusters[order] = in_order
     return K, describe_clusters(K, clusters, stable, similarity.widths)
 
 
@@ -145,18 +151,18 @@ def _by_neighbors(
     squares = squared_distances(described, described)
     squares = 0.5 * (squares + squares.transpose(0, 2, 1))
     component = components(squares)
-    kept = np.flatnonzero(np.bincount(component)[component] >= min_members)
+    large = np.flatnonzero(np.bincount(component)[component] >= min_members)
     clusters = np.full(len(described), -1, dtype=np.intp)
-    if len(kept) < 3:
+    if len(large) < 3:
         return clusters, np.empty(0)
-    squares, weights = squares[:, kept[:, None], kept], described.own_weights
+    squares, weights = squares[:, large[:, None], large], described.own_weights
     similar = fuse(squares, weights)
     if people is not None:
-        similar = link_people(similar, local_similarities(squares, weights), people[kept])
-    similar = set_apart(similar, component[kept])
+        similar = link_people(similar, local_similarities(squares, weights), people[large])
+    similar = set_apart(similar, component[large])
     wanted = count_by_eigengap(similar) if n_clusters is None else n_clusters
-    clusters[kept] = spectral(similar, wanted, min_members)
-    stable = stabilities(similar, clusters[kept], lambda some: spectral(some, wanted), _REPEATS)
+    clusters[large] = spectral(similar, wanted, min_members)
+    stable = stabilities(similar, clusters[large], lambda some: spectral(some, wanted), _REPEATS)
     return clusters, stable
 
 
@@ -165,7 +171,7 @@ def by_shape(described: Described) -> Described:
     if described.pairs is None:
         return described
     n = len(described.blocks)
-    positions = [r for r, one in enumerate(described.blocks) if one is described.pairs.positions]
+    positions = [r for r, block in enumerate(described.blocks) if block is described.pairs.positions]
     return described.select([*positions, *range(n, described.n_representations)])
 
 
@@ -178,8 +184,8 @@ def _by_distances(distances: Array, method: str, n_clusters: int | None, min_mem
     def again(some: Array) -> Clusters:
         return METHODS[method](some, share, 1 if method == "agglomerative" else min_members)
 
-    found = METHODS[method](distances, share, min_members)
-    return found, stabilities(distances, found, again, _REPEATS)
+    clusters = METHODS[method](distances, share, min_members)
+    return clusters, stabilities(distances, clusters, again, _REPEATS)
 
 
 def own_order(K: Array) -> NDArray[np.intp]:
@@ -202,7 +208,7 @@ def link_people(similar: Array, near: Array, people: NDArray[np.intp]) -> Array:
     Parameters
     ----------
     similar : ndarray of shape (n, n)
-        W, as `kineme.anchoring.clustering.fusion.fuse` gives it.
+        W, as `kineme.anchoring.clustering.fuse` gives it.
     near : ndarray of shape (n, n)
         By which the nearest are found; greater is nearer.
     people : ndarray of shape (n,)
@@ -210,8 +216,8 @@ def link_people(similar: Array, near: Array, people: NDArray[np.intp]) -> Array:
     """
     n = len(similar)
     share = np.zeros((n, n))  # 1 / p
-    for one in np.unique(people):
-        own = np.flatnonzero(people == one)
+    for person in np.unique(people):
+        own = np.flatnonzero(people == person)
         nearest = own[np.argsort(-near[:, own], axis=1, kind="stable")[:, :_NEAREST]]
         share[np.arange(n)[:, None], nearest] = 1.0 / np.arange(1, nearest.shape[1] + 1)
     links = np.where(people[:, None] != people, share * share.T, 0.0)

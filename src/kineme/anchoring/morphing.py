@@ -56,30 +56,30 @@ def morph(a: Primitives, b: Primitives, shares: ArrayLike, like: Compares | None
 
 
 def _check_pair(a: Primitives, b: Primitives) -> None:
-    for one in (a, b):
-        check_primitives(one)
-        if len(one) != 1:
-            raise TrajectoryError(f"expected one primitive at each end, got {len(one)}; choose one, primitives[0]")
+    for symbol in (a, b):
+        check_primitives(symbol)
+        if len(symbol) != 1:
+            raise TrajectoryError(f"expected one primitive at each end, got {len(symbol)}; choose one, primitives[0]")
     if a.n_dims != b.n_dims:
         raise TrajectoryError(f"expected primitives of the same dimensions, got {a.n_dims} and {b.n_dims}")
     if a.dmp != b.dmp:
         raise SpecificationError(f"expected primitives of one specification, got {a.dmp} and {b.dmp}; learn them again")
 
 
-def _part_way(whole: Maps, center: Array, s: Array) -> Maps:
+def _part_way(maps: Maps, center: Array, s: Array) -> Maps:
     """The share s (m,) of one map, about a center (d,) that moves evenly to where the map takes it."""
-    R = _part_rotation(whole.rotations[0], s)
-    scales = whole.scales[0] ** s[:, None]
-    matrices = scales[:, :, None] * R if np.ptp(whole.scales[0]) == 0 else _part_matrix(whole, s)
-    there = whole.matrices[0] @ center + whole.shifts[0]
+    R = _part_rotation(maps.rotations[0], s)
+    scales = maps.scales[0] ** s[:, None]
+    matrices = scales[:, :, None] * R if np.ptp(maps.scales[0]) == 0 else _part_matrix(maps, s)
+    there = maps.matrices[0] @ center + maps.shifts[0]
     shifts = center + s[:, None] * (there - center) - matrices @ center
     return Maps(matrices, shifts, R, scales)
 
 
-def _part_matrix(whole: Maps, s: Array) -> Array:
+def _part_matrix(maps: Maps, s: Array) -> Array:
     """Sizes per dimension: the matrix goes evenly, since it is no rotation and one size."""
-    d = whole.matrices.shape[1]
-    return np.eye(d) + s[:, None, None] * (whole.matrices[0] - np.eye(d))
+    d = maps.matrices.shape[1]
+    return np.eye(d) + s[:, None, None] * (maps.matrices[0] - np.eye(d))
 
 
 def _part_rotation(R: Array, s: Array) -> Array:

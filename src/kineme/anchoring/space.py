@@ -83,7 +83,7 @@ class ConceptualSpace:
                 continue
             share = 0.5 + 0.5 * (ac**2 - cb**2) / ab**2  # law of cosines
             between_them.append(Between(self.symbols[c], float((ac + cb) / ab - 1.0), float(np.clip(share, 0.0, 1.0))))
-        return tuple(sorted(between_them, key=lambda one: one.excess))
+        return tuple(sorted(between_them, key=lambda symbol: symbol.excess))
 
     def index(self, symbol: Any) -> int:
         """Index of a symbol among `symbols`.

@@ -1,1 +1,0 @@
-"""From similarities to clusters, and how many there are."""

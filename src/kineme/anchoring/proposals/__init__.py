@@ -1,1 +1,0 @@
-"""Proposals of symbols for a person to name, and how they change."""
