@@ -123,7 +123,7 @@ javascript: node_modules/ready
 	node_modules/.bin/tsc --project jsconfig.json
 
 node_modules/ready: package-lock.json
-	npm ci --silent --no-audit --no-fund
+	npm install --silent --no-audit --no-fund  # not `ci`: the lock names what other systems need, which a mirror may lack
 	touch $@
 
 bench: .venv-bench/ready

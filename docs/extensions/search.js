@@ -1,7 +1,8 @@
 /*
- * How the search orders pages. Sphinx wants every word of a question in a page, and counts none more than another. Here a word
- * counts the more the fewer pages hold it, some words may be missing, titles, index entries and error messages count by how
- * much of them was asked for and most of all where they are what was typed, and pages written for readers come before those that list names.
+ * How the search orders pages. Sphinx wants every word of a question in a page, and counts none more than another. Here
+ * a word counts the more the fewer pages hold it, some words may be missing, titles, index entries and error messages
+ * count by how much of them was asked for and most of all where they are what was typed, and pages written for readers
+ * come before those that list names.
  */
 const Ranking = {
   /** The first part of a page's address that is listed -> how much its pages count, and what they are called. */
@@ -37,7 +38,7 @@ const Ranking = {
     );
   },
 
-  /** The stems that a question asks for; of a name such as column_stack its parts only where no page holds the whole. */
+  /** The stems that a question asks for; of a name as column_stack its parts only where no page holds all of it. */
   asked: (query) => {
     const { pages } = Ranking.prepared;
     const names = splitQuery(query).filter((word) => word.includes("_"));
@@ -60,7 +61,7 @@ const Ranking = {
         for (const [page, id] of places) {
           const words = Ranking.words(text);
           lines.push({ page, text, words, id, entry: kind === "indexentries" });
-          words.forEach((word) => add(word, page));
+          for (const word of words) add(word, page);
         }
     for (const [inside, members] of Object.entries(index.objects))
       for (const [page, , , , name] of members) {

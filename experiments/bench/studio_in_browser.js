@@ -1,6 +1,7 @@
 // What happens in the page of the studio, and when: run in it before its own modules.
 (() => {
-  const probe = (window.probe = { shown: null, answers: [], frames: [], moves: 0, drawn: 0, dragged: [] });
+  const probe = { shown: null, answers: [], frames: [], moves: 0, drawn: 0, dragged: [] };
+  window.probe = probe;
   const afterFrame = (act) =>
     requestAnimationFrame(() => {
       const channel = new MessageChannel();
@@ -33,7 +34,8 @@
   window.WebSocket = class extends Socket {
     constructor(...how) {
       super(...how);
-      setTimeout(() => this.addEventListener("message", (event) => event.data.startsWith('{"state"') && answered())); // after the page
+      const hear = (event) => event.data.startsWith('{"state"') && answered();
+      setTimeout(() => this.addEventListener("message", hear)); // after the page
     }
 
     send(data) {
@@ -43,7 +45,7 @@
   };
   function answered() {
     const [now, stamps] = [performance.now(), asked.shift() ?? []];
-    afterFrame((shown) => stamps.forEach((stamp) => probe.answers.push([now - stamp, shown - stamp])));
+    afterFrame((shown) => probe.answers.push(...stamps.map((stamp) => [now - stamp, shown - stamp])));
   }
 
   // Dragging: the frames, and whether the path of each move is drawn in the frame of the move.

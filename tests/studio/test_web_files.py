@@ -17,7 +17,7 @@ PAGE = WEB.parent / "page"
 SCRIPTS = sorted(WEB.rglob("*.js"))
 PAGES = sorted(WEB.glob("*.html"))
 STYLES = sorted(WEB.glob("*.css"))
-MAX_FILE = 400
+MAX_FILE, MAX_LINE = 400, 120
 NODE = shutil.which("node")
 needs_node = pytest.mark.skipif(NODE is None, reason="node is not installed")
 
@@ -333,6 +333,7 @@ def test_a_module_is_short_and_says_what_it_is_for(path):
     text = path.read_text()
     assert text.startswith("// ")
     assert len(text.splitlines()) <= MAX_FILE
+    assert [line for line in text.splitlines() if len(line) > MAX_LINE] == []
 
 
 @pytest.mark.parametrize("path", SCRIPTS, ids=_name)
@@ -418,6 +419,19 @@ def test_every_id_is_one_elements_and_is_used():
     naming = r'\s(?:aria-\w+|for|list)="([^"]+)"'
     used |= {name for page in pages for several in re.findall(naming, page) for name in several.split()}
     assert [name for one in ids for name in one if name not in used] == []
+
+
+def test_types_of_elements_by_their_ids_are_those_of_the_pages():
+    """The table by which the type checker knows what `byId` gives."""
+    table = (WEB / "parts" / "elements.js").read_text()
+    kinds = dict(re.findall(r'^ \*   "?([\w-]+)"?: HTML(\w+)Element,$', table, re.MULTILINE))
+    tags = [
+        (name, tag)
+        for page in (*PAGES, PAGE / "page.html")
+        for tag, name in re.findall(r'<(\w+)\b[^>]*?\sid="([^"]+)"', page.read_text())
+    ]
+    assert {name for name, _ in tags} >= kinds.keys()
+    assert [name for name, tag in tags if kinds.get(name, tag).lower() != tag] == []
 
 
 def test_what_a_module_exports_is_imported():

@@ -1,8 +1,6 @@
 // A movement primitive to play with: the reader drags the goal and the weights, or draws a movement of their own.
 // Both matrices stand in the page: encode, from a path to weights, and decode, from weights to a path.
-"use strict";
-
-(function () {
+(() => {
   const K = 1; // the matrices take and give weights over the stiffness, in millimeters
 
   /** Of each of d dimensions, the path from weights, start, goal and initial velocity. */
@@ -59,7 +57,7 @@
       const f = shares.reduce((sum, share, i) => sum + share * one.weights[k][i], 0) * ratioOf(name, one, goal, k);
       return name === "original" ? f : f + s * (one.start[k] - row[t]);
     });
-    if (name !== "original") pull.forEach((value, k) => (pull[k] = (1 - s) * value));
+    if (name !== "original") for (const k of pull.keys()) pull[k] *= 1 - s;
     return { pull, bend };
   }
 
@@ -125,7 +123,10 @@
 
     function draw() {
       const path = decode(data, state.name, state.one, state.goal);
-      const dot = (node, at) => ["cx", "cy"].forEach((key, k) => node.setAttribute(key, at[k]));
+      const dot = (node, [x, y]) => {
+        node.setAttribute("cx", x);
+        node.setAttribute("cy", y);
+      };
       parts.shown.setAttribute("d", planePath(state.shown));
       parts.path.setAttribute("d", planePath(path));
       parts.plane.setAttribute("viewBox", viewOf(path[0].map((x, t) => toPixels([x, path[1][t]]))));
@@ -144,7 +145,7 @@
           path.map((row) => row[state.t]),
           terms[kind],
         );
-      parts.rows.forEach((row, k) => drawWeights(data, row, state.one.weights[k], most));
+      for (const [k, row] of parts.rows.entries()) drawWeights(data, row, state.one.weights[k], most);
     }
 
     function drag(node, begin, move) {
@@ -175,7 +176,10 @@
     }
 
     let held; // where the plane is on the screen as a drag begins: while it goes on, the view may change
-    const hold = () => (parts.goal.focus(), (held = parts.plane.getScreenCTM()));
+    const hold = () => {
+      parts.goal.focus();
+      held = parts.plane.getScreenCTM();
+    };
     drag(parts.goal, hold, (event) => setGoal(...toMillimeters(at(parts.plane, event, held))));
     parts.goal.addEventListener("keydown", (event) => {
       const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
@@ -183,26 +187,34 @@
       event.preventDefault();
       setGoal(...state.goal.map((value, k) => value + step[k] * (event.shiftKey ? 5 : 1)));
     });
-    parts.rows.forEach((row, k) =>
+    parts.rows.forEach((row, k) => {
       row.grips.forEach((grip, i) => {
         const move = (event) =>
           setWeight(k, i, (1 - (2 * (at(parts.weights, event)[1] - k * ROW - 20)) / (ROW - 30)) * most);
-        drag(grip, (event) => (grip.focus(), move(event)), move);
+        const begin = (event) => {
+          grip.focus();
+          move(event);
+        };
+        drag(grip, begin, move);
         grip.addEventListener("keydown", (event) => {
           const step = { ArrowUp: 1, ArrowDown: -1, PageUp: 5, PageDown: -5 }[event.key];
           if (step === undefined && event.key !== "Home") return;
           event.preventDefault();
           setWeight(k, i, event.key === "Home" ? 0 : state.one.weights[k][i] + (step * most) / 40);
         });
-      }),
-    );
+      });
+    });
 
     let points = [];
     const add = (event) => {
       points.push([event.timeStamp, ...inPlane(toMillimeters(at(parts.plane, event)))]);
       parts.pen.setAttribute("d", line(points.map(([, x, y]) => toPixels([x, y]))));
     };
-    drag(parts.plane, (event) => ((points = []), add(event)), add);
+    const begin = (event) => {
+      points = [];
+      add(event);
+    };
+    drag(parts.plane, begin, add);
     parts.plane.addEventListener("drawn", () => {
       parts.pen.setAttribute("d", "");
       if (points.length > 8) learn(resampled(points, n));
@@ -223,7 +235,7 @@
     const actions = {
       again: () => learn(data.shown),
       spring: () => {
-        state.one.weights.forEach((row) => row.fill(0));
+        for (const row of state.one.weights) row.fill(0);
         state.one.velocity.fill(0);
         draw();
       },
@@ -236,10 +248,13 @@
       draw();
     });
     slider.max = n - 1;
-    slider.addEventListener("input", () => ((state.t = Number(slider.value)), draw()));
+    slider.addEventListener("input", () => {
+      state.t = Number(slider.value);
+      draw();
+    });
     draw();
     root.hidden = false;
-    document.querySelectorAll(".primitive-picture").forEach((picture) => (picture.hidden = true));
+    for (const picture of document.querySelectorAll(".primitive-picture")) picture.hidden = true;
   }
 
   /** Where a pointer is, in the drawing's own pixels. */

@@ -78,7 +78,11 @@ export function argmax(values) {
   return best;
 }
 
-/** Indices of the numbers, largest first; of equal ones the first. @param {ArrayLike<number>} values @returns {number[]} */
+/**
+ * Indices of the numbers, largest first; of equal ones the first.
+ * @param {ArrayLike<number>} values
+ * @returns {number[]}
+ */
 export function descending(values) {
   return Array.from(values, (_, k) => k).sort((i, j) => (values[j] === values[i] ? i - j : values[j] - values[i]));
 }

@@ -18,6 +18,8 @@ export const N_POINTS = 199; // even samples from which the phases are computed
  * @typedef {Object} Shapes segments and points of m movements, see `shapes`
  * @property {Float32Array} segments m times K times (tangent, midpoint, turning angle / pi)
  * @property {Float32Array} points m times P times (point, turning angle / pi, tangent)
+ * @property {number} n_segments K
+ * @property {number} n_points P
  */
 
 /**
@@ -88,7 +90,7 @@ function forcing(path, d, operator, translation) {
  */
 export function featureRows(path, how, arrays) {
   const d = how.n_dims;
-  return how.by_rows.map((one, r) => {
+  return how.by_rows.map((one) => {
     const matrix = one.resample === undefined ? undefined : arrays[one.resample];
     const single = Float32Array.from(normalized(along(path, d, one, matrix), d, how));
     if (one.quantity !== "forcing") return single;
@@ -159,7 +161,10 @@ function units(n, d, vector) {
   const found = new Float64Array(n * d);
   for (let p = 0; p < n; p++) {
     let square = 0;
-    for (let k = 0; k < d; k++) square += (found[p * d + k] = vector(p, k)) ** 2;
+    for (let k = 0; k < d; k++) {
+      found[p * d + k] = vector(p, k);
+      square += found[p * d + k] ** 2;
+    }
     const length = Math.sqrt(square);
     for (let k = 0; k < d; k++) found[p * d + k] = length > NO_LENGTH ? found[p * d + k] / length : 0;
   }

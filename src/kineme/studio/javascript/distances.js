@@ -19,6 +19,13 @@ const FAR = 1e300;
  * @property {number} turning_weight of segments
  * @property {number} cloud_turning_weight of points
  * @property {number} line_weight
+ *
+ * @callback WritePairDistances writes three squares
+ * @param {import("./description.js").Shapes} others
+ * @param {number} j of one of them
+ * @param {Float64Array} R the rotation that brings it onto the one movement
+ * @param {Float64Array} squares
+ * @returns {void}
  */
 
 /**
@@ -28,8 +35,7 @@ const FAR = 1e300;
  * @param {import("./description.js").Shapes} own of the one movement
  * @param {boolean} cloud whether the point cloud is wanted
  * @param {boolean} elastic whether the others are
- * @returns {function(import("./description.js").Shapes, number, Float64Array, Float64Array): void} of the others, the
- *   number of one of them and the rotation that brings it onto the one movement, it writes three squares
+ * @returns {WritePairDistances}
  */
 export function pairDistances(how, d, own, cloud = true, elastic = true) {
   const { n_segments: K, n_points: P, band } = how;

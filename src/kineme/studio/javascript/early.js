@@ -67,7 +67,7 @@ function decision(confidence, patience) {
 
 /**
  * Follows one movement; see `kineme.Recognizer.stream`.
- * @param {ReturnType<typeof hypotheses>} stored
+ * @param {ReturnType<typeof import("./hypotheses.js").hypotheses>} stored
  * @param {{confidence?: number, patience?: number}} [options]
  */
 export function follow(stored, { confidence = 0.9, patience = 0.05 } = {}) {

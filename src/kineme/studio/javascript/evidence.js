@@ -1,4 +1,5 @@
-// How much speaks for each beginning of a stored movement, and with it for each class; see kineme.recognition.early.evidence.
+// How much speaks for each beginning of a stored movement, and with it for each class.
+// See kineme.recognition.early.evidence.
 
 import { argmax, finiteLog, logSumExp, product, softmax } from "./arrays.js";
 import { describePath } from "./description.js";

@@ -24,8 +24,8 @@ export function beginnings(paths, d, progress, how) {
   const [S, G, n] = [how.n_segments + 1, progress.length, paths.length / (d * N_POINTS)];
   const room = (size) => new Float64Array(n * G * size);
   const [squares, sizes, lengths, elapsed, endSpeeds] = [1, 1, 1, 1, 1].map(room);
-  const found = { rows: new Float32Array(n * G * d * S), timing: room(S), shapes: roomForShapes(n * G, d, how) };
-  Object.assign(found, { squares, sizes, lengths, elapsed, endSpeeds });
+  const [rows, timing, shapes] = [new Float32Array(n * G * d * S), room(S), roomForShapes(n * G, d, how)];
+  const found = { rows, timing, shapes, squares, sizes, lengths, elapsed, endSpeeds };
   const even = linspace(0, 1, N_POINTS);
   for (let i = 0; i < n; i++) {
     const path = paths.subarray(i * d * N_POINTS, (i + 1) * d * N_POINTS);
@@ -56,7 +56,10 @@ function describeBeginning(found, at, own, times, d, S) {
   for (let k = 0; k < d; k++) {
     const row = own.subarray(k * S, (k + 1) * S);
     const mean = row.reduce((sum, x) => sum + x, 0) / S;
-    for (let t = 0; t < S; t++) total += (row[t] -= mean) ** 2;
+    for (let t = 0; t < S; t++) {
+      row[t] -= mean;
+      total += row[t] ** 2;
+    }
   }
   found.sizes[at] = Math.sqrt(total / S);
   const per = 1 / ((found.sizes[at] || 1) * Math.sqrt(S));

@@ -22,10 +22,11 @@ const LARGEST = 1e100; // position, and 1e50 s: squares of larger numbers may ov
  * @returns {Movement}
  */
 export function movement(times, positions, d) {
-  const flat =
-    typeof positions[0] === "object"
-      ? Float64Array.from(Array.from(positions, (one) => [...one]).flat())
-      : Float64Array.from(positions);
+  /** @type {(number|number[])[]} */
+  const rows = Array.from(/** @type {ArrayLike<number|ArrayLike<number>>} */ (positions), (row) =>
+    typeof row === "number" ? row : Array.from(row),
+  );
+  const flat = Float64Array.from(rows.flat());
   const t = Float64Array.from(times);
   if (t.length < MIN_SAMPLES) throw new Error(`expected at least ${MIN_SAMPLES} samples, got ${t.length}; draw longer`);
   if (flat.length !== t.length * d) {
@@ -197,7 +198,7 @@ function separated(one) {
   return { times: stamps, positions: means, d };
 }
 
-/** Whether each sample belongs to the group of the one before; a group that is longer than a step is a dense stretch. */
+/** Tell whether each sample is in the group of the one before; a group longer than a step is a dense stretch. */
 function joined(times, gaps, step) {
   const T = times.length;
   const merged = new Uint8Array(T);

@@ -13,7 +13,7 @@ export function openPrimitive(text) {
   const end = rollout(snapshot, one).velocities.at(-1);
   return {
     ...one,
-    /** @param {{start?: number[], goal?: number[], duration?: number, via?: [number, number[]][], samples?: number}} [asked] */
+    /** @param {import("./rollout.js").Wish} [asked] */
     rollout: (asked = {}) => {
       const { duration = one.duration } = asked;
       return rollout(snapshot, one, { ...asked, endVelocity: end.map((v) => (v * one.duration) / duration) });

@@ -236,7 +236,7 @@ export function recognize(known, one, errorRate = 0.05) {
   const m = known.stored.m;
   const shares = SHARES[how.mean](Float64Array.from(how.widths, (_, r) => compared.logs[r * m + nearest[0].index]));
   const responsibilities = {};
-  how.names.forEach((name, r) => (responsibilities[name] = (responsibilities[name] ?? 0) + shares[r]));
+  for (const [r, name] of how.names.entries()) responsibilities[name] = (responsibilities[name] ?? 0) + shares[r];
   return {
     label: isKnown ? classes[chosen] : null,
     confidence: isKnown ? odds[shown] : 1 - p.known,

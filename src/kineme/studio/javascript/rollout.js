@@ -101,7 +101,7 @@ function step(how, formulation, state, u, h) {
   return next;
 }
 
-/** A state with a third row: x'' = K (g - x) - D x' + f + coupling (g - x0), with the values of `forcing` at its time. */
+/** A state with a third row, x'' = K (g - x) - D x' + f + coupling (g - x0); `values` are those of `forcing` then. */
 function withAcceleration({ n_basis: N, K, D }, state, values) {
   const M = N + 2;
   const whole = new Float64Array(3 * M);
@@ -177,7 +177,10 @@ export function inFormulation({ header, arrays }, one, formulation) {
   return { ...one, weights, velocity, formulation };
 }
 
-/** Weights and initial velocity that fit a path y of n_points, in which no goal pulls. */
+/**
+ * Weights and initial velocity that fit a path y of n_points, in which no goal pulls.
+ * @returns {[Float64Array, number]}
+ */
 function fitted(arrays, { n_basis: N, n_points: n }, y) {
   const weights = Float64Array.from({ length: N }, (_, i) => product(arrays.encoder, i * n, y, 0, n));
   return [weights, product(arrays["encoder velocity"], 0, y, 0, n)];
@@ -200,7 +203,7 @@ export function encode({ header, arrays }, one) {
   const [start, goal] = [at(0), at(times.length - 1)];
   const duration = times[times.length - 1] - times[0];
   const weights = new Float64Array(d * how.n_basis);
-  const velocity = start.map((x, k) => {
+  const velocity = start.map((_, k) => {
     const [own, v0] = fitted(
       arrays,
       how,
@@ -209,8 +212,8 @@ export function encode({ header, arrays }, one) {
     weights.set(own, k * how.n_basis);
     return v0 / duration;
   });
-  const extents = start.map((x, k) => {
-    let [low, high] = [x, x];
+  const extents = start.map((first, k) => {
+    let [low, high] = [first, first];
     for (let j = k; j < positions.length; j += d)
       [low, high] = [Math.min(low, positions[j]), Math.max(high, positions[j])];
     return high - low;
@@ -219,11 +222,18 @@ export function encode({ header, arrays }, one) {
 }
 
 /**
+ * @typedef {Object} Wish with an end velocity the goal is met exactly, as with via points
+ * @property {number[]} [start]
+ * @property {number[]} [goal]
+ * @property {number} [duration]
+ * @property {[number, number[]][]} [via]
+ * @property {number[]} [endVelocity]
+ * @property {number} [samples]
+ *
  * The movement to a new start and goal; see `kineme.Primitives.rollout`.
  * @param {import("./arrays.js").Snapshot} snapshot
  * @param {Primitive} one
- * @param {{start?: number[], goal?: number[], duration?: number, via?: [number, number[]][], endVelocity?: number[],
- *   samples?: number}} [asked] with an end velocity the goal is met exactly, as with via points
+ * @param {Wish} [asked]
  * @returns {{times: Float64Array, positions: number[][], velocities: number[][], accelerations: number[][]}}
  */
 export function rollout({ header, arrays }, one, asked = {}) {
@@ -258,8 +268,8 @@ export function rollout({ header, arrays }, one, asked = {}) {
 }
 
 /**
- * Change the weights as little as possible so that the movement passes the via points, and ends at its goal; by how much
- * faster it shall be there `faster` says.
+ * Change the weights as little as possible so that the movement passes the via points, and ends at its goal; by how
+ * much faster it shall be there `faster` says.
  */
 function passThrough(how, smooth, formulation, via, goal, numbers, map, faster) {
   const grid = keptDecoder(how, formulation, Math.max(how.n_points, 2 * how.n_basis));
@@ -274,7 +284,8 @@ function passThrough(how, smooth, formulation, via, goal, numbers, map, faster) 
   const missing = states.map((state, j) => map(state).map((x, k) => asked[j][k] - x));
   missing.push(faster(states.at(-1)));
   const gain = gains(smooth, [...states, states.at(-1).subarray(how.n_basis + 2)], how.n_basis);
-  numbers.forEach((own, k) => gain.forEach((row, j) => row.forEach((value, i) => (own[i] += missing[j][k] * value))));
+  for (const [k, own] of numbers.entries())
+    for (const [j, row] of gain.entries()) for (const [i, value] of row.entries()) own[i] += missing[j][k] * value;
 }
 
 /** Rows by which what is missing changes the weights: F' Q R'^-1 with F A' = Q R, see kineme.dmp.condition. */

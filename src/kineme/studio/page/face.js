@@ -2,7 +2,7 @@
 
 import { open } from "../javascript/runtime.js";
 import { breakable } from "../web/parts/breakable.js";
-import { element, make } from "./elements.js";
+import { byId, make } from "../web/parts/elements.js";
 import { createKnown } from "./known.js";
 import { createMoving, placed } from "./movements.js";
 import { boxOf, createStage } from "./stage.js";
@@ -15,11 +15,11 @@ const DRAWN = "Your drawing";
 
 const percent = (share) => `${Math.round(100 * Math.min(Math.max(share, 0), 1))} %`;
 
-const runtime = open(element("snapshot").textContent);
+const runtime = open(byId("snapshot").textContent);
 const d = runtime.header.comparison.n_dims;
 const prototypes = runtime.classes.map((name) => runtime.rollout(runtime.primitive(name)).positions);
 const box = viewed();
-const stage = createStage(element("stage"), runtime.header.view, box);
+const stage = createStage(byId("stage"), runtime.header.view, box);
 const state = {
   stroke: null,
   live: null,
@@ -63,9 +63,10 @@ function paint() {
     stage.dot(state.live.path.at(-1), "--predicted", { radius: 6 });
   }
   if (moving && !stroke) paintMoving(moving);
-  element("hint").hidden = Boolean(stroke || moving || answer);
-  for (const id of ["play", "save"]) element(id).disabled = !moving || Boolean(stroke);
-  element("clear").disabled = !moving && !answer;
+  byId("hint").hidden = Boolean(stroke || moving || answer);
+  byId("play").disabled = !moving || Boolean(stroke);
+  byId("save").disabled = byId("play").disabled;
+  byId("clear").disabled = !moving && !answer;
 }
 
 function paintMoving(moving) {
@@ -80,12 +81,12 @@ function paintMoving(moving) {
 
 /** Words of the answer, and how sure it is; a reader of the screen is told once for each verdict. */
 function say(verdict, reason, kind = "", sure = "") {
-  element("certainty").textContent = sure && sure[0].toUpperCase() + sure.slice(1);
-  const said = element("verdict");
+  byId("certainty").textContent = sure && sure[0].toUpperCase() + sure.slice(1);
+  const said = byId("verdict");
   if (said.textContent !== verdict) said.replaceChildren(...breakable(verdict));
   said.title = verdict;
   said.className = kind;
-  element("reason").textContent = state.note || reason;
+  byId("reason").textContent = state.note || reason;
 }
 
 function showLive() {
@@ -132,8 +133,8 @@ function showAnswer() {
 
 /** The numbers, for who asks. */
 function why(reasons) {
-  element("why").hidden = !reasons.length;
-  element("numbers").replaceChildren(...reasons.map((textContent) => make("p", { textContent })));
+  byId("why").hidden = !reasons.length;
+  byId("numbers").replaceChildren(...reasons.map((text) => make("p", {}, text)));
 }
 
 /** The most likely ones, if it is a known one; always as many rows; names are text. */
@@ -141,12 +142,12 @@ function bars(probabilities) {
   const shown = Object.entries(probabilities)
     .sort((a, b) => b[1] - a[1])
     .slice(0, ROWS);
-  [...element("bars").children].forEach((row, i) => {
+  [...byId("bars").children].forEach((row, i) => {
     const [name, track, value] = row.children;
     const [label, share] = shown[i] ?? ["", 0];
     name.textContent = label;
     value.textContent = label && percent(share);
-    track.firstChild.style.width = `${100 * share}%`;
+    /** @type {HTMLElement} */ (track.firstElementChild).style.width = `${100 * share}%`;
   });
 }
 
@@ -171,8 +172,7 @@ function clear() {
 function show(name, what, place) {
   try {
     state.moving = createMoving(runtime, name, what, place);
-    if (element("formulation").value)
-      state.note = state.moving.update({ formulation: element("formulation").value }) ?? "";
+    if (byId("formulation").value) state.note = state.moving.update({ formulation: byId("formulation").value }) ?? "";
   } catch (error) {
     state.moving = null;
     state.note = error.message;
@@ -209,14 +209,14 @@ function finish() {
 }
 
 const placeOf = (event) => {
-  const { left, top } = element("stage").getBoundingClientRect();
+  const { left, top } = byId("stage").getBoundingClientRect();
   return [event.clientX - left, event.clientY - top];
 };
 
 function down(event) {
   const palm = state.kind === "touch" && event.pointerType === "pen"; // the hand came to rest before the pen
   if ((state.pointer !== null && !palm) || event.button > 0) return;
-  element("stage").setPointerCapture(event.pointerId);
+  byId("stage").setPointerCapture(event.pointerId);
   state.pointer = event.pointerId;
   state.kind = event.pointerType;
   state.played = null;
@@ -258,7 +258,7 @@ function move(event) {
 }
 
 function hover(event) {
-  element("stage").classList.toggle("over", Boolean(state.moving?.held(stage, placeOf(event))));
+  byId("stage").classList.toggle("over", Boolean(state.moving?.held(stage, placeOf(event))));
 }
 
 function up(event) {
@@ -279,7 +279,7 @@ function key(event) {
   else if (event.key === " ") play();
   else if (event.key in ARROWS && state.moving) {
     const part = event.shiftKey ? "start" : "goal";
-    const step = STEP * element("stage").clientHeight;
+    const step = STEP * byId("stage").clientHeight;
     const at = stage.project(state.moving[part]);
     const [x, y] = ARROWS[event.key].map((one, k) => at[k] + one * step);
     state.note = state.moving.update({ [part]: stage.unproject(x, y, state.moving[part]) }) ?? "";
@@ -298,7 +298,8 @@ function play() {
   const duration = moving.times.at(-1);
   const step = (now) => {
     if (state.moving !== moving || state.pointer !== null) return;
-    const share = still ? 1 : Math.min(Math.max(now - begun, 0) / 1000 / duration, 1); // a frame may be older than its wish
+    // A frame may be older than its wish.
+    const share = still ? 1 : Math.min(Math.max(now - begun, 0) / 1000 / duration, 1);
     state.played = share < 1 || still ? Math.round(share * (moving.positions.length - 1)) : null;
     later();
     if (share < 1) requestAnimationFrame(step);
@@ -316,39 +317,39 @@ function save() {
 }
 
 /** By how much the view is turned and tilted [degrees]. */
-const turned = () => ["turn", "tilt"].map((id) => Number(element(id).value));
+const turned = () => [Number(byId("turn").value), Number(byId("tilt").value)];
 
 function start() {
   for (let i = 0; i < ROWS; i++) {
-    element("bars").append(
+    byId("bars").append(
       make(
         "li",
         {},
-        make("span", { className: "name" }),
-        make("span", { className: "track" }, make("i")),
-        make("span", { className: "value" }),
+        make("span", { class: "name" }),
+        make("span", { class: "track" }, make("i")),
+        make("span", { class: "value" }),
       ),
     );
   }
-  for (const name of runtime.formulations)
-    element("formulation").append(make("option", { value: name, textContent: name }));
-  element("formulation").value = runtime.header.movements.formulation;
-  element("how").hidden = runtime.formulations.length < 2;
-  for (const label of document.querySelectorAll(".turn")) label.hidden = d === 2;
-  const canvas = element("stage");
+  for (const name of runtime.formulations) byId("formulation").append(make("option", { value: name }, name));
+  byId("formulation").value = runtime.header.movements.formulation;
+  byId("how").hidden = runtime.formulations.length < 2;
+  for (const label of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll(".turn")))
+    label.hidden = d === 2;
+  const canvas = byId("stage");
   const listeners = { pointerdown: down, pointermove: move, pointerup: up, pointercancel: up, keydown: key };
   for (const [name, listener] of Object.entries(listeners)) canvas.addEventListener(name, listener);
-  element("clear").addEventListener("click", clear);
-  element("play").addEventListener("click", play);
-  element("save").addEventListener("click", save);
-  element("formulation").addEventListener("change", (event) => {
-    state.note = state.moving?.update({ formulation: event.target.value }) ?? "";
+  byId("clear").addEventListener("click", clear);
+  byId("play").addEventListener("click", play);
+  byId("save").addEventListener("click", save);
+  byId("formulation").addEventListener("change", () => {
+    state.note = state.moving?.update({ formulation: byId("formulation").value }) ?? "";
     showAnswer();
     later();
   });
   for (const id of ["turn", "tilt"])
-    element(id).addEventListener("input", () => {
-      stage.turned(...turned());
+    byId(id).addEventListener("input", () => {
+      stage.turned(turned());
       known.paint(turned());
       later();
     });
@@ -367,4 +368,4 @@ function start() {
 }
 
 start();
-window.kineme = { runtime, state, stage };
+Object.assign(window, { kineme: { runtime, state, stage } });

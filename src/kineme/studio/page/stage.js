@@ -3,10 +3,14 @@
 const RADIUS = 9; // of start and goal [CSS pixels]
 const FILLED = 0.4; // of the shorter side, by half of a typical movement
 
-/** Rotation matrix of a view: a first one, turned about what is up on the screen, then tilted. */
-function viewOf(first, turn, tilt) {
+/**
+ * Rotation matrix of a view: a first one, turned about what is up on the screen, then tilted.
+ * @param {number[]} first
+ * @param {number[]} angles [degrees]
+ */
+function viewOf(first, angles) {
   if (first.length === 4) return first;
-  const [a, b] = [turn, tilt].map((one) => (one * Math.PI) / 180);
+  const [a, b] = angles.map((angle) => (angle * Math.PI) / 180);
   const [right, up, near] = [0, 1, 2].map((k) => first.slice(3 * k, 3 * k + 3));
   const mix = (u, x, v, y) => u.map((one, k) => x * one + y * v[k]);
   const behind = mix(near, Math.cos(a), right, -Math.sin(a));
@@ -25,7 +29,7 @@ function viewOf(first, turn, tilt) {
 export function createStage(canvas, view, box) {
   const d = box.center.length;
   const context = canvas.getContext("2d");
-  let [width, height, R] = [1, 1, viewOf(view, 0, 0)];
+  let [width, height, R] = [1, 1, viewOf(view, [0, 0])];
   let style = getComputedStyle(canvas);
   const scale = () => (FILLED * Math.min(width, height)) / box.half;
   const rotated = (x) =>
@@ -46,7 +50,10 @@ export function createStage(canvas, view, box) {
   function line(points, color, { wide = 3, dashed = false } = {}) {
     if (points.length < 2) return;
     context.beginPath();
-    points.forEach((x, i) => context[i ? "lineTo" : "moveTo"](...project(x)));
+    for (const x of points) {
+      const [px, py] = project(x);
+      context.lineTo(px, py);
+    }
     context.strokeStyle = style.getPropertyValue(color);
     context.lineWidth = wide;
     context.lineJoin = context.lineCap = "round";
@@ -57,7 +64,8 @@ export function createStage(canvas, view, box) {
 
   function dot(x, color, { radius = RADIUS, hollow = false, edge = 3 } = {}) {
     context.beginPath();
-    context.arc(...project(x), radius, 0, 2 * Math.PI);
+    const [px, py] = project(x);
+    context.arc(px, py, radius, 0, 2 * Math.PI);
     context.fillStyle = style.getPropertyValue(hollow ? "--surface" : color);
     context.fill();
     context.lineWidth = edge;
@@ -76,9 +84,9 @@ export function createStage(canvas, view, box) {
     context.lineWidth = 4;
     context.strokeStyle = style.getPropertyValue("--surface");
     context.fillStyle = style.getPropertyValue(color);
-    const at = [px + (left ? -1 : 1) * (RADIUS + 7), py + 5];
-    context.strokeText(text, ...at);
-    context.fillText(text, ...at);
+    const at = px + (left ? -1 : 1) * (RADIUS + 7);
+    context.strokeText(text, at, py + 5);
+    context.fillText(text, at, py + 5);
   }
 
   function cleared() {
@@ -92,7 +100,10 @@ export function createStage(canvas, view, box) {
     context.clearRect(0, 0, width, height);
   }
 
-  const turned = (turn, tilt) => (R = viewOf(view, turn, tilt));
+  /** Turn and tilt the view. @param {number[]} angles [degrees] */
+  function turned(angles) {
+    R = viewOf(view, angles);
+  }
   return { project, unproject, line, dot, word, cleared, turned };
 }
 

@@ -14,7 +14,8 @@ import { startRobot } from "./robot/view.js";
 
 const AWAY = "The server does not answer. What you draw stays here; trying again.";
 const ANEW =
-  "The studio was started anew, with another token. Open the address that it printed; what you drew here stays until then.";
+  "The studio was started anew, with another token. Open the address that it printed; " +
+  "what you drew here stays until then.";
 
 /** The last part of a folder's path. @param {string} folder */
 const lastPart = (folder) =>
@@ -51,8 +52,15 @@ const live = new Live({
   source: draw.source,
   error: (text) => draw.error(text) || say(text, { failed: true }),
   changed: (version) => version !== library().version && tried(refresh),
-  here: () => (connected(true), draw.renewed(), tried(refresh)),
-  away: () => (connected(false), draw.lost()),
+  here: () => {
+    connected(true);
+    draw.renewed();
+    tried(refresh);
+  },
+  away: () => {
+    connected(false);
+    draw.lost();
+  },
 });
 tried(refresh); // without waiting for the websocket
 startLibrary();

@@ -1,9 +1,11 @@
 // The page's script: time moves the arm, the trace of its tip, and the cursors of the charts.
-"use strict";
 (() => {
   const data = JSON.parse(document.getElementById("data").textContent);
   const byId = (id) => document.getElementById(id);
-  const [play, slider, now, speed, reset, canvas] = ["play", "time", "now", "speed", "reset", "canvas"].map(byId);
+  const [play, now, canvas] = ["play", "now", "canvas"].map(byId);
+  const reset = /** @type {HTMLButtonElement} */ (byId("reset"));
+  const slider = /** @type {HTMLInputElement} */ (byId("time"));
+  const speed = /** @type {HTMLSelectElement} */ (byId("speed"));
   const times = data.times;
   const duration = times[times.length - 1];
   const charts = [...document.querySelectorAll(".chart")].map((chart) => ({
@@ -28,6 +30,7 @@
     return share === 1 ? [high, 0] : [low, share];
   }
 
+  /** A row between samples. @param {number[][]} rows @param {number[]} sample */
   function between(rows, [i, share]) {
     return share === 0 ? rows[i] : rows[i].map((value, k) => value + share * (rows[i + 1][k] - value));
   }
@@ -38,11 +41,11 @@
     const joints = between(data.positions, sample);
     const values = [...joints, ...data.steps.map((channel) => channel[sample[0]])];
     const said = `${time.toFixed(2)} s`;
-    slider.value = (Number(slider.max) * time) / duration;
+    slider.value = String((Number(slider.max) * time) / duration);
     slider.setAttribute("aria-valuetext", `${time.toFixed(2)} of ${duration.toFixed(2)} seconds`);
     now.textContent = said + (time < data.begins ? " approach" : "");
     charts.forEach((chart, k) => {
-      const x = (chart.width * time) / duration;
+      const x = String((chart.width * time) / duration);
       chart.cursor.setAttribute("x1", x);
       chart.cursor.setAttribute("x2", x);
       const unit = chart.output.dataset.unit;
@@ -72,14 +75,15 @@
   });
   play.addEventListener("click", () => setPlaying(last === null));
   document.addEventListener("keydown", (event) => {
-    if (event.key !== " " || event.target.closest("button, select, summary")) return;
+    const target = /** @type {Element} */ (event.target);
+    if (event.key !== " " || target.closest("button, select, summary")) return;
     event.preventDefault();
     setPlaying(last === null);
   });
   if (!data.wanted.length) byId("legend-wanted").hidden = true;
   show(0);
   // For tests: where the drawn arm has its tip.
-  window.kineme = { show, tip: () => view && view.tip(), frames: () => view && view.frames() };
+  Object.assign(window, { kineme: { show, tip: () => view?.tip(), frames: () => view?.frames() } });
 
   /** The scene, or null where the browser cannot draw one: the charts and the table still work. */
   function sceneOrNothing() {
@@ -89,7 +93,7 @@
       const problem = byId("problem");
       const why = error.message.replace(/\.$/, "");
       problem.textContent = `The arm cannot be drawn here: ${why}. The joints and the checks are shown.`;
-      document.querySelector(".legend").hidden = true;
+      /** @type {HTMLElement} */ (document.querySelector(".legend")).hidden = true;
       problem.hidden = false;
       reset.disabled = true;
       return null;
@@ -97,7 +101,7 @@
   }
 
   function makeScene() {
-    const T = scene; // of vendor/scene.min.js
+    const T = globalThis.scene; // of vendor/scene.min.js
     const renderer = new T.WebGLRenderer({ canvas, antialias: true });
     const world = new T.Scene();
     const camera = new T.PerspectiveCamera(40, 1, 0.01, 100);
@@ -222,18 +226,16 @@
   }
 
   function pose(arm, joints) {
-    data.joints.forEach((name, k) => arm.setJointValue(name, joints[k]));
+    for (const [k, name] of data.joints.entries()) arm.setJointValue(name, joints[k]);
   }
 
   /** The middle of what moves, and the size of the arm and its paths [m]. */
   function extent(T, arm) {
     const low = [0, 0, 0];
     const high = [0, 0, 0];
-    const include = (point) =>
-      point.forEach((value, k) => {
-        low[k] = Math.min(low[k], value);
-        high[k] = Math.max(high[k], value);
-      });
+    const include = (point) => {
+      for (const k of low.keys()) [low[k], high[k]] = [Math.min(low[k], point[k]), Math.max(high[k], point[k])];
+    };
     data.executed.forEach(include);
     data.wanted.forEach(include);
     for (const row of [

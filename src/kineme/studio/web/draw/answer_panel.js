@@ -61,13 +61,17 @@ export class AnswerPanel {
   progress(share) {
     const meter = byId("draw-progress");
     meter.setAttribute("aria-valuenow", String(Math.round(100 * share)));
-    meter.firstElementChild.style.setProperty("--share", String(share));
+    /** @type {HTMLElement} */ (meter.firstElementChild).style.setProperty("--share", String(share));
   }
 
-  /** The same while it is drawn and after: how likely each name is, if it is a known one. @param {{name: string, probability: number|null}[]} ranked */
+  /**
+   * How likely each name is, if it is a known one: the same while it is drawn and after.
+   * @param {{name: string, probability: number|null}[]} ranked
+   */
   list(ranked) {
     write(byId("ranks-kind"), "If it is a known one");
-    this.rows.forEach((one, k) => this.set(one, ranked[k]?.name ?? "\u00a0", ranked[k]?.probability ?? null));
+    for (const [k, row] of this.rows.entries())
+      this.set(row, ranked[k]?.name ?? "\u00a0", ranked[k]?.probability ?? null);
   }
 
   set(/** @type {any} */ one, /** @type {string} */ name, /** @type {number|null} */ value) {

@@ -56,5 +56,8 @@ export function followKeys(canvas, hear) {
     event.preventDefault();
   });
   canvas.addEventListener("keyup", (event) => held.delete(event.key));
-  canvas.addEventListener("blur", () => (held.clear(), lift()));
+  canvas.addEventListener("blur", () => {
+    held.clear();
+    lift();
+  });
 }

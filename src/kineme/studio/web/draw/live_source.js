@@ -35,7 +35,9 @@ export function describeLiveSource(element) {
     make(
       "p",
       { class: "small soft" },
-      "Any program can send a movement while it happens, such as a hand tracker. It is shown here, and each message is answered with what it is so far. The token is in the address that kineme studio prints; KINEME_STUDIO_TOKEN keeps one. In Python:",
+      "Any program can send a movement while it happens, such as a hand tracker. It is shown here, and each message " +
+        "is answered with what it is so far. The token is in the address that kineme studio prints; " +
+        "KINEME_STUDIO_TOKEN keeps one. In Python:",
     ),
     code(PYTHON(location.host)),
     make("p", { class: "small soft" }, "In JavaScript, with node 22 or later:"),

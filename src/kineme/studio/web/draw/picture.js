@@ -11,7 +11,10 @@ export class Picture {
     this.ink = [];
     this.rest = [];
     this.pen = null;
-    /** @type {number|null} Of the canvas when what is being drawn began [px]: ink stays under the hand whatever the window does. */
+    /**
+     * Height of the canvas when the drawing began [px]: ink stays under the hand whatever the window does.
+     * @type {number|null}
+     */
     this.height = null;
     this.replayed = null;
     this.run = {}; // of the replay that is under way
@@ -30,7 +33,7 @@ export class Picture {
 
   /** Whether what is shown is in space. */
   get turns() {
-    return this.frame !== null && this.frame.turns;
+    return this.frame?.turns ?? false;
   }
 
   /** @param {number} dx Pixels. @param {number} dy */
@@ -63,7 +66,8 @@ export class Picture {
 
   /** Show the drawing again, as fast as it was. */
   replay() {
-    const run = (this.run = {});
+    const run = {};
+    this.run = run;
     const began = performance.now();
     const duration = this.ink[this.ink.length - 1][0];
     const step = (/** @type {number} */ now) => {

@@ -20,7 +20,10 @@ export function usualSide() {
   return sides.sort((/** @type {number} */ a, /** @type {number} */ b) => a - b)[sides.length >> 1] ?? null;
 }
 
-/** @returns {number} Height of the canvas in the units of the library: a power of ten, so that it stays as the library grows. */
+/**
+ * Height of the canvas in the units of the library: a power of ten, so that it stays as the library grows.
+ * @returns {number}
+ */
 export function canvasHeight() {
   const middle = usualSide();
   return middle === null ? 1 : 10 ** Math.round(Math.log10(middle / USUAL));

@@ -78,6 +78,6 @@ export class Sources {
       );
     };
     fill(byId("sources"), ...[...this.known.values()].map(line));
-    byId("sources").querySelector(`[data-id="${focused}"] button`)?.focus();
+    /** @type {HTMLElement} */ (byId("sources").querySelector(`[data-id="${focused}"] button`))?.focus();
   }
 }

@@ -3,8 +3,14 @@
 /** @typedef {number[]} Sample [time in s, x, y]; the canvas is 1 high, y points up. */
 
 /**
+ * @typedef {Object} Hearer
+ * @property {(kind: string) => boolean} begins Tells whether one may draw.
+ * @property {(samples: Sample[]) => void} goes
+ * @property {() => void} ends
+ * @property {(at: number[]|null) => void} [pen] Where the pen of the keyboard is.
+ *
  * @param {HTMLCanvasElement} canvas
- * @param {{begins: (kind: string) => boolean, goes: (samples: Sample[]) => void, ends: () => void}} hear `begins` says whether one may draw.
+ * @param {Hearer} hear
  */
 export function followPointer(canvas, hear) {
   let pointer = null;

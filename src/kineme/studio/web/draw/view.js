@@ -30,7 +30,11 @@ function takesDrawings() {
   );
 }
 
-/** @param {number[]} point Of the canvas. @param {number} height Of the canvas, in the units of the library. @returns {number[]} In the library's dimensions. */
+/**
+ * @param {number[]} point Of the canvas.
+ * @param {number} height Of the canvas, in the units of the library.
+ * @returns {number[]} In the library's dimensions.
+ */
 const inLibrary = (point, height) => [...point.map((value) => value * height), ...(library().n_dims === 3 ? [0] : [])];
 
 class Draw {
@@ -53,9 +57,13 @@ class Draw {
   listen() {
     const hear = {
       begins: (/** @type {string} */ kind) => this.begins(kind),
-      goes: (/** @type {number[][]} */ samples) => this.drawing && this.goes(samples), // Escape ends it while the pen is down
+      // Escape ends it while the pen is down.
+      goes: (/** @type {number[][]} */ samples) => this.drawing && this.goes(samples),
       ends: () => this.drawing && this.ends(),
-      pen: (/** @type {number[]|null} */ at) => ((this.picture.pen = at), this.picture.board.draw()),
+      pen: (/** @type {number[]|null} */ at) => {
+        this.picture.pen = at;
+        this.picture.board.draw();
+      },
     };
     followPointer(byId("draw-canvas"), hear);
     followKeys(byId("draw-canvas"), hear);
@@ -72,10 +80,10 @@ class Draw {
       (event) =>
         event.key === "Escape" && currentView() === "draw" && !document.querySelector("dialog[open]") && this.clear(),
     );
-    byId("draw-how").addEventListener(
-      "click",
-      () => (byId("live-source").scrollIntoView({ block: "start" }), byId("live-source").firstElementChild.focus()),
-    );
+    byId("draw-how").addEventListener("click", () => {
+      byId("live-source").scrollIntoView({ block: "start" });
+      /** @type {HTMLElement} */ (byId("live-source").firstElementChild).focus();
+    });
     onLibrary(() => this.invite());
     describeLiveSource(byId("live-source-text"));
   }
@@ -91,7 +99,8 @@ class Draw {
         ? "Draw a movement here"
         : "Nothing is known yet";
     byId("draw-empty-text").textContent = !takes
-      ? "This library holds movements that a mouse cannot draw. Send samples from a program and see them here, or drop a recording in Recordings."
+      ? "This library holds movements that a mouse cannot draw. Send samples from a program and see them here, or " +
+        "drop a recording in Recordings."
       : symbols.length || readOnly
         ? "In one stroke, with mouse, pen or finger. What it is appears while you draw."
         : "Draw a movement in one stroke, then give it a name. One drawing is enough to be recognized again.";
@@ -232,7 +241,7 @@ class Draw {
     this.focusName();
   }
 
-  /** A keyboard of glass would cover the drawing: with a finger the field waits to be touched, as while programs move. */
+  /** A keyboard of glass covers the drawing: with a finger the field waits to be touched, as while programs move. */
   focusName() {
     if (!["touch", "program"].includes(this.kind) && currentView() === "draw") this.naming.focus();
   }
@@ -276,7 +285,7 @@ class Draw {
     this.panel.idle();
     this.naming.allow(false);
     this.naming.empty();
-    for (const id of ["draw-clear", "draw-replay", "draw-move"]) byId(id).disabled = true;
+    byId("draw-clear").disabled = byId("draw-replay").disabled = byId("draw-move").disabled = true;
     if (isLoaded()) this.invite();
   }
 }
@@ -284,7 +293,11 @@ class Draw {
 /** @param {(message: any) => boolean} send @returns {any} What hears the server. */
 export function startDraw(send) {
   const draw = new Draw(send);
-  const renewed = () => (draw.sending.renewed(), draw.follow.sources.renewed(), draw.waits && draw.askOnce());
+  const renewed = () => {
+    draw.sending.renewed();
+    draw.follow.sources.renewed();
+    if (draw.waits) draw.askOnce();
+  };
   const lost = () => draw.sending.lost();
   return {
     lost,

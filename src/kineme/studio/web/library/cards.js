@@ -18,7 +18,11 @@ function card(symbol, page) {
     checked: chosen.has(symbol.id),
     "data-key": `choose ${symbol.id}`,
   });
-  box.addEventListener("change", () => (box.checked ? chosen.add(symbol.id) : chosen.delete(symbol.id), page.chose()));
+  box.addEventListener("change", () => {
+    if (box.checked) chosen.add(symbol.id);
+    else chosen.delete(symbol.id);
+    page.chose();
+  });
   const open = make(
     "button",
     {

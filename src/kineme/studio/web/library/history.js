@@ -9,7 +9,9 @@ import { tried } from "../parts/toasts.js";
 
 /** @param {any} one A version. @param {number} seen */
 async function again(one, seen) {
-  const text = `${one.said}. The library will be as it was then. Nothing is lost: later versions stay in the history, and this can be undone.`;
+  const text =
+    `${one.said}. The library will be as it was then. Nothing is lost: later versions stay in the history, ` +
+    "and this can be undone.";
   if (await ask({ title: `Restore version ${one.number}?`, text, yes: "Restore" })) await restore(one.number, seen);
 }
 

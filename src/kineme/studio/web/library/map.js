@@ -19,7 +19,10 @@ export class MovementMap {
     this.board = new Board(byId("map"), () => this.paint());
     this.board.canvas.addEventListener("pointermove", (event) => this.point(event));
     this.board.canvas.addEventListener("pointerleave", () => this.show(-1));
-    this.board.canvas.addEventListener("click", (event) => (this.point(event), this.choose()));
+    this.board.canvas.addEventListener("click", (event) => {
+      this.point(event);
+      this.choose();
+    });
     this.board.canvas.addEventListener("keydown", (event) => this.key(event));
   }
 
@@ -66,9 +69,8 @@ export class MovementMap {
   names(pixels) {
     const { context } = this.board;
     const places = new Map();
-    this.points.forEach(
-      (point, k) => point.symbol !== null && places.set(point.symbol, [...(places.get(point.symbol) ?? []), pixels[k]]),
-    );
+    for (const [k, { symbol }] of this.points.entries())
+      if (symbol !== null) places.set(symbol, [...(places.get(symbol) ?? []), pixels[k]]);
     const chosen = this.points[this.at]?.symbol ?? null;
     const taken = places.size > MANY ? pixels.map(([x, y]) => [x - 7, x + 7, y + 4, 12]) : [];
     Object.assign(context, {
@@ -85,9 +87,13 @@ export class MovementMap {
     if (chosen !== null) this.name(chosen, places.get(chosen), []);
   }
 
-  /** @param {string} id @param {number[][]} members Their pixels. @param {number[][]} taken From where to where, on which line, how far from it; this name is added. */
+  /**
+   * @param {string} id
+   * @param {number[][]} members Their pixels.
+   * @param {number[][]} taken From where to where, on which line, how far from it; this name is added.
+   */
   name(id, members, taken) {
-    const { context, width } = this.board;
+    const { context } = this.board;
     const name = symbolOf(id)?.name ?? "";
     const short = name.length > 18 ? `${name.slice(0, 17)}…` : name;
     const half = context.measureText(short).width / 2 + 4;

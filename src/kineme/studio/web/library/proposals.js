@@ -71,6 +71,14 @@ function card(proposal, movements) {
   );
 }
 
+/** @param {number} count */
+function groups(count) {
+  if (count > 1) return `${count} groups of them may be a symbol each.`;
+  return count
+    ? "One group of them may be a symbol."
+    : "They form no clear groups yet; choose those that belong together under Show all.";
+}
+
 export async function showProposals() {
   const { unlabeled: count, version } = library();
   byId("proposals").hidden = count === 0;
@@ -79,7 +87,6 @@ export async function showProposals() {
   const movements = await tried(unlabeled);
   if (!answer || !movements || version !== library().version) return;
   const { proposals } = answer;
-  byId("proposals-text").textContent =
-    `${counted(count, "movement")} without a name. ${proposals.length > 1 ? `${proposals.length} groups of them may be a symbol each.` : proposals.length ? "One group of them may be a symbol." : "They form no clear groups yet; choose those that belong together under Show all."}`;
+  byId("proposals-text").textContent = `${counted(count, "movement")} without a name. ${groups(proposals.length)}`;
   keepingFocus(() => fill(byId("proposal-cards"), ...proposals.map((/** @type {any} */ one) => card(one, movements))));
 }

@@ -30,19 +30,26 @@ async function forget(symbol) {
 
 /** @param {any} symbol */
 function description(symbol) {
-  const field = make("textarea", { rows: 2, maxlength: "2000", placeholder: "What it means, for people and planners" });
+  const placeholder = "What it means, for people and planners";
+  const field = make("textarea", { rows: 2, maxlength: "2000", placeholder });
   field.value = symbol.description ?? "";
   field.addEventListener("change", () => changes.describe(symbol.id, field.value));
   return make("label", { class: "field" }, make("span", {}, "Description"), field);
 }
 
-/** What can be done with chosen movements. @param {any} symbol Or null of those without one. @param {Members} members */
+/**
+ * What can be done with chosen movements.
+ * @param {any} symbol Or null of those without one.
+ * @param {Members} members
+ */
 function actions(symbol, members) {
   const ids = () => members.ids();
   const name = (/** @type {string} */ title) =>
     ask({
       title,
-      text: `${counted(ids().length, "movement")} chosen. A name that exists is that symbol, another one is a new symbol.`,
+      text:
+        `${counted(ids().length, "movement")} chosen. A name that exists is that symbol, ` +
+        "another one is a new symbol.",
       yes: "Give the name",
       name: "",
     });
@@ -80,7 +87,10 @@ function actions(symbol, members) {
   return [...made, button("Delete", drop, "danger")];
 }
 
-/** The side panel of a symbol, or of the movements without one; in a narrow window a sheet at the lower edge, which closes. */
+/**
+ * The side panel of a symbol, or of the movements without one; in a narrow window a sheet at the lower edge, which
+ * closes.
+ */
 export class SymbolPanel {
   /** @param {(id: string) => void} closed */
   constructor(closed) {
@@ -153,7 +163,10 @@ export class SymbolPanel {
 
   /** @param {any} symbol */
   head(symbol) {
-    const moveIt = () => (chooseToMove(symbol.id), show("move", true));
+    const moveIt = () => {
+      chooseToMove(symbol.id);
+      show("move", true);
+    };
     const { read_only: readOnly } = library();
     const facts = symbol.duration ? `${Number(symbol.duration).toFixed(1)} s` : "";
     return [
@@ -190,7 +203,8 @@ export class SymbolPanel {
           {},
           library().read_only
             ? "Here its movements are shown."
-            : "Here it can be renamed, described and deleted; its movements can be split off or given to another symbol. Everything can be undone.",
+            : "Here it can be renamed, described and deleted; its movements can be split off or given to another " +
+                "symbol. Everything can be undone.",
         ),
       ),
     );

@@ -28,11 +28,10 @@ async function mergeChosen() {
 }
 
 export function startLibrary() {
-  const panel = new SymbolPanel(
-    (id) => (
-      marked(null), /** @type {any} */ (document.querySelector(`[data-key="${CSS.escape(`open ${id}`)}"]`))?.focus()
-    ),
-  );
+  const panel = new SymbolPanel((id) => {
+    marked(null);
+    /** @type {HTMLElement} */ (document.querySelector(`[data-key="${CSS.escape(`open ${id}`)}"]`))?.focus();
+  });
   const map = new MovementMap((id) => open(id));
   const chose = () => {
     byId("merging").hidden = library().symbols.length < 2;
@@ -55,8 +54,9 @@ export function startLibrary() {
     shown = library().version;
     const nothing = library().n_movements === 0;
     byId("library-empty").hidden = library().symbols.length > 0;
+    const advice = nothing ? "Draw one and name it, or drop recordings." : "Name movements that are here, or draw one.";
     byId("library-empty-text").textContent =
-      `A symbol is a movement with a name. ${library().read_only ? "This library holds none." : nothing ? "Draw one and name it, or drop recordings." : "Name movements that are here, or draw one."}`;
+      `A symbol is a movement with a name. ${library().read_only ? "This library holds none." : advice}`;
     byId("library-head").hidden = !library().symbols.length;
     byId("history").hidden = byId("symbol").hidden = nothing;
     panel.show();

@@ -6,11 +6,20 @@ const STEP = 6; // of an arrow key [px]; ten times with Shift
 const KEYS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 
 /**
- * @typedef {{key: string, kind: string, name: string, at: () => number[], move: (point: number[]) => void, remove?: () => void}} Handle
+ * @typedef {Object} Handle
+ * @property {string} key
+ * @property {string} kind
+ * @property {string} name
+ * @property {() => number[]} at
+ * @property {(point: number[]) => void} move
+ * @property {() => void} [remove]
  */
 
 export class Handles {
-  /** @param {import("../parts/camera.js").Camera} camera @param {{moving: (on: boolean) => void, said: (value: number) => string}} page */
+  /**
+   * @param {import("../parts/camera.js").Camera} camera
+   * @param {{moving: (on: boolean) => void, said: (value: number) => string}} page
+   */
   constructor(camera, page) {
     this.camera = camera;
     this.page = page;

@@ -16,7 +16,10 @@ export class MovePicture {
     this.plan = null;
     this.time = null;
     this.board = new Board(byId("move-canvas"), () => this.paint());
-    this.board.resized = () => (this.fit(), turned());
+    this.board.resized = () => {
+      this.fit();
+      turned();
+    };
     this.turned = turned;
     followTurns(
       this.board.canvas,

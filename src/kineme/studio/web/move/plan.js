@@ -1,10 +1,21 @@
 // What the movement shall do: where from, where to, past what, how fast.
 
 /**
- * @typedef {{symbol: string, start: number[], goal: number[], path: number[][], reach: number[], usual: number, share: number,
- *   style: number[]|null, styled?: string, via: {at: number, point: number[]}[], obstacles: {center: number[], radius: number}[]}} Plan
- *   `reach` is the demonstrated way from start to goal; `usual` is the demonstrated duration [s]; `share` stretches it;
- *   `styled` is the formulation of the style.
+ * @typedef {{at: number, point: number[]}} ViaPoint
+ * @typedef {{center: number[], radius: number}} Obstacle
+ *
+ * @typedef {Object} Plan
+ * @property {string} symbol
+ * @property {number[]} start
+ * @property {number[]} goal
+ * @property {number[][]} path
+ * @property {number[]} reach The demonstrated way from start to goal.
+ * @property {number} usual The demonstrated duration [s].
+ * @property {number} share By which the duration is stretched.
+ * @property {number[]|null} style
+ * @property {string} [styled] The formulation of the style.
+ * @property {ViaPoint[]} via
+ * @property {Obstacle[]} obstacles
  */
 
 /** From start to goal. @param {{start: number[], goal: number[]}} plan */
@@ -42,7 +53,10 @@ export function extent(path) {
   return Math.hypot(...spans) || 1;
 }
 
-/** A coordinate as far as it matters in a movement of a size. @param {number} value @param {number} size @returns {string} */
+/**
+ * A coordinate as far as it matters in a movement of a size.
+ * @param {number} value @param {number} size @returns {string}
+ */
 export const rounded = (value, size) =>
   String(Number(value.toFixed(Math.min(Math.max(Math.ceil(2.2 - Math.log10(size)), 0), 12))));
 

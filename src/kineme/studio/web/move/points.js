@@ -5,7 +5,13 @@ import { extent, rounded } from "./plan.js";
 
 const AXES = ["x", "y", "z"];
 
-/** @param {string} label @param {string} key @param {string} value @param {(value: number) => void} set @param {Record<string, any>} more */
+/**
+ * @param {string} label
+ * @param {string} key
+ * @param {string} value
+ * @param {(value: number) => void} set
+ * @param {Record<string, string>} more
+ */
 function number(label, key, value, set, more = {}) {
   const field = make("input", {
     type: "number",
@@ -19,10 +25,20 @@ function number(label, key, value, set, more = {}) {
   return field;
 }
 
-/** @param {string} name @param {number[]} point @param {(value: number) => string} short @param {() => void} changed @param {(()=>void)|null} remove @param {...any} more */
+/**
+ * @param {string} name
+ * @param {number[]} point
+ * @param {(value: number) => string} short
+ * @param {() => void} changed
+ * @param {(() => void)|null} remove
+ * @param {...HTMLElement} more
+ */
 function row(name, point, short, changed, remove, ...more) {
   const fields = point.map((value, k) =>
-    number(`${name} ${AXES[k] ?? k}`, `${name} ${k}`, short(value), (typed) => ((point[k] = typed), changed())),
+    number(`${name} ${AXES[k] ?? k}`, `${name} ${k}`, short(value), (typed) => {
+      point[k] = typed;
+      changed();
+    }),
   );
   const away =
     remove &&
@@ -40,46 +56,59 @@ function row(name, point, short, changed, remove, ...more) {
   );
 }
 
-/** @param {any} plan @param {() => void} changed After a number; `structure` true where a point went away. @param {() => void} removed */
+/**
+ * @param {import("./plan.js").Plan} plan
+ * @param {() => void} changed After a number.
+ * @param {() => void} removed After a point went away.
+ */
 export function showPoints(plan, changed, removed) {
   const size = extent(plan.path);
   const short = (/** @type {number} */ value) => rounded(value, size);
-  const drop = (/** @type {any[]} */ list, /** @type {number} */ k) => () => (list.splice(k, 1), removed());
-  const via = plan.via.map((/** @type {any} */ one, /** @type {number} */ k) =>
+  const drop = (/** @type {Object[]} */ points, /** @type {number} */ k) => () => {
+    points.splice(k, 1);
+    removed();
+  };
+  const via = plan.via.map((via, k) =>
     row(
       `Via ${k + 1}`,
-      one.point,
+      via.point,
       short,
       changed,
       drop(plan.via, k),
       number(
         `Via ${k + 1} when, percent of the duration`,
         `via ${k} when`,
-        rounded(100 * one.at, 100),
-        (at) => ((one.at = Math.min(Math.max(at / 100, 0.01), 0.99)), changed()),
+        rounded(100 * via.at, 100),
+        (at) => {
+          via.at = Math.min(Math.max(at / 100, 0.01), 0.99);
+          changed();
+        },
         { min: "1", max: "99", title: "When, percent of the duration" },
       ),
     ),
   );
-  const obstacles = plan.obstacles.map((/** @type {any} */ one, /** @type {number} */ k) =>
+  const obstacles = plan.obstacles.map((obstacle, k) =>
     row(
       `Obstacle ${k + 1}`,
-      one.center,
+      obstacle.center,
       short,
       changed,
       drop(plan.obstacles, k),
       number(
         `Obstacle ${k + 1} radius`,
         `obstacle ${k} radius`,
-        short(one.radius),
-        (radius) => ((one.radius = Math.abs(radius) || one.radius), changed()),
+        short(obstacle.radius),
+        (radius) => {
+          obstacle.radius = Math.abs(radius) || obstacle.radius;
+          changed();
+        },
         { min: "0", title: "Radius" },
       ),
     ),
   );
   const extra = via.length || obstacles.length;
   const heads = [
-    ...plan.start.map((/** @type {number} */ _, /** @type {number} */ k) => AXES[k] ?? String(k + 1)),
+    ...plan.start.map((_, k) => AXES[k] ?? String(k + 1)),
     ...(extra ? [via.length && obstacles.length ? "%, radius" : via.length ? "when %" : "radius"] : []),
   ];
   const head = make(

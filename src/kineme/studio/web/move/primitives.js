@@ -13,15 +13,21 @@ async function ask(what, formulation) {
   return document && openPrimitive(document);
 }
 
-/** @param {any} what @param {string} formulation @param {number} version Of the library. @returns {Promise<any>} Null where only the server knows. */
+/**
+ * @param {any} what
+ * @param {string} formulation
+ * @param {number} version Of the library.
+ * @returns {Promise<any>} Null where only the server knows.
+ */
 export function primitiveOf(what, formulation, version) {
   const key = JSON.stringify([what, formulation, version]);
   if (!known.has(key)) {
     if (known.size > 60) known.clear();
-    known.set(
-      key,
-      ask(what, formulation).catch(() => (known.delete(key), null)),
-    ); // next time it is asked again
+    const failed = () => {
+      known.delete(key); // next time it is asked again
+      return null;
+    };
+    known.set(key, ask(what, formulation).catch(failed));
   }
   return /** @type {Promise<any>} */ (known.get(key));
 }

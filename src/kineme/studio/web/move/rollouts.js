@@ -1,4 +1,5 @@
-// The newest path of each formulation: at once by the runtime, with what is to be said of it from the server; never an old one after a new one.
+// The newest path of each formulation: at once by the runtime, with what is to be said of it from the server; never an
+// old one after a new one.
 import { post } from "../parts/api.js";
 import { library } from "../parts/library_state.js";
 import { question, what } from "./plan.js";
@@ -40,7 +41,8 @@ export class Rollouts {
   /** @param {any} plan */
   async prepare(plan) {
     this.primitive = null;
-    const key = (this.preparing = JSON.stringify(what(plan)));
+    const key = JSON.stringify(what(plan));
+    this.preparing = key;
     const primitive = await primitiveOf(what(plan), this.formulation, library().version);
     if (this.preparing === key) this.primitive = primitive;
   }

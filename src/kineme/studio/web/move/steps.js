@@ -18,7 +18,11 @@ export class Steps {
     if (this.kept.length > KEPT) this.kept.shift();
   }
 
-  /** Make a plan what it was before the last change. @param {import("./plan.js").Plan} plan @returns {boolean} Whether there was one. */
+  /**
+   * Make a plan what it was before the last change.
+   * @param {import("./plan.js").Plan} plan
+   * @returns {boolean} Whether there was one.
+   */
   back(plan) {
     if (this.kept.length < 2) return false;
     this.kept.pop();

@@ -12,13 +12,14 @@ async function stylesOf(symbol) {
 
 /**
  * @param {any} symbol
- * @param {(values: number[]|null, formulation: string) => void} changed Values of the directions and the only formulation in which they move; null is the prototype as it was recorded.
+ * @param {(values: number[]|null, formulation: string) => void} changed Values of the directions and the only
+ *   formulation in which they move; null is the prototype as it was recorded.
  * @param {() => boolean} current Whether the symbol is still the one that moves.
  */
 export async function showStyles(symbol, changed, current) {
   byId("styles").hidden = true;
   const styles = await stylesOf(symbol);
-  if (!styles || !styles.lowest.length || !current()) return;
+  if (!styles?.lowest.length || !current()) return;
   const values = styles.lowest.map(() => 0);
   const box = make("input", { type: "checkbox", "data-key": "mix" });
   const sliders = styles.lowest.slice(0, SHOWN).map((/** @type {number} */ low, /** @type {number} */ k) => {

@@ -83,10 +83,17 @@ class Move {
     byId("move-empty").hidden = id !== null;
     for (const part of ["pick-part", "move-name", "move-tools", "move-plots", "move-panel"])
       byId(part).hidden = id === null;
-    for (const name of ["move-play", "add-via", "add-obstacle", "move-reset", "export", "duration"])
-      byId(name).disabled = id === null;
+    for (const control of /** @type {const} */ ([
+      "move-play",
+      "add-via",
+      "add-obstacle",
+      "move-reset",
+      "export",
+      "duration",
+    ]))
+      byId(control).disabled = id === null;
     showPick(id, (chosen) => this.choose(chosen));
-    if (id === null) this.plan = this.picture.plan = this.chosen = null;
+    if (id === null) Object.assign(this, { plan: null, chosen: null }).picture.plan = null;
     else if (this.chosen?.id !== id || this.version !== version) this.choose(id);
   }
 
@@ -94,7 +101,8 @@ class Move {
   async choose(id) {
     const symbol = id && symbolOf(id);
     if (!symbol) return;
-    const chosen = (this.chosen = { id: symbol.id });
+    const chosen = { id: symbol.id };
+    this.chosen = chosen;
     chooseToMove(symbol.id);
     this.version = library().version;
     this.plan = null;
@@ -107,7 +115,10 @@ class Move {
       post("/api/rollout", { what: { symbol: symbol.id }, formulation: FORMULATIONS[0].name }),
     );
     if (this.chosen !== chosen) return; // another one since then, or this one anew
-    if (!rollout) return void (this.chosen = null); // so that it is asked for again
+    if (!rollout) {
+      this.chosen = null; // so that it is asked for again
+      return;
+    }
     this.plan = this.picture.plan = asShown(symbol, rollout);
     for (const one of this.rollouts.values()) one.reset();
     byId("duration").value = "0";
@@ -134,7 +145,10 @@ class Move {
     await Promise.all(this.names().map((name) => this.rollouts.get(name).prepare(this.plan)));
   }
 
-  /** Another style moves; its primitive is asked for once the slider rests. @param {number[]|null} values @param {string} formulation */
+  /**
+   * Another style moves; its primitive is asked for once the slider rests.
+   * @param {number[]|null} values @param {string} formulation
+   */
   style(values, formulation) {
     Object.assign(this.plan, { style: values, styled: formulation });
     byId("formulations").disabled = values !== null;
@@ -150,14 +164,21 @@ class Move {
     const size = extent(plan.path);
     const point = (/** @type {any} */ owner, /** @type {string} */ field) => ({
       at: () => owner[field],
-      move: (/** @type {number[]} */ to) => ((owner[field] = to), this.changed()),
+      move: (/** @type {number[]} */ to) => {
+        owner[field] = to;
+        this.changed();
+      },
     });
-    const gone = (/** @type {any[]} */ list, /** @type {number} */ k) => () => (list.splice(k, 1), this.structure());
+    const gone = (/** @type {any[]} */ list, /** @type {number} */ k) => () => {
+      list.splice(k, 1);
+      this.structure();
+    };
     const edge = (/** @type {any} */ one) => ({
       at: () => this.camera.moved(one.center, one.radius * this.camera.scale, 0),
-      move: (/** @type {number[]} */ to) => (
-        (one.radius = Math.max(Math.hypot(...to.map((value, k) => value - one.center[k])), 0.01 * size)), this.changed()
-      ),
+      move: (/** @type {number[]} */ to) => {
+        one.radius = Math.max(Math.hypot(...to.map((value, k) => value - one.center[k])), 0.01 * size);
+        this.changed();
+      },
     });
     this.handles.set([
       { key: "start", kind: "start", name: "Start", ...point(plan, "start") },
@@ -281,7 +302,10 @@ class Move {
     this.structure();
   }
 
-  /** A point of the path that is shown, or of the recording as long as there is none. @param {number} share @returns {number[]} */
+  /**
+   * A point of the path that is shown, or of the recording as long as there is none.
+   * @param {number} share @returns {number[]}
+   */
   pointAt(share) {
     const points = this.picture.paths[0]?.path.positions ?? this.plan.path;
     return [...points[Math.round(share * (points.length - 1))]];
@@ -316,7 +340,8 @@ class Move {
   play() {
     if (!this.picture.paths.length) return;
     const began = performance.now();
-    const run = (this.run = {});
+    const run = {};
+    this.run = run;
     const step = (/** @type {number} */ now) => {
       if (this.run !== run) return;
       const time = Math.max(now - began, 0) / 1000;

@@ -37,7 +37,9 @@ export const get = async (path) => (await request(path)).json();
 
 /**
  * What is there now and its tag; null where it is what the page has.
- * @param {string} path @param {string|null} tag Of the answer before. @returns {Promise<{body: any, tag: string|null}|null>}
+ * @param {string} path
+ * @param {string|null} tag Of the answer before.
+ * @returns {Promise<{body: any, tag: string|null}|null>}
  */
 export async function newer(path, tag) {
   const response = await request(path, tag ? { headers: { "If-None-Match": tag } } : {});

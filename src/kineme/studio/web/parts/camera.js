@@ -48,7 +48,10 @@ export class Camera {
     return [this.size[0] / 2 + this.scale * dot(right), this.size[1] / 2 - this.scale * dot(up)];
   }
 
-  /** A point moved by pixels, in the plane of the screen. @param {number[]} point @param {number} dx @param {number} dy */
+  /**
+   * A point moved by pixels, in the plane of the screen.
+   * @param {number[]} point @param {number} dx @param {number} dy
+   */
   moved(point, dx, dy) {
     const { right, up } = this.axes();
     return point.map((value, k) => (k < 3 ? value + (right[k] * dx - up[k] * dy) / this.scale : value));

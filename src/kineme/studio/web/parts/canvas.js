@@ -12,6 +12,8 @@ export class Board {
     this.width = 0;
     this.height = 0;
     this.asked = 0;
+    /** @type {(() => void)|null} After the canvas has another size. */
+    this.resized = null;
     boards.add(this);
     new ResizeObserver(() => this.fit()).observe(canvas);
     this.fit();

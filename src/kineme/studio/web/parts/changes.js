@@ -8,7 +8,12 @@ let turn = Promise.resolve(); // of undoing, one after the other
 
 const KNOWN = "Nothing is new: all of it is in the library, and a movement keeps the name that it has there.";
 
-/** @param {() => Promise<any>} ask @param {string} done What to say then. @param {string} same What, where nothing changed. @returns {Promise<any>} */
+/**
+ * @param {() => Promise<any>} ask
+ * @param {string} done What to say then.
+ * @param {string} same What to say where nothing changed.
+ * @returns {Promise<any>}
+ */
 async function change(ask, done, same = done) {
   return tried(async () => {
     const before = library().version;
@@ -24,7 +29,10 @@ async function change(ask, done, same = done) {
   });
 }
 
-/** Back to the state before a change, by default the last one that is shown; the server refuses if others came since. @param {number} [version] */
+/**
+ * Back to the state before a change, by default the last one that is shown; the server refuses if others came since.
+ * @param {number} [version]
+ */
 export function undo(version) {
   turn = turn.then(() => takeBack(version));
   return turn;
@@ -40,7 +48,10 @@ async function takeBack(version) {
   });
 }
 
-/** The state of an earlier version again; refused if somebody has changed the library since it was looked at. @param {number} number @param {number} seen */
+/**
+ * The state of an earlier version again; refused if somebody has changed the library since it was looked at.
+ * @param {number} number @param {number} seen
+ */
 export const restore = (number, seen) =>
   change(() => post("/api/library/undo", { version: seen, to: number }), `Version ${number} is restored.`);
 

@@ -4,13 +4,20 @@
 let chosen = null;
 
 /** @param {string|null} id */
-export const chooseToMove = (id) => (chosen = id);
+export function chooseToMove(id) {
+  chosen = id;
+}
 
-/** @type {{symbol: string, displacement: number[]}|null} The way from start to goal where it is not the recorded one. */
+/**
+ * The way from start to goal where it is not the recorded one.
+ * @type {{symbol: string, displacement: number[]}|null}
+ */
 let dragged = null;
 
 /** @param {string} symbol @param {number[]|null} displacement */
-export const dragGoal = (symbol, displacement) => (dragged = displacement && { symbol, displacement });
+export function dragGoal(symbol, displacement) {
+  dragged = displacement && { symbol, displacement };
+}
 
 /** @param {string} symbol @returns {number[]|null} */
 export const draggedGoal = (symbol) => (dragged?.symbol === symbol ? dragged.displacement : null);

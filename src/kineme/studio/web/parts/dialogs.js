@@ -2,8 +2,8 @@
 import { byId } from "./elements.js";
 
 /**
- * @param {{title: string, text?: string, yes?: string, name?: string|null, danger?: boolean}} question `name` is what the
- *   field holds at first; without it there is no field.
+ * @param {{title: string, text?: string, yes?: string, name?: string|null, danger?: boolean}} question
+ *   `name` is what the field holds at first; without it there is no field.
  * @returns {Promise<string|null>} The name, or "yes"; null if it was cancelled.
  */
 export function ask({ title, text = "", yes = "OK", name = null, danger = false }) {

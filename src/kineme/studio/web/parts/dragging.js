@@ -25,6 +25,7 @@ export function drag(element, event, go, end = () => {}) {
   element.setPointerCapture(event.pointerId);
   held.add(element);
   element.addEventListener("pointermove", ours);
-  for (const kind of ENDS) document.addEventListener(kind, lost); // the document hears them also where the element is gone
+  // The document hears them also where the element is gone.
+  for (const kind of ENDS) document.addEventListener(kind, lost);
   return true;
 }

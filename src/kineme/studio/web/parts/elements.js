@@ -1,16 +1,20 @@
 // Elements of the page, made of plain values; text is always text.
 
-/** @param {string} id @returns {any} The element of that id. */
-export const byId = (id) => document.getElementById(id);
-
-const SVG = "http://www.w3.org/2000/svg";
+/**
+ * The element of that id.
+ * @template {string} Id
+ * @param {Id} id
+ * @returns {Id extends keyof Elements ? Elements[Id] : HTMLElement}
+ */
+export const byId = (id) => /** @type {any} */ (document.getElementById(id));
 
 /**
  * Make an element. Names of `on` are events, `class` and attributes are set as they are, null and false are left out.
- * @param {string} tag
+ * @template {keyof HTMLElementTagNameMap} Tag
+ * @param {Tag} tag
  * @param {Record<string, any>} options
  * @param {...(Node|string|number|null)} children Strings become text.
- * @returns {any}
+ * @returns {HTMLElementTagNameMap[Tag]}
  */
 export function make(tag, options = {}, ...children) {
   const element = document.createElement(tag);
@@ -27,14 +31,6 @@ export function make(tag, options = {}, ...children) {
   return element;
 }
 
-/** @param {string} tag @param {Record<string, any>} attributes @param {...Node} children @returns {SVGElement} */
-export function svg(tag, attributes, ...children) {
-  const element = document.createElementNS(SVG, tag);
-  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, String(value));
-  element.append(...children);
-  return element;
-}
-
 /** Say something else; what stays the same costs no layout. @param {Element} element @param {string} text */
 export function write(element, text) {
   if (element.textContent !== text) element.textContent = text;
@@ -47,3 +43,74 @@ export function fill(element, ...children) {
 
 /** "1 movement", "2 movements". @param {number} n @param {string} what */
 export const counted = (n, what) => `${n} ${what}${n === 1 ? "" : "s"}`;
+
+/**
+ * Elements by their ids that are more than an HTMLElement.
+ * @typedef {{
+ *   "add-obstacle": HTMLButtonElement,
+ *   "add-span": HTMLButtonElement,
+ *   "add-via": HTMLButtonElement,
+ *   "ask-yes": HTMLButtonElement,
+ *   "draw-clear": HTMLButtonElement,
+ *   "draw-how": HTMLButtonElement,
+ *   "draw-move": HTMLButtonElement,
+ *   "draw-replay": HTMLButtonElement,
+ *   "draw-save": HTMLButtonElement,
+ *   "learn-file": HTMLButtonElement,
+ *   "learn-spans": HTMLButtonElement,
+ *   "move-play": HTMLButtonElement,
+ *   "move-reset": HTMLButtonElement,
+ *   "naming-learn": HTMLButtonElement,
+ *   "robot-draw": HTMLButtonElement,
+ *   "robot-go": HTMLButtonElement,
+ *   "show-unlabeled": HTMLButtonElement,
+ *   "zoom-in": HTMLButtonElement,
+ *   "zoom-out": HTMLButtonElement,
+ *   clear: HTMLButtonElement,
+ *   export: HTMLButtonElement,
+ *   help: HTMLButtonElement,
+ *   merge: HTMLButtonElement,
+ *   play: HTMLButtonElement,
+ *   reset: HTMLButtonElement,
+ *   save: HTMLButtonElement,
+ *   spot: HTMLButtonElement,
+ *   undo: HTMLButtonElement,
+ *   "draw-canvas": HTMLCanvasElement,
+ *   "move-canvas": HTMLCanvasElement,
+ *   "plot-acceleration": HTMLCanvasElement,
+ *   "plot-speed": HTMLCanvasElement,
+ *   "timeline-canvas": HTMLCanvasElement,
+ *   canvas: HTMLCanvasElement,
+ *   map: HTMLCanvasElement,
+ *   stage: HTMLCanvasElement,
+ *   "live-source": HTMLDetailsElement,
+ *   "robot-preflight": HTMLDetailsElement,
+ *   history: HTMLDetailsElement,
+ *   why: HTMLDetailsElement,
+ *   ask: HTMLDialogElement,
+ *   keys: HTMLDialogElement,
+ *   "pick-part": HTMLFieldSetElement,
+ *   channels: HTMLFieldSetElement,
+ *   formulations: HTMLFieldSetElement,
+ *   styles: HTMLFieldSetElement,
+ *   "ask-name": HTMLInputElement,
+ *   "find-pick": HTMLInputElement,
+ *   "find-symbol": HTMLInputElement,
+ *   "naming-name": HTMLInputElement,
+ *   "robot-dragged": HTMLInputElement,
+ *   "robot-size": HTMLInputElement,
+ *   "robot-slow": HTMLInputElement,
+ *   duration: HTMLInputElement,
+ *   file: HTMLInputElement,
+ *   find: HTMLInputElement,
+ *   tilt: HTMLInputElement,
+ *   time: HTMLInputElement,
+ *   turn: HTMLInputElement,
+ *   "export-format": HTMLSelectElement,
+ *   "robot-arm": HTMLSelectElement,
+ *   "robot-what": HTMLSelectElement,
+ *   formulation: HTMLSelectElement,
+ *   tables: HTMLSelectElement,
+ *   spans: HTMLTableElement,
+ * }} Elements
+ */

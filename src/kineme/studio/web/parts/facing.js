@@ -4,7 +4,8 @@ export const OBLIQUE = { around: -0.6, above: 0.5 };
 const FLATTER = 1.5; // how much larger their area must be from the front than obliquely
 const STEPS = [0, 6, -6, 3, -3, 1, -1, 2, -2, 4, -4, 5, -5]; // of 15 degrees, those that are preferred first
 const BETTER = 1.1; // how much larger the area must be from a view that is less preferred
-const ASKEW = 0.4; // share of the area that counts for nothing where letters, seen from above, would stand on their side
+// Share of the area that counts for nothing where letters, seen from above, would stand on their side.
+const ASKEW = 0.4;
 const STEP = Math.PI / 12;
 
 /** Directions on the screen: right and up. @param {{around: number, above: number}} view */
@@ -13,7 +14,11 @@ export function axesOf({ around, above }) {
   return { right: [c, s, 0], up: [-s * Math.sin(above), c * Math.sin(above), Math.cos(above)] };
 }
 
-/** How coordinates of paths vary together, each path about its middle. @param {number[][][]} paths @returns {number[][]} */
+/**
+ * How coordinates of paths vary together, each path about its middle.
+ * @param {number[][][]} paths
+ * @returns {number[][]}
+ */
 function variances(paths) {
   const sums = [0, 1, 2].map(() => [0, 0, 0]);
   for (const path of paths) {

@@ -11,7 +11,12 @@ export function startFinding(field, changed, first) {
   field.addEventListener("keydown", (event) => event.key === "Enter" && first()?.click());
 }
 
-/** Symbols with all words of the field in their name or description. @param {HTMLInputElement} field @param {any[]} symbols @returns {any[]} */
+/**
+ * Symbols with all words of the field in their name or description.
+ * @param {HTMLInputElement} field
+ * @param {any[]} symbols
+ * @returns {any[]}
+ */
 export function found(field, symbols) {
   field.hidden = symbols.length <= MANY;
   if (field.hidden) field.value = "";

@@ -4,7 +4,12 @@ import { line } from "./lines.js";
 
 const CELLS = 6;
 
-/** @param {CanvasRenderingContext2D} context @param {import("./camera.js").Camera} camera @param {number[]} low Corner. @param {number[]} high */
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {import("./camera.js").Camera} camera
+ * @param {number[]} low Corner.
+ * @param {number[]} high
+ */
 export function ground(context, camera, low, high) {
   for (let k = 0; k <= CELLS; k += 1) {
     const [x, y] = [0, 1].map((axis) => low[axis] + ((high[axis] - low[axis]) * k) / CELLS);

@@ -35,9 +35,17 @@ export const isLoaded = () => loaded;
 /** @param {(library: any) => void} act Called after every change. */
 export const onLibrary = (act) => told.push(act);
 
-/** The library as it is now: an answer that is under way may be older, and is followed by one more. @returns {Promise<any>} */
+/**
+ * The library as it is now: an answer that is under way may be older, and is followed by one more.
+ * @returns {Promise<any>}
+ */
 export function refresh() {
-  if (!loading) return (loading = load().finally(() => (loading = null)));
+  if (!loading) {
+    loading = load().finally(() => {
+      loading = null;
+    });
+    return loading;
+  }
   next ??= loading
     .catch(() => null)
     .then(() => {

@@ -49,11 +49,18 @@ const MARKS = {
 };
 
 function corners(/** @type {CanvasRenderingContext2D} */ context, /** @type {number[][]} */ points) {
-  points.forEach(([x, y], k) => (k ? context.lineTo(x, y) : context.moveTo(x, y)));
+  context.moveTo(points[0][0], points[0][1]);
+  for (const [x, y] of points.slice(1)) context.lineTo(x, y);
   context.closePath();
 }
 
-/** @param {CanvasRenderingContext2D} context @param {number[]} at @param {string} kind @param {number} r @param {string} color */
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {number[]} at
+ * @param {string} kind
+ * @param {number} r
+ * @param {string} color
+ */
 export function mark(context, [x, y], kind, r, color) {
   context.save();
   context.translate(x, y);

@@ -1,6 +1,6 @@
 // A movement as a small picture that scales: its path and where it starts.
 import { Camera } from "./camera.js";
-import { svg } from "./elements.js";
+import { svg } from "./svg.js";
 
 const SIDE = 100;
 

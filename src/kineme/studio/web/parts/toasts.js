@@ -11,17 +11,20 @@ export function say(text, { act, action, failed = false } = {}) {
     make("p", {}, text),
   );
   const close = () => toast.remove();
-  if (act)
-    toast.append(
-      make("button", { class: "button", type: "button", on: { click: () => (close(), act()) } }, action ?? "Undo"),
-    );
+  const takeBack = () => {
+    close();
+    act();
+  };
+  if (act) toast.append(make("button", { class: "button", type: "button", on: { click: takeBack } }, action ?? "Undo"));
   else toast.append(make("button", { class: "button", type: "button", on: { click: close } }, "Close"));
   byId("toasts").append(toast);
   while (byId("toasts").children.length > 3) byId("toasts").firstChild.remove();
   let timer = setTimeout(close, failed ? 2 * STAYS : STAYS);
   toast.addEventListener("pointerenter", () => clearTimeout(timer));
   toast.addEventListener("focusin", () => clearTimeout(timer));
-  toast.addEventListener("pointerleave", () => (timer = setTimeout(close, STAYS)));
+  toast.addEventListener("pointerleave", () => {
+    timer = setTimeout(close, STAYS);
+  });
 }
 
 /** Run something and show what goes wrong. @template T @param {() => Promise<T>} act @returns {Promise<T|undefined>} */

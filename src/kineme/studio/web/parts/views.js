@@ -8,7 +8,9 @@ const shown = {};
 let current = "";
 
 /** @param {string} view @param {() => void} act */
-export const onShow = (view, act) => (shown[view] = act);
+export function onShow(view, act) {
+  shown[view] = act;
+}
 
 /** The view that is shown. */
 export const currentView = () => current;
@@ -44,7 +46,7 @@ function step(event) {
 export function startViews() {
   for (const view of VIEWS) byId(`tab-${view}`).addEventListener("click", () => show(view));
   document.querySelector(".tabs").addEventListener("keydown", step);
-  for (const button of document.querySelectorAll("[data-view]"))
+  for (const button of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll("[data-view]")))
     button.addEventListener("click", () => show(button.dataset.view, true));
   window.addEventListener("hashchange", () => show(location.hash.slice(1)));
   show(VIEWS.includes(location.hash.slice(1)) ? location.hash.slice(1) : "draw");

@@ -3,7 +3,11 @@ import { request } from "../parts/api.js";
 import { byId, counted } from "../parts/elements.js";
 import { currentView, show } from "../parts/views.js";
 
-/** @param {File} file @param {AbortSignal} signal @returns {Promise<any>} What the server read; undefined where it did not. */
+/**
+ * @param {File} file
+ * @param {AbortSignal} signal
+ * @returns {Promise<any>} What the server read; undefined where it did not.
+ */
 async function send(file, signal) {
   byId("drop-state").textContent = `Reading ${file.name} …`;
   byId("drop-state").classList.remove("went-wrong");

@@ -1,12 +1,19 @@
 // Which channels of a recording fit the movements of the library: as many columns as these have.
 import { counted } from "../parts/elements.js";
 
-/** Columns that channels are recognized by; an orientation turns in three ways, whatever its columns. @param {any[]} channels */
-export const columnCount = (channels) => channels.reduce((sum, one) => sum + (one.columns?.length || 1), 0);
+/** @param {any[]} channels */
+export const columnCount = (channels) => channels.reduce((sum, channel) => sum + (channel.columns?.length || 1), 0);
+
+/** Columns that channels are recognized by; an orientation turns in three ways, whatever its columns. */
 const moving = (/** @type {any[]} */ channels) =>
   channels.reduce((sum, one) => sum + (one.kind === "orientation" ? 3 : one.columns?.length || 1), 0);
 
-/** Names of the channels that are chosen at first. @param {any[]} channels @param {any} library @returns {Set<string>} */
+/**
+ * Names of the channels that are chosen at first.
+ * @param {any[]} channels
+ * @param {any} library
+ * @returns {Set<string>}
+ */
 export function fitting(channels, { n_dims: wanted, channels: known, symbols }) {
   const names = (/** @type {any[]} */ some) => new Set(some.map((one) => one.name));
   if (!symbols.length || moving(channels) === wanted) return names(channels);
@@ -17,7 +24,12 @@ export function fitting(channels, { n_dims: wanted, channels: known, symbols }) 
   return moving(first) === wanted ? names(first) : names(channels);
 }
 
-/** What to do where chosen channels do not fit; "" where they do. @param {any[]} chosen @param {any} library @returns {string} */
+/**
+ * What to do where chosen channels do not fit; "" where they do.
+ * @param {any[]} chosen
+ * @param {any} library
+ * @returns {string}
+ */
 export function mismatch(chosen, { n_dims: wanted, symbols }) {
   const have = moving(chosen);
   if (!have) return "Choose at least one channel.";

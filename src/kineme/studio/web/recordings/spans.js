@@ -30,8 +30,16 @@ export function showSpans(spans, chosen, page) {
       on: { focus: () => page.choose(k) },
     });
     field.value = span.label ?? "";
-    field.addEventListener("change", () => ((span.label = field.value.trim() || null), page.changed()));
+    field.addEventListener("change", () => {
+      span.label = field.value.trim() || null;
+      page.changed();
+    });
     return field;
+  };
+  const remove = (/** @type {number} */ k) => {
+    spans.splice(k, 1);
+    page.choose(-1);
+    page.changed();
   };
   const away = (/** @type {number} */ k) =>
     make(
@@ -40,7 +48,7 @@ export function showSpans(spans, chosen, page) {
         class: "button quiet square",
         type: "button",
         "aria-label": `Remove span ${k + 1}`,
-        on: { click: () => (spans.splice(k, 1), page.choose(-1), page.changed()) },
+        on: { click: () => remove(k) },
       },
       "×",
     );
@@ -60,5 +68,5 @@ export function showSpans(spans, chosen, page) {
 
 /** Mark the row of the chosen one. @param {number} chosen */
 export function markRow(chosen) {
-  [...byId("spans").tBodies[0].rows].forEach((row, k) => row.classList.toggle("chosen", k === chosen));
+  for (const [k, row] of [...byId("spans").tBodies[0].rows].entries()) row.classList.toggle("chosen", k === chosen);
 }

@@ -49,7 +49,7 @@ export class Timeline {
   paint() {
     const { context, height } = this.board;
     const lane = height - BAND - AXIS - 12;
-    this.spans.forEach((span, k) => this.paintSpan(span, k));
+    for (const [k, span] of this.spans.entries()) this.paintSpan(span, k);
     this.plot.columns.forEach((/** @type {any} */ column, /** @type {number} */ k) => {
       const low = Math.min(...column.values);
       const span = Math.max(...column.values) - low || 1;
@@ -164,7 +164,10 @@ export class Timeline {
     }
   }
 
-  /** A click chooses a span, dragging moves along a recording that is longer than the picture. @param {PointerEvent} event */
+  /**
+   * A click chooses a span, dragging moves along a recording that is longer than the picture.
+   * @param {PointerEvent} event
+   */
   grab(event) {
     const at = this.time(event.offsetX);
     const hit = this.spans.findIndex((span) => span.begin <= at && at <= span.end);

@@ -34,7 +34,10 @@ class Recordings {
       byId(id).addEventListener("click", () => this.timeline.zoom(factor));
     byId("tables").addEventListener("change", () => this.table());
     byId("channels").addEventListener("change", () => this.columns());
-    onLibrary(() => (this.allow(), this.timeline.board.draw()));
+    onLibrary(() => {
+      this.allow();
+      this.timeline.board.draw();
+    });
   }
 
   /** @param {any} recording @param {string} name */
@@ -49,10 +52,11 @@ class Recordings {
         make("option", { value: String(k) }, one.name),
       ),
     );
-    const labeled = recording.tables.filter((/** @type {any} */ one) => one.label !== null);
+    const labeled = recording.tables.filter((/** @type {any} */ table) => table.label !== null);
+    const labels = [...new Set(labeled.map((/** @type {any} */ table) => table.label))].slice(0, 8).join(", ");
     byId("learn-file").hidden = recording.tables.length < 2 || !labeled.length;
     byId("learn-file").title =
-      `${counted(recording.tables.length, "movement")}, ${labeled.length} with a label: ${[...new Set(labeled.map((/** @type {any} */ one) => one.label))].slice(0, 8).join(", ")}`;
+      `${counted(recording.tables.length, "movement")}, ${labeled.length} with a label: ${labels}`;
     fill(
       byId("problems"),
       ...recording.problems.map((/** @type {string} */ one) => make("p", { class: "small" }, one)),
@@ -95,7 +99,9 @@ class Recordings {
   }
 
   chosenChannels() {
-    return [...byId("channels").querySelectorAll("input:checked")].map((one) => one.value);
+    /** @type {NodeListOf<HTMLInputElement>} */
+    const boxes = byId("channels").querySelectorAll("input:checked");
+    return [...boxes].map((box) => box.value);
   }
 
   /** The plot with the columns of the chosen channels. */
@@ -126,7 +132,8 @@ class Recordings {
 
   async spot() {
     const path = `/api/recordings/${encodeURIComponent(this.read.recording)}/spotted`;
-    const search = (this.search = new AbortController());
+    const search = new AbortController();
+    this.search = search;
     this.allow();
     byId("spans-state").textContent = "Looking …";
     const timer = setInterval(() => this.tell(path, search), ASKED);
@@ -138,8 +145,9 @@ class Recordings {
     this.choose(-1);
     this.changed();
     const known = answer.spans.filter((/** @type {any} */ one) => one.label !== null).length;
+    const advice = answer.spans.length ? " Choose one to drag its edges." : "";
     byId("spans-state").textContent =
-      `${counted(known, "known movement")}, ${answer.spans.length - known} unknown.${answer.spans.length ? " Choose one to drag its edges." : ""}`;
+      `${counted(known, "known movement")}, ${answer.spans.length - known} unknown.${advice}`;
   }
 
   /** How much is searched. @param {string} path @param {AbortController} search */
@@ -163,7 +171,7 @@ class Recordings {
     this.timeline.spans.push({ begin: from + aside, end: to - aside, label: null, p: null });
     this.changed();
     this.choose(this.timeline.spans.length - 1);
-    byId("spans").querySelector("tr:last-child input[type=text]").focus();
+    /** @type {HTMLElement} */ (byId("spans").querySelector("tr:last-child input[type=text]")).focus();
   }
 
   /** @param {number} k -1 for none. */

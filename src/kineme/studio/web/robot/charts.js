@@ -1,9 +1,14 @@
 // Each joint over time, between its limits.
-import { make, svg } from "../parts/elements.js";
+import { make } from "../parts/elements.js";
+import { svg } from "../parts/svg.js";
 
 const [WIDTH, HEIGHT] = [300, 80];
 
-/** @param {any} scene @param {{name: string, low: number|null, high: number|null}} joint @param {number} k Its column. */
+/**
+ * @param {any} scene
+ * @param {{name: string, low: number|null, high: number|null}} joint
+ * @param {number} k Its column.
+ */
 export function chart(scene, joint, k) {
   const values = scene.positions.map((/** @type {number[]} */ row) => row[k]);
   const limits = [joint.low, joint.high].filter((one) => Number.isFinite(one));

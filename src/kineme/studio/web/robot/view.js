@@ -28,7 +28,10 @@ const written = (/** @type {number} */ value) =>
 const number = (/** @type {number|null|undefined} */ value) =>
   value === null || value === undefined ? "–" : written(Number(value));
 
-/** A cell of two lines: a table beside the arm has no room for one. @param {string} tag @param {string} first @param {string} second */
+/**
+ * A cell of two lines: a table beside the arm has no room for one.
+ * @param {"th"|"td"} tag @param {string} first @param {string} second
+ */
 const cell = (tag, first, second) =>
   make(tag, tag === "th" ? { scope: "row" } : {}, first, " ", make("span", { class: "says soft" }, second));
 
@@ -87,7 +90,9 @@ async function move(event) {
 }
 
 /** Whether a goal was dragged in Move is offered where it was. */
-const offer = () => (byId("robot-dragged").parentElement.hidden = draggedGoal(byId("robot-what").value) === null);
+function offer() {
+  byId("robot-dragged").parentElement.hidden = draggedGoal(byId("robot-what").value) === null;
+}
 
 async function shown() {
   if (currentView() !== "robot") return;
@@ -113,7 +118,10 @@ async function shown() {
 
 export function startRobot() {
   byId("robot-form").addEventListener("submit", move);
-  byId("robot-what").addEventListener("change", () => (chooseToMove(byId("robot-what").value), offer()));
+  byId("robot-what").addEventListener("change", () => {
+    chooseToMove(byId("robot-what").value);
+    offer();
+  });
   onShow("robot", shown);
   onLibrary(shown);
 }
