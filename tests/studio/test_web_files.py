@@ -249,7 +249,7 @@ def test_what_moves_is_never_the_path_of_another_movement_and_what_failed_is_ask
 
 
 BROKEN = """globalThis.document = { createElement: () => "|" };
-const { breakable } = await import(`${process.argv[1]}/parts/breakable.js`);
+const { breakable } = await import(`${process.argv[1]}/parts/elements.js`);
 console.log(JSON.stringify(process.argv.slice(2).map((name) => breakable(name).join(""))));"""
 
 

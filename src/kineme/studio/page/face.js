@@ -1,8 +1,7 @@
 // The page: draw, see live what it is, drag start and goal.
 
 import { open } from "../javascript/runtime.js";
-import { breakable } from "../web/parts/breakable.js";
-import { byId, make } from "../web/parts/elements.js";
+import { breakable, byId, make } from "../web/parts/elements.js";
 import { createKnown } from "./known.js";
 import { createMoving, placed } from "./movements.js";
 import { boxOf, createStage } from "./stage.js";

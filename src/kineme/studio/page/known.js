@@ -1,7 +1,6 @@
 // The known movements: small pictures as buttons, one of them chosen; many are found by words of their names.
 
-import { breakable } from "../web/parts/breakable.js";
-import { byId, make } from "../web/parts/elements.js";
+import { breakable, byId, make } from "../web/parts/elements.js";
 import { boxOf, createStage } from "./stage.js";
 
 const MANY = 12; // that can be looked through

@@ -1,6 +1,5 @@
 // What it is: a word, how far along, the candidates with their bars. Rows stay where they are.
-import { breakable } from "../parts/breakable.js";
-import { byId, fill, make, write } from "../parts/elements.js";
+import { breakable, byId, fill, make, write } from "../parts/elements.js";
 import { library } from "../parts/library_state.js";
 
 const ROWS = 5;

@@ -1,118 +1,105 @@
 // A program's movement on the canvas, while it happens: as if it were drawn there.
 import { byId } from "../parts/elements.js";
 import { library } from "../parts/library_state.js";
-import { usualSide } from "./scale.js";
+import { requestAnswer, showAnswer } from "./answers.js";
+import { showLegend } from "./invitation.js";
 import { Frame } from "./frame.js";
+import { usualSide } from "./scale.js";
+import { clear, FEWEST_SAMPLES, keyOf, movementOf } from "./session.js";
 import { Sources } from "./sources.js";
 
-const LEAST = 4; // samples that make a movement
+/**
+ * @typedef {import("./session.js").Session} Session
+ * @typedef {import("./sources.js").Source} Source
+ */
 
-/** @param {{id: number, movement: number}} source */
-const keyOf = (source) => `${source.id} ${source.movement}`;
+/** @param {Session} session @returns {Sources} */
+export function startFollowing(session) {
+  const sources = new Sources(
+    (source) => follow(session, source),
+    () => release(session, sources),
+  );
+  return sources;
+}
 
-export class Follow {
-  /** @param {any} draw The view. */
-  constructor(draw) {
-    this.draw = draw;
-    /** @type {import("./sources.js").Source|null} Whose movement is shown. */
-    this.source = null;
-    this.passed = "";
-    this.sources = new Sources(
-      (source) => this.follow(source),
-      () => this.fewer(),
-    );
+/** Whether a program's movement may take the canvas: nothing is lost that was drawn or is being named. */
+function isFree(/** @type {Session} */ session, /** @type {Source} */ source) {
+  if (session.drawing || session.pending || byId("naming-name").value.trim()) return false;
+  const shown = session.source;
+  return shown ? shown.id === source.id || shown.ended !== null : session.movement === null;
+}
+
+/** @param {Session} session @param {Source} source */
+function follow(session, source) {
+  const key = keyOf(source);
+  if (key === session.dismissed || !source.samples.length) return;
+  if (!session.source || keyOf(session.source) !== key) {
+    const free = isFree(session, source);
+    byId("sources").classList.toggle("waits", !free);
+    if (!free) return;
+    begin(session);
   }
+  const { samples: painted, ended } = session.source ?? { samples: [], ended: null };
+  session.source = source;
+  paint(session, painted.length);
+  if (source.ended === null) showProgress(session);
+  else if (ended === null) end(session, source.ended);
+}
 
-  /** Show no program's movement; this one not again. */
-  leave() {
-    if (this.source) this.passed = keyOf(this.source);
-    this.source = null;
-    this.draw.picture.frame = null;
-  }
+/** @param {Session} session */
+function begin(session) {
+  clear(session);
+  session.pointer = "program";
+  const paths = library().symbols.map((symbol) => symbol.path);
+  session.picture.frame = new Frame(usualSide() ?? 0.5, paths.filter(Boolean));
+  showLegend(true);
+}
 
-  /** Whether a movement of this program may take the canvas: nothing is lost that was drawn or is being named. */
-  isFree(/** @type {any} */ source) {
-    const { drawing, waits, whole } = this.draw;
-    if (drawing || waits || byId("naming-name").value.trim()) return false;
-    return this.source ? this.source.id === source.id || this.source.ended !== null : whole === null;
-  }
+/** @param {Session} session @param {number} painted How many samples are on the canvas already. */
+function paint({ picture, source: { samples, state, ended } }, painted) {
+  const width = samples[0].length - 1;
+  const path = ended === null ? (state?.path ?? []) : [];
+  picture.ink = samples.map(([time, ...point]) => [time - samples[0][0], ...point]);
+  picture.rest = path.filter((/** @type {number[]} */ point) => point.length === width);
+  const added = samples.slice(Math.min(painted, samples.length - 1)).map(([, ...point]) => point);
+  picture.frame.include([...added, ...picture.rest], picture.board);
+  picture.board.draw();
+  byId("draw-clear").disabled = false;
+}
 
-  /** @param {import("./sources.js").Source} source */
-  follow(source) {
-    const key = keyOf(source);
-    if (key === this.passed || !source.samples.length) return;
-    if (!this.source || keyOf(this.source) !== key) {
-      const free = this.isFree(source);
-      byId("sources").classList.toggle("waits", !free);
-      if (!free) return;
-      this.begin();
-    }
-    const known = this.source?.samples.length ?? 0;
-    const ended = this.source?.ended ?? null;
-    this.source = source;
-    this.paint(source, known);
-    if (source.ended === null) this.underWay(source);
-    else if (ended === null) this.over(source.ended);
-  }
+/** @param {Session} session */
+function showProgress({ panel, source: { samples, state } }) {
+  if (!state) return;
+  panel.drawing(state, samples[samples.length - 1][0]);
+  if (state.skipped && !state.ranked.length) panel.words("Cannot be compared", "?", state.status[0] ?? "", "unknown");
+}
 
-  begin() {
-    this.draw.clear();
-    this.draw.kind = "program";
-    this.draw.picture.frame = new Frame(
-      usualSide() ?? 0.5,
-      library()
-        .symbols.map((/** @type {any} */ one) => one.path)
-        .filter(Boolean),
-    );
-    this.draw.filled(true);
-  }
+/** The program said that its movement is over, or has gone. @param {Session} session @param {any} ending */
+function end(session, ending) {
+  const { samples } = session.source;
+  byId("draw-replay").disabled = false;
+  if (ending.error || samples.length < FEWEST_SAMPLES)
+    return session.panel.words("No answer", "?", ending.error ?? "too short", "unknown");
+  session.movement = movementOf(samples);
+  showAnswer(session, ending.answer);
+}
 
-  /** @param {import("./sources.js").Source} source @param {number} known How many of its samples are painted. */
-  paint({ samples, state, ended }, known) {
-    const { picture } = this.draw;
-    const rest =
-      ended === null
-        ? (state?.path ?? []).filter((/** @type {number[]} */ one) => one.length === samples[0].length - 1)
-        : [];
-    picture.ink = samples.map(([t, ...point]) => [t - samples[0][0], ...point]);
-    picture.rest = rest;
-    picture.frame.include(
-      [...samples.slice(Math.min(known, samples.length - 1)).map((one) => one.slice(1)), ...rest],
-      picture.board,
-    );
-    picture.board.draw();
-    byId("draw-clear").disabled = false;
+/**
+ * A program is gone or ignored: a movement that it has not ended is asked for.
+ * @param {Session} session
+ * @param {Sources} sources
+ */
+function release(session, sources) {
+  const { source } = session;
+  if (!source || source.ended !== null) return;
+  if (sources.connected.has(source.id)) {
+    if (sources.ignored.has(source.name)) clear(session);
+    return;
   }
-
-  /** @param {any} source */
-  underWay({ samples, state }) {
-    const { panel } = this.draw;
-    if (!state) return;
-    panel.drawing(state, samples[samples.length - 1][0]);
-    if (state.skipped && !state.ranked.length) panel.words("Cannot be compared", "?", state.status[0] ?? "", "unknown");
-  }
-
-  /** The program said so, or has gone. @param {any} ended */
-  over(ended) {
-    const { draw } = this;
-    const { samples } = this.source;
-    byId("draw-replay").disabled = false;
-    if (ended.error || samples.length < LEAST)
-      return draw.panel.words("No answer", "?", ended.error ?? "too short", "unknown");
-    draw.whole = { times: samples.map(([t]) => t), positions: samples.map(([, ...point]) => point) };
-    draw.answered(ended.answer);
-  }
-
-  /** One is gone or ignored: a movement that it has not ended is asked for as a whole. */
-  fewer() {
-    const { source, sources } = this;
-    if (!source || source.ended !== null) return;
-    if (sources.known.has(source.id)) return sources.ignored.has(source.name) ? this.draw.clear() : undefined;
-    this.source = { ...source, ended: { error: "" } };
-    this.draw.picture.rest = [];
-    if (source.samples.length < LEAST) return this.over({});
-    this.draw.whole = { times: source.samples.map(([t]) => t), positions: source.samples.map(([, ...point]) => point) };
-    this.draw.naming.allow(true);
-    this.draw.askOnce();
-  }
+  session.source = { ...source, ended: { error: "" } };
+  session.picture.rest = [];
+  if (source.samples.length < FEWEST_SAMPLES) return end(session, {});
+  session.movement = movementOf(source.samples);
+  session.naming.allow(true);
+  requestAnswer(session);
 }

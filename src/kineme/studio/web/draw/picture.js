@@ -1,7 +1,6 @@
 // The drawing on its canvas: ink, the predicted rest, the arrival, the pen of the keyboard.
 import { Board, color } from "../parts/canvas.js";
-import { ground } from "../parts/ground.js";
-import { line, mark } from "../parts/lines.js";
+import { ground, line, mark } from "../parts/lines.js";
 
 const FINGER = 10; // radius of the replayed point [px]
 
@@ -46,7 +45,7 @@ export class Picture {
     const { context } = this.board;
     const ink = this.ink.map((one) => this.pixel(one.slice(1)));
     const rest = this.rest.map((one) => this.pixel(one));
-    if (this.turns) ground(context, this.frame.camera, this.frame.low, this.frame.high);
+    if (this.turns) ground(context, this.frame.camera, this.frame.low, this.frame.high, color("--line"));
     if (rest.length && ink.length)
       line(context, [ink[ink.length - 1], ...rest], { color: color("--predicted"), width: 3, dash: [2, 9] });
     line(context, ink, { color: color("--ink"), width: 5, alpha: this.replayed === null ? 1 : 0.35 });

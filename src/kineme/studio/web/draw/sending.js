@@ -4,18 +4,18 @@ const PATIENCE = 1000; // how long an answer may take before the next message go
 const MOST = 5000; // samples in one message; the server takes twice as many
 
 export class Sending {
-  /** @param {(message: any) => boolean} send */
+  /** @param {(message: Object) => boolean} send */
   constructor(send) {
     this.send = send;
     /** @type {number[][]} The movement that has no answer yet: a connection that comes back knows nothing of it. */
     this.movement = [];
-    this.told = 0; // samples of it that were sent
-    this.stale = false;
-    this.open = false;
-    this.finishes = 0;
-    this.over = false;
-    this.asked = false;
-    this.sent = 0;
+    this.sent = 0; // samples of it
+    this.sentAt = 0;
+    this.open = false; // no answer came to what was sent
+    this.stale = false; // what is answered next is about the movement before
+    this.ended = false;
+    this.finishing = false; // the server knows that the movement has ended
+    this.finishes = 0; // answers that are to come, to this movement and to those before
   }
 
   /** A new movement: states of the one before are no longer wanted. */
@@ -33,30 +33,30 @@ export class Sending {
 
   /** The movement is over. @returns {boolean} Whether the server hears it. */
   finish() {
-    this.over = true;
+    this.ended = true;
     return this.go();
   }
 
   go() {
-    if (this.open && performance.now() - this.sent < PATIENCE) return true;
-    const waiting = this.movement.slice(this.told, this.told + MOST);
-    if (waiting.length) {
-      if (!this.send({ samples: waiting })) return false;
-      this.told += waiting.length;
-      this.sent = performance.now();
+    if (this.open && performance.now() - this.sentAt < PATIENCE) return true;
+    const samples = this.movement.slice(this.sent, this.sent + MOST);
+    if (samples.length) {
+      if (!this.send({ samples })) return false;
+      this.sent += samples.length;
+      this.sentAt = performance.now();
       this.open = true;
       return true;
     }
-    if (!this.over || this.asked) return true;
-    this.asked = this.send({ finish: true });
-    if (this.asked) this.finishes += 1;
-    return this.asked;
+    if (!this.ended || this.finishing) return true;
+    this.finishing = this.send({ finish: true });
+    if (this.finishing) this.finishes += 1;
+    return this.finishing;
   }
 
-  /** An answer to a whole movement came. @returns {boolean} Whether it is about the movement of now. */
+  /** An answer to a movement that has ended came. @returns {boolean} Whether it is about the movement of now. */
   answered() {
     this.finishes = Math.max(this.finishes - 1, 0);
-    const wanted = this.asked && this.finishes === 0;
+    const wanted = this.finishing && this.finishes === 0;
     if (wanted) this.forget();
     return wanted;
   }
@@ -72,8 +72,8 @@ export class Sending {
   /** The movement is answered, or not wanted any more. */
   forget() {
     this.movement = [];
-    this.told = 0;
-    this.over = this.asked = false;
+    this.sent = 0;
+    this.ended = this.finishing = false;
   }
 
   /** The connection is gone: no answer comes to what was sent. */
@@ -83,9 +83,9 @@ export class Sending {
 
   /** The connection is new: nothing is open, and the movement is sent from its beginning. */
   renewed() {
-    this.open = this.stale = this.asked = false;
+    this.open = this.stale = this.finishing = false;
     this.finishes = 0;
-    this.told = 0;
+    this.sent = 0;
     this.go();
   }
 }

@@ -1,8 +1,6 @@
 // The symbols as cards: a picture, a name, how many movements; a box to choose several.
-import { breakable } from "../parts/breakable.js";
-import { byId, counted, fill, make } from "../parts/elements.js";
+import { breakable, byId, counted, fill, keepingFocus, make } from "../parts/elements.js";
 import { found } from "../parts/find.js";
-import { keepingFocus } from "../parts/keep_focus.js";
 import { library } from "../parts/library_state.js";
 import { thumbnail } from "../parts/thumbnails.js";
 

@@ -2,8 +2,7 @@
 import { get } from "../parts/api.js";
 import { restore } from "../parts/changes.js";
 import { ask } from "../parts/dialogs.js";
-import { byId, fill, make } from "../parts/elements.js";
-import { keepingFocus } from "../parts/keep_focus.js";
+import { byId, fill, keepingFocus, make } from "../parts/elements.js";
 import { library } from "../parts/library_state.js";
 import { tried } from "../parts/toasts.js";
 

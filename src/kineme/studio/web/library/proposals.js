@@ -1,8 +1,7 @@
 // Proposals: groups of movements without a name. All or some of them get one, or they are not a symbol.
 import { get } from "../parts/api.js";
 import { accept, assign, reject } from "../parts/changes.js";
-import { byId, counted, fill, make } from "../parts/elements.js";
-import { keepingFocus } from "../parts/keep_focus.js";
+import { byId, counted, fill, keepingFocus, make } from "../parts/elements.js";
 import { library } from "../parts/library_state.js";
 import { tried } from "../parts/toasts.js";
 import { memberButton } from "./members.js";

@@ -1,8 +1,7 @@
 // One symbol: its name, its description, its movements, and what can be done with them.
-import { breakable } from "../parts/breakable.js";
 import * as changes from "../parts/changes.js";
 import { ask } from "../parts/dialogs.js";
-import { byId, counted, fill, make } from "../parts/elements.js";
+import { breakable, byId, counted, fill, make } from "../parts/elements.js";
 import { library, symbolOf } from "../parts/library_state.js";
 import { thumbnail } from "../parts/thumbnails.js";
 import { show } from "../parts/views.js";

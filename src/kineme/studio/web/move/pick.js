@@ -1,8 +1,6 @@
 // What moves: the symbols as pictures in a row, one chosen.
-import { breakable } from "../parts/breakable.js";
-import { byId, fill, make } from "../parts/elements.js";
+import { breakable, byId, fill, keepingFocus, make } from "../parts/elements.js";
 import { found } from "../parts/find.js";
-import { keepingFocus } from "../parts/keep_focus.js";
 import { library } from "../parts/library_state.js";
 import { thumbnail } from "../parts/thumbnails.js";
 

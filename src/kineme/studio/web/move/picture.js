@@ -1,9 +1,8 @@
 // The stage of Move: paths, obstacles, points in time; in space it turns.
 import { Board, color } from "../parts/canvas.js";
-import { line, mark } from "../parts/lines.js";
+import { ground, line, mark } from "../parts/lines.js";
 import { byId } from "../parts/elements.js";
-import { ground } from "../parts/ground.js";
-import { followTurns } from "../parts/turning.js";
+import { followTurns } from "../parts/dragging.js";
 import { extent } from "./plan.js";
 
 const LEGEND_ROOM = 40; // at the lower edge [px]
@@ -96,7 +95,7 @@ export class MovePicture {
     const { path } = this.plan;
     const low = [0, 1, 2].map((k) => Math.min(...path.map((/** @type {number[]} */ p) => p[k])));
     const high = [0, 1, 2].map((k) => Math.max(...path.map((/** @type {number[]} */ p) => p[k])));
-    ground(this.board.context, this.camera, low, high);
+    ground(this.board.context, this.camera, low, high, color("--line"));
   }
 
   /** Where a path is now. @param {any} path */

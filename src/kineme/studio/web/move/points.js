@@ -1,6 +1,5 @@
 // The same points as numbers: every coordinate can be typed.
-import { byId, fill, make } from "../parts/elements.js";
-import { keepingFocus } from "../parts/keep_focus.js";
+import { byId, fill, keepingFocus, make } from "../parts/elements.js";
 import { extent, rounded } from "./plan.js";
 
 const AXES = ["x", "y", "z"];

@@ -1,6 +1,7 @@
 // A thing is held and dragged until it is let go, or is gone. A second finger on the same thing is not heard.
 
 const ENDS = ["pointerup", "pointercancel", "lostpointercapture"];
+const TURNS = { ArrowLeft: [-12, 0], ArrowRight: [12, 0], ArrowUp: [0, -12], ArrowDown: [0, 12] };
 
 /** @type {WeakSet<HTMLElement>} */
 const held = new WeakSet();
@@ -28,4 +29,22 @@ export function drag(element, event, go, end = () => {}) {
   // The document hears them also where the element is gone.
   for (const kind of ENDS) document.addEventListener(kind, lost);
   return true;
+}
+
+/**
+ * Turn a view in space by dragging its background, and by the arrow keys.
+ * @param {HTMLCanvasElement} canvas
+ * @param {() => boolean} turns Whether it can be turned now.
+ * @param {(dx: number, dy: number) => void} turn By pixels.
+ */
+export function followTurns(canvas, turns, turn) {
+  canvas.addEventListener("pointerdown", (event) => {
+    if (turns()) drag(canvas, event, (now) => turn(now.movementX, now.movementY));
+  });
+  canvas.addEventListener("keydown", (event) => {
+    const step = TURNS[event.key];
+    if (!step || !turns()) return;
+    event.preventDefault();
+    turn(step[0], step[1]);
+  });
 }

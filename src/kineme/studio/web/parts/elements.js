@@ -45,6 +45,29 @@ export function fill(element, ...children) {
 export const counted = (n, what) => `${n} ${what}${n === 1 ? "" : "s"}`;
 
 /**
+ * Replace elements; the focus stays on the one that it was on, which is recognized by its `data-key`.
+ * @param {() => void} act
+ */
+export function keepingFocus(act) {
+  const key = /** @type {HTMLElement} */ (document.activeElement)?.dataset?.key;
+  act();
+  if (key && document.activeElement === document.body)
+    /** @type {HTMLElement} */ (document.querySelector(`[data-key="${CSS.escape(key)}"]`))?.focus({
+      preventScroll: true,
+    });
+}
+
+/**
+ * A name that may break into lines where its words meet, as in DoubleBendedLine or pick_and_place, and not within them.
+ * @param {string} name
+ * @returns {(Node|string)[]}
+ */
+export const breakable = (name) =>
+  name
+    .split(/(?<=\p{Ll})(?=\p{Lu})|(?<=[\p{L}\p{N}][_\-./:])(?=[\p{L}\p{N}])/u)
+    .flatMap((part, k) => (k ? [document.createElement("wbr"), part] : [part]));
+
+/**
  * Elements by their ids that are more than an HTMLElement.
  * @typedef {{
  *   "add-obstacle": HTMLButtonElement,

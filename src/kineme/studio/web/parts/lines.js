@@ -1,5 +1,7 @@
 // Lines and marks on a canvas.
 
+const CELLS = 6; // of the ground
+
 /** Black or white, whichever reads better on a color. @param {string} hex As #rrggbb. */
 export function readableOn(hex) {
   const [r, g, b] = [1, 3, 5].map((at) => (parseInt(hex.slice(at, at + 2), 16) / 255) ** 2.2);
@@ -69,4 +71,33 @@ export function mark(context, [x, y], kind, r, color) {
   if (kind === "ring") Object.assign(context, { strokeStyle: color, lineWidth: 2 }).stroke();
   else Object.assign(context, { fillStyle: color }).fill();
   context.restore();
+}
+
+/**
+ * A grid below a movement in space, so that one sees how it lies.
+ * @param {CanvasRenderingContext2D} context
+ * @param {import("./camera.js").Camera} camera
+ * @param {number[]} low Corner.
+ * @param {number[]} high
+ * @param {string} color
+ */
+export function ground(context, camera, low, high, color) {
+  for (let k = 0; k <= CELLS; k += 1) {
+    const [x, y] = [0, 1].map((axis) => low[axis] + ((high[axis] - low[axis]) * k) / CELLS);
+    for (const ends of [
+      [
+        [x, low[1]],
+        [x, high[1]],
+      ],
+      [
+        [low[0], y],
+        [high[0], y],
+      ],
+    ])
+      line(
+        context,
+        ends.map(([a, b]) => camera.toScreen([a, b, low[2]])),
+        { color, width: 1 },
+      );
+  }
 }

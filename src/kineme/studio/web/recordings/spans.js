@@ -1,6 +1,5 @@
 // What was found, as a table: times and names can be typed, a row can be removed.
-import { byId, fill, make } from "../parts/elements.js";
-import { keepingFocus } from "../parts/keep_focus.js";
+import { byId, fill, keepingFocus, make } from "../parts/elements.js";
 
 /** @param {any[]} spans @param {number} chosen @param {{choose: (k: number) => void, changed: () => void}} page */
 export function showSpans(spans, chosen, page) {

@@ -1,0 +1,73 @@
+// A movement is drawn on the canvas: its samples go to the picture and to the server.
+import { byId } from "../parts/elements.js";
+import { library } from "../parts/library_state.js";
+import { requestAnswer, showAnswer } from "./answers.js";
+import { showLegend, takesDrawings } from "./invitation.js";
+import { canvasHeight } from "./scale.js";
+import { clear, FEWEST_SAMPLES, movementOf } from "./session.js";
+
+/** @typedef {import("./session.js").Session} Session */
+
+/**
+ * Samples of the canvas in the units and dimensions of the library.
+ * @param {number[][]} samples
+ * @param {number} height Of the canvas, in the units of the library.
+ */
+const inLibrary = (samples, height) =>
+  samples.map(([time, ...point]) => [
+    time,
+    ...point.map((value) => value * height),
+    ...(library().n_dims === 3 ? [0] : []),
+  ]);
+
+/** @param {Session} session @param {string} pointer @returns {boolean} Whether one may draw. */
+function begin(session, pointer) {
+  const { picture } = session;
+  if (!takesDrawings() || picture.turns) return false;
+  clear(session);
+  picture.height = picture.board.height;
+  session.sending.reset();
+  Object.assign(session, { drawing: true, pointer, height: canvasHeight() });
+  showLegend(true);
+  session.panel.words("Drawing", "…", "", "open");
+  return true;
+}
+
+/** @param {Session} session @param {number[][]} samples */
+function extend(session, samples) {
+  session.picture.ink.push(...samples);
+  session.picture.board.draw();
+  if (library().symbols.length) session.sending.push(inLibrary(samples, session.height));
+}
+
+/** @param {Session} session */
+function end(session) {
+  const { picture, panel } = session;
+  session.drawing = false;
+  Object.assign(picture, { height: null, rest: [] });
+  picture.board.draw();
+  byId("draw-clear").disabled = byId("draw-replay").disabled = picture.ink.length === 0;
+  if (picture.ink.length < FEWEST_SAMPLES)
+    return panel.words("Too short", "–", "Press, draw, and let go at the end.", "open");
+  session.movement = movementOf(inLibrary(picture.ink, session.height));
+  session.naming.allow(true);
+  if (!library().symbols.length) return showAnswer(session, null);
+  session.pending = true;
+  if (!session.sending.finish()) requestAnswer(session);
+}
+
+/**
+ * What hears the pointer and the pen of the keyboard.
+ * @param {Session} session
+ * @returns {import("./stroke.js").Hearer}
+ */
+export const hearerOf = (session) => ({
+  begins: (pointer) => begin(session, pointer),
+  // Escape ends a drawing while the pen is down.
+  goes: (samples) => session.drawing && extend(session, samples),
+  ends: () => session.drawing && end(session),
+  pen: (at) => {
+    session.picture.pen = at;
+    session.picture.board.draw();
+  },
+});

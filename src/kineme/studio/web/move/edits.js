@@ -1,0 +1,102 @@
+// The plan is edited: its points are dragged, typed, added and removed, its duration is stretched; each step can be
+// taken back.
+import { dragGoal } from "../parts/chosen.js";
+import { byId } from "../parts/elements.js";
+import { say } from "../parts/toasts.js";
+import { handlesOf } from "./handles.js";
+import { keepInSight } from "./paths.js";
+import { draggedWay, extent } from "./plan.js";
+import { showPoints } from "./points.js";
+import { movingFormulations } from "./session.js";
+
+const VIA_TIMES = [0.5, 0.25, 0.75, 0.375, 0.625, 0.125, 0.875]; // of new via points, shares of the duration
+const OBSTACLE = { time: 0.6, away: 0.08, radius: 0.07 }; // beside the path, in sizes of the movement
+const LONGEST = 4; // times the demonstrated duration; the shortest is as many times less
+
+/** @typedef {import("./session.js").Session} Session */
+
+/** Points came or went. @param {Session} session */
+export function showStructure(session) {
+  const page = { changed: () => showChange(session), removed: () => showStructure(session) };
+  session.handles.set(handlesOf(session.plan, session.camera, page));
+  showChange(session);
+}
+
+/** A point or the duration is another one. @param {Session} session */
+export function showChange(session) {
+  const { plan } = session;
+  keepInSight(session);
+  session.handles.place();
+  byId("duration-text").textContent = `${(plan.usual * plan.share).toFixed(2)} s`;
+  for (const name of movingFormulations(session)) session.rollouts.get(name).follow(plan);
+  session.picture.board.draw();
+  dragGoal(plan.symbol, draggedWay(plan));
+  if (!session.dragging) showNumbers(session);
+}
+
+/** @param {Session} session */
+function showNumbers(session) {
+  session.steps.keep(session.plan);
+  showPoints(
+    session.plan,
+    () => showChange(session),
+    () => showStructure(session),
+  );
+}
+
+/** A point is held, or let go. @param {Session} session @param {boolean} dragging */
+export function showDragging(session, dragging) {
+  session.dragging = dragging;
+  byId("move-stage").classList.toggle("dragging", dragging);
+  if (dragging || !session.plan) return;
+  showNumbers(session);
+  keepInSight(session);
+}
+
+/** Stretch the movement: from a quarter of the demonstrated duration to four times it. @param {Session} session */
+export function stretch(session) {
+  if (!session.plan) return;
+  session.plan.share = LONGEST ** (Number(byId("duration").value) / 100);
+  showChange(session);
+}
+
+/** Go back before the last change of a point or the duration. @param {Session} session */
+export function undoEdit(session) {
+  const { plan, steps } = session;
+  if (!plan || !steps.back(plan)) {
+    say("Nothing is changed here. The arrow in the bar takes back changes of the library.");
+    return;
+  }
+  byId("duration").value = String(Math.round((100 * Math.log(plan.share)) / Math.log(LONGEST)));
+  showStructure(session);
+}
+
+/**
+ * A point of the path that is shown, or of the recording as long as there is none.
+ * @param {Session} session @param {number} time Share of the duration. @returns {number[]}
+ */
+function pointAt({ picture, plan }, time) {
+  const points = picture.paths[0]?.path.positions ?? plan.path;
+  return [...points[Math.round(time * (points.length - 1))]];
+}
+
+/** @param {Session} session */
+export function addVia(session) {
+  const { plan, handles } = session;
+  if (!plan) return;
+  const at = VIA_TIMES[plan.via.length % VIA_TIMES.length];
+  plan.via.push({ at, point: pointAt(session, at) });
+  showStructure(session);
+  handles.focus(`via ${plan.via.length - 1}`);
+}
+
+/** @param {Session} session */
+export function addObstacle(session) {
+  const { plan, handles } = session;
+  if (!plan) return;
+  const size = extent(plan.path);
+  const center = pointAt(session, OBSTACLE.time).map((value, k) => value + (k < 2 ? OBSTACLE.away * size : 0));
+  plan.obstacles.push({ center, radius: OBSTACLE.radius * size });
+  showStructure(session);
+  handles.focus(`obstacle ${plan.obstacles.length - 1}`);
+}

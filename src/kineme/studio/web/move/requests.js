@@ -1,0 +1,96 @@
+// What Move asks the server for: the movement of a symbol, its primitives, a file of it.
+import { download, post } from "../parts/api.js";
+import { chooseToMove } from "../parts/chosen.js";
+import { byId } from "../parts/elements.js";
+import { library, symbolOf } from "../parts/library_state.js";
+import { say, tried } from "../parts/toasts.js";
+import { showChange, showStructure } from "./edits.js";
+import { FORMULATIONS } from "./formulations.js";
+import { showPaths } from "./paths.js";
+import { asShown, question } from "./plan.js";
+import { movingFormulations } from "./session.js";
+import { Steps } from "./steps.js";
+import { showStyles } from "./styles.js";
+
+const RESTS = 400; // how long a style slider rests before the primitive is asked for [ms]
+
+/** @typedef {import("./session.js").Session} Session */
+
+/** Start anew with a symbol. @param {Session} session @param {string|undefined} id */
+export async function chooseSymbol(session, id) {
+  const { picture, rollouts } = session;
+  const symbol = id && symbolOf(id);
+  if (!symbol) return;
+  const chosen = { id: symbol.id };
+  chooseToMove(symbol.id);
+  Object.assign(session, { chosen, version: library().version, plan: null, steps: new Steps() });
+  session.handles.set([]);
+  session.camera.face([symbol.path]);
+  picture.sketch(symbol.path);
+  byId("move-name").textContent = symbol.name;
+  const rollout = await tried(() =>
+    post("/api/rollout", { what: { symbol: symbol.id }, formulation: FORMULATIONS[0].name }),
+  );
+  if (session.chosen !== chosen) return; // another symbol since then, or this one anew
+  if (!rollout) {
+    session.chosen = null; // so that it is asked for again
+    return;
+  }
+  const plan = asShown(symbol, rollout);
+  session.plan = picture.plan = plan;
+  for (const each of rollouts.values()) each.reset();
+  byId("duration").value = "0";
+  byId("formulations").disabled = false;
+  picture.paths = [];
+  picture.fit();
+  showStructure(session);
+  showStyles(
+    symbol,
+    (values, formulation) => chooseStyle(session, values, formulation),
+    () => session.plan === plan,
+  );
+  await prepare(session);
+}
+
+/** Ask for the primitives of what moves. @param {Session} session */
+async function prepare(session) {
+  const { plan, rollouts } = session;
+  if (plan) await Promise.all(movingFormulations(session).map((name) => rollouts.get(name).prepare(plan)));
+}
+
+/**
+ * Let another style move; its primitive is asked for once the slider rests.
+ * @param {Session} session
+ * @param {number[]|null} values
+ * @param {string} formulation
+ */
+function chooseStyle(session, values, formulation) {
+  Object.assign(session.plan, { style: values, styled: formulation });
+  byId("formulations").disabled = values !== null;
+  for (const rollouts of session.rollouts.values()) rollouts.primitive = null;
+  showChange(session);
+  clearTimeout(session.resting);
+  session.resting = setTimeout(() => prepare(session), RESTS);
+}
+
+/** @param {Session} session @param {string} name @param {boolean} ticked */
+export async function tickFormulation(session, name, ticked) {
+  if (ticked) session.ticked.add(name);
+  else session.ticked.delete(name);
+  if (!session.plan) return;
+  showPaths(session);
+  if (!ticked) return;
+  const rollouts = session.rollouts.get(name);
+  await rollouts.prepare(session.plan);
+  if (session.plan && movingFormulations(session).includes(name)) rollouts.follow(session.plan);
+}
+
+/** Save the movement as a file. @param {Session} session */
+export async function save(session) {
+  if (!session.plan) return;
+  const format = byId("export-format").value;
+  const formulation = movingFormulations(session)[0] ?? FORMULATIONS[0].name;
+  const body = { ...question(session.plan, formulation), format };
+  const name = await tried(() => download("/api/export", body, `movement.${format}`));
+  if (name) say(`Saved as ${name}.`);
+}
