@@ -51,7 +51,7 @@ def arrays_movements(arrays: Mapping[str, Any], layout: Layout, kind: str) -> Pa
         No positions, or arrays that do not fit together.
     """
     arrays = _axes_stacked(arrays)
-    key = _named(arrays, POSITIONS)
+    key = first_named(arrays, POSITIONS)
     if key is not None:
         xs, ts, how = _of_one(arrays, numbers_of(arrays[key]), layout)
     else:
@@ -61,7 +61,7 @@ def arrays_movements(arrays: Mapping[str, Any], layout: Layout, kind: str) -> Pa
         ts, layout = [rate.stamps(len(x)) for x in xs], replace(layout, units="s")
     shape: tuple[int, ...] = () if key is None else np.shape(arrays[key])
     points = point_names(*shape[1:]) if len(shape) == 3 and len(xs) < shape[0] else None
-    named = Named(_labels(arrays, len(xs)), _named(arrays, TIMES) or STAMP, None, _column_names(arrays) or points)
+    named = Named(_labels(arrays, len(xs)), first_named(arrays, TIMES) or STAMP, None, _column_names(arrays) or points)
     return parsed_arrays(xs, ts, named, layout, (kind, how))
 
 
@@ -247,14 +247,15 @@ def _no_number(array: NDArray[Any]) -> Any:
     return array.dtype.name
 
 
-def _named(arrays: Mapping[str, Any], names: Sequence[str]) -> str | None:
+def first_named(arrays: Mapping[str, Any], names: Sequence[str]) -> str | None:
+    """Return the first of some names that an array has, or None."""
     return next((name for name in names if name in arrays), None)
 
 
 def _of_one(arrays: Mapping[str, Any], x: Array, layout: Layout) -> tuple[list[Array], list[Array] | None, str]:
-    key = _named(arrays, TIMES)
+    key = first_named(arrays, TIMES)
     t = None if key is None else numbers_of(arrays[key], of_time=True)
-    if x.ndim == 3 and t is None and _named(arrays, LABELS) is None:
+    if x.ndim == 3 and t is None and first_named(arrays, LABELS) is None:
         xs = sets_or_points(list(x), layout.every)
         x = x if len(xs) == len(x) else xs[0]
     elif x.ndim == 3 and t is not None and t.shape == x.shape[:1] != x.shape[1:2]:  # points at each of these times
@@ -304,7 +305,7 @@ def _numbered(arrays: Mapping[str, Any]) -> tuple[list[Array], list[Array] | Non
 
 
 def _labels(arrays: Mapping[str, Any], n: int) -> list[str | None]:
-    key = _named(arrays, LABELS)
+    key = first_named(arrays, LABELS)
     if key is None:
         return [None] * n
     given = arrays[key]

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kineme.errors import DataError
-from kineme.io.arrays.arrays import numbers_of
+from kineme.io.arrays.arrays import first_named, numbers_of
 from kineme.io.arrays.trees import STAMP, Rate, rate_of
 from kineme.movements.rotations import exp
 from kineme.movements.tables.columns import choose_roles, is_time
@@ -125,7 +125,7 @@ def _clock(arrays: Mapping[str, Any], body: Body, layout: Layout) -> tuple[dict[
 
 def _smpl(arrays: Mapping[str, Any]) -> Body | None:
     """Rotation vectors of all joints of a model, or of some, with the translation of the root."""
-    name = _first(arrays, _ALL_JOINTS)
+    name = first_named(arrays, _ALL_JOINTS)
     x = None if name is None else _values(arrays, name)
     model = next((model for model, joints in _MODELS.items() if x is not None and x.shape[1] == 3 * len(joints)), None)
     columns: dict[str, Array] = {}
@@ -153,12 +153,12 @@ def _rotations(joints: Sequence[str], x: Array) -> dict[str, Array]:
 
 def _robot(arrays: Mapping[str, Any]) -> Body | None:
     """Joints by their names, with the pose of the root where there is one; of MuJoCo's ``qpos`` it is in the array."""
-    name = _first(arrays, _JOINTS)
+    name = first_named(arrays, _JOINTS)
     x = None if name is None else _values(arrays, name)
     if name is None or x is None or np.ndim(arrays[name]) != 2:
         return None
     place, columns = _points_of(arrays, _PLACES, len(x))
-    turn = _first(arrays, _TURNS)
+    turn = first_named(arrays, _TURNS)
     q = None if turn is None else _values(arrays, turn, len(x))
     used = [*place, *([turn] if turn and q is not None else []), name]
     names = _texts(arrays, _JOINT_NAMES)
@@ -178,7 +178,7 @@ def _robot(arrays: Mapping[str, Any]) -> Body | None:
 
 def _named_points(arrays: Mapping[str, Any]) -> Body | None:
     """Points (T, J, 2) or (T, J, 3) that are named so, where a rate or times say that the first axis is time."""
-    name = _first(arrays, _POINTS)
+    name = first_named(arrays, _POINTS)
     x = None if name is None else _values(arrays, name)
     if name is None or x is None or np.ndim(arrays[name]) != 3 or np.shape(arrays[name])[2] not in (2, 3):
         return None
@@ -195,13 +195,9 @@ def _named_points(arrays: Mapping[str, Any]) -> Body | None:
 _KINDS: tuple[Callable[[Mapping[str, Any]], Body | None], ...] = (_smpl, _robot, _named_points)
 
 
-def _first(arrays: Mapping[str, Any], names: Sequence[str]) -> str | None:
-    return next((name for name in names if name in arrays), None)
-
-
 def _points_of(arrays: Mapping[str, Any], names: Sequence[str], n: int) -> tuple[list[str], dict[str, Array]]:
     """The array of a point over time, and its columns; nothing where there is none."""
-    name = _first(arrays, names)
+    name = first_named(arrays, names)
     x = None if name is None else _values(arrays, name, n)
     if name is None or x is None or x.shape[1] != 3:
         return [], {}

@@ -103,7 +103,13 @@ def inspect(recordings: Recordings) -> Inspection:
     sampling = sampling_of(demos)
     names = demos.names or ()
     duplicates = tuple(tuple(str(names[i]) for i in group) for group in duplicates_among(demos))
-    labels = _summaries(recordings, sampling)
+    order = labels_in_order(recordings)
+    number = {label: k for k, label in enumerate(order)}
+    codes = np.array([number[label] for label in recordings.labels])
+    extents = extents_of(demos).max(axis=1)
+    labels = tuple(
+        _summary(label, np.flatnonzero(codes == k), demos, sampling, extents) for k, label in enumerate(order)
+    )
     return Inspection(
         len(demos),
         len({source.path for source in recordings.sources}),
@@ -122,14 +128,6 @@ def labels_in_order(recordings: Recordings) -> list[str | None]:
     labels = set(recordings.labels)
     named = sorted(label for label in labels if label is not None)
     return [*named, *([None] if None in labels else [])]
-
-
-def _summaries(recordings: Recordings, sampling: Sampling) -> tuple[LabelSummary, ...]:
-    demos, order = recordings.demonstrations, labels_in_order(recordings)
-    number = {label: k for k, label in enumerate(order)}
-    codes = np.array([number[label] for label in recordings.labels])
-    extents = extents_of(demos).max(axis=1)
-    return tuple(_summary(order[k], np.flatnonzero(codes == k), demos, sampling, extents) for k in range(len(order)))
 
 
 def _summary(
@@ -260,7 +258,14 @@ def notes_on_extents(demos: Demonstrations) -> list[str]:
         return []
     *_, second, widest = sorted(groups.values(), key=lambda group: max(group.values()))
     here, there = max(widest.values()), max(second.values())
-    return [_note([*widest], here, there)] if there > 0 and here >= _MORE * there else []
+    if not there > 0 or here < _MORE * there:
+        return []
+    names = [*widest]
+    spans, steps = ("spans", f", or say --kind {names[0]}=discrete") if len(names) == 1 else ("span", "")
+    return [
+        f"{first_names(names, _LISTED)} {spans} up to {here:.3g}, the other columns up to {there:.3g}, which hardly "
+        f"count in what is learned: bring all to similar sizes, or choose some with --columns{steps}"
+    ]
 
 
 def notes_on_sizes(demos: Demonstrations) -> list[str]:
@@ -288,14 +293,6 @@ def _group(channel: Channel) -> str:
         return channel.unit or "an angle"
     stem = _END.sub("", channel.name).lower()
     return "an axis" if stem.endswith(("x", "y", "z")) else stem
-
-
-def _note(names: Sequence[str], here: float, there: float) -> str:
-    spans, steps = ("spans", f", or say --kind {names[0]}=discrete") if len(names) == 1 else ("span", "")
-    return (
-        f"{first_names(names, _LISTED)} {spans} up to {here:.3g}, the other columns up to {there:.3g}, which hardly "
-        f"count in what is learned: bring all to similar sizes, or choose some with --columns{steps}"
-    )
 
 
 def as_data(inspection: Inspection) -> dict[str, Any]:

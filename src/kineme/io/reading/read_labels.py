@@ -341,7 +341,11 @@ def labeled_pieces(recordings: Recordings, table: LabelTable) -> Recordings:
             start, stop = _samples(row, times, origin)
             outside = max(times[0] - origin - row.start, 0.0) + max(row.end + origin - times[-1], 0.0)
             if stop - start < MIN_SAMPLES or outside > _OUTSIDE * (row.end - row.start):
-                problems.append(Problem(table.name, row.line, _too_short(row, source, times, since)))
+                reason = (
+                    f"expected at least {MIN_SAMPLES} samples, and nine tenths, of the time between {row.start:g} and "
+                    f"{row.end:g} s in {source.path}; it lasts from {times[0] - origin:g} to {times[-1] - origin:g} s"
+                )
+                problems.append(Problem(table.name, row.line, reason))
             elif (line := lines.setdefault((start, stop), row.line)) != row.line:
                 problems.append(
                     Problem(table.name, row.line, f"expected one label for a stretch, line {line} has it too")
@@ -402,14 +406,6 @@ def _samples(row: LabelRow, times: Array, origin: float) -> tuple[int, int]:
 def _place(source: Source, times: Array, start: int, stop: int) -> str:
     ends = (np.format_float_positional(times[k], precision=4, trim="-") for k in (start, stop - 1))
     return f"{source.place} {'-'.join(ends)} s".strip()
-
-
-def _too_short(row: LabelRow, source: Source, times: Array, since: bool) -> str:
-    origin = float(times[0]) if since else 0.0
-    return (
-        f"expected at least {MIN_SAMPLES} samples, and nine tenths, of the time between {row.start:g} and "
-        f"{row.end:g} s in {source.path}; it lasts from {times[0] - origin:g} to {times[-1] - origin:g} s"
-    )
 
 
 def _cut(demos: Demonstrations, stretches: Sequence[tuple[int, int]], sources: Sequence[Source]) -> Demonstrations:
