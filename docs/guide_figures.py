@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
+from morph_figure import draw_morph
 from walk_through import walk
 
 import kineme
 from kineme.control import ObstacleAvoidance
-from kineme.dmp.styles.figure import draw_morph
 from kineme.reporting.figures import BLUE, GRAY, GREEN, ORANGE, new_figure
 from result_tables.measured import DOCS, rows
 

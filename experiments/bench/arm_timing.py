@@ -11,7 +11,6 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-from kineme.robots.execution.torques import Torques
 from scipy.interpolate import BPoly
 
 from bench.rows import Row
@@ -19,6 +18,7 @@ from kineme import DMP, Rollout, Trajectory, load_lasa
 from kineme.datasets.lasa import LASA_26
 from kineme.errors import TrajectoryError
 from kineme.robots import JointTrajectory, Robot, load, move
+from kineme.robots.execution.timing import Torques
 
 ARMS = ("panda", "ur5e", "wam", "so101")
 SIZES = (0.05, 0.1, 0.2)  # of the longer side [m]

@@ -40,8 +40,8 @@ from kineme.dmp.improve import improve as improve
 from kineme.dmp.improve import Improvement as Improvement
 
 # Features and kernels
-from kineme.features.dmp_features import DMPFeatures as DMPFeatures
-from kineme.features.rhythmic_features import RhythmicFeatures as RhythmicFeatures
+from kineme.features.movement_features import DMPFeatures as DMPFeatures
+from kineme.features.movement_features import RhythmicFeatures as RhythmicFeatures
 from kineme.features.random_binning import RandomBinning as RandomBinning
 from kineme import kernels as kernels
 

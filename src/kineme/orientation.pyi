@@ -4,7 +4,7 @@ from kineme.dmp.pose.pose_dmp import PosePrimitives as PosePrimitives
 from kineme.dmp.pose.pose_rollout import PoseRollout as PoseRollout
 from kineme.dmp.pose.pose_controller import PoseController as PoseController
 from kineme.dmp.pose.pose_controller import PoseState as PoseState
-from kineme.features.pose_features import PoseFeatures as PoseFeatures
+from kineme.features.movement_features import PoseFeatures as PoseFeatures
 from kineme.dmp.pose.tangent import to_tangent as to_tangent
 from kineme.dmp.pose.tangent import from_tangent as from_tangent
 

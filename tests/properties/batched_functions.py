@@ -41,8 +41,7 @@ from kineme import (
 from kineme.dmp.discrete.formulations import FORMULATIONS
 from kineme.dmp.discrete.specification import FITS, GATINGS
 from kineme.dmp.join import laid_out, laid_out_poses
-from kineme.features.movement_features import FEATURES
-from kineme.features.pose_features import PoseFeatures
+from kineme.features.movement_features import FEATURES, PoseFeatures
 from kineme.features.random_binning import RandomBinning
 from kineme.kernels import KERNELS, MEANS, averaged
 from kineme.kernels.pair_distances import listed_distances, pair_bounds, pair_distances

@@ -99,7 +99,6 @@ EXEMPT = {
     "dmp.styles.parameters.shared_recording": "what a whole batch was recorded as; see test_recorded_as.py",
     "dmp.styles.average.encoded": "of `AveragePrimitive.blend`, one average",
     "dmp.styles.average.average_by_label": "means of the batch, by `average`",
-    "dmp.styles.figure.draw_morph": "one picture",
     "dmp.styles.model.learn_styles": "what differs within the batch; see test_order_of_training.py",
     "movements.trajectories.collect.collect_trajectories": "joins arrays that the table's movements are made of",
     "movements.trajectories.demonstrations.require_labels": "hands out labels, or raises",

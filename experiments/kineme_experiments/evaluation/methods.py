@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
 from kineme.anchoring.unlabeled import propose
-from kineme.kernels.point_cloud import matched_sums
+from kineme.kernels.shapes import matched_sums
 from kineme.movements.trajectories.demonstrations import Demonstrations, require_labels
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.recognition.early.early import cut

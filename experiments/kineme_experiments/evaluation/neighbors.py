@@ -12,7 +12,7 @@ from scipy.spatial.distance import cdist, squareform
 
 from kineme.dmp.discrete.dmp import DMP
 from kineme.errors import DegenerateMovementWarning
-from kineme.features.dmp_features import DMPFeatures
+from kineme.features.movement_features import DMPFeatures
 from kineme.movements.trajectories.demonstrations import Demonstrations, require_labels
 from kineme.validation import Array
 from kineme_experiments.evaluation.optional import optional_module

@@ -1,4 +1,4 @@
-"""What all generated movements share, be they discrete, rhythmic or poses."""
+"""Base of all generated movements, be they discrete, rhythmic or poses."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class BaseRollout(Presented, ABC):
     @property
     @abstractmethod
     def positions(self) -> Array:
-        """What was demonstrated, generated: (n, T, d)."""
+        """Movements in the columns that were demonstrated, (n, T, d)."""
 
     @property
     @abstractmethod
@@ -57,7 +57,7 @@ class BaseRollout(Presented, ABC):
 
     @property
     def _shares(self) -> Array:
-        """When the samples are, as a share of the duration (T,)."""
+        """Times of the samples as shares of the duration (T,)."""
         return np.asarray(self.times[0] / self.times[0, -1])
 
     @property
@@ -66,7 +66,7 @@ class BaseRollout(Presented, ABC):
 
     @property
     def _column_channels(self) -> Channels | None:
-        """What the columns of `positions` are, where these are no coordinates and no recording is known."""
+        """Channels of the columns of `positions`, where these are no coordinates and no recording is known."""
         return None
 
     @property
@@ -83,7 +83,7 @@ class BaseRollout(Presented, ABC):
 
     @property
     def axis_names(self) -> list[str]:
-        """What the d columns of `positions` are called, in tables and figures."""
+        """Names of the d columns of `positions`, in tables and figures."""
         about = self._to_recording
         return axis_names(self.positions.shape[2]) if about is None else list(about.column_names)
 
@@ -97,13 +97,13 @@ class BaseRollout(Presented, ABC):
 
     @property
     def rate_names(self) -> list[str]:
-        """What the columns of `velocities` and `accelerations` are called."""
+        """Names of the columns of `velocities` and `accelerations`."""
         about = self._to_recording
         return axis_names(self.velocities.shape[2]) if about is None else list(about.rate_names)
 
     @property
     def channels(self) -> Channels | None:
-        """What was recorded, where that is known; see `Demonstrations.channels`."""
+        """Channels of the recordings, where they are known; see `Demonstrations.channels`."""
         return self._batch.channels
 
     @property
@@ -133,14 +133,18 @@ class BaseRollout(Presented, ABC):
         TrajectoryError
             Movements that are none, as of fewer than four samples.
         """
-        made = Demonstrations.from_arrays(self.positions, self.labels, list(self.times), self.names, copy=False)
+        demonstrations = Demonstrations.from_arrays(
+            self.positions, self.labels, list(self.times), self.names, copy=False
+        )
         about = self._to_recording
         if about is not None:
-            return Demonstrations.of_movements(with_recorded(made.movements, about, self._shares, len(self._batch)))
+            return Demonstrations.of_movements(
+                with_recorded(demonstrations.movements, about, self._shares, len(self._batch))
+            )
         if (columns := self._column_channels) is None:
-            return made
+            return demonstrations
         return Demonstrations.of_movements(
-            replace(made.movements, channels=columns, dimensions=recorded_names(columns))
+            replace(demonstrations.movements, channels=columns, dimensions=recorded_names(columns))
         )
 
     @property

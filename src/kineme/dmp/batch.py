@@ -45,7 +45,7 @@ class Batch:
 
         @property
         def names(self) -> tuple[str | None, ...] | None:
-            """Where each demonstration comes from, or None."""
+            """Source of each demonstration, or None."""
 
         @property
         def recorded_as(self) -> RecordedAs | None:
@@ -60,13 +60,13 @@ class Batch:
             object.__setattr__(self, "labels", label_array(self.labels))
 
     def __len__(self) -> int:
-        return len(self._row(next(iter(self.ROWS))))
+        return len(self.row(next(iter(self.ROWS))))
 
     def __getitem__(self, index: Any) -> Self:
         """The chosen primitives as a batch; an integer gives a batch of one."""
         chosen = np.atleast_1d(as_indices(index, len(self)))
         return self._with(
-            {name: self._row(name)[chosen] for name in self.ROWS},
+            {name: self.row(name)[chosen] for name in self.ROWS},
             None if self.labels is None else self.labels[chosen],
             None if self.names is None else tuple(self.names[i] for i in chosen),
             None if self.recorded_as is None else self.recorded_as.take(chosen),
@@ -82,11 +82,11 @@ class Batch:
     @property
     def n_dims(self) -> int:
         """Number of dimensions d."""
-        return int(self._row(next(iter(self.ROWS))).shape[1])
+        return int(self.row(next(iter(self.ROWS))).shape[1])
 
     @property
     def channels(self) -> Channels | None:
-        """What was recorded, where that is known; see `Demonstrations.channels`."""
+        """Channels of the recordings, where they are known; see `Demonstrations.channels`."""
         return None if self.recorded_as is None else self.recorded_as.channels
 
     @property
@@ -121,19 +121,31 @@ class Batch:
             raise TrajectoryError(f"expected at least one batch of {cls.__name__}, got {got}")
         first = batches[0]
         for i, batch in enumerate(batches):
-            _check_specification(first, batch, i)
+            if batch.dmp != first.dmp:
+                name = next(
+                    f.name for f in fields(first.dmp) if getattr(first.dmp, f.name) != getattr(batch.dmp, f.name)
+                )
+                raise SpecificationError(
+                    f"batch {i}: expected {name}={getattr(first.dmp, name)!r} as in batch 0, got "
+                    f"{getattr(batch.dmp, name)!r}; primitives of one batch share one specification: learn them again "
+                    "with it"
+                )
+            if batch.n_dims != first.n_dims:
+                raise TrajectoryError(
+                    f"batch {i}: expected {first.n_dims} dimensions as in batch 0, got {batch.n_dims}"
+                )
         check_alike([batch.moving_channels for batch in batches], "batch")
         labels = [batch.labels for batch in batches if batch.labels is not None]
         if len(labels) not in (0, len(batches)):
             raise TrajectoryError(
                 f"expected labels on every batch or on none, got them on {len(labels)} of {len(batches)}"
             )
-        if len({known.dtype.kind for known in labels}) > 1:
-            types = ("texts" if known.dtype == object else str(known.dtype) for known in labels)
+        if len({of_batch.dtype.kind for of_batch in labels}) > 1:
+            types = ("texts" if of_batch.dtype == object else str(of_batch.dtype) for of_batch in labels)
             raise TrajectoryError(f"expected labels of one type, got {', '.join(types)}")
         named = any(batch.names is not None for batch in batches)
         return first._with(
-            {name: np.concatenate([batch._row(name) for batch in batches]) for name in cls.ROWS},
+            {name: np.concatenate([batch.row(name) for batch in batches]) for name in cls.ROWS},
             np.concatenate(labels) if labels else None,
             tuple(name for batch in batches for name in batch.names or (None,) * len(batch)) if named else None,
             merged([batch.recorded_as for batch in batches]),
@@ -149,7 +161,7 @@ class Batch:
         OSError
             The file cannot be written; what was there before stays.
         """
-        rows = {name: self._row(name) for name in self.ROWS}
+        rows = {name: self.row(name) for name in self.ROWS}
         from kineme.dmp.persistence import header_of, save_as, step_arrays  # files load when they are used
 
         header = header_of(self.dmp, self.labels, self.names, self.channels)
@@ -170,8 +182,8 @@ class Batch:
 
         return load_as(cls.KIND, path, cls._from_file)
 
-    def _row(self, name: str) -> NDArray[Any]:
-        """The array of that name in `ROWS`."""
+    def row(self, name: str) -> NDArray[Any]:
+        """Return the array of that name in `ROWS`."""
         return np.asarray(getattr(self, name))
 
     def _with(
@@ -188,25 +200,9 @@ class Batch:
 
     @classmethod
     def _from_file(cls, header: dict[str, Any], arrays: Arrays) -> Self:
-        from kineme.dmp.persistence import (
-            checked_rows,
-            labels_and_names,
-            recorded_as_from,
-            specification_from_dict,
-        )
+        from kineme.dmp.persistence import checked_rows, labels_and_names, recorded_as_from, specification_from_dict
 
         dmp: Any = specification_from_dict(cls.SPECIFICATION, header["dmp"])
         rows = checked_rows(cls.ROWS, arrays, dmp.n_basis)
         n, d = next(iter(rows.values())).shape[:2]
         return cls._of_rows(dmp, rows, *labels_and_names(header, n), recorded_as_from(header, arrays, n, d))
-
-
-def _check_specification(first: Batch, batch: Batch, i: int) -> None:
-    if batch.dmp != first.dmp:
-        name = next(f.name for f in fields(first.dmp) if getattr(first.dmp, f.name) != getattr(batch.dmp, f.name))
-        raise SpecificationError(
-            f"batch {i}: expected {name}={getattr(first.dmp, name)!r} as in batch 0, got {getattr(batch.dmp, name)!r}; "
-            "primitives of one batch share one specification: learn them again with it"
-        )
-    if batch.n_dims != first.n_dims:
-        raise TrajectoryError(f"batch {i}: expected {first.n_dims} dimensions as in batch 0, got {batch.n_dims}")

@@ -26,7 +26,7 @@ _DEPENDENT = 1e-11  # of the largest number on the diagonal of R: smaller ones a
 
 
 class Conditioned(NamedTuple):
-    """What observing k linear functions of p numbers does to their distribution."""
+    """Distribution of p numbers after k linear functions of them were observed."""
 
     gain: Array  # (k, p): the mean changes by e @ gain, with e (k,) or (n, k) observed minus expected
     factor: Array  # (r, p) of the covariance that remains

@@ -140,10 +140,14 @@ class Contextual(BaseEstimator):
         Y = _compressed_paths(primitives)
         tried = candidates(self.length_scale, self.noise)
         names = list(tried) if self.regression == "auto" else [self.regression]
-        best = {name: min((solve(one, X) for one in tried[name]), key=lambda s: _rms(s.left_out(Y))) for name in names}
+        best = {
+            name: min((solve(smoother, X) for smoother in tried[name]), key=lambda s: _rms(s.left_out(Y)))
+            for name in names
+        }
         self.errors_ = {name: _rms(best[name].left_out(Y)) for name in names}
         self.errors_["average"] = _rms(solve(Smoother("average"), X).left_out(Y))
-        self._solved = best[_simplest(names, self.errors_)]
+        enough = max(_AS_GOOD * min(self.errors_[name] for name in names), _EXACT * self.errors_["average"])
+        self._solved = best[next(name for name in names if self.errors_[name] <= enough)]  # the simplest come first
         self.smoother_ = self._solved.smoother
         self.leave_one_out_errors_ = self._solved.left_out(Y)
         self.leave_one_out_error_ = _rms(self.leave_one_out_errors_)
@@ -205,12 +209,6 @@ def _compressed_paths(primitives: Primitives) -> Array:
     return np.asarray(np.linalg.qr(rows.T, mode="r")).T
 
 
-def _simplest(names: list[str], errors: dict[str, float]) -> str:
-    """The first name that is as good as the best; the simplest come first."""
-    enough = max(_AS_GOOD * min(errors[name] for name in names), _EXACT * errors["average"])
-    return next(name for name in names if errors[name] <= enough)
-
-
 def _rms(errors: Array) -> float:
     return float(np.sqrt(np.mean(errors**2)))
 
@@ -221,7 +219,7 @@ def _standardized(C: Array, center: Array, scale: Array) -> Array:
 
 @dataclass(frozen=True)
 class Smoother:
-    """How numbers follow from parameters.
+    """Regression of numbers on parameters.
 
     Attributes
     ----------
@@ -248,7 +246,7 @@ def candidates(length_scale: float | None, noise: float | None) -> dict[str, lis
     """Name -> the smoothers of that name."""
     lengths = LENGTH_SCALES if length_scale is None else (float(length_scale),)
     noises = NOISES if noise is None else (float(noise),)
-    processes = [Smoother("gaussian-process", *one) for one in product(lengths, noises)]
+    processes = [Smoother("gaussian-process", *settings) for settings in product(lengths, noises)]
     return {"linear": [Smoother("linear")], "gaussian-process": processes}
 
 
@@ -266,7 +264,7 @@ class Solved:
         return _covariance(self.smoother, tasks, self.tasks) @ self.Q + _trend(self.smoother, tasks) @ self.trend
 
     def left_out(self, Y: Array) -> Array:
-        """How far each row of Y (n, p) is from what the others say, shape (n,)."""
+        """Return the distances (n,) of the rows of Y (n, p) from what the others say."""
         return np.asarray(np.linalg.norm(self.Q @ Y, axis=1) / np.diag(self.Q))
 
 
@@ -323,18 +321,14 @@ def demonstrated_parameters(parameters: ArrayLike, n: int) -> Array:
         )
     if np.linalg.matrix_rank(deviations / lengths, tol=1e-9) < k:
         raise TrajectoryError(f"expected {k} parameters of which none follows from the others; leave out those that do")
-    _check_alone(deviations / lengths)
-    return C.copy()
-
-
-def _check_alone(deviations: Array) -> None:
-    """Refuse a demonstration without which the others say nothing about a parameter: it cannot be left out."""
-    leverage = 1.0 / len(deviations) + np.sum(np.linalg.qr(deviations)[0] ** 2, axis=1)
+    # Without a demonstration that is alone with its parameter, the others say nothing about it.
+    leverage = 1.0 / n + np.sum(np.linalg.qr(deviations / lengths)[0] ** 2, axis=1)
     if leverage.max() > 1.0 - _ALONE:
         raise TrajectoryError(
             f"expected parameters that differ independently in all demonstrations but one, too, so that it can be left "
             f"out, got demonstration {np.argmax(leverage)} alone with its own; demonstrate another one like it"
         )
+    return C.copy()
 
 
 def task_parameters(parameters: ArrayLike, k: int) -> Array:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import block_diag
 
-from kineme.dmp.discrete.dmp import DMP, Primitives
+from kineme.dmp.discrete.dmp import Primitives
 from kineme.dmp.discrete.modulate import SLACK, changes, mixed_factor, path_variance, smooth_factor
 from kineme.dmp.discrete.operators import decoder_at, smoothness_factor
 from kineme.dmp.discrete.rollout import Rollout
@@ -78,42 +78,49 @@ def couple(
     >>> learned = kineme.DMP().learn(kineme.load_lasa(["Line", "Angle"]))
     >>> left, right = kineme.couple(learned[0], learned[7], during=(0.3, 0.7))
     """
-    spread = [_spread(one) for one in (left, right)]
-    arms = moving([one.primitive if isinstance(one, AveragePrimitive) else one for one in (left, right)])
+    factors = [arm.factor[:, :, :-3] if isinstance(arm, AveragePrimitive) else np.zeros(0) for arm in (left, right)]
+    spread = [factor if factor.any() else None for factor in factors]
+    arms = moving([part.primitive if isinstance(part, AveragePrimitive) else part for part in (left, right)])
     begin, end = within(during, "during")
     if begin == 0.0 or end == 1.0:
         raise SpecificationError(
             f"expected during=(begin, end) above 0 and below 1, got {during!r}; starts and goals say what it is there"
         )
-    longer = np.maximum(*(one.durations for one in arms))
-    arms = [Primitives.from_rollout(one.rollout(duration=longer)) for one in arms]
-    times = _times([one.dmp for one in arms], (begin, end))
-    paths = [_at(one, times) for one in arms]  # (n, d, K)
+    longer = np.maximum(*(arm.durations for arm in arms))
+    arms = [Primitives.from_rollout(arm.rollout(duration=longer)) for arm in arms]
+    n_times = math.ceil(_PER_BASIS * max(arm.dmp.n_basis for arm in arms) * (end - begin)) + 2
+    times = tuple(np.linspace(begin, end, n_times).tolist())
+    paths = [_at(arm, times) for arm in arms]  # (n, d, K)
     wanted = _offset(offset, paths[1] - paths[0])
-    made = [
-        replace(one, scaled_weights=one.scaled_weights + change)
-        for one, change in zip(arms, _shared(arms, spread, times, wanted - (paths[1] - paths[0])), strict=True)
+    coupled = [
+        replace(arm, scaled_weights=arm.scaled_weights + change)
+        for arm, change in zip(arms, _shared(arms, spread, times, wanted - (paths[1] - paths[0])), strict=True)
     ]
-    _warn_loose(made, times, wanted)
-    return made[0], made[1]
+    missing = np.abs(_at(coupled[1], times) - _at(coupled[0], times) - wanted)
+    worst = np.where(np.isnan(missing), 0.0, missing).max(axis=(1, 2))
+    extents = np.maximum(*(arm.extents.max(axis=1) for arm in coupled))
+    if (worst > _LOOSE * extents).any():
+        i = int(np.argmax(worst / extents))
+        warn(
+            f"the difference of movements {i} is {worst[i]:.3g} off, {100 * worst[i] / extents[i]:.2g} % of their "
+            "extent: it bends more than the basis functions can; use more of them, or a shorter stretch",
+            ExtrapolationWarning,
+            stacklevel=2,
+        )
+    return coupled[0], coupled[1]
 
 
-def _times(dmps: list[DMP], stretch: tuple[float, float]) -> tuple[float, ...]:
-    n = math.ceil(_PER_BASIS * max(dmp.n_basis for dmp in dmps) * (stretch[1] - stretch[0]))
-    return tuple(np.linspace(*stretch, n + 2).tolist())
-
-
-def _at(one: Primitives, times: tuple[float, ...]) -> Array:
+def _at(arm: Primitives, times: tuple[float, ...]) -> Array:
     """Positions (n, d, K) at any times."""
-    response = decoder_at(one.dmp, times)
-    path = one.scaled_weights @ response.Phi[0].T + one.starts[:, :, None]
-    path += (one.goals - one.starts)[:, :, None] * response.goal[0]
-    path += (one.velocities * one.durations[:, None])[:, :, None] * response.velocity[0]
+    response = decoder_at(arm.dmp, times)
+    path = arm.scaled_weights @ response.Phi[0].T + arm.starts[:, :, None]
+    path += (arm.goals - arm.starts)[:, :, None] * response.goal[0]
+    path += (arm.velocities * arm.durations[:, None])[:, :, None] * response.velocity[0]
     return np.asarray(path)
 
 
 def _offset(offset: ArrayLike | None, difference: Array) -> Array:
-    """What the difference is to be (n, d, 1), NaN where it is free."""
+    """Return the difference that is asked for (n, d, 1), NaN where it is free."""
     if offset is None:
         return np.asarray(difference.mean(axis=2, keepdims=True))
     given = np.asarray(as_numbers(offset, "offset"))
@@ -126,50 +133,28 @@ def _offset(offset: ArrayLike | None, difference: Array) -> Array:
     return np.asarray(np.broadcast_to(value, difference.shape[:2])[:, :, None])
 
 
-def _spread(one: Primitives | Rollout | AveragePrimitive) -> Array | None:
-    """Factor (r, d, N) of the covariance of the demonstrations' weights, where there are several."""
-    shown = one.factor[:, :, :-3] if isinstance(one, AveragePrimitive) else np.zeros(0)
-    return shown if shown.any() else None
-
-
 def _shared(arms: list[Primitives], spread: list[Array | None], times: tuple[float, ...], errors: Array) -> list[Array]:
     """The changes of both arms' weights (n, d, N), the most probable ones together."""
     n, d, k = errors.shape
-    along = [decoder_at(one.dmp, (*times, 1.0)).Phi for one in arms]
-    kept = block_diag(*(np.vstack((Phi[0, -1], Phi[1, -1])) for Phi in along))  # goals and velocities there
-    observed = np.vstack((np.hstack((-along[0][0, :-1], along[1][0, :-1])), kept))
+    along = [decoder_at(arm.dmp, (*times, 1.0)).Phi for arm in arms]
+    held = block_diag(*(np.vstack((Phi[0, -1], Phi[1, -1])) for Phi in along))  # goals and velocities there
+    observed = np.vstack((np.hstack((-along[0][0, :-1], along[1][0, :-1])), held))
     rows, slack = np.concatenate((errors, np.zeros((n, d, 4))), axis=2), np.repeat((SLACK, 0.0), (k, 4))
-    if all(one is None for one in spread):
-        factor = block_diag(*(smoothness_factor(one.dmp) for one in arms))
+    if all(factor_of is None for factor_of in spread):
+        factor = block_diag(*(smoothness_factor(arm.dmp) for arm in arms))
         both = changes(factor, observed, rows.reshape(n * d, -1), slack).reshape(n, d, -1)
         return np.split(both, [arms[0].dmp.n_basis], axis=2)
     # All dimensions at once: the numbers of one arm, dimension after dimension, then those of the other.
-    factor = block_diag(*_scaled_factors(arms, spread))
+    # An arm that was shown once varies as much as the other, smoothly.
+    dmp, shown = next((arm.dmp, shown) for arm, shown in zip(arms, spread, strict=True) if shown is not None)
+    variance = path_variance(dmp, shown)
+    factor = block_diag(
+        *(
+            smooth_factor(arm.dmp, d, variance) if shown is None else mixed_factor(arm.dmp, shown)
+            for arm, shown in zip(arms, spread, strict=True)
+        )
+    )
     every_dim = np.hstack([np.kron(np.eye(d), part) for part in np.split(observed, [arms[0].dmp.n_basis], axis=1)])
     both = changes(factor, every_dim, rows.reshape(n, -1), np.tile(slack, d))
     parts = np.split(both, [d * arms[0].dmp.n_basis], axis=1)
     return [part.reshape(n, d, -1) for part in parts]
-
-
-def _scaled_factors(arms: list[Primitives], spread: list[Array | None]) -> list[Array]:
-    """Of the covariance of each arm's weights (d N); one that was shown once varies as much as the other, smoothly."""
-    known = next((one.dmp, shown) for one, shown in zip(arms, spread, strict=True) if shown is not None)
-    variance, d = path_variance(*known), known[1].shape[1]
-    return [
-        smooth_factor(one.dmp, d, variance) if shown is None else mixed_factor(one.dmp, shown)
-        for one, shown in zip(arms, spread, strict=True)
-    ]
-
-
-def _warn_loose(made: list[Primitives], times: tuple[float, ...], wanted: Array) -> None:
-    missing = np.abs(_at(made[1], times) - _at(made[0], times) - wanted)
-    worst = np.where(np.isnan(missing), 0.0, missing).max(axis=(1, 2))
-    extents = np.maximum(*(one.extents.max(axis=1) for one in made))
-    if (worst > _LOOSE * extents).any():
-        i = int(np.argmax(worst / extents))
-        warn(
-            f"the difference of movements {i} is {worst[i]:.3g} off, {100 * worst[i] / extents[i]:.2g} % of their "
-            "extent: it bends more than the basis functions can; use more of them, or a shorter stretch",
-            ExtrapolationWarning,
-            stacklevel=3,
-        )

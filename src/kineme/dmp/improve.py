@@ -12,9 +12,7 @@ change of position and velocity at the end.
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -100,16 +98,13 @@ def covariance_adaptation(search: Search, variants: Array, costs: Array) -> Sear
     settled = np.sqrt(1.0 - (1.0 - c_size) ** (2 * (search.update + 1)))
     moving = float(length / settled < (1.4 + 2.0 / (p + 1.0)) * expected)
     path = (1.0 - c_path) * search.path + moving * np.sqrt(c_path * (2.0 - c_path) * effective) * step
-    kept = 1.0 - c_rank - c_one * (1.0 - (1.0 - moving) * c_path * (2.0 - c_path))
-    covariance = kept * search.covariance + c_one * np.outer(path, path) + c_rank * (steps.T * weights) @ steps
+    remaining = 1.0 - c_rank - c_one * (1.0 - (1.0 - moving) * c_path * (2.0 - c_path))
+    covariance = remaining * search.covariance + c_one * np.outer(path, path) + c_rank * (steps.T * weights) @ steps
     size = search.size * np.exp(min(1.0, c_size / damping * (length / expected - 1.0)))
     return Search(search.center + search.size * step, float(size), covariance, path, size_path, search.update + 1)
 
 
-METHODS: dict[str, Callable[[Search, Array, Array], Search]] = {
-    "cma-es": covariance_adaptation,
-    "pi-bb": path_integral,
-}
+METHODS: dict[str, Callable[[Search, Array, Array], Search]] = {"cma-es": covariance_adaptation, "pi-bb": path_integral}
 
 _NEGLIGIBLE = 1e-2  # of the largest: directions that change the path less are not explored
 
@@ -121,7 +116,7 @@ _WIDEST = 1e3  # extents
 
 @dataclass(frozen=True, eq=False)
 class Improvement:
-    """What `improve` found.
+    """Result of `improve`.
 
     Attributes
     ----------
@@ -221,6 +216,8 @@ def improve(  # noqa: PLR0913 - one parameter per option
     >>> bool(better.cost < better.costs[0, 0])
     True
     """
+    from tqdm import tqdm  # only who searches needs it
+
     check_primitives(primitive)
     _check_options(primitive, rollouts, updates, method, exploration, target, smallest)
     check_switch("progress", progress)
@@ -236,7 +233,7 @@ def improve(  # noqa: PLR0913 - one parameter per option
     tried: list[Array] = []
     sizes: list[float] = []
     best, stopped = (np.inf, search.center), f"{updates} updates"
-    with _bar(updates, progress) as bar:
+    with tqdm(total=updates, desc="improving", leave=False, disable=not progress) as bar:
         for update in range(updates):
             drawn = search.draw(rollouts, rng)
             moved = variants(primitive, factor, drawn).rollout(start, goal, duration, n_samples=n_samples)
@@ -280,12 +277,6 @@ def _check_options(  # noqa: PLR0913, PLR0917 - the options of improve, in its o
         check_number("target", target)
 
 
-def _bar(updates: int, progress: bool) -> AbstractContextManager[Any]:
-    from tqdm import tqdm
-
-    return tqdm(total=updates, desc="improving", leave=False, disable=not progress)
-
-
 def checked_costs(costs: ArrayLike, n: int, update: int) -> Array:
     """The costs (n,) of the movements of an update, as a copy.
 
@@ -294,19 +285,19 @@ def checked_costs(costs: ArrayLike, n: int, update: int) -> Array:
     SpecificationError
         Another number of costs, or costs that are NaN or infinite; with the number of the movement.
     """
-    found = as_numbers(costs, "cost", f"{n} numbers, the cost of each movement")
-    if found.shape != (n,):
+    paid = as_numbers(costs, "cost", f"{n} numbers, the cost of each movement")
+    if paid.shape != (n,):
         raise SpecificationError(
-            f"expected the cost to return {n} numbers, one for each movement of the rollout, got shape {found.shape}; "
+            f"expected the cost to return {n} numbers, one for each movement of the rollout, got shape {paid.shape}; "
             "reduce over samples and dimensions, axis=(1, 2)"
         )
-    if not np.isfinite(found).all():
-        i = int(np.argmin(np.isfinite(found)))
+    if not np.isfinite(paid).all():
+        i = int(np.argmin(np.isfinite(paid)))
         raise SpecificationError(
-            f"expected finite costs, got {found[i]:g} for movement {i} of update {update}; "
+            f"expected finite costs, got {paid[i]:g} for movement {i} of update {update}; "
             "give a movement that fails a large cost"
         )
-    return found.copy()
+    return paid.copy()
 
 
 def exploration_factor(dmp: Specification) -> Array:
@@ -318,11 +309,11 @@ def exploration_factor(dmp: Specification) -> Array:
     L = np.diff(np.eye(n_basis + 4, n_basis, -2), n=2, axis=0)
     smooth = np.linalg.inv(np.linalg.qr(L, mode="r")).T  # F0' F0 = (L'L)^-1
     response = decoder(dmp, dmp.n_points)
-    kept = condition(smooth, response.Phi[:2, -1]).factor
-    U, S, paths = np.linalg.svd(kept @ response.Phi[0].T, full_matrices=False)
+    held = condition(smooth, response.Phi[:2, -1]).factor
+    U, S, paths = np.linalg.svd(held @ response.Phi[0].T, full_matrices=False)
     chosen = _NEGLIGIBLE * S[0] < S
     largest = np.linalg.norm(S[chosen, None] * paths[chosen], axis=0).max()
-    return np.asarray(U[:, chosen].T @ kept / largest)
+    return np.asarray(U[:, chosen].T @ held / largest)
 
 
 def variants(primitive: Primitives, factor: Array, z: Array) -> Primitives:

@@ -97,19 +97,19 @@ def join(
         An overlap that is negative or longer than half a part; more than 2,000 basis functions.
     """
     movements = moving(parts, poses=True)
-    durations = np.stack([one.durations for one in movements])  # (parts, n)
+    durations = np.stack([movement.durations for movement in movements])  # (parts, n)
     check_number("overlap", overlap, least=0.0)
     if len(movements) > 1 and overlap > 0.5 * durations.min():
         raise SpecificationError(
             f"expected overlap of at most half the shortest part, {0.5 * durations.min():.3g} s, got {overlap:g} s"
         )
-    plain = [one for one in movements if isinstance(one, Primitives)]
-    turning = [one for one in movements if isinstance(one, PosePrimitives)]
+    plain = [movement for movement in movements if isinstance(movement, Primitives)]
+    turning = [movement for movement in movements if isinstance(movement, PosePrimitives)]
     laid, references = laid_out_poses(turning, shift) if turning else (laid_out(plain, shift), None)
     begins = np.vstack((np.zeros(durations.shape[1]), np.cumsum(durations[:-1] - overlap, axis=0)))
     total = begins[-1] + durations[-1]
     dmp = fitting_specification(
-        movements, float(total.max() * max(one.dmp.n_basis / one.durations.min() for one in movements))
+        movements, float(total.max() * max(movement.dmp.n_basis / movement.durations.min() for movement in movements))
     )
     times = total[:, None] * np.linspace(0.0, 1.0, dmp.n_points)
     rises = [smooth_rise(times - begin[:, None], overlap) for begin in begins[1:]]
@@ -119,8 +119,12 @@ def join(
         path += share[:, :, None] * _at(part.positions, (times - begin[:, None]) / part.durations[:, None])
     when = [np.column_stack((a, a + b)) / total[:, None] for a, b in zip(begins, durations, strict=True)]
     ends = (laid[0].begin_velocities, laid[-1].positions[:, -1], laid[-1].end_velocities)
-    made = carried_over(refitted(dmp, path, times, ends), movements, when, begins[1:] / total)
-    return made if references is None else PosePrimitives(replace(made, recorded_as=None), references, made.recorded_as)
+    joined = carried_over(refitted(dmp, path, times, ends), movements, when, begins[1:] / total)
+    return (
+        joined
+        if references is None
+        else PosePrimitives(replace(joined, recorded_as=None), references, joined.recorded_as)
+    )
 
 
 def _at(x: Array, u: Array) -> Array:
@@ -143,10 +147,10 @@ class LaidOut(NamedTuple):
 def laid_out(movements: Sequence[Primitives], shift: bool) -> list[LaidOut]:
     """Each part from where the one before it ends, to its own goal or, shifted, as far as it was shown to go."""
     laid: list[LaidOut] = []
-    for one in movements:
-        start = laid[-1].positions[:, -1] if laid else one.starts
-        goal = one.goals + (start - one.starts) if shift else one.goals
-        path = one.rollout(start, goal, n_samples=_SAMPLES)
+    for movement in movements:
+        start = laid[-1].positions[:, -1] if laid else movement.starts
+        goal = movement.goals + (start - movement.starts) if shift else movement.goals
+        path = movement.rollout(start, goal, n_samples=_SAMPLES)
         laid.append(LaidOut(path.durations, path.positions, path.velocities[:, 0], path.velocities[:, -1]))
     return laid
 
@@ -162,27 +166,29 @@ def laid_out_poses(movements: Sequence[PosePrimitives], shift: bool) -> tuple[li
         Orientations farther than a full turn from the last one, about an axis that changes.
     """
     rolled: list[PoseRollout] = []
-    for one in movements:
-        start = rolled[-1].positions[:, -1] if rolled else one.starts
-        rolled.append(one.rollout(start, _shifted(one, start) if shift else one.goals, n_samples=_SAMPLES))
+    for movement in movements:
+        start = rolled[-1].positions[:, -1] if rolled else movement.starts
+        rolled.append(
+            movement.rollout(start, _shifted(movement, start) if shift else movement.goals, n_samples=_SAMPLES)
+        )
     m = movements[0].n_positions
     turned = np.concatenate([path.orientations for path in rolled], axis=1)
     references = turned[:, -1].copy()
     vectors = _vectors(turned, references)
     laid = []
-    for i, (one, path) in enumerate(zip(movements, rolled, strict=True)):
+    for i, (movement, path) in enumerate(zip(movements, rolled, strict=True)):
         here = vectors[:, i * _SAMPLES : (i + 1) * _SAMPLES]
         places = np.concatenate((path.positions[:, :, :m], here), axis=2)
         begin, end = (rates_in_tangent(path.velocities[:, k], places[:, k], m, "velocity") for k in (0, -1))
         assert begin is not None
         assert end is not None
-        laid.append(LaidOut(one.durations, places, begin, end))
+        laid.append(LaidOut(movement.durations, places, begin, end))
     return laid, references
 
 
-def _shifted(one: PosePrimitives, starts: Array) -> Array:
+def _shifted(movement: PosePrimitives, starts: Array) -> Array:
     """The goals of poses that begin elsewhere."""
-    m, own, goals = one.n_positions, one.starts, one.goals
+    m, own, goals = movement.n_positions, movement.starts, movement.goals
     q, q_own, q_goal = (columns[:, m:].reshape(len(columns), -1, 4) for columns in (starts, own, goals))
     turned = product(q_goal, product(conjugate(q_own), q))
     return np.concatenate((goals[:, :m] + starts[:, :m] - own[:, :m], turned.reshape(len(turned), -1)), axis=1)
@@ -219,27 +225,29 @@ def moving(parts: Sequence[Any], poses: bool = False) -> list[Primitives] | list
         raise TrajectoryError(f"expected several movements, as [reach, pour], got {parts!r}")
     poses = poses and isinstance(parts[0], (PosePrimitives, PoseRollout))
     expected = (PosePrimitives, PoseRollout) if poses else (Primitives, Rollout)
-    for i, one in enumerate(parts):
-        if not isinstance(one, expected):
-            what, remedy = type(one).__name__, _REMEDIES.get(type(one).__name__, "")
-            names = " or ".join(known.__name__ for known in expected)
+    for i, movement in enumerate(parts):
+        if not isinstance(movement, expected):
+            what, remedy = type(movement).__name__, _REMEDIES.get(type(movement).__name__, "")
+            names = " or ".join(kind.__name__ for kind in expected)
             raise TrajectoryError(f"expected {names} as part {i}, got {what}{remedy}")
     own: Any = PosePrimitives if poses else Primitives
-    moving: Any = [one if isinstance(one, own) else own.from_rollout(one) for one in parts]
-    n = max(len(one) for one in moving)
-    for i, one in enumerate(moving):
-        if one.n_dims != moving[0].n_dims:
-            raise TrajectoryError(f"part {i}: expected {moving[0].n_dims} dimensions as in part 0, got {one.n_dims}")
-        if len(one) not in (1, n):
-            raise TrajectoryError(f"part {i}: expected one movement or {n}, got {len(one)}")
-    check_alike([one.moving_channels for one in moving])
-    return [one if len(one) == n else one[np.zeros(n, dtype=np.intp)] for one in moving]
+    moving: Any = [movement if isinstance(movement, own) else own.from_rollout(movement) for movement in parts]
+    n = max(len(movement) for movement in moving)
+    for i, movement in enumerate(moving):
+        if movement.n_dims != moving[0].n_dims:
+            raise TrajectoryError(
+                f"part {i}: expected {moving[0].n_dims} dimensions as in part 0, got {movement.n_dims}"
+            )
+        if len(movement) not in (1, n):
+            raise TrajectoryError(f"part {i}: expected one movement or {n}, got {len(movement)}")
+    check_alike([movement.moving_channels for movement in moving])
+    return [movement if len(movement) == n else movement[np.zeros(n, dtype=np.intp)] for movement in moving]
 
 
 def within(stretch: tuple[float, float], name: str) -> tuple[float, float]:
     """A stretch (begin, end) as shares of the duration."""
     try:
-        begin, end = (float(one) for one in stretch)
+        begin, end = (float(bound) for bound in stretch)
     except (TypeError, ValueError) as error:
         raise SpecificationError(f"expected {name}=(begin, end), shares of the duration, got {stretch!r}") from error
     if not 0.0 <= begin < end <= 1.0:
@@ -258,7 +266,7 @@ def fitting_specification(parts: Sequence[Primitives | PosePrimitives], n_basis:
         More than 2,000 basis functions.
     """
     first = parts[0].dmp
-    least = max(one.dmp.n_points for one in parts)
+    least = max(part.dmp.n_points for part in parts)
     n = math.ceil(n_basis - 1e-9)
     ridge = first.ridge if first.fit == "trajectory" else None
     return replace(
@@ -287,16 +295,18 @@ def refitted(dmp: DMP, path: Array, times: Array, ends: tuple[Array, Array, Arra
 
     `ends` are the velocities at the start (n, d), the positions at the end, and the velocities there.
     """
-    made = dmp.learn(Demonstrations.from_arrays(path, times=list(times)))
-    movement = made.rollout(n_samples=2)
-    asked = np.stack(ends, axis=2)
-    reached = np.stack((made.velocities, movement.positions[:, -1], movement.velocities[:, -1]), axis=2)
-    errors = (asked - reached) * np.stack((made.durations, np.ones(len(made)), made.durations), axis=1)[:, None]
+    learned = dmp.learn(Demonstrations.from_arrays(path, times=list(times)))
+    movement = learned.rollout(n_samples=2)
+    wanted = np.stack(ends, axis=2)
+    reached = np.stack((learned.velocities, movement.positions[:, -1], movement.velocities[:, -1]), axis=2)
+    errors = (wanted - reached) * np.stack((learned.durations, np.ones(len(learned)), learned.durations), axis=1)[
+        :, None
+    ]
     change = errors @ _end_gain(dmp)  # (n, d, N + 1)
     return replace(
-        made,
-        scaled_weights=made.scaled_weights + change[:, :, :-1] * dmp.K,
-        velocities=made.velocities + change[:, :, -1] / made.durations[:, None],
+        learned,
+        scaled_weights=learned.scaled_weights + change[:, :, :-1] * dmp.K,
+        velocities=learned.velocities + change[:, :, -1] / learned.durations[:, None],
     )
 
 
@@ -316,7 +326,7 @@ def _end_gain(dmp: DMP) -> Array:
 
 
 def carried_over(
-    made: Primitives, parts: Sequence[Primitives | PosePrimitives], when: Sequence[Array], switches: Array
+    joined: Primitives, parts: Sequence[Primitives | PosePrimitives], when: Sequence[Array], switches: Array
 ) -> Primitives:
     """The movements with the labels and names that all their parts have in common, and with their channels.
 
@@ -331,19 +341,19 @@ def carried_over(
     switches : ndarray of shape (p - 1, n)
         From when on discrete channels are those of the next part.
     """
-    labels, names = [one.labels for one in parts], [one.names for one in parts]
+    labels, names = [part.labels for part in parts], [part.names for part in parts]
     first = labels[0]
-    same = first is not None and all(one is not None and np.array_equal(one, first) for one in labels)
-    about = merged([one.recorded_as for one in parts])
-    steps = [one.recorded_as.steps for one in parts if one.recorded_as is not None]
-    known = [one for one in steps if one is not None]
+    same = first is not None and all(other is not None and np.array_equal(other, first) for other in labels)
+    about = merged([part.recorded_as for part in parts])
+    steps = [part.recorded_as.steps for part in parts if part.recorded_as is not None]
+    stepping = [steps_of_part for steps_of_part in steps if steps_of_part is not None]
     if about is not None:
-        whole = len(known) == len(parts)
-        about = RecordedAs(about.channels, _one_after_another(known, when, switches) if whole else None)
+        complete = len(stepping) == len(parts)
+        about = RecordedAs(about.channels, _one_after_another(stepping, when, switches) if complete else None)
     return replace(
-        made,
+        joined,
         labels=first if same else None,
-        names=names[0] if all(one == names[0] for one in names) else None,
+        names=names[0] if all(other == names[0] for other in names) else None,
         recorded_as=about,
     )
 
@@ -356,14 +366,14 @@ def _one_after_another(parts: Sequence[DiscreteSteps], when: Sequence[Array], sw
     values, shares, lengths = [], [], []
     for i in range(n):
         rows = [
-            _within(one, i, at[i], (begins[k, i], ends[k, i]))
-            for k, (one, at) in enumerate(zip(parts, when, strict=True))
+            _within(part, i, at[i], (begins[k, i], ends[k, i]))
+            for k, (part, at) in enumerate(zip(parts, when, strict=True))
         ]
         value, share = (np.concatenate([row[k] for row in rows]) for k in (0, 1))
-        kept = np.append(True, (value[1:] != value[:-1]).any(axis=1))
-        values.append(value[kept])
-        shares.append(share[kept])
-        lengths.append(int(kept.sum()))
+        changed = np.append(True, (value[1:] != value[:-1]).any(axis=1))
+        values.append(value[changed])
+        shares.append(share[changed])
+        lengths.append(int(changed.sum()))
     return DiscreteSteps(np.concatenate(values), np.concatenate(shares), np.concatenate(([0], np.cumsum(lengths))))
 
 
@@ -407,8 +417,8 @@ def blend(first: Primitives | Rollout, second: Primitives | Rollout, stretch: tu
     """
     movements = moving([first, second])
     begin, end = within(stretch, "stretch")
-    dmp = fitting_specification(movements, max(one.dmp.n_basis for one in movements))
-    laid = [one.rollout(n_samples=dmp.n_points) for one in movements]
+    dmp = fitting_specification(movements, max(movement.dmp.n_basis for movement in movements))
+    laid = [movement.rollout(n_samples=dmp.n_points) for movement in movements]
     u = np.linspace(0.0, 1.0, dmp.n_points)
     share = smooth_rise(u - begin, end - begin)
     path = (1.0 - share)[:, None] * laid[0].positions + share[:, None] * laid[1].positions
@@ -416,11 +426,6 @@ def blend(first: Primitives | Rollout, second: Primitives | Rollout, stretch: tu
     steps = 0.5 * (pace[:, 1:] + pace[:, :-1]) / (dmp.n_points - 1)
     times = np.concatenate((np.zeros((len(path), 1)), np.cumsum(steps, axis=1)), axis=1)
     shares = times / times[:, -1:]
-    switch = _at_phase(shares, 0.5 * (begin + end))
+    switch = np.array([np.interp(0.5 * (begin + end), u, row) for row in shares])
     ends = (laid[0].velocities[:, 0], laid[1].positions[:, -1], laid[1].velocities[:, -1])
     return carried_over(refitted(dmp, path, times, ends), movements, [shares, shares], switch[None])
-
-
-def _at_phase(shares: Array, u: float) -> Array:
-    """The columns (n,) of numbers at even phases (n, T) at phase u."""
-    return np.array([np.interp(u, np.linspace(0.0, 1.0, shares.shape[1]), one) for one in shares])

@@ -84,11 +84,11 @@ def step_arrays(about: RecordedAs | None) -> dict[str, NDArray[Any]]:
 
 
 def recorded_as_from(header: dict[str, Any], arrays: Arrays, n: int, n_dims: int) -> RecordedAs | None:
-    """What n movements were recorded as, checked; files of earlier versions do not say it."""
+    """Read what n movements were recorded as, checked; files of earlier versions do not say it."""
     if header.get("channels") is None:
         return None
     channels = channels_from_data(header["channels"], n_dims)
-    n_discrete = sum(one.kind == "discrete" for one in channels)
+    n_discrete = sum(channel.kind == "discrete" for channel in channels)
     if not n_discrete or not set(_STEPS_OF) <= set(arrays):
         return RecordedAs(channels)
     steps = DiscreteSteps(**{field: arrays[name] for name, field in _STEPS_OF.items()})
@@ -109,8 +109,8 @@ def checked_rows(rows: Mapping[str, str], arrays: Arrays, n_basis: int) -> dict[
     """The arrays of a batch, refused unless they have the shapes of `rows`, in the letters n, d and N; q is any."""
     sizes = {"N": n_basis} | dict(zip("nd", arrays[next(iter(rows))].shape, strict=False))
     for name, letters in rows.items():
-        found = dict(zip(letters, arrays[name].shape, strict=False))
-        shape = tuple(found.get("q", 0) if letter == "q" else sizes[letter] for letter in letters)
+        own_sizes = dict(zip(letters, arrays[name].shape, strict=False))
+        shape = tuple(own_sizes.get("q", 0) if letter == "q" else sizes[letter] for letter in letters)
         check_array(name, arrays[name], shape)
     return {name: arrays[name] for name in rows}
 
@@ -120,7 +120,7 @@ def _one_each(n: int, header: dict[str, Any], name: str) -> list[Any] | None:
     given = header[name]
     allowed = (str, type(None)) if name == "names" else _LABEL_TYPES
     if given is not None and (
-        not isinstance(given, list) or len(given) != n or not all(isinstance(one, allowed) for one in given)
+        not isinstance(given, list) or len(given) != n or not all(isinstance(entry, allowed) for entry in given)
     ):
         raise ValueError(f"{name} should be a list of {n} {'texts' if name == 'names' else 'texts or numbers'}")
     return given

@@ -1,4 +1,4 @@
-"""What learned movements were recorded as, and from the columns of a primitive back to those of the recording.
+"""Channels of the recordings of learned movements, and from the columns of a primitive back to those of the recording.
 
 The columns of a primitive are the positions and angles, in the order of their channels, and after them the orientations
 as (w, x, y, z); its rates are those of the positions and angles, and after them angular velocities in the world frame.
@@ -39,34 +39,34 @@ class RecordedAs:
     steps: DiscreteSteps | None = None
 
     def take(self, chosen: NDArray[np.intp]) -> RecordedAs:
-        """That of the chosen movements."""
+        """Return that of the chosen movements."""
         return self if self.steps is None else replace(self, steps=self.steps.take(chosen))
 
     @property
     def has_steps(self) -> bool:
-        """Whether nothing is missing of the discrete channels."""
+        """True if nothing is missing of the discrete channels."""
         return self.steps is not None or len(self.moving) == len(self.channels)
 
     @cached_property
     def moving(self) -> Channels:
         """The channels that are not discrete, in the order of the recording."""
-        return tuple(one for one in self.channels if one.coordinates)
+        return tuple(channel for channel in self.channels if channel.coordinates)
 
     @cached_property
     def plain(self) -> Channels:
         """The channels that are positions or angles: the first columns of a primitive."""
-        return tuple(one for one in self.moving if one.kind != "orientation")
+        return tuple(channel for channel in self.moving if channel.kind != "orientation")
 
     @cached_property
     def orientations(self) -> Channels:
         """The channels that are orientations: the last columns of a primitive."""
-        return tuple(one for one in self.moving if one.kind == "orientation")
+        return tuple(channel for channel in self.moving if channel.kind == "orientation")
 
     @property
     def column_names(self) -> tuple[str, ...]:
         """Names of the columns of a primitive."""
-        turned = [one.columns[one.order.index(part)] for one in self.orientations for part in "wxyz"]
-        return (*(name for one in self.plain for name in one.columns), *turned)
+        turned = [channel.columns[channel.order.index(part)] for channel in self.orientations for part in "wxyz"]
+        return (*(name for channel in self.plain for name in channel.columns), *turned)
 
     @property
     def rate_names(self) -> tuple[str, ...]:
@@ -76,14 +76,14 @@ class RecordedAs:
     @property
     def rates_in_order(self) -> list[int]:
         """The rates of a primitive in the order of the recording."""
-        kinds = [one.kind for one in self.moving for _ in one.coordinates]
+        kinds = [channel.kind for channel in self.moving for _ in channel.coordinates]
         plain = [k for k, kind in enumerate(kinds) if kind != "orientation"]
         turned = [k for k, kind in enumerate(kinds) if kind == "orientation"]
         return np.argsort(plain + turned).tolist()
 
 
 def recorded_as(movements: Demonstrations, steps: Iterable[Step] = ()) -> RecordedAs | None:
-    """What movements were recorded as, where that is known.
+    """Return what movements were recorded as, where that is known.
 
     Of the steps that are applied before learning, trimming moves the steps of discrete channels, too.
     """
@@ -92,8 +92,8 @@ def recorded_as(movements: Demonstrations, steps: Iterable[Step] = ()) -> Record
         return None
     columns = [
         k
-        for one, some in zip(channels, columns_of(channels), strict=True)
-        if one.kind == "discrete"
+        for channel, some in zip(channels, columns_of(channels), strict=True)
+        if channel.kind == "discrete"
         for k in range(some.start, some.stop)
     ]
     if not columns:
@@ -103,23 +103,25 @@ def recorded_as(movements: Demonstrations, steps: Iterable[Step] = ()) -> Record
 
 
 def merged(several: Sequence[RecordedAs | None]) -> RecordedAs | None:
-    """That of several batches, one after the other; None if they were not recorded as the same.
+    """Merge those of several batches, one after the other; None if they were not recorded as the same.
 
     Without steps where those of a batch are not known.
     """
-    known = [one for one in several if one is not None]
-    if len(known) < len(several) or not all(same_columns(one.channels, known[0].channels) for one in known):
+    recordings = [about for about in several if about is not None]
+    if len(recordings) < len(several) or not all(
+        same_columns(about.channels, recordings[0].channels) for about in recordings
+    ):
         return None
-    steps = [one.steps for one in known if one.steps is not None]
-    return replace(known[0], steps=concatenated(steps) if len(steps) == len(known) else None)
+    steps = [about.steps for about in recordings if about.steps is not None]
+    return replace(recordings[0], steps=concatenated(steps) if len(steps) == len(recordings) else None)
 
 
 def in_primitive(point: Array, about: RecordedAs) -> Array:
     """A point in the columns of `RecordedAs.moving`, in the columns of the primitive."""
-    parts = [(one, point[columns]) for one, columns in zip(about.moving, columns_of(about.moving), strict=True)]
+    parts = [(channel, point[columns]) for channel, columns in zip(about.moving, columns_of(about.moving), strict=True)]
     return np.concatenate(
-        [part for one, part in parts if one.kind != "orientation"]
-        + [as_wxyz(part, one) for one, part in parts if one.kind == "orientation"]
+        [part for channel, part in parts if channel.kind != "orientation"]
+        + [as_wxyz(part, channel) for channel, part in parts if channel.kind == "orientation"]
     )
 
 
@@ -137,11 +139,11 @@ def in_recording(columns: Array, about: RecordedAs, i: int, shares: Array) -> Ar
     """
     values = None if about.steps is None else about.steps.at(i, shares)
     parts, plain, turned, discrete = [], 0, len(about.plain), 0
-    for one in about.channels:
-        if one.kind == "orientation":
-            parts.append(from_wxyz(columns[:, turned : turned + 4], one))
+    for channel in about.channels:
+        if channel.kind == "orientation":
+            parts.append(from_wxyz(columns[:, turned : turned + 4], channel))
             turned += 4
-        elif one.kind == "discrete":
+        elif channel.kind == "discrete":
             assert values is not None
             parts.append(values[:, discrete : discrete + 1])
             discrete += 1
@@ -177,7 +179,7 @@ def with_recorded(movements: Movements, about: RecordedAs, shares: Array, n_prim
 
 @dataclass(frozen=True, eq=False)
 class DiscreteSteps:
-    """What the discrete channels of n movements were, and since when.
+    """Values of the discrete channels of n movements, and since when.
 
     Attributes
     ----------
@@ -219,16 +221,16 @@ def steps_of(demonstrations: Demonstrations, columns: Sequence[int]) -> Discrete
     changes = np.concatenate(([True], (values[1:] != values[:-1]).any(axis=1)))
     changes[first] = True
     elapsed = demonstrations.times - np.repeat(demonstrations.times[first], demonstrations.lengths)
-    kept = np.flatnonzero(changes)
-    shares = (elapsed / np.repeat(demonstrations.durations, demonstrations.lengths))[kept]
-    return DiscreteSteps(values[kept], shares, np.searchsorted(kept, demonstrations.offsets))
+    rows = np.flatnonzero(changes)
+    shares = (elapsed / np.repeat(demonstrations.durations, demonstrations.lengths))[rows]
+    return DiscreteSteps(values[rows], shares, np.searchsorted(rows, demonstrations.offsets))
 
 
 def concatenated(several: Sequence[DiscreteSteps]) -> DiscreteSteps:
     """The steps of the movements of all, in the order given."""
-    lengths = np.concatenate([np.diff(one.offsets) for one in several])
+    lengths = np.concatenate([np.diff(steps.offsets) for steps in several])
     return DiscreteSteps(
-        np.concatenate([one.values for one in several]),
-        np.concatenate([one.shares for one in several]),
+        np.concatenate([steps.values for steps in several]),
+        np.concatenate([steps.shares for steps in several]),
         np.concatenate(([0], np.cumsum(lengths))),
     )

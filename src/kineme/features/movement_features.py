@@ -8,16 +8,17 @@ from typing import Any, ClassVar, Generic, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.base import BaseEstimator, TransformerMixin
+from sklearn.base import BaseEstimator, TransformerMixin, clone
 from sklearn.utils.validation import check_is_fitted
 
 from kineme.dmp.discrete.dmp import DMP, Primitives
+from kineme.dmp.pose.tangent import as_poses, to_tangent
 from kineme.dmp.rhythmic.rhythmic_dmp import RhythmicDMP, RhythmicPrimitives
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import axis_names
 from kineme.movements.trajectories.trajectory import MovementsLike
-from kineme.validation import check_choice, check_count
+from kineme.validation import check_choice, check_count, check_number
 
 #: Feature name -> (primitives, S) -> array (n, size, d).
 FEATURES: dict[str, Callable[[Primitives | RhythmicPrimitives, int], NDArray[Any]]] = {
@@ -145,6 +146,175 @@ class MovementFeatures(TransformerMixin, BaseEstimator, Generic[Specification]):
                 f"{self._specification_type.__name__} has no parameter {', '.join(map(repr, unknown))}; it has {names}"
             )
         return nested, others
+
+    def __sklearn_tags__(self) -> Any:
+        tags = super().__sklearn_tags__()
+        tags.input_tags.two_d_array = False
+        tags.input_tags.three_d_array = True
+        return tags
+
+
+class DMPFeatures(MovementFeatures[DMP]):
+    """Describe each movement by its DMP: rows ``x_1 ... x_S, y_1 ... y_S``, Eq. (9).
+
+    Parameters
+    ----------
+    feature : {"shape-attractor", "forcing", "weights"}, default "shape-attractor"
+        The shape-attractor term of the equation, the forcing term f, or the weights w; see
+        `Primitives.shape_attractor`, `Primitives.forcing`, `Primitives.weights`.
+    dmp : DMP, default DMP()
+        How the movements are learned. Its fields are searched as ``dmp__n_basis`` and so on.
+    n_samples : int, default 100
+        Samples S of the shape-attractor and of f. Weights have ``dmp.n_basis`` instead.
+    dtype : {"float64", "float32"}, default "float64"
+        Type of the result; kernels compute in the type of their input.
+
+    Attributes
+    ----------
+    dmp_ : DMP
+        The specification in force.
+    n_dims_ : int
+        Dimensions d of the training movements.
+
+    Examples
+    --------
+    >>> import kineme
+    >>> from sklearn.model_selection import cross_val_score
+    >>> from sklearn.neighbors import KNeighborsClassifier
+    >>> from sklearn.pipeline import make_pipeline
+    >>> demos = kineme.load_lasa(kineme.datasets.PAPER_LETTERS)
+    >>> model = make_pipeline(kineme.DMPFeatures("shape-attractor"), KNeighborsClassifier(1))
+    >>> float(cross_val_score(model, demos, demos.labels).mean())
+    1.0
+    """
+
+    _specification_type: ClassVar[type] = DMP
+
+    def fit(self, X: MovementsLike, y: Any = None) -> Self:
+        """Check the parameters and store the number of dimensions; y is ignored."""
+        self.dmp_ = self._checked()
+        self.n_dims_ = Demonstrations.of(X).n_dims
+        return self
+
+
+class RhythmicFeatures(MovementFeatures[RhythmicDMP]):
+    """Describe each recording by its rhythmic DMP: features of one cycle, wherever it started, rows as in Eq. (9).
+
+    Parameters
+    ----------
+    feature : {"shape-attractor", "forcing", "weights"}, default "shape-attractor"
+        ``r f``, which depends on the amplitude; f or w, which do not. None of them depends on translation and tempo.
+    dmp : RhythmicDMP, default RhythmicDMP()
+        How the recordings are learned. Its fields are searched as ``dmp__n_basis`` and so on.
+    n_samples : int, default 100
+        Samples S of a cycle. Weights have ``dmp.n_basis`` instead.
+    dtype : {"float64", "float32"}, default "float64"
+        Type of the result.
+
+    Attributes
+    ----------
+    dmp_ : RhythmicDMP
+        The specification in force. Unless `align_on` is given, it is the dimension with the largest first harmonic in
+        most training recordings, one for all: otherwise it could change between recordings with two similar dimensions.
+    n_dims_ : int
+        Dimensions d of the training movements.
+    """
+
+    _specification_type: ClassVar[type] = RhythmicDMP
+
+    def fit(self, X: MovementsLike, y: Any = None) -> Self:
+        """Check the parameters and choose the dimension to align on; y is ignored.
+
+        Raises
+        ------
+        TrajectoryError
+            Recordings that cannot be used; see `RhythmicDMP.learn`.
+        """
+        dmp = self._checked()
+        demonstrations = Demonstrations.of(X)
+        if dmp.align_on is None:
+            aligned_on = dmp.learn(demonstrations).aligned_on
+            dmp = replace(dmp, align_on=int(np.bincount(aligned_on).argmax()))
+        self.dmp_ = dmp
+        self.n_dims_ = demonstrations.n_dims
+        return self
+
+
+class PoseFeatures(TransformerMixin, BaseEstimator):
+    """Describe movements of an orientation, or of a position and an orientation, by their DMPs.
+
+    The features of `DMPFeatures` on the rotation vector from the goal; see `PoseDMP`.
+
+    Parameters
+    ----------
+    features : DMPFeatures, optional
+        What to compute; by default ``DMPFeatures()``. Its parameters are searched as ``features__n_samples``,
+        ``features__dmp__n_basis`` and so on.
+    orientation_weight : float, default 0.2
+        Weight of a radian beside the positions, in their unit per radian. With 0.2 m, about the length of a hand or a
+        tool, a rotation counts as much as the displacement of the tip. Positions in millimeters need 200. Not used
+        without positions.
+
+    Attributes
+    ----------
+    features_ : DMPFeatures
+        The fitted transformer behind it.
+    n_columns_ : int
+        4 for orientations, 7 for poses.
+
+    Notes
+    -----
+    Unchanged by the sign of any quaternion, by the tempo, and by a fixed quaternion from the right (a tool mounted
+    differently). A fixed quaternion from the left (the scene turned) rotates the three orientation rows of
+    the bio-inspired features like a vector, as it does the three position rows. In the original formulation the
+    weights and f are relative to g - x0, so that `orientation_weight` cancels in them.
+    """
+
+    def __init__(self, features: DMPFeatures | None = None, orientation_weight: float = 0.2) -> None:
+        self.features = features
+        self.orientation_weight = orientation_weight
+
+    def fit(self, X: MovementsLike, y: Any = None) -> Self:
+        """Check the parameters and the movements; y is ignored."""
+        check_number("orientation_weight", self.orientation_weight, above=0.0)
+        self.features_ = DMPFeatures() if self.features is None else clone(self.features)
+        demonstrations = as_poses(X)
+        self.n_columns_ = demonstrations.n_dims
+        self.steps_ = tuple(self.features_.get_params()["dmp__preprocessing"])
+        self.features_.set_params(dmp__preprocessing=())  # applied in to_tangent, before the goal is read
+        self.features_.fit(self._tangent(demonstrations))
+        return self
+
+    def transform(self, X: MovementsLike) -> NDArray[Any]:
+        """Features of movements, shape (n, d * S) with d = 3 (orientations) or 6 (poses); see `DMPFeatures`.
+
+        Raises
+        ------
+        TrajectoryError
+            Movements that cannot be used, or orientations where `fit` saw poses.
+        """
+        check_is_fitted(self)
+        demonstrations = as_poses(X)
+        if demonstrations.n_dims != self.n_columns_:
+            raise TrajectoryError(
+                f"expected movements of {self.n_columns_} columns as in fit, got {demonstrations.n_dims}; fit again"
+            )
+        return self.features_.transform(self._tangent(demonstrations))
+
+    def get_feature_names_out(self, input_features: Any = None) -> NDArray[Any]:
+        """Names rx_1 ... rx_S, ry_1 ... rz_S of the rotation vector, for poses after x_1 ... z_S."""
+        check_is_fitted(self)
+        axes = ("rx", "ry", "rz") if self.n_columns_ == 4 else ("x", "y", "z", "rx", "ry", "rz")
+        size = len(self.features_.get_feature_names_out()) // len(axes)
+        return np.array([f"{axis}_{k + 1}" for axis in axes for k in range(size)], dtype=object)
+
+    def _tangent(self, demonstrations: Demonstrations) -> Demonstrations:
+        tangent, _ = to_tangent(demonstrations, self.steps_)
+        if tangent.n_dims == 3:
+            return tangent
+        weights = np.repeat([1.0, float(self.orientation_weight)], 3)
+        weighted = replace(tangent.movements, positions=tangent.positions * weights)
+        return Demonstrations.of_movements(weighted, tangent.steps)
 
     def __sklearn_tags__(self) -> Any:
         tags = super().__sklearn_tags__()

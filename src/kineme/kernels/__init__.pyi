@@ -10,5 +10,5 @@ from kineme.kernels.average import Averaged as Averaged
 
 # Tables
 from kineme.kernels.table import KERNELS as KERNELS
-from kineme.kernels.means import MEANS as MEANS
+from kineme.kernels.average import MEANS as MEANS
 from kineme.kernels.table import PAPER_WIDTHS as PAPER_WIDTHS

@@ -25,9 +25,9 @@ _ROWS = 4
 def _aligned(n_rows, n_columns, like):  # type: ignore[no-untyped-def]
     """An array on cache lines of 64 bytes; half of those that Numba makes begin in the middle of one."""
     size, per_line = n_rows * n_columns, 64 // like.itemsize
-    whole = np.empty(size + per_line, like.dtype)
-    first = (-whole.ctypes.data // like.itemsize) % per_line
-    return whole[first : first + size].reshape(n_rows, n_columns)
+    block = np.empty(size + per_line, like.dtype)
+    first = (-block.ctypes.data // like.itemsize) % per_line
+    return block[first : first + size].reshape(n_rows, n_columns)
 
 
 @jit

@@ -52,12 +52,12 @@ def _constant(value: float | int, vector: ir.VectorType) -> ir.Constant:
 
 
 def _splat(builder: Any, value: Any, vector: ir.VectorType) -> Any:
-    one = builder.insert_element(ir.Constant(vector, ir.Undefined), value, ir.Constant(ir.IntType(32), 0))
-    return builder.shuffle_vector(one, one, _constant(0, _INT))
+    lanes = builder.insert_element(ir.Constant(vector, ir.Undefined), value, ir.Constant(ir.IntType(32), 0))
+    return builder.shuffle_vector(lanes, lanes, _constant(0, _INT))
 
 
 def _row(context: Any, builder: Any, array: Any, row: Any) -> Any:
-    """Where row `row` of an array (n, 16) begins, as the address of a vector."""
+    """Return where row `row` of an array (n, 16) begins, as the address of a vector."""
     kind, value = array
     data = context.make_array(kind)(context, builder, value).data
     first = builder.gep(data, [builder.mul(row, ir.Constant(row.type, LANES))])
@@ -131,13 +131,13 @@ def _transposed(builder: Any, vectors: list[Any]) -> list[Any]:
 
 @_operation
 def load_vector(_context, array, row, dims):  # type: ignore[no-untyped-def]
-    """As many rows of an array (n, 16), from `row` on, as the tuple `dims` is long, as a tuple."""
+    """Load as many rows of an array (n, 16), from `row` on, as the tuple `dims` is long, as a tuple."""
     return _load_tuple(array, dims, len(dims))
 
 
 @_operation
 def load_matrix(_context, array, row, dims):  # type: ignore[no-untyped-def]
-    """As many rows as the square of that."""
+    """Load as many rows as the square of that."""
     return _load_tuple(array, dims, len(dims) ** 2)
 
 
@@ -203,8 +203,8 @@ def rotated(_context, matrix, vector):  # type: ignore[no-untyped-def]
         d = len(vector)
         entries = [builder.extract_value(values[0], k) for k in range(d * d)]
         members = [builder.extract_value(values[1], k) for k in range(d)]
-        found = [_sum_of_products(builder, entries[k * d : k * d + d], members) for k in range(d)]
-        return context.make_tuple(builder, signature.return_type, found)
+        sums = [_sum_of_products(builder, entries[k * d : k * d + d], members) for k in range(d)]
+        return context.make_tuple(builder, signature.return_type, sums)
 
     return vector(matrix, vector), code
 
@@ -310,19 +310,19 @@ def union(_context, a, b):  # type: ignore[no-untyped-def]
 
 
 @_operation
-def unless(_context, bits, one, value):  # type: ignore[no-untyped-def]
-    """`value` where `bits` and `one` share no bit, else 0."""
+def unless(_context, bits, mask, value):  # type: ignore[no-untyped-def]
+    """`value` where `bits` and `mask` share no bit, else 0."""
 
     def code(_context, builder, _signature, v):  # type: ignore[no-untyped-def]
         free = builder.icmp_signed("==", builder.and_(v[0], v[1]), _constant(0, _INT))
         return builder.select(free, v[2], _constant(0.0, _FLOAT))
 
-    return _floats(bits, one, value), code
+    return _floats(bits, mask, value), code
 
 
 @jit
 def aligned(n_rows):  # type: ignore[no-untyped-def]
     """An array (n_rows, 16) of float32 in which every row is a cache line."""
-    whole = np.empty((n_rows + 1) * LANES, np.float32)
-    first = (-whole.ctypes.data // 4) % LANES
-    return whole[first : first + n_rows * LANES].reshape(n_rows, LANES)
+    block = np.empty((n_rows + 1) * LANES, np.float32)
+    first = (-block.ctypes.data // 4) % LANES
+    return block[first : first + n_rows * LANES].reshape(n_rows, LANES)

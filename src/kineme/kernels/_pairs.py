@@ -130,15 +130,15 @@ def _choose(start, n, chosen):  # type: ignore[no-untyped-def]
 def _bound(dims, shapes, j, numbers, every_segment, work):  # type: ignore[no-untyped-def]
     """Sums of the least costs of some segments of movement j."""
     weights, sizes = numbers
-    (n_segments, band, _), d, a, one = sizes, len(dims), work.a, work.b
+    (n_segments, band, _), d, a, other = sizes, len(dims), work.a, work.b
     _, midpoints, angles = begins_of(dims, sizes)[:3]
     matrix = load_matrix(work.rotation, 0, dims)
     elastic, turning = every(np.float32(0)), every(np.float32(0))
     for q in range(every_segment // 2, n_segments, every_segment):
         for k in range(d):
-            store(one, k, every(shapes[0][j, q * d + k] * weights[0]))
-            store(one, d + k, every(shapes[1][j, q * d + k] * weights[1]))
-        tangent, midpoint = rotated(matrix, load_vector(one, 0, dims)), rotated(matrix, load_vector(one, d, dims))
+            store(other, k, every(shapes[0][j, q * d + k] * weights[0]))
+            store(other, d + k, every(shapes[1][j, q * d + k] * weights[1]))
+        tangent, midpoint = rotated(matrix, load_vector(other, 0, dims)), rotated(matrix, load_vector(other, d, dims))
         turn = every(shapes[2][j, q] * weights[2])
         smallest, smallest_turning = every(_FAR), every(_FAR)
         for p in range(max(0, q - band), min(n_segments, q + band + 1)):

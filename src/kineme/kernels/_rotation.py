@@ -37,8 +37,8 @@ class _Lanes(NamedTuple):
 def fill_best_products(products, c, s, best):  # type: ignore[no-untyped-def]
     """``best[i, j]`` of the covariance ``products[3 i : 3 i + 3, 3 j : 3 j + 3]``, c and s of half the limit."""
     n_pairs, n_columns = best.size, best.shape[1]
-    S, z, scale, one = np.empty((3, 3, _LANES)), np.empty((3, _LANES)), np.empty(_LANES), np.empty((6, _LANES))
-    lanes = _Lanes(z, np.empty((3, _LANES)), one[0], one[1], one[2], one[3], one[4], one[5])
+    S, z, scale, six = np.empty((3, 3, _LANES)), np.empty((3, _LANES)), np.empty(_LANES), np.empty((6, _LANES))
+    lanes = _Lanes(z, np.empty((3, _LANES)), six[0], six[1], six[2], six[3], six[4], six[5])
     for first in range(0, n_pairs, _LANES):
         width = min(_LANES, n_pairs - first)
         for lane in range(_LANES):
@@ -121,7 +121,7 @@ def _turn(S, z, first, second, third):  # type: ignore[no-untyped-def]
 
 @jit
 def _is_diagonal(S):  # type: ignore[no-untyped-def]
-    """Whether further sweeps would change no lane; false where there is NaN."""
+    """Tell whether further sweeps would change no lane; false where there is NaN."""
     n_turned = 0.0
     for lane in range(_LANES):
         left = abs(S[0, 1, lane]) + abs(S[0, 2, lane]) + abs(S[1, 2, lane])
@@ -198,7 +198,7 @@ def _finish_at_limit(lanes, c, s):  # type: ignore[no-untyped-def]
 
 @jit
 def _step_within(lanes):  # type: ignore[no-untyped-def]
-    """As `_step_at_limit`, for the root where the best rotation is within the limit."""
+    """Step as `_step_at_limit`, for the root where the best rotation is within the limit."""
     squares, gaps, x, top, trace, moving = lanes.squares, lanes.gaps, lanes.x, lanes.top, lanes.trace, lanes.moving
     left = 0.0
     for lane in range(_LANES):

@@ -54,7 +54,16 @@ def checked_rows(X: ArrayLike, name: str = "X") -> Rows:
     limit = largest_value(rows)
     # min and max need no array of absolute values, and NaN fails both comparisons.
     if rows.size and not (rows.min() >= -limit and rows.max() <= limit):
-        _raise_bad_value(rows, limit, name)
+        bad_rows, bad_columns = np.nonzero(~(np.abs(rows) <= limit))
+        row, column, n_bad = bad_rows[0], bad_columns[0], len(np.unique(bad_rows))
+        what = f"{rows[row, column]} in row {row}, column {column} of {name}"
+        if np.isfinite(rows[row, column]):
+            raise SpecificationError(
+                f"expected values up to {limit:.3g} in {rows.dtype}, got {what}; rescale the features or pass float64"
+            )
+        raise SpecificationError(
+            f"expected finite numbers, got {what} ({n_bad} such rows); repair or leave out these rows"
+        )
     return rows
 
 
@@ -72,15 +81,3 @@ def contiguous(rows: Rows, dtype: np.dtype[np.floating]) -> Rows:
     view = np.ascontiguousarray(rows, dtype).view()
     view.flags.writeable = False
     return view
-
-
-def _raise_bad_value(rows: Rows, limit: float, name: str) -> None:
-    bad_rows, bad_columns = np.nonzero(~(np.abs(rows) <= limit))
-    row, column = bad_rows[0], bad_columns[0]
-    what = f"{rows[row, column]} in row {row}, column {column} of {name}"
-    n_bad = len(np.unique(bad_rows))
-    if np.isfinite(rows[row, column]):
-        raise SpecificationError(
-            f"expected values up to {limit:.3g} in {rows.dtype}, got {what}; rescale the features or pass float64"
-        )
-    raise SpecificationError(f"expected finite numbers, got {what} ({n_bad} such rows); repair or leave out these rows")

@@ -34,8 +34,8 @@ class _Lanes(NamedTuple):
 
 @jit
 def _room():  # type: ignore[no-untyped-def]
-    three, one = np.empty((3, 3, 3, _LANES)), np.empty((6, _LANES))
-    return _Lanes(three[0], three[1], three[2], one[0], one[1], one[2], one[3], one[4], one[5])
+    three, six = np.empty((3, 3, 3, _LANES)), np.empty((6, _LANES))
+    return _Lanes(three[0], three[1], three[2], six[0], six[1], six[2], six[3], six[4], six[5])
 
 
 @jit

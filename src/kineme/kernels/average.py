@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -11,8 +11,82 @@ import numpy as np
 from kineme.errors import SpecificationError
 from kineme.kernels._rows import Rows
 from kineme.kernels.base import Kernel
-from kineme.kernels.means import MEANS
 from kineme.runtime.parallel import for_tiles
+
+
+@dataclass(frozen=True)
+class Mean:
+    """One A-average.
+
+    Attributes
+    ----------
+    average : callable
+        Similarities (d, ...) to their average (...).
+    formula : str
+    psd : {"always", "infinitely divisible", "not claimed"}
+        For which positive semi-definite kernels the average is proved positive semi-definite.
+    reason : str
+        The proof, or why there is none.
+    nonnegative : bool
+        Whether it is defined for non-negative similarities only.
+    """
+
+    average: Callable[[Rows], Rows]
+    formula: str
+    psd: str
+    reason: str
+    nonnegative: bool = False
+
+
+def _geometric(similarities: Rows) -> Rows:
+    with np.errstate(divide="ignore"):  # log 0 = -inf, and exp(-inf) = 0 is right
+        logarithms = np.log(similarities)
+    mean = logarithms.mean(axis=0)
+    return np.exp(mean, out=mean)
+
+
+def _harmonic(similarities: Rows) -> Rows:
+    with np.errstate(divide="ignore", over="ignore"):  # 1 / 0 = inf, and 1 / inf = 0 is right
+        mean = np.reciprocal(similarities).mean(axis=0)
+        return np.reciprocal(mean, out=mean)
+
+
+#: Name of a mean -> how it averages similarities, and what is proved of it.
+MEANS: dict[str, Mean] = {
+    "arithmetic": Mean(
+        lambda k: k.mean(axis=0),
+        "1/d Σ k_j",
+        "always",
+        "Sums of positive semi-definite kernels, with positive factors, are positive semi-definite.",
+    ),
+    "geometric": Mean(
+        _geometric,
+        "(Π k_j)^(1/d)",
+        "infinitely divisible",
+        "Where every power k_j^(1/d) is positive semi-definite (an infinitely divisible kernel), so is "
+        "their product (Schur). Other kernels: not claimed.",
+        nonnegative=True,
+    ),
+    "harmonic": Mean(
+        _harmonic,
+        "d / Σ (1 / k_j)",
+        "not claimed",
+        "Reciprocals of positive semi-definite kernels are not positive semi-definite.",
+        nonnegative=True,
+    ),
+    "quadratic": Mean(
+        lambda k: np.sqrt(np.square(k).mean(axis=0)),
+        "√(1/d Σ k_j²)",
+        "not claimed",
+        "The sum of squares is positive semi-definite (Schur), its square root need not be.",
+    ),
+    "min": Mean(
+        lambda k: k.min(axis=0),
+        "min k_j",
+        "not claimed",
+        "The smaller of two positive semi-definite kernels need not be positive semi-definite.",
+    ),
+}
 
 # Bytes of per-dimension similarities that exist at a time.
 _SCRATCH = 2**24
@@ -80,7 +154,9 @@ class Averaged(Kernel):
     def _fill(self, A: Rows, B: Rows | None, gram: Rows) -> None:
         a = self._blocks(A)
         b = a if B is None else self._blocks(B)
-        for band in _bands(len(A), self.n_dims * len(b[0]) * A.itemsize):
+        step = max(1, _SCRATCH // (self.n_dims * len(b[0]) * A.itemsize))
+        for start in range(0, len(A), step):
+            band = slice(start, min(start + step, len(A)))
             rows = [block[band] for block in a]
             if B is not None:
                 self._average(rows, b, gram[band])
@@ -143,9 +219,3 @@ def _fitted(kernel: Kernel, block: Rows, dimension: int) -> Kernel:
         n = block.shape[1]
         where = f"dimension {dimension} (columns {dimension * n} to {dimension * n + n - 1})"
         raise SpecificationError(f"in {where}: {error}") from None
-
-
-def _bands(n_rows: int, row_bytes: int) -> Iterator[slice]:
-    step = max(1, _SCRATCH // row_bytes)
-    for start in range(0, n_rows, step):
-        yield slice(start, min(start + step, n_rows))

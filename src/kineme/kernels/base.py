@@ -168,15 +168,30 @@ class Kernel(Parameters, ABC):
         return replace(self, **{name: self._median_width(name, X) for name in missing})  # type: ignore[type-var]
 
     def _check_dtype(self, dtype: np.dtype[np.floating]) -> None:
+        """Refuse a width whose square leaves the range of `dtype`."""
+        limits = np.finfo(dtype)
         for name in self._width_names():
-            _check_representable(getattr(self, name), name, dtype)
+            width = getattr(self, name)
+            if not float(limits.tiny) <= width * width <= float(limits.max):
+                raise SpecificationError(
+                    f"expected {name} squared within the range of {dtype}, got {name} = {width:g}; "
+                    "rescale the features or pass float64 rows"
+                )
 
-    def _check_widths(self) -> None:
+    def __post_init__(self) -> None:
+        """Refuse widths that are not finite numbers above zero; the others become floats."""
         for name in self._width_names():
             value, default = getattr(self, name), getattr(type(self), name)
             hint = "leave it out to take it from the training rows" if default is None else f"the default is {default}"
-            if value is not None or default is not None:
-                object.__setattr__(self, name, _positive(value, name, hint))
+            if value is None and default is None:
+                continue
+            try:
+                number = float(value) if isinstance(value, Real) else math.nan
+            except OverflowError:  # an integer beyond the range of floats
+                number = math.inf
+            if not math.isfinite(number) or number <= 0:
+                raise SpecificationError(f"expected a finite {name} > 0, got {value!r}; {hint}")
+            object.__setattr__(self, name, number)
 
     @classmethod
     def _width_names(cls) -> tuple[str, ...]:
@@ -188,24 +203,3 @@ class Kernel(Parameters, ABC):
     @abstractmethod
     def _fill(self, A: Rows, B: Rows | None, gram: Rows) -> None:
         """Write the Gram matrix of checked, non-empty rows; B None means A."""
-
-
-def _positive(value: object, name: str, otherwise: str) -> float:
-    """Return `value` as a float; refuse it unless it is finite and above zero. The message ends with `otherwise`."""
-    try:
-        number = float(value) if isinstance(value, Real) else math.nan
-    except OverflowError:  # an integer beyond the range of floats
-        number = math.inf
-    if not math.isfinite(number) or number <= 0:
-        raise SpecificationError(f"expected a finite {name} > 0, got {value!r}; {otherwise}")
-    return number
-
-
-def _check_representable(value: float, name: str, dtype: np.dtype[np.floating]) -> None:
-    """Raise SpecificationError if `value` squared leaves the range of `dtype`."""
-    limits = np.finfo(dtype)
-    if not float(limits.tiny) <= value * value <= float(limits.max):
-        raise SpecificationError(
-            f"expected {name} squared within the range of {dtype}, got {name} = {value:g}; "
-            "rescale the features or pass float64 rows"
-        )

@@ -1,6 +1,6 @@
 """Elastic, turning and point-cloud distances of many pairs of movements, each after the rotation of its pair.
 
-`kineme.kernels.elastic` and `kineme.kernels.point_cloud` define them. Movements are described once, by
+`kineme.kernels.shapes` and `kineme.kernels.shapes` define them. Movements are described once, by
 `kineme.kernels.shapes.shapes_of`. A pair's distances do not depend on the pairs beside it.
 """
 
@@ -15,9 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
-from kineme.kernels.elastic import elastic_bounds, elastic_squares
-from kineme.kernels.point_cloud import cloud_squares
-from kineme.kernels.shapes import CloudSpec, ElasticSpec, Floats, Shapes
+from kineme.kernels.shapes import CloudSpec, ElasticSpec, Floats, Shapes, cloud_squares, elastic_bounds, elastic_squares
 from kineme.runtime.compiled import compiled_module, use_compiled
 from kineme.runtime.parallel import for_tiles
 from kineme.validation import Array
@@ -65,7 +63,7 @@ def pair_distances(A: Shapes, B: Shapes, rotations: NDArray[Any] | None = None) 
 def pair_bounds(A: Shapes, B: Shapes, rotations: NDArray[Any] | None = None) -> Floats:
     """Lower bounds (3, n, m) of what `pair_distances` gives, up to rounding.
 
-    For 16 movements of A or more they take a seventh of its time. See `kineme.kernels.elastic.elastic_bounds`; that of
+    For 16 movements of A or more they take a seventh of its time. See `kineme.kernels.shapes.elastic_bounds`; that of
     the point cloud is 0.
     """
     return _grid(A, B, rotations, (_bound_compiled, _bound_plain), _TILE_BOUNDS)
@@ -97,7 +95,7 @@ def listed_distances(
 def _grid(
     A: Shapes, B: Shapes, rotations: NDArray[Any] | None, fillers: tuple[Filler, Filler], tile_pairs: int
 ) -> Floats:
-    """What a filler, compiled or plain, writes of all pairs, tile by tile, in threads."""
+    """Fill the distances of all pairs by a filler, compiled or plain, tile by tile, in threads."""
     _check(A, B)
     n, m, d = len(A), len(B), A.n_dims
     squares = np.empty((3, n, m), np.float32)
@@ -156,26 +154,26 @@ def _fill_compiled(A: Shapes, B: Shapes, tile: Tile, entries: Floats, squares: F
     module, numbers = compiled_module("kineme.kernels._pairs"), _numbers(A.elastic, A.cloud)
     sides = (_arrays(A, tile[0]), _arrays(B, tile[1]))
     # Always contiguous, so that one version is compiled.
-    found = squares if squares.flags.c_contiguous else np.empty(squares.shape, np.float32)
+    result = squares if squares.flags.c_contiguous else np.empty(squares.shape, np.float32)
     by_columns, by_rows, listed = n * -(-m // _LANES), m * -(-n // _LANES), _LISTED * -(-n * m // _LANES)
     if by_columns <= min(by_rows, listed):
-        module.fill_grid((0,) * A.n_dims, sides, numbers, entries, found)
+        module.fill_grid((0,) * A.n_dims, sides, numbers, entries, result)
     elif by_rows <= listed:
-        module.fill_by_rows((0,) * A.n_dims, sides, numbers, entries, found)
+        module.fill_by_rows((0,) * A.n_dims, sides, numbers, entries, result)
     else:
         pairs = np.divmod(np.arange(n * m), m)
         entries = entries.reshape(n * m, 1, -1) if entries.size else np.empty((n * m, 1, 0), np.float32)
-        module.fill_listed((0,) * A.n_dims, sides, pairs, numbers, entries, found.reshape(3, -1))
-    if found is not squares:
-        squares[:] = found
+        module.fill_listed((0,) * A.n_dims, sides, pairs, numbers, entries, result.reshape(3, -1))
+    if result is not squares:
+        squares[:] = result
 
 
 def _fill_plain(A: Shapes, B: Shapes, tile: Tile, entries: Floats, squares: Floats) -> None:
     """The same by the plain definitions."""
     pairs, entries = _listed(tile, entries)
-    found = np.empty((3, len(pairs[0])), np.float32)
-    _fill_listed_plain(A, B, pairs, entries, found)
-    squares[:] = found.reshape(squares.shape)
+    result = np.empty((3, len(pairs[0])), np.float32)
+    _fill_listed_plain(A, B, pairs, entries, result)
+    squares[:] = result.reshape(squares.shape)
 
 
 def _listed(tile: Tile, entries: Floats) -> tuple[Pairs, Floats]:
@@ -204,18 +202,18 @@ def _parts(entries: Floats, d: int) -> Iterator[tuple[slice, Array | None]]:
 def _bound_compiled(A: Shapes, B: Shapes, tile: Tile, entries: Floats, squares: Floats) -> None:
     """Write lower bounds of the squared distances (3, n, m) of a tile of pairs."""
     module, sides = compiled_module("kineme.kernels._pairs"), (_arrays(A, tile[0]), _arrays(B, tile[1]))
-    found = np.empty((2, *squares.shape[1:]), np.float32)
-    module.fill_bounds((0,) * A.n_dims, sides, _numbers(A.elastic, A.cloud), entries, _BOUND_EVERY, found)
-    squares[:2], squares[2] = found, 0
+    result = np.empty((2, *squares.shape[1:]), np.float32)
+    module.fill_bounds((0,) * A.n_dims, sides, _numbers(A.elastic, A.cloud), entries, _BOUND_EVERY, result)
+    squares[:2], squares[2] = result, 0
 
 
 def _bound_plain(A: Shapes, B: Shapes, tile: Tile, entries: Floats, squares: Floats) -> None:
     """The same by the plain definition."""
     shape, (pairs, entries) = squares.shape[1:], _listed(tile, entries)
-    found = np.zeros((3, len(entries)), np.float32)
+    result = np.zeros((3, len(entries)), np.float32)
     for part, R in _parts(entries, A.n_dims):
-        found[:2, part] = elastic_bounds(A, B, pairs[0][part], pairs[1][part], R, _BOUND_EVERY)
-    squares[:] = found.reshape(3, *shape)
+        result[:2, part] = elastic_bounds(A, B, pairs[0][part], pairs[1][part], R, _BOUND_EVERY)
+    squares[:] = result.reshape(3, *shape)
 
 
 def _matrices(entries: Floats, d: int) -> Array | None:
@@ -229,7 +227,7 @@ def _matrices(entries: Floats, d: int) -> Array | None:
 
 
 def _arrays(shapes: Shapes, chosen: slice) -> tuple[Floats, ...]:
-    """What the compiled loops read, of some movements: the numbers of each in one row."""
+    """Return what the compiled loops read of some movements: the numbers of each in one row."""
     s, segments, points = shapes, shapes.elastic.n_segments * shapes.n_dims, shapes.cloud.n_points * shapes.n_dims
     return (
         s.tangents[chosen].reshape(-1, segments),
@@ -245,4 +243,4 @@ def _arrays(shapes: Shapes, chosen: slice) -> tuple[Floats, ...]:
 def _numbers(elastic: ElasticSpec, cloud: CloudSpec) -> tuple[tuple[np.float32, ...], tuple[int, int, int]]:
     """Roots of the weights of those arrays, and the numbers of segments, band and points."""
     weights = (1.0, elastic.position_weight, elastic.turning_weight, 1.0, cloud.line_weight**0.5, cloud.turning_weight)
-    return tuple(np.float32(one**0.5) for one in weights), (elastic.n_segments, elastic.band, cloud.n_points)
+    return tuple(np.float32(weight**0.5) for weight in weights), (elastic.n_segments, elastic.band, cloud.n_points)

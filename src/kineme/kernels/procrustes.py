@@ -40,7 +40,7 @@ class Prepared(NamedTuple):
 
     def empty(self, n: int) -> Prepared:
         """Room for n rows."""
-        return Prepared(*(np.empty((n, *one.shape[1:]), one.dtype) for one in self))
+        return Prepared(*(np.empty((n, *batch.shape[1:]), batch.dtype) for batch in self))
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,9 @@ class Procrustes:
         """The largest inner products ``<A, R B>`` (n, m) over the rotations allowed, less what they cost."""
         if self.max_angle == 0 or self.n_dims == 1:
             mixed = np.iscomplexobj(A.rows) != np.iscomplexobj(B.rows)  # one was prepared for rotations
-            a, b = (as_complex(one.rows) if mixed and not np.iscomplexobj(one.rows) else one.rows for one in (A, B))
+            a, b = (
+                as_complex(batch.rows) if mixed and not np.iscomplexobj(batch.rows) else batch.rows for batch in (A, B)
+            )
             return np.asarray((a @ b.conj().T).real)
         if self.n_dims == 2:
             if self.prior is None:  # the angle's sign does not matter here
@@ -179,7 +181,7 @@ class Procrustes:
         return best, np.stack((c, -s), -1).astype(np.float32) if rotations else None
 
     def _hard_filler(self, n_pairs: int) -> Filler:
-        """What writes the best products (n, m) of a block of products (3 n, 3 m): compiled or plain."""
+        """Return the writer of the best products (n, m) of a block of products (3 n, 3 m): compiled or plain."""
         if use_compiled(n_pairs * _PAIR_OPERATIONS):
             fill_best_products = compiled_module("kineme.kernels._rotation").fill_best_products
             return lambda products, a, b, best, R: fill_best_products(products, *half_angle(self.max_angle), best)
@@ -291,7 +293,7 @@ _CALL_OPERATIONS = 10_000  # the time of a call of it for a few pairs, in such o
 def _in_space(
     A: Prepared, B: Prepared, fill: Filler, rotations: bool = False
 ) -> tuple[Array, NDArray[np.float32] | None]:
-    """What `fill` makes of the covariances ``A_i B_j^T`` (n, m), a tile of the longer side at a time."""
+    """Return what `fill` makes of the covariances ``A_i B_j^T`` (n, m), a tile of the longer side at a time."""
     n, m = len(A.rows), len(B.rows)
     a, b = A.rows.reshape(n * 3, -1), B.rows.reshape(m * 3, -1)
     p, q = np.sqrt(A.squares), np.sqrt(B.squares)

@@ -105,7 +105,7 @@ def _form(C: Array) -> _Form:
 
 
 def _straight(C: Array) -> NDArray[np.bool_]:
-    """Whether the second singular value is below a share of the first: ``|adj C|`` is about their product."""
+    """Tell whether the second singular value is below a share of the first: ``|adj C|`` is about their product."""
     cofactors = np.cross(C[:, [1, 2, 0]], C[:, [2, 0, 1]])
     return np.asarray((cofactors**2).sum(axis=(1, 2)) <= (_STRAIGHT * (C**2).sum(axis=(1, 2))) ** 2)
 

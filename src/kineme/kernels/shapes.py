@@ -1,8 +1,33 @@
-"""What two movements are compared by pair by pair: segments and points of their paths along arc length.
+"""Shapes of movements, compared pair by pair: segments and points of paths, and the plain definitions of distances.
 
 A *path* (d, S) holds positions at even steps along arc length, centered at their mean, with a root mean square distance
 of 1 from it. Its *segments* are the pieces between ``n_segments + 1`` even values along it; its *points* are
 ``n_points`` even values. Values between two positions are interpolated linearly.
+
+For movements a and b and a rotation R that brings b onto a, two segments p, q cost
+
+    c(p, q) = |t_p - R t_q|^2 + w_x |x_p - R x_q|^2 + w_theta (theta_p - theta_q)^2
+
+with tangents t, midpoints x and turning angles theta (divided by pi). The squared elastic distance is the least sum of
+costs over warping paths from (0, 0) to (K - 1, K - 1) with steps (1, 0), (0, 1), (1, 1) and ``|p - q| <= band``
+(H. Sakoe and S. Chiba, "Dynamic programming algorithm optimization for spoken word recognition", IEEE TASSP 26(1),
+1978), divided by the number K of segments. The squared turning distance is the same with the last term alone, so it
+needs no rotation and is never larger. A warping path visits every segment of b, so that the costs of some of them, each
+with whichever segment of a within the band costs least, bound both from below. Both are symmetric, with the transposed
+rotation, non-negative, and zero for equal movements; neither satisfies the triangle inequality.
+
+$P+ (R.-D. Vatavu, "Improving gesture recognition accuracy on touch screens for users with low vision", CHI 2017)
+compares points by position and turning angle, whatever their order. Here they have also the line of their tangent,
+without its direction, and the second movement is rotated first:
+
+    D(p, q)^2 = |x_p - R x_q|^2 + w_theta (theta_p - theta_q)^2 + w_l ((|t_p|^2 + |t_q|^2) / 2 - (t_p . R t_q)^2)
+
+The last term is the squared sine of the angle between two tangents; a point without a tangent, t = 0, differs from one
+with a tangent by a half and not at all from another without. Each point of one movement is matched with the nearest of
+the other, the first of equally near ones, and then each point of the other that nobody matched with its nearest. The
+distance is the sum of D over these pairs divided by the number of points, in the direction in which it is smaller. It
+is symmetric, with the transposed rotation, non-negative, and zero for equal movements; it does not satisfy the
+triangle inequality.
 """
 
 from __future__ import annotations
@@ -17,6 +42,8 @@ from kineme.errors import SpecificationError
 from kineme.runtime.compiled import compiled_module, use_compiled
 from kineme.validation import Array
 
+Indices = NDArray[np.intp]
+
 Floats = NDArray[np.float32]
 
 _PATH_OPERATIONS, _CALL_OPERATIONS = 800, 12_000  # elementary operations of the plain definition per path and call
@@ -25,7 +52,7 @@ MOST_POINTS = 32  # of a cloud: the matched ones are bits of an integer
 
 @dataclass(frozen=True)
 class ElasticSpec:
-    """How segments are compared by dynamic time warping; see `kineme.kernels.elastic`.
+    """Options of comparing segments by dynamic time warping; see `kineme.kernels.shapes`.
 
     Attributes
     ----------
@@ -51,7 +78,7 @@ class ElasticSpec:
 
 @dataclass(frozen=True)
 class CloudSpec:
-    """How points are compared as a cloud; see `kineme.kernels.point_cloud`.
+    """Options of comparing points as a cloud; see `kineme.kernels.shapes`.
 
     Attributes
     ----------
@@ -140,7 +167,9 @@ class Shapes:
 
     def arrays(self) -> dict[str, Floats]:
         """The arrays by name."""
-        return {one.name: getattr(self, one.name) for one in fields(self) if one.name not in ("elastic", "cloud")}
+        return {
+            field.name: getattr(self, field.name) for field in fields(self) if field.name not in ("elastic", "cloud")
+        }
 
 
 def shapes_of(paths: NDArray[Any], elastic: ElasticSpec | None = None, cloud: CloudSpec | None = None) -> Shapes:
@@ -223,3 +252,87 @@ def _angles(a: Array, b: Array) -> Array:
     """Angles between unit vectors (..., d), divided by pi; 0 where one of them is zero."""
     both = (a != 0).any(axis=-1) & (b != 0).any(axis=-1)
     return np.where(both, np.arccos(np.clip((a * b).sum(axis=-1), -1.0, 1.0)) / np.pi, 0.0)
+
+
+def elastic_squares(A: Shapes, B: Shapes, first: Indices, second: Indices, rotations: Array | None) -> Array:
+    """Squared elastic and turning distances (2, k) of k pairs: A's movement ``first[i]`` and B's ``second[i]``.
+
+    Parameters
+    ----------
+    A, B : Shapes
+    first, second : arrays (k,) of indices
+    rotations : array (k, d, d), or None for none
+    """
+    sums = [_warped(costs, A.elastic.band) for costs in _costs(A, B, first, second, rotations)]
+    return np.stack(sums) / A.elastic.n_segments
+
+
+def elastic_bounds(A: Shapes, B: Shapes, first: Indices, second: Indices, rotations: Array | None, every: int) -> Array:
+    """Lower bounds (2, k) of the same: the costs of each `every`-th segment of b with the one of a that costs least."""
+    n = A.elastic.n_segments
+    far = np.abs(np.subtract.outer(np.arange(n), np.arange(n))) > A.elastic.band
+    some = slice(every // 2, None, every)
+    costs = (np.where(far, np.inf, each)[:, :, some] for each in _costs(A, B, first, second, rotations))
+    return np.stack([each.min(axis=1).sum(axis=1) for each in costs]) / n
+
+
+def _costs(A: Shapes, B: Shapes, first: Indices, second: Indices, rotations: Array | None) -> tuple[Array, Array]:
+    """Costs (k, n, n) of segments with segments: all of c, and its last term."""
+    angles = A.turning[first, :, None].astype(np.float64) - B.turning[second, None, :]
+    turning: Array = A.elastic.turning_weight * angles**2
+    costs = turning.copy()
+    for weight, name in ((1.0, "tangents"), (A.elastic.position_weight, "midpoints")):
+        a, b = getattr(A, name)[first].astype(float), rotated(getattr(B, name)[second], rotations)
+        for k in range(A.n_dims):
+            costs += weight * (a[:, :, None, k] - b[:, None, :, k]) ** 2
+    return costs, turning
+
+
+def rotated(vectors: Floats, rotations: Array | None) -> Array:
+    """Vectors (k, n, d), each pair's by its own rotation (k, d, d)."""
+    double = vectors.astype(np.float64)
+    return double if rotations is None else np.asarray(double @ rotations.transpose(0, 2, 1))
+
+
+def _warped(costs: Array, band: int) -> Array:
+    """Least sums (k,) over warping paths through costs (k, n, n)."""
+    n = costs.shape[1]
+    table = np.full((n + 1, n + 1, len(costs)), np.inf)
+    table[0, 0] = 0
+    for p in range(n):
+        for q in range(max(0, p - band), min(n, p + band + 1)):
+            before = np.minimum(np.minimum(table[p, q + 1], table[p + 1, q]), table[p, q])
+            table[p + 1, q + 1] = costs[:, p, q] + before
+    return table[n, n]
+
+
+def cloud_squares(A: Shapes, B: Shapes, first: Indices, second: Indices, rotations: Array | None) -> Array:
+    """Squared distances (k,) of k pairs: A's movement ``first[i]`` and B's ``second[i]``.
+
+    Parameters
+    ----------
+    A, B : Shapes
+    first, second : arrays (k,) of indices
+    rotations : array (k, d, d), or None for none
+    """
+    x, y = A.points[first].astype(float), rotated(B.points[second], rotations)
+    t, u = A.point_tangents[first].astype(float), rotated(B.point_tangents[second], rotations)
+    angles = A.point_turning[first, :, None].astype(float) - B.point_turning[second, None, :]
+    halves = 0.5 * ((t * t).sum(axis=2)[:, :, None] + (u * u).sum(axis=2)[:, None, :])
+    squares = A.cloud.turning_weight * angles**2
+    squares += A.cloud.line_weight * (halves - (t @ u.transpose(0, 2, 1)) ** 2)
+    for k in range(A.n_dims):
+        squares += (x[:, :, None, k] - y[:, None, :, k]) ** 2
+    return np.asarray((matched_sums(np.sqrt(np.maximum(squares, 0))) / A.cloud.n_points) ** 2)
+
+
+def matched_sums(D: Array) -> Array:
+    """Sums (k,) of the distances of matched points, of distances (k, n, n): those of the better direction."""
+    return np.minimum(_directed(D), _directed(D.transpose(0, 2, 1)))
+
+
+def _directed(D: Array) -> Array:
+    """Sums (k,) of distances (k, n, n) to the nearest, by rows, and by columns where no row's nearest is."""
+    matched = np.zeros(D.shape[::2], dtype=bool)
+    np.put_along_axis(matched, D.argmin(axis=2), True, axis=1)
+    return np.asarray(D.min(axis=2).sum(axis=1) + np.where(matched, 0, D.min(axis=1)).sum(axis=1))

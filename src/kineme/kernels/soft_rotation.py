@@ -41,7 +41,7 @@ CONCENTRATION = {2: 0.03, 3: 0.1}
 
 @dataclass(frozen=True)
 class RotationPrior:
-    """How rare rotations between movements of one class are.
+    """Prior of rotations between movements of one class.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def _invariants(M: Array) -> tuple[Array, Array, Array, Array]:
     M = np.asarray(M, dtype=np.float64)
     cofactors = np.cross(M[:, [1, 2, 0]], M[:, [2, 0, 1]])
     determinant = np.einsum("nj,nj->n", M[:, 0], cofactors[:, 0])
-    squares = (np.einsum("nij,nij->n", one, one) for one in (M, cofactors))
+    squares = (np.einsum("nij,nij->n", matrices, matrices) for matrices in (M, cofactors))
     return next(squares), determinant, 4.0 * next(squares), cofactors
 
 

@@ -8,10 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from kineme.kernels._rows import Rows
-from kineme.kernels._sums import ABSOLUTE, CANBERRA, SQUARED, TRUNCATED, fill_gram
-from kineme.kernels._widths import median_difference, median_of_sums
+from kineme.kernels._sums import ABSOLUTE, CANBERRA, SQUARED, TRUNCATED, fill_gram, median_difference, median_of_sums
+from kineme.kernels.average import MEANS
 from kineme.kernels.base import Kernel
-from kineme.kernels.means import MEANS
 from kineme.runtime.parallel import for_tiles
 
 
@@ -38,9 +37,6 @@ class TruncatedEuclidean(Kernel):
 
     m: float | None = field(default=None, metadata={"width": True})
     sigma: float = field(default=1.0, metadata={"width": True})
-
-    def __post_init__(self) -> None:
-        self._check_widths()
 
     def _median_width(self, name: str, X: Rows) -> float:
         return median_difference(X)
@@ -82,9 +78,6 @@ class RBF(Kernel):
 
     sigma: float | None = field(default=None, metadata={"width": True})
 
-    def __post_init__(self) -> None:
-        self._check_widths()
-
     def _median_width(self, name: str, X: Rows) -> float:
         return median_of_sums(SQUARED, lambda tile: np.sqrt(tile, out=tile), X)
 
@@ -101,15 +94,16 @@ class RBF(Kernel):
         if max(a2.max(), b2.max()) * float(np.finfo(A.dtype).eps) ** 0.25 <= 1:
             _exp_of_product(a, b, a2, b2, gram)
         else:
-            fill_gram(SQUARED, 0.0, self._exp_of_sums, A, B, gram)
+            slope = A.dtype.type(-0.5 / self.sigma**2)
+
+            def similarity(tile: Rows) -> None:
+                with np.errstate(over="ignore"):  # exp(-inf) = 0 is right
+                    tile *= slope
+                np.exp(tile, out=tile)
+
+            fill_gram(SQUARED, 0.0, similarity, A, B, gram)
         if B is None:
             np.fill_diagonal(gram, 1)
-
-    def _exp_of_sums(self, tile: Rows) -> None:
-        assert self.sigma is not None
-        with np.errstate(over="ignore"):  # exp(-inf) = 0 is right
-            tile *= tile.dtype.type(-0.5 / self.sigma**2)
-        np.exp(tile, out=tile)
 
 
 def _exp_of_product(a: Rows, b: Rows, a2: Rows, b2: Rows, gram: Rows) -> None:
@@ -143,9 +137,6 @@ class Laplacian(Kernel):
     """
 
     sigma: float | None = field(default=None, metadata={"width": True})
-
-    def __post_init__(self) -> None:
-        self._check_widths()
 
     def _median_width(self, name: str, X: Rows) -> float:
         return median_of_sums(ABSOLUTE, lambda tile: tile, X)
@@ -225,11 +216,7 @@ class KernelRow:
 KERNELS: dict[str, KernelRow] = {
     "rbf": KernelRow(RBF, "exp(-‖x - y‖² / (2 σ²))", "(6)", psd=True, infinitely_divisible=True),
     "truncated": KernelRow(
-        TruncatedEuclidean,
-        "1/n Σ max(0, m - min(m, |x_i - y_i|) / σ)",
-        "(7)-(8)",
-        psd=True,
-        infinitely_divisible=False,
+        TruncatedEuclidean, "1/n Σ max(0, m - min(m, |x_i - y_i|) / σ)", "(7)-(8)", psd=True, infinitely_divisible=False
     ),
     "laplacian": KernelRow(Laplacian, "exp(-Σ |x_i - y_i| / σ)", "", psd=True, infinitely_divisible=True),
     "canberra": KernelRow(

@@ -1,6 +1,6 @@
 """A-averages of kernels that are given by their logarithms, and the share of each kernel in them.
 
-`kineme.kernels.means` has the same averages of the kernels themselves, with what is proved of each.
+`kineme.kernels.average` has the same averages of the kernels themselves, with what is proved of each.
 """
 
 from __future__ import annotations

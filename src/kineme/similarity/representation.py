@@ -42,7 +42,7 @@ class Representation:
         from it, which turns with the movement. The DMP is fitted to the path with a curvature penalty
         (``fit="trajectory"``), so that no noise is differentiated. Pair by pair: "elastic", dynamic time warping of
         tangents, positions and turning angles, "turning", of turning angles alone, or "cloud", points in any order, see
-        `kineme.kernels.elastic` and `kineme.kernels.point_cloud`. They need positions over arc length beside them.
+        `kineme.kernels.shapes` and `kineme.kernels.shapes`. They need positions over arc length beside them.
     arc_share : float, default 1.0
         The phase: 0 is time, 1 arc length, between them a blend; see `arc_length_phase`. Arc length is independent of
         timing; time distinguishes movements that differ in timing only. What is compared pair by pair takes arc length.

@@ -12,16 +12,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.dmp.control.options import ObstacleAvoidance, Options, numbers
-from kineme.dmp.control.plan import SHORTEST, Influences, MovingGoal, Plan, ViaPlaces, check_controlled, passed
+from kineme.dmp.control.plan import SHORTEST, Influences, MovingGoal, Plan, check_controlled, passed
 from kineme.dmp.control.state import State, Status
 from kineme.dmp.control.stepping import stepper
 from kineme.errors import SpecificationError
 from kineme.validation import Array
 
 _LARGEST = 1e150
-
-_NONE = Status(0)
-
 
 _NOTHING = Status(0)
 _STANDSTILL = 1e-30  # durations; a step as short as this is none
@@ -127,56 +124,40 @@ class Controller:
         -------
         State
         """
-        self._events = _NOTHING
-        self._step(position, velocity, (goal, goal_velocity), tempo, coupling, (obstacles, obstacle_velocities), dt)
-        return self.state
-
-    def _step(  # noqa: PLR0913, PLR0917 - as `step`
-        self,
-        position: Any,
-        velocity: Any,
-        goal: tuple[Any, Any],
-        tempo: Any,
-        coupling: Any,
-        obstacles: tuple[Any, Any],
-        dt: Any,
-    ) -> None:
-        """`step`, after the events of the last one are forgotten; goal and obstacles with their velocities."""
-        dt, tempo = self._pace(dt, tempo)
-        last = self._motion
-        if position is not None or velocity is not None:
-            self._measure(position, velocity)
-        else:
-            self._slowing = 0.0
-        if goal[0] is not None or goal[1] is not None:
-            self._aim(*goal)
-        self._sense(*obstacles)
-        push = self._zeros if coupling is None else self._couple(coupling)
-        velocity_before = self._derivatives()[0] if self._limited else self._zeros
-        self._rate = tempo / (self._tau * (1.0 + self._slowing))
-        self._move(dt, push, last)
-        derivatives = self._derivatives()
-        if self._limited:
-            self._events |= self._limits.exceeded(velocity_before, *derivatives, dt)
-        self.state = self._report(*derivatives)
-
-    def _pace(self, dt: Any, tempo: Any) -> tuple[float, float]:
-        """The time and tempo of this step."""
         wanted = read_number(tempo)
         if wanted >= 0.0 and wanted * self.dt <= self._longest:
             self._tempo = wanted
         else:
             self._events |= Status.TEMPO_REJECTED
-        if dt is None:
-            return self.dt, self._tempo
-        dt = read_number(dt)
-        if self._fits(dt) and dt * self._tempo <= self._longest:
-            return dt, self._tempo
-        self._events |= Status.DT_REJECTED
-        return self.dt, self._tempo
-
-    def _fits(self, dt: float) -> bool:
-        return SHORTEST * self._tau <= dt <= self._longest
+        length = self.dt if dt is None else read_number(dt)
+        if dt is not None and not (SHORTEST * self._tau <= length <= self._longest >= length * self._tempo):
+            self._events |= Status.DT_REJECTED
+            length = self.dt
+        last = self._motion
+        self._slowing = self._slowing if self.options.phase_stopping is not None and position is not None else 0.0
+        if position is not None or velocity is not None:
+            self._measure(position, velocity)
+        if goal is not None or goal_velocity is not None:
+            self._aim(goal, goal_velocity)
+        if obstacles is None and obstacle_velocities is None:
+            self._obstacles = self._obstacle_velocities = self._nowhere
+        elif (points := read_points(obstacles, obstacle_velocities, self._plan.n_positions)) is None:
+            self._events |= Status.OBSTACLES_REJECTED
+        else:
+            self._obstacles, self._obstacle_velocities = points[0] - self._origin[: self._plan.n_positions], points[1]
+        push = self._zeros if coupling is None else self._read_rates(coupling, self._motion[0])
+        if push is None:
+            self._events |= Status.COUPLING_REJECTED
+            push = self._zeros
+        velocity_before = self._derivatives()[0] if self._limited else self._zeros
+        self._rate = self._tempo / (self._tau * (1.0 + self._slowing))
+        self._move(length, push, last)
+        derivatives = self._derivatives()
+        if self._limited:
+            self._events |= self._limits.exceeded(velocity_before, *derivatives, length)
+        self.state = self._report(*derivatives)
+        self._events = _NOTHING
+        return self.state
 
     def _set_tau(self, tau: float) -> None:
         """The duration of u = 1, and with it the longest step."""
@@ -184,68 +165,39 @@ class Controller:
 
     def _measure(self, position: Any, velocity: Any) -> None:
         """Go on from what was measured, or let its distance slow the phase."""
-        x = None if position is None else self._read_position(position)
-        v = None if velocity is None else self._read_velocity(velocity, x)
+        x = None if position is None else self._read_place(position, self._motion[0])
+        v = None if velocity is None else self._read_rates(velocity, self._motion[0] if x is None else x)
         if (x is None and position is not None) or (v is None and velocity is not None):
             self._events |= Status.MEASUREMENT_REJECTED
         if self.options.phase_stopping is not None:
             if x is not None:
-                error = x - self._origin - self._motion[0]
+                error = x - self._motion[0]
                 self._slowing = float(self.options.phase_stopping * error.dot(error))
-            elif position is None:
-                self._slowing = 0.0
             return
         motion = self._motion.copy()
         if x is not None:
-            motion[0] = x - self._origin
+            motion[0] = x
         if v is not None and self._rate > 0:
             motion[1] = v / self._rate
         self._motion = motion
 
-    def _read_position(self, value: Any) -> Array | None:
-        """A measured position (d,), or None where it cannot be used."""
-        return read_vector(value, self._n_dims)
+    def _read_place(self, value: Any, near: Array) -> Array | None:
+        """Return a place (d,) relative to the origin, of several that are one the nearest; None if it is none."""
+        place = read_vector(value, self._n_dims)
+        return None if place is None else place - self._origin
 
-    def _read_velocity(self, value: Any, position: Array | None) -> Array | None:
-        """A measured velocity (d,), at a measured position if there is one."""
-        return read_vector(value, self._n_dims)
-
-    def _read_goal(self, value: Any) -> Array | None:
-        return read_vector(value, self._n_dims)
-
-    def _read_goal_velocity(self, value: Any) -> Array | None:
-        return read_vector(value, self._n_dims)
-
-    def _read_coupling(self, value: Any) -> Array | None:
+    def _read_rates(self, value: Any, place: Array) -> Array | None:
+        """Return rates (d,) at a place relative to the origin, or None where they cannot be used."""
         return read_vector(value, self._n_dims)
 
     def _aim(self, goal: Any, velocity: Any = None) -> None:
         """Set a goal, or let the one in force move; what cannot be used of one of them spoils both."""
-        target = self._goal.target + self._origin if goal is None else self._read_goal(goal)
-        moving = None if velocity is None else self._read_goal_velocity(velocity)
+        target = self._goal.target if goal is None else self._read_place(goal, self._goal.target)
+        moving = None if velocity is None else self._read_rates(velocity, self._goal.target)
         unread = moving is None and velocity is not None
         remaining = (1.0 - self._clock.u) / (self._rate or 1.0 / self._tau)  # below 0 after the end
-        if unread or target is None or not self._goal.aim(target - self._origin, moving, remaining):
+        if unread or target is None or not self._goal.aim(target, moving, remaining):
             self._events |= Status.GOAL_REJECTED
-
-    def _sense(self, obstacles: Any, velocities: Any) -> None:
-        """Take over the obstacles, relative to the origin; without any there are none."""
-        if obstacles is None and velocities is None:
-            self._obstacles = self._obstacle_velocities = self._nowhere
-            return
-        n = self._plan.n_positions
-        read = read_points(obstacles, velocities, n)
-        if read is None:
-            self._events |= Status.OBSTACLES_REJECTED
-        else:
-            self._obstacles, self._obstacle_velocities = read[0] - self._origin[:n], read[1]
-
-    def _couple(self, coupling: Any) -> Array:
-        push = self._read_coupling(coupling)
-        if push is not None:
-            return push
-        self._events |= Status.COUPLING_REJECTED
-        return self._zeros
 
     def _move(self, dt: float, push: Array, last: Array) -> None:
         """Advance by one step; if that leads out of the range of numbers, stay with `last`."""
@@ -270,22 +222,18 @@ class Controller:
         if self._usable(motion):
             self._clock.add_phase(du)
             if self._plan.via is not None:
-                self._pass(self._plan.via, begin, du, influences)
+                for ahead, point in passed(self._plan.via, begin, self._clock.u, du, self._plan.periodic):
+                    at = self._advance(self._motion[:2], begin, ahead, influences)[0, : len(point)]
+                    self._via_missed = max(self._via_missed, float(np.sqrt(np.nansum((at - point) ** 2))))
+                if not self._via_missed <= self._plan.via.tolerance:
+                    self._events |= Status.VIA_POINT_MISSED
             self._motion = motion
         else:
             self._motion = last
             self._events |= Status.STATE_KEPT
 
-    def _pass(self, via: ViaPlaces, begin: float, du: float, influences: Influences) -> None:
-        """Measure how far from the via points, whose times lie in a step of du from `begin`, the movement passes."""
-        for ahead, point in passed(via, begin, self._clock.u, du, self._plan.periodic):
-            at = self._advance(self._motion[:2], begin, ahead, influences)[0, : len(point)]
-            self._via_missed = max(self._via_missed, float(np.sqrt(np.nansum((at - point) ** 2))))
-        if not self._via_missed <= via.tolerance:
-            self._events |= Status.VIA_POINT_MISSED
-
     def _usable(self, motion: Array) -> bool:
-        """Whether the movement can go on from there."""
+        """Tell whether the movement can go on from there."""
         return is_usable(motion)
 
     def _follow(self, dt: float) -> tuple[Array, Array]:
@@ -298,21 +246,16 @@ class Controller:
 
     def _report(self, velocity: Array, acceleration: Array) -> State:
         x, clock = self._motion[0], self._clock
-        origin, goal = self._origin, self._goal.now
-        place, aim = origin + x, origin + goal
-        return State(clock.time, clock.progress, place, velocity, acceleration, aim, self._via_missed, self._status())
-
-    def _status(self) -> Status:
         status = Status.MOVING
         if self._rate == 0.0:
             status = Status.PAUSED
-        elif not self._plan.periodic and self._clock.u >= 1.0 and self._rests():
-            status = Status.SETTLED
-        return status if self._events is _NOTHING else status | self._events
-
-    def _rests(self) -> bool:
-        distance, slope = self._motion[0] - self._goal.target, self._motion[1]
-        return bool(max(np.abs(distance).max(), np.abs(slope).max()) <= self._settle)
+        elif not self._plan.periodic and clock.u >= 1.0:
+            distance = np.abs(x - self._goal.target).max()
+            if max(distance, np.abs(self._motion[1]).max()) <= self._settle:
+                status = Status.SETTLED
+        status = status if self._events is _NOTHING else status | self._events
+        place, aim = self._origin + x, self._origin + self._goal.now
+        return State(clock.time, clock.progress, place, velocity, acceleration, aim, self._via_missed, status)
 
 
 class RunningSum:
@@ -332,11 +275,11 @@ class RunningSum:
         self._lost += (self._sum - total) + step if self._sum >= step else (step - total) + self._sum
         self._sum = total
 
-    def take_whole(self) -> int:
-        """Subtract the whole part, which rounds nothing, and return it."""
-        whole = math.floor(self.value)
-        self._sum -= whole
-        return whole
+    def take_turns(self) -> int:
+        """Subtract the integer part, which rounds nothing, and return it."""
+        turns = math.floor(self.value)
+        self._sum -= turns
+        return turns
 
     @property
     def value(self) -> float:
@@ -378,7 +321,7 @@ class Clock:
         self.u = self.progress = self._phase.value
         if self._periodic:
             if self.u >= 1.0:
-                self._turns += self._phase.take_whole()
+                self._turns += self._phase.take_turns()
                 self.u = self._phase.value
             self.progress = self._turns + self.u - self._begin
 
@@ -391,15 +334,15 @@ class Limits(NamedTuple):
 
     @property
     def exist(self) -> bool:
-        """Whether there is any."""
+        """True with any limit."""
         return self.velocity is not None or self.acceleration is not None
 
     def exceeded(self, before: Array, velocity: Array, acceleration: Array, dt: float) -> Status:
-        """Which are exceeded after a step of dt from the velocity `before` it, as members of `Status`.
+        """Return those that are exceeded after a step of dt from the velocity `before` it, as members of `Status`.
 
         The acceleration is the larger of that at the end of the step and the mean change of velocity over it.
         """
-        events = _NONE
+        events = _NOTHING
         if self.velocity is not None and (np.abs(velocity) > self.velocity).any():
             events |= Status.VELOCITY_LIMIT
         if self.acceleration is not None:
@@ -465,7 +408,7 @@ def read_number(value: Any) -> float:
 
 
 def is_usable(array: Array) -> bool:
-    """Whether all numbers are finite, and so far from overflow that their squares are finite too."""
+    """Tell whether all numbers are finite, and so far from overflow that their squares are finite too."""
     return math.hypot(*array.ravel().tolist()) < _LARGEST  # for a few numbers faster than any of NumPy's reductions
 
 

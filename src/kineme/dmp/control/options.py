@@ -18,7 +18,7 @@ FEEDBACK = ("state", "phase")
 
 @dataclass(frozen=True)
 class Options:
-    """How a controller treats what it is told while it moves.
+    """Options of a controller: what measurements, new goals, limits and obstacles do.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ def check_one(n_primitives: int) -> None:
 
 
 def numbers(name: str, value: ArrayLike) -> Array:
-    """What a user typed as an array of numbers."""
+    """Return what a user typed as an array of numbers."""
     try:
         return np.array(value, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:

@@ -20,7 +20,7 @@ _ROUNDING = 64 * np.finfo(np.float64).eps
 
 
 class Influences(NamedTuple):
-    """What acts on the movement during one step, held constant over it; in normalized time, relative to the origin."""
+    """Influences on the movement during one step, held constant over it; in normalized time, relative to the origin."""
 
     goal: Array  # (d,), at the start of the step; ahead of a goal that moves, see `MovingGoal`
     ratio: Array  # (d,), what scale f is multiplied by
@@ -35,7 +35,7 @@ MISSED = 1e-2
 
 
 class ViaPlaces(NamedTuple):
-    """Where a movement is to be at k times, relative to the origin."""
+    """Places of a movement at k times, relative to the origin."""
 
     times: Array  # (k,), normalized
     points: Array  # (k, n_positions), or (k, d) of a movement without positions; NaN where a dimension is free
@@ -121,7 +121,7 @@ class Plan:
     @cached_property
     def rounding(self) -> float:
         """Distance that rounding leaves between equal positions, once the origin is subtracted from them."""
-        return float(_ROUNDING * max(np.abs(one).max() for one in (self.origin, self.goal, self.state[0])))
+        return float(_ROUNDING * max(np.abs(place).max() for place in (self.origin, self.goal, self.state[0])))
 
     @cached_property
     def intervals(self) -> float:

@@ -1,4 +1,4 @@
-"""What a controller says after each step: where the movement is, and what there is to know about the step."""
+"""Answer of a controller after each step: where the movement is, and what there is to know about the step."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from kineme.validation import Array
 
 
 class Status(Flag):
-    """What happened in a step; members combine. Nothing here is an exception: the motion went on."""
+    """Events of a step; members combine. Nothing here is an exception: the motion went on."""
 
     MOVING = auto()
     SETTLED = auto()
@@ -34,7 +34,7 @@ class Status(Flag):
 
     @property
     def rejected(self) -> bool:
-        """Whether something that was passed to the step could not be used."""
+        """True if something that was passed to the step could not be used."""
         return bool(self & REJECTED)
 
 

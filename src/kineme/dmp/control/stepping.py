@@ -201,14 +201,14 @@ def _carry_smoothly(
 
 @lru_cache(maxsize=64)
 def step_matrices(stiffness: float, damping: float, h: float) -> tuple[Array, Array]:
-    """What carries a state over h (2, 2), and what an acceleration at each quadrature node adds to it (8, 2)."""
+    """Return what carries a state over h (2, 2), and what an acceleration at each quadrature node adds to it (8, 2)."""
     carry = np.array(transition(stiffness, damping, h)).reshape(2, 2)
     _, s01, _, s11 = transition(stiffness, damping, h * (1.0 - NODES))
     return carry, np.column_stack((s01, s11)) * (h * NODE_WEIGHTS)[:, None]
 
 
 def _forcing(plan: Plan, u: Array, aims: Array, influences: Influences, push: Array) -> Array:
-    """What acts besides spring and damper at u (T,), with the goals (T, d) then; shape (T, d)."""
+    """Return what acts besides spring and damper at u (T,), with the goals (T, d) then; shape (T, d)."""
     shape = plan.shape(u)
     return shape[:, :-1] * influences.ratio + shape[:, -1:] * aims + push
 

@@ -43,7 +43,7 @@ _MOST_MOVEMENTS = 2_000  # from which the choice is made
 
 @dataclass(frozen=True, eq=False)
 class BasisSelection(Generic[S]):
-    """What `DMP.choose` found.
+    """Result of `DMP.choose`.
 
     Attributes
     ----------
@@ -103,16 +103,19 @@ def choose(
     check_number("negligible", negligible, least=0.0)
     rows = relative_paths(dmp, movements)
     counts = _counts(n_basis, rows.shape[1])
-    ridges = np.array([_checked_ridge(one) for one in (RIDGES if ridge is None else _listed("ridge", ridge))])
+    strengths = RIDGES if ridge is None else _listed("ridge", ridge)
+    for strength in strengths:
+        check_number("ridge", strength, above=0.0)
+    ridges = np.array(strengths, dtype=np.float64)
     if not len(counts) or not len(ridges):
         raise SpecificationError(f"expected at least one n_basis and one ridge, got {len(counts)} and {len(ridges)}")
     scores = [score(replace(dmp, n_basis=count), rows, ridges) for count in counts]
-    errors = np.array([one.errors for one in scores])
+    errors = np.array([scored.errors for scored in scores])
     best = errors.min(axis=1)
     a = int(np.argmax(best <= max((1.0 + tolerance) * best.min(), negligible)))  # the fewest that are good enough
     chosen = replace(dmp, n_basis=counts[a], ridge=float(ridges[errors[a].argmin()]))
     return BasisSelection(
-        chosen, np.array(counts), ridges, errors, np.array([one.degrees_of_freedom for one in scores])
+        chosen, np.array(counts), ridges, errors, np.array([scored.degrees_of_freedom for scored in scores])
     )
 
 
@@ -142,9 +145,9 @@ def score(dmp: Specification, rows: Array, ridges: Array) -> Scores:
     y = rows - rows[:, -1:] * response.goal[0]
     parts = np.sum((y @ U) ** 2, axis=0)
     outside = max(0.0, float(np.sum(y**2) - parts.sum()))  # of what the columns span
-    kept = C**2 / (C**2 + ridges[:, None] * S2)
-    mean_square = (outside + (1.0 - kept) ** 2 @ parts) / rows.size
-    degrees = kept.sum(axis=1)
+    shares = C**2 / (C**2 + ridges[:, None] * S2)
+    mean_square = (outside + (1.0 - shares) ** 2 @ parts) / rows.size
+    degrees = shares.sum(axis=1)
     free = 1.0 - degrees / n_points
     errors = np.full(len(ridges), np.inf)  # where as many numbers as samples leave nothing to predict
     np.divide(np.sqrt(mean_square), free, out=errors, where=free > _FREE)
@@ -162,8 +165,3 @@ def _listed(name: str, values: Any) -> list[Any]:
         return list(values)
     except TypeError:
         raise SpecificationError(f"expected {name} to be a sequence of what to try, got {values!r}") from None
-
-
-def _checked_ridge(ridge: float) -> float:
-    check_number("ridge", ridge, above=0.0)
-    return float(ridge)

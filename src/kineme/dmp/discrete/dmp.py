@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
+from kineme.dmp.batch import Batch
 from kineme.dmp.discrete.formulations import safe_amplitudes
-from kineme.dmp.discrete.learned import Learned
 from kineme.dmp.discrete.operators import forcing_matrix
 from kineme.dmp.discrete.specification import Specification
+from kineme.dmp.recorded_as import RecordedAs
+from kineme.errors import SpecificationError
 from kineme.validation import Array, check_count, check_samples
 
 if TYPE_CHECKING:
@@ -153,7 +155,7 @@ class DMP(Specification):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Primitives(Learned):
+class Primitives(Batch):
     """n primitives of d dimensions that share one specification; made by `DMP.learn`.
 
     Attributes
@@ -175,10 +177,27 @@ class Primitives(Learned):
     names : tuple of str or None
     """
 
+    ROWS = {  # noqa: RUF012 - declared as a class variable by Batch
+        "scaled_weights": "ndN",
+        "starts": "nd",
+        "goals": "nd",
+        "velocities": "nd",
+        "durations": "n",
+        "extents": "nd",
+    }
     SPECIFICATION = DMP
     KIND = "primitives"
 
     dmp: DMP
+    scaled_weights: Array
+    starts: Array
+    goals: Array
+    velocities: Array
+    durations: Array
+    extents: Array
+    labels: NDArray[Any] | None = None
+    names: tuple[str | None, ...] | None = None
+    recorded_as: RecordedAs | None = None
 
     @property
     def weights(self) -> Array:
@@ -215,7 +234,9 @@ class Primitives(Learned):
         s = self.dmp.basis.phase(np.linspace(0.0, 1.0, term.shape[2]))
         coupling = self.dmp.system.coupling(self.dmp.K, s)
         if coupling.any():
-            term += coupling * self._relative_path(n_samples)
+            term += coupling * (
+                self.rollout(n_samples=n_samples).positions.transpose(0, 2, 1) - self.starts[:, :, None]
+            )
         return term.transpose(0, 2, 1)
 
     def rollout(  # noqa: PLR0913 - one parameter per option
@@ -313,11 +334,24 @@ class Primitives(Learned):
         SpecificationError
             A rollout with a goal that moves, which a primitive has not.
         """
-        from kineme.dmp.discrete.rollout import own_primitives
-
-        own = own_primitives(movement)
-        return cls._of_rows(
-            own.dmp, {name: getattr(own, name) for name in cls.ROWS}, own.labels, own.names, own.recorded_as
+        if movement.goal_velocities is not None and movement.goal_velocities.any():
+            raise SpecificationError(
+                "expected movements to goals at rest, got goal_velocity= other than 0: primitives know no goals that "
+                "move; give it to their rollout, or to controller.step, or use end_velocity= to go on at the goal"
+            )
+        of = movement.primitives
+        of = of if len(of) == len(movement) else of[np.zeros(len(movement), dtype=np.intp)]
+        return cls(
+            of.dmp,
+            scaled_weights=movement.weights,
+            starts=movement.starts.copy(),
+            goals=movement.goals.copy(),
+            velocities=movement.velocities_at_start.copy(),
+            durations=movement.durations.copy(),
+            extents=of.row("extents"),
+            labels=of.labels,
+            names=of.names,
+            recorded_as=of.recorded_as,
         )
 
     def controller(  # noqa: PLR0913 - an option per parameter
@@ -389,8 +423,3 @@ class Primitives(Learned):
     def _scaled_forcing(self, n_samples: int) -> Array:
         n_samples = check_samples(check_count("n_samples", n_samples, 2), self.dmp.n_basis, "n_samples")
         return self.scaled_weights @ forcing_matrix(self.dmp, n_samples).T
-
-    def _relative_path(self, n_samples: int) -> Array:
-        """Positions minus the start, shape (n, d, S)."""
-        path = self.rollout(n_samples=n_samples).positions.transpose(0, 2, 1)
-        return path - self.starts[:, :, None]

@@ -55,7 +55,7 @@ MEASURED = Measured()
 
 
 class Changed(NamedTuple):
-    """What a change of the weights does to movements."""
+    """Change of the weights, and what it does to movements."""
 
     change: Change
     left: Array | None  # (n, d, K) of what it was to make up for; None where nothing is left
@@ -63,19 +63,19 @@ class Changed(NamedTuple):
 
 
 def warn_far(
-    extents: Array, asked: ViaPoints, errors: Array, measured: Measured = MEASURED, span: Span = SHARES
+    extents: Array, targets: ViaPoints, errors: Array, measured: Measured = MEASURED, span: Span = SHARES
 ) -> None:
     """Say how far a via point is from the path as it is, if that is farther than the movement is large, `extents` (n,).
 
     `errors` (n, d, K or more) is what is missing at the points.
     """
-    distances, unit = _distances(asked, errors, measured), measured.unit
+    distances, unit = _distances(targets, errors, measured), measured.unit
     far = distances > extents[:, None]
     if far.any():
         i, j = np.unravel_index(int(np.argmax(distances / extents[:, None])), far.shape)
         warn(
             f"{far.any(axis=1).sum()} of {len(far)} movements have a via point outside what was demonstrated: the one "
-            f"at {span.where.format(asked.times[j] * span.end)} is {distances[i, j]:.3g}{unit} from the path of "
+            f"at {span.where.format(targets.times[j] * span.end)} is {distances[i, j]:.3g}{unit} from the path of "
             f"movement {i} at that time, which is {extents[i]:.3g}{unit} large; check its unit and frame, or "
             "demonstrate such a movement",
             ExtrapolationWarning,
@@ -84,19 +84,19 @@ def warn_far(
 
 
 def warn_changed(
-    extents: Array, asked: ViaPoints, errors: Array, changed: Changed, measured: Measured = MEASURED
+    extents: Array, targets: ViaPoints, errors: Array, changed: Changed, measured: Measured = MEASURED
 ) -> None:
     """Say how far a movement stays from a stretch that it does not follow, or how far it is led from its path."""
     unit = measured.unit
-    asked_for = _distances(asked, errors, measured).max(axis=1, initial=0.0)
+    asked_for = _distances(targets, errors, measured).max(axis=1, initial=0.0)
     much = _WIDE * np.maximum(extents, asked_for)
     farthest = _farthest(changed, much, measured)
     wide = farthest > much
-    missed = np.zeros(len(much)) if changed.left is None else _distances(asked, changed.left, measured).max(axis=1)
+    missed = np.zeros(len(much)) if changed.left is None else _distances(targets, changed.left, measured).max(axis=1)
     if (missed > _LOOSE * extents).any():
         i = int(np.argmax(missed / extents))
-        one = changed.change._replace(coefficients=changed.change.coefficients[[i]])
-        swing = _farthest(changed._replace(change=one), np.full(1, -1.0), measured)
+        worst = changed.change._replace(coefficients=changed.change.coefficients[[i]])
+        swing = _farthest(changed._replace(change=worst), np.full(1, -1.0), measured)
         message = (
             f"movement {i} stays {missed[i]:.3g}{unit} from its via stretch, {100 * missed[i] / extents[i]:.2g} % of "
             f"its extent, and is led away from its path by {swing[0]:.3g}{unit}, where the stretch is "
@@ -118,21 +118,21 @@ def warn_changed(
 
 
 def extents_of(movement: Rollout, measured: Measured) -> Array:
-    """How large each movement is (n,): the diagonal of its bounding box."""
+    """Return the sizes (n,) of movements: the diagonal of its bounding box."""
     between = np.abs(movement.arrivals - movement.starts)
-    sides = np.maximum(movement.primitives.extents, between)[:, measured.dims]
+    sides = np.maximum(movement.primitives.row("extents"), between)[:, measured.dims]
     return np.maximum(np.sqrt(np.einsum("nd,nd->n", sides, sides)), measured.least)
 
 
-def _distances(asked: ViaPoints, errors: Array, measured: Measured) -> Array:
+def _distances(targets: ViaPoints, errors: Array, measured: Measured) -> Array:
     """Of the paths from the via points (n, k), in the dimensions that are not free."""
-    missing = errors[:, measured.dims, : len(asked.times)]
+    missing = errors[:, measured.dims, : len(targets.times)]
     missing = np.where(np.isnan(missing), 0.0, missing)
     return np.asarray(np.sqrt(np.einsum("ndk,ndk->nk", missing, missing)))
 
 
 def _farthest(changed: Changed, much: Array, measured: Measured) -> Array:
-    """How far a change leads each movement away in a coordinate (n,); where it is not `much`, at most so far."""
+    """Return how far a change leads each movement away in a coordinate (n,); where it is not `much`, at most so far."""
     change, effect = changed.change, changed.change.directions @ changed.looks
     coefficients = change.coefficients[:, measured.dims]
     farthest = (np.abs(coefficients) @ np.abs(effect).max(axis=1)).max(axis=1)
@@ -175,28 +175,31 @@ def modulated(
     if via is None and end_velocity is None and position_limits is None:
         return movement
     d = movement.starts.shape[1]
-    asked = via if isinstance(via, ViaPoints) else via_points(() if via is None else via, d)
+    targets = via if isinstance(via, ViaPoints) else via_points(() if via is None else via, d)
     velocity = per_movement(end_velocity, "end_velocity", d)
-    n = broadcast_length(len(movement), {"via": asked.points, "end_velocity": velocity}, "movements")
+    n = broadcast_length(len(movement), {"via": targets.points, "end_velocity": velocity}, "movements")
     movement = movement if len(movement) == n else movement[np.zeros(n, dtype=np.intp)]
-    observed = _observed(movement.primitives.dmp, tuple(asked.times.tolist()))
-    errors = _errors(movement, asked, velocity, observed)
-    for one in measured:
-        warn_far(extents_of(movement, one), asked, errors, one)
+    observed = _observed(movement.primitives.dmp, tuple(targets.times.tolist()))
+    k, errors = len(targets.times), -_along(movement, observed)  # (n, d, K), NaN where a place is free
+    errors[:, :, :k] += targets.points.transpose(0, 2, 1) - movement.starts[:, :, None]
+    errors[:, :, k] += movement.arrivals - movement.starts
+    errors[:, :, k + 1] = 0.0 if velocity is None else errors[:, :, k + 1] + velocity * movement.durations[:, None]
+    for group in measured:
+        warn_far(extents_of(movement, group), targets, errors, group)
     if factor is None or not factor.any():
-        change = _smooth_change(movement, asked, observed, errors)
+        change = _smooth_change(movement, targets, observed, errors)
     else:
-        change = _shown_change(movement, asked, observed, errors, factor)
-    left = errors - change.coefficients @ (change.directions @ observed.weights.T) if asked.stretch.any() else None
+        change = _shown_change(movement, targets, observed, errors, factor)
+    left = errors - change.coefficients @ (change.directions @ observed.weights.T) if targets.stretch.any() else None
     looks = looks_of(movement.primitives.dmp)
-    for one in measured:
-        warn_changed(extents_of(movement, one), asked, errors, Changed(change, left, looks), one)
+    for group in measured:
+        warn_changed(extents_of(movement, group), targets, errors, Changed(change, left, looks), group)
     fixed = movement.fixed_velocity or (velocity is not None and bool(velocity.any()))
     movement = replace(movement, change=change, fixed_velocity=fixed)
     return (
         movement
         if position_limits is None
-        else within_limits(movement, position_limits, asked.points, observed.weights, SLACK * _stretch(asked))
+        else within_limits(movement, position_limits, targets.points, observed.weights, SLACK * _stretch(targets))
     )
 
 
@@ -226,53 +229,44 @@ def _smooth_gain(dmp: Specification, times: tuple[float, ...]) -> Array:
     return condition(smoothness_factor(dmp), _observed(dmp, times).weights).gain
 
 
-def _errors(movement: Rollout, asked: ViaPoints, velocity: Array | None, observed: _Observed) -> Array:
-    """What is missing (n, d, K) at the via points, at the goal, and of the velocity there; NaN where it is free."""
-    k, errors = len(asked.times), -_along(movement, observed)
-    errors[:, :, :k] += asked.points.transpose(0, 2, 1) - movement.starts[:, :, None]
-    errors[:, :, k] += movement.arrivals - movement.starts
-    errors[:, :, k + 1] = 0.0 if velocity is None else errors[:, :, k + 1] + velocity * movement.durations[:, None]
-    return errors
-
-
 def _along(movement: Rollout, observed: _Observed) -> Array:
-    """What these functions (n, d, K) of the movement relative to its start are, before it is changed."""
-    own = movement.primitives.scaled_weights
-    found = (own.reshape(-1, own.shape[2]) @ observed.weights.T).reshape(*own.shape[:2], -1)
-    found = found * movement.ratio[:, :, None]
-    found += (movement.goals - movement.starts)[:, :, None] * observed.goal
-    found += (movement.velocities_at_start * movement.durations[:, None])[:, :, None] * observed.velocity
-    found += movement.goal_steps[:, :, None] * observed.moving_goal
-    return np.asarray(found)
+    """Evaluate these functions (n, d, K) of the movement relative to its start, before it is changed."""
+    own = movement.primitives.row("scaled_weights")
+    values = (own.reshape(-1, own.shape[2]) @ observed.weights.T).reshape(*own.shape[:2], -1)
+    values = values * movement.ratio[:, :, None]
+    values += (movement.goals - movement.starts)[:, :, None] * observed.goal
+    values += (movement.velocities_at_start * movement.durations[:, None])[:, :, None] * observed.velocity
+    values += movement.goal_steps[:, :, None] * observed.moving_goal
+    return np.asarray(values)
 
 
-def _smooth_change(movement: Rollout, asked: ViaPoints, observed: _Observed, errors: Array) -> Change:
+def _smooth_change(movement: Rollout, targets: ViaPoints, observed: _Observed, errors: Array) -> Change:
     """The change with the least mean square acceleration; few coefficients where all points are met."""
     dmp = movement.primitives.dmp
     rows = errors.reshape(-1, errors.shape[2])
-    if asked.stretch.any():
-        dense = loose_changes(looks_of(dmp), smoothness_factor(dmp), observed.weights, rows, _stretch(asked))
+    if targets.stretch.any():
+        dense = loose_changes(looks_of(dmp), smoothness_factor(dmp), observed.weights, rows, _stretch(targets))
         return Change(dense.reshape(*errors.shape[:2], -1), np.eye(dmp.n_basis))
-    gain = _smooth_gain(dmp, tuple(asked.times.tolist()))
+    gain = _smooth_gain(dmp, tuple(targets.times.tolist()))
     if not np.isfinite(np.sum(rows)):  # free places follow from the others
-        found = changes(smoothness_factor(dmp), observed.weights, rows, np.zeros(rows.shape[1]))
-        errors = (found @ observed.weights.T).reshape(errors.shape)
+        change = changes(smoothness_factor(dmp), observed.weights, rows, np.zeros(rows.shape[1]))
+        errors = (change @ observed.weights.T).reshape(errors.shape)
     return Change(errors, gain)
 
 
-def _shown_change(movement: Rollout, asked: ViaPoints, observed: _Observed, errors: Array, factor: Array) -> Change:
+def _shown_change(movement: Rollout, targets: ViaPoints, observed: _Observed, errors: Array, factor: Array) -> Change:
     """The change that is likely after the demonstrations' covariance, all dimensions at once."""
     dmp, (n, d, _) = movement.primitives.dmp, errors.shape
     scale = np.where(movement.ratio == 0.0, 1.0, movement.ratio)[:, :, None]  # the deviations scale like the weights
     rows = (errors / scale).reshape(n, -1)
     every_dim = np.asarray(np.kron(np.eye(d), observed.weights), dtype=np.float64)
-    change = loose_changes(looks_of(dmp), mixed_factor(dmp, factor), every_dim, rows, np.tile(_stretch(asked), d))
+    change = loose_changes(looks_of(dmp), mixed_factor(dmp, factor), every_dim, rows, np.tile(_stretch(targets), d))
     return Change(change.reshape(n, d, -1) * scale, np.eye(dmp.n_basis))
 
 
-def _stretch(asked: ViaPoints) -> Array:
+def _stretch(targets: ViaPoints) -> Array:
     """1 for each of the rows (K,) that belongs to a stretch, 0 for the others."""
-    return np.append(asked.stretch.astype(np.float64), (0.0, 0.0))
+    return np.append(targets.stretch.astype(np.float64), (0.0, 0.0))
 
 
 def mixed_factor(dmp: Specification, factor: Array) -> Array:
@@ -306,15 +300,15 @@ def changes(factor: Array, observed: Array, errors: Array, slack: Array) -> Arra
     `slack` (k,) is the deviation of each, as a share of what it is under the covariance ``factor.T @ factor``.
     """
     slack = slack * np.linalg.norm(observed @ factor.T, axis=1)
-    known = np.isfinite(errors)
-    if known.all():
+    given = np.isfinite(errors)
+    if given.all():
         return np.asarray(errors @ condition(factor, observed, slack).gain)
-    patterns, which = np.unique(known, axis=0, return_inverse=True)
-    found = np.empty((len(errors), observed.shape[1]))
+    patterns, which = np.unique(given, axis=0, return_inverse=True)
+    change = np.empty((len(errors), observed.shape[1]))
     for i, pattern in enumerate(patterns):  # of free dimensions: few, however many movements
         rows = np.flatnonzero(which.ravel() == i)
-        found[rows] = errors[rows][:, pattern] @ condition(factor, observed[pattern], slack[pattern]).gain
-    return found
+        change[rows] = errors[rows][:, pattern] @ condition(factor, observed[pattern], slack[pattern]).gain
+    return change
 
 
 def loose_changes(looks: Array, factor: Array, observed: Array, errors: Array, stretch: Array) -> Array:
@@ -323,17 +317,17 @@ def loose_changes(looks: Array, factor: Array, observed: Array, errors: Array, s
     The rows of a stretch, those where `stretch` (k,) is 1 and not 0, are met so closely that the path does not swing,
     which `looks` (N, T) shows: from the weights of a dimension to its path.
     """
-    found = changes(factor, observed, errors, SLACK * stretch)
+    change = changes(factor, observed, errors, SLACK * stretch)
     if not stretch.any():
-        return found
+        return change
     missing = np.where(np.isnan(errors), 0.0, errors)
-    rows = np.flatnonzero(_swing(looks, found) > _SWING * np.abs(missing).max(axis=1))
+    rows = np.flatnonzero(_swing(looks, change) > _SWING * np.abs(missing).max(axis=1))
     if len(rows):
-        tried = np.stack([found[rows], *(changes(factor, observed, errors[rows], k * stretch) for k in _SLACKS)])
+        tried = np.stack([change[rows], *(changes(factor, observed, errors[rows], k * stretch) for k in _SLACKS)])
         left = np.where(np.isnan(errors[rows]), 0.0, missing[rows] - tried @ observed.T)[:, :, stretch > 0.0]
-        cost = np.abs(left).max(axis=2) + _PRICE * np.stack([_swing(looks, one) for one in tried])
-        found[rows] = tried[cost.argmin(axis=0), np.arange(len(rows))]
-    return found
+        cost = np.abs(left).max(axis=2) + _PRICE * np.stack([_swing(looks, candidate) for candidate in tried])
+        change[rows] = tried[cost.argmin(axis=0), np.arange(len(rows))]
+    return change
 
 
 def _swing(looks: Array, changed: Array) -> Array:

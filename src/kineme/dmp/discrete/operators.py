@@ -251,7 +251,7 @@ def trajectory_regression(response: Response, stiffness: float, ridge: float) ->
 
 
 def trajectory_columns(response: Response, stiffness: float) -> tuple[Array, Array]:
-    """What `trajectory_regression` fits a path with, and what it keeps small, both per square root of their rows.
+    """Return what `trajectory_regression` fits a path with and what it keeps small, both per square root of their rows.
 
     Returns
     -------

@@ -5,19 +5,19 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kineme.dmp.batch import Batch
 from kineme.dmp.control.options import check_one, one_vector
 from kineme.dmp.control.plan import MISSED, Plan, ViaPlaces
-from kineme.dmp.discrete.learned import Learned
 from kineme.dmp.discrete.modulate import modulated
-from kineme.dmp.discrete.rollout import Rollout, own_primitives, rollout
+from kineme.dmp.discrete.rollout import Rollout, rollout
 from kineme.dmp.discrete.via_points import ViaLike, ViaPoints, via_points
-from kineme.validation import Array, check_number
+from kineme.validation import check_number
 
 _SETTLED = 1e-3  # of the demonstration's largest extent
 
 
 def plan_of(  # noqa: PLR0913, PLR0917 - one parameter per option
-    primitive: Learned,
+    primitive: Batch,
     start: ArrayLike | None = None,
     goal: ArrayLike | None = None,
     duration: float | None = None,
@@ -38,20 +38,21 @@ def plan_of(  # noqa: PLR0913, PLR0917 - one parameter per option
         duration,
         one_vector("velocity", velocity, d),
     )
-    asked = None if via is None else via_points(via, d)
-    movement = modulated(movement, asked, one_vector("end_velocity", end_velocity, d), position_limits)
-    return plan_along(movement, d, asked)
+    targets = None if via is None else via_points(via, d)
+    movement = modulated(movement, targets, one_vector("end_velocity", end_velocity, d), position_limits)
+    return plan_along(movement, d, targets)
 
 
 def plan_along(movement: Rollout, n_positions: int, via: ViaPoints | None) -> Plan:
     """The plan of one generated movement through via points, with that many positions, others behind them."""
     check_one(len(movement))
-    primitive = movement.primitives if movement.change is None else own_primitives(movement)
-    dmp, d = primitive.dmp, primitive.n_dims
+    primitive, own = movement.primitives, movement.change is None
+    dmp, d, extents = primitive.dmp, primitive.n_dims, primitive.row("extents")
     x0, tau = movement.starts[0].copy(), float(movement.durations[0])
-    learned, extents = primitive.goals - primitive.starts, primitive.extents
+    learned = primitive.row("goals") - primitive.row("starts") if own else movement.goals - movement.starts
+    columns = slice(0, n_positions or None)
     mixing = np.zeros((dmp.n_basis + 1, d + 1))
-    mixing[:-1, :-1], mixing[-1, -1] = primitive.scaled_weights[0].T, 1.0
+    mixing[:-1, :-1], mixing[-1, -1] = (primitive.row("scaled_weights") if own else movement.weights)[0].T, 1.0
 
     return Plan(
         dmp,
@@ -63,10 +64,7 @@ def plan_along(movement: Rollout, n_positions: int, via: ViaPoints | None) -> Pl
         duration=tau,
         settle=_SETTLED * float(extents.max()),
         n_positions=n_positions,
-        via=None if via is None else _places(via, x0, n_positions, MISSED * float(extents.max())),
+        via=None
+        if via is None
+        else ViaPlaces(via.times, via.points[0, :, columns] - x0[columns], MISSED * float(extents.max())),
     )
-
-
-def _places(via: ViaPoints, origin: Array, n_positions: int, tolerance: float) -> ViaPlaces:
-    columns = slice(0, n_positions or None)
-    return ViaPlaces(via.times, via.points[0, :, columns] - origin[columns], tolerance)

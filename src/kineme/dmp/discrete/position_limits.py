@@ -46,7 +46,7 @@ def within_limits(
     """
     low, high = as_limits(limits, movement.starts.shape[1])
     dmp = movement.primitives.dmp
-    rounding = _ROUNDING * movement.primitives.extents.max(axis=1)[:, None]  # (1 or n, 1)
+    rounding = _ROUNDING * movement.primitives.row("extents").max(axis=1)[:, None]  # (1 or n, 1)
     held_at = {"start": movement.starts[:, None], "goal": movement.arrivals[:, None], "via points": points}
     for name, places in held_at.items():
         outside = (places < low - rounding[:, None]) | (places > high + rounding[:, None])
@@ -67,14 +67,14 @@ def within_limits(
     for i in np.flatnonzero(near.any(axis=1)).tolist():
         path = replace(movement[i : i + 1], n_samples=fine, end=1.0).positions[0]
         for k in np.flatnonzero(near[i]).tolist():
-            known = np.append(
+            held_rows = np.append(
                 ~np.isnan(points[min(i, len(points) - 1), :, k]), np.ones(len(held) - points.shape[1], bool)
             )
-            if known.tobytes() not in factors:
-                factor = condition(smooth, held[known], deviation[known]).factor
-                factors[known.tobytes()] = factor, Phi @ factor.T
-            factor, effect = factors[known.tobytes()]
-            tolerance = _BETWEEN * float(movement.primitives.extents[min(i, len(movement.primitives) - 1)].max())
+            if held_rows.tobytes() not in factors:
+                factor = condition(smooth, held[held_rows], deviation[held_rows]).factor
+                factors[held_rows.tobytes()] = factor, Phi @ factor.T
+            factor, effect = factors[held_rows.tobytes()]
+            tolerance = _BETWEEN * float(movement.primitives.row("extents")[min(i, len(movement.primitives) - 1)].max())
             dense[i, k] = _inside_between(effect, path[:, k], (low[k], high[k]), (i, k), tolerance) @ factor
     if not dense.any():
         return movement
@@ -92,7 +92,7 @@ def as_limits(limits: tuple[ArrayLike, ArrayLike], n_dims: int) -> tuple[Array, 
         No two numbers or (d,) arrays, or low that is not below high.
     """
     try:
-        low, high = (np.broadcast_to(as_numbers(one, "position_limits"), n_dims) for one in limits)
+        low, high = (np.broadcast_to(as_numbers(limit, "position_limits"), n_dims) for limit in limits)
     except (TypeError, ValueError) as error:
         raise SpecificationError(
             f"expected position_limits=(low, high), each a number or {n_dims} of them, got {limits!r}"
@@ -119,16 +119,16 @@ def _inside_between(
     low, high = limits
     if not (np.maximum(low - path, path - high) > tolerance).any():
         return np.zeros(effect.shape[1])
-    asked = np.zeros(len(path), bool)
-    asked[::_FINER] = True
+    bounded = np.zeros(len(path), bool)
+    bounded[::_FINER] = True
     for _ in range(_ROUNDS):
-        z = _inside(effect[asked], path[asked], limits, where)
+        z = _inside(effect[bounded], path[bounded], limits, where)
         reached = path + effect @ z
         beyond = np.maximum(low - reached, reached - high)
         if not (beyond > tolerance).any():
             break
         tops = np.flatnonzero((beyond[1:-1] > tolerance) & (beyond[1:-1] >= np.maximum(beyond[:-2], beyond[2:]))) + 1
-        asked[np.concatenate((tops - 1, tops, tops + 1))] = True
+        bounded[np.concatenate((tops - 1, tops, tops + 1))] = True
     return z
 
 

@@ -10,21 +10,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kineme.dmp.base_rollout import BaseRollout
+from kineme.dmp.base_rollout import BaseRollout, least_durations
 from kineme.dmp.batch import Batch
-from kineme.dmp.discrete.learned import Learned
 from kineme.dmp.discrete.operators import decoder
 from kineme.dmp.discrete.specification import Specification
 from kineme.dmp.discrete.via_points import broadcast_length, check_durations, per_movement
 from kineme.errors import DegenerateMovementError, SpecificationError
 from kineme.runtime.parallel import for_tiles
-from kineme.validation import (
-    Array,
-    check_count,
-    check_number,
-    check_samples,
-    describe,
-)
+from kineme.validation import Array, check_count, check_number, check_samples, describe
 
 _LONGEST = 10.0  # durations after which a movement that has not settled is given up
 _SETTLING_SAMPLES = 400
@@ -54,7 +47,7 @@ class Rollout(BaseRollout):
         From 0 [s].
     """
 
-    primitives: Learned
+    primitives: Batch
     ratio: Array  # (n, d), what scale f is multiplied by
     starts: Array  # (n, d)
     goals: Array  # (n, d)
@@ -73,13 +66,19 @@ class Rollout(BaseRollout):
         return f"Rollout({len(self)} movements of {self.n_samples} samples from {self.primitives!r})"
 
     @property
+    def weights(self) -> Array:
+        """Scaled weights in force (n, d, N), with the change."""
+        weights = self.primitives.row("scaled_weights") * self.ratio[:, :, None]
+        return weights if self.change is None else weights + self.change.coefficients @ self.change.directions
+
+    @property
     def arrivals(self) -> Array:
-        """Where the goals are at the end of the duration (n, d)."""
+        """The goals at the end of the duration (n, d)."""
         return self.goals if self.goal_velocities is None else self.goals + self.goal_steps
 
     @property
     def goal_steps(self) -> Array:
-        """How far the goals move in one duration (n, d)."""
+        """Distances by which the goals move in one duration (n, d)."""
         if self.goal_velocities is None:
             return np.zeros_like(self.goals)
         return self.goal_velocities * self.durations[:, None]
@@ -123,9 +122,7 @@ class Rollout(BaseRollout):
             No limit, or one that is not above 0; a rollout that was given a velocity other than 0, initial, at the end
             or of the goal, for its path depends on the duration.
         """
-        from kineme.dmp.base_rollout import least_durations
-
-        finely = self.end * self.primitives.dmp.n_basis, lambda one, n: replace(one, n_samples=n)
+        finely = self.end * self.primitives.dmp.n_basis, lambda movements, n: replace(movements, n_samples=n)
         return least_durations(self, self.durations, finely, self.fixed_velocity, (velocity, acceleration))
 
     @property
@@ -158,7 +155,7 @@ class Rollout(BaseRollout):
         n_others = len(matrix) - len(change.directions)
         per_tau = (1.0 / self.durations**order)[:, None, None]
         shared = len(self.primitives) == 1
-        weights, d = self.primitives.scaled_weights, self.starts.shape[1]
+        weights, d = self.primitives.row("scaled_weights"), self.starts.shape[1]
         result = np.empty((len(self), d, self.n_samples))
 
         def tile(start: int, stop: int) -> None:
@@ -183,7 +180,7 @@ class Rollout(BaseRollout):
 
 
 def rollout(
-    primitives: Learned,
+    primitives: Batch,
     start: ArrayLike | None,
     goal: ArrayLike | None,
     duration: ArrayLike | None,
@@ -191,7 +188,7 @@ def rollout(
     goal_velocity: ArrayLike | None = None,
 ) -> Rollout:
     """Check the options and broadcast them over the primitives; see `Primitives.rollout`."""
-    d = primitives.n_dims
+    d, row = primitives.n_dims, primitives.row
     options = {
         "start": per_movement(start, "start", d),
         "goal": per_movement(goal, "goal", d),
@@ -206,18 +203,26 @@ def rollout(
         value = default if option is None else option
         return np.broadcast_to(value, (n, *value.shape[1:]))
 
-    durations = fill("duration", primitives.durations)
+    durations = fill("duration", row("durations"))
     check_durations("duration", durations)
-    starts, goals = fill("start", primitives.starts), fill("goal", primitives.goals)
+    starts, goals = fill("start", row("starts")), fill("goal", row("goals"))
     # The demonstrated velocity scales with the tempo; a given velocity does not.
-    tempo = primitives.durations / durations
-    velocities = fill("velocity", primitives.velocities) * (tempo[:, None] if options["velocity"] is None else 1.0)
+    tempo = row("durations") / durations
+    velocities = fill("velocity", row("velocities")) * (tempo[:, None] if options["velocity"] is None else 1.0)
     moving = None if options["goal_velocity"] is None else fill("goal_velocity", np.zeros((1, d)))
     arrivals = goals if moving is None else goals + moving * durations[:, None]
+    ratio = primitives.dmp.system.ratio(arrivals - starts, row("goals") - row("starts"), row("extents"))
+    if not np.isfinite(ratio).all():
+        i, k = (int(index) for index in np.argwhere(~np.isfinite(ratio))[0])
+        raise DegenerateMovementError(
+            f"{describe(min(i, len(primitives) - 1), primitives.names)}: expected a demonstration with g != x0 in "
+            f"dimension {k} to move to another goal, got a closed or flat one; the original formulation scales by "
+            'g - x0: use "bio-inspired" or "amplitude-scaled"'
+        )
     given = [option for option in (options["velocity"], moving) if option is not None]
     return Rollout(
         primitives,
-        _ratio(primitives, arrivals - starts),
+        ratio,
         starts,
         goals,
         velocities,
@@ -225,48 +230,6 @@ def rollout(
         primitives.dmp.n_points,
         goal_velocities=moving,
         fixed_velocity=any(bool(option.any()) for option in given),
-    )
-
-
-def _ratio(primitives: Learned, amplitudes: Array) -> Array:
-    learned = primitives.goals - primitives.starts
-    ratio = primitives.dmp.system.ratio(amplitudes, learned, primitives.extents)
-    if not np.isfinite(ratio).all():
-        i, k = (int(index) for index in np.argwhere(~np.isfinite(ratio))[0])
-        i = min(i, len(primitives) - 1)
-        raise DegenerateMovementError(
-            f"{describe(i, primitives.names)}: expected a demonstration with g != x0 in dimension {k} to move to "
-            "another goal, got a closed or flat one; the original formulation scales by g - x0: use "
-            '"bio-inspired" or "amplitude-scaled"'
-        )
-    return ratio
-
-
-def own_primitives(movement: Rollout) -> Learned:
-    """The movements as n primitives of their own: each with this start, goal, velocity, duration and weights.
-
-    Raises
-    ------
-    SpecificationError
-        A goal that moves.
-    """
-    if movement.goal_velocities is not None and movement.goal_velocities.any():
-        raise SpecificationError(
-            "expected movements to goals at rest, got goal_velocity= other than 0: primitives know no goals that move; "
-            "give it to their rollout, or to controller.step, or use end_velocity= to go on at the goal"
-        )
-    some = movement.primitives
-    some = some if len(some) == len(movement) else some[np.zeros(len(movement), dtype=np.intp)]
-    weights = some.scaled_weights * movement.ratio[:, :, None]
-    if movement.change is not None:
-        weights += movement.change.coefficients @ movement.change.directions
-    return replace(
-        some,
-        scaled_weights=weights,
-        starts=movement.starts.copy(),
-        goals=movement.goals.copy(),
-        velocities=movement.velocities_at_start.copy(),
-        durations=movement.durations.copy(),
     )
 
 

@@ -26,7 +26,7 @@ MOST_POINTS = 10_000  # a fit with T points needs matrices of T^2 numbers
 
 @dataclass(frozen=True)
 class Specification(SpringDamper):
-    """What `DMP` is made of; its parameters are explained there."""
+    """Parameters of a `DMP`, which explains them."""
 
     formulation: str = "bio-inspired"
     n_basis: int = 40

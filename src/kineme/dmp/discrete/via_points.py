@@ -34,7 +34,7 @@ class ViaPoints(NamedTuple):
 
 
 class Span(NamedTuple):
-    """What the times of via points are."""
+    """Unit and bounds of the times of via points."""
 
     end: float  # below which they lie
     closed: bool  # whether 0 is one of them
@@ -81,7 +81,7 @@ def via_points(via: ViaLike, n_dims: int, learned: Learned | None = None, span: 
         return ViaPoints(np.zeros(0), none if learned is None else learned(np.zeros(0), none), np.zeros(0, bool))
     times = np.concatenate([times for times, _, _ in parts])
     points = np.concatenate([np.broadcast_to(p, (n, *p.shape[1:])) for _, p, _ in parts], axis=1)
-    stretch = np.repeat([one for _, _, one in parts], [len(times) for times, _, _ in parts])
+    stretch = np.repeat([is_stretch for _, _, is_stretch in parts], [len(times) for times, _, _ in parts])
     order = np.argsort(times, kind="stable")
     written = ViaPoints(times[order], points[:, order], stretch[order])
     points = written.points if learned is None else learned(written.times, written.points)
@@ -136,8 +136,8 @@ def _merged(via: ViaPoints, written: Array, span: Span) -> ViaPoints:
         return via
     points = via.points.copy()
     for j in np.flatnonzero(same):
-        one, other = points[:, j], points[:, j + 1]
-        apart = np.abs(one - other) > _SAME_PLACE * np.maximum(np.abs(one), np.abs(other))
+        point, other = points[:, j], points[:, j + 1]
+        apart = np.abs(point - other) > _SAME_PLACE * np.maximum(np.abs(point), np.abs(other))
         if apart.any():
             k = int(np.argmax(apart.any(axis=1)))
             raise SpecificationError(
@@ -145,11 +145,11 @@ def _merged(via: ViaPoints, written: Array, span: Span) -> ViaPoints:
                 f"{_shown(written, k, int(j))} and {_shown(written, k, int(j) + 1)}"
                 f"{f' for movement {k}' if len(points) > 1 else ''}"
             )
-        points[:, j + 1] = np.where(np.isnan(other), one, other)
-    kept = np.append(~same, True)
+        points[:, j + 1] = np.where(np.isnan(other), point, other)
+    first_of_time = np.append(~same, True)
     stretch = via.stretch.copy()
     stretch[1:] &= ~same | stretch[:-1]  # a point on a stretch is met exactly
-    return ViaPoints(via.times[kept], points[:, kept], stretch[kept])
+    return ViaPoints(via.times[first_of_time], points[:, first_of_time], stretch[first_of_time])
 
 
 def _shown(written: Array, movement: int, point: int) -> list[float]:

@@ -26,7 +26,7 @@ _FITTED: dict[str, Any] = {"color": GREEN, "linestyle": "--", "linewidth": 1.2}
 _MADE: dict[str, Any] = {"color": BLUE}
 
 
-def draw_movement(learned: Learned, made: Columns, obstacles: Array | None) -> Figure:
+def draw_movement(learned: Learned, generated: Columns, obstacles: Array | None) -> Figure:
     """The path, where it lies in the plane or in space, and each column over time.
 
     Three lines: the recording, where it is known; the fit, which is the primitive moved as demonstrated; and the new
@@ -39,9 +39,9 @@ def draw_movement(learned: Learned, made: Columns, obstacles: Array | None) -> F
     over_time: Figure | SubFigure = figure
     if paths:
         left, over_time = figure.subfigures(1, 2, width_ratios=(1, 0.1 + n_columns))  # type: ignore[misc]
-        _draw_paths(left, learned, (fitted["positions"], made["positions"]), obstacles)
+        _draw_paths(left, learned, (fitted["positions"], generated["positions"]), obstacles)
     grid = over_time.subplots(n_rows, n_columns, sharex=True, squeeze=False).T
-    _draw_over_time(grid.ravel(), learned, fitted, made)
+    _draw_over_time(grid.ravel(), learned, fitted, generated)
     for axes in (grid[0, -1], grid.ravel()[len(learned.columns) - 1]):
         axes.set_xlabel("time [s]")
         axes.tick_params(labelbottom=True)
@@ -51,16 +51,16 @@ def draw_movement(learned: Learned, made: Columns, obstacles: Array | None) -> F
     return figure
 
 
-def _draw_over_time(grid: NDArray[Any], learned: Learned, fitted: Columns, made: Columns) -> None:
+def _draw_over_time(grid: NDArray[Any], learned: Learned, fitted: Columns, generated: Columns) -> None:
     """Each column over time into one of the axes; those that are left over are hidden."""
-    names, one, about = learned.columns, learned.demonstration, learned.primitive.to_recording
+    names, demonstration, about = learned.columns, learned.demonstration, learned.primitive.to_recording
     discrete = set() if about is None else {channel.name for channel in about.channels if channel.kind == "discrete"}
     for k, (name, shown, axes) in enumerate(zip(names, short_names(names), grid, strict=False)):
         how = "steps-post" if name in discrete else "default"
-        if one is not None and learned.recorded is not None:
-            axes.plot(one.times - one.times[0], learned.recorded[:, k], drawstyle=how, **_RECORDED)
+        if demonstration is not None and learned.recorded is not None:
+            axes.plot(demonstration.times - demonstration.times[0], learned.recorded[:, k], drawstyle=how, **_RECORDED)
         axes.plot(fitted["times"], fitted["positions"][:, k], drawstyle=how, **_FITTED)
-        axes.plot(made["times"], made["positions"][:, k], drawstyle=how, **_MADE)
+        axes.plot(generated["times"], generated["positions"][:, k], drawstyle=how, **_MADE)
         axes.set_ylabel(drawable(shown), fontsize=8)
     for axes in grid[len(names) :]:
         axes.set_visible(False)
@@ -88,7 +88,7 @@ def path_columns(learned: Learned) -> list[list[int]]:
 
 
 def _draw_paths(figure: SubFigure, learned: Learned, lines: tuple[Array, Array], obstacles: Array | None) -> None:
-    paths, (fitted, made) = path_columns(learned), lines
+    paths, (fitted, generated) = path_columns(learned), lines
     n_dims = len(paths[0])
     axes: Any = figure.subplots(subplot_kw=None if n_dims == 2 else {"projection": "3d"})
     shown = []
@@ -96,13 +96,15 @@ def _draw_paths(figure: SubFigure, learned: Learned, lines: tuple[Array, Array],
         if learned.recorded is not None:
             axes.plot(*learned.recorded[:, columns].T, **_RECORDED)
             shown.append(learned.recorded[:, columns])
-        shown += [fitted[:, columns], made[:, columns]]
+        shown += [fitted[:, columns], generated[:, columns]]
         axes.plot(*fitted[:, columns].T, **_FITTED)
-        axes.plot(*made[:, columns].T, **_MADE)
-        axes.plot(*made[:1, columns].T, "o", color=BLUE, markersize=5)
-        axes.plot(*made[-1:, columns].T, "*", color=BLUE, markersize=9)
+        axes.plot(*generated[:, columns].T, **_MADE)
+        axes.plot(*generated[:1, columns].T, "o", color=BLUE, markersize=5)
+        axes.plot(*generated[-1:, columns].T, "*", color=BLUE, markersize=9)
         if len(paths) > 1:
-            axes.text(*made[-1, columns], "  " + drawable(learned.columns[columns[0]][:-1].rstrip("._ /")), fontsize=8)
+            axes.text(
+                *generated[-1, columns], "  " + drawable(learned.columns[columns[0]][:-1].rstrip("._ /")), fontsize=8
+            )
     if obstacles is not None and obstacles.shape[1] == n_dims:
         axes.plot(*obstacles.T, "X", color=ORANGE, markersize=8, linestyle="none")
         shown.append(obstacles)
@@ -131,12 +133,10 @@ def _key(learned: Learned, has_path: bool, has_obstacles: bool) -> list[Any]:
 
 def short_names(names: Sequence[str]) -> list[str]:
     """The last parts of long names; where these do not tell the columns of one recording apart, the last letters."""
-    short = [_last_parts(name) for name in names]
+    short = []
+    for name in names:
+        while len(name) > _LONGEST and "." in name.rstrip("."):
+            name = name.partition(".")[2]  # noqa: PLW2901 - the last parts of it
+        short.append(name)
     different = len(set(short)) == len(set(names))
     return [name if len(name) <= _LONGEST else "…" + name[1 - _LONGEST :] for name in (short if different else names)]
-
-
-def _last_parts(name: str) -> str:
-    while len(name) > _LONGEST and "." in name.rstrip("."):
-        name = name.partition(".")[2]
-    return name

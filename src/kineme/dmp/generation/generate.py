@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kineme.dmp.control.options import ObstacleAvoidance
-from kineme.dmp.control.state import State, Status
+from kineme.dmp.control.state import Status
 from kineme.dmp.discrete.dmp import Primitives
 from kineme.dmp.generation.learned import Learned
 from kineme.dmp.pose.pose_dmp import PosePrimitives
@@ -26,7 +26,7 @@ _MET = 0.01  # of the extent: a via point that is missed by more is said
 
 @dataclass(frozen=True, eq=False)
 class MovementOptions:
-    """What the new movement should be; None leaves it as demonstrated.
+    """Options of a new movement; None leaves it as demonstrated.
 
     Attributes
     ----------
@@ -87,10 +87,11 @@ def generate(learned: Learned, options: MovementOptions) -> Generated:
     """
     with np.errstate(over="ignore", invalid="ignore"):  # refused below
         start, goal = (checked_point(learned, getattr(options, name), name) for name in ("start", "goal"))
-        via = tuple((share, _via_point(learned, point)) for share, point in options.via)
+        points = [(share, checked_point(learned, point, "a via point")) for share, point in options.via]
+        via = tuple((share, point) for share, point in points if point is not None)
         move = _undisturbed if options.obstacles is None else _around_obstacles
-        made = move(learned.primitive, replace(options, start=start, goal=goal, via=via))
-    for name, column in made.items():
+        movement = move(learned.primitive, replace(options, start=start, goal=goal, via=via))
+    for name, column in movement.items():
         if not np.isfinite(column).all():
             raise SpecificationError(
                 f"expected finite {name} of the new movement, they leave the range of numbers; choose a start, a "
@@ -99,9 +100,11 @@ def generate(learned: Learned, options: MovementOptions) -> Generated:
     about = learned.primitive.to_recording
     if about is not None:
         duration = float(learned.primitive.durations[0]) if options.duration is None else options.duration
-        made["positions"] = in_recording(_signed(made["positions"], learned), about, 0, made["times"] / duration)
-        made |= {name: made[name][:, about.rates_in_order] for name in ("velocities", "accelerations")}
-    return Generated(made, ColumnNames(learned.columns, learned.rates))
+        movement["positions"] = in_recording(
+            _signed(movement["positions"], learned), about, 0, movement["times"] / duration
+        )
+        movement |= {name: movement[name][:, about.rates_in_order] for name in ("velocities", "accelerations")}
+    return Generated(movement, ColumnNames(learned.columns, learned.rates))
 
 
 def checked_point(learned: Learned, point: Array | None, name: str) -> Array | None:
@@ -138,12 +141,6 @@ def checked_point(learned: Learned, point: Array | None, name: str) -> Array | N
     return point if about is None else in_primitive(point, about)
 
 
-def _via_point(learned: Learned, point: Array) -> Array:
-    checked = checked_point(learned, point, "a via point")
-    assert checked is not None
-    return checked
-
-
 def _signed(columns: Array, learned: Learned) -> Array:
     """Columns of a primitive, with orientations of the recorded sign: q and -q are one, but not in one column."""
     if not isinstance(learned.primitive, PosePrimitives):
@@ -159,7 +156,7 @@ def _undisturbed(primitive: Primitives | PosePrimitives, options: MovementOption
     end = None
     if options.meet_goal:
         end = primitive.rollout(duration=options.duration, rate=options.rate).velocities[:, -1]
-    made = primitive.rollout(
+    movement = primitive.rollout(
         options.start,
         options.goal,
         options.duration,
@@ -169,10 +166,10 @@ def _undisturbed(primitive: Primitives | PosePrimitives, options: MovementOption
         settle=options.settle,
     )
     return {
-        "times": made.times[0],
-        "positions": made.positions[0],
-        "velocities": made.velocities[0],
-        "accelerations": made.accelerations[0],
+        "times": movement.times[0],
+        "positions": movement.positions[0],
+        "velocities": movement.velocities[0],
+        "accelerations": movement.accelerations[0],
     }
 
 
@@ -183,17 +180,17 @@ def _around_obstacles(primitive: Primitives | PosePrimitives, options: MovementO
         raise SpecificationError(
             f"expected obstacles in the {n_dims} dimensions of the movement, two or more, got shape {obstacles.shape}"
         )
-    made = _steered(primitive, options, obstacles)
-    return _through(primitive, options, obstacles, made) if options.via else made
+    movement = _steered(primitive, options, obstacles)
+    return _through(primitive, options, obstacles, movement) if options.via else movement
 
 
 def _through(
-    primitive: Primitives | PosePrimitives, options: MovementOptions, obstacles: Array, made: Columns
+    primitive: Primitives | PosePrimitives, options: MovementOptions, obstacles: Array, movement: Columns
 ) -> Columns:
     """The movement around obstacles that comes nearest to its via points, aimed as far beside them as it missed."""
     n = obstacles.shape[1]
-    tolerance = _MET * float(np.ptp(made["positions"][:, :n], axis=0).max())
-    best, least = made, _missing(primitive, options, made, n)
+    tolerance = _MET * float(np.ptp(movement["positions"][:, :n], axis=0).max())
+    best, least = movement, _missing(primitive, options, movement, n)
     missing, beside = least, np.zeros_like(least)
     with heard_warnings():  # of what it is aimed at, which nobody asked for
         for _ in range(_AIMED):
@@ -204,10 +201,10 @@ def _through(
                 (share, np.append(point[:n] + off, point[n:]))
                 for (share, point), off in zip(options.via, beside, strict=True)
             )
-            made = _steered(primitive, replace(options, via=aimed), obstacles)
-            missing = _missing(primitive, options, made, n)
+            movement = _steered(primitive, replace(options, via=aimed), obstacles)
+            missing = _missing(primitive, options, movement, n)
             if _largest(missing) < _largest(least):
-                best, least = made, missing
+                best, least = movement, missing
     for (share, point), off in zip(options.via, np.linalg.norm(least, axis=1), strict=True):
         if not off <= tolerance:
             warn(
@@ -219,11 +216,11 @@ def _through(
     return best
 
 
-def _missing(primitive: Primitives | PosePrimitives, options: MovementOptions, made: Columns, n: int) -> Array:
+def _missing(primitive: Primitives | PosePrimitives, options: MovementOptions, movement: Columns, n: int) -> Array:
     """From the movement to each of the k via points, at its time (k, n)."""
     duration = float(primitive.durations[0]) if options.duration is None else options.duration
     at = duration * np.array([share for share, _ in options.via])
-    reached = np.column_stack([np.interp(at, made["times"], x) for x in made["positions"][:, :n].T])
+    reached = np.column_stack([np.interp(at, movement["times"], x) for x in movement["positions"][:, :n].T])
     return np.array([point[:n] for _, point in options.via]) - reached
 
 
@@ -245,7 +242,10 @@ def _steered(primitive: Primitives | PosePrimitives, options: MovementOptions, o
         settle=options.settle,
     )
     states = [control.state]
-    while not _arrived(states[-1], options) and len(states) <= _LONGEST * steps:
+    while len(states) <= _LONGEST * steps:
+        settled = options.settle is None or bool(states[-1].status & Status.SETTLED)
+        if states[-1].progress >= 1.0 - 1e-9 and settled:
+            break
         states.append(control.step(obstacles=obstacles))
     if options.settle is not None and not states[-1].status & Status.SETTLED:
         raise SpecificationError(
@@ -258,8 +258,3 @@ def _steered(primitive: Primitives | PosePrimitives, options: MovementOptions, o
         "velocities": np.array([state.velocity for state in states]),
         "accelerations": np.array([state.acceleration for state in states]),
     }
-
-
-def _arrived(state: State, options: MovementOptions) -> bool:
-    over = state.progress >= 1.0 - 1e-9
-    return over if options.settle is None else over and bool(state.status & Status.SETTLED)

@@ -86,8 +86,8 @@ def learn_one(demonstration: Trajectory, dmp: DMP) -> Learned:
 
 
 def has_orientation(demonstration: Trajectory) -> bool:
-    """Whether a channel of the recording is an orientation."""
-    return any(one.kind == "orientation" for one in demonstration.channels or ())
+    """Tell whether a channel of the recording is an orientation."""
+    return any(channel.kind == "orientation" for channel in demonstration.channels or ())
 
 
 def load_saved(path: Path) -> Primitives | PosePrimitives:
@@ -122,34 +122,36 @@ class Deviation(NamedTuple):
 
 
 def largest_deviation(learned: Learned) -> Deviation | None:
-    """That of the positions, of the angles or of one orientation, whichever is off by the largest share of its extent.
+    """Return the deviation of positions, angles or one orientation that is the largest share of its extent.
 
-    At the recorded times. None without a demonstration, or where nothing of it moves.
+    It is measured at the recorded times. None without a demonstration, or where nothing of it moves.
     """
-    one = learned.demonstration
-    if one is None:
+    demonstration = learned.demonstration
+    if demonstration is None:
         return None
-    replay = learned.primitive.rollout(n_samples=max(1000, len(one))).demonstrations[0]
-    at = one.times - one.times[0]
-    made = np.stack([np.interp(at, replay.times, column) for column in replay.recorded.T], axis=1)
-    found = [Deviation(off, off / extent, of) for off, extent, of in _deviations(one, made) if extent > 0.0]
-    if not found:
+    replay = learned.primitive.rollout(n_samples=max(1000, len(demonstration))).demonstrations[0]
+    at = demonstration.times - demonstration.times[0]
+    generated = np.stack([np.interp(at, replay.times, column) for column in replay.recorded.T], axis=1)
+    deviations = [
+        Deviation(off, off / extent, of) for off, extent, of in _deviations(demonstration, generated) if extent > 0.0
+    ]
+    if not deviations:
         return None
-    worst = max(found, key=lambda each: each.share)
-    return worst if len(found) > 1 else worst._replace(of="")
+    worst = max(deviations, key=lambda each: each.share)
+    return worst if len(deviations) > 1 else worst._replace(of="")
 
 
-def _deviations(one: Trajectory, made: Array) -> Iterator[tuple[float, float, str]]:
-    """How far each kind of columns (T, columns) is off at most, its extent, and what it is."""
-    channels = one.channels or ()
-    kinds = [channel.kind for channel in channels for _ in channel.columns] or ["position"] * made.shape[1]
+def _deviations(demonstration: Trajectory, generated: Array) -> Iterator[tuple[float, float, str]]:
+    """Yield the largest distance of each kind of columns (T, columns), its extent, and what it is."""
+    channels = demonstration.channels or ()
+    kinds = [channel.kind for channel in channels for _ in channel.columns] or ["position"] * generated.shape[1]
     for kind in ("position", "angle"):
-        columns = [k for k, known in enumerate(kinds) if known == kind]
-        recorded = one.recorded[:, columns]
-        off = np.linalg.norm(made[:, columns] - recorded, axis=1)
+        columns = [k for k, name in enumerate(kinds) if name == kind]
+        recorded = demonstration.recorded[:, columns]
+        off = np.linalg.norm(generated[:, columns] - recorded, axis=1)
         yield float(off.max()), float(np.linalg.norm(np.ptp(recorded, axis=0))), f"{kind}s"
     for channel, some in zip(channels, columns_of(channels), strict=True):
         if channel.kind == "orientation":
-            q, fitted = as_wxyz(one.recorded[:, some], channel), as_wxyz(made[:, some], channel)
+            q, fitted = as_wxyz(demonstration.recorded[:, some], channel), as_wxyz(generated[:, some], channel)
             fitted = fitted / np.linalg.norm(fitted, axis=1, keepdims=True)  # between samples shorter than 1
             yield float(angle_between(fitted, q).max()), float(angle_between(q, q[0]).max()), channel.name

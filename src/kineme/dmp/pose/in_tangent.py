@@ -1,4 +1,4 @@
-"""What is asked for of poses, as positions and rotation vectors: starts and goals, rates, via points, limits."""
+"""Options of poses as positions and rotation vectors: starts and goals, rates, via points, limits."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def changes_in_tangent(
     end_velocity: ArrayLike | None,
     position_limits: tuple[ArrayLike, ArrayLike] | None,
 ) -> tuple[ViaPoints | None, Array | None, tuple[Array, Array] | None, None, list[Measured]]:
-    """What `modulated` takes, of what is asked for in poses; `references` (1 or n, 4 k)."""
+    """Return what `modulated` takes, of what is asked for in poses; `references` (1 or n, 4 k)."""
     n_dims = movement.starts.shape[1]
     n_positions = n_dims - 3 * (references.shape[1] // 4)
     return (
@@ -108,17 +108,17 @@ def via_poses(movement: Rollout, references: Array, via: ViaLike | None) -> ViaP
 def _vectors(q: Array, references: Array, near: Array) -> Array:
     """Rotation vectors (n, K, k, 3) of quaternions, each nearest to another vector; NaN where all four are."""
     free = np.isnan(q)
-    whole = np.asarray(free.all(axis=3))
-    if (free.any(axis=3) & ~whole).any():
+    unset = np.asarray(free.all(axis=3))
+    if (free.any(axis=3) & ~unset).any():
         raise TrajectoryError(
             "expected via orientations (w, x, y, z) of four numbers, or NaN in all four where one is free, got some NaN"
         )
     try:
-        turned = normalized(np.where(whole[..., None], [1.0, 0.0, 0.0, 0.0], q))
+        turned = normalized(np.where(unset[..., None], [1.0, 0.0, 0.0, 0.0], q))
     except TrajectoryError as error:
         raise TrajectoryError(f"via: {error}") from error
     vectors = nearest(log(product(turned, conjugate(references))), near)
-    return np.where(whole[..., None], np.nan, vectors)
+    return np.where(unset[..., None], np.nan, vectors)
 
 
 def limits_of_positions(
@@ -143,7 +143,7 @@ def limits_of_positions(
 
 
 def measured_of(movement: Rollout, n_positions: int) -> list[Measured]:
-    """How far poses are led is measured in their positions, and of each orientation in radians."""
+    """Return the groups in which distances are measured: positions, and each orientation in radians."""
     ends = np.abs(np.concatenate((movement.starts, movement.goals))[:, :n_positions])
     positions = [
         Measured(slice(0, n_positions), "", _ROUNDING * max(float(ends.max(initial=0.0)), np.finfo(float).tiny))

@@ -102,31 +102,18 @@ class PoseController(Controller):
         -------
         PoseState
         """
-        self._events = Status(0)
-        self._step(position, velocity, (goal, goal_velocity), tempo, coupling, (obstacles, obstacle_velocities), dt)
+        super().step(
+            position, velocity, goal, tempo, coupling, obstacles,
+            goal_velocity=goal_velocity, obstacle_velocities=obstacle_velocities, dt=dt,
+        )  # fmt: skip
         return self.state
 
-    def _read_position(self, value: Any) -> Array | None:
-        return self._as_tangent(value, self._origin + self._motion[0])
-
-    def _read_goal(self, value: Any) -> Array | None:
-        return self._as_tangent(value, self._origin + self._goal.target)
-
-    def _read_velocity(self, value: Any, position: Array | None) -> Array | None:
-        return self._as_rates(value, self._origin + self._motion[0] if position is None else position)
-
-    def _read_goal_velocity(self, value: Any) -> Array | None:
-        return self._as_rates(value, self._origin + self._goal.target)
-
-    def _read_coupling(self, value: Any) -> Array | None:
-        return self._as_rates(value, self._origin + self._motion[0])  # J p'' is the part that is linear in p''
-
-    def _as_tangent(self, value: Any, near: Array) -> Array | None:
-        """Position and the rotation vector closest to that of `near`; None for what is no pose."""
+    def _read_place(self, value: Any, near: Array) -> Array | None:
+        """Return position and the rotation vector closest to that of `near`; None for what is no pose."""
         array = read_vector(value, self._n_dims + len(self._references))
         if array is None:
             return None
-        columns, close = array.tolist(), near.tolist()
+        columns, close = array.tolist(), (self._origin + near).tolist()
         tangent = columns[: self._linear]
         for i, backwards in enumerate(self._backwards):
             q, p = self._linear + 4 * i, self._linear + 3 * i
@@ -134,15 +121,18 @@ class PoseController(Controller):
             if vector is None:  # a quaternion that is none: the motion goes on
                 return None
             tangent.extend(vector)
-        return np.array(tangent)
+        return np.array(tangent) - self._origin
 
-    def _as_rates(self, value: Any, x: Array) -> Array | None:
-        """Rates of position and rotation vector at x, from linear and angular ones."""
+    def _read_rates(self, value: Any, place: Array) -> Array | None:
+        """Return rates of position and rotation vector at a place, from linear and angular ones.
+
+        Of accelerations it is the part that is linear in them, ``J p''``.
+        """
         array = read_vector(value, self._n_dims)
         if array is None:
             return None
         columns, m = array.tolist(), self._linear
-        rates = np.array([*columns[:m], *self._of_each(rate_components, x.tolist(), columns)])
+        rates = np.array([*columns[:m], *self._of_each(rate_components, (self._origin + place).tolist(), columns)])
         return rates if is_usable(rates) and np.abs(rates[m:]).max() <= _FASTEST else None
 
     def _move(self, dt: float, push: Array, last: Array) -> None:

@@ -147,7 +147,8 @@ class PosePrimitives(Batch):
         columns = {4: "orientations", 7: "poses"}.get(self.n_columns, f"{self.n_columns} columns")
         return f"PosePrimitives({len(self)} movements of {columns}, {self.tangent.dmp})"
 
-    def _row(self, name: str) -> NDArray[Any]:
+    def row(self, name: str) -> NDArray[Any]:
+        """Return the array of that name in `ROWS`."""
         return np.asarray(getattr(self if name == "references" else self.tangent, name))
 
     @classmethod
@@ -192,7 +193,7 @@ class PosePrimitives(Batch):
 
     @property
     def names(self) -> tuple[str | None, ...] | None:
-        """Where each demonstration came from, or None."""
+        """Source of each demonstration, or None."""
         return self.tangent.names
 
     @property
@@ -379,7 +380,7 @@ class PosePrimitives(Batch):
     def _endpoints(self, start: ArrayLike | None, goal: ArrayLike | None) -> tuple[Array, Array, Array]:
         """Start and goal in positions and rotation vectors, and the orientations that the latter refer to."""
         starts, goals = (
-            checked_poses(*one, self.n_positions, self.n_columns) for one in ((start, "start"), (goal, "goal"))
+            checked_poses(*option, self.n_positions, self.n_columns) for option in ((start, "start"), (goal, "goal"))
         )
         starts, goals = self.starts if starts is None else starts, self.goals if goals is None else goals
         n = broadcast_length(len(self), {"start": starts, "goal": goals})

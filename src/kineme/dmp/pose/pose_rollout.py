@@ -65,7 +65,7 @@ class PoseRollout(BaseRollout):
 
     @property
     def positions(self) -> Array:
-        """What was demonstrated: orientations (n, T, 4), or positions and orientations (n, T, 7)."""
+        """Movements as demonstrated: orientations (n, T, 4), or positions and orientations (n, T, 7)."""
         return np.concatenate((self.tangent.positions[..., : self._n_positions], self.orientations), axis=-1)
 
     @cached_property
@@ -105,25 +105,25 @@ class PoseRollout(BaseRollout):
         tangent = self.tangent
         finely = (
             tangent.end * tangent.primitives.dmp.n_basis,
-            lambda one, n: replace(one, tangent=replace(one.tangent, n_samples=n)),
+            lambda movements, n: replace(movements, tangent=replace(movements.tangent, n_samples=n)),
         )
         return least_durations(self, tangent.durations, finely, tangent.fixed_velocity, (velocity, acceleration))
 
     @property
     def axis_names(self) -> list[str]:
-        """What the columns of `positions` are called: as recorded, else x, y, z and qw, qx, qy, qz."""
-        known = self._to_recording
-        return list(known.column_names) if known else [*"xyz"[: self._n_positions], "qw", "qx", "qy", "qz"]
+        """Names of the columns of `positions`: as recorded, else x, y, z and qw, qx, qy, qz."""
+        about = self._to_recording
+        return list(about.column_names) if about else [*"xyz"[: self._n_positions], "qw", "qx", "qy", "qz"]
 
     @property
     def rate_names(self) -> list[str]:
-        """What the columns of `velocities` and `accelerations` are called: as recorded, else x, y, z, q.rx, ..."""
-        known = self._to_recording
-        return list(known.rate_names) if known else [*"xyz"[: self._n_positions], "q.rx", "q.ry", "q.rz"]
+        """Names of the columns of `velocities` and `accelerations`: as recorded, else x, y, z, q.rx, ..."""
+        about = self._to_recording
+        return list(about.rate_names) if about else [*"xyz"[: self._n_positions], "q.rx", "q.ry", "q.rz"]
 
     @property
     def channels(self) -> Channels | None:
-        """What was recorded, where that is known; see `Demonstrations.channels`."""
+        """Channels of the recordings, where they are known; see `Demonstrations.channels`."""
         return None if self.recorded_as is None else self.recorded_as.channels
 
     @property
@@ -163,7 +163,7 @@ class PoseRollout(BaseRollout):
         results = []
         for i in range(self.references.shape[1] // 4):
             at = self._n_positions + 3 * i
-            vectors = (one[..., at : at + 3] for one in motion)
+            vectors = (rows[..., at : at + 3] for rows in motion)
             results.append(self._by_tiles(function, size, self.references[:, None, 4 * i : 4 * i + 4], *vectors))
         return results[0] if len(results) == 1 else np.concatenate(results, axis=-1)
 

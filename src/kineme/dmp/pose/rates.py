@@ -1,4 +1,4 @@
-"""How the rates of a rotation vector relate to angular velocity and acceleration: the Jacobian of the logarithm.
+"""Rates of a rotation vector, angular velocity and acceleration: the Jacobian of the logarithm.
 
 For ``q = exp(p) r`` with a fixed r, and omega in the world frame,
 

@@ -89,7 +89,7 @@ def with_orientations_last(movements: MovementsLike) -> tuple[Demonstrations, in
         Movements without known channels that are of other than 4 or 7 columns.
     """
     demos = Demonstrations.of(movements)
-    k = sum(one.kind == "orientation" for one in demos.channels or ())
+    k = sum(channel.kind == "orientation" for channel in demos.channels or ())
     if k and demos.channels is not None:
         return _with_positions(demos, np.concatenate(_columns(demos.channels, demos.recorded), axis=1)), k
     return as_poses(demos), 1
@@ -105,11 +105,11 @@ def as_poses(movements: MovementsLike) -> Demonstrations:
     """
     demos = Demonstrations.of(movements)
     if demos.channels is not None and not is_plain(demos.channels):
-        kinds = [one.kind for one in demos.channels]
+        kinds = [channel.kind for channel in demos.channels]
         if kinds.count("orientation") != 1 or len(learned_names(demos.channels)) not in (3, 6):
             raise TrajectoryError(
                 "expected channels that are an orientation, or an orientation and three positions, got "
-                f"{', '.join(f'{one.name} ({one.kind})' for one in demos.channels)}; "
+                f"{', '.join(f'{channel.name} ({channel.kind})' for channel in demos.channels)}; "
                 "choose the columns by columns= of read_recordings, in the shell --columns"
             )
         return _with_positions(demos, np.concatenate(_columns(demos.channels, demos.recorded), axis=1))
@@ -124,8 +124,10 @@ def as_poses(movements: MovementsLike) -> Demonstrations:
 def _columns(channels: Channels, recorded: Array) -> list[Array]:
     """The positions and angles, and after them the orientations as (w, x, y, z)."""
     named = list(zip(channels, columns_of(channels), strict=True))
-    positions = [recorded[:, columns] for one, columns in named if one.kind in ("position", "angle")]
-    return positions + [as_wxyz(recorded[:, columns], one) for one, columns in named if one.kind == "orientation"]
+    positions = [recorded[:, columns] for channel, columns in named if channel.kind in ("position", "angle")]
+    return positions + [
+        as_wxyz(recorded[:, columns], channel) for channel, columns in named if channel.kind == "orientation"
+    ]
 
 
 def _rotation_vectors(demos: Demonstrations, columns: slice, start: int, stop: int) -> tuple[Array, Array]:
@@ -222,7 +224,7 @@ def unwrapped(q: Array, offsets: NDArray[np.intp], where: Callable[[int], str]) 
 
 
 def _parity(flips: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Whether an odd number of flips (total - 1,) lies before each sample, shape (total,).
+    """Tell whether an odd number of flips (total - 1,) lies before each sample, shape (total,).
 
     Counted through all movements: only differences within a movement matter.
     """

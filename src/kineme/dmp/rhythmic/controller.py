@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -88,12 +86,26 @@ class RhythmicController(Controller):
         -------
         RhythmicState
         """
-        self._events = Status(0)
         if amplitude is not None:
-            self._set_amplitude(amplitude)
+            gain = np.array([read_number(amplitude) / self._learned_amplitude])
+            if is_usable(gain):
+                self._gain.set(gain)
+            else:
+                self._events |= Status.AMPLITUDE_REJECTED
         if period is not None:
-            self._set_period(period)
-        self._step(position, velocity, (goal, goal_velocity), tempo, coupling, (obstacles, obstacle_velocities), dt)
+            new_period = read_number(period)
+            if SHORTEST_STEP <= new_period <= LARGEST_STAMP and self.dt <= new_period * self._plan.longest_step:
+                motion = self._motion.copy()
+                motion[1] *= new_period / self._tau  # the velocity in time stays
+                self._motion = motion
+                self._rate *= self._tau / new_period
+                self._set_tau(new_period)
+            else:
+                self._events |= Status.PERIOD_REJECTED
+        super().step(
+            position, velocity, goal, tempo, coupling, obstacles,
+            goal_velocity=goal_velocity, obstacle_velocities=obstacle_velocities, dt=dt,
+        )  # fmt: skip
         return self.state
 
     @property
@@ -110,24 +122,6 @@ class RhythmicController(Controller):
     def baseline(self) -> Array:
         """The baseline in force; `step` changes it, as the goal."""
         return self.state.goal.copy()
-
-    def _set_amplitude(self, amplitude: Any) -> None:
-        gain = np.array([read_number(amplitude) / self._learned_amplitude])
-        if is_usable(gain):
-            self._gain.set(gain)
-        else:
-            self._events |= Status.AMPLITUDE_REJECTED
-
-    def _set_period(self, period: Any) -> None:
-        period = read_number(period)
-        if not (SHORTEST_STEP <= period <= LARGEST_STAMP and self.dt <= period * self._plan.longest_step):
-            self._events |= Status.PERIOD_REJECTED
-            return
-        motion = self._motion.copy()
-        motion[1] *= period / self._tau  # the velocity in time stays
-        self._motion = motion
-        self._rate *= self._tau / period
-        self._set_tau(period)
 
     def _follow(self, dt: float) -> tuple[Array, Array]:
         goal, ratio = super()._follow(dt)

@@ -63,8 +63,8 @@ def encode(dmp: RhythmicSpecification, movements: MovementsLike) -> dict[str, An
     phases, explained, aligned_on = np.empty(n), np.empty(n), np.empty(n, dtype=np.intp)
 
     def fold_tile(chosen: NDArray[np.intp], rows: Array) -> None:
-        one = fold(rows, estimated.cycles[chosen], demos.lengths[chosen], H, dmp.align_on)
-        coefficients[chosen], phases[chosen], aligned_on[chosen], explained[chosen] = one
+        cycle = fold(rows, estimated.cycles[chosen], demos.lengths[chosen], H, dmp.align_on)
+        coefficients[chosen], phases[chosen], aligned_on[chosen], explained[chosen] = cycle
 
     _for_even_rows(demos, fold_tile)
     series = as_real(coefficients)
@@ -111,7 +111,14 @@ def periodicity(dmp: RhythmicSpecification, demos: Demonstrations) -> Periodicit
                 f"{describe(i, demos.names)}: expected at least one period of {dmp.period:g} s, got a recording of "
                 f"{demos.durations[i]:.4g} s; record longer, or correct the period (times are in seconds)"
             )
-        _check_samples(demos, dmp.period)
+        per_period = (demos.lengths - 1) / demos.durations * dmp.period
+        if (per_period < SAMPLES_PER_PERIOD).any():
+            i = int(per_period.argmin())
+            raise TrajectoryError(
+                f"{describe(i, demos.names)}: expected at least {SAMPLES_PER_PERIOD} samples per period of "
+                f"{dmp.period:g} s, got {per_period[i]:.3g}; record faster, or correct the period (times are in "
+                "seconds)"
+            )
         return Periodicity(cycles, np.ones(n))
     estimated = Periodicity(np.empty(n), np.empty(n))
 
@@ -138,16 +145,6 @@ def _refuse(demos: Demonstrations, estimated: Periodicity, aperiodic: np.ndarray
         f"{best} ({aperiodic.sum()} of {len(demos)} movements); record longer, remove drift, give period= if known, "
         'learn a single reach with kineme.DMP, or take the best period with aperiodic="accept"'
     )
-
-
-def _check_samples(demos: Demonstrations, period: float) -> None:
-    per_period = (demos.lengths - 1) / demos.durations * period
-    if (per_period < SAMPLES_PER_PERIOD).any():
-        i = int(per_period.argmin())
-        raise TrajectoryError(
-            f"{describe(i, demos.names)}: expected at least {SAMPLES_PER_PERIOD} samples per period of {period:g} s, "
-            f"got {per_period[i]:.3g}; record faster, or correct the period (times are in seconds)"
-        )
 
 
 class Cycles(NamedTuple):

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Never
+from typing import TYPE_CHECKING, Any, Never
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
+from kineme.dmp.batch import Batch
 from kineme.dmp.control.options import check_one, one_vector
 from kineme.dmp.control.plan import MISSED, Plan, ViaPlaces
 from kineme.dmp.discrete.via_points import ViaLike, via_points
+from kineme.dmp.recorded_as import RecordedAs
 from kineme.dmp.rhythmic.encode import encode
-from kineme.dmp.rhythmic.learned import RhythmicLearned
 from kineme.dmp.rhythmic.operators import forcing_matrix
 from kineme.dmp.rhythmic.rollout import PHASES, RhythmicRollout, modulated, rollout
 from kineme.dmp.rhythmic.specification import RhythmicSpecification
@@ -126,7 +127,7 @@ class RhythmicDMP(RhythmicSpecification):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RhythmicPrimitives(RhythmicLearned):
+class RhythmicPrimitives(Batch):
     """n limit cycles of d dimensions that share one specification; made by `RhythmicDMP.learn`.
 
     Attributes
@@ -153,10 +154,29 @@ class RhythmicPrimitives(RhythmicLearned):
     names : tuple of str or None
     """
 
+    ROWS = {  # noqa: RUF012 - declared as a class variable by Batch
+        "scaled_weights": "ndN",
+        "baselines": "nd",
+        "amplitudes": "n",
+        "periods": "n",
+        "phases": "n",
+        "aligned_on": "n",
+        "explained": "n",
+    }
     SPECIFICATION = RhythmicDMP
     KIND = "rhythmic primitives"
 
     dmp: RhythmicDMP
+    scaled_weights: Array
+    baselines: Array
+    amplitudes: Array
+    periods: Array
+    phases: Array
+    aligned_on: NDArray[np.intp]
+    explained: Array
+    labels: NDArray[Any] | None = None
+    names: tuple[str | None, ...] | None = None
+    recorded_as: RecordedAs | None = None
 
     @property
     def weights(self) -> Array:
@@ -294,7 +314,7 @@ class RhythmicPrimitives(RhythmicLearned):
 
 
 def plan_of(
-    primitive: RhythmicLearned, options: dict[str, ArrayLike | None], via: ViaLike | None = None
+    primitive: RhythmicPrimitives, options: dict[str, ArrayLike | None], via: ViaLike | None = None
 ) -> tuple[Plan, float]:
     """The plan of one limit cycle and its amplitude, with the options of `rollout` checked for one movement.
 
@@ -303,8 +323,8 @@ def plan_of(
     check_one(len(primitive))
     d, dmp = primitive.n_dims, primitive.dmp
     vectors = {name: one_vector(name, options[name], d) for name in ("baseline", "start", "velocity")}
-    asked = None if via is None else via_points(via, d, span=PHASES)
-    movement = modulated(rollout(primitive, options | vectors, 1.0, None, n_samples=2), asked)
+    targets = None if via is None else via_points(via, d, span=PHASES)
+    movement = modulated(rollout(primitive, options | vectors, 1.0, None, n_samples=2), targets)
     check_one(len(movement))
     origin, tau = movement.baselines[0].copy(), float(movement.periods[0])
     gain, ones, weights = float(movement.ratio[0]), np.ones(d), primitive.scaled_weights[0]
@@ -326,12 +346,12 @@ def plan_of(
         begin=float(movement.phases[0] / (2 * np.pi) % 1.0),
         periodic=True,
         longest_step=_LONGEST_STEP,
-        via=None if asked is None else ViaPlaces(asked.times, asked.points[0] - origin, MISSED * size),
+        via=None if targets is None else ViaPlaces(targets.times, targets.points[0] - origin, MISSED * size),
     )
     return plan, gain
 
 
-def refuse_others(what: str, asked: Mapping[str, object]) -> None:
+def refuse_others(what: str, options: Mapping[str, object]) -> None:
     """Refuse options that a rhythm does not have.
 
     Raises
@@ -341,7 +361,7 @@ def refuse_others(what: str, asked: Mapping[str, object]) -> None:
     TypeError
         Another name, as of any function.
     """
-    for name, value in asked.items():
+    for name, value in options.items():
         if name not in _INSTEAD:
             raise TypeError(f"{what}() got an unexpected keyword argument {name!r}")
         if value is not None:

@@ -28,7 +28,6 @@ from kineme.dmp.discrete.via_points import (
     via_points,
 )
 from kineme.dmp.rhythmic.encode import SAMPLES_PER_PERIOD
-from kineme.dmp.rhythmic.learned import RhythmicLearned
 from kineme.dmp.rhythmic.operators import as_real, even_phases, limit_cycle, waves
 from kineme.dmp.rhythmic.specification import RhythmicSpecification
 from kineme.dmp.spring_damper import transitions
@@ -55,7 +54,7 @@ class RhythmicRollout(BaseRollout):
     spring-damper from the state off the cycle: ``x = b + a x_cycle(phi) + e^(A u) (z0 - z_cycle)``.
     """
 
-    primitives: RhythmicLearned
+    primitives: Batch
     ratio: Array  # (n,), amplitude over the learned one
     baselines: Array  # (n, d)
     periods: Array  # (n,)
@@ -108,7 +107,7 @@ class RhythmicRollout(BaseRollout):
             No limit, or one that is not above 0; a rollout that was given an initial velocity other than 0.
         """
         fixed = self.velocity is not None and bool(self.velocity.any())
-        finely = self.n_periods * self.primitives.dmp.n_basis, lambda one, n: replace(one, n_samples=n)
+        finely = self.n_periods * self.primitives.dmp.n_basis, lambda movements, n: replace(movements, n_samples=n)
         return least_durations(self, self.periods, finely, fixed, (velocity, acceleration))
 
     @property
@@ -131,7 +130,7 @@ class RhythmicRollout(BaseRollout):
     @property
     def _weights(self) -> tuple[Array, Array]:
         """The weights in force (1 or n, d, N), and what is to be multiplied by the cycle that they make (n,)."""
-        own = self.primitives.scaled_weights
+        own = self.primitives.row("scaled_weights")
         if self.change is None:
             return own, self.ratio
         return own * self.ratio[:, None, None] + self.change, np.ones(len(self))
@@ -174,11 +173,7 @@ def cycle(dmp: RhythmicSpecification, weights: Array, ratio: Array, when: tuple[
 
 
 def rollout(
-    primitives: RhythmicLearned,
-    options: dict[str, ArrayLike | None],
-    n_periods: float,
-    rate: float | None,
-    n_samples: int | None,
+    primitives: Batch, options: dict[str, ArrayLike | None], n_periods: float, rate: float | None, n_samples: int | None
 ) -> RhythmicRollout:
     """Check the options and broadcast them over the primitives; see `RhythmicPrimitives.rollout`."""
     vectors = ("baseline", "start", "velocity")
@@ -194,12 +189,12 @@ def rollout(
         return np.broadcast_to(value, (n, *value.shape[1:]))
 
     check_number("n_periods", n_periods, above=0.0)
-    periods = fill("period", primitives.periods)
+    periods = fill("period", primitives.row("periods"))
     check_durations("period", periods)
     return RhythmicRollout(
         primitives,
-        fill("amplitude", primitives.amplitudes) / primitives.amplitudes,
-        fill("baseline", primitives.baselines),
+        fill("amplitude", primitives.row("amplitudes")) / primitives.row("amplitudes"),
+        fill("baseline", primitives.row("baselines")),
         periods,
         fill("phase", np.zeros(1)),
         given["start"],
@@ -240,25 +235,25 @@ def modulated(movement: RhythmicRollout, via: ViaLike | ViaPoints | None) -> Rhy
     if via is None:
         return movement
     dmp = movement.primitives.dmp
-    asked = via if isinstance(via, ViaPoints) else via_points(via, movement.baselines.shape[1], span=PHASES)
-    n = broadcast_length(len(movement), {"via": asked.points}, "movements")
+    targets = via if isinstance(via, ViaPoints) else via_points(via, movement.baselines.shape[1], span=PHASES)
+    n = broadcast_length(len(movement), {"via": targets.points}, "movements")
     movement = movement if len(movement) == n else movement[np.zeros(n, dtype=np.intp)]
     if not movement.ratio.all():
         raise SpecificationError(
             "expected an amplitude other than 0 with via points, got 0: what was learned does not move; leave out via="
         )
-    observed = np.vstack((_path(dmp, 2.0 * np.pi * asked.times), limit_cycle(dmp)[:, 0].real))
-    own = movement.primitives.scaled_weights * movement.ratio[:, None, None]
+    observed = np.vstack((_path(dmp, 2.0 * np.pi * targets.times), limit_cycle(dmp)[:, 0].real))
+    own = movement.primitives.row("scaled_weights") * movement.ratio[:, None, None]
     errors = -(own @ observed.T)  # (n, d, K + 1)
-    errors[:, :, :-1] += asked.points.transpose(0, 2, 1) - movement.baselines[:, :, None]
+    errors[:, :, :-1] += targets.points.transpose(0, 2, 1) - movement.baselines[:, :, None]
     errors[:, :, -1] = 0.0
-    rows, stretch = errors.reshape(-1, errors.shape[2]), np.append(asked.stretch.astype(np.float64), 0.0)
-    extents, looks = 2.0 * np.abs(movement.ratio * movement.primitives.amplitudes), _looks(dmp)
-    warn_far(extents, asked, errors, span=PHASES)
-    found = loose_changes(looks, smoothness_factor(dmp), observed, rows, stretch)
-    change = Change(found.reshape(*errors.shape[:2], -1), np.eye(dmp.n_basis))
-    left = errors - change.coefficients @ observed.T if asked.stretch.any() else None
-    warn_changed(extents, asked, errors, Changed(change, left, looks))
+    rows, stretch = errors.reshape(-1, errors.shape[2]), np.append(targets.stretch.astype(np.float64), 0.0)
+    extents, looks = 2.0 * np.abs(movement.ratio * movement.primitives.row("amplitudes")), _looks(dmp)
+    warn_far(extents, targets, errors, span=PHASES)
+    weights = loose_changes(looks, smoothness_factor(dmp), observed, rows, stretch)
+    change = Change(weights.reshape(*errors.shape[:2], -1), np.eye(dmp.n_basis))
+    left = errors - change.coefficients @ observed.T if targets.stretch.any() else None
+    warn_changed(extents, targets, errors, Changed(change, left, looks))
     return replace(movement, change=change.coefficients)
 
 

@@ -22,7 +22,7 @@ APERIODIC = ("raise", "accept")
 
 @dataclass(frozen=True)
 class RhythmicSpecification(SpringDamper):
-    """What `RhythmicDMP` is made of; its parameters are explained there."""
+    """Parameters of a `RhythmicDMP`, which explains them."""
 
     n_basis: int = 25
     stiffness: float = 100.0

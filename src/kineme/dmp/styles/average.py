@@ -197,10 +197,10 @@ class AveragePrimitive:
             None if velocity is None else as_observations("velocity", times, velocity, velocity_std, d),
         )
         now = updated(self.primitive, self.factor, self.tempo_factor, observed)
-        one = from_numbers(
+        mean = from_numbers(
             self.primitive.dmp, now.theta, now.duration, shared_label(self.primitive), self.primitive.recorded_as
         )
-        return AveragePrimitive(one, now.factor, now.tempo_factor, self.noise)
+        return AveragePrimitive(mean, now.factor, now.tempo_factor, self.noise)
 
     def log_likelihood(self, movements: Primitives | MovementsLike, noise: float | None = None) -> Array:
         """Log probability density of the path of each movement, shape (n,), in nats.
@@ -250,8 +250,10 @@ class AveragePrimitive:
             Another specification or dimension, or an activation outside 0 to 1.
         """
         a = as_activation(activation, self.primitive.dmp.n_points)
-        own, its = self.primitive, self._of_this_kind(_primitive_of(other))
-        found = blended(
+        if not isinstance(other, AveragePrimitive):
+            raise SpecificationError(f"expected an AveragePrimitive to blend with, got {type(other).__name__}")
+        own, its = self.primitive, self._of_this_kind(other.primitive)
+        gaussian = blended(
             own.dmp,
             (to_numbers(own), self.factor),
             (to_numbers(its), other.factor),
@@ -261,10 +263,10 @@ class AveragePrimitive:
         share = float(a.mean())
         duration = own.durations ** (1.0 - share) * its.durations**share
         label = shared_label(Primitives.concatenate([own, its])) if own.labels is not None is not its.labels else None
-        one = from_numbers(own.dmp, found.theta, duration, label, merged([own.recorded_as, its.recorded_as]))
+        mean = from_numbers(own.dmp, gaussian.theta, duration, label, merged([own.recorded_as, its.recorded_as]))
         tempo = np.concatenate(((1.0 - share) * self.tempo_factor, share * other.tempo_factor))
         noises = [noise for noise in (self.noise, other.noise) if noise is not None]
-        return AveragePrimitive(one, found.factor, tempo, max(noises, default=None))
+        return AveragePrimitive(mean, gaussian.factor, tempo, max(noises, default=None))
 
     def _of_this_kind(self, movements: Primitives | MovementsLike) -> Primitives:
         own = self.primitive
@@ -275,12 +277,6 @@ class AveragePrimitive:
             raise SpecificationError(f"expected movements of {own.n_dims} dimensions, got {primitives.n_dims}")
         check_alike([own.moving_channels, primitives.moving_channels], "movement")
         return primitives
-
-
-def _primitive_of(other: Any) -> Primitives:
-    if not isinstance(other, AveragePrimitive):
-        raise SpecificationError(f"expected an AveragePrimitive to blend with, got {type(other).__name__}")
-    return other.primitive
 
 
 def average(primitives: Primitives | MovementsLike, weights: ArrayLike | None = None) -> AveragePrimitive:
@@ -322,11 +318,11 @@ def average(primitives: Primitives | MovementsLike, weights: ArrayLike | None = 
         factor = np.linalg.qr(factor, mode="r")  # the same covariance from as few rows as it has columns
     shape = (primitives.n_dims, primitives.dmp.n_basis + 3)
     duration = primitives.durations[:1] * np.exp(mean[-1:])
-    one = from_numbers(
+    center = from_numbers(
         primitives.dmp, mean[:-1].reshape(1, *shape), duration, shared_label(primitives), shared_recording(primitives)
     )
     noise = unexplained_noise(primitives.dmp, numbers[p > 0.0] - numbers[p > 0.0].mean(axis=0))
-    return AveragePrimitive(one, factor[:, :-1].reshape(len(factor), *shape), factor[:, -1], noise)
+    return AveragePrimitive(center, factor[:, :-1].reshape(len(factor), *shape), factor[:, -1], noise)
 
 
 def average_by_label(primitives: Primitives | MovementsLike) -> dict[Any, AveragePrimitive]:
@@ -380,15 +376,15 @@ def as_activation(activation: ArrayLike, n_points: int) -> Array:
 
 
 def blended(
-    dmp: Specification, one: tuple[Array, Array], other: tuple[Array, Array], activation: Array, floor: float
+    dmp: Specification, first: tuple[Array, Array], other: tuple[Array, Array], activation: Array, floor: float
 ) -> Blended:
     """Blend two averages, each (theta (1, d, N + 3), factor (r, d, N + 3)), with `activation` (T,) of the other.
 
     `floor` is the deviation below which all positions count as equally certain, in the unit of the movements.
     """
     matrix = path_matrix(dmp, len(activation))
-    means = [map_rows(theta, matrix)[0].T for theta, _ in (one, other)]  # (T, d)
-    deviations = [map_rows(factor, matrix).transpose(2, 0, 1) for _, factor in (one, other)]  # (T, r, d)
+    means = [map_rows(theta, matrix)[0].T for theta, _ in (first, other)]  # (T, d)
+    deviations = [map_rows(factor, matrix).transpose(2, 0, 1) for _, factor in (first, other)]  # (T, r, d)
     a = np.stack((1.0 - activation, activation))[:, :, None, None]
     size = np.sqrt(sum(float(np.mean(np.sum(x**2, axis=1))) for x in deviations) / 2.0)
     least = max(_FLOOR * size, floor) ** 2 * np.eye(means[0].shape[1])
@@ -432,7 +428,7 @@ def log_likelihoods(dmp: Specification, deviations: Array, factor: Array, noise:
 
 
 def unexplained_noise(dmp: Specification, deviations: Array) -> float | None:
-    """What other demonstrations do not explain, as a standard deviation, from theta (n, d, N + 3) minus their mean.
+    """Estimate the standard deviation that others leave unexplained, from theta (n, d, N + 3) minus its mean.
 
     Each demonstration is compared with the nearest weighted mean of the others, of any weights with the sum 1. With G
     the products of the centered paths its squared distance is ``1 / (G^+)_ii``, in d T - (n - 2) directions. None where

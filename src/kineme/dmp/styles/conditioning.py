@@ -82,12 +82,19 @@ def updated(
         if step == 0:
             _warn_outside(rows, both @ matrix.T, error, deviation, now, extent)
         open_ones = _open(rows, both @ matrix.T, error, deviation, extent)
-        found = condition(both, matrix[open_ones], deviation[open_ones])
-        change, remaining = error[open_ones] @ found.gain, found.factor
+        conditioned = condition(both, matrix[open_ones], deviation[open_ones])
+        change, remaining = error[open_ones] @ conditioned.gain, conditioned.factor
         if not speed.any() or root.found(float(change[-1]) - ln_tau):
             break
     else:
-        _warn_unsettled(float(change[-1]) - ln_tau)
+        if (left := abs(float(change[-1]) - ln_tau)) > _UNSETTLED:
+            warn(
+                f"after {_STEPS} steps the duration of the conditioned movement still changes by {100 * left:.2g} % "
+                "a step, so the velocities are met about as closely only; give a larger velocity_std, fewer "
+                "velocities, or such as were demonstrated",
+                ExtrapolationWarning,
+                stacklevel=3,
+            )
     if not abs(change[-1]) <= _TEMPO:
         raise SpecificationError(
             "expected positions and velocities that a movement like the demonstrations could have, got such that its "
@@ -115,7 +122,7 @@ class _Root:
         self._last: tuple[float, float] | None = None
 
     def found(self, value: float) -> bool:
-        """Whether it is where the function has this value; else `at` is where to look next."""
+        """Tell whether it is where the function has this value; else `at` is where to look next."""
         at, self._bracket[int(value < 0.0)] = self.at, self.at
         step = value
         if self._last is not None and value != self._last[1]:
@@ -150,7 +157,7 @@ def _rows(dmp: Specification, d: int, kinds: tuple[Observations | None, Observat
 
 
 def _open(rows: _Rows, whitened: Array, error: Array, deviation: Array, extent: float) -> Array:
-    """Which rows (K,) are left to be met: not those that are met by every movement of the distribution."""
+    """Return which rows (K,) are left to be met: not those that are met by every movement of the distribution."""
     still = (np.linalg.norm(whitened, axis=0) <= _NOTHING * extent) & (deviation == 0.0)
     impossible = still & (np.abs(error) > _MET * extent)
     if impossible.any():
@@ -191,18 +198,6 @@ def _warn_outside(rows: _Rows, whitened: Array, error: Array, deviation: Array, 
         warn(message, ExtrapolationWarning, stacklevel=4)
 
 
-def _warn_unsettled(change: float) -> None:
-    """Say that the duration which fits the velocities was not found."""
-    if abs(change) > _UNSETTLED:
-        warn(
-            f"after {_STEPS} steps the duration of the conditioned movement still changes by {100 * abs(change):.2g} % "
-            "a step, so the velocities are met about as closely only; give a larger velocity_std, fewer velocities, or "
-            "such as were demonstrated",
-            ExtrapolationWarning,
-            stacklevel=4,
-        )
-
-
 def mahalanobis(whitened: Array, error: Array, deviation: Array, extent: float) -> float:
     """``sqrt(e' (B' B + diag(s^2))^-1 e)`` of ``B`` (r, k); infinite where nothing varies."""
     stacked = np.vstack((whitened, np.diag(deviation)))
@@ -231,7 +226,8 @@ def as_observations(name: str, times: Array, values: ArrayLike, std: ArrayLike, 
     """Check values (m, d), with NaN for dimensions that are free, and their standard deviations."""
     m = len(times)
     x = as_numbers(values, name)
-    x = x.reshape(m, n_dims) if x.shape in _shapes(m, n_dims) else x
+    flat = m == 1 and (x.shape == (n_dims,) or (n_dims == 1 and not x.ndim))
+    x = x.reshape(m, n_dims) if flat or (n_dims == 1 and x.shape == (m,)) else x
     if x.shape != (m, n_dims):
         shape = f"({n_dims},) or (1, {n_dims})" if m == 1 else f"({m}, {n_dims})"
         raise TrajectoryError(f"expected {name} of shape {shape}, one for each of {m} times, got {np.shape(values)}")
@@ -252,9 +248,3 @@ def as_observations(name: str, times: Array, values: ArrayLike, std: ArrayLike, 
         raise SpecificationError(f"expected std of 0 or more, got {std!r}")
     free = deviations > LARGEST  # infinitely uncertain: not observed
     return Observations(times, np.where(free, np.nan, x), np.where(free, 0.0, deviations))
-
-
-def _shapes(m: int, n_dims: int) -> tuple[tuple[int, ...], ...]:
-    """What stands for (m, d) without doubt."""
-    one = ((n_dims,),) if m == 1 else ()
-    return (*one, *(((m,),) if n_dims == 1 else ()), *(((),) if m == n_dims == 1 else ()))

@@ -13,7 +13,6 @@ because f is dominated by accelerations and their noise.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -37,26 +36,21 @@ from kineme.movements.channels.channel import Channels, check_alike
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.validation import Array, as_numbers, check_choice, check_count, check_number
 
-
-def _relative_path(dmp: DMP) -> Array:
-    """To the path minus its start: position in space is no style."""
-    matrix = path_matrix(dmp, dmp.n_points)
-    matrix[-3] -= 1.0
-    return matrix
-
-
-def _forcing(dmp: DMP) -> Array:
-    """To the forcing term times the formulation's scale, the target of Matsubara et al. (2011)."""
-    return np.vstack((forcing_matrix(dmp, dmp.n_points).T, np.zeros((3, dmp.n_points))))
-
-
-#: Name -> matrix (N + 3, T) from theta of `kineme.dmp.styles.parameters` to what is compared.
-METRICS: dict[str, Callable[[DMP], Array]] = {"path": _relative_path, "forcing": _forcing}
+METRICS = ("path", "forcing")
 
 
 def compared(metric: str, dmp: DMP, theta: Array) -> Array:
-    """What the styles explain, shape (n, d T): its Euclidean norm is the root mean square over the T phases."""
-    return map_rows(theta, METRICS[metric](dmp) / np.sqrt(dmp.n_points)).reshape(len(theta), -1)
+    """Return what the styles explain, shape (n, d T): its Euclidean norm is the root mean square over the T phases.
+
+    From theta of `kineme.dmp.styles.parameters` it is the path minus its start, for position in space is no style, or
+    the forcing term times the formulation's scale, the target of Matsubara et al. (2011).
+    """
+    if metric == "path":
+        matrix = path_matrix(dmp, dmp.n_points)
+        matrix[-3] -= 1.0
+    else:
+        matrix = np.vstack((forcing_matrix(dmp, dmp.n_points).T, np.zeros((3, dmp.n_points))))
+    return map_rows(theta, matrix / np.sqrt(dmp.n_points)).reshape(len(theta), -1)
 
 
 _SLACK = 1e-9  # of the range: a demonstrated style is inside, whatever the rounding
@@ -101,7 +95,7 @@ class StyleModel:
 
     @property
     def channels(self) -> Channels | None:
-        """What was recorded, where that is known; see `Demonstrations.channels`."""
+        """Channels of the recordings, where they are known; see `Demonstrations.channels`."""
         return None if self.recorded_as is None else self.recorded_as.channels
 
     @property
@@ -253,8 +247,9 @@ def learn_styles(
     theta = to_numbers(primitives)
     mean = theta[0] + np.mean(theta - theta[0], axis=0)
     U, S, Vt = np.linalg.svd(compared(metric, primitives.dmp, theta - mean), full_matrices=False)
-    J = _n_styles(S, _rank(S, compared(metric, primitives.dmp, theta)), n_styles, variance)
-    n = len(theta)
+    X, n = compared(metric, primitives.dmp, theta), len(theta)
+    rank = int(np.sum(max(X.shape) * np.finfo(float).eps * np.linalg.norm(X) < S))  # the others are rounding
+    J = _n_styles(S, rank, n_styles, variance)
     sign = np.sign(np.take_along_axis(Vt[:J], np.argmax(np.abs(Vt[:J]), axis=1)[:, None], axis=1))
     styles = U[:, :J] * sign[:, 0] * np.sqrt(n)
     tempo = np.log(primitives.durations / primitives.durations[0])
@@ -272,11 +267,6 @@ def learn_styles(
         label=shared_label(primitives),
         recorded_as=shared_recording(primitives),
     )
-
-
-def _rank(S: Array, X: Array) -> int:
-    """How many singular values are more than rounding."""
-    return int(np.sum(max(X.shape) * np.finfo(float).eps * np.linalg.norm(X) < S))
 
 
 def _n_styles(S: Array, rank: int, n_styles: int | None, variance: float | None) -> int:

@@ -91,7 +91,7 @@ def map_rows(theta: Array, matrix: Array) -> Array:
 
 
 def shared_recording(primitives: Primitives) -> RecordedAs | None:
-    """What the primitives were recorded as, without the steps of discrete channels: those are of one movement each."""
+    """Return the common channels of primitives, without the steps of discrete ones: those are of one movement each."""
     return None if primitives.recorded_as is None else replace(primitives.recorded_as, steps=None)
 
 

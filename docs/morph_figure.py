@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from kineme.dmp.discrete.dmp import Primitives
 from kineme.dmp.styles.model import StyleModel, learn_styles
-from kineme.errors import TrajectoryError
 from kineme.reporting.figures import BLUE, GRAY, ORANGE, new_figure
 from kineme.reporting.text import drawable
-from kineme.validation import Array, check_count
+from kineme.validation import Array
 
 
 def draw_morph(primitives: Primitives, steps: int = 9, unit: str = "mm") -> Figure:
@@ -29,18 +28,7 @@ def draw_morph(primitives: Primitives, steps: int = 9, unit: str = "mm") -> Figu
         Movements of the morph, both ends included.
     unit : str, default "mm"
         Of the positions, for the axes.
-
-    Raises
-    ------
-    TrajectoryError
-        Fewer than three demonstrations, or not two-dimensional.
     """
-    check_count("steps", steps, 2)
-    if len(primitives) < 3 or primitives.n_dims != 2:
-        raise TrajectoryError(
-            "expected at least 3 two-dimensional demonstrations for a picture of their styles, "
-            f"got {len(primitives)} of {primitives.n_dims} dimensions"
-        )
     model = learn_styles(primitives, 2)
     second = above_widest_gap(model.styles[:, 0])
     route = np.linspace(model.styles[~second].mean(axis=0), model.styles[second].mean(axis=0), steps)
@@ -61,7 +49,7 @@ def draw_morph(primitives: Primitives, steps: int = 9, unit: str = "mm") -> Figu
 
 
 def above_widest_gap(values: Array) -> NDArray[np.bool_]:
-    """Whether each number (n,) lies above the widest gap between neighbors."""
+    """Tell whether each number (n,) lies above the widest gap between neighbors."""
     ordered = np.sort(values)
     k = int(np.argmax(np.diff(ordered)))
     return np.asarray(values > 0.5 * (ordered[k] + ordered[k + 1]))
@@ -94,7 +82,7 @@ def _plane(axes: Any, model: StyleModel, second: NDArray[np.bool_], route: Array
 
 
 def _key() -> list[Any]:
-    """What the markers mean."""
+    """Return the entries of the legend."""
     from matplotlib.lines import Line2D
 
     def marker(shape: str, label: str, size: float, **how: Any) -> Line2D:
