@@ -19,7 +19,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
 from kineme.errors import TrajectoryError
 from kineme.validation import Array, as_numbers
@@ -215,6 +214,8 @@ def matrices_of(q: ArrayLike) -> Array:
     TrajectoryError
         Not of shape (..., 4), or not of norm 1; see `normalized`.
     """
+    from scipy.spatial.transform import Rotation  # reading files needs no SciPy
+
     q = normalized(q)
     rows = Rotation.from_quat(q.reshape(-1, 4), scalar_first=True).as_matrix()
     return np.asarray(rows.reshape(*q.shape[:-1], 3, 3))
@@ -222,6 +223,8 @@ def matrices_of(q: ArrayLike) -> Array:
 
 def quaternion_of(R: Array) -> Array:
     """The unit quaternion (4,) of a rotation matrix (3, 3)."""
+    from scipy.spatial.transform import Rotation
+
     return np.asarray(Rotation.from_matrix(np.array(R)).as_quat(scalar_first=True))  # SciPy 1.14: none read-only
 
 
