@@ -229,7 +229,7 @@ def test_few_hypotheses_compared_in_full_say_what_all_of_them_say(monkeypatch):
     recognizer, test = _fitted_in_space()
     parts = cut(test, 0.6)
     few = partial_shares(recognizer, parts)
-    monkeypatch.setattr(evidence, "_COMPARED", 10**9)
+    monkeypatch.setattr(evidence, "COMPARED", 10**9)
     every = partial_shares(recognizer, parts)
     np.testing.assert_array_equal(few.argmax(axis=1), every.argmax(axis=1))
     np.testing.assert_allclose(few, every, atol=0.05)

@@ -21,6 +21,7 @@ import kineme
 from kineme.movements.preparation.pauses import cut_pauses
 from kineme.recognition.certainty import LEAST_CONFIDENCE, certainty
 from kineme.studio.snapshot.make import snapshot_of_recognizer
+from kineme.studio.snapshot.recognition import pause_rule
 from kineme.studio.snapshot.snapshot import Snapshot
 from movement_samples import draw_shapes, stepped, turn
 from soaking import SOAK
@@ -207,7 +208,7 @@ def test_pauses_are_cut_short_as_in_python():
 
 
 CUTS = """const { withoutPauses } = await import(process.argv[1]);
-const cuts = JSON.parse(process.argv[2]).map((one) => withoutPauses(one));
+const cuts = JSON.parse(process.argv[2]).map((one) => withoutPauses(one, JSON.parse(process.argv[3])));
 console.log(JSON.stringify(cuts.map((one) => [[...one.times], [...one.positions]])));"""
 PAUSED = [
     [(16, 1.0), (1, 100.0, 2.0), (14, 1.0)],  # a gap of 2
@@ -228,7 +229,7 @@ def test_pauses_are_cut_to_the_same_samples_as_in_python():
         {"times": one.times.tolist(), "positions": one.positions.ravel().tolist(), "d": one.n_dims} for one in cases
     ]
     done = subprocess.run(
-        [NODE, "--input-type=module", "-e", CUTS, FOLDER / "pauses.js", json.dumps(asked)],
+        [NODE, "--input-type=module", "-e", CUTS, FOLDER / "pauses.js", json.dumps(asked), json.dumps(pause_rule())],
         capture_output=True, text=True, timeout=300, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
@@ -434,16 +435,16 @@ WRONG = {
         ("0.5 * (ends", "0.501 * (ends", worst_answers),
     ],
     "rotation.js": [("rule.prior[3]) * norms", "rule.prior[3]) * norms * 1.01", worst_answers)],
-    "hypotheses.js": [("LAST = 0.02", "LAST = 0.021", worst_states)],
+    "hypotheses.js": [("/ numbers.last,", "/ (1.05 * numbers.last),", worst_states)],
     "evidence.js": [
-        ("ROTATION = 10", "ROTATION = 10.1", worst_states),
-        ("SPEED_SPREAD = 0.5", "SPEED_SPREAD = 0.501", worst_states),
-        ("PROGRESS = 0.25", "PROGRESS = 0.251", worst_states),
-        ("POWER = 3", "POWER = 3.01", worst_states),
-        ("OVER = -3", "OVER = -3.01", worst_states),
-        ("(1.5 / 0.4)", "(1.51 / 0.4)", worst_states),
-        ("TEMPER = 0.8", "TEMPER = 0.801", worst_states),
-        ("EXPLAINING = 20", "EXPLAINING = 20.1", worst_states),
+        ("numbers.rotation *", "1.01 * numbers.rotation *", worst_states),
+        ("/ numbers.speed_spread", "/ (1.002 * numbers.speed_spread)", worst_states),
+        ("numbers.progress *", "1.004 * numbers.progress *", worst_states),
+        ("numbers.power *", "1.004 * numbers.power *", worst_states),
+        ("numbers.prior_odds +", "1.004 * numbers.prior_odds +", worst_states),
+        ("numbers.log_unknown]", "1.01 * numbers.log_unknown]", worst_states),
+        ("numbers.temper *", "1.002 * numbers.temper *", worst_states),
+        ("/ numbers.explaining", "/ (1.005 * numbers.explaining)", worst_states),
     ],
     "rollout.js": [
         ("HANDOVER = 0.2", "HANDOVER = 0.201", worst_rollouts),

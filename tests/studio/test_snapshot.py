@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 from base64 import b64decode
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,9 +13,13 @@ from node_runtime import NODE, REASON, ask, question
 
 import kineme
 from kineme.errors import SpecificationError
+from kineme.movements.preparation import pauses
+from kineme.recognition import left_out
+from kineme.recognition.early import evidence, hypotheses, prefixes
 from kineme.studio.snapshot.make import MOST_NUMBERS, snapshot_of_library, snapshot_of_recognizer
 from movement_samples import draw_shapes
 
+RUNTIME = Path(kineme.__file__).parent / "studio" / "javascript"
 HOSTILE = "</script><script>alert(1)</script>"
 
 
@@ -31,6 +37,25 @@ def test_arrays_are_written_whole_and_in_order():
         array = np.frombuffer(block, kind, length, offset)
         np.testing.assert_array_equal(array, snapshot.arrays[name].ravel(), err_msg=name)
         assert offset % 8 == 0
+
+
+def test_numbers_that_are_tuned_come_from_python_alone():
+    """The runtime reads each of them from the header, under its name, and has no constant of that name."""
+    header = snapshot_of_recognizer(kineme.Recognizer().fit(draw_shapes([2, 3]))).header
+    groups = {
+        "pauses.js": (header["comparison"]["pauses"], [pauses]),
+        "recognition.js": (header["calibration"], [left_out]),
+        "evidence.js hypotheses.js": (header["early"]["numbers"], [evidence, hypotheses, prefixes]),
+    }
+    for files, (numbers, modules) in groups.items():
+        constants = {name: value for module in modules for name, value in vars(module).items() if name.isupper()}
+        text = "".join((RUNTIME / file).read_text() for file in files.split())
+        shared = [name for name in numbers if name.upper() in constants]
+        assert len(shared) >= 6
+        for name in shared:
+            assert numbers[name] == constants[name.upper()], name
+            assert re.search(rf"\b{name}\b", text), name
+            assert not re.search(rf"\bconst {name.upper()}\b", text), name
 
 
 def test_names_cannot_end_the_script_element(tmp_path):

@@ -13,10 +13,13 @@ from kineme.errors import TrajectoryError
 from kineme.validation import Array
 
 _PRIOR = 4.0  # demonstrations that the common scale counts for beside those of the class
-_DIMENSIONS = 8  # in which members of a class vary, about: even, for the closed form of the law of distances
+DIMENSIONS = 8  # in which members of a class vary, about: even, for the closed form of the law of distances
+MEAN_LENGTH = (
+    math.sqrt(2.0) * math.gamma((DIMENSIONS + 1) / 2) / math.gamma(DIMENSIONS / 2)
+)  # of normal vectors in these
 #: Smallest scale, in kernel widths: rounding of single precision puts copies up to 0.002 apart.
 LEAST = 5e-3
-_ROUNDING = 1e-5  # of log similarities, in single precision
+ROUNDING = 1e-5  # of log similarities, in single precision
 #: Share of the typical distance to another class within which 95 % of members are expected, with one demonstration of
 #: each class: of movements by the same people, and by others.
 REACH, REACH_OF_OTHERS = 0.75, 1.0
@@ -35,7 +38,7 @@ def distances(logs: Array) -> Array:
 
     0 between copies: what rounding makes of them would make some more novel than others.
     """
-    return np.sqrt(np.where(logs < -_ROUNDING, -2.0 * logs, 0.0))
+    return np.sqrt(np.where(logs < -ROUNDING, -2.0 * logs, 0.0))
 
 
 def broad_law(scores: Array) -> Array:
@@ -49,9 +52,8 @@ def law(scores: Array) -> Array:
     ``P(chi_8 >= x) = exp(-y) (1 + y + y^2 / 2 + y^3 / 6)`` with ``y = x^2 / 2``; x is the score times the mean of
     chi_8, 2.74. It is 0.05 at 1.44 times the mean; measured were 1.36 to 1.47 times, of people's movements.
     """
-    mean = math.sqrt(2.0) * math.gamma((_DIMENSIONS + 1) / 2) / math.gamma(_DIMENSIONS / 2)
-    y = 0.5 * (mean * scores) ** 2
-    terms = sum(y**k / math.factorial(k) for k in range(_DIMENSIONS // 2))
+    y = 0.5 * (MEAN_LENGTH * scores) ** 2
+    terms = sum(y**k / math.factorial(k) for k in range(DIMENSIONS // 2))
     return np.asarray(np.exp(-y) * terms)
 
 
@@ -133,7 +135,7 @@ class ClassDistances:
 
     def shares(self, size: int) -> Array:
         """By which each distance to the nearest shrinks, about, with `size` others instead of those `counted`."""
-        return np.asarray((np.maximum(self.counted(size), 1) / size) ** (1 / _DIMENSIONS))
+        return np.asarray((np.maximum(self.counted(size), 1) / size) ** (1 / DIMENSIONS))
 
     def left_out(self, size: int) -> Array:
         """Distances (k, k) to the nearest, row i as if i and its group did not exist; NaN where there is none."""

@@ -17,13 +17,13 @@ from kineme.similarity.described import Described
 from kineme.similarity.log_averages import LOG_MEANS
 from kineme.validation import Array
 
-_COMPARED = 200  # hypotheses compared pair by pair, and the best one of each class
-_WIDENED = 2.0  # widths of positions where they choose those
-_ROTATION = 10.0  # weight of the rotation prior, whose unit is the inner product of two equal paths
-_SPEED_SPREAD = 0.5  # of the logarithm of the speed at the end
-_PROGRESS = 0.25  # exponent of the density of progress
-_POWER = 3.0  # of the similarity of whole movements, beside the evidence for beginnings
-_NEGLIGIBLE = 5.0  # whole movements are not compared if they have less than exp(-5) of the largest evidence
+COMPARED = 200  # hypotheses compared pair by pair, and the best one of each class
+WIDENED = 2.0  # widths of positions where they choose those
+ROTATION = 10.0  # weight of the rotation prior, whose unit is the inner product of two equal paths
+SPEED_SPREAD = 0.5  # of the logarithm of the speed at the end
+PROGRESS = 0.25  # exponent of the density of progress
+POWER = 3.0  # of the similarity of whole movements, beside the evidence for beginnings
+NEGLIGIBLE = 5.0  # whole movements are not compared if they have less than exp(-5) of the largest evidence
 
 _WHOLE = np.ones(1)
 
@@ -59,7 +59,7 @@ def log_evidence(stored: Hypotheses, begun: Begun) -> Array:
     priors = _log_priors(stored, begun)
     odds = stored.ending.log_odds(begun.prefixes.end_speeds)
     squares = stored.procrustes.squared_distances(begun.described.blocks[0], stored.described.blocks[0])
-    rough = priors - squares / (2.0 * (_WIDENED * stored.widths[0]) ** 2)
+    rough = priors - squares / (2.0 * (WIDENED * stored.widths[0]) ** 2)
     evidence = np.full(rough.shape, -np.inf)
     for i in range(len(rough)):
         chosen = _choose(stored, rough[i])
@@ -78,19 +78,19 @@ def _log_priors(stored: Hypotheses, begun: Begun) -> Array:
     late = np.maximum(norms - 2.0 * (timing @ stored.prefixes.timing.T), 0.0)
     early = stored.early
     normal = 0.5 * (sizes / early.size_spread) ** 2 + 0.5 * (longer / early.duration_spread) ** 2
-    faster = (begun.prefixes.end_speeds[:, None] - stored.prefixes.end_speeds) / _SPEED_SPREAD
+    faster = (begun.prefixes.end_speeds[:, None] - stored.prefixes.end_speeds) / SPEED_SPREAD
     cauchy = (1.0 + late / (2.0 * early.timing_spread**2)) * (1.0 + 0.5 * faster**2)
-    progress = np.tile(_PROGRESS * np.log(stored.progress), len(stored.durations))
+    progress = np.tile(PROGRESS * np.log(stored.progress), len(stored.durations))
     return np.asarray(progress - normal - np.log(cauchy))
 
 
 def _choose(stored: Hypotheses, rough: Array) -> NDArray[np.intp]:
     """Hypotheses to be compared pair by pair; all that are equally good are, so that their order does not matter."""
-    if len(rough) <= _COMPARED:
+    if len(rough) <= COMPARED:
         return np.arange(len(rough))
     starts = stored.first * len(stored.progress)
     best = np.repeat(np.maximum.reduceat(rough, starts), np.diff(starts, append=len(rough)))
-    least = np.partition(rough, len(rough) - _COMPARED)[len(rough) - _COMPARED]
+    least = np.partition(rough, len(rough) - COMPARED)[len(rough) - COMPARED]
     return np.flatnonzero((rough >= least) | (rough >= best))
 
 
@@ -112,7 +112,7 @@ def _log_rotations(procrustes: Procrustes, rotations: NDArray[np.float32] | None
     F = procrustes.prior.matrix(procrustes.n_dims)
     R = rotations[0].astype(float)
     product = R[:, 0] * np.trace(F) if procrustes.n_dims == 2 else np.einsum("kij,ij->k", R, F)
-    return np.asarray(_ROTATION * (product - np.trace(F)))
+    return np.asarray(ROTATION * (product - np.trace(F)))
 
 
 def _add_over(stored: Hypotheses, path: Array, evidence: Array, priors: Array) -> None:
@@ -125,11 +125,11 @@ def _add_over(stored: Hypotheses, path: Array, evidence: Array, priors: Array) -
     """
     G, counts = len(stored.progress), np.diff(stored.first, append=len(stored.durations))
     most = priors[G - 1 :: G]
-    if most.max() < evidence.max() - _NEGLIGIBLE:
+    if most.max() < evidence.max() - NEGLIGIBLE:
         return
     rotations = stored.comparison if stored.early.max_angle is None else stored
     whole = describe_paths(path, stored.comparison, rotations.procrustes)
-    similar = _POWER * stored.comparison.similarity.log_average(whole, stored.references.described)[0]
+    similar = POWER * stored.comparison.similarity.log_average(whole, stored.references.described)[0]
     log_counts = np.log(counts)
     over = np.logaddexp.reduce(most + similar - np.repeat(log_counts, counts))
     parts = np.split(similar, stored.first[1:])

@@ -20,18 +20,18 @@ from kineme.similarity.widths import SHARE, beginning_widths
 from kineme.validation import Array, check_count, check_number
 
 _LEAST_SPREAD = 0.4  # of the logarithm of the speed, where there are few movements
-_MOST = 10.0  # of the logarithm of the likelihood ratio: the speed alone settles nothing
+MOST_ODDS = 10.0  # of the logarithm of the likelihood ratio: the speed alone settles nothing
 #: Logarithm of the odds that a movement is over before its speed is known: about one in 20, as for any other progress.
 #: At 0 a movement slows down at a corner and is taken for a whole one of another class, or of a known one.
-_PRIOR = -3.0
+PRIOR_ODDS = -3.0
 
 #: An unknown movement is 1.5 times as far as a typical impostor, and as unlikely in size, duration and timing as a true
 #: one. Movements by people without demonstrations have -4 to -6 of their own class, one in ten less than -8 to -13;
 #: movements of no class have -10 after half of their path and -20 or less at its end.
-_LOG_UNKNOWN = -0.5 * (1.5 / SHARE) ** 2 - 1.5
+LOG_UNKNOWN = -0.5 * (1.5 / SHARE) ** 2 - 1.5
 #: Exponent of the shares. Elastic paths, point clouds, size, duration and timing are not independent: with 1, labels
 #: with a share of 0.9 are right less often than that for people without demonstrations.
-_TEMPER = 0.8
+TEMPER = 0.8
 #: A movement that explains a beginning perfectly does so at about one in 20 values of progress.
 EXPLAINING = 20
 _MOST_PROGRESS = 1000  # beginnings of one movement
@@ -143,11 +143,11 @@ class Hypotheses(NamedTuple):
         counts = np.diff(self.first, append=len(self.durations)) * (G / EXPLAINING)
         with np.errstate(divide="ignore"):
             known = np.log(sums / counts) + top
-        return np.column_stack((known, np.full(len(evidence), _LOG_UNKNOWN)))
+        return np.column_stack((known, np.full(len(evidence), LOG_UNKNOWN)))
 
     def shares(self, evidence: Array) -> Array:
         """Share of each class, and, last, of an unknown movement, in the evidence to the power of 0.8: (n, C + 1)."""
-        logs = _TEMPER * self.log_classes(evidence)
+        logs = TEMPER * self.log_classes(evidence)
         shares = np.exp(logs - logs.max(axis=1, keepdims=True))
         return np.asarray(shares / shares.sum(axis=1, keepdims=True))
 
@@ -217,7 +217,7 @@ class Ending(NamedTuple):
         """
         too_fast = np.maximum(speeds - self.over[0], 0.0) / self.over[1]
         too_slow = np.minimum(speeds - self.before[0], 0.0) / self.before[1]
-        return np.asarray(_PRIOR + np.clip(0.5 * (too_slow**2 - too_fast**2), -_MOST, _MOST))
+        return np.asarray(PRIOR_ODDS + np.clip(0.5 * (too_slow**2 - too_fast**2), -MOST_ODDS, MOST_ODDS))
 
 
 def ending(speeds: Array) -> Ending:

@@ -19,8 +19,8 @@ from kineme.similarity.representation import PAIR_QUANTITIES
 from kineme.validation import Array
 
 N_PREFIX = ElasticSpec().n_segments + 1  # samples along the arc length of a beginning: the ends of segments
-_LAST = 0.02  # share of a beginning's time in which the speed at its end is measured
-_LEAST_SPEED = 0.01  # of the mean speed
+LAST = 0.02  # share of a beginning's time in which the speed at its end is measured
+LEAST_SPEED = 0.01  # of the mean speed
 #: What beginnings are compared by pair by pair.
 _PAIRS = tuple(PAIR_QUANTITIES.index(quantity) for quantity in ("elastic", "cloud"))
 
@@ -98,8 +98,8 @@ def _end_speeds(phase: Array, elapsed: Array, progress: Array) -> Array:
     Of movements with a `phase` (n, T) of arc length, whose beginnings end at `elapsed` (n, G) of their time.
     """
     even = np.linspace(0.0, 1.0, phase.shape[1])
-    before = np.stack([np.interp((1.0 - _LAST) * ends, even, one) for ends, one in zip(elapsed, phase, strict=True)])
-    return np.asarray(np.log(np.maximum((1.0 - before / progress) / _LAST, _LEAST_SPEED)).ravel())
+    before = np.stack([np.interp((1.0 - LAST) * ends, even, one) for ends, one in zip(elapsed, phase, strict=True)])
+    return np.asarray(np.log(np.maximum((1.0 - before / progress) / LAST, LEAST_SPEED)).ravel())
 
 
 def describe_prefixes(prefixes: Prefixes, procrustes: Procrustes) -> Described:

@@ -191,7 +191,7 @@ function angle(vectors, p, q, d) {
  * @param {Object} arrays
  */
 export function describeMovement(one, how, arrays) {
-  return describePath(evenPath(withoutPauses(one), how.cutoff, N_POINTS), one.positions, how, arrays);
+  return describePath(evenPath(withoutPauses(one, how.pauses), how.cutoff, N_POINTS), one.positions, how, arrays);
 }
 
 /** The same of a smooth path relative to a first position. */

@@ -74,7 +74,8 @@ export function follow(stored, { confidence = 0.9, patience = 0.05 } = {}) {
   const {
     classes,
     certainty: least,
-    comparison: { n_dims: d, cutoff },
+    comparison: { n_dims: d, cutoff, pauses },
+    early,
   } = stored.known.header;
   const decide = decision(confidence, patience);
   let [leader, furthest] = [-1, 0];
@@ -86,14 +87,14 @@ export function follow(stored, { confidence = 0.9, patience = 0.05 } = {}) {
   return (times, positions) => {
     const n = times.length;
     if (n < 4 || positions.every((x) => x.every((value, k) => value === positions[0][k]))) return null;
-    const active = withoutPauses(movement(times, positions, d));
+    const active = withoutPauses(movement(times, positions, d), pauses);
     const duration = active.times[active.times.length - 1] - active.times[0];
     const even = linspace(active.times[0], active.times[0] + duration, N_POINTS);
     const column = (k) => Float64Array.from(active.times, (_, j) => active.positions[j * d + k] - positions[0][k]);
     const rows = Array.from({ length: d }, (_, k) => interpolate(even, active.times, column(k)));
     const samples = Float64Array.from({ length: d * N_POINTS }, (_, j) => rows[j % d][Math.floor(j / d)]);
     const path = smooth(movement(linspace(0, 1, N_POINTS), samples, d), cutoff, rows);
-    const begun = beginnings(path, d, WHOLE, stored.known.header.early.shapes);
+    const begun = beginnings(path, d, WHOLE, early);
     const elapsed = times[n - 1] - times[0];
     const evidence = logEvidence(stored, begun, path, positions[0], duration);
     const share = shares(stored, evidence);

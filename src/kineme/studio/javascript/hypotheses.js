@@ -4,9 +4,6 @@ import { finiteLog, interpolate, linspace, product } from "./arrays.js";
 import { fillShapes, N_POINTS, roomForShapes } from "./description.js";
 import { arcLengthPhase } from "./preparation.js";
 
-const LAST = 0.02; // share of a beginning's time in which the speed at its end is measured
-const LEAST_SPEED = 0.01; // of the mean speed
-
 /**
  * @typedef {Object} Prefixes G beginnings of each of n movements, S samples along their arc lengths
  * @property {Float32Array} rows centered, of norm 1
@@ -19,8 +16,12 @@ const LEAST_SPEED = 0.01; // of the mean speed
  * @property {import("./description.js").Shapes} shapes
  */
 
-/** The beginnings of paths (n, d, N_POINTS) until each share of their arc length. @returns {Prefixes} */
-export function beginnings(paths, d, progress, how) {
+/**
+ * The beginnings of paths (n, d, N_POINTS) until each share of their arc length; `numbers.last` is the share of a
+ * beginning's time in which the speed at its end is measured.
+ * @returns {Prefixes}
+ */
+export function beginnings(paths, d, progress, { shapes: how, numbers }) {
   const [S, G, n] = [how.n_segments + 1, progress.length, paths.length / (d * N_POINTS)];
   const room = (size) => new Float64Array(n * G * size);
   const [squares, sizes, lengths, elapsed, endSpeeds] = [1, 1, 1, 1, 1].map(room);
@@ -38,8 +39,8 @@ export function beginnings(paths, d, progress, how) {
       for (let k = 0; k < d; k++)
         own.set(interpolate(targets, phase, path.subarray(k * N_POINTS, (k + 1) * N_POINTS)), k * S);
       describeBeginning(found, at, own, times, d, S);
-      const before = interpolate([(1 - LAST) * times[S - 1]], even, phase)[0];
-      endSpeeds[at] = Math.log(Math.max((1 - before / progress[g]) / LAST, LEAST_SPEED));
+      const before = interpolate([(1 - numbers.last) * times[S - 1]], even, phase)[0];
+      endSpeeds[at] = Math.log(Math.max((1 - before / progress[g]) / numbers.last, numbers.least_speed));
     }
   }
   return found;
@@ -81,7 +82,7 @@ export function hypotheses(known) {
   const { early, comparison, n_movements: m } = header;
   const G = early.n_progress;
   const progress = Float64Array.from({ length: G }, (_, g) => (g + 1) / G);
-  const prefixes = beginnings(arrays.paths, comparison.n_dims, progress, early.shapes);
+  const prefixes = beginnings(arrays.paths, comparison.n_dims, progress, early);
   const S = early.shapes.n_segments + 1;
   const each = (value) => Float64Array.from({ length: m * G }, (_, h) => value(h));
   return {

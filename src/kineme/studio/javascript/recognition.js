@@ -5,14 +5,8 @@ import { certainty } from "./certainty.js";
 import { describeMovement, fillShapes, featureRows, N_POINTS, roomForShapes } from "./description.js";
 import { squaredDistances } from "./distances.js";
 
-const LEAST = 5e-3; // smallest distance that counts, in kernel widths
-const NO_DISTANCE = 1e-5; // of a log similarity: rounding
-const REACH_OF_STRANGERS = 0.9; // of the typical distance between classes: how far people differ at the most
-const REACH_TO_NEXT = 2 / 3; // of the distance to the next class
 const SCALE_OF_REACH = Math.sqrt(Math.PI / 4 / Math.log(20)); // by which the broad law is 0.05 at a reach of 1
-const GUESSES = ["strangers", "guess"]; // rules that promise nothing
 const SHOWN = 3; // movements named in an answer
-const MEAN_IN_EIGHT = (Math.SQRT2 * 11.631728396567448) / 6; // of chi with 8 degrees of freedom: gamma(4.5) / gamma(4)
 
 /** A-averages of kernels given by their logarithms. */
 const MEANS = {
@@ -37,6 +31,15 @@ const SHARES = {
  * @property {Object} header
  * @property {Object} arrays
  * @property {import("./distances.js").Stored} stored
+ *
+ * @typedef {Object} Calibration in the header, beside other numbers
+ * @property {number} least smallest distance that counts, in kernel widths
+ * @property {number} rounding of a log similarity: no distance
+ * @property {number} reach_of_strangers of the typical distance between classes: how far people differ at the most
+ * @property {number} reach_to_next of the distance to the next class
+ * @property {number} dimensions in which members of a class vary, about; even
+ * @property {number} mean_length of normal vectors in these
+ * @property {string[]} guesses rules that promise nothing
  *
  * @typedef {Object} Answer
  * @property {string|null} label null: unknown
@@ -139,15 +142,20 @@ export function compare(known, described) {
 }
 
 /** `sqrt(-2 log K)`: the distance, in kernel widths, of an averaged similarity. */
-const distance = (log) => (log < -NO_DISTANCE ? Math.sqrt(-2 * log) : 0);
+const distance = (log, { rounding }) => (log < -rounding ? Math.sqrt(-2 * log) : 0);
 
 /** Share of distances above a score, broad: normal vectors in the plane. */
 const broadLaw = (score) => Math.exp(-0.25 * Math.PI * score * score);
 
-/** The same of normal vectors in eight dimensions. */
-function law(score) {
-  const y = 0.5 * (MEAN_IN_EIGHT * score) ** 2;
-  return Math.exp(-y) * (1 + y + (y * y) / 2 + (y * y * y) / 6);
+/** The same of normal vectors in more dimensions, an even number. @param {number} score @param {Calibration} numbers */
+function law(score, { dimensions, mean_length: mean }) {
+  const y = 0.5 * (mean * score) ** 2;
+  let [sum, term] = [0, 1];
+  for (let k = 1; k <= dimensions / 2; k++) {
+    sum += term;
+    term *= y / k;
+  }
+  return Math.exp(-y) * sum;
 }
 
 /** `(1 + #{calibrating >= score}) / (number + 1)`, of rising numbers. */
@@ -174,11 +182,11 @@ function counted(known, kind, c, errorRate) {
 
 /** The p-value if somebody else made the movement; 0 where groups tell how much people differ. */
 function byStrangers(known, away) {
-  const { between } = known.header.calibration;
+  const { between, least, reach_of_strangers: most, reach_to_next: share } = known.header.calibration;
   if (!between) return 0;
   const [nearest, next = Infinity] = Float64Array.from(away).sort();
-  const reach = Math.min(REACH_OF_STRANGERS * between, REACH_TO_NEXT * next);
-  return broadLaw(nearest / Math.max(reach * SCALE_OF_REACH, LEAST));
+  const reach = Math.min(most * between, share * next);
+  return broadLaw(nearest / Math.max(reach * SCALE_OF_REACH, least));
 }
 
 /**
@@ -188,14 +196,17 @@ function byStrangers(known, away) {
  * @param {number} errorRate
  */
 function pValues(known, nearest, errorRate) {
-  const away = nearest.map(distance);
+  const { calibration } = known.header;
+  const away = nearest.map((log) => distance(log, calibration));
   const scores = away.map((one, c) => one / known.arrays.scales[c]);
   const found = Array.from(scores, (_, c) => counted(known, "scores", c, errorRate));
   const each = scores.map((score, c) => (found[c].scores ? shareAbove(found[c].scores, score) : broadLaw(score)));
   const like = scores.reduce((best, score, c) => (score < scores[best] ? c : best), 0);
   const all = counted(known, "novelties", like, errorRate);
   const mean = all.pooled.reduce((sum, one) => sum + one, 0) / all.pooled.length;
-  const guess = all.pooled.length ? law(scores[like] / Math.max(mean, LEAST)) : broadLaw(scores[like]);
+  const guess = all.pooled.length
+    ? law(scores[like] / Math.max(mean, calibration.least), calibration)
+    : broadLaw(scores[like]);
   const shown = all.scores ? shareAbove(all.scores, scores[like]) : guess;
   const strangers = byStrangers(known, away);
   return {
@@ -208,8 +219,9 @@ function pValues(known, nearest, errorRate) {
 
 /** Probability of each class for movements of one of them: the odds are ratios of distances to the power fitted. */
 function probabilities(known, similar) {
-  const { exponent } = known.header.calibration;
-  return softmax(similar.map((log) => -exponent * Math.log(Math.max(distance(log), LEAST))));
+  const { calibration } = known.header;
+  const { exponent, least } = calibration;
+  return softmax(similar.map((log) => -exponent * Math.log(Math.max(distance(log, calibration), least))));
 }
 
 /**
@@ -220,7 +232,7 @@ function probabilities(known, similar) {
  * @returns {Answer}
  */
 export function recognize(known, one, errorRate = 0.05) {
-  const { comparison: how, classes, first } = known.header;
+  const { calibration, comparison: how, classes, first } = known.header;
   const compared = compare(known, describeMovement(one, how, known.arrays));
   const p = pValues(known, compared.nearest, errorRate);
   const possible = p.each.some((share) => share > errorRate);
@@ -244,7 +256,10 @@ export function recognize(known, one, errorRate = 0.05) {
     pValues: Object.fromEntries(classes.map((name, c) => [name, p.each[c]])),
     probabilities: Object.fromEntries(classes.map((name, c) => [name, odds[c]])),
     rule: p.rule,
-    certainty: certainty(known.header.certainty, odds[shown], { isNew: !isKnown, isGuess: GUESSES.includes(p.rule) }),
+    certainty: certainty(known.header.certainty, odds[shown], {
+      isNew: !isKnown,
+      isGuess: calibration.guesses.includes(p.rule),
+    }),
     calibrated: p.calibrated,
     ranked: ranked.map((c) => classes[c]),
     nearest,

@@ -229,7 +229,9 @@ export function encode({ header, arrays }, one) {
  * @property {[number, number[]][]} [via]
  * @property {number[]} [endVelocity]
  * @property {number} [samples]
- *
+ */
+
+/**
  * The movement to a new start and goal; see `kineme.Primitives.rollout`.
  * @param {import("./arrays.js").Snapshot} snapshot
  * @param {Primitive} one

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -11,12 +12,15 @@ from numpy.typing import NDArray
 from kineme.errors import SpecificationError
 from kineme.kernels.procrustes import Procrustes
 from kineme.kernels.shapes import Shapes
-from kineme.movements.preparation.pauses import without_pauses
+from kineme.movements.preparation import pauses
 from kineme.movements.preparation.smooth import spline_matrix
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.recognition import left_out
 from kineme.recognition.certainty import LEAST_CONFIDENCE
 from kineme.recognition.classifiers import Classifier, Nearest, NearestEach, Prototype
-from kineme.recognition.conformal import Calibration
+from kineme.recognition.conformal import GUESSES, Calibration
+from kineme.recognition.early import evidence, prefixes
+from kineme.recognition.early import hypotheses as beginnings
 from kineme.recognition.early.hypotheses import Early, hypotheses
 from kineme.recognition.known_classes import KnownClasses
 from kineme.similarity.comparison import Comparison
@@ -62,7 +66,7 @@ def recognition_parts(known: KnownClasses) -> Snapshot:
     arrays: dict[str, NDArray[Any]] = {
         "paths": paths.astype(np.float32),
         "starts": _starts(demos),
-        "durations": np.asarray((without_pauses(demos, 0, len(demos)) or demos).durations, dtype=np.float64),
+        "durations": np.asarray((pauses.without_pauses(demos, 0, len(demos)) or demos).durations, dtype=np.float64),
         **comparison_arrays,
         **calibration_arrays,
     }
@@ -89,6 +93,7 @@ def _comparison(how: Comparison, pairs: Any) -> tuple[dict[str, Any], dict[str, 
         "cutoff": how.cutoff,
         "translation": how.normalization.translation,
         "scale": how.normalization.scale,
+        "pauses": pause_rule(),
         "mean": how.mean,
         "rule": rotation_rule(how.procrustes),
         "by_rows": rows,
@@ -115,6 +120,17 @@ def _row_representation(one: Representation, r: int) -> tuple[dict[str, Any], di
         row["resample"] = f"resample {r}"
         arrays[row["resample"]] = spline_matrix(N_POINTS, one.n_points)
     return row, arrays
+
+
+def pause_rule() -> dict[str, float]:
+    """Return how pauses within movements are cut short."""
+    names = "RADIUS GAP PAUSE REST LAST_REST SHORTEST WINDOWS FEWEST EQUAL WHOLE ROUNDS"
+    return _numbers(pauses, *names.split())
+
+
+def _numbers(module: ModuleType, *names: str) -> dict[str, float]:
+    """Return constants of a module by their names in small letters; the runtime has none of them itself."""
+    return {name.lower(): getattr(module, name) for name in names}
 
 
 def rotation_rule(procrustes: Procrustes) -> dict[str, Any]:
@@ -176,7 +192,12 @@ def _calibration(calibration: Calibration) -> tuple[dict[str, Any], dict[str, ND
     for name, several in parts.items():
         arrays[name] = np.concatenate([np.sort(one) for one in several])
         arrays[f"{name} ends"] = np.cumsum([len(one) for one in several]).astype(np.int32)
-    header = {"between": calibration.between, "exponent": calibration.exponent}
+    header = {
+        "between": calibration.between,
+        "exponent": calibration.exponent,
+        "guesses": list(GUESSES),
+        **_numbers(left_out, "LEAST", "ROUNDING", "DIMENSIONS", "MEAN_LENGTH", "REACH_OF_STRANGERS", "REACH_TO_NEXT"),
+    }
     return {"pooled": [numbers[pair] for pair in shared], **header}, arrays
 
 
@@ -194,4 +215,9 @@ def early_part(known: KnownClasses, early: Early | None = None) -> dict[str, Any
         "widths": made.widths.tolist(),
         "over": list(made.ending.over),
         "before": list(made.ending.before),
+        "numbers": {
+            **_numbers(evidence, "COMPARED", "WIDENED", "ROTATION", "SPEED_SPREAD", "PROGRESS", "POWER", "NEGLIGIBLE"),
+            **_numbers(beginnings, "MOST_ODDS", "PRIOR_ODDS", "LOG_UNKNOWN", "TEMPER", "EXPLAINING"),
+            **_numbers(prefixes, "LAST", "LEAST_SPEED"),
+        },
     }

@@ -8,7 +8,9 @@
  * @property {(samples: Sample[]) => void} goes
  * @property {() => void} ends
  * @property {(at: number[]|null) => void} [pen] Where the pen of the keyboard is.
- *
+ */
+
+/**
  * @param {HTMLCanvasElement} canvas
  * @param {Hearer} hear
  */
