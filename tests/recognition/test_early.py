@@ -206,7 +206,7 @@ def test_a_movement_that_is_over_is_recognized_as_a_whole(monkeypatch):
         return np.log(shares[np.arange(len(parts)), np.searchsorted(recognizer.classes_, parts.labels)] / shares[:, -1])
 
     over, half = log_odds(1.0), log_odds(0.5)
-    monkeypatch.setattr(evidence, "_NEGLIGIBLE", -np.inf)  # nothing is compared as a whole
+    monkeypatch.setattr(evidence, "NEGLIGIBLE", -np.inf)  # nothing is compared as a whole
     assert np.median(over - log_odds(1.0)) > 0.5
     assert np.abs(half - log_odds(0.5)).max() < 0.05
 

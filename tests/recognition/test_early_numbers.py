@@ -85,7 +85,7 @@ def test_speed_at_the_end_and_progress_count_among_the_other_densities(monkeypat
     own = stored.prefixes.end_speeds[5]
     same, faster = priors(np.array([own])), priors(np.array([own + 0.5]))
     assert same[5] - faster[5] == pytest.approx(math.log(1.5))
-    monkeypatch.setattr(evidence, "_PROGRESS", 0.0)
+    monkeypatch.setattr(evidence, "PROGRESS", 0.0)
     counted = same - priors(np.array([own]))
     np.testing.assert_allclose(counted, np.tile(0.25 * np.log(stored.progress), 2))
 
@@ -102,7 +102,7 @@ def test_a_class_of_what_is_over_counts_by_its_most_similar_movement_whatever_it
 
 
 def test_the_similarity_of_whole_movements_counts_to_the_power_of_three():
-    assert evidence._POWER == 3.0
+    assert evidence.POWER == 3.0
 
 
 def test_digits_of_other_people_are_known_at_the_end_as_whole_movements_are(digits):
