@@ -6,7 +6,7 @@ import numpy as np
 
 import kineme
 from kineme.robots import load
-from kineme.robots.checks.along import along
+from kineme.robots.execution.along import along
 from kineme.robots.execution.joint_trajectory import JointTrajectory
 from kineme.robots.kinematics.inverse import InverseKinematics
 

@@ -10,7 +10,7 @@ import numpy as np
 from bench.rows import Row
 from kineme import Trajectory
 from kineme.robots import Robot, move
-from kineme.robots.checks.along import along
+from kineme.robots.execution.along import along
 from kineme.robots.execution.joint_trajectory import JointTrajectory
 from kineme.validation import Array
 

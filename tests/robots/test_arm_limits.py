@@ -14,7 +14,7 @@ import kineme
 from arm_samples import simulated, stroke, tip_in
 from kineme.errors import TrajectoryError
 from kineme.robots import load, move
-from kineme.robots.execution.retime import fastest, sampled
+from kineme.robots.execution.timing import fastest, sampled
 from kineme.robots.kinematics.descent import postures
 from kineme.robots.kinematics.inverse import InverseKinematics
 from kineme.robots.models.load import MODELS

@@ -14,11 +14,10 @@ import kineme
 from arm_samples import simple_arm, stroke
 from kineme.errors import TrajectoryError
 from kineme.robots import InfeasibleError, JointTrajectory, load, move, preflight
-from kineme.robots.checks.along import along
-from kineme.robots.execution.between import _bernstein, between, dense_times, extreme
-from kineme.robots.execution.retime import _by_length as by_length
-from kineme.robots.execution.retime import fastest, sampled
-from kineme.robots.execution.timing import Torques, as_generated
+from kineme.robots.execution.along import along
+from kineme.robots.execution.joint_trajectory import _bernstein, between, dense_times, extreme
+from kineme.robots.execution.timing import Torques, as_generated, fastest, sampled
+from kineme.robots.execution.timing import _by_length as by_length
 from soaking import SOAK, examples
 
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from arm_samples import simple_arm
 from kineme.robots import InfeasibleError, JointTrajectory, load, move, preflight
-from kineme.robots.checks.along import along
+from kineme.robots.execution.along import along
 from kineme.robots.execution.timing import approach
 from kineme.robots.kinematics.task_path import TaskPath
 

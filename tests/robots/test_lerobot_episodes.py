@@ -13,7 +13,7 @@ from kineme.errors import DataError, SpecificationError
 from kineme.io.lerobot import write_episode as module
 from kineme.io.lerobot.write_episode import merged_statistics, statistics_of
 from kineme.robots.execution.joint_trajectory import JointTrajectory
-from kineme.robots.export.lerobot import states_at, write_lerobot
+from kineme.robots.export_files import states_at, write_lerobot
 from lerobot_sets import write_v2, write_v3
 
 

@@ -11,11 +11,10 @@ from scipy.interpolate import CubicSpline
 import kineme
 from arm_samples import stroke
 from kineme.robots import load, move
-from kineme.robots.checks.along import along
-from kineme.robots.execution.between import between
-from kineme.robots.execution.retime import fastest
-from kineme.robots.execution.timing import as_generated
-from kineme.robots.planning import timed_movement
+from kineme.robots.execution.along import along
+from kineme.robots.execution.joint_trajectory import between
+from kineme.robots.execution.timing import as_generated, fastest
+from kineme.robots.planning import robot_movement
 
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")
 
@@ -93,7 +92,7 @@ def test_the_fastest_is_never_slower_than_the_movement_itself_where_that_passes(
 
 def test_a_path_without_any_timing_is_slowed_down(monkeypatch):
     robot = _robot("ur5e")
-    monkeypatch.setattr(timed_movement, "fastest", lambda *_: None)
+    monkeypatch.setattr(robot_movement, "fastest", lambda *_: None)
     slowed, fast = (move(stroke(robot, 0.8), robot, timing=timing) for timing in ("slowed", "fastest"))
     assert fast.preflight.passed
     assert fast.factor == slowed.factor > 1

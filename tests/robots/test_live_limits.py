@@ -16,7 +16,7 @@ import kineme
 from arm_samples import stroke
 from kineme.orientation import PoseDMP, exp, product
 from kineme.robots import ArmController, ArmStatus, load
-from kineme.robots.live.live_kinematics import Braking, brakeable
+from kineme.robots.arm_controller import Braking, brakeable
 from soaking import SOAK, combined, examples
 
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")

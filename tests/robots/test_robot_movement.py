@@ -12,7 +12,7 @@ from kineme.dmp.generation.learned import learn_one
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.orientation import PoseDMP
 from kineme.robots import InfeasibleError, load, move
-from kineme.robots.checks.along import along
+from kineme.robots.execution.along import along
 from kineme.robots.kinematics.inverse import InverseKinematics
 from kineme.robots.models.load import MODELS
 from kineme.robots.planning.generate_at import generate_at

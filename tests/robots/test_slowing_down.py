@@ -12,7 +12,7 @@ import kineme
 from arm_samples import simple_arm, stroke
 from kineme.errors import KinemeError
 from kineme.robots import InfeasibleError, load, move
-from kineme.robots.planning import timed_movement
+from kineme.robots.planning import robot_movement
 from soaking import SOAK, combined
 
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")
@@ -54,10 +54,10 @@ def test_of_the_two_timings_the_shorter_that_passes_is_taken(monkeypatch, along_
     def slowed(untimed, course, most, follows=False):
         return made("along path", *along_path) if follows else made("as shown", *as_shown)
 
-    monkeypatch.setattr(timed_movement, "fastest", lambda robot, joints: "a parameterization")
-    monkeypatch.setattr(timed_movement, "_slowed", slowed)
+    monkeypatch.setattr(robot_movement, "fastest", lambda robot, joints: "a parameterization")
+    monkeypatch.setattr(robot_movement, "_slowed", slowed)
     untimed = SimpleNamespace(robot=None, joints=None, rate=100.0)
-    assert timed_movement.with_timing(untimed, "fastest").name == chosen
+    assert robot_movement.with_timing(untimed, "fastest").name == chosen
 
 
 def test_what_a_refusal_promises_holds():

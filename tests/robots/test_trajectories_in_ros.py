@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kineme.robots.execution.joint_trajectory import JointTrajectory
-from kineme.robots.export.ros import STATES, TOPIC, write_action_goal, write_bag
+from kineme.robots.export_files import STATES, TOPIC, write_action_goal, write_bag
 from ros_programs import ros_1, ros_2
 
 _AS_SAID = """

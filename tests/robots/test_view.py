@@ -21,7 +21,7 @@ pytest.importorskip("pinocchio", reason="the extra robot is not installed")
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.reporting import figures
 from kineme.robots import load, move, write_view
-from kineme.robots.checks.along import along
+from kineme.robots.execution.along import along
 from kineme.robots.kinematics.inverse import InverseKinematics
 from kineme.robots.models.load import MODELS
 from kineme.robots.view import shapes as module

@@ -15,7 +15,7 @@ from browsing import Pages, wait_until
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")
 
 from kineme.robots import load, write_view
-from kineme.robots.checks.along import along
+from kineme.robots.execution.along import along
 from soaking import combined
 
 WIDTHS = (390, 820, 1440)

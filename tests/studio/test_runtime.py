@@ -20,9 +20,7 @@ from node_runtime import NODE, REASON, RUNTIME, ask, question
 import kineme
 from kineme.movements.preparation.pauses import cut_pauses
 from kineme.recognition.certainty import LEAST_CONFIDENCE, certainty
-from kineme.studio.snapshot.make import snapshot_of_recognizer
-from kineme.studio.snapshot.recognition import pause_rule
-from kineme.studio.snapshot.snapshot import Snapshot
+from kineme.studio.snapshot import Snapshot, pause_rule, snapshot_of_recognizer
 from movement_samples import draw_shapes, stepped, turn
 from soaking import SOAK
 

@@ -16,7 +16,7 @@ from kineme.errors import SpecificationError
 from kineme.movements.preparation import pauses
 from kineme.recognition import left_out
 from kineme.recognition.early import evidence, hypotheses, prefixes
-from kineme.studio.snapshot.make import MOST_NUMBERS, snapshot_of_library, snapshot_of_recognizer
+from kineme.studio.snapshot import MOST_NUMBERS, snapshot_of_library, snapshot_of_recognizer
 from movement_samples import draw_shapes
 
 RUNTIME = Path(kineme.__file__).parent / "studio" / "javascript"

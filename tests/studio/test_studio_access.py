@@ -338,10 +338,10 @@ def test_an_error_of_our_own_is_no_traceback_for_the_client(client, monkeypatch,
     def fail(self):
         raise RuntimeError("secret")
 
-    monkeypatch.setattr(Studio, "shown", fail)
+    monkeypatch.setattr(Studio, "view", fail)
     answer = client.get("/api/library/movements?symbol=x")
     assert answer.status_code == 500
-    assert "secret" not in answer.text
+    assert answer.json() == {"error": "internal error; details are in the server log"}
     assert caplog.text.count("RuntimeError: secret") == 1
     assert "script-src 'self'" in answer.headers["content-security-policy"]
 

@@ -159,18 +159,18 @@ def test_what_is_shown_is_made_again_if_the_library_changes_meanwhile(client, fo
                 raise DataError("what was looked for is gone")
         return seen[-1]
 
-    assert studio.kept("seen", make) == studio.library.version == 2
+    assert studio.cached("seen", make) == studio.library.version == 2
     assert seen == [1, 2]
-    assert studio.kept("seen", make) == 2
+    assert studio.cached("seen", make) == 2
     assert len(seen) == 2
 
 
 def test_of_many_things_the_last_200_are_kept(client):
     studio, made = client.app.state.studio, []
     for k in [*range(250), 249, 0]:
-        assert studio.kept_some("squares", str(k), lambda k=k: made.append(k) or k * k) == k * k
+        assert studio.cached_item("squares", str(k), lambda k=k: made.append(k) or k * k) == k * k
     assert made == [*range(250), 0]
-    assert len(studio.kept("squares", dict)) == 200
+    assert len(studio.cached("squares", dict)) == 200
 
 
 def test_a_library_that_another_process_writes_is_busy_not_wrong(client, folder):

@@ -16,11 +16,10 @@ from studio_samples import LIVE, asked, make_library, samples
 from kineme import ActionLibrary
 from kineme.errors import DataError, TrajectoryError
 from kineme.studio.page.write_page import library_page
-from kineme.studio.server.changes import Changes
-from kineme.studio.server.live_socket import _Client, parsed_samples
+from kineme.studio.server.live_socket import _Client, _Received, parsed_samples
 from kineme.studio.server.live_sources import MOST, Follower, Sources
-from kineme.studio.server.studio import Studio
-from kineme.studio.snapshot.recognition import DRAWN
+from kineme.studio.server.studio import Changes, Studio
+from kineme.studio.snapshot import DRAWN
 
 
 def _said(socket, kind):
@@ -408,7 +407,7 @@ def test_a_page_that_does_not_read_delays_no_program_and_is_told_all_of_it_in_th
 
         sources = Sources()
         page = _Client(SimpleNamespace(send_text=send_text), None, sources)
-        page._watch()
+        await page._answer(_Received(command="watch"))
         source = sources.add()
         for k in range(500):
             source.update(np.array([[k, 1.0, 2.0]]), {"k": k})  # returns at once

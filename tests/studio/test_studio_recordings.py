@@ -22,7 +22,7 @@ from kineme import ActionLibrary
 from kineme.errors import DataError
 from kineme.io.reading.recordings import read_recordings
 from kineme.studio.server import app, read_upload, recording_routes, uploads
-from kineme.studio.server import work as work_module
+from kineme.studio.server import studio as work_module
 from kineme.studio.server.refusals import MissingError
 
 

@@ -18,7 +18,7 @@ from kineme.dmp.discrete.formulations import FORMULATIONS
 from kineme.dmp.styles.model import learn_styles
 from kineme.movements.channels.channel import Channel
 from kineme.movements.trajectories.movements import of_channels
-from kineme.studio.server import rollouts
+from kineme.studio.server import rollout_routes
 
 
 @pytest.fixture
@@ -57,7 +57,7 @@ def test_it_passes_via_points_at_their_time(client, symbol):
 
 
 def test_rollouts_do_not_wait_for_each_other_and_each_has_its_own_warnings(client, symbol, monkeypatch):
-    around, entered, may_go = rollouts._around, Event(), Event()
+    around, entered, may_go = rollout_routes._around, Event(), Event()
 
     def slow(learned, options, balls):
         if options.goal is not None:
@@ -65,7 +65,7 @@ def test_rollouts_do_not_wait_for_each_other_and_each_has_its_own_warnings(clien
             assert may_go.wait(300)
         return around(learned, options, balls)
 
-    monkeypatch.setattr(rollouts, "_around", slow)
+    monkeypatch.setattr(rollout_routes, "_around", slow)
     with ThreadPoolExecutor(1) as pool:
         first = pool.submit(_rollout, client, {"symbol": symbol}, goal=[3.0, -1.0])
         assert entered.wait(300)

@@ -93,23 +93,26 @@ def anchor(folder: Path, **options: Any) -> None:
             **_as_data(proposals),
             "pictures": [str(path) for path in pictures],
         }
-        alone = _named(library, proposals.left_over)
+        alone, ids = "", proposals.left_over  # names of the first movements that are left over
+        if len(ids):
+            shown = library.movements(ids=ids[:_SHOWN]).names or ()
+            words = [printable(name or key) for name, key in zip(shown, ids.tolist(), strict=False)]
+            alone = ": " + ", ".join([*words, *(["..."] if len(ids) > _SHOWN else [])])
         if interactive:
             write(_text(data, alone))
             Session(library, proposals, pictures[1:]).run()
             return
-        data["accepted"] = _accept(library, proposals, accepted, names)
-        data["rejected"] = _reject(library, proposals, rejected)
+        data["accepted"] = {}
+        for number in accepted:
+            taken = {symbol.name for symbol in library.symbols()}
+            free = (f"cluster {k}" for k in range(number, number + len(taken) + 1) if f"cluster {k}" not in taken)
+            name = names.get(number) or next(free)
+            library.accept(proposals[number - 1], name)
+            data["accepted"][name] = len(proposals[number - 1])
+        for number in rejected:
+            library.reject(proposals[number - 1])
+        data["rejected"] = rejected
     say(options["as_json"], data, lambda: _text(data, alone))
-
-
-def _named(library: Any, ids: Any) -> str:
-    """Names of the first movements."""
-    if not len(ids):
-        return ""
-    names = library.movements(ids=ids[:_SHOWN]).names or ()
-    shown = [printable(name or key) for name, key in zip(names, ids.tolist(), strict=False)]
-    return ": " + ", ".join([*shown, *(["..."] if len(ids) > _SHOWN else [])])
 
 
 def _names(path: Path | None) -> dict[int, str]:
@@ -144,8 +147,8 @@ def _draw(library: Any, proposals: Any, folder: Path) -> list[Path]:
     movements = library.movements(ids=proposals.ids)
     like = library.specification.comparison
     paths = [save_figure(draw_proposals(movements, proposals.by_position, like), folder / "all.png")]
-    for number, one in enumerate(proposals.by_position.proposals, 1):
-        paths.append(save_figure(draw_proposal(movements, one, like=like), folder / f"proposal-{number}.png"))
+    for number, proposal in enumerate(proposals.by_position.proposals, 1):
+        paths.append(save_figure(draw_proposal(movements, proposal, like=like), folder / f"proposal-{number}.png"))
     number = len(proposals) + 1
     while (stale := folder / f"proposal-{number}.png").exists():  # of an earlier run
         stale.unlink()
@@ -154,7 +157,7 @@ def _draw(library: Any, proposals: Any, folder: Path) -> list[Path]:
 
 
 def _chosen(proposals: Any, choice: Any, option: str) -> list[int]:
-    """Numbers of proposals, from 1."""
+    """Return numbers of proposals, from 1."""
     numbers = range(1, len(proposals) + 1) if choice == "all" else choice or []
     for number in numbers:
         if not 1 <= number <= len(proposals):
@@ -164,40 +167,18 @@ def _chosen(proposals: Any, choice: Any, option: str) -> list[int]:
     return list(dict.fromkeys(numbers))
 
 
-def _accept(library: Any, proposals: Any, chosen: list[int], names: dict[int, str]) -> dict[str, int]:
-    done = {}
-    for number in chosen:
-        one = proposals[number - 1]
-        name = names.get(number) or _free_name(library, number)
-        library.accept(one, name)
-        done[name] = len(one)
-    return done
-
-
-def _free_name(library: Any, number: int) -> str:
-    """The number of the proposal as a name; of one that a symbol has, the next free number."""
-    taken = {symbol.name for symbol in library.symbols()}
-    return next(name for k in range(number, number + len(taken) + 1) if (name := f"cluster {k}") not in taken)
-
-
-def _reject(library: Any, proposals: Any, chosen: list[int]) -> list[int]:
-    for number in chosen:
-        library.reject(proposals[number - 1])
-    return chosen
-
-
 def _as_data(proposals: Any) -> dict[str, Any]:
     return {
         "proposals": [
             {
                 "number": number,
-                "movements": [int(i) for i in one.members],
-                "medoid": one.medoid,
-                "cohesion": one.cohesion,
-                "stability": one.stability,
-                "nearest": None if one.nearest is None else one.nearest + 1,
+                "movements": [int(i) for i in proposal.members],
+                "medoid": proposal.medoid,
+                "cohesion": proposal.cohesion,
+                "stability": proposal.stability,
+                "nearest": None if proposal.nearest is None else proposal.nearest + 1,
             }
-            for number, one in enumerate((proposals[i] for i in range(len(proposals))), 1)
+            for number, proposal in enumerate((proposals[i] for i in range(len(proposals))), 1)
         ],
         "left_over": [int(i) for i in proposals.left_over],
     }
@@ -256,7 +237,9 @@ class Session:
             write("Give each a name; /help says what else there is.")
         while self.items:
             item = self.items[0]
-            write(self._summary(item))
+            size, stability = counted(len(item.proposal), "movement"), item.proposal.stability
+            where = f"; see {printable(item.picture)}" if item.picture else ""
+            write(f"\n{item.title}: {size}, stability {stability:.2f}{where}")
             try:
                 line = ask("name")
             except click.Abort:
@@ -278,9 +261,17 @@ class Session:
         if command == "/help":
             write(HELP)
         elif command == "/members":
-            self._members(item)
+            names = self.library.movements(ids=item.proposal.members).names or ()
+            for key, name in zip(item.proposal.members.tolist(), names, strict=False):
+                write(f"  {key}  {printable(name or '')}")
         elif command == "/split":
-            self._split(item)
+            parts = self.library.propose(item.proposal.members, n_clusters=2, min_members=2)
+            if len(parts) < 2:
+                write("  no two clusters of two movements or more in it")
+            else:
+                self.items.popleft()
+                halves = (Item(f"{item.title}{'ab'[k]}", parts[k], None) for k in range(len(parts)))
+                self.items.extendleft(reversed(list(halves)))
         elif command == "/reject":
             self.library.reject(item.proposal)
             self.items.popleft()
@@ -301,22 +292,3 @@ class Session:
         self.items.popleft()
         symbol = self.library[name]
         write(f"  {printable(symbol.name)}: {counted(len(symbol), 'movement')} ({symbol.id})")
-
-    def _split(self, item: Item) -> None:
-        parts = self.library.propose(item.proposal.members, n_clusters=2, min_members=2)
-        if len(parts) < 2:
-            write("  no two clusters of two movements or more in it")
-            return
-        self.items.popleft()
-        for k in reversed(range(len(parts))):
-            self.items.appendleft(Item(f"{item.title}{'ab'[k]}", parts[k], None))
-
-    def _members(self, item: Item) -> None:
-        names = self.library.movements(ids=item.proposal.members).names or ()
-        for key, name in zip(item.proposal.members.tolist(), names, strict=False):
-            write(f"  {key}  {printable(name or '')}")
-
-    def _summary(self, item: Item) -> str:
-        one = item.proposal
-        where = f"; see {printable(item.picture)}" if item.picture else ""
-        return f"\n{item.title}: {counted(len(one), 'movement')}, stability {one.stability:.2f}{where}"

@@ -65,56 +65,48 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
     from kineme.io.writing.annotations import targets_of, write_annotations
     from kineme.library.annotate import annotate as find
     from kineme.library.library import ActionLibrary
+    from kineme.recognition.certainty import certainty
 
-    as_json, as_csv, force, error_rate = (options.pop(one) for one in ("as_json", "as_csv", "force", "error_rate"))
+    as_json, as_csv, force, error_rate = (options.pop(name) for name in ("as_json", "as_csv", "force", "error_rate"))
     if as_csv and (as_json or output is not None):
         raise click.UsageError("expected --csv alone, or --json, or --output")
     if output is None and form is not None:
         raise click.UsageError("expected --output with --format")
-    sources = [one for path in recordings for one in expanded(path)]
+    sources = [source for path in recordings for source in expanded(path)]
     with ActionLibrary(folder, read_only=True) as library:
         parsed = read(recordings, options, library)
         movements = [(source.path, source.place) for source in parsed.sources]
         if output is not None:
             for target in targets_of(output, sources, movements, form):
                 check_new(target, force, *sources, *paths_of(recordings, parsed))
-                _check_folder(target, force)
+                if target.is_dir() and any(target.iterdir()) and not force:
+                    raise click.UsageError(
+                        f"expected a new folder to write, {printable(target)} is there; write over it with --force"
+                    )
         with _progress(parsed) as progress:
-            found = find(library.store, parsed, error_rate, progress)
+            report = find(library.store, parsed, error_rate, progress)
         notes = known_choices(parsed, options, library.channels) + notes_on_gaps(parsed)
         notes += differences(library.channels, parsed.demonstrations.channels)
-    written = [] if output is None else write_annotations(output, found.annotations, sources, form, movements)
+    written = [] if output is None else write_annotations(output, report.annotations, sources, form, movements)
+    is_guess = not report.calibrated
     data = {
         "annotations": [
-            as_row(annotation) | {"certainty": _certainty(annotation, found.calibrated)}
-            for annotation in found.annotations
+            as_row(each) | {"certainty": certainty(each.confidence, is_new=each.unknown, is_guess=is_guess)}
+            for each in report.annotations
         ],
         "seconds": float(parsed.demonstrations.durations.sum()),
-        "calibrated": found.calibrated,
-        "written": [str(one) for one in written],
+        "calibrated": report.calibrated,
+        "written": list(map(str, written)),
         "notes": notes,
-        "problems": [str(problem) for problem in (*parsed.problems, *found.problems)],
+        "problems": [str(problem) for problem in (*parsed.problems, *report.problems)],
     }
-    problems = problem_lines((*parsed.problems, *found.problems), "not annotated: ")
+    problems = problem_lines((*parsed.problems, *report.problems), "not annotated: ")
     if as_csv:
-        write(to_csv(found.annotations).decode().removesuffix("\n"))
+        write(to_csv(report.annotations).decode().removesuffix("\n"))
         for line in _remarks(data, problems):
             write(line, err=True)
     else:
         say(as_json, data, lambda: _text(data, problems))
-
-
-def _certainty(one: Any, calibrated: bool) -> str:
-    from kineme.recognition.certainty import certainty
-
-    return certainty(one.confidence, is_new=one.unknown, is_guess=not calibrated)
-
-
-def _check_folder(target: Path, force: bool) -> None:
-    if target.is_dir() and any(target.iterdir()) and not force:
-        raise click.UsageError(
-            f"expected a new folder to write, {printable(target)} is there; write over it with --force"
-        )
 
 
 @contextmanager
@@ -133,52 +125,39 @@ def _progress(parsed: Any) -> Iterator[Callable[[float], None]]:
 
 
 def _text(data: dict[str, Any], problems: list[str]) -> str:
-    from kineme.reporting.table import to_text
+    from kineme.reporting.table import Table, to_text
 
     rows, written = data["annotations"], data["written"]
-    known = [row for row in rows if not row["unknown"]]
-    said = f"{counted(len(known), 'movement')} of {counted(len({one['symbol'] for one in known}), 'symbol')}"
-    lines = [f"{said}, {len(rows) - len(known):,} unknown, in {data['seconds']:,.1f} s"]
-    if rows:
-        lines.append(to_text(_totals(rows) if written else _each(rows)))
-    return "\n".join([*lines, *_remarks(data, problems), *(f"written to {printable(one)}" for one in written)])
+    symbols = [row["symbol"] for row in rows if not row["unknown"]]
+    counts = f"{counted(len(symbols), 'movement')} of {counted(len(set(symbols)), 'symbol')}"
+    lines = [f"{counts}, {len(rows) - len(symbols):,} unknown, in {data['seconds']:,.1f} s"]
+    names = ["unknown" if row["unknown"] else printable(row["symbol"]) for row in rows]
+    if rows and written:
+        seconds: Counter[str] = Counter()
+        for name, row in zip(names, rows, strict=True):
+            seconds[name] += row["end"] - row["start"]
+        totals = [(name, f"{n:,}", f"{seconds[name]:,.1f}") for name, n in Counter(names).most_common()]
+        lines.append(to_text(Table("", ("symbol", "times", "seconds"), totals)))
+    elif rows:
+        heads = ("recording", "start [s]", "end [s]", "symbol", "how sure")
+        cells = [
+            (
+                printable(f"{row['recording']} {row['place']}".strip()),
+                f"{row['start']:.2f}",
+                f"{row['end']:.2f}",
+                name,
+                row["certainty"],
+            )
+            for name, row in zip(names, rows, strict=True)
+        ]
+        lines.append(to_text(Table("", heads, cells)))
+    return "\n".join([*lines, *_remarks(data, problems), *(f"written to {printable(path)}" for path in written)])
 
 
 def _remarks(data: dict[str, Any], problems: list[str]) -> list[str]:
-    """What to know of the annotations, and what has none."""
+    """List what to know of the annotations, and what has none."""
     guess = (
         "What is unknown is a guess: too few demonstrations tell how much movements of one symbol differ, so that "
         "nothing more than looks like a symbol; learn more of each"
     )
     return [*([] if data["calibrated"] else [guess]), *map(printable, data["notes"]), *problems]
-
-
-def _each(rows: list[dict[str, Any]]) -> Any:
-    from kineme.reporting.table import Table
-
-    heads = ("recording", "start [s]", "end [s]", "symbol", "how sure")
-    return Table(
-        "",
-        heads,
-        [
-            (
-                printable(f"{row['recording']} {row['place']}".strip()),
-                f"{row['start']:.2f}",
-                f"{row['end']:.2f}",
-                "unknown" if row["unknown"] else printable(row["symbol"]),
-                row["certainty"],
-            )
-            for row in rows
-        ],
-    )
-
-
-def _totals(rows: list[dict[str, Any]]) -> Any:
-    from kineme.reporting.table import Table
-
-    names = ["unknown" if row["unknown"] else printable(row["symbol"]) for row in rows]
-    seconds: Counter[str] = Counter()
-    for name, one in zip(names, rows, strict=True):
-        seconds[name] += one["end"] - one["start"]
-    counts = Counter(names).most_common()
-    return Table("", ("symbol", "times", "seconds"), [(name, f"{n:,}", f"{seconds[name]:,.1f}") for name, n in counts])

@@ -65,28 +65,29 @@ def generate(**options: Any) -> None:
     kineme generate wave --library actions/ --goal 0.4,0.2 --duration 2 -o wave.csv
     kineme generate wave.csv --goal 0.4,0.2 --duration 2 -o new.csv --plot new.png
     """  # noqa: D301 - a backspace tells click to keep the lines
-    from kineme.dmp.generation.generate import checked_point
+    import numpy as np
+
+    from kineme.dmp.generation.generate import MovementOptions, checked_point
     from kineme.dmp.generation.generate import generate as make
+    from kineme.dmp.generation.learned import largest_deviation
 
     for name in ("output", "save", "plot"):
         check_new(options[name], options["force"], options["source"])
     learned = read_source(options)
-    wanted = _movement_options(options)
+    obstacles = options["obstacles"]
+    if len({len(point) for point in obstacles}) > 1:
+        raise click.BadParameter("expected obstacles of equally many dimensions", param_hint="--obstacle")
+    movement_options = MovementOptions(
+        start=None if options["start"] is None else np.array(options["start"]),
+        goal=None if options["goal"] is None else np.array(options["goal"]),
+        duration=options["duration"],
+        rate=options["rate"],
+        settle=options["settle"],
+        obstacles=np.array(obstacles) if obstacles else None,
+    )
     for name in ("start", "goal"):
-        checked_point(learned, getattr(wanted, name), f"--{name}")
-    made = make(learned, wanted)
-    _warn_of_bad_fit(learned)
-    _warn_of_missed_goal(learned, made, wanted)
-    if options["save"]:
-        learned.primitive.save(options["save"])
-    if options["plot"]:
-        _plot(options["plot"], learned, made, wanted.obstacles)
-    _write(options["output"], made, ".json" if options["as_json"] else ".csv")
-
-
-def _warn_of_bad_fit(learned: Any) -> None:
-    from kineme.dmp.generation.learned import largest_deviation
-
+        checked_point(learned, getattr(movement_options, name), f"--{name}")
+    movement = make(learned, movement_options)
     off = largest_deviation(learned)
     if off is not None and off.share > _BAD_FIT:
         of = f"in its {printable(off.of)}, " if off.of else ""
@@ -95,17 +96,23 @@ def _warn_of_bad_fit(learned: Any) -> None:
             "extent; see it with --plot, and try more basis functions with --n-basis",
             err=True,
         )
+    if movement_options.goal is not None and movement_options.settle is None:
+        _warn_of_missed_goal(learned, movement, movement_options.goal)
+    if options["save"]:
+        learned.primitive.save(options["save"])
+    if options["plot"]:
+        _plot(options["plot"], learned, movement, movement_options.obstacles)
+    _write(options["output"], movement, ".json" if options["as_json"] else ".csv")
 
 
-def _warn_of_missed_goal(learned: Any, made: Any, wanted: Any) -> None:
+def _warn_of_missed_goal(learned: Any, movement: Any, goals: Any) -> None:
     """Say how far from a goal a movement ends that still moves there, orientations aside."""
-    if wanted.goal is None or wanted.settle is not None:
-        return
     about = learned.primitive.to_recording
-    turned = {name for one in (about.moving if about else ()) if one.kind == "orientation" for name in one.columns}
+    channels = about.moving if about else ()
+    turned = {name for channel in channels if channel.kind == "orientation" for name in channel.columns}
     misses = []
-    for name, goal in zip(learned.moving_columns, wanted.goal, strict=True):
-        column = made.columns["positions"][:, learned.columns.index(name)]
+    for name, goal in zip(learned.moving_columns, goals, strict=True):
+        column = movement.columns["positions"][:, learned.columns.index(name)]
         if name not in turned and (extent := float(column.max() - column.min())) > 0.0:
             off = abs(float(column[-1]) - float(goal))
             misses.append((off / extent, off, name, extent))
@@ -118,35 +125,17 @@ def _warn_of_missed_goal(learned: Any, made: Any, wanted: Any) -> None:
         )
 
 
-def _movement_options(options: dict[str, Any]) -> Any:
-    import numpy as np
-
-    from kineme.dmp.generation.generate import MovementOptions
-
-    obstacles = options["obstacles"]
-    if len({len(point) for point in obstacles}) > 1:
-        raise click.BadParameter("expected obstacles of equally many dimensions", param_hint="--obstacle")
-    return MovementOptions(
-        start=None if options["start"] is None else np.array(options["start"]),
-        goal=None if options["goal"] is None else np.array(options["goal"]),
-        duration=options["duration"],
-        rate=options["rate"],
-        settle=options["settle"],
-        obstacles=np.array(obstacles) if obstacles else None,
-    )
-
-
-def _plot(path: Path, learned: Any, made: Any, obstacles: Any) -> None:
+def _plot(path: Path, learned: Any, movement: Any, obstacles: Any) -> None:
     from kineme.dmp.generation.figure import draw_movement
     from kineme.reporting.figures import save_figure
 
-    save_figure(draw_movement(learned, made.columns, obstacles), path)
+    save_figure(draw_movement(learned, movement.columns, obstacles), path)
 
 
-def _write(output: Path, made: Any, ending: str) -> None:
+def _write(output: Path, movement: Any, ending: str) -> None:
     from kineme.io.writing.write_movement import encode_movement, write_movement
 
     if str(output) == "-":
-        write_bytes(encode_movement(made.columns, ending, made.names))
+        write_bytes(encode_movement(movement.columns, ending, movement.names))
     else:
-        write_movement(output, made.columns, made.names)
+        write_movement(output, movement.columns, movement.names)

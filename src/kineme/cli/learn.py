@@ -52,6 +52,7 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
     Example: kineme learn recordings/ --library actions/
     """
     from kineme.io.reading.entries import root_of
+    from kineme.library.learn import learn_recordings
     from kineme.library.library import ActionLibrary
 
     as_json, label, no_labels = options.pop("as_json"), options.pop("label"), options.pop("no_labels")
@@ -60,13 +61,18 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
         raise click.UsageError("expected --label or --no-labels, not both")
     if person is not None and by_person:
         raise click.UsageError("expected --person or --by-person, not both")
-    parsed = _labeled(read(recordings, options), table)
+    parsed = read(recordings, options)
+    if table is not None:
+        from kineme.io.reading.read_labels import labeled_pieces, read_labels
+
+        parsed = labeled_pieces(parsed, read_labels(table))
     root = root_of(*(path for path in recordings if str(path) != "-"))
     people = _people(root, parsed, person, by_person)
     labels = [None if no_labels else each if label is None else label for each in parsed.labels]
     with ActionLibrary(folder, create=True) as library:
         before = library.version
-        report = _learn(library, root, parsed, options, labels, people)
+        with _progress(len(parsed)) as progress:
+            report = learn_recordings(library.store, parsed, options, labels, progress, root, people)
         data = {
             "library": str(folder),
             "added": report.added,
@@ -75,7 +81,7 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
             **_named(library, report.ids, labels),
             "symbols": list(report.symbols),
             "movements": len(library),
-            "people": sorted({one for one in people or () if one is not None}),
+            "people": sorted({name for name in people or () if name is not None}),
             "version": report.version,
             "problems": list(map(str, parsed.problems)),
             "notes": _notes(parsed),
@@ -84,7 +90,7 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
 
 
 def _notes(recordings: Any) -> list[str]:
-    """What a person should know of how recordings were read, before they rely on what is learned."""
+    """List what a person should know of how recordings were read, before they rely on what is learned."""
     from kineme.io.inspection.inspect import notes_on_extents, notes_on_sizes
     from kineme.io.reading.column_order import notes_on_aside, notes_on_order
     from kineme.io.reading.recording_gaps import notes_on_gaps, notes_on_sampling
@@ -97,17 +103,8 @@ def _notes(recordings: Any) -> list[str]:
     return [*recordings.notes, *aside, *ordered, *repaired, *notes_on_sizes(demos), *notes_on_extents(demos)]
 
 
-def _labeled(recordings: Any, table: Path | None) -> Any:
-    """The stretches that a table labels, where there is one."""
-    if table is None:
-        return recordings
-    from kineme.io.reading.read_labels import labeled_pieces, read_labels
-
-    return labeled_pieces(recordings, read_labels(table))
-
-
 def _people(root: Path, recordings: Any, person: str | None, by_person: bool) -> list[str | None] | None:
-    """Who showed each movement, as far as the options and the recordings say."""
+    """List who showed each movement, as far as the options and the recordings say."""
     from kineme.errors import DataError
     from kineme.io.reading.merge_files import each_person
 
@@ -124,33 +121,26 @@ def _people(root: Path, recordings: Any, person: str | None, by_person: bool) ->
     return people
 
 
-def _learn(library: Any, root: Path, recordings: Any, options: dict[str, Any], labels: list[Any], groups: Any) -> Any:
-    from kineme.library.learn import learn_recordings
-
-    with _progress(len(recordings)) as progress:
-        return learn_recordings(library.store, recordings, options, labels, progress, root, groups)
-
-
 def _joined(library: Any, before: int) -> int:
-    """Number of stored movements that were unlabeled and got a symbol, since their copy has a label."""
+    """Count stored movements that were unlabeled and got a symbol, since their copy has a label."""
     import numpy as np
 
     return len(np.setdiff1d(library.at(before).unlabeled(), library.unlabeled()))
 
 
 def _named(library: Any, ids: Any, labels: list[Any]) -> dict[str, Any]:
-    """How many movements have no symbol, and the labels that were not taken since a movement has another symbol."""
+    """Count movements without symbol, and the labels that were not taken since a movement has another symbol."""
     from kineme.library.storage.read import names_of
 
     names = names_of(library.store, ids)
-    kept = Counter(
+    refused = Counter(
         (symbol, label)
         for symbol, label in zip(names, labels, strict=True)
         if symbol is not None and label is not None and symbol != label
     )
     return {
         "without_symbol": sum(name is None for name in names),
-        "kept": [{"symbol": one[0], "label": one[1], "movements": n} for one, n in kept.items()],
+        "kept": [{"symbol": symbol, "label": label, "movements": n} for (symbol, label), n in refused.items()],
     }
 
 
@@ -171,10 +161,10 @@ def _text(data: dict[str, Any], problems: list[str]) -> str:
     people = data["people"]
     by = f", by {counted(len(people), 'person', 'people')}" if people else ""
     lines = [f"learned {counted(data['added'], 'movement')}{stored}{new}{by}; {held}"]
-    for kept in data["kept"]:
+    for other in data["kept"]:
         lines.append(
-            f"{counted(kept['movements'], 'movement')} in {printable(kept['symbol'])} already: the label "
-            f"{printable(kept['label'])} is not taken; kineme library rename, merge and split change symbols"
+            f"{counted(other['movements'], 'movement')} in {printable(other['symbol'])} already: the label "
+            f"{printable(other['label'])} is not taken; kineme library rename, merge and split change symbols"
         )
     if n := data["without_symbol"]:
         verb = "has" if n == 1 else "have"

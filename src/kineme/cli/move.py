@@ -40,32 +40,29 @@ _FILES = {
 }
 
 
-def _file_option(name: str) -> Any:
-    short, _, words = _FILES[name]
-    names = [f"--{name.replace('_', '-')}", *([short] if short else [])]
-    return click.option(*names, type=_NEW_FILE, help=words)
-
-
 #: Add an option for each file that is written.
-file_options = under("Output", *map(_file_option, _FILES))
+file_options = under(
+    "Output",
+    *(
+        click.option(f"--{name.replace('_', '-')}", *([short] if short else []), type=_NEW_FILE, help=words)
+        for name, (short, _, words) in _FILES.items()
+    ),
+)
 
 
 def check_files(options: dict[str, Any]) -> None:
     """Refuse files that no writer writes, or that are there, before an arm is loaded.
 
-    Raises
-    ------
-    click.UsageError
-        The message names the option or the file.
+    Raises click.UsageError: the message names the option or the file.
     """
     for name, (_, endings, _) in _FILES.items():
         path = options[name]
         if path is None or (name == "output" and str(path) == "-"):
             continue
         if path.suffix.lower() not in endings:
-            known = ", ".join(ending or "a folder" for ending in endings)
+            expected = ", ".join(ending or "a folder" for ending in endings)
             raise click.BadParameter(
-                f"expected {known}, got {path.suffix or 'no ending'}", param_hint=f"--{name.replace('_', '-')}"
+                f"expected {expected}, got {path.suffix or 'no ending'}", param_hint=f"--{name.replace('_', '-')}"
             )
         if path.is_dir():
             raise click.UsageError(
@@ -77,18 +74,17 @@ def check_files(options: dict[str, Any]) -> None:
 
 
 def written_in_words(options: dict[str, Any]) -> str:
-    """The files and folders that are asked for, in one line."""
+    """Write the files and folders that are asked for in one line."""
     paths = [options[name] for name in (*_FILES, "lerobot") if options[name] is not None]
     named = ", ".join(str(path) for path in paths)
     return f"wrote {named}" if paths else "checked only, nothing written; name a file: -o joints.csv, --view arm.html"
 
 
-def write_files(made: Any, options: dict[str, Any]) -> None:
+def write_files(movement: Any, options: dict[str, Any]) -> None:
     """Write what is asked for."""
-    from kineme.robots.export.columns import encode_joints, write_joints
-    from kineme.robots.export.ros import write_action_goal, write_bag
+    from kineme.robots.export_files import encode_joints, write_action_goal, write_bag, write_joints
 
-    trajectory = made.trajectory
+    trajectory = movement.trajectory
     writers = {"output": write_joints, "ros1": write_bag, "ros2": write_bag, "action_goal": write_action_goal}
     for name, writer in writers.items():
         path = options[name]
@@ -102,17 +98,17 @@ def write_files(made: Any, options: dict[str, Any]) -> None:
         from kineme.reporting.figures import save_figure
         from kineme.robots.view.figure import draw_robot_movement
 
-        save_figure(draw_robot_movement(made), options["plot"])
+        save_figure(draw_robot_movement(movement), options["plot"])
     if options["lerobot"]:
-        from kineme.robots.export.lerobot import write_lerobot
+        from kineme.robots.export_files import write_lerobot
 
         task = name_of_source(options)
         units = "percent" if options["joint_units"] == "percent" else "deg"
-        write_lerobot(options["lerobot"], trajectory, task, options["fps"], made.robot, units)
+        write_lerobot(options["lerobot"], trajectory, task, options["fps"], movement.robot, units)
     if options["view"]:
         from kineme.robots.view.write_view import write_view
 
-        write_view(options["view"], made)
+        write_view(options["view"], movement)
 
 
 _NEW_FOLDER = click.Path(path_type=Path, file_okay=False)
@@ -172,7 +168,7 @@ def move(**options: Any) -> None:
     """  # noqa: D301 - a backspace tells click to keep the lines
     from kineme.errors import heard_warnings
     from kineme.reporting.table import to_text
-    from kineme.robots.checks.check import preflight_table
+    from kineme.robots.execution.preflight import preflight_table
     from kineme.robots.models.load import load
 
     if options["slow_down"] and options["fastest"]:
@@ -185,57 +181,27 @@ def move(**options: Any) -> None:
         write(f"note: {sentence}", err=True)
     with heard_warnings() as heard:
         try:
-            made = _moved(robot, options)
+            movement = _moved(robot, options)
         finally:
             for sentence in heard:
                 write(f"note: {sentence}", err=True)
     if str(options["output"]) != "-":
         say(
             options["as_json"],
-            _as_data(made),
-            lambda: "\n".join([to_text(preflight_table(made.preflight)), _summary(made)]),
+            _as_data(movement),
+            lambda: "\n".join([to_text(preflight_table(movement.preflight)), _summary(movement)]),
         )
-    if not made.preflight.passed:
-        write(f"warning: checks FAILED: {len(made.preflight.failed)}; written because of --force", err=True)
-    write_files(made, options)
+    if not movement.preflight.passed:
+        write(f"warning: checks FAILED: {len(movement.preflight.failed)}; written because of --force", err=True)
+    write_files(movement, options)
     if not options["as_json"] and str(options["output"]) != "-":
         write(written_in_words(options))
 
 
 def _moved(robot: Any, options: dict[str, Any]) -> Any:
+    from kineme.robots.planning.generate_at import generate_at
     from kineme.robots.planning.move import move as move_robot
     from kineme.robots.planning.refusal import InfeasibleError
-
-    generated, space = _generated(robot, options)
-    timing = "fastest" if options["fastest"] else "slowed" if options["slow_down"] else "generated"
-    try:
-        return move_robot(
-            generated.movement,
-            robot,
-            space=space,
-            orientation=options["orientation"],
-            follow=options["follow"],
-            plane=options["plane"],
-            place="as given" if options["at"] or options["as_recorded"] or space == "joints" else "free",
-            timing=timing,
-            rate=options["rate"],
-            start=options["start"],
-            steps=generated.steps,
-            continuous=generated.continuous,
-            force=options["force"],
-        )
-    except InfeasibleError as error:
-        from kineme.reporting.table import to_text
-        from kineme.robots.checks.check import preflight_table
-
-        if error.preflight is not None:
-            write(to_text(preflight_table(error.preflight)), err=True)
-        raise
-
-
-def _generated(robot: Any, options: dict[str, Any]) -> tuple[Any, str]:
-    """The movement, of the tip [m] or of the joints, and which of the two."""
-    from kineme.robots.planning.generate_at import generate_at
     from kineme.robots.planning.roles import space_of
 
     learned = read_source(options)
@@ -256,30 +222,53 @@ def _generated(robot: Any, options: dict[str, Any]) -> tuple[Any, str]:
         joint_units=options["joint_units"],
         plane=options["plane"],
     )
-    return generated, space
+    timing = "fastest" if options["fastest"] else "slowed" if options["slow_down"] else "generated"
+    try:
+        return move_robot(
+            generated.movement,
+            robot,
+            space=space,
+            orientation=options["orientation"],
+            follow=options["follow"],
+            plane=options["plane"],
+            place="as given" if options["at"] or options["as_recorded"] or space == "joints" else "free",
+            timing=timing,
+            rate=options["rate"],
+            start=options["start"],
+            steps=generated.steps,
+            continuous=generated.continuous,
+            force=options["force"],
+        )
+    except InfeasibleError as error:
+        from kineme.reporting.table import to_text
+        from kineme.robots.execution.preflight import preflight_table
+
+        if error.preflight is not None:
+            write(to_text(preflight_table(error.preflight)), err=True)
+        raise
 
 
-def _summary(made: Any) -> str:
+def _summary(movement: Any) -> str:
     from kineme.robots.planning.robot_movement import duration_in_words
 
-    n_samples, n_joints = made.trajectory.positions.shape
-    return f"{made.robot.name}: {duration_in_words(made)}; {n_samples} samples of {n_joints} joints"
+    n_samples, n_joints = movement.trajectory.positions.shape
+    return f"{movement.robot.name}: {duration_in_words(movement)}; {n_samples} samples of {n_joints} joints"
 
 
-def _as_data(made: Any) -> dict[str, Any]:
+def _as_data(movement: Any) -> dict[str, Any]:
     import math
 
-    def known(value: Any) -> Any:
+    def finite(value: Any) -> Any:
         return None if isinstance(value, float) and not math.isfinite(value) else value
 
-    checks = [{name: known(value) for name, value in check._asdict().items()} for check in made.preflight.checks]
+    report = movement.preflight
     return {
-        "robot": made.robot.name,
-        "duration": made.trajectory.duration,
-        "approach": made.begins,
-        "factor": made.factor,
-        "assumed": list(made.robot.assumed),
-        "passed": made.preflight.passed,
-        "checks": checks,
-        "not_checked": list(made.preflight.unchecked),
+        "robot": movement.robot.name,
+        "duration": movement.trajectory.duration,
+        "approach": movement.begins,
+        "factor": movement.factor,
+        "assumed": list(movement.robot.assumed),
+        "passed": report.passed,
+        "checks": [{name: finite(value) for name, value in check._asdict().items()} for check in report.checks],
+        "not_checked": list(report.unchecked),
     }

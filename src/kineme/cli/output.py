@@ -28,10 +28,7 @@ def write(text: Any = "", *, err: bool = False) -> None:
 def check_new(path: Path | None, force: bool, *inputs: str | Path, remedy: str = "--force") -> None:
     """Refuse to write over an input, and without --force, or what `remedy` names, over any file.
 
-    Raises
-    ------
-    click.UsageError
-        The message names the file.
+    Raises click.UsageError: the message names the file.
     """
     if path is None or str(path) == "-" or not path.exists():
         return

@@ -20,10 +20,7 @@ _IDLE = 3600.0  # seconds since the last write after which the file of a process
 def write_atomically(path: Path, data: bytes) -> Path:
     """Write `data` to a hidden file beside `path`, flush it to the disk, and rename it to `path`.
 
-    Raises
-    ------
-    OSError
-        The folder is missing, read-only or full; an existing file at `path` is unchanged.
+    Raises OSError: the folder is missing, read-only or full; an existing file at `path` is unchanged.
     """
     with whole_file(path) as beside:
         beside.write_bytes(data)
@@ -44,12 +41,8 @@ def whole_file(path: Path, *, replace: bool = True, companions: Sequence[str] = 
     companions : sequence of str
         Ends of the names of other files that may be made beside the new one, as "-wal" by SQLite; they are deleted.
 
-    Raises
-    ------
-    FileExistsError
-        `replace` is False and there is a file of that name, or another process was faster; it stays as it is.
-    OSError
-        The folder is missing, read-only or full; what was at `path` is as it was.
+    Raises FileExistsError: `replace` is False and there is a file of that name, or another process was faster; it stays
+    as it is; OSError: the folder is missing, read-only or full; what was at `path` is as it was.
     """
     if len(os.fsencode(path.name)) > _LONGEST_NAME:
         raise OSError(
@@ -170,12 +163,8 @@ def _named(path: Path, beside: Path) -> Iterator[None]:
 def whole_folder(path: Path) -> Iterator[Path]:
     """Context manager: a new hidden folder beside `path` to write into; on success it is named `path`.
 
-    Raises
-    ------
-    FileExistsError
-        There is something at `path`, and not an empty folder.
-    OSError
-        The folder around it is missing, read-only or full.
+    Raises FileExistsError: there is something at `path`, and not an empty folder; OSError: the folder around it is
+    missing, read-only or full.
     """
     empty = path.is_dir() and not any(path.iterdir())
     if path.exists() and not empty:

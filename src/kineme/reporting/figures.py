@@ -101,10 +101,7 @@ def render(figure: Figure, dpi: int) -> dict[str, bytes]:
 def save_figure(figure: Figure, path: Path) -> Path:
     """Write the figure in the format that the file's ending names, atomically.
 
-    Raises
-    ------
-    DataError
-        An ending that is not in `FORMATS`.
+    Raises DataError: an ending that is not in `FORMATS`.
     """
     kind = path.suffix.lower().removeprefix(".")
     if kind not in FORMATS:

@@ -138,10 +138,7 @@ def to_html(table: Table) -> str:
 def data_frame(columns: Mapping[str, Any]) -> Any:
     """Columns as a data frame of pandas.
 
-    Raises
-    ------
-    DataError
-        The package pandas is not installed.
+    Raises DataError: the package pandas is not installed.
     """
     try:
         import pandas as pd

@@ -45,10 +45,7 @@ def choose_posture(robot: Robot, path: TaskPath, turn_costs: Array, stands: Arra
     stands : ndarray of shape (n,)
         Where the joints stand: 0.1 is added for each radian of the joint that has farthest to go.
 
-    Raises
-    ------
-    TrajectoryError
-        No posture reaches the start: where and by how far.
+    Raises TrajectoryError: no posture reaches the start: where and by how far.
     """
     starts = reaching_postures(robot, path.positions[0], path.rotations[0], turn_costs, pose_in_words(path, 0))
     total = _costs_of_movements(robot, path, starts, np.zeros((len(starts), 3)), turn_costs)

@@ -26,10 +26,7 @@ class OutOfReachError(TrajectoryError):
 def reaching_postures(robot: Robot, position: Array, rotation: Array, turn_costs: Array, what: str) -> Array:
     """Postures (m, n) whose tips reach a pose; `what` says which pose it is.
 
-    Raises
-    ------
-    OutOfReachError
-        There is none: where, and by how far.
+    Raises OutOfReachError: there is none: where, and by how far.
     """
     found = postures(robot, position, rotation, turn_costs)
     if found.errors[0] > _REACHED:
@@ -42,12 +39,8 @@ def reaching_postures(robot: Robot, position: Array, rotation: Array, turn_costs
 def check_reached(robot: Robot, path: TaskPath, joints: Array, turn_costs: Array, tolerance: float) -> None:
     """Refuse joints (T, n) whose tip stays farther from the poses of the path than `tolerance` [m].
 
-    Raises
-    ------
-    OutOfReachError
-        The pose that is farthest out of reach: at which time, where and by how far.
-    TrajectoryError
-        Every pose is within reach, but the tip does not keep up: from when to when.
+    Raises OutOfReachError: the pose that is farthest out of reach: at which time, where and by how far;
+    TrajectoryError: every pose is within reach, but the tip does not keep up: from when to when.
     """
     errors = np.linalg.norm(kinematics(robot, joints)[0] - path.positions, axis=1)
     missed = np.flatnonzero(~(errors <= tolerance))

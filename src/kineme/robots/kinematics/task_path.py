@@ -49,12 +49,8 @@ def task_path(
     through : array_like of shape (3,), optional
         A point of that plane; the origin if it is not given.
 
-    Raises
-    ------
-    TrajectoryError
-        Positions of another number of dimensions; an orientation of another shape, or not of norm 1.
-    SpecificationError
-        An unknown plane.
+    Raises TrajectoryError: positions of another number of dimensions; an orientation of another shape, or not of norm
+    1; SpecificationError: an unknown plane.
     """
     d = positions.shape[1]
     if d not in (2, 3):

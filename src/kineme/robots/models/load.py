@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.errors import DataError, SpecificationError
-from kineme.robots.models.ends import Candidate, in_words
 from kineme.robots.models.robot import Robot
-from kineme.robots.models.urdf import Chain, read_chain
+from kineme.robots.models.urdf import Candidate, Chain, in_words, read_chain
 from kineme.validation import Array, as_numbers, check_number
 
 #: Where their URDF files lie.
@@ -61,7 +60,6 @@ _MOST_BENT = 3  # joints
 _FREE = 0.05  # the smallest singular value of the Jacobian from which on a posture is good to start from
 _ALIKE = 6  # digits to which two postures are as good as each other
 
-_FOLDER = Path(__file__).parent
 _ACCELERATION = 5.0  # of joints whose file says none [rad/s^2 or m/s^2]
 _VELOCITY = 1.0  # the same for velocities
 
@@ -97,18 +95,26 @@ def load(
     SpecificationError
         An unknown name; a rest posture of another number of joints or outside the limits.
     """
-    pinocchio = _pinocchio()
+    try:
+        import pinocchio
+    except ImportError as error:
+        raise DataError("expected the package pin for arms; pip install 'kineme[robot]'") from error
     path, default_tip, default_rest, name = _find(robot, tip)
     chain = read_chain(path, tip or default_tip)
     model, geometry = _build(pinocchio, path, chain)
     lower, upper, velocity, acceleration, effort = (np.array(column) for column in zip(*chain.limits, strict=True))
-    assumed = _assumed_of(chain, MODELS.get(name) if path.parent == _FOLDER else None)
+    assumed = [MODELS[name].assumed] if name in MODELS and path.parent == FOLDER and MODELS[name].assumed else []
+    assumed += _assumptions(chain)
     assumed += _limit("velocity", velocity, max_velocity, _VELOCITY, "1/s", chain)
     assumed += _limit("acceleration", acceleration, max_acceleration, _ACCELERATION, "1/s^2", chain)
     posture = default_rest if rest is None and tip in (None, default_tip) else rest
     if posture is None:
         at_rest, bent = rest_posture(model, chain.tip, lower, upper)
-        assumed += [bent_in_words(at_rest)] if bent else []
+        if bent:
+            words = ",".join(f"{value:.4g}" for value in at_rest)
+            assumed.append(
+                f"in the middle of its limits the arm is singular: it rests at {words} (choose with rest=, --rest)"
+            )
     else:
         at_rest = checked_rest(posture, lower, upper, chain.joints)
     return Robot(
@@ -129,14 +135,6 @@ def load(
     )
 
 
-def _pinocchio() -> Any:
-    try:
-        import pinocchio
-    except ImportError as error:
-        raise DataError("expected the package pin for arms; pip install 'kineme[robot]'") from error
-    return pinocchio
-
-
 def _find(robot: str | Path, tip: str | None) -> tuple[Path, str | None, ArrayLike | None, str]:
     if not isinstance(tip, str | None):
         raise SpecificationError(f"expected tip as the name of a link, got {tip!r:.80}")
@@ -144,7 +142,7 @@ def _find(robot: str | Path, tip: str | None) -> tuple[Path, str | None, ArrayLi
         raise SpecificationError(f"expected the name of a robot or the path of a .urdf file, got {robot!r:.80}")
     text = os.fspath(robot)
     if text in MODELS:
-        return _FOLDER / f"{text}.urdf", MODELS[text].tip, MODELS[text].rest, text
+        return FOLDER / f"{text}.urdf", MODELS[text].tip, MODELS[text].rest, text
     path = Path(text)
     if path.suffix.lower() not in (".urdf", ".xml", ".xacro"):
         raise SpecificationError(f"expected one of {', '.join(MODELS)} or the path of a .urdf file, got {text!r}")
@@ -152,14 +150,14 @@ def _find(robot: str | Path, tip: str | None) -> tuple[Path, str | None, ArrayLi
 
 
 def _build(pinocchio: Any, path: Path, chain: Chain) -> tuple[Any, Any]:
-    """The reduced model of the chain's joints, and the geometry of those links whose shapes can be had."""
+    """Build the reduced model of the chain's joints, and the geometry of those links whose shapes can be had."""
     try:
-        whole = pinocchio.buildModelFromXML(chain.text)
-        shapes = pinocchio.buildGeomFromUrdfString(whole, chain.text, pinocchio.GeometryType.COLLISION, package_dirs=[])
-        locked = [whole.getJointId(name) for name in list(whole.names)[1:] if name not in chain.joints]
-        _check_read(chain.text, whole, shapes, path)
-        still = np.clip(pinocchio.neutral(whole), whole.lowerPositionLimit, whole.upperPositionLimit)
-        model, geometry = pinocchio.buildReducedModel(whole, shapes, locked, still)
+        full = pinocchio.buildModelFromXML(chain.text)
+        shapes = pinocchio.buildGeomFromUrdfString(full, chain.text, pinocchio.GeometryType.COLLISION, package_dirs=[])
+        locked = [full.getJointId(name) for name in list(full.names)[1:] if name not in chain.joints]
+        _check_read(chain.text, full, shapes, path)
+        still = np.clip(pinocchio.neutral(full), full.lowerPositionLimit, full.upperPositionLimit)
+        model, geometry = pinocchio.buildReducedModel(full, shapes, locked, still)
     except (ValueError, RuntimeError) as error:
         raise DataError(f"{path}: pinocchio cannot read this URDF: {error}") from error
     order = [str(name) for name in list(model.names)[1:]]
@@ -171,10 +169,7 @@ def _build(pinocchio: Any, path: Path, chain: Chain) -> tuple[Any, Any]:
 def _check_read(text: str, model: Any, shapes: Any, path: Path) -> None:
     """Refuse a model with other numbers of collision shapes, or other masses that move, than its XML says.
 
-    Raises
-    ------
-    DataError
-        The first such link or joint, with what its XML says and what was read.
+    Raises DataError: the first such link or joint, with what its XML says and what was read.
     """
     frames = {str(frame.name): frame.parentJoint for frame in model.frames if frame.type.name == "BODY"}
     n_read = Counter(str(model.frames[shape.parentFrame].name) for shape in shapes.geometryObjects)
@@ -198,7 +193,7 @@ def _check_read(text: str, model: Any, shapes: Any, path: Path) -> None:
 
 
 def _limit(what: str, values: Array, largest: float | None, default: float, unit: str, chain: Chain) -> list[str]:
-    """Put the default where the file says no limit, and nothing above `largest`, in place; what was assumed."""
+    """Put the default where the file says no limit, and nothing above `largest`, in place; return what was assumed."""
     unknown = np.isnan(values)
     if largest is None:
         named = ", ".join(np.array(chain.joints)[unknown])
@@ -210,9 +205,9 @@ def _limit(what: str, values: Array, largest: float | None, default: float, unit
     return []
 
 
-def _assumed_of(chain: Chain, known: Model | None) -> list[str]:
-    """What is said about a model that comes with kineme, and about joints and links of which a file says too little."""
-    assumed = [known.assumed] if known is not None and known.assumed else []
+def _assumptions(chain: Chain) -> list[str]:
+    """Describe assumptions about joints and links of which a file says too little."""
+    assumed = []
     if chain.others:
         assumed.append(
             f"the tip is {Candidate(chain.tip, len(chain.joints))}, of the longest chain; others are "
@@ -234,7 +229,7 @@ def _assumed_of(chain: Chain, known: Model | None) -> list[str]:
 
 
 def _have(names: tuple[str, ...]) -> str:
-    """Up to three names, and that each has what follows."""
+    """Write up to three names, and that each has what follows."""
     return f"{_named(names)} {'each have' if len(names) > 1 else 'has'}"
 
 
@@ -243,12 +238,9 @@ def _named(names: tuple[str, ...]) -> str:
 
 
 def checked_rest(rest: ArrayLike, lower: Array, upper: Array, joints: tuple[str, ...]) -> Array:
-    """A rest posture (n,) as it is given.
+    """Check a rest posture (n,) that is given.
 
-    Raises
-    ------
-    SpecificationError
-        One of another number of joints, or outside the limits; with the joint.
+    Raises SpecificationError: one of another number of joints, or outside the limits; with the joint.
     """
     posture = as_numbers(rest, "rest")
     if posture.shape != lower.shape:
@@ -263,7 +255,7 @@ def checked_rest(rest: ArrayLike, lower: Array, upper: Array, joints: tuple[str,
 
 
 def rest_posture(model: Any, tip: str, lower: Array, upper: Array) -> tuple[Array, bool]:
-    """The middle of the limits (n,); if the arm is singular there, as a straight one is, the same with joints bent.
+    """Return the middle of the limits (n,); if the arm is singular there, as a straight one is, with joints bent.
 
     Of the postures with up to three joints turned by 60 degrees, within the limits and with no link lower than in the
     middle or than the base, that whose Jacobian has the largest smallest singular value. Whether
@@ -275,8 +267,15 @@ def rest_posture(model: Any, tip: str, lower: Array, upper: Array) -> tuple[Arra
     if best >= _FREE:
         return middle, False
     floor, chosen = min(0.0, lowest), middle
-    for bent in _bends(len(middle)):
-        q = middle + bent
+    bends = (
+        (list(joints), _BEND * np.array(signs))
+        for count in range(1, _MOST_BENT + 1)
+        for joints in combinations(range(len(middle)), count)
+        for signs in product((1.0, -1.0), repeat=count)
+    )
+    for joints, angles in bends:
+        q = middle.copy()
+        q[joints] += angles
         if np.all((q >= lower) & (q <= upper)):
             value, lowest = _manipulability(model, tip, q)
             if lowest >= floor - 1e-6 and round(value, _ALIKE) > round(best, _ALIKE):
@@ -284,19 +283,8 @@ def rest_posture(model: Any, tip: str, lower: Array, upper: Array) -> tuple[Arra
     return np.asarray(chosen, dtype=np.float64), chosen is not middle
 
 
-def _bends(n: int) -> list[Array]:
-    bends = []
-    for count in range(1, _MOST_BENT + 1):
-        for joints in combinations(range(n), count):
-            for signs in product((1.0, -1.0), repeat=count):
-                bent = np.zeros(n)
-                bent[list(joints)] = _BEND * np.array(signs)
-                bends.append(bent)
-    return bends
-
-
 def _manipulability(model: Any, tip: str, q: Array) -> tuple[float, float]:
-    """The smallest singular value of the Jacobian of the tip, and how high its lowest joint or the tip is [m]."""
+    """Return the smallest singular value of the Jacobian of the tip, and the height of the lowest joint or tip [m]."""
     import pinocchio
 
     data = model.createData()
@@ -306,9 +294,3 @@ def _manipulability(model: Any, tip: str, q: Array) -> tuple[float, float]:
     jacobian = pinocchio.getFrameJacobian(model, data, frame, pinocchio.ReferenceFrame.LOCAL_WORLD_ALIGNED)
     heights = [data.oMf[frame].translation[2], *(data.oMi[j].translation[2] for j in range(1, model.njoints))]
     return float(np.linalg.svd(jacobian.reshape(6, -1), compute_uv=False)[min(6, len(q)) - 1]), float(min(heights))
-
-
-def bent_in_words(rest: Array) -> str:
-    """The sentence about a posture that `rest_posture` bent."""
-    posture = ",".join(f"{value:.4g}" for value in rest)
-    return f"in the middle of its limits the arm is singular: it rests at {posture} (choose with rest=, --rest)"

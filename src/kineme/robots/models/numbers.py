@@ -1,4 +1,4 @@
-"""What of a URDF a library for kinematics would leave out or misread without a word, and what may mean other units."""
+"""Checks of URDF values that libraries for kinematics would leave out or misread silently, and of their units."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 from kineme.errors import DataError
 
 _MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
-_SIZES = {"box": ("size", 3), "cylinder": ("radius length", 1), "sphere": ("radius", 1)}
+SIZES = {"box": ("size", 3), "cylinder": ("radius length", 1), "sphere": ("radius", 1)}  # and how many numbers each has
 
 
 _ORIGIN = {"xyz": 3, "rpy": 3, "quat_xyzw": 4}  # attributes of an <origin>, and how many numbers each has
@@ -24,13 +24,13 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)  # Pyth
 
 
 def finite_number(text: str) -> float | None:
-    """A number as every reader of URDF files reads it; None of anything else."""
+    """Read a number as every reader of URDF files reads it; None of anything else."""
     value = float(text) if _NUMBER.fullmatch(text.strip(" \t\r\n")) else math.nan
     return value if math.isfinite(value) else None
 
 
 def finite_numbers(text: str | None, length: int) -> list[float]:
-    """The finite numbers of an attribute; none of them where there are not as many as expected."""
+    """Read the finite numbers of an attribute; none of them where there are not as many as expected."""
     values = [value for word in (text or "").split() if (value := finite_number(word)) is not None]
     return values if len(values) == length == len((text or "").split()) else []
 
@@ -38,10 +38,8 @@ def finite_numbers(text: str | None, length: int) -> list[float]:
 def check_origins(robot: ElementTree.Element, path: Path) -> None:
     """Refuse places of joints, masses and collision shapes that readers would leave out or misread.
 
-    Raises
-    ------
-    DataError
-        The first <origin> that is misspelt or whose values are no numbers or degrees, with the joint or link.
+    Raises DataError: the first <origin> that is misspelt or whose values are no numbers or degrees, with the joint or
+    link.
     """
     for part in robot:
         if part.tag not in ("joint", "link"):
@@ -49,36 +47,31 @@ def check_origins(robot: ElementTree.Element, path: Path) -> None:
         of = f"{path}: {part.tag} {part.get('name')!r}"
         for owner in (part, *part.iterfind("inertial"), *part.iterfind("collision")):
             for element in owner:
-                _check_spelling(element, of)
+                meant = get_close_matches(str(element.tag), _ELEMENTS, 1, 0.7)
+                if meant and element.tag != meant[0]:
+                    raise DataError(
+                        f"{of}: expected <{meant[0]}>, got <{element.tag}>, which readers of URDF leave out"
+                    )
             for origin in owner.findall("origin"):
-                _check_origin(origin, of)
-
-
-def _check_spelling(element: ElementTree.Element, of: str) -> None:
-    meant = get_close_matches(str(element.tag), _ELEMENTS, 1, 0.7)
-    if meant and element.tag != meant[0]:
-        raise DataError(f"{of}: expected <{meant[0]}>, got <{element.tag}>, which readers of URDF leave out")
-
-
-def _check_origin(origin: ElementTree.Element, of: str) -> None:
-    unread = sorted(origin.attrib.keys() - _ORIGIN.keys())
-    if unread:
-        raise DataError(f"{of}: expected <origin xyz= rpy=/>, got {unread[0]}=, which readers of URDF leave out")
-    for name, length in _ORIGIN.items():
-        if name in origin.attrib and not finite_numbers(origin.get(name), length):
-            raise DataError(
-                f"{of}: expected <origin {name}=/> as {length} numbers with spaces between them, got "
-                f"{origin.get(name)!r}"
-            )
-    if max(map(abs, finite_numbers(origin.get("rpy"), 3)), default=0.0) > _TURNS:
-        raise DataError(f"{of}: expected <origin rpy=/> in radians, got {origin.get('rpy')!r}; are these degrees?")
+                unread = sorted(origin.attrib.keys() - _ORIGIN.keys())
+                if unread:
+                    raise DataError(
+                        f"{of}: expected <origin xyz= rpy=/>, got {unread[0]}=, which readers of URDF leave out"
+                    )
+                for name, length in _ORIGIN.items():
+                    value = origin.get(name)
+                    if value is not None and not finite_numbers(value, length):
+                        raise DataError(
+                            f"{of}: expected <origin {name}=/> as {length} numbers with spaces between them, got "
+                            f"{value!r}"
+                        )
+                rpy = origin.get("rpy")
+                if max(map(abs, finite_numbers(rpy, 3)), default=0.0) > _TURNS:
+                    raise DataError(f"{of}: expected <origin rpy=/> in radians, got {rpy!r}; are these degrees?")
 
 
 def doubts_of(joints: Sequence[ElementTree.Element]) -> list[str]:
-    """What the numbers of the joints between root and tip leave in doubt: degrees for radians, millimeters for meters.
-
-    One sentence each.
-    """
+    """List doubtful numbers of the joints between root and tip, degrees for radians, millimeters for meters."""
     doubts = []
     for joint in joints:
         limits = joint.findall("limit") if joint.get("type") == "revolute" else []
@@ -98,10 +91,7 @@ def doubts_of(joints: Sequence[ElementTree.Element]) -> list[str]:
 def check_masses(robot: ElementTree.Element, path: Path) -> None:
     """Refuse masses and moments of inertia that are no numbers: torques would be checked without them.
 
-    Raises
-    ------
-    DataError
-        The first link with such a number.
+    Raises DataError: the first link with such a number.
     """
     for link in robot.findall("link"):
         for inertial in link.findall("inertial"):
@@ -119,10 +109,7 @@ def check_masses(robot: ElementTree.Element, path: Path) -> None:
 def check_axis(joint: ElementTree.Element, path: Path) -> None:
     """Refuse a joint that moves about or along no axis.
 
-    Raises
-    ------
-    DataError
-        An axis of length 0, or of other than three finite numbers.
+    Raises DataError: an axis of length 0, or of other than three finite numbers.
     """
     axis = joint.find("axis")
     values = [1.0, 0.0, 0.0] if axis is None else finite_numbers(axis.get("xyz"), 3)
@@ -136,26 +123,18 @@ def check_axis(joint: ElementTree.Element, path: Path) -> None:
 def check_shapes(robot: ElementTree.Element, path: Path) -> None:
     """Refuse collision shapes that cannot be read: contacts would be looked for without them.
 
-    Raises
-    ------
-    DataError
-        The first link with another shape than a mesh, or a box, cylinder or sphere larger than nothing.
+    Raises DataError: the first link with another shape than a mesh, or a box, cylinder or sphere larger than nothing.
     """
     for link in robot.findall("link"):
         for collision in link.findall("collision"):
             shapes = [shape for geometry in collision.findall("geometry") for shape in geometry]
-            if len(shapes) != 1 or not (_is_mesh(shapes[0]) or _has_size(shapes[0])):
-                found = ", ".join(f"<{shape.tag}>" for shape in shapes) or "nothing"
+            if len(shapes) == 1 and shapes[0].tag == "mesh" and finite_numbers(shapes[0].get("scale", "1 1 1"), 3):
+                continue
+            names, length = SIZES.get(shapes[0].tag, ("", 0)) if len(shapes) == 1 else ("", 0)
+            sizes = [finite_numbers(shapes[0].get(name), length) for name in names.split()]
+            if not sizes or not all(min(values, default=0.0) > 0 for values in sizes):
+                named = ", ".join(f"<{shape.tag}>" for shape in shapes) or "nothing"
                 raise DataError(
                     f"{path}: link {link.get('name')!r}: expected the <geometry> of a <collision> to be a mesh, or a "
-                    f"box, cylinder or sphere with sizes above 0, got {found}"
+                    f"box, cylinder or sphere with sizes above 0, got {named}"
                 )
-
-
-def _is_mesh(shape: ElementTree.Element) -> bool:
-    return shape.tag == "mesh" and bool(finite_numbers(shape.get("scale", "1 1 1"), 3))
-
-
-def _has_size(shape: ElementTree.Element) -> bool:
-    names, length = _SIZES.get(shape.tag, ("", 0))
-    return bool(names) and all(min(finite_numbers(shape.get(name), length), default=0.0) > 0 for name in names.split())

@@ -69,10 +69,7 @@ class Robot:
 def check_robot(robot: object) -> None:
     """Refuse what is not an arm.
 
-    Raises
-    ------
-    SpecificationError
-        Something else than a `Robot`, as its name.
+    Raises SpecificationError: something else than a `Robot`, as its name.
     """
     if not isinstance(robot, Robot):
         raise SpecificationError(f"expected a robot, as of kineme.robots.load('panda'), got {robot!r:.80}")
@@ -81,10 +78,7 @@ def check_robot(robot: object) -> None:
 def check_start(robot: Robot, q: Array) -> None:
     """Refuse joint positions (n,) outside the limits, where a movement is to start.
 
-    Raises
-    ------
-    SpecificationError
-        The first such joint, with its limits.
+    Raises SpecificationError: the first such joint, with its limits.
     """
     inside = (q >= robot.lower - _ROUNDING) & (q <= robot.upper + _ROUNDING)
     if not inside.all():

@@ -1,19 +1,41 @@
-"""What a URDF file says about an arm, checked before a library for kinematics reads it."""
+"""URDF files of arms, checked before a library for kinematics reads them: joints, limits, meshes, grippers, the tip."""
 
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
 
 from kineme.errors import DataError
-from kineme.robots.models.ends import MOVING, Candidate, Ends, in_words
 from kineme.robots.models.numbers import check_axis, check_masses, check_origins, check_shapes, doubts_of, finite_number
+
+#: Types of joints that move.
+MOVING = ("revolute", "continuous", "prismatic")
+_LISTED = 8  # links that a message names
+_DIGITS = re.compile(r"finger|thumb|knuckle|jaw|claw", re.IGNORECASE)  # in the name of a joint, or of the link it moves
+_GRIPPER = re.compile(r"gripper|hand.*(index|middle|ring|little|pinky|mrl)", re.IGNORECASE)  # in the name of a joint
+_WRIST = re.compile(r"wrist|roll|pitch|yaw|rotat|swivel", re.IGNORECASE)  # turns the gripper, and is no part of it
+_SENSOR = re.compile(
+    r"camera|optical|lens|depth|imu|laser|lidar|sensor|sonar|accelerom|gyro|collision|inertia", re.IGNORECASE
+)
+# Names of tips, the surest first: words between underscores, dashes, dots or slashes.
+_TIPS = [
+    re.compile(rf"(^|[_\-./])({words})($|[_\-./])", re.IGNORECASE)
+    for words in (
+        "tcp|tool_center_point",
+        "tool0",
+        "ee|eef|end_?effector",
+        "tool|tool_frame|tool_link|gripper_frame|grasping_frame",
+        "flange|hand|palm|gripper|tip",
+    )
+]
 
 _PREFIXES = ("package://", "model://", "file://")
 
-_NAMES = ("http://www.ros.org/wiki/xacro", "http://wiki.ros.org/xacro", "http://ros.org/wiki/xacro")
+#: How tags of xacro begin, which a URDF has no more.
+_XACRO = ("{http://www.ros.org/wiki/xacro}", "{http://wiki.ros.org/xacro}", "{http://ros.org/wiki/xacro}")
 
 _LARGEST = 20_000_000  # bytes
 _TWIN = " link"  # is added to the name of a link that a joint has too
@@ -48,24 +70,35 @@ class Chain(NamedTuple):
 
 
 def read_chain(path: Path, tip: str | None) -> Chain:
-    """The chain from the root of the URDF at `path` to the frame `tip`, by default the end of the longest chain.
+    """Read the chain from the root of the URDF at `path` to the frame `tip`, by default the end of the longest chain.
 
     Joints of grippers and hands are no part of it.
 
-    Raises
-    ------
-    DataError
-        No such file, no URDF, a tip that does not exist, several chains as long and no tip, a joint without limits or
-        with a mimic joint in the chain, masses or shapes that cannot be read; each with the name of the joint or link.
+    Raises DataError: no such file, no URDF, a tip that does not exist, several chains as long and no tip, a joint
+    without limits or with a mimic joint in the chain, masses or shapes that cannot be read; each with the name of the
+    joint or link.
     """
     robot = read_root(path)
-    parents = _joints_above(robot, path)
+    parents: dict[str, ElementTree.Element] = {}  # the joint above each link that has one
+    for joint in robot.findall("joint"):
+        _end(joint, "parent", path)
+        child = _end(joint, "child", path)
+        if child in parents:
+            raise DataError(
+                f"{path}: link {child!r} is the child of {parents[child].get('name')!r} and of {joint.get('name')!r}; "
+                "a URDF is a tree"
+            )
+        parents[child] = joint
     links = [str(link.get("name")) for link in robot.findall("link")]
     ends = Ends(links, parents)
     candidates = ends.candidates()
     others = tuple(candidates[1:]) if tip is None else ()
     tip = _tip(tip, links, candidates, path)
-    above = _above(tip, parents)
+    above: list[ElementTree.Element] = []  # the joints between the root and the tip
+    link = tip
+    while link in parents:
+        above.insert(0, parents[link])
+        link = _parent_link(parents[link])
     moving = [joint for joint in above if joint.get("type") in MOVING]
     moving = [joint for joint in moving if joint.get("name") not in ends.gripper]
     if not moving:
@@ -80,47 +113,18 @@ def read_chain(path: Path, tip: str | None) -> Chain:
     joints = tuple(str(joint.get("name")) for joint in moving)
     units = tuple("m" if joint.get("type") == "prismatic" else "rad" for joint in moving)
     gripper = tuple(str(joint.get("name")) for joint in robot.findall("joint") if joint.get("name") in ends.gripper)
-    return Chain(_as_text(robot, path), joints, units, limits, tip, free, missing, gripper, others, doubts)
-
-
-def _joints_above(robot: ElementTree.Element, path: Path) -> dict[str, ElementTree.Element]:
-    """The joint above each link that has one."""
-    parents: dict[str, ElementTree.Element] = {}
-    for joint in robot.findall("joint"):
-        _end(joint, "parent", path)
-        child = _end(joint, "child", path)
-        if child in parents:
-            raise DataError(
-                f"{path}: link {child!r} is the child of {parents[child].get('name')!r} and of {joint.get('name')!r}; "
-                "a URDF is a tree"
-            )
-        parents[child] = joint
-    return parents
-
-
-def _above(tip: str, parents: dict[str, ElementTree.Element]) -> list[ElementTree.Element]:
-    """The joints between the root and a link."""
-    chain, link = [], tip
-    while link in parents:
-        chain.append(parents[link])
-        link = str(parents[link].find("parent").get("link"))  # type: ignore[union-attr] # looked at before
-    return chain[::-1]
-
-
-def _as_text(robot: ElementTree.Element, path: Path) -> str:
     try:
-        return ElementTree.tostring(robot, "unicode")
+        text = ElementTree.tostring(robot, "unicode")
     except RecursionError as error:
         raise DataError(f"{path}: expected a URDF file, got elements within one another without end") from error
+    return Chain(text, joints, units, limits, tip, free, missing, gripper, others, doubts)
 
 
 def read_root(path: Path) -> ElementTree.Element:
-    """The root of a URDF file, in which no link is called like a joint; of a xacro file, what it is converted to.
+    """Read the root of a URDF file, in which no link is called like a joint; a xacro file is converted.
 
-    Raises
-    ------
-    DataError
-        No such file, one of more than 20 MB, no XML, or XML that is no URDF; xacro without the package of that name.
+    Raises DataError: no such file, one of more than 20 MB, no XML, or XML that is no URDF; xacro without the package of
+    that name.
     """
     try:
         if path.stat().st_size > _LARGEST:
@@ -135,24 +139,19 @@ def read_root(path: Path) -> ElementTree.Element:
         raise DataError(
             f"{path}: expected a URDF file, got text that is no XML of a robot: it declares a document type"
         )
-    if has_macros(robot):
+    if any(element.tag.startswith(_XACRO) for element in robot.iter()):
         robot = without_macros(path)
     if robot.tag != "robot":
         raise DataError(f"{path}: expected a URDF, whose root is <robot>, got <{robot.tag}>")
-    _name_apart(robot)
-    return robot
-
-
-def _name_apart(robot: ElementTree.Element) -> None:
-    """Give links that are called like a joint another name, in place: frames of the model are known by their names."""
     joints = {joint.get("name") for joint in robot.findall("joint")}
     for link in robot.findall("link"):
         name = link.get("name")
-        if name in joints:
+        if name in joints:  # another name: the model knows frames by their names
             link.set("name", f"{name}{_TWIN}")
             for end in robot.iterfind("joint/*[@link]"):
                 if end.get("link") == name:
                     end.set("link", f"{name}{_TWIN}")
+    return robot
 
 
 def _end(joint: ElementTree.Element, which: str, path: Path) -> str:
@@ -163,7 +162,7 @@ def _end(joint: ElementTree.Element, which: str, path: Path) -> str:
 
 
 def _tip(tip: str | None, links: list[str], candidates: list[Candidate], path: Path) -> str:
-    """The link that is asked for, else the end of the longest chain if one is longer than all others."""
+    """Choose the link that is asked for, else the end of the longest chain if one is longer than all others."""
     if tip is not None:
         tip = f"{tip}{_TWIN}" if tip not in links and f"{tip}{_TWIN}" in links else tip
         if tip not in links:
@@ -184,7 +183,7 @@ def _tip(tip: str | None, links: list[str], candidates: list[Candidate], path: P
 
 
 def _limits(joint: ElementTree.Element, path: Path) -> JointLimits:
-    """The limits of a joint; one without stops becomes a joint with those of one turn to each side, in place."""
+    """Read the limits of a joint; one without stops becomes a joint with those of one turn to each side, in place."""
     name = joint.get("name")
     if not name:
         raise DataError(f"{path}: expected a name of each joint that moves, got one without")
@@ -204,37 +203,28 @@ def _limits(joint: ElementTree.Element, path: Path) -> JointLimits:
         limit.set("effort", limit.get("effort", "0"))
     if limit is None or limit.get("lower") is None or limit.get("upper") is None:
         raise DataError(f"{path}: joint {name!r} has no limits; add <limit lower= upper= velocity= effort=/> to it")
-    found = JointLimits(*(_number(limit, key, joint, path) for key in JointLimits._fields))
-    if not found.lower < found.upper:
-        raise DataError(f"{path}: joint {name!r}: expected lower < upper, got {found.lower:g} and {found.upper:g}")
+    values = []
+    for key in JointLimits._fields:
+        text = limit.get(key)
+        value = math.nan if text is None else finite_number(text)
+        if value is None:
+            raise DataError(f"{path}: joint {name!r}: expected a number for {key}, got {text!r}")
+        values.append(value)
+    limits = JointLimits(*values)
+    if not limits.lower < limits.upper:
+        raise DataError(f"{path}: joint {name!r}: expected lower < upper, got {limits.lower:g} and {limits.upper:g}")
     for key in ("velocity", "effort"):
         limit.set(key, limit.get(key, "0"))
-    known = {key: getattr(found, key) for key in ("velocity", "acceleration", "effort")}
-    if any(0 < value < _LEAST for value in known.values()):
-        raise DataError(f"{path}: joint {name!r}: expected limits of at least {_LEAST:g}, got {known}")
-    return found._replace(**{key: value if value > 0 else math.nan for key, value in known.items()})
-
-
-def _number(limit: ElementTree.Element, key: str, joint: ElementTree.Element, path: Path) -> float:
-    text = limit.get(key)
-    value = math.nan if text is None else finite_number(text)
-    if value is None:
-        raise DataError(f"{path}: joint {joint.get('name')!r}: expected a number for {key}, got {text!r}")
-    return value
-
-
-def has_macros(robot: ElementTree.Element) -> bool:
-    """Whether the tree has elements of xacro, which a URDF has no more."""
-    return any(element.tag.startswith(tuple(f"{{{name}}}" for name in _NAMES)) for element in robot.iter())
+    rates = {key: getattr(limits, key) for key in ("velocity", "acceleration", "effort")}
+    if any(0 < value < _LEAST for value in rates.values()):
+        raise DataError(f"{path}: joint {name!r}: expected limits of at least {_LEAST:g}, got {rates}")
+    return limits._replace(**{key: value if value > 0 else math.nan for key, value in rates.items()})
 
 
 def without_macros(path: Path) -> ElementTree.Element:
-    """The root of the URDF that a xacro file is converted to, with the defaults of its arguments.
+    """Convert a xacro file to a URDF with the defaults of its arguments, and return its root.
 
-    Raises
-    ------
-    DataError
-        The package ``xacro`` is not installed, or it cannot convert the file.
+    Raises DataError: the package ``xacro`` is not installed, or it cannot convert the file.
     """
     remedy = f"xacro {path.name} > {path.name.split('.')[0]}_converted.urdf"
     try:
@@ -254,7 +244,7 @@ def without_macros(path: Path) -> ElementTree.Element:
 
 
 def resolve_meshes(robot: ElementTree.Element, path: Path) -> list[str]:
-    """Write the path of each collision mesh into the tree, and remove those that are not there; links without shape.
+    """Write the path of each collision mesh into the tree, and remove missing ones; return links without shape.
 
     ``package://NAME/...`` is looked for in every folder above the URDF, as ROS packages lie beside one another.
     """
@@ -266,20 +256,138 @@ def resolve_meshes(robot: ElementTree.Element, path: Path) -> list[str]:
             mesh = collision.find("geometry/mesh")
             if mesh is None:
                 continue
-            found = find_mesh(mesh.get("filename", ""), path)
-            if found is None:
+            file = find_mesh(mesh.get("filename", ""), path)
+            if file is None:
                 link.remove(collision)
                 missing.append(str(link.get("name")))
             else:
-                mesh.set("filename", str(found))
+                mesh.set("filename", str(file))
     return missing
 
 
 def find_mesh(name: str, path: Path) -> Path | None:
-    """Where the mesh lies that the URDF at `path` calls `name`; None where it is not there."""
+    """Find the file of a mesh that the URDF at `path` calls `name`; None where it is not there."""
     within = next((name.removeprefix(prefix) for prefix in _PREFIXES if name.startswith(prefix)), name)
     folders = path.resolve().parents
     try:
         return next((folder / within for folder in folders if within and (folder / within).is_file()), None)
     except (OSError, ValueError):  # as a name that is too long
         return None
+
+
+class Candidate(NamedTuple):
+    """A link that may be the tip."""
+
+    link: str
+    n_joints: int  # of the arm, between the root and the link
+
+    def __str__(self) -> str:
+        return f"{self.link!r} ({self.n_joints} joint{'s' if self.n_joints != 1 else ''})"
+
+
+class Ends:
+    """The tree of a URDF as bodies, which are links that fixed joints hold together, and the joints between them.
+
+    Parameters
+    ----------
+    links : list of str
+    parents : dict of str to Element
+        The joint above each link that has one.
+
+    Attributes
+    ----------
+    gripper : set of str
+        Names of the joints of grippers and hands: by their names (finger, thumb, jaw, gripper ...), joints that mimic
+        others at the end of a chain, and two or more branches of equally many joints that leave the end of a chain at
+        least twice as long. If nothing else moves, there are none.
+    """
+
+    def __init__(self, links: list[str], parents: dict[str, ElementTree.Element]) -> None:
+        self._links, self._parents = links, parents
+        self._bodies = {}  # link -> the link that stands for those which fixed joints hold together
+        for link in links:
+            body, passed = link, set[str]()
+            while body in parents and parents[body].get("type") not in MOVING and body not in passed:
+                passed.add(body)
+                body = _parent_link(parents[body])
+            self._bodies[link] = body
+        self._branches: dict[str, list[str]] = {body: [] for body in self._bodies.values()}
+        for link in links:
+            if link in parents and parents[link].get("type") in MOVING:
+                self._branches[self._bodies[_parent_link(parents[link])]].append(link)
+        self.gripper: set[str] = set()
+        cut = [link for link in links if self._begins_gripper(link)]
+        inside, left = set[str](), cut
+        while left:
+            link = left.pop()
+            inside.add(str(parents[link].get("name")))
+            left += self._branches[link]
+        if len(inside) < sum(map(len, self._branches.values())):
+            self.gripper = inside
+
+    def candidates(self) -> list[Candidate]:
+        """List the likely tip at each end of the arm, the one with most joints first."""
+        arm = [body for body in self._branches if body in self._parents and self._is_arm(body)]
+        ends = [body for body in arm if not any(map(self._is_arm, self._branches[body]))]
+        return sorted(
+            (Candidate(self._tip_of(body), self._n_above(body)) for body in ends), key=lambda end: -end.n_joints
+        )
+
+    def _is_arm(self, body: str) -> bool:
+        return str(self._parents[body].get("name")) not in self.gripper
+
+    def _n_above(self, body: str) -> int:
+        """Count the joints of the arm between the root and a body."""
+        count, passed = 0, set()
+        while body in self._parents and body not in passed:
+            passed.add(body)
+            count += self._is_arm(body)
+            body = self._bodies[_parent_link(self._parents[body])]
+        return count
+
+    def _n_below(self, body: str, depth: int = 0) -> int:
+        """Count the joints of the longest chain below a body."""
+        below = self._branches[body] if depth < len(self._links) else []
+        return max((1 + self._n_below(branch, depth + 1) for branch in below), default=0)
+
+    def _begins_gripper(self, link: str) -> bool:
+        joint = self._parents.get(link)
+        if joint is None or joint.get("type") not in MOVING:
+            return False
+        name = str(joint.get("name"))
+        if _DIGITS.search(name) or _DIGITS.search(link) or (_GRIPPER.search(name) and not _WRIST.search(name)):
+            return True
+        if joint.find("mimic") is not None:
+            return self._n_below(link) == 0
+        body = self._bodies[_parent_link(joint)]
+        lengths = sorted((1 + self._n_below(branch) for branch in self._branches[body]), reverse=True)
+        return len(lengths) > 1 and lengths[0] == lengths[1] and 2 * lengths[0] <= self._n_above(body) + 1
+
+    def _tip_of(self, body: str) -> str:
+        """Choose the most likely tip of a body: by its name, else its only end, else the link itself."""
+
+        def n_fixed(link: str) -> int:
+            count = 0
+            while link != body:
+                count, link = count + 1, _parent_link(self._parents[link])
+            return count
+
+        links = [link for link in self._links if self._bodies[link] == body and not _SENSOR.search(link)]
+        for names in _TIPS:
+            named = [link for link in links if names.search(link)]
+            if named:
+                return max(named, key=n_fixed)
+        inner = {_parent_link(self._parents[link]) for link in links if link in self._parents}
+        ends = [link for link in links if link not in inner]
+        return ends[0] if len(ends) == 1 else body
+
+
+def in_words(candidates: list[Candidate]) -> str:
+    """Write the first eight, each with its number of joints."""
+    more = f" and {len(candidates) - _LISTED} more" if len(candidates) > _LISTED else ""
+    return ", ".join(map(str, candidates[:_LISTED])) + more
+
+
+def _parent_link(joint: ElementTree.Element) -> str:
+    parent = joint.find("parent")
+    return "" if parent is None else str(parent.get("link"))

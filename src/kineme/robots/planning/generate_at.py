@@ -12,7 +12,7 @@ from kineme.dmp.generation.learned import Learned
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.channels.coordinates import as_wxyz
 from kineme.movements.trajectories.trajectory import Trajectory
-from kineme.robots.checks.tracking import TRACKED
+from kineme.robots.execution.preflight import TRACKED
 from kineme.robots.kinematics.task_path import PLANES
 from kineme.robots.models.robot import Robot
 from kineme.robots.planning.roles import Roles, Scales, roles_of, scales_of
@@ -78,12 +78,8 @@ def generate_at(  # noqa: PLR0913 - one parameter per option
     plane : {"xy", "xz", "yz"}
         Where the axes of a movement of two dimensions lie.
 
-    Raises
-    ------
-    TrajectoryError
-        A movement of the tip without two or three positions.
-    SpecificationError
-        A start or goal of another number of coordinates; of a movement of two dimensions, a goal in another plane.
+    Raises TrajectoryError: a movement of the tip without two or three positions; SpecificationError: a start or goal of
+    another number of coordinates; of a movement of two dimensions, a goal in another plane.
     """
     roles = roles_of(learned.primitive.channels, len(learned.columns), "joints" if joints else "tip", joints)
     _check_tip(roles, learned, joints is not None)

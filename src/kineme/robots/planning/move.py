@@ -16,7 +16,7 @@ from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.channels.coordinates import as_wxyz
 from kineme.movements.rotations import quaternion_of
 from kineme.movements.segmentation.segment import as_recording
-from kineme.robots.checks.tracking import TRACKED
+from kineme.robots.execution.preflight import TRACKED
 from kineme.robots.kinematics.choose import choose_place, choose_posture
 from kineme.robots.kinematics.descent import kinematics
 from kineme.robots.kinematics.inverse import ORIENTATIONS, InverseKinematics
@@ -25,9 +25,15 @@ from kineme.robots.kinematics.reach import OutOfReachError, check_reached
 from kineme.robots.kinematics.task_path import PLANES, TaskPath, task_path
 from kineme.robots.models.robot import Robot, check_robot, check_start
 from kineme.robots.planning.refusal import loses_its_path, refuse_failed, refuse_outside
-from kineme.robots.planning.robot_movement import RobotMovement
+from kineme.robots.planning.robot_movement import (
+    FASTEST_RATE,
+    SLOWEST_RATE,
+    TIMINGS,
+    RobotMovement,
+    Untimed,
+    with_timing,
+)
 from kineme.robots.planning.roles import JOINT_UNITS, SPACES, check_plausible, roles_of, scales_of, space_of
-from kineme.robots.planning.timed_movement import FASTEST_RATE, SLOWEST_RATE, TIMINGS, Untimed, with_timing
 from kineme.validation import Array, as_numbers, check_choice, check_number, check_switch
 
 PLACES = ("as given", "free")
@@ -226,12 +232,8 @@ class Way(NamedTuple):
 
         The posture at the start, and a place that is free, are those with which the whole movement costs least.
 
-        Raises
-        ------
-        OutOfReachError
-            No posture reaches the start of the path.
-        TrajectoryError
-            None of the postures that are followed keeps to the path.
+        Raises OutOfReachError: no posture reaches the start of the path; TrajectoryError: None of the postures that are
+        followed keeps to the path.
         """
         choose = choose_place if place == "free" else choose_posture
         chosen = choose(self.ik.robot, path, self.ik.costs, stands)
@@ -283,12 +285,8 @@ def request_of(
 ) -> Request:
     """What `move` was given, as one movement; `steps` and `continuous` besides such channels of its own.
 
-    Raises
-    ------
-    TrajectoryError
-        Several movements, several orientations, joints of another number, or steps of another length.
-    SpecificationError
-        Steps that are no dict.
+    Raises TrajectoryError: several movements, several orientations, joints of another number, or steps of another
+    length; SpecificationError: steps that are no dict.
     """
     if isinstance(movement, Primitives | PosePrimitives):
         movement = movement.rollout()

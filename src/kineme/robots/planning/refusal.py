@@ -5,12 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from kineme.errors import SpecificationError, TrajectoryError
-from kineme.robots.checks.along import SAMPLING
-from kineme.robots.checks.check import Check, Preflight
+from kineme.robots.execution.preflight import SAMPLING, Check, Preflight
 from kineme.robots.kinematics.reach import point_in_words
 from kineme.robots.models.robot import Robot
-from kineme.robots.planning.robot_movement import RobotMovement
-from kineme.robots.planning.timed_movement import FASTEST_RATE, Untimed, with_timing
+from kineme.robots.planning.robot_movement import FASTEST_RATE, RobotMovement, Untimed, with_timing
 from kineme.validation import Array
 
 _OF_SAMPLING = ("jump", "tracking", "turned away", "steps")  # may be mended by more samples
@@ -36,10 +34,7 @@ class InfeasibleError(TrajectoryError):
 def refuse_outside(robot: Robot, times: Array, joints: Array) -> None:
     """Refuse a movement of the joints (T, n) that is far outside their limits, before anything is computed.
 
-    Raises
-    ------
-    InfeasibleError
-        The joint that is farthest outside: when, its position and its limit.
+    Raises InfeasibleError: the joint that is farthest outside: when, its position and its limit.
     """
     beyond = np.maximum(robot.lower - joints, joints - robot.upper)
     t, j = np.unravel_index(int(np.argmax(beyond)), beyond.shape)
@@ -59,10 +54,7 @@ def loses_its_path(made: RobotMovement) -> bool:
 def refuse_failed(made: RobotMovement, untimed: Untimed, timing: str) -> None:
     """Refuse a movement that did not pass its checks.
 
-    Raises
-    ------
-    InfeasibleError
-        A check that did not pass, with the least duration that works.
+    Raises InfeasibleError: a check that did not pass, with the least duration that works.
     """
     if not made.preflight.passed:
         raise InfeasibleError(_refusal(made, remedy(made, untimed, timing)), made.preflight)

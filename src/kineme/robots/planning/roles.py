@@ -57,10 +57,8 @@ def roles_of(channels: Channels | None, n_columns: int, space: str, robot: Robot
     Columns with the names of the joints of the arm are these joints, in its order; the others, as of a gripper, go
     along. As many columns of other names are the joints one after the other, which a warning says.
 
-    Raises
-    ------
-    TrajectoryError
-        Several orientations of the tip, or angles beside its position; names of joints at the places of others.
+    Raises TrajectoryError: several orientations of the tip, or angles beside its position; names of joints at the
+    places of others.
     """
     if channels is None:
         posed = space == "tip" and n_columns == 7
@@ -108,10 +106,8 @@ def scales_of(roles: Roles, robot: Robot | None, joint_units: str | None = None)
     columns that are called as LeRobot's drivers call them are in degrees, which is said by a warning; others are in
     radians and meters, and so are positions of the tip.
 
-    Raises
-    ------
-    TrajectoryError
-        A unit of another quantity, or that is not in the table of units; `joint_units` beside another unit in the head.
+    Raises TrajectoryError: a unit of another quantity, or that is not in the table of units; `joint_units` beside
+    another unit in the head.
     """
     n = len(roles.positions)
     size, offset = np.ones(n), np.zeros(n)
@@ -168,10 +164,7 @@ def _scale(name: str, text: str, native: str, robot: Robot | None, k: int) -> tu
 def check_plausible(positions: Array, robot: Robot) -> None:
     """Refuse joint positions (T, n) [rad, m] that are turns beyond the limits: degrees that are taken for radians.
 
-    Raises
-    ------
-    TrajectoryError
-        The message names the option for units of joints.
+    Raises TrajectoryError: the message names the option for units of joints.
     """
     beyond = np.maximum(positions.max(axis=0) - robot.upper, robot.lower - positions.min(axis=0))
     wrong = np.array([unit == "rad" for unit in robot.units]) & (beyond > tau)
@@ -213,10 +206,7 @@ def joints_among(names: Sequence[str], robot: Robot) -> list[int] | None:
 
     Columns of velocities, accelerations and efforts are no joints.
 
-    Raises
-    ------
-    TrajectoryError
-        Every joint is there for both sides, or several times and nothing else.
+    Raises TrajectoryError: every joint is there for both sides, or several times and nothing else.
     """
     names = ["" if _is_rate(name) else name for name in names]
     plain = [split_head(name)[0].removesuffix(DRIVERS) for name in names]
@@ -245,10 +235,8 @@ def joints_among(names: Sequence[str], robot: Robot) -> list[int] | None:
 def check_order(names: Sequence[str], robot: Robot) -> None:
     """Say that columns, as many as joints and of other names, are taken as these one after the other.
 
-    Raises
-    ------
-    TrajectoryError
-        Velocities; a column at the place of another joint than its name says, or numbers that do not rise.
+    Raises TrajectoryError: Velocities; a column at the place of another joint than its name says, or numbers that do
+    not rise.
     """
     rates = list(filter(_is_rate, names))
     if rates:

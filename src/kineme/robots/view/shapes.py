@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 from kineme.errors import DataError
 from kineme.robots.models.load import FOLDER, MODELS
-from kineme.robots.models.numbers import finite_numbers
+from kineme.robots.models.numbers import SIZES, finite_numbers
 from kineme.robots.models.robot import Robot
 from kineme.robots.models.urdf import find_mesh, read_root
 
@@ -23,7 +23,6 @@ _ROBOTS = "cmeel.prefix/share/example-robot-data/robots"  # within what its whee
 
 _LARGEST = 16_000_000  # bytes of all meshes of one page
 _MESHES = {".stl": "stl", ".dae": "collada"}
-_SHAPES = {"box": ("size", 3), "cylinder": ("radius length", 1), "sphere": ("radius", 1)}
 
 _GRAYS = ((0.80, 0.82, 0.85, 1.0), (0.58, 0.61, 0.66, 1.0))  # of links one after the other that have no color
 _THICKNESS = 0.12  # of the cylinder between two joints: its radius for each meter of its length
@@ -160,9 +159,9 @@ class LinkShapes:
                 return None
             scale = finite_numbers(given.get("scale"), 3) or [1.0, 1.0, 1.0]
             return ElementTree.Element("mesh", filename=str(number), scale=as_text(scale))
-        if given.tag not in _SHAPES:
+        if given.tag not in SIZES:
             return None
-        names, length = _SHAPES[given.tag]
+        names, length = SIZES[given.tag]
         sizes = {name: finite_numbers(given.get(name), length) for name in names.split()}
         if not all(values and min(values) > 0 for values in sizes.values()):
             return None

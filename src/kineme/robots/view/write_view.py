@@ -14,7 +14,7 @@ import numpy as np
 from kineme.reporting.atomic import write_atomically
 from kineme.reporting.figures import BLUE, GRAY, GREEN, ORANGE
 from kineme.reporting.text import counted, in_markup, printable
-from kineme.robots.checks.check import preflight_table
+from kineme.robots.execution.preflight import preflight_table
 from kineme.robots.kinematics.descent import kinematics
 from kineme.robots.planning.robot_movement import RobotMovement, duration_in_words
 from kineme.robots.view.shapes import Shapes, shapes_of

@@ -1,4 +1,4 @@
-// One primitive, as kineme.studio.snapshot.movements writes it: it moves without asking anyone.
+// One primitive, as kineme.studio.snapshot writes it: it moves without asking anyone.
 
 import { unpack } from "./arrays.js";
 import { primitiveOf, rollout } from "./rollout.js";

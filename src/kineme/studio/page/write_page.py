@@ -14,9 +14,7 @@ from kineme.library.library import ActionLibrary
 from kineme.reporting.atomic import whole_file
 from kineme.reporting.text import counted, in_markup
 from kineme.similarity.describe import N_POINTS
-from kineme.studio.snapshot.make import snapshot_of_library
-from kineme.studio.snapshot.recognition import DRAWN
-from kineme.studio.snapshot.snapshot import Snapshot
+from kineme.studio.snapshot import DRAWN, Snapshot, snapshot_of_library
 
 _IMPORT = re.compile(r'^import \{([^}]*)\} from "(\.[^"]+)";\n', re.MULTILINE)
 _EXPORT = re.compile(r"^export (?=(?:async )?(?:function|const|class) (\w+))", re.MULTILINE)
@@ -28,12 +26,9 @@ _FROM_ABOVE = 0.8  # of the direction of the view: y is up where it is mostly al
 
 
 def library_page(library: ActionLibrary, title: str, most: int | None = None) -> tuple[str, Snapshot]:
-    """The text of the page, and the snapshot that it holds: `most` movements, see `snapshot_of_library`.
+    """Make the text of the page, and the snapshot that it holds: `most` movements, see `snapshot_of_library`.
 
-    Raises
-    ------
-    SpecificationError
-        Movements that are neither in the plane nor in space; what `snapshot_of_library` refuses.
+    Raises SpecificationError: Movements that are neither in the plane nor in space; what `snapshot_of_library` refuses.
     """
     if library.n_dims not in (2, 3) and len(library):
         raise SpecificationError(
@@ -45,7 +40,7 @@ def library_page(library: ActionLibrary, title: str, most: int | None = None) ->
 
 
 def page_of(snapshot: Snapshot, title: str) -> str:
-    """The page of a snapshot. Its content security policy allows its own script and style by their hashes, no more."""
+    """Make the page of a snapshot; its content security policy allows its own script and style by hashes, no more."""
     snapshot.header["view"] = view_of(snapshot)
     script = bundled(_FOLDER / "face.js")
     style = _TOKENS.read_text(encoding="utf-8") + (_FOLDER / "page.css").read_text(encoding="utf-8")
@@ -62,7 +57,7 @@ def page_of(snapshot: Snapshot, title: str) -> str:
         "snapshot": snapshot.to_json(),
     }
     template = (_FOLDER / "page.html").read_text(encoding="utf-8")
-    return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], template)
+    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], template)
 
 
 def write_page(
@@ -70,12 +65,7 @@ def write_page(
 ) -> Snapshot:
     """Write the page of a library, see `library_page`; the title is by default the name of the library's folder.
 
-    Raises
-    ------
-    FileExistsError
-        `replace` is False and there is a file.
-    OSError
-        The folder is missing, read-only or full.
+    Raises FileExistsError: `replace` is False and there is a file; OSError: the folder is missing, read-only or full.
     """
     text, snapshot = library_page(library, title or library.store.folder.resolve().name, most)
     with whole_file(Path(path), replace=replace) as beside:
@@ -99,11 +89,11 @@ def view_of(snapshot: Snapshot) -> list[float]:
 
 
 def summary_of(snapshot: Snapshot) -> str:
-    """How many symbols and movements a page holds, as in "4 symbols, 24 of 28 movements"."""
-    held, known = snapshot.header["n_movements"], snapshot.header.get("n_all", snapshot.header["n_movements"])
-    of_all = "" if held == known else f" of {known:,}"
+    """Count the symbols and movements of a page, as in "4 symbols, 24 of 28 movements"."""
+    held, n_all = snapshot.header["n_movements"], snapshot.header.get("n_all", snapshot.header["n_movements"])
+    of_all = "" if held == n_all else f" of {n_all:,}"
     symbols = counted(len(snapshot.header["classes"]), "symbol")
-    return f"{symbols}, {held:,}{of_all} {'movement' if known == 1 else 'movements'}"
+    return f"{symbols}, {held:,}{of_all} {'movement' if n_all == 1 else 'movements'}"
 
 
 def _hash(text: str) -> str:
@@ -122,14 +112,14 @@ def bundled(entry: Path) -> str:
 
 
 def _add(path: Path, done: dict[Path, str], parts: list[str]) -> str:
-    """Append a module, after those that it imports; its name."""
+    """Append a module, after those that it imports, and return its name."""
     if path in done:
         return done[path]
     done[path] = f"module{len(done)}"
     text = path.read_text(encoding="utf-8")
     needed = {source: _add((path.parent / source).resolve(), done, parts) for _, source in _IMPORT.findall(text)}
     names = _EXPORT.findall(text)
-    body = _IMPORT.sub(lambda found: f"const {{{found[1]}}} = {needed[found[2]]};\n", _EXPORT.sub("", text))
+    body = _IMPORT.sub(lambda match: f"const {{{match[1]}}} = {needed[match[2]]};\n", _EXPORT.sub("", text))
     if _LEFT.search(body):
         raise KinemeError(f"expected only plain imports and exports in {path.name}")
     parts.append(f"// {path.name}\nconst {done[path]} = (() => {{\n{body}return {{ {', '.join(names)} }};\n}})();")

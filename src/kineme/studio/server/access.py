@@ -1,4 +1,4 @@
-"""Who may ask: the right token, from this page or a program, under a name that is this machine's.
+"""The guard of the studio: who may ask needs the token, from this page or a program, under a name of this machine.
 
 A web page of anybody may send requests to a server on this machine. It cannot know the token; nor can it use the cookie
 of the studio's own page: browsers name the page that asks in ``Origin``, and a name that was pointed at this machine to
@@ -55,7 +55,7 @@ class Guard:
         guarded = _with_headers(send, scope, headers.get("host", ""))
         if refusal := self._refusal(scope, headers):
             await refuse(scope, guarded, *refusal)
-        elif self._opens(scope):
+        elif _is_page(scope) and not {"token", "once"}.isdisjoint(_query(scope)):
             await self._set_cookie(guarded, headers)
         else:
             await self.app(scope, receive, guarded)
@@ -77,32 +77,35 @@ class Guard:
         if (parts := _HOST.fullmatch(host)) is None:
             return False
         name = (parts["address"] or parts["name"]).lower()
-        address = _address(name)
-        return name in self.names or (address is not None and (self.any_address or address.is_loopback))
+        try:
+            address = ipaddress.ip_address(name)  # which nobody can point elsewhere
+        except ValueError:
+            return name in self.names
+        return name in self.names or self.any_address or address.is_loopback
 
     def _knows_token(self, scope: Scope, headers: Mapping[str, str]) -> bool:
         kind, _, bearer = headers.get("authorization", "").partition(" ")
-        told = [bearer.strip()] if kind.lower() == "bearer" else []
-        told += [_cookies(headers.get("cookie", "")).get(self.cookie, "")]
+        tokens = [bearer.strip()] if kind.lower() == "bearer" else []
+        cookies = (part.partition("=") for part in headers.get("cookie", "").split(";"))
+        tokens += [{name.strip(): value.strip() for name, _, value in cookies}.get(self.cookie, "")]
         if scope["type"] == "websocket" or scope["path"] == "/":
-            told += _query(scope).get("token", [])
-        return _is_among(told, self.token) or self._uses_once(scope)
-
-    def _uses_once(self, scope: Scope) -> bool:
+            tokens += _query(scope).get("token", [])
+        if _is_among(tokens, self.token):
+            return True
         used = bool(self._once) and _is_page(scope) and _is_among(_query(scope).get("once", []), self._once)
         if used:
             self._once = ""
         return used
 
-    def _opens(self, scope: Scope) -> bool:
-        return _is_page(scope) and not {"token", "once"}.isdisjoint(_query(scope))
-
-    async def _set_cookie(self, send: Send, asked: Mapping[str, str]) -> None:
+    async def _set_cookie(self, send: Send, headers: Mapping[str, str]) -> None:
         cookie = f"{self.cookie}={self.token}; Path=/; HttpOnly; SameSite=Strict"
-        status, way = (200, (b"refresh", b"0; url=/")) if _is_linked(asked) else (303, (b"location", b"/"))
-        headers = [way, (b"set-cookie", cookie.encode()), (b"content-length", b"0"), (b"cache-control", b"no-store")]
-        headers.append((b"content-type", b"text/html"))
-        await send({"type": "http.response.start", "status": status, "headers": headers})
+        # Where a page of another site may have led a browser here, it follows a redirect without the cookie.
+        site, is_page = headers.get("sec-fetch-site"), "text/html" in headers.get("accept", "")
+        is_linked = is_page and site not in {"none", "same-origin"}
+        status, way = (200, (b"refresh", b"0; url=/")) if is_linked else (303, (b"location", b"/"))
+        sent = [way, (b"set-cookie", cookie.encode()), (b"content-length", b"0"), (b"cache-control", b"no-store")]
+        sent.append((b"content-type", b"text/html"))
+        await send({"type": "http.response.start", "status": status, "headers": sent})
         await send({"type": "http.response.body", "body": b""})
 
 
@@ -112,29 +115,16 @@ def own_names(host: str) -> tuple[str, ...]:
     return host, name, f"{name}.local", socket.getfqdn()
 
 
-def _address(name: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
-    """The address that a host is, which nobody can point elsewhere; None if it is a name."""
-    try:
-        return ipaddress.ip_address(name)
-    except ValueError:
-        return None
-
-
 def _is_page(scope: Scope) -> bool:
     return scope["type"] == "http" and scope["path"] == "/"
 
 
-def _is_among(told: list[str], secret: str) -> bool:
-    return any(hmac.compare_digest(one.encode(), secret.encode()) for one in told)
-
-
-def _is_linked(headers: Mapping[str, str]) -> bool:
-    """Whether a page of another site may have led a browser here, so that it follows a redirect without the cookie."""
-    return "text/html" in headers.get("accept", "") and headers.get("sec-fetch-site") not in {"none", "same-origin"}
+def _is_among(tokens: list[str], secret: str) -> bool:
+    return any(hmac.compare_digest(token.encode(), secret.encode()) for token in tokens)
 
 
 def _same_origin(scope: Scope, headers: Mapping[str, str]) -> bool:
-    """Whether a request is of no page or of our own."""
+    """Tell whether a request is of no page or of our own."""
     origin = headers.get("origin")
     if origin is not None:
         scheme, _, host = origin.partition("://")
@@ -144,11 +134,6 @@ def _same_origin(scope: Scope, headers: Mapping[str, str]) -> bool:
     return headers.get("sec-fetch-site", "none") in {"same-origin", "none"}
 
 
-def _cookies(text: str) -> dict[str, str]:
-    pairs = (part.partition("=") for part in text.split(";"))
-    return {name.strip(): value.strip() for name, _, value in pairs}
-
-
 def _query(scope: Scope) -> dict[str, list[str]]:
     with suppress(ValueError):  # too many fields
         return parse_qs(scope["query_string"].decode("latin-1"), max_num_fields=20)
@@ -156,19 +141,7 @@ def _query(scope: Scope) -> dict[str, list[str]]:
 
 
 def _with_headers(send: Send, scope: Scope, host: str) -> Send:
-    added = _headers(scope, host)
-
-    async def guarded(message: Message) -> None:
-        if message["type"] == "http.response.start":
-            own = {name.lower() for name, _ in message["headers"]}
-            message = {**message, "headers": [*message["headers"], *(one for one in added if one[0] not in own)]}
-        await send(message)
-
-    return guarded
-
-
-def _headers(scope: Scope, host: str) -> list[tuple[bytes, bytes]]:
-    """What browsers are told: scripts, styles and requests of this server alone, and no page around it."""
+    """Allow browsers scripts, styles and requests of this server alone, and no page around it."""
     framed = scope["path"] == _FRAMED
     socket_of = f"ws://{host} wss://{host}" if all(mark.isalnum() or mark in ".-:[]" for mark in host) else ""
     policy = (
@@ -176,7 +149,7 @@ def _headers(scope: Scope, host: str) -> list[tuple[bytes, bytes]]:
         f"connect-src 'self' {socket_of}; frame-src 'self'; manifest-src 'self'; base-uri 'none'; form-action 'none'; "
         f"frame-ancestors {chr(39)}{'self' if framed else 'none'}{chr(39)}"
     )
-    return [
+    added = [
         (b"content-security-policy", policy.encode("latin-1")),
         (b"x-content-type-options", b"nosniff"),
         (b"x-frame-options", b"SAMEORIGIN" if framed else b"DENY"),
@@ -185,3 +158,12 @@ def _headers(scope: Scope, host: str) -> list[tuple[bytes, bytes]]:
         (b"cross-origin-resource-policy", b"same-origin"),
         (b"cache-control", b"no-store" if scope["path"].startswith("/api/") else b"no-cache"),
     ]
+
+    async def guarded(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            own = {name.lower() for name, _ in message["headers"]}
+            missing = (header for header in added if header[0] not in own)
+            message = {**message, "headers": [*message["headers"], *missing]}
+        await send(message)
+
+    return guarded

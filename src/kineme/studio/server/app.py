@@ -21,17 +21,14 @@ from kineme.studio.server import (
     change_routes,
     library_routes,
     live_socket,
-    proposal_routes,
-    recognize_routes,
     recording_routes,
     robot_routes,
     rollout_routes,
 )
 from kineme.studio.server.access import Guard
-from kineme.studio.server.changes import Changes, LooksAfterChanges
 from kineme.studio.server.live_sources import Sources
 from kineme.studio.server.refusals import AnswersFailures, answer_errors, refuse
-from kineme.studio.server.studio import Studio
+from kineme.studio.server.studio import Changes, NotifyAfterChanges, Studio
 
 _KINDS = {
     ".html": "text/html; charset=utf-8",
@@ -66,7 +63,7 @@ _STATUSES = (
 
 
 class Refusal(BaseModel):
-    """Why nothing was done."""
+    """The reason why nothing was done."""
 
     error: str = Field(description="What was expected, what came, and what to do.")
 
@@ -83,7 +80,7 @@ _TOKENS = {
 }
 
 
-class Described(FastAPI):
+class StudioApp(FastAPI):
     """An application whose description says that it wants a token."""
 
     def openapi(self) -> dict[str, Any]:
@@ -104,9 +101,9 @@ _THREADS = 8  # requests that are worked on at once, beside movements under way
 ROUTERS = (
     library_routes.router,
     change_routes.router,
-    recognize_routes.router,
+    rollout_routes.recognition_router,
     rollout_routes.router,
-    proposal_routes.router,
+    change_routes.proposal_router,
     recording_routes.router,
     robot_routes.router,
     live_socket.router,
@@ -131,13 +128,10 @@ def create_app(
     hosts : tuple of str
         Names beside those of the loopback under which it may be asked; with one, every address too.
 
-    Raises
-    ------
-    DataError
-        The library cannot be opened.
+    Raises DataError: the library cannot be opened.
     """
     studio = Studio(Path(folder), read_only)
-    app = Described(
+    app = StudioApp(
         title="kineme studio",
         version=version("kineme"),
         description=ABOUT,
@@ -151,7 +145,7 @@ def create_app(
     answer_errors(app)
     for router in ROUTERS:
         app.include_router(router)
-    app.add_middleware(LooksAfterChanges)
+    app.add_middleware(NotifyAfterChanges)
     app.add_middleware(LimitedBodies)
     app.add_middleware(StaticFiles)
     app.add_middleware(AnswersFailures)
@@ -206,11 +200,11 @@ class _RefusedError(Exception):
 class _Body:
     def __init__(self, receive: Receive, most: int, silence: float) -> None:
         self.receive, self.most, self.silence = receive, most, silence
-        self.got, self.whole = 0, False
+        self.got, self.complete = 0, False
         self.refused: tuple[int, str] | None = None
 
     async def __call__(self) -> Message:
-        if self.whole:  # what comes after the body is that the client has gone, whenever it does
+        if self.complete:  # what comes after the body is that the client has gone, whenever it does
             return await self.receive()
         try:
             async with asyncio.timeout(self.silence):
@@ -219,14 +213,14 @@ class _Body:
             self.refused = 408, f"expected the rest of the request, got nothing for {self.silence:g} s"
             raise _RefusedError from None
         self.got += len(message.get("body", b""))
-        self.whole = not message.get("more_body", False)
+        self.complete = not message.get("more_body", False)
         if self.got > self.most:
             self._refuse_size()
             raise _RefusedError
         return message
 
     def is_announced_too_large(self, scope: Scope) -> bool:
-        """Whether the head of the request says so."""
+        """Tell whether the head of the request says so."""
         length = dict(scope["headers"]).get(b"content-length", b"0")
         if length.isdigit() and int(length[:20]) > self.most:
             self._refuse_size()
@@ -237,7 +231,7 @@ class _Body:
 
 
 class StaticFile(NamedTuple):
-    """What is sent of a file: its bytes, its kind, and a tag that is another one when they are."""
+    """A file as it is sent: its bytes, its kind, and a tag that is another one when they are."""
 
     body: bytes
     kind: bytes
@@ -269,24 +263,24 @@ class StaticFiles:
 
 
 def static_files() -> dict[str, StaticFile]:
-    """All files by their path; ``/`` is the page."""
+    """Read all files, by their path; ``/`` is the page."""
     package = files("kineme")
-    found: dict[str, Traversable] = {}
+    by_path: dict[str, Traversable] = {}
     for path, folder in _FOLDERS.items():
-        found |= _below(package.joinpath(*folder), path)
-    found |= {path: package.joinpath(*where) for path, where in _VENDORED.items()}
-    found[""] = found["index.html"]
-    return {f"/{path}": _read(file) for path, file in found.items()}
+        by_path |= _below(package.joinpath(*folder), path)
+    by_path |= {path: package.joinpath(*where) for path, where in _VENDORED.items()}
+    by_path[""] = by_path["index.html"]
+    return {f"/{path}": _read(file) for path, file in by_path.items()}
 
 
 def _below(folder: Traversable, path: str) -> dict[str, Traversable]:
-    found: dict[str, Traversable] = {}
-    for one in folder.iterdir():
-        if one.is_dir():
-            found |= _below(one, f"{path}{one.name}/")
-        elif _ending(one.name) in _KINDS:
-            found[path + one.name] = one
-    return found
+    by_path: dict[str, Traversable] = {}
+    for entry in folder.iterdir():
+        if entry.is_dir():
+            by_path |= _below(entry, f"{path}{entry.name}/")
+        elif _ending(entry.name) in _KINDS:
+            by_path[path + entry.name] = entry
+    return by_path
 
 
 def _ending(name: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from hashlib import sha256
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import numpy as np
 from fastapi import APIRouter, Query, Request, Response
@@ -36,30 +36,38 @@ def listed_history(studio: Studio) -> dict[str, Any]:
     """The last versions, the last one first."""
     every = studio.library.history()
     last = every[: -_VERSIONS - 1 : -1]
-    before = _annotated_before(studio, last)
+    keys = {"keys": listed(version.id for version in last if version.action == "annotate")}
+    with studio.library.store.reading() as connection:
+        rows = select(connection, "symbol_state", among("removed"), keys)
+    before = {row[_STATE["removed"]]: row for row in rows}  # version -> the state of the symbol that it replaced
     now = _same_as(every, len(every))
     return {
         "total": len(every),
         "versions": [
             {
-                "number": one.id,
-                "time": one.at,
-                "what": one.action,
-                "said": said(one, before.get(one.id), _undone(every, one)),
-                "can_restore": not studio.read_only and _same_as(every, one.id) != now,
-                "detail": _short(dict(one.detail)),
+                "number": version.id,
+                "time": version.at,
+                "what": version.action,
+                "said": said(version, before.get(version.id), _undone(every, version)),
+                "can_restore": not studio.read_only and _same_as(every, version.id) != now,
+                "detail": _short(dict(version.detail)),
             }
-            for one in last
+            for version in last
         ],
     }
 
 
 def said(version: Version, before: Row | None = None, undone: Sequence[Version] = ()) -> str:
-    """A change in one sentence; `before` is how the annotated symbol was, `undone` what was taken back."""
+    """Describe a change in one sentence; `before` is the annotated symbol as it was, `undone` what was taken back."""
     if undone:
-        first, last = undone[0].id, undone[-1].id
-        which = f"version {last}" if first == last else f"versions {first} to {last}"
-        return f"Took back {which}: {said(_in_one(undone))}"
+        first, last = undone[0].id, undone[-1]
+        which = f"version {last.id}" if first == last.id else f"versions {first} to {last.id}"
+        details = [dict(each.detail) for each in undone]
+        if len(undone) > 1 and all("added" in detail and "symbols" in detail for detail in details):
+            added = sum(detail["added"] for detail in details)  # all that one call learned
+            symbols = [name for detail in details for name in detail["symbols"]]
+            last = replace(last, detail={"added": added, "symbols": symbols})
+        return f"Took back {which}: {said(last)}"
     detail = dict(version.detail)
     words = _SAID.get(version.action, lambda _: version.action)
     try:
@@ -68,22 +76,10 @@ def said(version: Version, before: Row | None = None, undone: Sequence[Version] 
         return version.action
 
 
-def _in_one(versions: Sequence[Version]) -> Version:
-    """The one change that they are; of several, all that one call learned."""
-    details = [dict(version.detail) for version in versions]
-    if len(versions) == 1 or not all("added" in detail and "symbols" in detail for detail in details):
-        return versions[-1]
-    whole = {
-        "added": sum(detail["added"] for detail in details),
-        "symbols": [name for detail in details for name in detail["symbols"]],
-    }
-    return replace(versions[-1], detail=whole)
-
-
 def _learned(detail: dict[str, Any]) -> str:
-    added, made = detail["added"], detail["symbols"]
+    added, symbols = detail["added"], detail["symbols"]
     what = f"Learned {_movements(added)}" if added else "Learned more of movements that were there"
-    return f"{what}; new: {_names(made)}" if made else what
+    return f"{what}; new: {_names(symbols)}" if symbols else what
 
 
 def _annotated(detail: dict[str, Any]) -> str:
@@ -104,15 +100,17 @@ def _deleted(detail: dict[str, Any]) -> str:
 
 _SAID: dict[str, Any] = {
     "learn": _learned,
-    "rename": lambda one: f"Renamed {_name(one['old'])} to {_name(one['new'])}",
+    "rename": lambda detail: f"Renamed {_name(detail['old'])} to {_name(detail['new'])}",
     "annotate": _annotated,
     "delete": _deleted,
-    "merge": lambda one: f"Merged {_names(one['names'])} into {_name(one['into'])}",
-    "split": lambda one: f"Split {_movements(one['movements'])} off {_name(one['symbol'])} as {_name(one['new'])}",
-    "assign": lambda one: f"Assigned {_movements(one['movements'])} to {_name(one['symbol'])}",
-    "release": lambda one: f"Took the name off {_movements(one['movements'])}",
-    "reject": lambda one: f"Rejected a proposal of {_movements(len(one['movements']))}",
-    "restore": lambda one: f"Restored version {one['to']}",
+    "merge": lambda detail: f"Merged {_names(detail['names'])} into {_name(detail['into'])}",
+    "split": lambda detail: (
+        f"Split {_movements(detail['movements'])} off {_name(detail['symbol'])} as {_name(detail['new'])}"
+    ),
+    "assign": lambda detail: f"Assigned {_movements(detail['movements'])} to {_name(detail['symbol'])}",
+    "release": lambda detail: f"Took the name off {_movements(detail['movements'])}",
+    "reject": lambda detail: f"Rejected a proposal of {_movements(len(detail['movements']))}",
+    "restore": lambda detail: f"Restored version {detail['to']}",
 }
 
 
@@ -135,36 +133,28 @@ def _value(value: Any) -> str:
     return f"\u201c{_name(value)}\u201d" if isinstance(value, str) else f"{value:g}"
 
 
-def _annotated_before(studio: Studio, versions: Sequence[Version]) -> dict[int, Row]:
-    """Version -> the row of the symbol's state that it replaced."""
-    keys = {"keys": listed(version.id for version in versions if version.action == "annotate")}
-    with studio.library.store.reading() as connection:
-        rows = select(connection, "symbol_state", among("removed"), keys)
-    return {row[_STATE["removed"]]: row for row in rows}
-
-
 def _same_as(every: Sequence[Version], number: int, returns: Sequence[str] = RETURNS) -> int:
-    """The first version that had the state of this one, as far as the history says so."""
-    while number and (one := every[number - 1]).action in returns and _returned(one):
-        number = one.detail["to"]
+    """Return the first version that had the state of this one, as far as the history says so."""
+    while number and (version := every[number - 1]).action in returns and _returned(version):
+        number = version.detail["to"]
     return number
 
 
-def _returned(one: Version) -> bool:
-    """Whether it says the earlier version that it returned to, as all do but those of a damaged library."""
-    to = one.detail.get("to")
-    return isinstance(to, int) and 0 <= to < one.id
+def _returned(version: Version) -> bool:
+    """Tell whether a version says to which earlier one it returned, as all do but those of a damaged library."""
+    to = version.detail.get("to")
+    return isinstance(to, int) and 0 <= to < version.id
 
 
-def _undone(every: Sequence[Version], one: Version) -> Sequence[Version]:
-    """The versions that an undo took back: those up to the one before it, or to the one whose state that one had."""
-    if one.action != UNDO or not _returned(one):
+def _undone(every: Sequence[Version], version: Version) -> Sequence[Version]:
+    """Find the versions that an undo took back: up to the one before it, or to the one whose state that one had."""
+    if version.action != UNDO or not _returned(version):
         return ()
-    return every[one.detail["to"] : _same_as(every, one.id - 1, (UNDO,))]
+    return every[version.detail["to"] : _same_as(every, version.id - 1, (UNDO,))]
 
 
 def _short(detail: dict[str, Any]) -> dict[str, Any]:
-    """What a change says of itself; long lists by their length."""
+    """Replace long lists by their length."""
     return {
         name: len(value) if isinstance(value, list) and len(value) > 20 else value for name, value in detail.items()
     }
@@ -227,7 +217,7 @@ class RecordingOut(BaseModel):
 
 
 class MapPoint(BaseModel):
-    """Where a movement lies among others: near those that it is like."""
+    """A movement among others: near those that it is like."""
 
     id: int
     symbol: str | None
@@ -268,10 +258,9 @@ _MOST_ON_MAP = 2000  # where there are more symbols than that
 @router.get("", response_model=LibraryOut, summary="What the library holds")
 def library(request: Request, studio: Reads) -> Response:
     """Symbols with the path of their prototype, and how many movements have none."""
-    document = studio.kept("library", lambda: _document(studio))
-    same = request.headers.get("if-none-match") == document.tag
-    body = None if same else document.body
-    return Response(body, 304 if same else 200, {"ETag": document.tag}, media_type="application/json")
+    body, tag = studio.cached("library", lambda: _document(studio))
+    same = request.headers.get("if-none-match") == tag
+    return Response(None if same else body, 304 if same else 200, {"ETag": tag}, media_type="application/json")
 
 
 @router.get("/movements", response_model=MovementsOut, summary="Movements, some at a time")
@@ -294,21 +283,20 @@ def movements(
 def movement(studio: Reads, key: MovementKey) -> dict[str, Any]:
     """Its times [s] and positions as they were recorded."""
     studio.check_movements([key])
-    one = studio.library.movements(ids=[key])[0]
-    symbol = studio.shown().symbol_of.get(key)
+    recording = studio.library.movements(ids=[key])[0]
     return {
         "id": key,
-        "name": one.name,
-        "symbol": symbol,
-        "times": numbers(one.times),
-        "positions": numbers(one.positions),
+        "name": recording.name,
+        "symbol": studio.view().symbol_of.get(key),
+        "times": numbers(recording.times),
+        "positions": numbers(recording.positions),
     }
 
 
 @router.get("/map", response_model=MapOut, summary="Movements in the plane, alike ones near each other")
 def movement_map(studio: Reads) -> dict[str, Any]:
     """Classical scaling of their distances, of 600 movements, equally many of each symbol, or of one of each."""
-    return studio.kept("map", lambda: _map(studio))
+    return studio.cached("map", lambda: _map(studio))
 
 
 @router.get("/history", response_model=HistoryOut, summary="What was changed, the last change first")
@@ -317,47 +305,42 @@ def history(studio: Reads) -> dict[str, Any]:
     return listed_history(studio)
 
 
-class _Document(NamedTuple):
-    """An answer that is made once for each version, and a tag that is another one when the answer is."""
-
-    body: bytes
-    tag: str
-
-
-def _document(studio: Studio) -> _Document:
+def _document(studio: Studio) -> tuple[bytes, str]:
+    """Make the answer of one version, and a tag that is another one when the answer is."""
     with collector_paused():  # 10,000 symbols are 640,000 lists
         body = LibraryOut.model_validate(_library(studio)).model_dump_json().encode()
-    return _Document(body, f'"{sha256(body).hexdigest()[:20]}"')
+    return body, f'"{sha256(body).hexdigest()[:20]}"'
 
 
 def _library(studio: Studio) -> dict[str, Any]:
-    library, shown = studio.library, studio.shown()
-    symbols = sorted(shown.symbols.values(), key=lambda symbol: symbol.name)
+    library, view = studio.library, studio.view()
+    symbols = sorted(view.symbols.values(), key=lambda symbol: symbol.name)
     typical = [symbol.prototype or (int(symbol.members[0]) if len(symbol) else None) for symbol in symbols]
-    drawn = {one["id"]: one for one in _listed(studio, np.array([key for key in typical if key], dtype=np.int64))}
+    paths = _listed(studio, np.array([key for key in typical if key], dtype=np.int64))
+    drawn = {movement["id"]: movement for movement in paths}
     channels = library.channels
     return {
         "folder": printable(library.folder),
-        "version": shown.version,
+        "version": view.version,
         "n_movements": len(library),
         "n_dims": library.n_dims,
         "channels": None if channels is None else [channel._asdict() for channel in channels],
         "read_only": studio.read_only,
         "can_undo": can_undo(library.store),
-        "unlabeled": len(library) - len(shown.symbol_of),
+        "unlabeled": len(library) - len(view.symbol_of),
         "formats": list(WRITERS),
         "formulations": list(FORMULATIONS),
         "symbols": [
             {
-                "id": one.id,
-                "name": one.name,
-                "description": one.description,
-                "n_members": len(one),
-                "prototype": one.prototype,
+                "id": symbol.id,
+                "name": symbol.name,
+                "description": symbol.description,
+                "n_members": len(symbol),
+                "prototype": symbol.prototype,
                 "path": drawn[key]["path"] if key else None,
                 "duration": drawn[key]["duration"] if key else None,
             }
-            for one, key in zip(symbols, typical, strict=True)
+            for symbol, key in zip(symbols, typical, strict=True)
         ],
     }
 
@@ -366,24 +349,24 @@ def _listed(studio: Studio, ids: read.Ids) -> list[dict[str, Any]]:
     """Movements with thumbnails."""
     if not len(ids):
         return []
-    store, symbol_of = studio.library.store, studio.shown().symbol_of
+    store, symbol_of = studio.library.store, studio.view().symbol_of
     people = read.groups(store, ids)
     return [
         {
             "id": key,
-            "name": one.name,
+            "name": recording.name,
             "symbol": symbol_of.get(key),
             "group": person,
-            "duration": float(one.duration),
-            "path": thumbnail(one.positions),
+            "duration": float(recording.duration),
+            "path": thumbnail(recording.positions),
         }
-        for key, one, person in zip(ids.tolist(), read.movements(store, ids), people, strict=True)
+        for key, recording, person in zip(ids.tolist(), read.movements(store, ids), people, strict=True)
     ]
 
 
 def _map(studio: Studio) -> dict[str, Any]:
-    shown = studio.shown()
-    groups = [symbol.members for symbol in shown.symbols.values() if len(symbol)]
+    view = studio.view()
+    groups = [symbol.members for symbol in view.symbols.values() if len(symbol)]
     if len(rest := studio.library.unlabeled()):
         groups.append(rest)
     if not groups:
@@ -395,7 +378,7 @@ def _map(studio: Studio) -> dict[str, Any]:
     where = classical_scaling(space.distances)[0]
     return {
         "points": [
-            {"id": key, "symbol": shown.symbol_of.get(key), "x": x, "y": y}
+            {"id": key, "symbol": view.symbol_of.get(key), "x": x, "y": y}
             for key, (x, y) in zip(ids.tolist(), where.tolist(), strict=True)
         ]
     }

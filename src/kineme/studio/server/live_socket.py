@@ -1,4 +1,4 @@
-"""The websocket: samples in, what the movement is out, and word of every change of the library.
+"""The websocket: samples in, answers to the movement out, and word of every change of the library.
 
 Clients that watch are the pages: they are told of the movements of all others, the programs.
 """
@@ -14,12 +14,10 @@ import numpy as np
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 
 from kineme.errors import KinemeError, SpecificationError, TrajectoryError
-from kineme.recognition.answer import Answer
 from kineme.recognition.early.stream import Live
-from kineme.studio.server.changes import Changes
 from kineme.studio.server.live_sources import Follower, Source, Sources, parsed_name
 from kineme.studio.server.records import plain_answer, plain_state
-from kineme.studio.server.studio import Studio
+from kineme.studio.server.studio import Changes, Studio
 from kineme.validation import LARGEST, Array
 
 MOST_SAMPLES = 10_000  # in one message
@@ -61,8 +59,8 @@ async def live(socket: WebSocket) -> None:
         reading.cancel()
 
 
-class _Told(NamedTuple):
-    """What a client sent: samples, a command, its name, or what was wrong with it; `_END` at the end."""
+class _Received(NamedTuple):
+    """A message of a client: samples, a command, its name, or what was wrong with it; `_END` at the end."""
 
     samples: Array | None = None
     command: str | None = None
@@ -70,7 +68,7 @@ class _Told(NamedTuple):
     wrong: str | None = None
 
 
-_END = _Told()
+_END = _Received()
 
 
 class _Client:
@@ -81,10 +79,10 @@ class _Client:
         self._sources = sources
         self._source: Source | None = None  # of a program, once it has sent something
         self._follower: Follower | None = None  # of a page
-        self._waiting: asyncio.Queue[_Told] = asyncio.Queue(_WAITING)
-        self._held: _Told | None = None
+        self._waiting: asyncio.Queue[_Received] = asyncio.Queue(_WAITING)
+        self._held: _Received | None = None
         self._turn = asyncio.Lock()
-        self._version = self._told = -1  # of the library, that the client is to know, and that it knows
+        self._version = self._sent_version = -1  # of the library, that the client is to know, and that it knows
         self._telling: asyncio.Task[None] | None = None
 
     def tell_of(self, version: int) -> None:
@@ -106,17 +104,18 @@ class _Client:
 
     async def _tell(self) -> None:
         with suppress(WebSocketDisconnect, RuntimeError):
-            while news := self._news():
-                for new in news:
-                    await self._send(new)
+            while True:
+                news: list[dict[str, Any]] = []
+                if self._sent_version != self._version:
+                    news = [{"changed": self._version}]
+                    self._sent_version = self._version
+                if self._follower is not None:
+                    news += [{"source": source} for source in self._follower.news()]
+                if not news:
+                    return
+                for message in news:
+                    await self._send(message)
                 await asyncio.sleep(_PAUSE)
-
-    def _news(self) -> list[dict[str, Any]]:
-        """What the client is to be told that it did not ask for."""
-        changed = [] if self._told == self._version else [{"changed": self._version}]
-        self._told = self._version
-        shown = [] if self._follower is None else self._follower.news()
-        return [*changed, *({"source": one} for one in shown)]
 
     async def read(self) -> None:
         """Queue what arrives, and an empty one at the end."""
@@ -129,71 +128,62 @@ class _Client:
 
     async def answer_all(self) -> None:
         """Answer to one message after the other, until the client goes."""
-        while (told := await self._next()) is not _END:
+        while (received := await self._next()) is not _END:
             try:
-                answer = await self._answer(told)
+                answer = await self._answer(received)
             except KinemeError as error:
                 answer = {"error": str(error)}
             if answer is not None:
                 await self._send(answer)
 
-    async def _next(self) -> _Told:
-        """The next message; samples that wait behind samples are taken in with them, and answered once."""
-        told, self._held = self._held or await self._waiting.get(), None
-        blocks = [told.samples]
-        while told.samples is not None and not self._waiting.empty():
+    async def _next(self) -> _Received:
+        """Wait for the next message; samples that wait behind samples are taken in with them, and answered once."""
+        received, self._held = self._held or await self._waiting.get(), None
+        if received.samples is None:
+            return received
+        blocks = [received.samples]
+        while not self._waiting.empty():
             following = self._waiting.get_nowait()
-            if following.samples is None or following.samples.shape[1] != told.samples.shape[1]:
+            if following.samples is None or following.samples.shape[1] != received.samples.shape[1]:
                 self._held = following
                 break
             blocks.append(following.samples)
-        return told if len(blocks) == 1 else _Told(np.concatenate([block for block in blocks if block is not None]))
+        return received if len(blocks) == 1 else _Received(np.concatenate(blocks))
 
-    async def _answer(self, told: _Told) -> dict[str, Any] | None:
+    async def _answer(self, received: _Received) -> dict[str, Any] | None:
         run = asyncio.get_running_loop().run_in_executor
-        source = self._shown(told)
-        if told.samples is not None:
-            state = await run(self.studio.live, self.session.update, told.samples)
+        samples, command, name, wrong = received
+        if self._source is None and self._follower is None and (samples is not None or name is not None):
+            self._source = self._sources.add()  # a program, which the pages show
+        source = self._source
+        if samples is not None:
+            state = await run(self.studio.live, self.session.update, samples)
             if source is not None:
-                source.update(told.samples, state)
+                source.update(samples, state)
             return {"state": state}
-        if told.command == "finish":
-            return await self._finish(source)
-        if told.command == "reset":
+        if command == "finish":
+            try:
+                ended: dict[str, Any] = {"answer": await run(self.studio.live, self.session.finish)}
+            except KinemeError as error:
+                ended = {"error": str(error)}
+            if source is not None:
+                source.end(ended)
+            return ended
+        if command == "reset":
             self.session.reset()
             if source is not None:
                 source.reset()
-        elif told.command == "watch":
-            self._watch()
-        elif told.name is not None and source is not None:
-            source.rename(told.name)
-        return None if told.wrong is None else {"error": told.wrong}
-
-    async def _finish(self, source: Source | None) -> dict[str, Any]:
-        try:
-            run = asyncio.get_running_loop().run_in_executor
-            ended: dict[str, Any] = {"answer": await run(self.studio.live, self.session.finish)}
-        except KinemeError as error:
-            ended = {"error": str(error)}
-        if source is not None:
-            source.end(ended)
-        return ended
-
-    def _shown(self, told: _Told) -> Source | None:
-        """What the pages are shown of this client, if it is a program."""
-        if self._source is None and self._follower is None and (told.samples is not None or told.name is not None):
-            self._source = self._sources.add()
-        return self._source
-
-    def _watch(self) -> None:
-        """It is a page: it is shown the movements of programs, and its own are not shown to others."""
-        if self._follower is None:
-            self._follower = Follower(self._sources)
-            self._sources.listen(self._tell_soon)
-            self._tell_soon()
-        if self._source is not None:
-            self._sources.remove(self._source)
-            self._source = None
+        elif command == "watch":  # a page: it shows the movements of programs, and others do not show its own
+            if self._follower is None:
+                self._follower = Follower(self._sources)
+                self._sources.listen(self._tell_soon)
+                self._tell_soon()
+            if source is not None:
+                self._sources.remove(source)
+                self._source = None
+        elif name is not None and source is not None:
+            source.rename(name)
+        return None if wrong is None else {"error": wrong}
 
     async def _send(self, message: dict[str, Any]) -> None:
         text = json.dumps(message, allow_nan=False, ensure_ascii=False)
@@ -201,22 +191,22 @@ class _Client:
             await self.socket.send_text(text)
 
 
-def _parsed(message: Any) -> _Told:
+def _parsed(message: Any) -> _Received:
     try:
-        told = json.loads(message.get("text") or "")
+        content = json.loads(message.get("text") or "")
     except (ValueError, RecursionError):
-        return _Told(wrong=f"expected JSON: {_WORDS}; got something else")
+        return _Received(wrong=f"expected JSON: {_WORDS}; got something else")
     try:
-        if isinstance(told, dict) and "samples" in told:
-            return _Told(samples=parsed_samples(told["samples"]))
-        if isinstance(told, dict) and "name" in told:
-            return _Told(name=parsed_name(told["name"]))
+        if isinstance(content, dict) and "samples" in content:
+            return _Received(samples=parsed_samples(content["samples"]))
+        if isinstance(content, dict) and "name" in content:
+            return _Received(name=parsed_name(content["name"]))
     except TrajectoryError as error:
-        return _Told(wrong=str(error))
+        return _Received(wrong=str(error))
     for command in ("finish", "reset", "watch"):
-        if isinstance(told, dict) and told.get(command) is True:
-            return _Told(command=command)
-    return _Told(wrong=f"expected {_WORDS}; got something else")
+        if isinstance(content, dict) and content.get(command) is True:
+            return _Received(command=command)
+    return _Received(wrong=f"expected {_WORDS}; got something else")
 
 
 class LiveSession:
@@ -242,9 +232,13 @@ class LiveSession:
         self._begun = False
 
     def update(self, samples: Array) -> dict[str, Any]:
-        """Take in samples (k, 1 + d): the state of the movement."""
+        """Take in samples (k, 1 + d), and return the state of the movement."""
         if not self._begun:
-            self._begin()
+            self._state, version = _EMPTY, self.studio.library.version
+            self._is_old = version != self._version and self._stream is not None and self.studio.warm != version
+            if version != self._version and not self._is_old:
+                self._renew()
+            self._begun = True
         if self._is_old:
             self._waiting.append(samples)
             if self.studio.warm == self.studio.library.version or len(self._waiting) > _MOST_WAITING:
@@ -255,7 +249,7 @@ class LiveSession:
         return self._state
 
     def finish(self) -> dict[str, Any] | None:
-        """The answer to the whole movement; None if nothing recognizes it."""
+        """Return the answer to the whole movement; None if nothing recognizes it."""
         if self._is_old and self._begun:
             self._renew()
         stream, begun = self._stream, self._begun
@@ -263,23 +257,13 @@ class LiveSession:
         if stream is None or not begun:
             return None
         try:
-            return plain_answer(self._answer(stream))
+            if self._version == self.studio.library.version:
+                return plain_answer(stream.finish())
+            return plain_answer(self.studio.library.recognize(stream.movement()))  # changed since the movement began
         except SpecificationError:  # no symbols any more
             return None
         finally:
             stream.reset()
-
-    def _answer(self, stream: Live) -> Answer:
-        if self._version == self.studio.library.version:
-            return stream.finish()
-        return self.studio.library.recognize(stream.movement())  # it has changed since the movement began
-
-    def _begin(self) -> None:
-        self._state, version = _EMPTY, self.studio.library.version
-        self._is_old = version != self._version and self._stream is not None and self.studio.warm != version
-        if version != self._version and not self._is_old:
-            self._renew()
-        self._begun = True
 
     def _renew(self) -> None:
         """Follow the movement by the library as it is now; wait for that if need be."""
@@ -296,24 +280,21 @@ class LiveSession:
 
 
 def parsed_samples(given: Any) -> Array:
-    """Samples of a message: rows of a time stamp and positions.
+    """Check samples of a message: rows of a time stamp and positions.
 
-    Raises
-    ------
-    TrajectoryError
-        Anything else.
+    Raises TrajectoryError: anything else.
     """
     words = f"samples as [[t, x, y, ...], ...], at most {MOST_SAMPLES:,} rows of equally many finite numbers"
-    if not isinstance(given, list) or not 0 < len(given) <= MOST_SAMPLES or not all(map(_is_row, given)):
+
+    def is_row(row: Any) -> bool:
+        return (
+            isinstance(row, list)
+            and 1 < len(row) <= 1000
+            and all(type(value) in {int, float} and abs(value) <= LARGEST for value in row)  # of NaN this is false
+        )
+
+    if not isinstance(given, list) or not 0 < len(given) <= MOST_SAMPLES or not all(map(is_row, given)):
         raise TrajectoryError(f"expected {words}; got something else")
     if len({len(row) for row in given}) > 1:
         raise TrajectoryError(f"expected {words}; got rows of different lengths")
     return np.array(given, dtype=np.float64)
-
-
-def _is_row(row: Any) -> bool:
-    return isinstance(row, list) and 1 < len(row) <= 1000 and all(map(_is_number, row))
-
-
-def _is_number(value: Any) -> bool:
-    return type(value) in {int, float} and abs(value) <= LARGEST  # of NaN this is false

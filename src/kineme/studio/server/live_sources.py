@@ -43,14 +43,14 @@ class Sources:
             listener()
 
     def add(self) -> Source:
-        """A program that was not there yet."""
+        """Add a program that was not there yet."""
         self._last += 1
         source = self.sources[self._last] = Source(self.tell)
         return source
 
     def remove(self, source: Source) -> None:
-        """A program has gone."""
-        self.sources = {key: one for key, one in self.sources.items() if one is not source}
+        """Remove a program that has gone."""
+        self.sources = {key: other for key, other in self.sources.items() if other is not source}
         self.tell()
 
 
@@ -77,24 +77,18 @@ class Source:
         """Take in samples (k, 1 + d) and what they were answered with; after an end they begin another movement."""
         if self.ended is not None:
             self._begin()
-        self.samples += self._following(rows)
+        if not self.samples or rows.shape[1] == len(self.samples[0]):  # as wide as the first, and later than the last
+            latest = self.samples[-1][0] if self.samples else -np.inf
+            before = np.maximum.accumulate(np.concatenate(([latest], rows[:-1, 0])))
+            self.samples += rows[rows[:, 0] > before].tolist()
         more = max(len(self.samples) - MOST, 0)
         del self.samples[:more]
         self.dropped += more
         self.state = state
         self._changed()
 
-    def _following(self, rows: Array) -> list[list[float]]:
-        """Samples that continue the movement: as wide as its first one, and later than the last."""
-        if self.samples and rows.shape[1] != len(self.samples[0]):
-            return []
-        latest = self.samples[-1][0] if self.samples else -np.inf
-        before = np.maximum.accumulate(np.concatenate(([latest], rows[:-1, 0])))
-        kept: list[list[float]] = rows[rows[:, 0] > before].tolist()
-        return kept
-
     def end(self, ended: dict[str, Any]) -> None:
-        """The movement is over, with an answer or an error, if one was under way."""
+        """End the movement, if one is under way, with an answer or an error."""
         if self.ended is None and self.samples:
             self.ended = ended
             self._changed()
@@ -110,8 +104,8 @@ class Source:
         self._tell()
 
 
-class _Told(NamedTuple):
-    """What one page knows of a source."""
+class _FollowedSource(NamedTuple):
+    """A source, and how much of it one page knows."""
 
     source: Source
     movement: int = 0
@@ -120,44 +114,45 @@ class _Told(NamedTuple):
 
 
 class Follower:
-    """What one page was told of the sources."""
+    """One page that shows the sources: what it knows of each."""
 
-    def __init__(self, of: Sources) -> None:
-        self._of = of
-        self._told: dict[int, _Told] = {}
+    def __init__(self, sources: Sources) -> None:
+        self._sources = sources
+        self._followed: dict[int, _FollowedSource] = {}
 
     def news(self) -> list[dict[str, Any]]:
-        """What it is to be told now; empty if it knows all."""
-        gone = self._told.keys() - self._of.sources.keys()
-        for key, source in self._of.sources.items():
-            self._told.setdefault(key, _Told(source))
-        news = [self._of_source(key, told) for key, told in self._told.items() if told.changes != told.source.changes]
+        """Return what the page does not know yet; empty if it knows all."""
+        gone = self._followed.keys() - self._sources.sources.keys()
+        for key, source in self._sources.sources.items():
+            self._followed.setdefault(key, _FollowedSource(source))
+        news = []
+        for key, (source, movement, n_samples, changes) in self._followed.items():
+            if changes == source.changes:
+                continue
+            first = max(n_samples - source.dropped, 0) if movement == source.movement else 0
+            self._followed[key] = _FollowedSource(
+                source, source.movement, source.dropped + len(source.samples), source.changes
+            )
+            news.append(
+                {
+                    "id": key,
+                    "name": source.name,
+                    "movement": source.movement,
+                    "samples": source.samples[first:],
+                    "state": source.state,
+                    "ended": source.ended,
+                }
+            )
         for key in sorted(gone):  # after what they have sent last
             news.append({"id": key, "gone": True})
-            del self._told[key]
+            del self._followed[key]
         return news
-
-    def _of_source(self, key: int, told: _Told) -> dict[str, Any]:
-        source = told.source
-        known = max(told.samples - source.dropped, 0) if told.movement == source.movement else 0
-        self._told[key] = _Told(source, source.movement, source.dropped + len(source.samples), source.changes)
-        return {
-            "id": key,
-            "name": source.name,
-            "movement": source.movement,
-            "samples": source.samples[known:],
-            "state": source.state,
-            "ended": source.ended,
-        }
 
 
 def parsed_name(given: Any) -> str:
-    """The name of a program, as its message holds it.
+    """Check the name of a program, as its message holds it.
 
-    Raises
-    ------
-    TrajectoryError
-        Anything but some characters; halves of them cannot be sent on.
+    Raises TrajectoryError: anything but some characters; halves of them cannot be sent on.
     """
     name = given.strip() if isinstance(given, str) else ""
     if not 0 < len(name) <= LONGEST or any("\ud800" <= mark <= "\udfff" for mark in name):

@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -27,11 +26,11 @@ REFUSED = 3  # exit code
 def save(recordings: Recordings, path: Path) -> None:
     """Write recordings to an archive, as they were recorded."""
     demos = recordings.demonstrations
-    whole = demos.movements
-    told = {
+    movements = demos.movements
+    header = {
         "channels": None if demos.channels is None else channels_to_data(demos.channels),
         "n_dims": demos.n_dims,
-        "dimensions": whole.dimensions,
+        "dimensions": movements.dimensions,
         "sources": [list(source) for source in recordings.sources],
         "problems": [[problem.file, problem.line, problem.reason] for problem in recordings.problems],
     }
@@ -39,16 +38,16 @@ def save(recordings: Recordings, path: Path) -> None:
     with path.open("wb") as file:
         np.savez(
             file,
-            told=np.frombuffer(json.dumps(told).encode(), np.uint8),
+            header=np.frombuffer(json.dumps(header).encode(), np.uint8),
             recorded=recorded,
             offsets=demos.offsets,
             durations=demos.durations,
-            stamps=whole.stamps,
+            stamps=movements.stamps,
         )
 
 
 def load(path: Path) -> Recordings:
-    """The inverse.
+    """Read such an archive.
 
     Raises
     ------
@@ -58,22 +57,18 @@ def load(path: Path) -> Recordings:
     try:
         with np.load(path, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in ("recorded", "offsets", "durations", "stamps")}
-            told = json.loads(archive["told"].tobytes())
-        return _recordings(arrays, told)
+            header = json.loads(archive["header"].tobytes())
+        sources = tuple(Source(*source) for source in header["sources"])
+        names = tuple(f"{source.path}#{source.place}" if source.place else source.path for source in sources)
+        dimensions = None if header["dimensions"] is None else tuple(header["dimensions"])
+        parts = (arrays["recorded"], arrays["offsets"], arrays["durations"], arrays["stamps"], None, names, dimensions)
+        movements = Movements(*parts)
+        if header["channels"] is not None:
+            movements = of_channels(movements, channels_from_data(header["channels"], header["n_dims"]))
+        problems = tuple(Problem(*problem) for problem in header["problems"])
+        return Recordings(Demonstrations.of_movements(movements), sources, problems, ())
     except (KinemeError, OSError, ValueError, LookupError, TypeError) as error:
         raise DataError(f"expected the file as it was read, got something else ({error}); send it again") from error
-
-
-def _recordings(arrays: dict[str, Any], told: dict[str, Any]) -> Recordings:
-    sources = tuple(Source(*one) for one in told["sources"])
-    names = tuple(f"{source.path}#{source.place}" if source.place else source.path for source in sources)
-    dimensions = None if told["dimensions"] is None else tuple(told["dimensions"])
-    parts = (arrays["recorded"], arrays["offsets"], arrays["durations"], arrays["stamps"], None, names, dimensions)
-    whole = Movements(*parts)
-    if told["channels"] is not None:
-        whole = of_channels(whole, channels_from_data(told["channels"], told["n_dims"]))
-    problems = tuple(Problem(*one) for one in told["problems"])
-    return Recordings(Demonstrations.of_movements(whole), sources, problems, ())
 
 
 def _limit(beyond: int, seconds: int) -> None:

@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Annotated, Any
 
-import numpy as np
 from fastapi import APIRouter, Header, Request
 from pydantic import BaseModel, Field
 
@@ -18,27 +17,36 @@ from kineme.library.learn import learn_recordings
 from kineme.movements.channels.channel import recorded_names
 from kineme.movements.trajectories.movements import axis_names
 from kineme.sampling import evenly_spaced
-from kineme.studio.server.records import Change, ChannelOut, Learned, Name, Number, RecordingKey, Sent, Text, numbers
+from kineme.studio.server.records import (
+    Change,
+    ChannelOut,
+    LearnedOut,
+    Name,
+    Number,
+    RecordingKey,
+    RequestBody,
+    Text,
+    numbers,
+)
 from kineme.studio.server.refusals import in_studio_words
-from kineme.studio.server.studio import Reads, Studio, Writes
+from kineme.studio.server.studio import Reads, Studio, Work, Writes, while_wanted
 from kineme.studio.server.uploads import go_on
-from kineme.studio.server.work import Work, while_wanted
 
 
-class ChannelsAsked(Change):
-    """Which table of a recording, and which of its columns; by default the first, and those that are found."""
+class ChannelChoice(Change):
+    """A table of a recording, and some of its columns; by default the first, and those that are found."""
 
     table: Text | None = None
     channels: list[Text] | None = Field(None, max_length=1000)
 
 
-class Spotting(ChannelsAsked):
-    """What to look for."""
+class SpotRequest(ChannelChoice):
+    """A search for movements of the library."""
 
     error_rate: Number = Field(0.05, gt=0, lt=1)
 
 
-class Span(Sent):
+class Span(RequestBody):
     """A stretch of a recording, in seconds since its first sample, and what it shows."""
 
     begin: Number
@@ -46,7 +54,7 @@ class Span(Sent):
     label: Name | None = None
 
 
-class LearnSpans(ChannelsAsked):
+class LearnRequest(ChannelChoice):
     """Stretches of one table to be learned; without them all tables of the file, by the labels that it gives them."""
 
     spans: list[Span] | None = Field(None, min_length=1, max_length=100_000)
@@ -78,7 +86,7 @@ class TableOut(BaseModel):
 
 
 class UploadOut(BaseModel):
-    """What a file holds."""
+    """The contents of a file."""
 
     recording: str
     tables: list[TableOut]
@@ -103,14 +111,14 @@ class RestOut(BaseModel):
 
 
 class SpottedOut(BaseModel):
-    """What happens when."""
+    """Movements and rests of a recording, with their times."""
 
     spans: list[SpannedOut]
     rests: list[RestOut]
 
 
 class SearchedOut(BaseModel):
-    """How much of a recording is searched, from 0 to 1; null where nothing is searched."""
+    """The share of a recording that is searched, from 0 to 1; null where nothing is searched."""
 
     share: float | None
 
@@ -147,14 +155,36 @@ async def send(
 
 
 @router.post("/{key}/spotted", response_model=SpottedOut, summary="What happens when in a recording")
-async def spotted(studio: Reads, request: Request, key: RecordingKey, asked: Spotting) -> dict[str, Any]:
+async def spotted(studio: Reads, request: Request, key: RecordingKey, body: SpotRequest) -> dict[str, Any]:
     """Movements of the library's symbols, and motion that is like none; times are seconds since the first sample.
 
     A search ends where the client that asked for it goes, and where another one of the same recording begins.
     """
     work = studio.works.begin(key)
+
+    def search() -> dict[str, Any]:
+        work.check()  # it may have waited for others
+        recording = _one(studio, key, body, work.check)
+        duration = float(recording.demonstrations.durations[0])
+        report = annotate(studio.library.store, recording, body.error_rate, lambda done: work.tell(done / duration))
+        if report.problems:
+            raise SpecificationError(report.problems[0].what)
+        spans = [
+            {
+                "begin": annotation.span[0],
+                "end": annotation.span[1],
+                "label": annotation.symbol,
+                "p": numbers(annotation.p_value),
+            }
+            for annotation in report.annotations
+        ]
+        ends = [0.0, *(span["end"] for span in spans)]
+        begins = [*(span["begin"] for span in spans), duration]
+        gaps = zip(ends, begins, strict=True)
+        return {"spans": spans, "rests": [{"begin": begin, "end": end} for begin, end in gaps if end > begin]}
+
     try:
-        return await while_wanted(request, studio.long, work, lambda: _spotted(studio, key, asked, work))
+        return await while_wanted(request, studio.long, work, search)
     finally:
         studio.works.end(key, work)
 
@@ -165,58 +195,35 @@ def searched(studio: Reads, key: RecordingKey) -> dict[str, Any]:
     return {"share": studio.works.share(key)}
 
 
-def _spotted(studio: Studio, key: str, asked: Spotting, work: Work) -> dict[str, Any]:
-    work.check()  # it may have waited for others
-    one = _one(studio, key, asked, work.check)
-    duration = float(one.demonstrations.durations[0])
-    found = annotate(studio.library.store, one, asked.error_rate, lambda done: work.tell(done / duration))
-    if found.problems:
-        raise SpecificationError(found.problems[0].what)
-    spans = [
-        {
-            "begin": annotation.span[0],
-            "end": annotation.span[1],
-            "label": annotation.symbol,
-            "p": numbers(annotation.p_value),
-        }
-        for annotation in found.annotations
-    ]
-    return {"spans": spans, "rests": _rests(spans, duration)}
-
-
-@router.post("/{key}/learn", response_model=Learned, summary="Learn stretches of a recording")
-def learn(studio: Writes, key: RecordingKey, asked: LearnSpans) -> dict[str, Any]:
+@router.post("/{key}/learn", response_model=LearnedOut, summary="Learn stretches of a recording")
+def learn(studio: Writes, key: RecordingKey, body: LearnRequest) -> dict[str, Any]:
     """Each stretch becomes a movement of the symbol that its label names; one without a label, an unnamed one.
 
     Without stretches each table of the file becomes a movement, of the symbol that the file names, if it does.
     """
-    if asked.spans is None:
-        pieces = _in_columns(studio, key, asked)
+    if body.spans is None:
+        pieces = _in_columns(studio, key, body)
     else:
-        rows = tuple(map(_row, range(len(asked.spans)), asked.spans))
-        pieces = labeled_pieces(_one(studio, key, asked), LabelTable("of the spans", rows, True))
-    columns = _columns_of(studio.uploads.recordings(key), asked.channels) if asked.channels else None
+        rows = (LabelRow(span.begin, span.end, span.label, "", "", k + 1) for k, span in enumerate(body.spans))
+        pieces = labeled_pieces(_one(studio, key, body), LabelTable("of the spans", tuple(rows), True))
+    columns = _columns_of(studio.uploads.recordings(key), body.channels) if body.channels else None
     report = learn_recordings(studio.library.store, pieces, {"columns": columns})
     return {"ids": report.ids.tolist(), "version": report.version}
 
 
-def _row(k: int, span: Span) -> LabelRow:
-    return LabelRow(span.begin, span.end, span.label, "", "", k + 1)
-
-
-def _in_columns(studio: Studio, key: str, asked: ChannelsAsked, check: Callable[[], object] = go_on) -> Recordings:
-    """All tables of a file, in the columns that are asked for, or those of the library where it has them."""
+def _in_columns(studio: Studio, key: str, body: ChannelChoice, check: Callable[[], object] = go_on) -> Recordings:
+    """Read all tables of a file, in the columns that are asked for, or those of the library where it has them."""
     read = studio.uploads.recordings(key, check=check)
     ours = () if studio.library.channels is None else recorded_names(studio.library.channels)
-    wanted = _columns_of(read, asked.channels) if asked.channels else list(ours)
-    if wanted != _columns(read) and (asked.channels or (ours and set(ours) <= set(_columns(read)))):
+    wanted = _columns_of(read, body.channels) if body.channels else list(ours)
+    if wanted != _columns(read) and (body.channels or (ours and set(ours) <= set(_columns(read)))):
         read = studio.uploads.recordings(key, wanted, check)
     return read
 
 
-def _one(studio: Studio, key: str, asked: ChannelsAsked, check: Callable[[], object] = go_on) -> Recordings:
-    """One table of a file, in the same columns."""
-    read, table = _in_columns(studio, key, asked, check), asked.table
+def _one(studio: Studio, key: str, body: ChannelChoice, check: Callable[[], object] = go_on) -> Recordings:
+    """Read one table of a file, in the same columns."""
+    read, table = _in_columns(studio, key, body, check), body.table
     names = [_name(read, k) for k in range(len(read))]
     k = 0 if table is None else names.index(table) if table in names else -1
     if k < 0:
@@ -234,9 +241,9 @@ def _columns(read: Recordings) -> list[str]:
 
 
 def _columns_of(read: Recordings, names: Sequence[str]) -> list[str]:
-    """The columns of channels, such as the four of an orientation; other names are those of columns."""
-    known = {channel.name: channel.columns for channel in read.demonstrations.channels or ()}
-    return [column for name in names for column in known.get(name, (name,))]
+    """List the columns of channels, such as the four of an orientation; other names are those of columns."""
+    columns = {channel.name: channel.columns for channel in read.demonstrations.channels or ()}
+    return [column for name in names for column in columns.get(name, (name,))]
 
 
 def _table(read: Recordings, k: int) -> dict[str, Any]:
@@ -262,18 +269,11 @@ def _table(read: Recordings, k: int) -> dict[str, Any]:
 
 
 def _plot(read: Recordings, k: int) -> dict[str, Any]:
-    """At most 1,000 samples of each column, over seconds since the first one."""
+    """Take at most 1,000 samples of each column, over seconds since the first one."""
     demos = read.demonstrations
     rows = slice(demos.offsets[k], demos.offsets[k + 1])
     values = (demos.positions if demos.channels is None else demos.recorded)[rows]
     times = demos.movements.stamps[rows]
-    kept = evenly_spaced(len(times), _PLOTTED)
-    columns = [{"name": name, "values": numbers(values[kept, j])} for j, name in enumerate(_columns(read))]
-    return {"times": numbers(times[kept] - times[0]), "columns": columns}
-
-
-def _rests(spans: list[dict[str, Any]], duration: float) -> list[dict[str, float]]:
-    """What lies between the spans."""
-    ends = np.array([0.0, *(span["end"] for span in spans)])
-    begins = np.array([*(span["begin"] for span in spans), duration])
-    return [{"begin": float(begin), "end": float(end)} for begin, end in zip(ends, begins, strict=True) if end > begin]
+    shown = evenly_spaced(len(times), _PLOTTED)
+    columns = [{"name": name, "values": numbers(values[shown, j])} for j, name in enumerate(_columns(read))]
+    return {"times": numbers(times[shown] - times[0]), "columns": columns}

@@ -1,4 +1,4 @@
-"""What requests and answers of several kinds have in common."""
+"""Parts that requests and answers of several kinds have in common."""
 
 from __future__ import annotations
 
@@ -36,36 +36,36 @@ RecordingKey = Annotated[str, Path(description="What was answered when the recor
 VERSION = "The version that the client has seen; 409 if what is named is gone."
 
 
-class Sent(BaseModel):
-    """What a client sends: nothing but the fields that are known."""
+class RequestBody(BaseModel):
+    """The body of a request: nothing but the fields that are known."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class Change(Sent):
-    """What a change may say beside what it is."""
+class Change(RequestBody):
+    """The body of a request for a change."""
 
     version: int | None = Field(None, description=VERSION)
 
 
-class AsOf(Change):
+class RejectRequest(Change):
     """The version that the client has seen, if it matters."""
 
 
-class Version(BaseModel):
+class ChangedOut(BaseModel):
     """The version of the library after a change."""
 
     version: int
 
 
-class Learned(Version):
+class LearnedOut(ChangedOut):
     """Ids of the movements; of one that was stored before, the id it had."""
 
     ids: list[int]
 
 
 class ChannelOut(BaseModel):
-    """What some columns of the recordings are."""
+    """A channel: the name, kind and unit of some columns of the recordings."""
 
     name: str
     kind: str
@@ -86,10 +86,7 @@ def numbers(values: ArrayLike) -> Any:
 def trajectory(times: list[float], positions: list[list[float]]) -> Trajectory:
     """A movement that a client sent.
 
-    Raises
-    ------
-    TrajectoryError
-        Rows of different lengths, and whatever `Trajectory` refuses.
+    Raises TrajectoryError: rows of different lengths, and whatever `Trajectory` refuses.
     """
     if len({len(row) for row in positions}) > 1:
         raise TrajectoryError("expected positions as rows of equally many numbers, got rows of different lengths")
@@ -134,8 +131,8 @@ def plain_state(state: LiveState) -> dict[str, Any]:
     return {
         "certainty": state.certainty,
         "ranked": [
-            {"name": one.label, "share": numbers(one.confidence), "probability": numbers(probabilities[one.label])}
-            for one in state.ranked[:_SHOWN]
+            {"name": label, "share": numbers(confidence), "probability": numbers(probabilities[label])}
+            for label, confidence in ((ranked.label, ranked.confidence) for ranked in state.ranked[:_SHOWN])
         ],
         "unknown": numbers(state.unknown),
         "decided": state.label,

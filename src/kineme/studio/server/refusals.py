@@ -1,10 +1,11 @@
-"""What is answered where a request is refused: a status and one sentence, as JSON."""
+"""Answers to requests that are refused: a status and one sentence, as JSON."""
 
 from __future__ import annotations
 
 import json
 import logging
 import re
+from collections.abc import Callable
 from typing import Any
 
 from fastapi import FastAPI, Request
@@ -17,7 +18,6 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from kineme.errors import KinemeError
 from kineme.library.storage.connection import BusyError
 from kineme.reporting.text import in_markup
-from kineme.studio.server.work import StoppedError
 
 # Bounded where they repeat: texts hold the names of other people's files and columns, of any length.
 _CHANNELS = r"(?:choose|select) the (?:columns|dimensions)\b.{0,80}?in the shell (?:with )?--columns(?: and --kind)?"
@@ -51,11 +51,15 @@ _LOG = logging.getLogger("kineme.studio")
 
 
 class MissingError(Exception):
-    """What is asked for is not there; 404."""
+    """Nothing of that name or number is there; 404."""
 
 
 class ConflictError(Exception):
     """The library has changed meanwhile; 409."""
+
+
+class StoppedError(Exception):
+    """Nobody waits for the work any more; 499, which nobody reads."""
 
 
 async def refuse(scope: Scope, send: Send, status: int, text: str) -> None:
@@ -66,7 +70,17 @@ async def refuse(scope: Scope, send: Send, status: int, text: str) -> None:
     as_page = scope["method"] == "GET" and any(
         name == b"accept" and b"text/html" in value for name, value in scope["headers"]
     )
-    kind, body = (b"text/html; charset=utf-8", _page(text)) if as_page else (b"application/json", _plain(text))
+    kind, body = (b"application/json", _plain(text))
+    if as_page:  # for people who have opened an address by hand: nothing but words
+        page = (
+            '<!doctype html><html lang="en"><meta charset="utf-8">'
+            '<meta name="viewport" content="width=device-width">'
+            '<meta name="color-scheme" content="light dark"><title>kineme studio: not opened</title>'
+            f"<h1>The studio was not opened</h1><p>It {in_markup(text.rstrip('.'))}.</p>"
+            "<p>The address stands in the terminal in which <code>kineme studio</code> was started; copy the whole of "
+            "it. The token in it is another one after each start.</p></html>"
+        )
+        kind, body = b"text/html; charset=utf-8", page.encode()
     more = [(b"connection", b"close")] if status in {408, 413} else []  # the rest of the body is not read
     await _answer(send, status, [(b"content-type", kind), *more], body)
 
@@ -92,7 +106,7 @@ class AnswersFailures:
             if begun:
                 raise
             _LOG.exception("%s %s failed", scope["method"], scope["path"])
-            text = _plain("the server failed at this, and goes on; what it was is in its window")
+            text = _plain("internal error; details are in the server log")
             await _answer(send, 500, [(b"content-type", b"application/json")], text)
 
 
@@ -106,69 +120,39 @@ def _plain(text: str) -> bytes:
     return json.dumps({"error": text}).encode()
 
 
-def _page(text: str) -> bytes:
-    """A refusal for people who have opened an address by hand: nothing but words."""
-    return (
-        '<!doctype html><html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
-        '<meta name="color-scheme" content="light dark"><title>kineme studio: not opened</title>'
-        f"<h1>The studio was not opened</h1><p>It {in_markup(text.rstrip('.'))}.</p>"
-        "<p>The address stands in the terminal in which <code>kineme studio</code> was started; copy the whole of it. "
-        "The token in it is another one after each start.</p></html>"
-    ).encode()
-
-
 def answer_errors(app: FastAPI) -> None:
     """Answer to errors with {"error": what was expected, what came, what to do}."""
 
-    def answer(status: int, text: str) -> JSONResponse:
+    async def answer(_: Request, error: Any) -> JSONResponse:
+        kind = next(kind for kind in type(error).__mro__ if kind in _STATUSES)
+        status, text = _STATUSES[kind](error)
         return JSONResponse({"error": text}, status)
 
-    async def refused(_: Request, error: Any) -> JSONResponse:
-        return answer(503 if isinstance(error, BusyError) else 400, in_studio_words(str(error)))
-
-    async def missing(_: Request, error: Any) -> JSONResponse:
-        return answer(404, str(error))
-
-    async def conflict(_: Request, error: Any) -> JSONResponse:
-        return answer(409, str(error))
-
-    async def forbidden(_: Request, error: Any) -> JSONResponse:
-        return answer(403, str(error))
-
-    async def stopped(_: Request, __: Any) -> JSONResponse:
-        return answer(499, "expected somebody to wait for the answer; it was stopped")
-
-    async def invalid(_: Request, error: Any) -> JSONResponse:
-        return answer(422, _first(error))
-
-    async def gone(_: Request, __: Any) -> JSONResponse:
-        return answer(400, "the rest of the request did not come")  # nobody is there to read it
-
-    async def other(_: Request, error: Any) -> JSONResponse:
-        return answer(error.status_code, str(error.detail))
-
-    for kind, handler in (
-        (KinemeError, refused),
-        (MissingError, missing),
-        (ConflictError, conflict),
-        (PermissionError, forbidden),
-        (StoppedError, stopped),
-        (RequestValidationError, invalid),
-        (ClientDisconnect, gone),
-        (HTTPException, other),
-    ):
-        app.add_exception_handler(kind, handler)
+    for kind in _STATUSES:
+        app.add_exception_handler(kind, answer)
 
 
-def _first(error: RequestValidationError) -> str:
-    """The first thing that is wrong with a request, in one sentence."""
-    one = error.errors()[0]
-    where = ".".join(str(part) for part in one["loc"] if part not in {"body", "query", "path"})
-    return f"expected another value of {where or 'the request'}: {one['msg']}"
+def _first_problem(error: RequestValidationError) -> str:
+    problem = error.errors()[0]
+    where = ".".join(str(part) for part in problem["loc"] if part not in {"body", "query", "path"})
+    return f"expected another value of {where or 'the request'}: {problem['msg']}"
+
+
+#: Kind of error -> status and text of the answer.
+_STATUSES: dict[type[Exception], Callable[[Any], tuple[int, str]]] = {
+    KinemeError: lambda error: (503 if isinstance(error, BusyError) else 400, in_studio_words(str(error))),
+    MissingError: lambda error: (404, str(error)),
+    ConflictError: lambda error: (409, str(error)),
+    PermissionError: lambda error: (403, str(error)),
+    StoppedError: lambda error: (499, "expected somebody to wait for the answer; it was stopped"),
+    RequestValidationError: lambda error: (422, _first_problem(error)),
+    ClientDisconnect: lambda error: (400, "the rest of the request did not come"),  # nobody is there to read it
+    HTTPException: lambda error: (error.status_code, str(error.detail)),
+}
 
 
 def in_studio_words(text: str) -> str:
-    """A refusal, with what can be done about it in the studio, or where else."""
+    """Return a refusal with what can be done about it in the studio, or where else."""
     for library, studio in _WORDS:
         text = library.sub(studio, text)
     return text

@@ -8,21 +8,19 @@ import numpy as np
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
-from kineme.dmp.generation.learned import Learned
 from kineme.errors import KinemeError, SpecificationError
-from kineme.robots.checks.check import Preflight
+from kineme.robots.execution.preflight import Preflight
 from kineme.robots.models.load import MODELS, load
 from kineme.robots.models.robot import Robot
 from kineme.robots.planning.generate_at import generate_at
 from kineme.robots.planning.move import move as move_arm
 from kineme.robots.planning.refusal import InfeasibleError
-from kineme.robots.planning.robot_movement import RobotMovement
 from kineme.robots.planning.roles import space_of
 from kineme.robots.view.shapes import shapes_of
 from kineme.robots.view.write_view import scene_data
 from kineme.studio.server.records import Number, Point, Text, numbers
 from kineme.studio.server.refusals import in_studio_words
-from kineme.studio.server.rollouts import Operated, learned_as
+from kineme.studio.server.rollout_routes import PrimitiveRequest, learned_as
 from kineme.studio.server.studio import Reads
 
 
@@ -34,7 +32,7 @@ class ArmsOut(BaseModel):
     robots: list[str]
 
 
-class ArmWanted(Operated):
+class MoveRequest(PrimitiveRequest):
     """A movement for an arm; `size` is its largest extent there [m], `at` and `goal` are in the frame of the robot.
 
     Instead of a goal, `displacement` is the way from start to goal in the unit of the library.
@@ -70,8 +68,8 @@ class JointOut(BaseModel):
     high: float | None
 
 
-class ArmMoved(BaseModel):
-    """What an arm would do, or why it must not; `scene` is what draws it."""
+class MoveOut(BaseModel):
+    """The answer to a movement for an arm: its joints and checks, or why it must not move; `scene` draws it."""
 
     passed: bool
     refusal: str | None
@@ -95,51 +93,41 @@ def robots(studio: Reads) -> dict[str, Any]:
     return {"available": True, "why": None, "robots": list(MODELS)}
 
 
-@router.post("/move", response_model=ArmMoved, summary="What an arm does to execute a movement")
-def move(studio: Reads, asked: ArmWanted) -> dict[str, Any]:
+@router.post("/move", response_model=MoveOut, summary="What an arm does to execute a movement")
+def move(studio: Reads, body: MoveRequest) -> dict[str, Any]:
     """Joints, and every check; a movement that must not be executed is refused, with how it could be."""
-    robot = _robot(asked.robot)
-    learned = learned_as(studio, asked)
+    if body.robot not in MODELS:  # clients name no files
+        raise SpecificationError(f"expected one of the arms {', '.join(MODELS)}, got {body.robot[:80]!r}")
+    robot = load(body.robot)
+    learned = learned_as(studio, body)
     space = space_of(learned.primitive.channels, learned.example, robot)
-    if asked.goal is not None and asked.at is None and space != "joints":
+    if body.goal is not None and body.at is None and space != "joints":
         raise SpecificationError("expected `at` with a goal: where the movement starts in the frame of the robot")
+    extent = float(np.ptp(learned.example, axis=0).max()) or 1.0  # the largest, in the unit of the library
     generated = generate_at(
         learned,
-        asked.at,
-        asked.goal,
-        asked.duration,
-        displacement=None if asked.goal is not None else asked.displacement,
-        scale=None if asked.size is None or space == "joints" else asked.size / _extent(learned),
+        body.at,
+        body.goal,
+        body.duration,
+        displacement=None if body.goal is not None else body.displacement,
+        scale=None if body.size is None or space == "joints" else body.size / extent,
         joints=robot if space == "joints" else None,
-        plane=asked.plane,
+        plane=body.plane,
     )
     try:
-        made = move_arm(
+        result = move_arm(
             generated.movement,
             robot,
             space=space,
-            plane=asked.plane,
-            place="as given" if asked.at is not None or space == "joints" else "free",
-            timing="slowed" if asked.slow_down else "generated",
+            plane=body.plane,
+            place="as given" if body.at is not None or space == "joints" else "free",
+            timing="slowed" if body.slow_down else "generated",
             steps=generated.steps,
             continuous=generated.continuous,
         )
     except InfeasibleError as error:
         return {**_answer(robot, error.preflight), "refusal": in_studio_words(str(error)), "scene": None}
-    return {**_answer(robot, made.preflight), "refusal": None, "scene": _scene(made)}
-
-
-def _robot(name: str) -> Robot:
-    """An arm that comes with kineme: clients name no files."""
-    if name not in MODELS:
-        raise SpecificationError(f"expected one of the arms {', '.join(MODELS)}, got {name[:80]!r}")
-    return load(name)
-
-
-def _extent(learned: Learned) -> float:
-    """The largest extent of the movement, in its unit."""
-    shown = learned.example
-    return float(np.ptp(shown, axis=0).max()) or 1.0
+    return {**_answer(robot, result.preflight), "refusal": None, "scene": scene_data(result, shapes_of(robot))}
 
 
 def _answer(robot: Robot, preflight: Preflight | None) -> dict[str, Any]:
@@ -163,7 +151,3 @@ def _answer(robot: Robot, preflight: Preflight | None) -> dict[str, Any]:
         "assumed": list(robot.assumed),
         "joints": [{"name": name, "low": low, "high": high} for name, low, high in joints],
     }
-
-
-def _scene(made: RobotMovement) -> dict[str, Any]:
-    return scene_data(made, shapes_of(made.robot))

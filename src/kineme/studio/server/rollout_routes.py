@@ -2,58 +2,259 @@
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple, Self
 from urllib.parse import quote
 
+import numpy as np
 from fastapi import APIRouter
 from fastapi.responses import Response
+from pydantic import BaseModel, Field, model_validator
 
-from kineme.io.writing.write_movement import encode_movement
-from kineme.studio.server.records import SymbolKey, numbers, thumbnail
-from kineme.studio.server.rollouts import (
-    Exported,
-    Moved,
-    Operated,
-    PrimitiveOut,
-    StylesOut,
-    Wanted,
-    learned_as,
-    make,
-    moving_positions,
-    primitive_document,
-    styles_of,
+from kineme.dmp.control.options import ObstacleAvoidance
+from kineme.dmp.generation.generate import Generated, MovementOptions, generate
+from kineme.dmp.generation.learned import Learned, learn_one
+from kineme.dmp.styles.model import StyleModel, learn_styles
+from kineme.errors import SpecificationError, heard_warnings
+from kineme.io.writing.write_movement import WRITERS, encode_movement
+from kineme.library.grounding import prototype_of
+from kineme.library.storage import read
+from kineme.studio.server.records import (
+    Number,
+    Point,
+    Points,
+    RequestBody,
+    SymbolKey,
+    Text,
+    Times,
+    numbers,
+    plain_answer,
+    thumbnail,
+    trajectory,
 )
-from kineme.studio.server.studio import Reads
+from kineme.studio.server.studio import Reads, Studio
+from kineme.studio.snapshot import snapshot_of_primitive
+from kineme.validation import Array
+
+recognition_router = APIRouter(prefix="/api", tags=["recognition"])
+
+
+_SAMPLES, _MOST_SAMPLES = 200, 20_000
+_STRONGER = (1.0, 2.0, 4.0, 8.0)  # steering that is tried until no obstacle is touched
+
+
+class Rollout(NamedTuple):
+    """A new movement, with warnings."""
+
+    movement: Generated
+    warnings: list[str]
+
+
+def learned_as(studio: Studio, body: PrimitiveRequest) -> Learned:
+    """Learn the primitive that is asked for, in the formulation that is asked for, once for each version."""
+    key = body.what.model_dump_json() + str(body.formulation)
+    return studio.cached_item("learned", key, lambda: _learned(studio, body.what, body.formulation))
+
+
+def styles_of(studio: Studio, symbol: str) -> StyleModel:
+    """Learn the directions in which the members of a symbol differ, once for each version."""
+    name = studio.symbol(symbol).name
+    return studio.cached_item("styles", symbol, lambda: learn_styles(studio.library.primitives(name)))
+
+
+def make(studio: Studio, body: RolloutRequest) -> Rollout:
+    """Generate the movement that is asked for.
+
+    Raises SpecificationError, TrajectoryError: See `kineme.dmp.generation.generate.generate`.
+    """
+    learned = learned_as(studio, body)
+    duration = body.duration or float(learned.primitive.durations[0])
+    rate = body.rate or _SAMPLES / duration
+    if rate * duration > _MOST_SAMPLES:
+        raise SpecificationError(
+            f"expected at most {_MOST_SAMPLES:,} samples, got {rate:g} per second for {duration:g} s; take a lower rate"
+        )
+    options = MovementOptions(
+        start=None if body.start is None else np.array(body.start),
+        goal=None if body.goal is None else np.array(body.goal),
+        duration=body.duration,
+        rate=rate,
+        meet_goal=True,  # it ends where the hand put it
+        via=tuple((share, np.array(point)) for share, point in sorted(body.via, key=lambda pair: pair[0])),
+    )
+    with heard_warnings() as heard:
+        movement, touched = _around(learned, options, body.obstacles)
+    return Rollout(movement, list(dict.fromkeys([*heard, *touched])))
+
+
+def moving_positions(learned: Learned, movement: Generated) -> Array:
+    """Select the positions that can be led elsewhere: all but discrete channels, such as a gripper's."""
+    names = list(movement.names.positions)
+    return np.asarray(movement.columns["positions"])[:, [names.index(name) for name in learned.moving_columns]]
+
+
+def _learned(studio: Studio, what: Subject, formulation: str | None) -> Learned:
+    store, dmp = studio.library.store, studio.library.specification.dmp
+    if what.style is not None:
+        if formulation not in {None, dmp.formulation}:
+            raise SpecificationError(f"expected styles in the formulation {dmp.formulation!r}, got {formulation!r}")
+        return Learned(styles_of(studio, what.style.symbol).primitive(what.style.values))
+    if what.movement is not None:
+        studio.check_movements([what.movement])
+        key = what.movement
+    else:
+        symbol = studio.symbol(what.symbol or "")
+        if not len(symbol):
+            raise SpecificationError(f"expected a symbol with movements, {symbol.name!r} has none; assign some")
+        key = prototype_of(store, symbol)
+    recording = read.movements(store, np.array([key]))[0]
+    return learn_one(recording, dmp if formulation is None else replace(dmp, formulation=formulation))
+
+
+def _around(learned: Learned, options: MovementOptions, balls: list[Obstacle]) -> tuple[Generated, list[str]]:
+    """Steer the movement around balls as strongly as it takes; return warnings of those that it touches."""
+    if not balls:
+        return generate(learned, options), []
+    centers, radii = [ball.center for ball in balls], np.array([ball.radius for ball in balls])
+    if len({len(center) for center in centers}) > 1:
+        raise SpecificationError("expected obstacles of equally many dimensions")
+    # Columns that are no part of an orientation have a velocity of the same name.
+    points, placed = np.array(centers), [k for k, name in enumerate(learned.moving_columns) if name in learned.rates]
+    if points.shape[1] == len(learned.moving_columns):  # a point of the movement: an orientation says nothing of where
+        points = points[:, placed]
+    for stronger in _STRONGER:
+        avoidance = ObstacleAvoidance(gamma=1000.0 * stronger)
+        movement = generate(learned, replace(options, obstacles=points, avoidance=avoidance))
+        path = moving_positions(learned, movement)[:, placed][:, : points.shape[1]]
+        gaps = np.linalg.norm(path[:, None] - points, axis=2).min(axis=0) - radii
+        if (gaps >= 0).all():
+            return movement, []
+    return movement, [
+        f"the movement passes {gap + radius:.3g} from the middle of obstacle {k + 1}, whose radius is {radius:.3g}: "
+        "move the obstacle, or add a via point beside it"
+        for k, (gap, radius) in enumerate(zip(gaps.tolist(), radii.tolist(), strict=True))
+        if gap < 0
+    ]
+
+
+class Style(RequestBody):
+    """A symbol with values of the directions in which its members differ."""
+
+    symbol: Text
+    values: list[Number] = Field(min_length=1, max_length=100)
+
+
+class Subject(RequestBody):
+    """The prototype of a symbol, a stored movement, or a style of a symbol; one of the three."""
+
+    symbol: Text | None = None
+    movement: int | None = None
+    style: Style | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        if sum(choice is not None for choice in (self.symbol, self.movement, self.style)) != 1:
+            raise ValueError("expected one of symbol, movement and style")
+        return self
+
+
+class Obstacle(RequestBody):
+    """A ball to pass by."""
+
+    center: Point
+    radius: Number = Field(0.0, ge=0)
+
+
+class PrimitiveRequest(RequestBody):
+    """A primitive, in the formulation of the library or in another one."""
+
+    what: Subject
+    formulation: Text | None = None
+
+
+class RolloutRequest(PrimitiveRequest):
+    """A new movement; what is left out is as demonstrated. Via points are pairs: share of the duration, point."""
+
+    start: Point | None = None
+    goal: Point | None = None
+    via: list[tuple[Number, Point]] = Field([], max_length=100)
+    obstacles: list[Obstacle] = Field([], max_length=100)
+    duration: Number | None = Field(None, gt=0, description="[s]")
+    rate: Number | None = Field(None, gt=0, description="Samples per second; by default 200 in all.")
+
+
+class ExportRequest(RolloutRequest):
+    """The same as a file."""
+
+    format: Text = Field(description=f"One of {', '.join(WRITERS)}.")
+
+
+class RolloutOut(BaseModel):
+    """A new movement, with warnings."""
+
+    times: list[float]
+    positions: Points
+    velocities: Points
+    accelerations: Points
+    columns: list[str]
+    start: list[float]
+    goal: list[float]
+    recorded: Points | None = Field(description="At most 64 points of the recording that moves; null for a style.")
+    warnings: list[str]
+
+
+class PrimitiveOut(BaseModel):
+    """A primitive as the runtime reads it: its specification, and arrays as one block of bytes in base64."""
+
+    format: str
+    version: int
+    movements: dict[str, Any]
+    arrays: dict[str, tuple[str, int, int]] = Field(description="Kind, first byte and length of each.")
+    data: str
+
+
+class StylesOut(BaseModel):
+    """Ranges of the members of a symbol in each direction of their styles, and where its prototype lies."""
+
+    lowest: list[float]
+    highest: list[float]
+    explained: list[float]
+    formulation: str = Field(description="That of the library, the only one in which styles move.")
+
 
 router = APIRouter(prefix="/api", tags=["movement"])
 
 
-@router.post("/rollout", response_model=Moved, summary="A new movement")
-def rollout(studio: Reads, asked: Wanted) -> dict[str, Any]:
+@router.post("/rollout", response_model=RolloutOut, summary="A new movement")
+def rollout(studio: Reads, body: RolloutRequest) -> dict[str, Any]:
     """Of a symbol, a stored movement or a style: from another start, to another goal, past points and obstacles.
 
     Its columns are those that a start and a goal have; the steps of a gripper are in the file that is exported.
     """
-    made, learned = make(studio, asked), learned_as(studio, asked)
-    columns, recording = made.movement.columns, learned.demonstration
-    positions = moving_positions(learned, made.movement)
+    (movement, warnings), learned = make(studio, body), learned_as(studio, body)
+    columns, recording = movement.columns, learned.demonstration
+    positions = moving_positions(learned, movement)
     return {
         **{name: numbers(columns[name]) for name in ("times", "velocities", "accelerations")},
         "positions": numbers(positions),
         "columns": list(learned.moving_columns),
         "start": numbers(positions[0]),
-        "goal": numbers(positions[-1] if asked.goal is None else asked.goal),
+        "goal": numbers(positions[-1] if body.goal is None else body.goal),
         "recorded": None if recording is None else thumbnail(recording.positions),
-        "warnings": made.warnings,
+        "warnings": warnings,
     }
 
 
 @router.post("/primitive", response_model=PrimitiveOut | None, summary="A primitive for the runtime of the page")
-def primitive(studio: Reads, asked: Operated) -> Response:
+def primitive(studio: Reads, body: PrimitiveRequest) -> Response:
     """To follow a hand without a request for each picture, by ``/runtime/primitive.js``; null where that cannot be."""
-    key = asked.model_dump_json()
-    document = studio.kept_some("primitive", key, lambda: primitive_document(studio, asked))
-    return Response(document, media_type="application/json")
+
+    def document() -> str:
+        snapshot = snapshot_of_primitive(learned_as(studio, body).primitive)
+        return "null" if snapshot is None else snapshot.to_json()
+
+    key = body.model_dump_json()
+    return Response(studio.cached_item("primitive", key, document), media_type="application/json")
 
 
 @router.get(
@@ -73,20 +274,60 @@ def styles(studio: Reads, key: SymbolKey) -> dict[str, Any]:
     response_class=Response,
     responses={200: {"content": {"application/octet-stream": {}}, "description": "The file, with its name."}},
 )
-def export(studio: Reads, asked: Exported) -> Response:
+def export(studio: Reads, body: ExportRequest) -> Response:
     """With times, positions, velocities and accelerations, in each format that movements are written in."""
-    made = make(studio, asked)
-    ending = f".{asked.format.lower().lstrip('.')}"
-    data = encode_movement(made.movement.columns, ending, made.movement.names)
-    symbol = asked.what.symbol or (asked.what.style.symbol if asked.what.style else None)
-    name = studio.symbol(symbol).name if symbol else f"movement {asked.what.movement}"
-    return Response(
-        data, media_type="application/octet-stream", headers={"Content-Disposition": _saved_as(name, ending)}
-    )
-
-
-def _saved_as(name: str, ending: str) -> str:
-    """A file's name for browsers: letters and digits of the name, whatever alphabet they are of."""
+    movement, _ = make(studio, body)
+    ending = f".{body.format.lower().lstrip('.')}"
+    data = encode_movement(movement.columns, ending, movement.names)
+    symbol = body.what.symbol or (body.what.style.symbol if body.what.style else None)
+    name = studio.symbol(symbol).name if symbol else f"movement {body.what.movement}"
+    # Letters and digits of the name, whatever alphabet they are of.
     plain = "".join(mark if mark.isalnum() or mark in "-_" else "_" for mark in name)[:80] or "movement"
     ascii_only = plain.encode("ascii", "replace").decode().replace("?", "_")
-    return f"attachment; filename=\"{ascii_only}{ending}\"; filename*=UTF-8''{quote(plain + ending)}"
+    saved_as = f"attachment; filename=\"{ascii_only}{ending}\"; filename*=UTF-8''{quote(plain + ending)}"
+    return Response(data, media_type="application/octet-stream", headers={"Content-Disposition": saved_as})
+
+
+class RecognizeRequest(RequestBody):
+    """A movement to be recognized."""
+
+    times: Times
+    positions: list[Point]
+    error_rate: Number = Field(0.05, gt=0, lt=1)
+
+
+class RankedOut(BaseModel):
+    """A class, its probability if the movement is of a known one, and its p-value."""
+
+    name: str
+    probability: float | None
+    p_value: float | None
+
+
+class NearestOut(BaseModel):
+    """A stored movement that is like the one asked for."""
+
+    id: int
+    name: str | None
+    similarity: float | None
+
+
+class AnswerOut(BaseModel):
+    """The answer to a movement; label null is unknown."""
+
+    label: str | None
+    certainty: str
+    confidence: float | None
+    p_known: float | None
+    p_values: dict[str, float | None]
+    ranked: list[RankedOut]
+    nearest: list[NearestOut]
+    calibrated: bool
+    rule: str
+    promise: str
+
+
+@recognition_router.post("/recognize", response_model=AnswerOut, summary="Recognize a whole movement")
+def recognize(studio: Reads, body: RecognizeRequest) -> dict[str, Any]:
+    """Its symbol, or null for unknown; with p-values that are calibrated where there are enough demonstrations."""
+    return plain_answer(studio.library.recognize(trajectory(body.times, body.positions), body.error_rate))

@@ -19,22 +19,18 @@ from collections.abc import Callable
 from contextlib import closing, suppress
 from pathlib import Path
 from threading import Timer
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from kineme.errors import DataError, SpecificationError
-
-if TYPE_CHECKING:
-    from kineme.studio.server.studio import Studio
-
 
 HEAD_SECONDS = 10.0  # that the head of a request may take
 BACKLOG = 64  # connections that wait to be accepted: as many are accepted at once
 _MOST, _LEAST = 512, 8  # connections that are open at once
 _SHARE = 4  # a connection for so many file descriptors: the library, uploads and new connections take some
 _AGAIN = 60.0  # seconds after which the same error is logged again
-_KEPT = 100  # errors that are known as logged
+_MOST_LOGGED = 100  # errors that are remembered as logged
 
 LOOPBACK = "127.0.0.1"
 PORT = 8420  # unless it is taken
@@ -45,7 +41,7 @@ _GRACE = 2.0  # seconds for what runs when it is stopped
 
 
 class Options(NamedTuple):
-    """How the studio is served; port None is 8420, or any that is free."""
+    """Options of the server; port None is 8420, or any that is free."""
 
     folder: Path
     host: str = LOOPBACK
@@ -58,15 +54,11 @@ def serve(options: Options, ready: Callable[[str, str], object]) -> None:
 
     The second argument of `ready` is an address for the browser of this machine, without the token: it opens once.
 
-    Raises
-    ------
-    DataError
-        The library cannot be opened, the address is taken, or the extra `studio` is not installed.
-    SpecificationError
-        A token in the environment that is too short.
+    Raises DataError: the library cannot be opened, the address is taken, or the extra `studio` is not installed;
+    SpecificationError: a token in the environment that is too short.
     """
     try:
-        import uvicorn  # noqa: F401
+        import uvicorn
         import websockets  # noqa: F401
 
         from kineme.studio.server.app import create_app
@@ -76,21 +68,44 @@ def serve(options: Options, ready: Callable[[str, str], object]) -> None:
         ) from error
     from kineme.studio.server.access import own_names
 
-    log_errors_once()
+    for name in ("asyncio", "uvicorn.error"):
+        logging.getLogger(name).addFilter(OncePerInterval())
     token, once = _token(), secrets.token_urlsafe(24)
     with closing(_listening(options)) as listening:
         hosts = () if is_loopback(options.host) else own_names(options.host)
         config = config_of(create_app(options.folder, token, once=once, read_only=options.read_only, hosts=hosts))
         address = f"http://{_name(options.host)}:{listening.getsockname()[1]}/"
-        server = _server(config, lambda: ready(f"{address}?token={token}", f"{address}?once={once}"))
+        studio = config.app.state.studio
+
+        def end_at_once() -> None:
+            """End the process: a thread that computes cannot be ended otherwise, and the library loses nothing."""
+            studio.uploads.close()
+            os._exit(0)
+
+        last_resort = Timer(_GRACE, end_at_once)  # also where the event loop itself waits
+
+        class Server(uvicorn.Server):
+            async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+                await super().startup(sockets)
+                # A closed terminal is an interruption, unless that is ignored, as after `nohup`.
+                if os.name == "posix" and signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:
+                    loop = asyncio.get_running_loop()
+                    loop.add_signal_handler(signal.SIGHUP, lambda: setattr(self, "should_exit", True))
+                ready(f"{address}?token={token}", f"{address}?once={once}")
+
+            async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+                last_resort.daemon = True
+                last_resort.start()
+                await super().shutdown(sockets)
+
         with suppress(KeyboardInterrupt):
-            server.run(sockets=[listening])
-        config.app.state.studio.join()
-        server.last_resort.cancel()
+            Server(config).run(sockets=[listening])
+        studio.join()
+        last_resort.cancel()
 
 
 def config_of(app: Any) -> Any:
-    """How uvicorn serves the application: quietly, with limits, without trust in headers of proxies."""
+    """Make uvicorn serve the application quietly, with limits, without trust in headers of proxies."""
     import uvicorn
 
     return uvicorn.Config(
@@ -109,43 +124,11 @@ def config_of(app: Any) -> Any:
 
 
 def is_loopback(host: str) -> bool:
-    """Whether only this machine reaches a host."""
+    """Tell whether only this machine reaches a host."""
     try:
         return host.lower() == "localhost" or ipaddress.ip_address(host).is_loopback
     except ValueError:
         return False
-
-
-def _server(config: Any, ready: Callable[[], object]) -> Any:
-    """A server that tells when it serves, and ends soon when it is stopped."""
-    import uvicorn
-
-    class Server(uvicorn.Server):
-        last_resort = Timer(_GRACE, _end_at_once, [config.app.state.studio])  # also where the event loop itself waits
-
-        async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-            await super().startup(sockets)
-            _end_with_the_terminal(self)
-            ready()
-
-        async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-            self.last_resort.daemon = True
-            self.last_resort.start()
-            await super().shutdown(sockets)
-
-    return Server(config)
-
-
-def _end_at_once(studio: Studio) -> None:
-    """End the process: a thread that computes cannot be ended otherwise, and the library loses nothing."""
-    studio.uploads.close()
-    os._exit(0)
-
-
-def _end_with_the_terminal(server: Any) -> None:
-    """Stop when the terminal is closed as when it is interrupted, unless that is ignored, as after `nohup`."""
-    if os.name == "posix" and signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:
-        asyncio.get_running_loop().add_signal_handler(signal.SIGHUP, lambda: setattr(server, "should_exit", True))
 
 
 def _token() -> str:
@@ -162,7 +145,7 @@ def _token() -> str:
 
 
 def _listening(options: Options) -> socket.socket:
-    """A socket that listens; on the usual port if that is free."""
+    """Open a socket that listens; on the usual port if that is free."""
     if not options.host:  # to the system that is every address
         raise SpecificationError(
             "expected an address to listen at, got an empty --host; leave it out for this machine alone, or write "
@@ -191,7 +174,7 @@ def _bound(host: str, port: int) -> socket.socket:
 
 
 def _name(host: str) -> str:
-    """How the host is written in an address that a browser on this machine opens."""
+    """Write the host in an address that a browser on this machine opens."""
     if host in {"0.0.0.0", "::"}:
         return socket.gethostname()
     return f"[{host}]" if ":" in host else host
@@ -220,7 +203,7 @@ class LimitedConnection(H11Protocol):
 
     @property
     def is_waiting(self) -> bool:
-        """Whether no request is under way: its head is not there, or it has been answered."""
+        """True where no request is under way: its head is not there, or it has been answered."""
         return self.cycle is None or self.cycle.response_complete
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
@@ -230,8 +213,8 @@ class LimitedConnection(H11Protocol):
         connections: Any = self.connections
         alive = [connection for connection in connections if not connection.transport.is_closing()]
         if len(alive) > most_connections():
-            waiting = [one for one in alive if isinstance(one, LimitedConnection) and one.is_waiting]
-            min(waiting, key=lambda one: one._since).transport.abort()  # itself where all others work
+            waiting = [each for each in alive if isinstance(each, LimitedConnection) and each.is_waiting]
+            min(waiting, key=lambda connection: connection._since).transport.abort()  # itself where all others work
 
     def data_received(self, data: bytes) -> None:
         """Limit the time from the first byte of a head to its last."""
@@ -264,17 +247,11 @@ class OncePerInterval(logging.Filter):
         self._logged: dict[str, float] = {}
 
     def filter(self, record: logging.LogRecord) -> bool:
-        """Whether the first line of a message has not been logged lately."""
+        """Tell whether the first line of a message has not been logged lately."""
         now, line = time.monotonic(), record.getMessage().partition("\n")[0]
         if now - self._logged.get(line, -_AGAIN) < _AGAIN:
             return False
-        if len(self._logged) >= _KEPT:
+        if len(self._logged) >= _MOST_LOGGED:
             self._logged.clear()
         self._logged[line] = now
         return True
-
-
-def log_errors_once() -> None:
-    """Limit what the event loop and the server log."""
-    for name in ("asyncio", "uvicorn.error"):
-        logging.getLogger(name).addFilter(OncePerInterval())

@@ -1,35 +1,42 @@
-"""What the routes share: the library, what of it is shown at a version, and threads for movements under way."""
+"""The state that routes share: the library, a cache of each version of it, threads, and word of every change."""
 
 from __future__ import annotations
 
 import asyncio
 import os
+import sqlite3
 from collections.abc import AsyncIterator, Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
-from threading import Lock, Thread
+from threading import Event, Lock, Thread
 from typing import Annotated, NamedTuple, TypeVar
 
 from fastapi import Depends, Request
+from starlette.types import ASGIApp, Receive, Scope, Send
 
 from kineme.errors import KinemeError
 from kineme.library.library import ActionLibrary
 from kineme.library.storage.symbols import Symbol
 from kineme.recognition.early.stream import Live
-from kineme.studio.server.refusals import ConflictError, MissingError
+from kineme.studio.server.refusals import ConflictError, MissingError, StoppedError
 from kineme.studio.server.uploads import Uploads
-from kineme.studio.server.work import Works
-from kineme.studio.snapshot.recognition import DRAWN
+from kineme.studio.snapshot import DRAWN
 
-Made = TypeVar("Made")
+PERIOD = 0.2  # seconds between looks whether the client is there
+
+LOOKS = 0.25  # seconds between looks at the version, for changes by other processes
+
+Tell = Callable[[int], object]  # must not wait
+
+Result = TypeVar("Result")
 
 _WRITERS = 4  # changes that are worked on at once; each holds a thread until it has its turn
-_KEPT = 200  # things of one kind
+_MOST_CACHED = 200  # things of one kind
 _LONG = 4  # files that are read or searched at once; others wait
 
 
-class Shown(NamedTuple):
+class LibraryView(NamedTuple):
     """The symbols of one version, by id, and the symbol's id of each member."""
 
     version: int
@@ -58,7 +65,7 @@ class Studio:
         self.works = Works()
         self.warm = -1  # the version of the library that recognition is prepared for
         self._warming: list[Thread] = []
-        self._kept: dict[str, tuple[int, object]] = {}
+        self._cached: dict[str, tuple[int, object]] = {}
         self._turns: dict[str, Lock] = {}
         self._turn = Lock()
         self._searches: dict[str, asyncio.Lock] = {}
@@ -78,75 +85,67 @@ class Studio:
         for thread in self._warming:
             thread.join()
 
-    def shown(self) -> Shown:
-        """The symbols as they are now."""
-        return self.kept("shown", self._show)
+    def view(self) -> LibraryView:
+        """Return the symbols as they are now."""
 
-    def _show(self) -> Shown:
-        version, symbols = self.library.version, self.library.symbols()
-        symbol_of = {int(i): symbol.id for symbol in symbols for i in symbol.members}
-        return Shown(version, {symbol.id: symbol for symbol in symbols}, symbol_of)
+        def make() -> LibraryView:
+            version, symbols = self.library.version, self.library.symbols()
+            symbol_of = {int(i): symbol.id for symbol in symbols for i in symbol.members}
+            return LibraryView(version, {symbol.id: symbol for symbol in symbols}, symbol_of)
 
-    def kept(self, name: str, make: Callable[[], Made]) -> Made:
-        """What was made at this version of the library, else made now; one thread makes it, others wait."""
+        return self.cached("view", make)
+
+    def cached(self, name: str, make: Callable[[], Result]) -> Result:
+        """Return the result of this version of the library, or make it; one thread makes it, others wait."""
         with self._turn:
             turn = self._turns.setdefault(name, Lock())
         with turn:
-            if self._kept.get(name, (None, None))[0] != self.library.version:
-                self._kept[name] = self._made(make)
-            return self._kept[name][1]  # type: ignore[return-value]
+            version = self.library.version
+            if self._cached.get(name, (None, None))[0] != version:
+                try:
+                    result = make()
+                except KinemeError:
+                    if self.library.version == version:
+                        raise
+                    version = -1
+                if self.library.version != version:  # it has changed meanwhile: once more
+                    version, result = self.library.version, make()
+                self._cached[name] = version, result
+            return self._cached[name][1]  # type: ignore[return-value]
 
-    def _made(self, make: Callable[[], Made]) -> tuple[int, Made]:
-        """What is made of one version: made once more if the library changes meanwhile."""
-        version = self.library.version
-        try:
-            made = make()
-        except KinemeError:
-            if self.library.version == version:
-                raise
-        else:
-            if self.library.version == version:
-                return version, made
-        return self.library.version, make()
-
-    def kept_some(self, name: str, key: str, make: Callable[[], Made]) -> Made:
-        """As `kept`, of many things of one kind; of too many the first ones are forgotten."""
-        several: dict[str, Made] = self.kept(name, dict)
+    def cached_item(self, name: str, key: str, make: Callable[[], Result]) -> Result:
+        """Do as `cached`, of many things of one kind; of too many the first ones are forgotten."""
+        items: dict[str, Result] = self.cached(name, dict)
         with self._turn:
-            if key in several:
-                return several[key]
-        made = make()
+            if key in items:
+                return items[key]
+        result = make()
         with self._turn:
-            several[key] = made
-            if len(several) > _KEPT:
-                del several[next(iter(several))]
-        return made
+            items[key] = result
+            if len(items) > _MOST_CACHED:
+                del items[next(iter(items))]
+        return result
 
-    async def searched(self, name: str, make: Callable[[], Made]) -> Made:
-        """As `kept`, of what takes long: those who wait for the one that makes it hold no thread of the requests."""
+    async def cached_in_background(self, name: str, make: Callable[[], Result]) -> Result:
+        """Do as `cached`, of what takes long: those who wait for it hold no thread of the requests."""
         turn = self._searches.setdefault(name, asyncio.Lock())
         async with turn:
-            return await asyncio.get_running_loop().run_in_executor(self.long, lambda: self.kept(name, make))
+            return await asyncio.get_running_loop().run_in_executor(self.long, lambda: self.cached(name, make))
 
     def symbol(self, key: str, expected: int | None = None) -> Symbol:
-        """The symbol of an id.
+        """Return the symbol of an id.
 
-        Raises
-        ------
-        ConflictError
-            It is gone since the version that the client has seen.
-        MissingError
-            There is none.
+        Raises ConflictError: it is gone since the version that the client has seen; MissingError: there is none.
         """
-        shown = self.shown()
-        if key not in shown.symbols:
+        symbols = self.view().symbols
+        if key not in symbols:
             raise self._gone(f"the symbol {key!r}", expected)
-        return shown.symbols[key]
+        return symbols[key]
 
     def check_movements(self, ids: list[int], expected: int | None = None) -> None:
         """Refuse ids of movements that are not in the library, in the same way."""
-        there = self.kept("ids", lambda: frozenset(self.library.ids().tolist()))
-        if lost := [one for one in ids if one not in there]:
+        there = self.cached("ids", lambda: frozenset(self.library.ids().tolist()))
+        if lost := [i for i in ids if i not in there]:
             raise self._gone(f"the movement {lost[0]}", expected)
 
     def _gone(self, what: str, expected: int | None) -> ConflictError | MissingError:
@@ -158,7 +157,7 @@ class Studio:
         """Prepare recognition for the library as it is now, beside all else: the next drawing is answered at once."""
         thread = Thread(target=self._prepare, name="kineme-warm-up", daemon=True)
         thread.start()
-        self._warming = [one for one in self._warming if one.is_alive()] + [thread]
+        self._warming = [warming for warming in self._warming if warming.is_alive()] + [thread]
 
     def _prepare(self) -> None:
         with suppress(KinemeError):  # closed meanwhile
@@ -169,7 +168,7 @@ class Studio:
                 self.warm = version
 
     def stream(self) -> Live:
-        """What recognizes one movement under way, by the library as it is now; see `kineme.ActionLibrary.stream`."""
+        """Recognize one movement under way by the library as it is now; see `kineme.ActionLibrary.stream`."""
         return self.library.stream(early=DRAWN)
 
 
@@ -182,10 +181,7 @@ def studio_of(request: Request) -> Studio:
 async def writable_studio_of(request: Request) -> AsyncIterator[Studio]:
     """The same for a change, of which few are worked on at once: while another process writes, others still read.
 
-    Raises
-    ------
-    PermissionError
-        The studio is open for reading only.
+    Raises PermissionError: the studio is open for reading only.
     """
     studio = studio_of(request)
     if studio.read_only:
@@ -198,3 +194,133 @@ async def writable_studio_of(request: Request) -> AsyncIterator[Studio]:
 
 Reads = Annotated[Studio, Depends(studio_of)]
 Writes = Annotated[Studio, Depends(writable_studio_of)]
+
+
+class Changes:
+    """Watch the version of a library, and tell it to those who listen."""
+
+    def __init__(self, studio: Studio, period: float = LOOKS) -> None:
+        self.studio, self.period = studio, period
+        self.version = studio.library.version
+        self._listeners: set[Tell] = set()
+        self._look = asyncio.Event()
+
+    def listen(self, tell: Tell) -> None:
+        """Call `tell` with every new version."""
+        self._listeners.add(tell)
+
+    def leave(self, tell: Tell) -> None:
+        """Call it no more."""
+        self._listeners.discard(tell)
+
+    def look(self) -> None:
+        """Look at once, as after a change of our own."""
+        self._look.set()
+
+    async def watch(self) -> None:
+        """Look again and again, until cancelled."""
+        while True:
+            # Not `asyncio.wait_for`: before Python 3.12 it loses a cancellation that comes just after a change.
+            with suppress(TimeoutError):
+                async with asyncio.timeout(self.period):
+                    await self._look.wait()
+            self._look.clear()
+            with suppress(KinemeError, sqlite3.Error):  # what cannot be read now: it is looked at again
+                await self._compare()
+
+    async def _compare(self) -> None:
+        version = await asyncio.to_thread(lambda: self.studio.library.version)
+        if version == self.version:
+            return
+        self.version = version
+        for tell in list(self._listeners):
+            tell(version)
+        self.studio.warm_up()
+
+
+class NotifyAfterChanges:
+    """Look at the version after every request that may have changed it."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass a request on."""
+        await self.app(scope, receive, send)
+        if scope["type"] == "http" and scope["method"] != "GET":
+            scope["app"].state.changes.look()
+
+
+class Work:
+    """One piece of work, which looks now and then whether it is still wanted."""
+
+    def __init__(self) -> None:
+        self.share = 0.0
+        self._stopped = Event()
+
+    def stop(self) -> None:
+        """Note that it is not wanted any more."""
+        self._stopped.set()
+
+    def check(self) -> None:
+        """End the work, if it is not wanted any more.
+
+        Raises StoppedError.
+        """
+        if self._stopped.is_set():
+            raise StoppedError
+
+    def tell(self, share: float) -> None:
+        """Note how much is done; raises as `check` does."""
+        self.share = share
+        self.check()
+
+
+class Works:
+    """Work under way, by the key that its client knows."""
+
+    def __init__(self) -> None:
+        self._works: dict[str, Work] = {}
+        self._turn = Lock()
+
+    def begin(self, key: str) -> Work:
+        """Begin work; what was done before under the same key is not wanted any more."""
+        work = Work()
+        with self._turn:
+            before = self._works.pop(key, None)
+            self._works[key] = work
+        if before is not None:
+            before.stop()
+        return work
+
+    def end(self, key: str, work: Work) -> None:
+        """Note that it is done, or not wanted any more."""
+        work.stop()
+        with self._turn:
+            if self._works.get(key) is work:
+                del self._works[key]
+
+    def share(self, key: str) -> float | None:
+        """Return how much is done; None if nothing is worked on."""
+        work = self._works.get(key)
+        return None if work is None else work.share
+
+    def close(self) -> None:
+        """Stop all work."""
+        for work in list(self._works.values()):
+            work.stop()
+
+
+async def while_wanted(request: Request, pool: Executor, work: Work, act: Callable[[], Result]) -> Result:
+    """Return the result of `act`, which looks at `work`; where its client goes meanwhile, it is not wanted any more.
+
+    Raises StoppedError: it was stopped.
+    """
+    result = asyncio.get_running_loop().run_in_executor(pool, act)
+    try:
+        while not (await asyncio.wait({result}, timeout=PERIOD))[0]:
+            if await request.is_disconnected():
+                work.stop()
+        return result.result()
+    finally:  # where the server ends too
+        work.stop()

@@ -33,12 +33,12 @@ BYTES = 2 * 2**30  # of memory for it
 HELD = 2**30  # bytes of what was read from all files
 PERIOD = 0.2  # seconds between looks whether anybody waits
 _READERS = 2  # files that are read at once
-_KEPT = 8  # files
+_MOST_FILES = 8  # files
 _LONGEST = 200  # bytes of a name
 
 
 def go_on() -> None:
-    """Whoever asked still waits."""
+    """Do nothing: the client still waits."""
 
 
 class Uploads:
@@ -48,8 +48,8 @@ class Uploads:
         self.seconds, self.memory, self.held = seconds, memory, held
         self.readers = asyncio.Semaphore(_READERS)
         self._folder = OwnFolder()
-        self._kept: dict[str, Path] = {}
-        self._read: dict[tuple[str, tuple[str, ...]], Recordings] = {}  # by the columns that were asked for
+        self._files: dict[str, Path] = {}
+        self._read: dict[tuple[str, tuple[str, ...]], Recordings] = {}  # by the chosen columns
         self._turn = Lock()
 
     def close(self) -> None:
@@ -59,10 +59,7 @@ class Uploads:
     async def receive(self, name: str, chunks: AsyncIterator[bytes]) -> str:
         """Keep a file under the key that is returned; `name` is percent-encoded, its ending says the format.
 
-        Raises
-        ------
-        DataError
-            The disk is full.
+        Raises DataError: the disk is full.
         """
         key = secrets.token_hex(8)
         path = self._folder.path / key / plain_name(name)
@@ -80,52 +77,45 @@ class Uploads:
                 ) from error
             raise
         with self._turn:
-            self._kept[key] = path
-            for old in list(self._kept)[:-_KEPT]:
-                self._forget(old)
+            self._files[key] = path
+            for old in list(self._files)[:-_MOST_FILES]:
+                shutil.rmtree(self._files.pop(old).parent, ignore_errors=True)
+                for which in [which for which in self._read if which[0] == old]:
+                    self._read.pop(which)
         return key
 
     def recordings(self, key: str, columns: Sequence[str] = (), check: Callable[[], object] = go_on) -> Recordings:
-        """What a file holds, in these columns or in those that are found.
+        """Read a file that was sent, in these columns or in those that are found.
 
         `check` is called again and again, and raises where nobody waits any more.
 
-        Raises
-        ------
-        MissingError
-            It was not sent, or too long ago.
-        DataError
-            It cannot be read, takes too long or too much memory.
+        Raises MissingError: it was not sent, or too long ago; DataError: it cannot be read, takes too long or too much
+        memory.
         """
-        path, asked = self._kept.get(key), tuple(columns)
+        path, chosen = self._files.get(key), tuple(columns)
         if path is None:
             raise MissingError(
-                f"expected one of the last {_KEPT} recordings that were sent, got another; send it again"
+                f"expected one of the last {_MOST_FILES} recordings that were sent, got another; send it again"
             )
-        read = self._read.get((key, asked))
+        read = self._read.get((key, chosen))
         if read is None:
-            read = self._read_apart(path, {"columns": list(asked)} if asked else {}, check)
+            read = self._read_apart(path, {"columns": list(chosen)} if chosen else {}, check)
             with self._turn:
-                if key in self._kept:
-                    self._hold((key, asked), read)
+                if key in self._files:
+                    self._hold((key, chosen), read)
         return read
 
     def _hold(self, which: tuple[str, tuple[str, ...]], read: Recordings) -> None:
-        """Keep what was read for the next question: of each file as it is, and in the columns asked for last.
+        """Keep what was read for the next question: of each file as it is, and in the columns chosen last.
 
         What was read long ago is read again if it is too much in all.
         """
         key, columns = which
-        for old in [one for one in self._read if one[0] == key and one[1] and columns]:
+        for old in [which for which in self._read if which[0] == key and which[1] and columns]:
             self._read.pop(old)
         self._read[which] = read
         while len(self._read) > 1 and sum(map(_bytes, self._read.values())) > self.held:
             self._read.pop(next(iter(self._read)))
-
-    def _forget(self, key: str) -> None:
-        shutil.rmtree(self._kept.pop(key).parent, ignore_errors=True)
-        for which in [one for one in self._read if one[0] == key]:
-            self._read.pop(which)
 
     def _read_apart(self, path: Path, options: dict[str, object], check: Callable[[], object]) -> Recordings:
         result = path.with_name(f"{secrets.token_hex(4)}.npz")
@@ -153,16 +143,19 @@ class Uploads:
 
 
 def _run(command: Sequence[str], given: str, seconds: float, check: Callable[[], object]) -> int:
-    """The exit code of a child process; it is ended after so many seconds (TimeoutError), and where `check` raises."""
+    """Run a child process, and return its exit code.
+
+    It is ended after so many seconds (TimeoutError), and where `check` raises.
+    """
     end, pipe = time.monotonic() + seconds, subprocess.PIPE
     with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True) as child:
         try:
-            told: str | None = given
+            pending: str | None = given
             while True:
                 with suppress(subprocess.TimeoutExpired):
-                    child.communicate(told, timeout=min(PERIOD, max(end - time.monotonic(), 0.0)))
+                    child.communicate(pending, timeout=min(PERIOD, max(end - time.monotonic(), 0.0)))
                     return child.returncode
-                told = None  # once: what was not written yet is kept
+                pending = None  # once: the child process gets what was not written yet all the same
                 check()
                 if time.monotonic() >= end:
                     raise TimeoutError
@@ -171,12 +164,13 @@ def _run(command: Sequence[str], given: str, seconds: float, check: Callable[[],
 
 
 def _bytes(read: Recordings) -> int:
-    whole = read.demonstrations.movements
-    return sum(one.nbytes for one in (whole.positions, whole.times, whole.recorded) if one is not None)
+    movements = read.demonstrations.movements
+    arrays = (movements.positions, movements.times, movements.recorded)
+    return sum(array.nbytes for array in arrays if array is not None)
 
 
 def plain_name(name: str) -> str:
-    """The name of a file without folders and without what a file system may not take."""
+    """Return the name of a file without folders and without what a file system may not take."""
     last = re.split(r"[/\\]", unquote(name))[-1]
     plain = re.sub(r"[^\w.\-()+ ]", "_", last).strip(" ").encode()[-_LONGEST:].decode(errors="ignore")
     return f"_{plain}" if plain.startswith((".", "-")) or not plain else plain
@@ -186,7 +180,13 @@ class OwnFolder:
     """A new folder, locked for as long as the process runs, however it ends."""
 
     def __init__(self) -> None:
-        _delete_left(Path(gettempdir()))
+        for path in Path(gettempdir()).glob(f"{_PREFIX}*"):  # of this user, that no process holds
+            with suppress(OSError):  # another process was faster
+                status = path.lstat()
+                own = stat.S_ISDIR(status.st_mode) and (not hasattr(os, "getuid") or status.st_uid == os.getuid())
+                if own and time.time() - status.st_mtime > _NEW and (handle := _locked(path)) is not None:
+                    shutil.rmtree(path, ignore_errors=True)
+                    os.close(handle)
         self._folder = TemporaryDirectory(prefix=_PREFIX, ignore_cleanup_errors=True)
         self.path = Path(self._folder.name)
         self._handle = _locked(self.path)
@@ -199,19 +199,8 @@ class OwnFolder:
             self._handle = None
 
 
-def _delete_left(where: Path) -> None:
-    """Delete folders of this user that no process holds."""
-    for path in where.glob(f"{_PREFIX}*"):
-        with suppress(OSError):  # another process was faster
-            known = path.lstat()
-            own = stat.S_ISDIR(known.st_mode) and (not hasattr(os, "getuid") or known.st_uid == os.getuid())
-            if own and time.time() - known.st_mtime > _NEW and (handle := _locked(path)) is not None:
-                shutil.rmtree(path, ignore_errors=True)
-                os.close(handle)
-
-
 def _locked(path: Path) -> int | None:
-    """A handle that locks a folder until it is closed; None where another process has it, or locks do not exist."""
+    """Lock a folder until the returned handle is closed; None where another process has it, or without locks."""
     if os.name != "posix":
         return None
     import fcntl

@@ -1,1 +1,1 @@
-"""What the pages of the server are made of."""
+"""Files of the pages of the server."""

@@ -4,24 +4,32 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import TrajectoryError
-from kineme.robots.checks.along import Along, along, between_samples
-from kineme.robots.checks.check import Check, Preflight, unit_of
-from kineme.robots.checks.tracking import tracking
-from kineme.robots.execution.between import between, dense_times
-from kineme.robots.execution.joint_trajectory import JointTrajectory
+from kineme.reporting.table import Table
+from kineme.robots.execution.along import Along, along
+from kineme.robots.execution.joint_trajectory import JointTrajectory, between, dense_times, extreme
 from kineme.robots.execution.timing import STANDS, knows_masses
+from kineme.robots.kinematics.descent import kinematics
+from kineme.robots.kinematics.inverse import is_partial
 from kineme.robots.kinematics.task_path import TaskPath
 from kineme.robots.models.robot import Robot
 from kineme.validation import Array
 
+TRACKED = 1e-3  # the tip may be this far from the path [m]
+TURNED = 1.0  # and turned by so many degrees from it, where the orientation is followed
+
+
 _STANDING = 0.02  # of the fastest instant as generated, or of the limits of velocity
 
+SAMPLING = " between samples"  # the end of what these checks are called
+_POSITION = 1e-6  # beyond a limit between samples [rad, m]
+_SLACK_BETWEEN = 1.001  # times the limit of velocity and acceleration between samples
 _SINGULAR = 0.02  # the smallest singular value of the Jacobian below which an arm is said to be singular
 _JUMP = 0.05  # a joint may deviate so far between two samples from what its velocities say [rad, m]
 _SLACK = 1 + 1e-6
@@ -227,3 +235,143 @@ def _changes(values: Array) -> NDArray[np.intp]:
 
 def _order(values: Array, changes: NDArray[np.intp]) -> Array:
     return values[np.concatenate(([0], changes))]
+
+
+def between_samples(robot: Robot, trajectory: JointTrajectory) -> Iterator[Check]:
+    """Positions, velocities and accelerations at their worst instant, whether a sample lies there or not.
+
+    Between samples lies what `between` says. Its acceleration overshoots where that of the movement is a step.
+    """
+    half, middle = (robot.upper - robot.lower) / 2, (robot.upper + robot.lower) / 2
+    share, j, time = extreme(trajectory, 0, half, middle)
+    beyond = (abs(share) - 1) * float(half[j])
+    passed, slower = (True, 1.0) if beyond <= _POSITION else (False, math.inf)
+    limit, worst = float((robot.lower if share < 0 else robot.upper)[j]), float(middle[j] + share * half[j])
+    yield Check("position" + SAMPLING, robot.joints[j], time, worst, limit, unit_of(robot, j), passed, slower)
+    for order, (what, limits) in enumerate((("velocity", robot.velocity), ("acceleration", robot.acceleration)), 1):
+        share, j, time = extreme(trajectory, order, limits)
+        worst, limit, unit = abs(share), float(limits[j]), unit_of(robot, j, order)
+        passed, slower = worst <= _SLACK_BETWEEN, worst ** (1 / order)
+        yield Check(what + SAMPLING, robot.joints[j], time, worst * limit, limit, unit, passed, slower)
+
+
+class Check(NamedTuple):
+    """The worst instant of one quantity beside its limit."""
+
+    what: str  # "velocity", "self-collision", ...
+    where: str  # the joint, the two links, or the tip
+    time: float  # [s]
+    worst: float
+    limit: float  # nan where there is none to keep
+    unit: str
+    passed: bool
+    slower: float = 1.0  # the movement would pass if it took so many times as long; inf: at no speed
+
+
+@dataclass(frozen=True)
+class Preflight:
+    """All checks of one trajectory.
+
+    Attributes
+    ----------
+    checks : tuple of Check
+        For velocity, acceleration, position and torque the worst instant of each joint, then the arm as a whole.
+    unchecked : tuple of str
+        What could not be checked and why, one sentence each.
+    """
+
+    checks: tuple[Check, ...]
+    unchecked: tuple[str, ...] = ()
+
+    @property
+    def passed(self) -> bool:
+        """Whether every check passed."""
+        return all(check.passed for check in self.checks)
+
+    @property
+    def failed(self) -> tuple[Check, ...]:
+        """The checks that did not pass, the worst ratio to its limit first."""
+        return tuple(sorted((c for c in self.checks if not c.passed), key=lambda c: -c.slower))
+
+    @property
+    def slower(self) -> float:
+        """The least factor of the duration with which all pass; inf if no speed helps."""
+        return max((check.slower for check in self.checks if not check.passed), default=1.0)
+
+
+def unit_of(robot: Robot, joint: int, order: int = 0) -> str:
+    """Unit of the position of a joint, of its velocity (order 1) or its acceleration (order 2)."""
+    return robot.units[joint] + ("", "/s", "/s^2")[order]
+
+
+def preflight_table(preflight: Preflight) -> Table:
+    """One line for each check: the worst value beside its limit, when, and whether it passed."""
+    rows = [
+        (
+            f"{check.what}, {check.where}",
+            f"{check.worst:.3g}",
+            _limit(check),
+            check.unit,
+            f"{check.time:.2f}",
+            _verdict(check),
+        )
+        for check in preflight.checks
+    ]
+    unchecked = f"Not checked: {'; '.join(preflight.unchecked)}." if preflight.unchecked else ""
+    return Table("Preflight", ("check", "worst", "limit", "unit", "at [s]", ""), rows, unchecked)
+
+
+def _limit(check: Check) -> str:
+    return "" if math.isnan(check.limit) else f"{check.limit:.4g}"
+
+
+def _verdict(check: Check) -> str:
+    if math.isnan(check.limit):
+        return ""
+    return "ok" if check.passed else "FAILED"
+
+
+def tracking(
+    robot: Robot, trajectory: JointTrajectory, path: TaskPath, follow: str, known: tuple[Array, Along]
+) -> Iterator[Check]:
+    """How far the tip is from its path, and how far turned from it.
+
+    Arms of fewer than six joints follow an orientation only as far as the position allows: of theirs, and of what is
+    not followed at all, the angle has no limit.
+
+    Parameters
+    ----------
+    path : TaskPath
+        At times of the trajectory.
+    follow : {"full", "axis", "free"}
+    known : times (m,) and what the arm does then
+        Where those times end with the path's, nothing is computed again.
+    """
+    positions, rotations = _tips(robot, trajectory, path.times, *known)
+    off = np.linalg.norm(positions - path.positions, axis=1)
+    turned = np.degrees(_angles(rotations, path.rotations, follow))
+    t, r = int(np.argmax(off)), int(np.argmax(turned))
+    worst, angle = float(off[t]), float(turned[r])
+    passed = worst <= TRACKED
+    slower = 1.0 if passed else math.inf
+    yield Check("tracking", "tip", float(path.times[t]), 1e3 * worst, 1e3 * TRACKED, "mm", passed, slower)
+    limit = math.nan if follow == "free" or is_partial(robot) else TURNED
+    passed = not angle > limit
+    slower = 1.0 if passed else math.inf
+    yield Check("turned away", "tip", float(path.times[r]), angle, limit, "deg", passed, slower)
+
+
+def _tips(robot: Robot, trajectory: JointTrajectory, times: Array, known: Array, state: Along) -> tuple[Array, Array]:
+    """Positions (T, 3) and rotations (T, 3, 3) of the tip at those times."""
+    if np.array_equal(known[-len(times) :], times):
+        return state.tip_positions[-len(times) :], state.tip_rotations[-len(times) :]
+    return kinematics(robot, between(trajectory, times).positions)[:2]
+
+
+def _angles(rotations: Array, wanted: Array, follow: str) -> Array:
+    """Angles (T,) between orientations; with "axis", between the z axes of the tip."""
+    if follow == "axis":
+        cosines = np.einsum("ti,ti->t", rotations[:, :, 2], wanted[:, :, 2])
+    else:
+        cosines = (np.einsum("tji,tji->t", rotations, wanted) - 1) / 2
+    return np.asarray(np.arccos(np.clip(cosines, -1, 1)))

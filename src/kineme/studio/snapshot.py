@@ -1,33 +1,52 @@
-"""What recognizes movements, as plain data and arrays: comparison, references, classifier and calibration."""
+"""A library, or a fitted recognizer, as plain data and arrays that a browser computes with."""
 
 from __future__ import annotations
 
+import json
 import math
+from base64 import b64encode
+from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kineme.dmp.discrete.dmp import DMP, Primitives
+from kineme.dmp.discrete.operators import decoder, smoothness_factor, trajectory_regression
+from kineme.dmp.pose.pose_dmp import PosePrimitives
 from kineme.errors import SpecificationError
 from kineme.kernels.procrustes import Procrustes
 from kineme.kernels.shapes import Shapes
+from kineme.library.grounding import prototype_of
+from kineme.library.library import ActionLibrary
+from kineme.library.members import Members, members_of
+from kineme.library.recognize import known_members
+from kineme.library.storage import read
+from kineme.library.storage.symbols import symbol
 from kineme.movements.preparation import pauses
 from kineme.movements.preparation.smooth import spline_matrix
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.recognition import left_out
 from kineme.recognition.certainty import LEAST_CONFIDENCE
-from kineme.recognition.classifiers import Classifier, Nearest, NearestEach, Prototype
+from kineme.recognition.classifiers import Classifier, Nearest, NearestEach, Prototype, fit_prototype
 from kineme.recognition.conformal import GUESSES, Calibration
 from kineme.recognition.early import evidence, prefixes
 from kineme.recognition.early import hypotheses as beginnings
 from kineme.recognition.early.hypotheses import Early, hypotheses
-from kineme.recognition.known_classes import KnownClasses
+from kineme.recognition.known_classes import FittedRecognizer, KnownClasses, known_classes
+from kineme.sampling import evenly_spaced
 from kineme.similarity.comparison import Comparison
 from kineme.similarity.describe import N_POINTS, even_paths
 from kineme.similarity.representation import PAIR_QUANTITIES, Representation, forcing_operator, rotating
-from kineme.studio.snapshot.snapshot import Snapshot
 from kineme.validation import Array
+
+#: Numbers of the stored paths, at most: 1.3 MB in base64, so that a page with all else stays below 2 MB.
+MOST_NUMBERS = 240_000
+
+
+_BOUNDARY = ("starts", "goals", "velocities", "durations", "extents")
+
 
 #: How the studio and its page recognize movements under way. People draw on a screen faster or slower than they showed:
 #: with 1.0 a factor of 7 either way is two standard deviations. Of 150 letters of 26 (letters2d, two of each in the
@@ -41,14 +60,47 @@ _AGAIN = (
     "then other.learn(library.movements(symbol.name)) for every symbol in library.symbols()"
 )
 
+FORMAT, VERSION = "kineme-snapshot", 1
+_KINDS = ("float64", "float32", "int32")
+_ALIGNMENT = 8  # bytes: arrays in JavaScript begin at multiples of the size of their numbers
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """What the runtime in `kineme.studio.javascript` computes with.
+
+    Attributes
+    ----------
+    header : dict
+        JSON data: names, specification, widths, weights.
+    arrays : dict from str to ndarray
+        Of float64, float32 or int32.
+    """
+
+    header: dict[str, Any]
+    arrays: dict[str, NDArray[Any]]
+
+    def to_json(self) -> str:
+        """One JSON document: the header, where each array is, and all of them as one block of bytes in base64.
+
+        No ``<`` is left in it, so that it can stand in a script element of a page.
+        """
+        places, block = {}, bytearray()
+        for name, array in self.arrays.items():
+            if array.dtype.name not in _KINDS:
+                raise ValueError(f"expected arrays of {', '.join(_KINDS)}, got {name} of {array.dtype}")
+            places[name] = [array.dtype.name, len(block), array.size]
+            block += np.ascontiguousarray(array).astype(array.dtype.newbyteorder("<")).tobytes()
+            block += bytes(-len(block) % _ALIGNMENT)
+        document = {"format": FORMAT, "version": VERSION, **self.header, "arrays": places}
+        document["data"] = b64encode(block).decode()
+        return json.dumps(document, allow_nan=False, separators=(",", ":")).replace("<", r"\u003c")
+
 
 def recognition_parts(known: KnownClasses) -> Snapshot:
     """Header and arrays of what recognizes movements.
 
-    Raises
-    ------
-    SpecificationError
-        A classifier, or a limit of rotations in space, that the runtime does not have.
+    Raises SpecificationError: a classifier, or a limit of rotations in space, that the runtime does not have.
     """
     demos = known.references.all_movements()
     comparison, comparison_arrays = _comparison(known.comparison, known.references.described.pairs)
@@ -136,10 +188,7 @@ def _numbers(module: ModuleType, *names: str) -> dict[str, float]:
 def rotation_rule(procrustes: Procrustes) -> dict[str, Any]:
     """How movements are rotated.
 
-    Raises
-    ------
-    SpecificationError
-        By at most an angle, in space.
+    Raises SpecificationError: By at most an angle, in space.
     """
     d, prior = procrustes.n_dims, procrustes.prior
     if d == 3 and prior is None and procrustes.max_angle > 0:
@@ -221,3 +270,112 @@ def early_part(known: KnownClasses, early: Early | None = None) -> dict[str, Any
             **_numbers(prefixes, "LAST", "LEAST_SPEED"),
         },
     }
+
+
+def movement_parts(primitives: Primitives, *, learns: bool = True) -> Snapshot:
+    """Header and arrays of C primitives, one of each class, and of their specification.
+
+    `learns` says whether the matrices are among them that fit other movements, and the same ones in other formulations.
+
+    Weights are in single precision, as libraries store them; all else is in double. The matrix that fits the path has
+    no goal in it, so that the runtime can fit any formulation: ``W = E (y - goal (g - x0))``, of which only `goal`
+    differs.
+    """
+    dmp = primitives.dmp
+    header = {
+        "formulation": dmp.formulation,
+        "n_dims": primitives.n_dims,
+        "n_basis": dmp.n_basis,
+        "n_points": dmp.n_points,
+        "K": dmp.K,
+        "D": dmp.D,
+        "alpha": dmp.basis.phase.alpha,
+        "overlap": dmp.overlap,
+        "gating": dmp.gating,
+        "encodes": learns and dmp.fit == "trajectory" and not dmp.preprocessing,
+    }
+    arrays: dict[str, NDArray[Any]] = {
+        "weights": primitives.scaled_weights.astype(np.float32),
+        **{f"primitive {name}": np.asarray(getattr(primitives, name), dtype=np.float64) for name in _BOUNDARY},
+        "smooth": smoothness_factor(dmp),
+    }
+    if header["encodes"]:
+        arrays |= _encoder(dmp)
+    return Snapshot({"movements": header}, arrays)
+
+
+def _encoder(dmp: DMP) -> dict[str, NDArray[Any]]:
+    response = decoder(dmp, dmp.n_points)
+    weights, velocity = trajectory_regression(
+        response._replace(goal=np.zeros_like(response.goal)), dmp.K, dmp.ridge_strength
+    )
+    return {"encoder": weights, "encoder velocity": velocity}
+
+
+def snapshot_of_primitive(primitive: Primitives | PosePrimitives) -> Snapshot | None:
+    """A batch of one, for `openPrimitive` of the runtime; None if not every column is a position.
+
+    Angles, orientations and discrete values are written in other columns than those that move, which the runtime does
+    not know.
+    """
+    if isinstance(primitive, PosePrimitives) or any(channel.kind != "position" for channel in primitive.channels or ()):
+        return None
+    return movement_parts(primitive, learns=False)
+
+
+def snapshot_of_library(library: ActionLibrary, most: int | None = None, early: Early | None = None) -> Snapshot:
+    """The symbols of a library with their movements.
+
+    Of symbols with many movements some are taken, evenly spaced, as many of each as add up to `most`; by default as
+    many as fit into 2 MB, 603 in the plane and 402 in space. Widths and calibration are those of the movements taken,
+    as if a library held these alone. ``header["n_all"]`` says of how many. `early` is how movements are recognized
+    under way; by default as `kineme.Recognizer.stream` does.
+
+    Raises SpecificationError: no movement belongs to a symbol; more symbols than fit; what the runtime does not have,
+    see `recognition_parts`.
+    """
+    store = library.store
+    members = members_of(store)
+    fitting = MOST_NUMBERS // (N_POINTS * (store.n_dims or 1))
+    taken = some_members(members, fitting if most is None else most)
+    known = known_members(store, taken)
+    prototypes = [prototype_of(store, symbol(store, str(name))) for name in members.names]
+    primitives = read.primitives(store, np.array(prototypes, dtype=np.int64))
+    made = _snapshot(known, primitives, early)
+    made.header["n_all"] = len(members.ids)
+    made.header["ids"] = taken.ids.tolist()
+    made.header["channels"] = None if store.channels is None else [channel.name for channel in store.channels]
+    return made
+
+
+def snapshot_of_recognizer(recognizer: FittedRecognizer, dmp: DMP | None = None) -> Snapshot:
+    """A fitted recognizer, with a primitive of the medoid of each class."""
+    known = known_classes(recognizer)
+    demos = known.references.all_movements()
+    medoids = fit_prototype(known.comparison, known.references).medoids
+    return _snapshot(known, (dmp or DMP()).learn(demos[medoids]))
+
+
+def some_members(members: Members, most: int) -> Members:
+    """At most `most` members in all: of each symbol the same number, evenly spaced, or all that it has."""
+    counts = np.diff(members.first, append=len(members.ids))
+    if most < len(counts):
+        raise SpecificationError(
+            f"expected at most {most} symbols, as many as there may be movements, got {len(counts)}; take more of "
+            "these, in the shell with --most, or make a library of some of the symbols"
+        )
+    each = int(counts.max(initial=1))
+    while np.minimum(counts, each).sum() > most:
+        each -= 1
+    chosen = np.concatenate(
+        [start + evenly_spaced(int(n), min(each, int(n))) for start, n in zip(members.first, counts, strict=True)]
+    )
+    first = np.concatenate(([0], np.cumsum(np.minimum(counts, each))[:-1])).astype(np.intp)
+    groups = None if members.groups is None else members.groups[chosen]
+    return Members(members.ids[chosen], members.names, first, groups)
+
+
+def _snapshot(known: KnownClasses, primitives: Primitives, early: Early | None = None) -> Snapshot:
+    recognition, movements = recognition_parts(known), movement_parts(primitives)
+    header: dict[str, Any] = {**recognition.header, **movements.header, "early": early_part(known, early)}
+    return Snapshot(header, recognition.arrays | movements.arrays)

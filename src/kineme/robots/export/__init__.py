@@ -1,1 +1,0 @@
-"""Joint trajectories in the formats that robots and their programs take."""

@@ -1,1 +1,0 @@
-"""An arm that follows a movement under live control, step by step."""

@@ -1,1 +1,0 @@
-"""A library as arrays and JSON that a browser computes with."""
