@@ -269,7 +269,7 @@ def test_what_was_warmed_up_compiles_nothing_more():
 import numpy as np
 import kineme
 from kineme.runtime import compiled
-from kineme.recognition.warm_up import warm_up
+from kineme.recognition.recognizer import warm_up
 
 def versions():
     functions = [one for module in compiled._modules.values() for one in vars(module).values()]

@@ -13,7 +13,7 @@ import numpy as np
 import kineme
 from bench.people import Recorded, handwriting, recorded, splits
 from bench.rows import Row
-from kineme.recognition.early.early import cut
+from kineme.recognition.early.evidence import cut
 from kineme.recognition.early.stream import Live
 from kineme_experiments.evaluation.data import load_data
 from kineme_experiments.evaluation.methods import OURS

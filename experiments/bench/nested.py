@@ -21,8 +21,7 @@ from bench.rows import Row
 from kineme.kernels.shapes import ElasticSpec
 from kineme.kernels.soft_rotation import CONCENTRATION, RotationPrior
 from kineme.similarity.describe import describe
-from kineme.similarity.described import Described
-from kineme.similarity.distances import squared_distances
+from kineme.similarity.described import Described, squared_distances
 from kineme.similarity.representation import DEFAULT_REPRESENTATIONS
 from kineme.similarity.specification import ComparisonSpecification
 from kineme.similarity.widths import SHARE

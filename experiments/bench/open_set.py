@@ -24,7 +24,7 @@ from bench.by_person import FOLDER
 from bench.people import recorded
 from bench.rows import Row
 from kineme.movements.preparation.perturbations import Perturbation
-from kineme.recognition.confidence import EXPONENT, class_probabilities
+from kineme.recognition.conformal import EXPONENT, class_probabilities
 from kineme.recognition.known_classes import fit_known_classes
 from kineme.recognition.left_out import LEAST, distances
 from kineme.similarity.describe import feature_rows, prepare

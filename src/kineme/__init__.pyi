@@ -56,7 +56,7 @@ from kineme.recognition.early.live_state import LiveState as LiveState
 from kineme.recognition.outliers import find_outliers as find_outliers
 from kineme.recognition.outliers import Outlier as Outlier
 from kineme.recognition.outliers import Outliers as Outliers
-from kineme.recognition.warm_up import warm_up as warm_up
+from kineme.recognition.recognizer import warm_up as warm_up
 
 # Symbols and the action library
 from kineme import anchoring as anchoring

@@ -12,7 +12,7 @@ from kineme import Demonstrations, TrajectoryError
 from kineme.anchoring.clustering import NEIGHBORS, components, count_by_eigengap, fuse, set_apart, spectral
 from kineme.anchoring.unlabeled import by_shape, link_people, propose
 from kineme.similarity.describe import describe
-from kineme.similarity.distances import squared_distances
+from kineme.similarity.described import squared_distances
 from kineme.similarity.representation import ROW_REPRESENTATIONS
 from kineme.similarity.specification import ComparisonSpecification
 from soaking import SOAK

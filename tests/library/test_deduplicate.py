@@ -9,7 +9,6 @@ from library_samples import draw_movements
 
 import kineme
 from kineme import ActionLibrary
-from kineme.library import learn
 from kineme.library.storage.source import Source
 from kineme.orientation import exp
 
@@ -98,11 +97,3 @@ def test_the_same_way_begun_in_another_direction_is_another_movement(library):
     straight[["qw", "qx", "qy", "qz"]] = (1.0, 0.0, 0.0, 0.0)
     reversed_[["qw", "qx", "qy", "qz"]] = (0.0, 0.0, 0.0, 1.0)
     assert [library.learn(kineme.Demonstrations.of(one)).added for one in (straight, reversed_)] == [1, 1]
-
-
-def test_a_movement_of_an_earlier_library_is_known_by_its_exact_digest(library, monkeypatch):
-    demos = draw_movements(3, ragged=True)
-    with monkeypatch.context() as earlier:
-        earlier.setattr(learn, "digests", learn.exact_digests)
-        library.learn(demos)
-    assert library.learn(demos).added == 0

@@ -16,8 +16,7 @@ from kineme.library import calibration_cache
 from kineme.library import reduced_features_cache as features_cache
 from kineme.library.members import members_of
 from kineme.library.recognize import LibraryRecognizer
-from kineme.recognition.confidence import EXPONENT
-from kineme.recognition.conformal import Calibration, calibrate
+from kineme.recognition.conformal import EXPONENT, Calibration, calibrate
 
 CODES, CALIBRATION = features_cache.FILE, calibration_cache.FILE
 LABELS = [["wave"] * 3 + ["nod"] * 4 + ["bow"] * 5, [f"kind {k}" for k in range(12)]]

@@ -15,7 +15,7 @@ from kineme.library import reduced_features_cache as features_cache
 from kineme.library.recognize import LibraryRecognizer
 from kineme.recognition import sampled_calibration
 from kineme.recognition.left_out import distances
-from kineme.similarity.stored_references import StoredReferences
+from kineme.similarity.references import StoredReferences
 
 
 def _kinds(counts, d=2, seed=0, spread=0.05):

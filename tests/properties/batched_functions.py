@@ -54,13 +54,12 @@ from kineme.movements.trajectories.as_learned import as_learned
 from kineme.movements.trajectories.movements import of_channels
 from kineme.orientation import PoseDMP, continuous, from_tangent, normalized, to_tangent
 from kineme.recognition.answer import Answer
-from kineme.recognition.early.early import cut
+from kineme.recognition.early.evidence import cut
 from kineme.similarity.alignment import maps_onto, paths_of
 from kineme.similarity.alignment import moved as laid_onto
 from kineme.similarity.bounds import fit_bases, reduce_features
 from kineme.similarity.describe import describe_rows, feature_rows
-from kineme.similarity.normalization import SCALES, Normalization
-from kineme.similarity.representation import ROW_REPRESENTATIONS
+from kineme.similarity.representation import ROW_REPRESENTATIONS, SCALES, Normalization
 from kineme.similarity.similarity import compare
 from kineme.similarity.specification import ComparisonSpecification
 

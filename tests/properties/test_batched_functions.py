@@ -21,7 +21,7 @@ TILES = {
     "kineme.movements.preparation.smooth._TILE_MOVEMENTS": 7,
     "kineme.similarity.describe._TILE_SAMPLES": 3000,
     "kineme.similarity.scores._TILE_PAIRS": 100,
-    "kineme.recognition.early.early._TILE": 5000,
+    "kineme.recognition.early.evidence._TILE": 5000,
     "kineme.kernels.procrustes._PAIRS": 300,
     "kineme.kernels.pair_distances._TILE_PAIRS": 500,
     "kineme.kernels.pair_distances._TILE_BOUNDS": 500,

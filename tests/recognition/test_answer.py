@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from kineme import Demonstrations, Recognizer, Representation, Trajectory
 from kineme.recognition.conformal import RULES
-from kineme.similarity.log_averages import LOG_MEANS
+from kineme.similarity.specification import LOG_MEANS
 from movement_samples import draw_shapes, turn
 
 any_seed = given(seed=st.integers(0, 10**6))

@@ -10,8 +10,16 @@ from scipy.stats import chi
 
 import kineme
 from kineme.kernels.procrustes import Prepared, Procrustes
-from kineme.recognition.confidence import class_probabilities, fit_exponent
-from kineme.recognition.conformal import GUESSES, RULES, Calibration, between_classes, calibrate, least_scale
+from kineme.recognition.conformal import (
+    GUESSES,
+    RULES,
+    Calibration,
+    between_classes,
+    calibrate,
+    class_probabilities,
+    fit_exponent,
+    least_scale,
+)
 from kineme.recognition.left_out import (
     ClassDistances,
     broad_law,

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import kineme
-from kineme.recognition.certainty import LEAST_CONFIDENCE, certainty
+from kineme.recognition.answer import LEAST_CONFIDENCE, certainty
 from kineme.recognition.early.live_state import LiveState, LiveStatus
 from kineme_experiments.evaluation.data import load_data
 

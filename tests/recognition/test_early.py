@@ -14,10 +14,19 @@ from kineme.kernels.soft_rotation import RotationPrior
 from kineme.movements.preparation.smooth import Smooth
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.recognition.early import evidence
-from kineme.recognition.early.early import cut, earliness
-from kineme.recognition.early.early import partial_shares as shares_of
-from kineme.recognition.early.hypotheses import Early, beginning_procrustes, ending, hypotheses
-from kineme.recognition.early.prefixes import N_PREFIX, beginnings, describe_prefixes, smooth_paths, smoother
+from kineme.recognition.early.evidence import cut, earliness
+from kineme.recognition.early.evidence import partial_shares as shares_of
+from kineme.recognition.early.hypotheses import (
+    N_PREFIX,
+    Early,
+    beginning_procrustes,
+    beginnings,
+    describe_prefixes,
+    ending,
+    hypotheses,
+    smooth_paths,
+    smoother,
+)
 from kineme.similarity.describe import N_POINTS
 
 

@@ -10,9 +10,8 @@ from sklearn.utils import Bunch
 
 import kineme
 from kineme.recognition.early import evidence
-from kineme.recognition.early.early import cut, partial_shares
-from kineme.recognition.early.hypotheses import Early, Ending, Hypotheses, hypotheses
-from kineme.recognition.early.prefixes import smooth_paths
+from kineme.recognition.early.evidence import cut, partial_shares
+from kineme.recognition.early.hypotheses import Early, Ending, Hypotheses, hypotheses, smooth_paths
 from kineme.similarity.widths import SHARE
 from kineme_experiments.evaluation.splits import one_person_out
 

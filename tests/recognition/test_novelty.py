@@ -13,8 +13,7 @@ from scipy.stats import chi
 
 from kineme import Recognizer, TrajectoryError
 from kineme.kernels.procrustes import Prepared, Procrustes
-from kineme.recognition.confidence import EXPONENT, class_probabilities, fit_exponent
-from kineme.recognition.conformal import calibrate
+from kineme.recognition.conformal import EXPONENT, calibrate, class_probabilities, fit_exponent
 from kineme.recognition.left_out import ClassDistances, law
 from kineme.similarity.described import Described
 from kineme.similarity.references import References

@@ -4,8 +4,14 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme.recognition.outlier_report import outliers_as_data, outliers_as_words
-from kineme.recognition.outliers import find_outliers, listed, scaled, tail_p_values
+from kineme.recognition.outliers import (
+    find_outliers,
+    listed,
+    outliers_as_data,
+    outliers_as_words,
+    scaled,
+    tail_p_values,
+)
 
 
 def wrongly_labeled(labels, share, rng):

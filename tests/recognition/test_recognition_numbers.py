@@ -13,13 +13,11 @@ from kineme.kernels.procrustes import Prepared, Procrustes
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.movements.segmentation.motion import observe
 from kineme.recognition import spotting
-from kineme.recognition.candidate_windows import Surroundings
-from kineme.recognition.compared_windows import Templates, compare_windows
+from kineme.recognition.compared_windows import Surroundings, Templates, compare_windows
 from kineme.recognition.conformal import Calibration, calibrate
-from kineme.recognition.early.decision import Decision
 from kineme.recognition.early.evidence import _log_priors, describe_begun
-from kineme.recognition.early.hypotheses import Early, hypotheses
-from kineme.recognition.early.prefixes import smooth_paths
+from kineme.recognition.early.hypotheses import Early, hypotheses, smooth_paths
+from kineme.recognition.early.stream import Decision
 from kineme.recognition.left_out import typical_scale
 from kineme.recognition.spotting import Manner, expected, score_windows
 from kineme.similarity.described import Described

@@ -17,13 +17,15 @@ from kineme import Demonstrations, Recognizer, SpecificationError, Trajectory, T
 from kineme.movements.segmentation.motion import observe
 from kineme.movements.segmentation.segment import pieces_of
 from kineme.recognition import compared_windows
-from kineme.recognition.candidate_windows import Durations, candidate_windows, resampled
 from kineme.recognition.compared_windows import (
     Candidates,
     ComparedWindows,
+    Durations,
     Templates,
+    candidate_windows,
     compare_candidates,
     rarity_weights,
+    resampled,
     size_and_slowness,
 )
 from kineme.recognition.spotting import (

@@ -11,11 +11,10 @@ from sklearn.base import clone
 
 import kineme
 from kineme.errors import SpecificationError, TrajectoryError
-from kineme.recognition.early.decision import Decision
-from kineme.recognition.early.early import partial_shares as shares_of
+from kineme.recognition.early.evidence import partial_shares as shares_of
 from kineme.recognition.early.hypotheses import Early, hypotheses
 from kineme.recognition.early.live_state import LiveStatus
-from kineme.recognition.early.stream import BoundedPath
+from kineme.recognition.early.stream import BoundedPath, Decision
 from soaking import SOAK
 
 SHAPES = ("CShape", "GShape", "NShape", "Sshape", "WShape", "Zshape")

@@ -13,11 +13,11 @@ from kineme import Demonstrations, Recognizer
 from kineme.errors import SpecificationError
 from kineme.recognition import two_stage_search
 from kineme.recognition.two_stage_search import TwoStageSearch
-from kineme.similarity import stored_references
+from kineme.similarity import references
 from kineme.similarity.bounds import fit_bases, reduce_features
 from kineme.similarity.describe import feature_rows
+from kineme.similarity.references import StoredReferences
 from kineme.similarity.representation import ROW_REPRESENTATIONS
-from kineme.similarity.stored_references import StoredReferences
 from movement_samples import draw_shapes
 from soaking import examples
 
@@ -172,7 +172,7 @@ def test_answers_do_not_depend_on_how_many_references_are_held(held, monkeypatch
     recognizer = Recognizer(classifier="nearest").fit(draw_shapes([6] * 12, 2, 3))
     asked = draw_shapes([2] * 12, 2, 3, spread=0.3)
     plain = _two_stages(recognizer)[0].recognize(asked)
-    monkeypatch.setattr(stored_references, "_HELD", held)
+    monkeypatch.setattr(references, "_HELD", held)
     for a, b in zip(plain, _two_stages(recognizer)[0].recognize(asked), strict=True):
         assert (a.label, a.p_values, a.ranked, a.nearest) == (b.label, b.p_values, b.ranked, b.nearest)
         np.testing.assert_array_equal(a.transform.matrix, b.transform.matrix)

@@ -7,7 +7,7 @@ import kineme
 from kineme.anchoring.unlabeled import by_shape
 from kineme.kernels.procrustes import Procrustes
 from kineme.similarity.describe import describe
-from kineme.similarity.distances import squared_distances
+from kineme.similarity.described import squared_distances
 
 
 @pytest.fixture(scope="module")

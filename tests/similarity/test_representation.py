@@ -7,9 +7,13 @@ import pytest
 
 from kineme import Demonstrations, Recognizer
 from kineme.similarity.describe import describe
-from kineme.similarity.distances import squared_distances
-from kineme.similarity.normalization import Normalization
-from kineme.similarity.representation import DEFAULT_REPRESENTATIONS, ROW_REPRESENTATIONS, default_representations
+from kineme.similarity.described import squared_distances
+from kineme.similarity.representation import (
+    DEFAULT_REPRESENTATIONS,
+    ROW_REPRESENTATIONS,
+    Normalization,
+    default_representations,
+)
 from movement_samples import draw_shapes
 
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kineme import Recognizer, SpecificationError
-from kineme.similarity.log_averages import LOG_MEANS, SHARES
+from kineme.similarity.specification import LOG_MEANS, SHARES
 from movement_samples import draw_shapes
 
 any_seed = given(seed=st.integers(0, 10**6))

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from kineme.kernels.shapes import CloudSpec, ElasticSpec
-from kineme.similarity import distances as module
+from kineme.similarity import described as described_module
 from kineme.similarity.describe import describe
-from kineme.similarity.distances import squared_distances
+from kineme.similarity.described import squared_distances
 from kineme.similarity.representation import DEFAULT_REPRESENTATIONS, Representation
 from kineme.similarity.similarity import averaged
 from kineme.similarity.specification import ComparisonSpecification
@@ -50,7 +50,7 @@ def test_without_labels_it_is_the_first_distance_beyond_the_largest_ratio(shapes
 
 def test_many_pairs_are_compared_as_few_are(shapes, monkeypatch):
     described, whole = shapes[0], squared_distances(shapes[0], shapes[0])
-    monkeypatch.setattr(module, "_TILE_PAIRS", 7 * len(described))
+    monkeypatch.setattr(described_module, "_TILE_PAIRS", 7 * len(described))
     np.testing.assert_allclose(squared_distances(described, described), whole, rtol=1e-5, atol=2e-3)
 
 

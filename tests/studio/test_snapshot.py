@@ -15,7 +15,7 @@ import kineme
 from kineme.errors import SpecificationError
 from kineme.movements.preparation import pauses
 from kineme.recognition import left_out
-from kineme.recognition.early import evidence, hypotheses, prefixes
+from kineme.recognition.early import evidence, hypotheses
 from kineme.studio.snapshot import MOST_NUMBERS, snapshot_of_library, snapshot_of_recognizer
 from movement_samples import draw_shapes
 
@@ -45,7 +45,7 @@ def test_numbers_that_are_tuned_come_from_python_alone():
     groups = {
         "pauses.js": (header["comparison"]["pauses"], [pauses]),
         "recognition.js": (header["calibration"], [left_out]),
-        "evidence.js hypotheses.js": (header["early"]["numbers"], [evidence, hypotheses, prefixes]),
+        "evidence.js hypotheses.js": (header["early"]["numbers"], [evidence, hypotheses]),
     }
     for files, (numbers, modules) in groups.items():
         constants = {name: value for module in modules for name, value in vars(module).items() if name.isupper()}

@@ -15,7 +15,7 @@ from kineme.anchoring.unlabeled import propose
 from kineme.kernels.shapes import matched_sums
 from kineme.movements.trajectories.demonstrations import Demonstrations, require_labels
 from kineme.movements.trajectories.trajectory import Trajectory
-from kineme.recognition.early.early import cut
+from kineme.recognition.early.evidence import cut
 from kineme.recognition.recognizer import Recognizer
 from kineme.runtime.compiled import compiled_module, use_compiled
 from kineme.validation import Array

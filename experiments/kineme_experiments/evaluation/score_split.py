@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.movements.trajectories.demonstrations import Demonstrations, require_labels
-from kineme.recognition.early.early import cut
+from kineme.recognition.early.evidence import cut
 from kineme.validation import Array
 from kineme_experiments.evaluation.conditions import Condition
 from kineme_experiments.evaluation.data import DataSet

@@ -22,8 +22,7 @@ from kineme.errors import SpecificationError
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.recognition.left_out import check_groups, comparable_groups
 from kineme.similarity.describe import describe
-from kineme.similarity.described import Described
-from kineme.similarity.distances import squared_distances
+from kineme.similarity.described import Described, squared_distances
 from kineme.similarity.similarity import AveragedSimilarity, averaged, similarities
 from kineme.similarity.specification import Compares
 from kineme.validation import Array, check_choice, check_count

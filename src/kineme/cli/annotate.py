@@ -65,7 +65,7 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
     from kineme.io.writing.annotations import targets_of, write_annotations
     from kineme.library.annotate import annotate as find
     from kineme.library.library import ActionLibrary
-    from kineme.recognition.certainty import certainty
+    from kineme.recognition.answer import certainty
 
     as_json, as_csv, force, error_rate = (options.pop(name) for name in ("as_json", "as_csv", "force", "error_rate"))
     if as_csv and (as_json or output is not None):

@@ -76,8 +76,7 @@ def _outliers(recorded: Any, error_rate: float) -> tuple[tuple[int, ...], dict[s
     from tqdm import tqdm
 
     from kineme.errors import KinemeError
-    from kineme.recognition.outlier_report import outliers_as_data, outliers_as_words
-    from kineme.recognition.outliers import find_outliers
+    from kineme.recognition.outliers import find_outliers, outliers_as_data, outliers_as_words
 
     names = recorded.short_names
     try:

@@ -1,4 +1,4 @@
-"""What happens when in long recordings, by the symbols of a library."""
+"""Annotation of long recordings by the symbols of a library."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _MAX_PIECES = 8  # most stretches between rests that a movement may consist of, 
 
 
 class Annotated(NamedTuple):
-    """What happens when in recordings.
+    """Annotations of recordings.
 
     Attributes
     ----------
@@ -60,49 +60,49 @@ def annotate(
     TrajectoryError
         The recordings have other columns than those of the library.
     """
-    known = some_of_each_symbol(store)
-    known.comparison.checked(recordings.demonstrations[:1], "recordings")  # all of them have the same columns
+    classes = some_of_each_symbol(store)
+    classes.comparison.checked(recordings.demonstrations[:1], "recordings")  # all of them have the same columns
     annotations, problems, done = [], [], 0.0
-    for one, source in zip(recordings.demonstrations, recordings.sources, strict=True):
+    for recording, source in zip(recordings.demonstrations, recordings.sources, strict=True):
         before = done
 
-        def tell(share: float, before: float = before, duration: float = one.duration) -> None:
+        def tell(share: float, before: float = before, duration: float = recording.duration) -> None:
             if progress is not None:
                 progress(before + share * duration)
 
         try:
-            found = spot_known(known, one, error_rate, tell)
+            spotted = spot_known(classes, recording, error_rate, tell)
         except KinemeError as error:
             where = f"{source.place}: " if source.place else ""
             problems.append(Problem(source.path, None, f"{where}{error}", type(error)))
         else:
-            annotations += annotations_of(found, one, source)
-        done += one.duration
+            annotations += annotations_of(spotted, recording, source)
+        done += recording.duration
         tell(1.0)
-    return Annotated(annotations, problems, bool(known.calibration.calibrated(error_rate).all()))
+    return Annotated(annotations, problems, bool(classes.calibration.calibrated(error_rate).all()))
 
 
 def spot_known(
-    known: KnownClasses, recording: Trajectory, error_rate: float, progress: Callable[[float], object] | None = None
+    classes: KnownClasses, recording: Trajectory, error_rate: float, progress: Callable[[float], object] | None = None
 ) -> list[Spotted]:
     """Find movements of known classes in a recording, see `Recognizer.spot`."""
-    templates = Templates(known.comparison, known.references, known.calibration)
+    templates = Templates(classes.comparison, classes.references, classes.calibration)
     return spot(templates, recording, error_rate, _MAX_PIECES, progress)
 
 
-def annotations_of(found: list[Spotted], recording: Trajectory, source: Source) -> list[Annotation]:
-    """What was spotted in a recording of that source."""
+def annotations_of(spotted: list[Spotted], recording: Trajectory, source: Source) -> list[Annotation]:
+    """Return what was spotted in a recording of that source as annotations."""
     origin = float(recording.times[0])
     return [
         Annotation(
             source.path,
             source.place,
-            one.start,
-            one.end,
-            None if one.label is None else str(one.label),
-            one.p_known,
-            one.confidence,
+            movement.start,
+            movement.end,
+            None if movement.label is None else str(movement.label),
+            movement.p_known,
+            movement.confidence,
             origin,
         )
-        for one in found
+        for movement in spotted
     ]

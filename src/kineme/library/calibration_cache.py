@@ -21,11 +21,9 @@ from kineme.recognition.conformal import Calibration, calibrate
 from kineme.recognition.sampled_calibration import calibrate_sample
 from kineme.reporting.atomic import write_atomically
 from kineme.sampling import evenly_spaced
-from kineme.similarity.comparison import Comparison
-from kineme.similarity.fit import fit_to_references
-from kineme.similarity.references import References
+from kineme.similarity.comparison import Comparison, fit_to_references
+from kineme.similarity.references import References, StoredReferences
 from kineme.similarity.similarity import AveragedSimilarity
-from kineme.similarity.stored_references import StoredReferences
 from kineme.validation import Array
 
 FILE = "calibration.cache"  # of a large library, by a sample
@@ -38,14 +36,14 @@ _SAMPLE = 500  # movements that widths and weights are estimated from, evenly sp
 
 
 def sample_comparison(store: Store, members: Members) -> Comparison:
-    """A comparison with widths and weights that are fitted to a sample of the members."""
+    """Return a comparison with widths and weights that are fitted to a sample of the members."""
     chosen, how = evenly_spaced(len(members.ids), _SAMPLE), store.specification
     references = described_references(store, members.ids[chosen], members.labels[chosen])
     return fit_to_references(how.comparison, references, how.weights, store.channels)[0]
 
 
 def calibrated(store: Store, members: Members, similarity: AveragedSimilarity, stored: StoredReferences) -> Calibration:
-    """The calibration on all members, taken from the cache if that is of the same ones."""
+    """Return the calibration on all members, taken from the cache if that is of the same ones."""
     return _cached(
         store, FILE, _key(store, members), members, lambda: calibrate_sample(similarity, stored, members.groups)
     )
@@ -58,7 +56,7 @@ def calibrated_once(
     references: References,
     groups: NDArray[np.intp] | None,
 ) -> Calibration:
-    """As `conformal.calibrate` of the members, from a cache of its own; of few, it is computed every time."""
+    """Return `conformal.calibrate` of the members, from a cache of its own; of few, it is computed every time."""
     if len(members.ids) < _FEW:
         return calibrate(similarity, references, groups)
     key = _key(store, members, _digests(store, members))
@@ -66,30 +64,26 @@ def calibrated_once(
 
 
 def _cached(store: Store, name: str, key: str, members: Members, make: Callable[[], Calibration]) -> Calibration:
-    """The calibration in that file of the folder, if it has this key; else made, and written there."""
+    """Return the calibration in that file of the folder, if it has this key; else made, and written there."""
     path = store.folder / name
     if path.is_file():  # not a pipe, which would block
         with suppress(*_SPOILED):
             return _deserialized(path.read_bytes(), key, len(members.names))
-    made = make()
+    calibration = make()
     if not store.read_only:
         with suppress(OSError):  # disk full or no permission: it is computed again next time
-            write_atomically(path, _serialized(made, key))
-    return made
+            write_atomically(path, _serialized(calibration, key))
+    return calibration
 
 
 def _digests(store: Store, members: Members) -> bytes:
-    """Digests of the samples of the members, in the order of their ids."""
     with store.reading() as connection:
         query = f"SELECT digest FROM movement WHERE {among('id')} ORDER BY id"
         return repr(connection.execute(query, {"keys": listed(members.ids)}).fetchall()).encode()
 
 
 def _key(store: Store, members: Members, content: bytes = b"") -> str:
-    """Cache validity key: changes with the library, its specification, the members of symbols, and their people.
-
-    And with `content`, what is known of the samples of the members.
-    """
+    """Cache validity key: changes with the library, its specification, members and people, and with `content`."""
     text = [_FORMAT, store.id, *store.specification.to_json().values(), *map(str, members.names)]
     digest = hashlib.sha256("\0".join(text).encode())
     digest.update(members.ids.tobytes() + members.first.tobytes())
@@ -100,26 +94,26 @@ def _key(store: Store, members: Members, content: bytes = b"") -> str:
 
 def _serialized(calibration: Calibration, key: str) -> bytes:
     both = zip(calibration.pooled, calibration.pooled_novelties, strict=True)
-    pooled = {(id(one), id(novelty)): (one, novelty) for one, novelty in both}  # classes of one size share arrays
+    pooled = {(id(score), id(novelty)): (score, novelty) for score, novelty in both}  # classes of one size share arrays
     numbers = {name: k for k, name in enumerate(pooled)}
-    arrays: dict[str, Any] = {f"pooled {k}": one for k, (one, _) in enumerate(pooled.values())}
-    arrays |= {f"novelties {k}": one for k, (_, one) in enumerate(pooled.values())}
+    arrays: dict[str, Any] = {f"pooled {k}": score for k, (score, _) in enumerate(pooled.values())}
+    arrays |= {f"novelties {k}": novelty for k, (_, novelty) in enumerate(pooled.values())}
     shared = zip(calibration.pooled, calibration.pooled_novelties, strict=True)
-    arrays["which"] = np.array([numbers[id(one), id(novelty)] for one, novelty in shared])
+    arrays["which"] = np.array([numbers[id(score), id(novelty)] for score, novelty in shared])
     for name, several in (("", calibration.own), ("novel ", calibration.own_novelties)):
-        arrays |= {f"{name}own": np.concatenate(several), f"{name}ends": np.cumsum([len(one) for one in several])}
+        arrays |= {f"{name}own": np.concatenate(several), f"{name}ends": np.cumsum([len(scores) for scores in several])}
     file = io.BytesIO()
     np.savez(file, scales=calibration.scales, two=[calibration.between, calibration.exponent], **arrays)
     return _seal(file.getvalue(), key) + file.getvalue()
 
 
 def _seal(data: bytes, key: str) -> bytes:
-    """Checksum of the bytes and the key."""
+    """Return the checksum of the bytes and the key."""
     return hashlib.sha256(key.encode() + data).digest()
 
 
 def _deserialized(data: bytes, key: str, n: int) -> Calibration:
-    """The calibration of n classes; a ValueError or KeyError if invalid, since anybody can compute the checksum."""
+    """Return the calibration of n classes; a ValueError or KeyError if invalid: anybody can compute the checksum."""
     data, seal = data[32:], data[:32]
     if seal != _seal(data, key):
         raise ValueError("damaged, or of other members")
@@ -141,7 +135,7 @@ def _deserialized(data: bytes, key: str, n: int) -> Calibration:
 
 
 def _split(scores: NDArray[Any], ends: NDArray[Any], n: int) -> tuple[Array, ...]:
-    """The scores of each of n classes."""
+    """Return the scores of each of n classes."""
     scores, ends = _real(scores), _whole(ends, n, len(scores))
     if (np.diff(ends) < 0).any() or ends[-1] != len(scores):
         raise ValueError("no calibration")

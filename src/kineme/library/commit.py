@@ -54,17 +54,20 @@ def commit(store: Store, batch: Batch, continues: int | None = None) -> Committe
             if not batch.row_of.keys() >= set(new.values()):  # what was stored has been deleted meanwhile
                 serialize_new(store, batch.demos, batch, list(new.values()))
             _insert_movements(change, batch, new, stored)
-        made = _assign_labels(change, batch, keys)
-        detail |= {"added": len(new), "known": len(keys) - len(new), "symbols": list(made)}
-        if people := _insert_people(change, batch, keys):
-            detail["people"] = people
+        labeled = _without_symbol(change.connection, batch, keys)  # movements that have a symbol keep it
+        symbols, new_symbols = keys_by_name(change, dict.fromkeys(labeled.values()))
+        add_members(change, [(movement, symbols[label]) for movement, label in labeled.items()], "label")
+        detail |= {"added": len(new), "known": len(keys) - len(new), "symbols": list(new_symbols)}
+        if people := _without_person(change.connection, batch, keys):
+            change.insert("shown_by", [(key, person, change.version) for key, person in people.items()])
+            detail["people"] = sorted(set(people.values()))
         if continues is not None:
             detail[CONTINUES] = continues
-    return Committed(len(new), made, np.array(keys, dtype=np.int64), change.version)
+    return Committed(len(new), new_symbols, np.array(keys, dtype=np.int64), change.version)
 
 
 def _all_stored(store: Store, batch: Batch) -> NDArray[np.int64] | None:
-    """The ids, if all movements are stored, with what is said of them, so that nothing changes; else None."""
+    """Return the ids, if all movements are stored, with what is said of them, so that nothing changes; else None."""
     with store.reading() as connection:
         stored = find_stored(connection, batch)
         keys = [stored.id_of(batch, i) for i in range(len(batch.digests))]
@@ -75,7 +78,7 @@ def _all_stored(store: Store, batch: Batch) -> NDArray[np.int64] | None:
 
 
 def _keys(change: Change, batch: Batch, stored: Stored) -> tuple[list[int], dict[int, int]]:
-    """The id of every movement of the batch, and new id -> movement of the batch."""
+    """Return the id of every movement of the batch, and new id -> movement of the batch."""
     key = next_key(change.connection, "movement")
     keys: list[int] = []
     new: dict[int, int] = {}
@@ -129,7 +132,7 @@ def _insert_movements(change: Change, batch: Batch, new: dict[int, int], stored:
 
 
 def _without_symbol(connection: Any, batch: Batch, keys: list[int]) -> dict[int, str]:
-    """Movement -> label, for movements with a label that belong to no symbol yet."""
+    """Return movement -> label, for movements with a label that belong to no symbol yet."""
     labeled = {key: label for key, label in zip(keys, batch.labels, strict=True) if label is not None}
     if not labeled:
         return {}
@@ -139,36 +142,19 @@ def _without_symbol(connection: Any, batch: Batch, keys: list[int]) -> dict[int,
     return labeled
 
 
-def _assign_labels(change: Change, batch: Batch, keys: list[int]) -> tuple[str, ...]:
-    """Assign movements to the symbols of their labels, made where there are none; who has a symbol keeps it."""
-    labeled = _without_symbol(change.connection, batch, keys)
-    names = list(dict.fromkeys(labeled.values()))
-    symbols, made = keys_by_name(change, names)
-    add_members(change, [(movement, symbols[name]) for movement, name in labeled.items()], "label")
-    return made
-
-
 def _without_person(connection: Any, batch: Batch, keys: list[int]) -> dict[int, str]:
-    """Movement -> who showed it, for movements of which that is said and was not known."""
+    """Return movement -> who showed it, for movements of which that is said and was not known."""
     said = {key: group for key, group in zip(keys, batch.groups, strict=True) if group is not None}
-    known = people_by_movement(connection, list(said), NOW) if said else {}
-    return {key: group for key, group in said.items() if key not in known}
-
-
-def _insert_people(change: Change, batch: Batch, keys: list[int]) -> list[str]:
-    """Store who showed the movements of which that was not known; return their names."""
-    new = _without_person(change.connection, batch, keys)
-    change.insert("shown_by", [(key, person, change.version) for key, person in new.items()])
-    return sorted(set(new.values()))
+    people = people_by_movement(connection, list(said), NOW) if said else {}
+    return {key: group for key, group in said.items() if key not in people}
 
 
 @dataclass
 class Batch:
-    """Movements to be stored, with labels and sources; `exact_digests` are those that earlier libraries hold."""
+    """Movements to be stored, with labels and sources."""
 
     demos: Demonstrations
     digests: list[int]
-    exact_digests: list[int]
     labels: list[str | None]
     groups: list[str | None]
     sources: list[Source | None]
@@ -179,26 +165,26 @@ class Batch:
 
 @dataclass(frozen=True)
 class Stored:
-    """Which movements and sources of a batch the library holds already, and their keys."""
+    """Movements and sources of a batch that the library holds already, and their keys."""
 
     by_digest: dict[int, int]
     sources: dict[tuple[str, str], int]  # (sha256, options) -> source
     by_place: dict[tuple[int, str], int]  # (source, place) -> movement
 
     def id_of(self, batch: Batch, i: int) -> int | None:
-        """The id of movement i of the batch; None if it is new."""
-        key = self.by_digest.get(batch.digests[i], self.by_digest.get(batch.exact_digests[i]))
+        """Return the id of movement i of the batch; None if it is new."""
+        key = self.by_digest.get(batch.digests[i])
         where = self.place_of(batch, i)
         return self.by_place.get(where) if key is None and where is not None else key
 
     def place_of(self, batch: Batch, i: int) -> tuple[int, str] | None:
-        """(source, position in it) of movement i, if its source is stored."""
+        """Return (source, position in it) of movement i, if its source is stored."""
         source, place = batch.sources[i], batch.places[i]
         key = None if source is None else self.sources.get((source.sha256, source.options_json))
         return None if key is None or place is None else (key, as_text(place))
 
     def remember(self, batch: Batch, i: int, key: int) -> None:
-        """Movement i has been stored: a copy of it later in the batch is not new."""
+        """Note that movement i has been stored: a copy of it later in the batch is not new."""
         self.by_digest[batch.digests[i]] = key
         if (where := self.place_of(batch, i)) is not None:
             self.by_place[where] = key
@@ -213,9 +199,6 @@ def find_stored(connection: sqlite3.Connection, batch: Batch) -> Stored:
     query = f"SELECT source, place, id FROM movement WHERE removed IS NULL AND source IS NOT NULL AND {among('source')}"
     rows = connection.execute(query, {"keys": listed(sources.values())}) if sources else ()
     by_place = {(source, place): key for source, place, key in rows}
-    return Stored(_by_digest(connection, [*batch.digests, *batch.exact_digests]), sources, by_place)
-
-
-def _by_digest(connection: sqlite3.Connection, digests: list[int]) -> dict[int, int]:
     query = f"SELECT digest, id FROM movement WHERE removed IS NULL AND {among('digest')}"
-    return dict(connection.execute(query, {"keys": listed(digests)}))
+    by_digest = dict(connection.execute(query, {"keys": listed(batch.digests)}))
+    return Stored(by_digest, sources, by_place)

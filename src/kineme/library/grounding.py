@@ -27,21 +27,21 @@ from kineme.sampling import evenly_spaced
 _MEMBERS = 500  # members that a medoid is chosen from, at most, evenly spaced
 
 
-def prototype_of(store: Store, one: Symbol) -> int:
-    """Id of the prototype of a symbol: the one that was set, else the medoid."""
-    if one.prototype is not None:
-        return int(one.prototype)
-    members = _some_members(one)
+def prototype_of(store: Store, of_symbol: Symbol) -> int:
+    """Return the id of the prototype of a symbol: the one that was set, else the medoid."""
+    if of_symbol.prototype is not None:
+        return int(of_symbol.prototype)
+    members = _some_members(of_symbol)
     return int(members[medoid_of(described(store, members), store.specification.comparison)])
 
 
 def primitive_of(store: Store, who: str) -> Primitives:
-    """The primitive of the prototype of a symbol, a batch of one."""
+    """Return the primitive of the prototype of a symbol, a batch of one."""
     return _primitives(store, np.array([prototype_of(store, symbol(store, who))]))
 
 
 def learned_of(store: Store, who: str) -> Learned:
-    """The primitive of the prototype of a symbol with its recording; of one with an orientation it is learned anew."""
+    """Return the primitive of a symbol's prototype with its recording; one with an orientation is learned anew."""
     ids = np.array([prototype_of(store, symbol(store, who))])
     recording = read.movements(store, ids)[0]
     if has_orientation(recording):
@@ -53,12 +53,12 @@ def learned_of(store: Store, who: str) -> Learned:
 def ground_symbol(
     store: Store, who: str, by: str = "medoid", units: str | Sequence[str] | None = None
 ) -> dict[str, Any]:
-    """A symbol for a planner; see `ActionLibrary.ground`."""
-    one = symbol(store, who)
-    typical = prototype_of(store, one)
-    members = np.union1d(_some_members(one), [typical])
+    """Return a symbol for a planner; see `ActionLibrary.ground`."""
+    grounded = symbol(store, who)
+    typical = prototype_of(store, grounded)
+    members = np.union1d(_some_members(grounded), [typical])
     grounding = ground(
-        SymbolName(one.id, one.name, one.description, one.parents),
+        SymbolName(grounded.id, grounded.name, grounded.description, grounded.parents),
         _primitives(store, members),
         by=by,
         units=units,
@@ -70,26 +70,28 @@ def ground_symbol(
 
 
 def space_of(store: Store) -> ConceptualSpace:
-    """The space of symbols, with distances of their prototypes; needs two symbols with movements."""
-    shown = [one for one in symbols(store) if len(one)]
+    """Return the space of symbols, with distances of their prototypes; needs two symbols with movements."""
+    shown = [each for each in symbols(store) if len(each)]
     if len(shown) < 2:
         raise SpecificationError(
             f"expected two symbols with movements or more, got {len(shown)}; learn recordings with labels, or name "
             "proposals"
         )
-    prototypes = described(store, [prototype_of(store, one) for one in shown])
-    return conceptual_space([one.name for one in shown], prototypes, store.specification.comparison)
+    prototypes = described(store, [prototype_of(store, each) for each in shown])
+    return conceptual_space([each.name for each in shown], prototypes, store.specification.comparison)
 
 
 def morph_symbols(store: Store, a: str, b: str, shares: ArrayLike) -> Primitives:
-    """Movements between two symbols; see `ActionLibrary.morph`."""
+    """Return movements between two symbols; see `ActionLibrary.morph`."""
     return morph(primitive_of(store, a), primitive_of(store, b), shares, store.specification.comparison)
 
 
-def _some_members(one: Symbol) -> Ids:
-    if not len(one):
-        raise SpecificationError(f"expected a symbol with movements, {one.name!r} has none; delete it, or learn some")
-    return np.asarray(one.members[evenly_spaced(len(one), _MEMBERS)])
+def _some_members(of_symbol: Symbol) -> Ids:
+    if not len(of_symbol):
+        raise SpecificationError(
+            f"expected a symbol with movements, {of_symbol.name!r} has none; delete it, or learn some"
+        )
+    return np.asarray(of_symbol.members[evenly_spaced(len(of_symbol), _MEMBERS)])
 
 
 def _primitives(store: Store, ids: Ids) -> Primitives:

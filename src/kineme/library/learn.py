@@ -20,10 +20,9 @@ from numpy.typing import NDArray
 
 from kineme.errors import TrajectoryError
 from kineme.io.reading.merge_files import Recordings
-from kineme.io.reading.merge_files import Source as File
 from kineme.library.commit import Batch, Committed, commit, find_stored, serialize_new
 from kineme.library.serialize import check, evenly_sampled, relative_times, stored_times
-from kineme.library.storage.channels import other_columns, to_bytes
+from kineme.library.storage.channels import other_columns
 from kineme.library.storage.read import count
 from kineme.library.storage.source import Source
 from kineme.library.storage.store import Store
@@ -41,7 +40,6 @@ from kineme.movements.trajectories.as_learned import as_recorded, by_names, of_c
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import Movements, in_coordinates
 from kineme.movements.trajectories.trajectory import MovementsLike
-from kineme.validation import Array
 from kineme.validation import describe as name_of
 
 _BITS = 24  # of a duration that count
@@ -91,58 +89,49 @@ def learn(  # noqa: PLR0913, PLR0917 - those of `ActionLibrary.learn`
 ) -> LearnReport:
     """Store new movements; see `ActionLibrary.learn`."""
     store.check_writable()
-    found = store.version
+    before = store.version
     demos = _in_columns_of(store, Demonstrations.of(movements))
-    _check_dimensions(store, demos)
+    _check_channels(store, demos)
     check(demos)
     names = _as_names(demos, "label", demos.labels if labels is None else labels)
     people = _as_names(demos, "group", groups)
-    sources = _as_sources(source, len(demos))
-    where = _as_places(places, sources)
+    sources, where = _as_origins(source, places, len(demos))
     reports: list[Committed] = []
     with ThreadPoolExecutor(1, "kineme-library") as pool:
         pending: Future[Committed] | None = None
-        done, version = 0, None
+        version = None
+
+        def finish(future: Future[Committed]) -> int | None:
+            reports.append(future.result())
+            if progress is not None:
+                progress(sum(len(report.ids) for report in reports), len(demos))
+            return reports[-1].version or version
+
         for start, stop in _ranges(demos):
             rows = slice(start, stop)
-            batch = _prepared(store, _part(demos, start, stop), (names[rows], people[rows], sources[rows], where[rows]))
+            part = _part(demos, start, stop)
+            even = evenly_sampled(part)
+            batch = Batch(part, digests(part, even), names[rows], people[rows], sources[rows], where[rows])
+            with store.reading() as connection:
+                stored = find_stored(connection, batch)
+            if new := [i for i in range(len(part)) if stored.id_of(batch, i) is None]:  # only these are serialized
+                serialize_new(store, part, batch, new)
             if pending is not None:  # one batch is written while the next one is described
-                reports.append(pending.result())
-                version = reports[-1].version or version
-                done = _tell(progress, done + len(reports[-1].ids), len(demos))
+                version = finish(pending)
             pending = pool.submit(commit, store, batch, version)
         if pending is not None:
-            reports.append(pending.result())
-            _tell(progress, done + len(reports[-1].ids), len(demos))
+            finish(pending)
     return LearnReport(
-        sum(one.added for one in reports),
-        sum(len(one.ids) - one.added for one in reports),
-        tuple(dict.fromkeys(name for one in reports for name in one.symbols)),
-        np.concatenate([one.ids for one in reports]),
-        max((one.version for one in reports if one.version is not None), default=found),
+        sum(report.added for report in reports),
+        sum(len(report.ids) - report.added for report in reports),
+        tuple(dict.fromkeys(name for report in reports for name in report.symbols)),
+        np.concatenate([report.ids for report in reports]),
+        max((report.version for report in reports if report.version is not None), default=before),
     )
 
 
-def _prepared(store: Store, demos: Demonstrations, given: tuple[Any, Any, Any, Any]) -> Batch:
-    """A batch ready to be committed; only what is new is serialized."""
-    even = evenly_sampled(demos)
-    batch = Batch(demos, digests(demos, even), exact_digests(demos, even), *given)
-    with store.reading() as connection:
-        stored = find_stored(connection, batch)
-    new = [i for i in range(len(demos)) if stored.id_of(batch, i) is None]
-    if new:
-        serialize_new(store, demos, batch, new)
-    return batch
-
-
-def _tell(progress: Progress | None, done: int, total: int) -> int:
-    if progress is not None:
-        progress(done, total)
-    return done
-
-
 def _ranges(demos: Demonstrations) -> Iterator[tuple[int, int]]:
-    """Ranges of movements for batches, limited by movements and samples; each has at least one movement."""
+    """Return ranges of movements for batches, limited by movements and samples; each has at least one movement."""
     start, n = 0, len(demos)
     most = min(_BATCH_MOVEMENTS, max(_SMALL_BATCH, -(-n // 4)))
     while start < n:
@@ -153,25 +142,25 @@ def _ranges(demos: Demonstrations) -> Iterator[tuple[int, int]]:
 
 
 def _part(demos: Demonstrations, start: int, stop: int) -> Demonstrations:
-    """Consecutive movements, sharing the samples."""
-    whole, first, last = demos.movements, demos.offsets[start], demos.offsets[stop]
+    """Return consecutive movements, sharing the samples."""
+    movements, first, last = demos.movements, demos.offsets[start], demos.offsets[stop]
     return Demonstrations.of_movements(
         Movements(
-            whole.positions[first:last],
-            whole.offsets[start : stop + 1] - first,
-            whole.durations[start:stop],
-            None if whole.times is None else whole.times[first:last],
+            movements.positions[first:last],
+            movements.offsets[start : stop + 1] - first,
+            movements.durations[start:stop],
+            None if movements.times is None else movements.times[first:last],
             None,
-            None if whole.names is None else whole.names[start:stop],
-            whole.dimensions,
-            whole.channels,
-            None if whole.recorded is None else whole.recorded[first:last],
+            None if movements.names is None else movements.names[start:stop],
+            movements.dimensions,
+            movements.channels,
+            None if movements.recorded is None else movements.recorded[first:last],
         )
     )
 
 
 def _in_columns_of(store: Store, demos: Demonstrations) -> Demonstrations:
-    """Columns without channels, or of the same names, as those of the library; generated ones as they are learned.
+    """Convert columns without channels, or of the same names, to those of the library; generated ones as learned.
 
     Raises
     ------
@@ -180,8 +169,8 @@ def _in_columns_of(store: Store, demos: Demonstrations) -> Demonstrations:
     """
     ours, n_dims = store.channels, store.n_dims
     if demos.channels is None:
-        known = ours is not None and demos.n_dims == len(recorded_names(ours))
-        return of_columns(demos, ours) if ours is not None and known else demos
+        fits = ours is not None and demos.n_dims == len(recorded_names(ours))
+        return of_columns(demos, ours) if ours is not None and fits else demos
     if ours is None and n_dims == demos.n_dims > len(learned_names(demos.channels)):
         return as_recorded(demos)
     if ours is not None and not same_columns(demos.channels, ours):
@@ -196,7 +185,8 @@ def _in_columns_of(store: Store, demos: Demonstrations) -> Demonstrations:
     return Demonstrations.of_movements(in_coordinates(demos.movements), demos.steps)
 
 
-def _check_dimensions(store: Store, demos: Demonstrations) -> None:
+def _check_channels(store: Store, demos: Demonstrations) -> None:
+    """Refuse another number of dimensions, or channels of other kinds, than the library holds."""
     n_dims = store.n_dims
     if n_dims is not None and n_dims != demos.n_dims:
         raise TrajectoryError(
@@ -207,7 +197,7 @@ def _check_dimensions(store: Store, demos: Demonstrations) -> None:
     if (
         n_dims is None
         or same_columns(ours, demos.channels)
-        or all(is_plain(one or ()) for one in (ours, demos.channels))
+        or all(is_plain(channels or ()) for channels in (ours, demos.channels))
     ):
         return
     raise TrajectoryError(
@@ -217,103 +207,85 @@ def _check_dimensions(store: Store, demos: Demonstrations) -> None:
 
 
 def _others(store: Store) -> str:
-    """The movements that new ones must be like; a library that is empty now keeps its earlier versions."""
+    """Return the movements that new ones must be like; a library that is empty now keeps its earlier versions."""
     return "all others" if count(store) else "those of earlier versions, which can be restored,"
 
 
 def _as_names(demos: Demonstrations, what: str, given: Any) -> list[str | None]:
-    """The name of each movement's symbol, from its "label", or of who showed it, its "group"; None without."""
+    """Return the name of each movement's symbol, from its "label", or of who showed it, its "group"; None without."""
     if given is None:
         return [None] * len(demos)
-    plain = _one_each(what, given, len(demos))
-    for i, one in enumerate(plain):
-        if isinstance(one, (list, tuple, dict, np.ndarray)) or (isinstance(one, float) and math.isnan(one)):
+    values = _one_each(what, given, len(demos))
+    for i, name in enumerate(values):
+        if isinstance(name, (list, tuple, dict, np.ndarray)) or (isinstance(name, float) and math.isnan(name)):
             named = "the action" if what == "label" else "who showed it"
             raise TrajectoryError(
-                f"{name_of(i, demos.names)}: expected a {what} that is text or a number, got {one!r}; "
+                f"{name_of(i, demos.names)}: expected a {what} that is text or a number, got {name!r}; "
                 f"name {named}, or pass None where it has no name"
             )
-    known = {one: None if one is None else check_name(str(one)) for one in dict.fromkeys(plain)}
-    return [known[one] for one in plain]
+    names = {name: None if name is None else check_name(str(name)) for name in dict.fromkeys(values)}
+    return [names[name] for name in values]
 
 
 def _one_each(what: str, given: Any, n: int) -> list[Any]:
-    """A user's list with one item per movement; a single text is refused."""
-    many = f"one {what} for each of the {n} movements"
+    """Return a user's list with one item per movement; a single text is refused."""
     try:
         size = -1 if isinstance(given, (str, bytes)) else len(given)
     except TypeError:
         size = -1
     if size != n:
-        raise TrajectoryError(f"expected {many}, got {size if size >= 0 else repr(given)}")
+        got = size if size >= 0 else repr(given)
+        raise TrajectoryError(f"expected one {what} for each of the {n} movements, got {got}")
     return given.tolist() if isinstance(given, np.ndarray) else list(given)
 
 
-def _as_sources(source: Source | Sequence[Source | None] | None, n: int) -> list[Source | None]:
-    if source is None or isinstance(source, Source):
-        return [source] * n
-    sources = _one_each("source, or one", source, n)
-    for one in sources:
-        if one is not None and not isinstance(one, Source):
-            raise TrajectoryError(f"expected sources to be kineme.library.storage.source.Source or None, got {one!r}")
-    return sources
+def _as_origins(
+    source: Source | Sequence[Source | None] | None, places: Sequence[Any] | None, n: int
+) -> tuple[list[Source | None], list[str | None]]:
+    """Return the source of each movement and its position there, at which no other movement may be.
 
-
-def _as_places(places: Sequence[Any] | None, sources: list[Source | None]) -> list[str | None]:
-    """The position of each movement in its source; if not given, duplicates are found by their samples alone."""
-    if places is None:
-        return [None] * len(sources)
-    places = _one_each("place", places, len(sources))
-    _check_apart(places, sources)
-    return [None if place is None else str(place) for place in places]
-
-
-def _check_apart(places: Sequence[Any], sources: list[Source | None]) -> None:
-    """Refuse two movements at one position of a source: the second would count as a copy of the first."""
+    Without positions, duplicates are found by their samples alone.
+    """
+    sources: list[Source | None] = (
+        [source] * n if source is None or isinstance(source, Source) else _one_each("source, or one", source, n)
+    )
+    for item in sources:
+        if item is not None and not isinstance(item, Source):
+            raise TrajectoryError(f"expected sources to be kineme.library.storage.source.Source or None, got {item!r}")
+    where = [None] * n if places is None else _one_each("place", places, n)
     first_at: dict[tuple[int, str], int] = {}
-    for i, (place, source) in enumerate(zip(places, sources, strict=True)):
-        if source is not None and place is not None and first_at.setdefault((id(source), str(place)), i) != i:
+    for i, (place, origin) in enumerate(zip(where, sources, strict=True)):
+        if origin is not None and place is not None and first_at.setdefault((id(origin), str(place)), i) != i:
             raise TrajectoryError(
-                f"expected a place of its own in {source.path!r} for each movement, got {place!r} for movements "
-                f"{first_at[id(source), str(place)]} and {i}; name them apart"
+                f"expected a place of its own in {origin.path!r} for each movement, got {place!r} for movements "
+                f"{first_at[id(origin), str(place)]} and {i}; name them apart"
             )
+    return sources, [None if place is None else str(place) for place in where]
 
 
 def digests(demos: Demonstrations, even: NDArray[np.bool_]) -> list[int]:
-    """BLAKE2b of each movement's positions, other columns and times from its start, as 64-bit numbers; without names.
+    """Compute BLAKE2b of the positions, other columns and times from the start of each movement, as 64-bit numbers.
 
-    They are of the numbers that will be read: a movement that is read and learned again has the same one. The
-    probability that any two of a million different movements have the same digest is 3e-8.
+    Names do not count. They are of the numbers that will be read: a movement that is read and learned again has the
+    same one. The probability that any two of a million different movements have the same digest is 3e-8.
     """
     starts = np.repeat(demos.positions[demos.offsets[:-1]], demos.lengths, axis=0)
     positions = starts + (demos.positions - starts).astype(np.float32)
-    times = None if even.all() else _times_as_read(demos, even)
+    times = None
+    if not even.all():
+        times, offsets = relative_times(demos), demos.offsets.tolist()
+        for i in np.flatnonzero(~even).tolist():  # as `read.movements` gives them
+            a, b = offsets[i : i + 2]
+            stored = stored_times(times[a:b])
+            read = np.frombuffer(stored, np.float32 if len(stored) == 4 * (b - a) else np.float64)
+            times[a:b] = (demos.times[a] + read) - demos.times[a]
     mantissas, exponents = np.frexp(demos.durations)  # even stamps say the duration but for rounding
-    durations = np.ldexp(np.rint(mantissas * 2.0**_BITS), exponents)
-    return _hashed(demos.offsets, positions, durations, times, even, _other_columns(demos))
-
-
-def exact_digests(demos: Demonstrations, even: NDArray[np.bool_]) -> list[int]:
-    """The same of the numbers as they come, which libraries of earlier versions hold."""
-    recorded = demos.movements.recorded
-    others = None if recorded is None else to_bytes(recorded, demos.offsets, demos.channels or ())
-    times = None if even.all() else relative_times(demos)
-    return _hashed(demos.offsets, demos.positions, demos.durations, times, even, others)
-
-
-def _hashed(
-    offsets: NDArray[np.intp],
-    positions: Array,
-    durations: Array,
-    times: Array | None,
-    even: NDArray[np.bool_],
-    others: list[bytes] | None,
-) -> list[int]:
+    lasting = np.ldexp(np.rint(mantissas * 2.0**_BITS), exponents).tobytes()
+    others = _other_columns(demos)
     blob, row = np.ascontiguousarray(positions).data.cast("B"), 8 * positions.shape[1]
     stamps = None if times is None else times.data.cast("B")
-    lasting = durations.tobytes()
     parts = []
-    for i, (a, b) in enumerate(pairwise(offsets.tolist())):
+    for i, (a, b) in enumerate(pairwise(demos.offsets.tolist())):
         digest = hashlib.blake2b(blob[a * row : b * row], digest_size=8)
         digest.update(lasting[8 * i : 8 * i + 8] if stamps is None or even[i] else stamps[8 * a : 8 * b])
         if others is not None:
@@ -323,7 +295,7 @@ def _hashed(
 
 
 def _other_columns(demos: Demonstrations) -> list[bytes] | None:
-    """Of each movement what its positions do not say: the steps of discrete columns, and how it is turned at its start.
+    """Return what the positions of each movement do not say: steps of discrete columns, and the turn at its start.
 
     A quaternion that is read has norm 1 again, and so other last digits than were stored: they are left out.
     """
@@ -331,21 +303,12 @@ def _other_columns(demos: Demonstrations) -> list[bytes] | None:
     if recorded is None:
         return None
     others = other_columns(channels)
-    kinds = [one.kind for one in channels for _ in one.columns]
+    kinds = [channel.kind for channel in channels for _ in channel.columns]
     steps = recorded[:, [k for k in others if kinds[k] == "discrete"]].astype(np.float32)
     turned = recorded[demos.offsets[:-1]][:, [k for k in others if kinds[k] == "orientation"]].round(_DECIMALS) + 0.0
-    return [one.tobytes() + steps[a:b].tobytes() for one, (a, b) in zip(turned, pairwise(demos.offsets), strict=True)]
-
-
-def _times_as_read(demos: Demonstrations, even: NDArray[np.bool_]) -> Array:
-    """Times from the start of each movement, of those that are stored as `read.movements` gives them."""
-    relative, offsets = relative_times(demos), demos.offsets.tolist()
-    for i in np.flatnonzero(~even).tolist():
-        a, b = offsets[i : i + 2]
-        stored = stored_times(relative[a:b])
-        read = np.frombuffer(stored, np.float32 if len(stored) == 4 * (b - a) else np.float64)
-        relative[a:b] = (demos.times[a] + read) - demos.times[a]
-    return relative
+    return [
+        start.tobytes() + steps[a:b].tobytes() for start, (a, b) in zip(turned, pairwise(demos.offsets), strict=True)
+    ]
 
 
 def learn_recordings(  # noqa: PLR0913, PLR0917 - those of `ActionLibrary.learn`
@@ -376,18 +339,18 @@ def learn_recordings(  # noqa: PLR0913, PLR0917 - those of `ActionLibrary.learn`
         As for `ActionLibrary.learn`.
     """
     now = datetime.now(UTC).isoformat(timespec="seconds")
-    told = {name: value for name, value in (options or {}).items() if value is not None}
-    files = {one.path: _source(one, PurePath(root) / one.path, told, now) for one in recordings.sources}
+    chosen = {name: value for name, value in (options or {}).items() if value is not None}
+    files = {}
+    for file in recordings.sources:
+        path = PurePath(root) / file.path
+        kind = path.suffix.lower().lstrip(".")
+        files[file.path] = Source(path.as_posix(), file.sha256, file.size, kind, chosen, now)
     return learn(
         store,
         recordings.demonstrations,
         list(recordings.labels) if labels is None else labels,
-        [files[one.path] for one in recordings.sources],
-        places=[one.place for one in recordings.sources],
+        [files[file.path] for file in recordings.sources],
+        places=[file.place for file in recordings.sources],
         progress=progress,
         groups=groups,
     )
-
-
-def _source(one: File, path: PurePath, told: Mapping[str, Any], now: str) -> Source:
-    return Source(path.as_posix(), one.sha256, one.size, path.suffix.lower().lstrip("."), told, now)

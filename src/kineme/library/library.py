@@ -42,22 +42,22 @@ if TYPE_CHECKING:
 
 def _blaming(cls: type[ActionLibrary]) -> type[ActionLibrary]:
     """Let every public method of a library blame a file whose rows do not fit together; see `verify.blame`."""
+
+    def guarded(method: Callable[..., Any]) -> Callable[..., Any]:
+        @wraps(method)
+        def call(self: ActionLibrary, *arguments: Any, **options: Any) -> Any:
+            try:
+                return method(self, *arguments, **options)
+            except verify.MISFITS as error:
+                verify.blame(self.store, error)
+                raise
+
+        return call
+
     for name, method in list(vars(cls).items()):
         if isinstance(method, FunctionType) and not name.startswith("_"):
-            setattr(cls, name, _guarded(method))
+            setattr(cls, name, guarded(method))
     return cls
-
-
-def _guarded(method: Callable[..., Any]) -> Callable[..., Any]:
-    @wraps(method)
-    def call(self: ActionLibrary, *arguments: Any, **options: Any) -> Any:
-        try:
-            return method(self, *arguments, **options)
-        except verify.MISFITS as error:
-            verify.blame(self.store, error)
-            raise
-
-    return call
 
 
 @_blaming
@@ -140,7 +140,7 @@ class ActionLibrary:
 
     @property
     def folder(self) -> Path:
-        """Where the library is."""
+        """Folder of the library."""
         return self.store.folder
 
     @property
@@ -155,7 +155,7 @@ class ActionLibrary:
 
     @property
     def channels(self) -> Channels | None:
-        """What its movements were recorded as, and those to be recognized should be; None if that is not known."""
+        """Channels that its movements were recorded as, and those to be recognized should be; None if unknown."""
         return self.store.channels
 
     @property
@@ -216,15 +216,15 @@ class ActionLibrary:
         return learn(self.store, movements, labels, source, places, progress, groups)
 
     def ids(self, symbol: str | None = None) -> Ids:
-        """Ids of all movements, or of those of a symbol, ascending."""
+        """Return the ids of all movements, or of those of a symbol, ascending."""
         return read.all_ids(self.store) if symbol is None else self[symbol].members
 
     def unlabeled(self) -> Ids:
-        """Ids of the movements without a symbol, ascending."""
+        """Return the ids of the movements without a symbol, ascending."""
         return read.unlabeled_ids(self.store)
 
     def movements(self, symbol: str | None = None, ids: ArrayLike | None = None) -> Demonstrations:
-        """The recordings: all, those of a symbol (ascending ids), or those of `ids`, in their order.
+        """Return the recordings: all, those of a symbol (ascending ids), or those of `ids`, in their order.
 
         Labels are the names of symbols if every movement belongs to one, else None.
         """
@@ -232,15 +232,15 @@ class ActionLibrary:
         return read.movements(self.store, chosen, read.names_of(self.store, chosen))
 
     def groups(self, ids: ArrayLike | None = None) -> NDArray[np.object_]:
-        """Who showed each movement, as told to `learn`, shape (k,): of all, or of `ids`; None where it is not known."""
+        """Return who showed each movement, shape (k,): of all, or of `ids`; None where `learn` was not told."""
         return read.groups(self.store, self._choose(None, ids))
 
     def features(self, ids: ArrayLike | None = None) -> NDArray[np.float32]:
-        """Rows of all representations that are compared sample by sample, concatenated, shape (k, sum of d * S)."""
+        """Return the rows of all representations compared sample by sample, concatenated, shape (k, sum of d * S)."""
         return read.features(self.store, self._choose(None, ids))
 
     def primitives(self, symbol: str | None = None, ids: ArrayLike | None = None) -> Primitives:
-        """Primitives: all, those of a symbol, or those of `ids`, in their order."""
+        """Return the primitives: all, those of a symbol, or those of `ids`, in their order."""
         chosen = self._choose(symbol, ids)
         return read.primitives(self.store, chosen, read.names_of(self.store, chosen))
 
@@ -248,11 +248,11 @@ class ActionLibrary:
         return self.ids(symbol) if ids is None else read.as_ids(self.store, ids)
 
     def symbols(self) -> tuple[Symbol, ...]:
-        """All symbols, by name."""
+        """Return all symbols, by name."""
         return symbols.symbols(self.store)
 
     def __getitem__(self, who: str) -> Symbol:
-        """The symbol of that name or, where no symbol has that name, of that id."""
+        """Return the symbol of that name or, where no symbol has that name, of that id."""
         return symbols.symbol(self.store, who)
 
     def __contains__(self, who: object) -> bool:
@@ -322,7 +322,7 @@ class ActionLibrary:
         return LibraryRecognizer(self.store)
 
     def history(self) -> tuple[Version, ...]:
-        """All versions, the first one first."""
+        """Return all versions, the first one first."""
         return history(self.store)
 
     def undo(self, expected: int | None = None, to: int | None = None) -> Undone:
@@ -355,7 +355,7 @@ class ActionLibrary:
         return undo.undo(self.store, expected, to)
 
     def at(self, version: int) -> ActionLibrary:
-        """The library as it was at a version, for reading."""
+        """Open the library as it was at a version, for reading."""
         past = object.__new__(ActionLibrary)
         past.store = Store(self.store.path, read_only=True, as_of=version, wait=self.store.wait)
         return past
@@ -458,7 +458,7 @@ class ActionLibrary:
         reject(self.store, proposal)
 
     def ground(self, who: str, by: str = "medoid", units: str | Sequence[str] | None = None) -> dict[str, Any]:
-        """A symbol for a planner: its prototype as a primitive, and the demonstrated ranges of its parameters.
+        """Describe a symbol for a planner: its prototype as a primitive and the ranges of its parameters.
 
         Plain data, as `kineme.anchoring.grounding.grounding_schema` describes it;
         `kineme.anchoring.grounding.primitive_from` makes it move again.
@@ -477,19 +477,19 @@ class ActionLibrary:
         return ground_symbol(self.store, who, by, units)
 
     def nearest(self, who: str, k: int = 3) -> tuple[Near, ...]:
-        """The symbols most similar to one, nearest first; see `kineme.anchoring.space.ConceptualSpace`."""
+        """Find the symbols nearest to one, nearest first; see `kineme.anchoring.space.ConceptualSpace`."""
         from kineme.library.grounding import space_of
 
         return space_of(self.store).nearest(self[who].name, k)
 
     def between(self, a: str, b: str, eps: float = 0.25) -> tuple[Between, ...]:
-        """The symbols that lie between two, the smallest detour first."""
+        """Find the symbols that lie between two, the smallest detour first."""
         from kineme.library.grounding import space_of
 
         return space_of(self.store).between(self[a].name, self[b].name, eps)
 
     def morph(self, a: str, b: str, shares: ArrayLike = 0.5) -> Primitives:
-        """Primitives between two symbols, one for each share of the way: 0 is a, 1 is b."""
+        """Return primitives between two symbols, one for each share of the way: 0 is a, 1 is b."""
         from kineme.library.grounding import morph_symbols
 
         return morph_symbols(self.store, a, b, shares)

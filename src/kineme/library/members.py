@@ -20,8 +20,7 @@ from kineme.sampling import evenly_spaced
 from kineme.similarity.comparison import Comparison
 from kineme.similarity.describe import describe_rows
 from kineme.similarity.described import Described
-from kineme.similarity.references import References
-from kineme.similarity.stored_references import OnDemand
+from kineme.similarity.references import OnDemand, References
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +39,7 @@ class Members:
 
 
 def members_of(store: Store) -> Members:
-    """All movements that belong to a symbol.
+    """Return all movements that belong to a symbol.
 
     Raises
     ------
@@ -73,33 +72,33 @@ def members_of(store: Store) -> Members:
 
 
 def groups_of(store: Store, ids: Ids) -> NDArray[np.intp] | None:
-    """Numbers of who showed the movements, (k,), for a calibration; None where that is known of none.
+    """Return numbers of who showed the movements, (k,), for a calibration; None where that is known of none.
 
     Those of whom it is not known count as of one more person: nobody says that they are of different ones.
     """
     people = read.groups(store, ids).tolist()
     if not any(people):
         return None
-    return np.asarray(np.unique([one or "" for one in people], return_inverse=True)[1], dtype=np.intp)
+    return np.asarray(np.unique([person or "" for person in people], return_inverse=True)[1], dtype=np.intp)
 
 
 def described(store: Store, ids: ArrayLike, comparison: Comparison | None = None) -> Described:
-    """Movements in the representations of the library, or in those of a comparison, from their stored features."""
+    """Describe movements as the library does, or as a comparison does, from their stored features."""
     rows, how = read.features(store, np.asarray(ids, dtype=np.int64)), store.specification.comparison
     every = describe_rows(rows, store.n_dims or 0, how)
     return every if comparison is None else every.select(map(how.representations.index, comparison.representations))
 
 
 def described_references(store: Store, ids: Ids, labels: NDArray[Any]) -> References:
-    """Movements with sorted labels, from their stored features; their samples are read when asked for."""
+    """Return movements with sorted labels, from their stored features; their samples are read when asked for."""
     return References.of(OnDemand(ids, partial(read.movements, store)), described(store, ids), labels)
 
 
 def some_members(members: Members, most: int) -> Members:
-    """At most so many members of each symbol, evenly spaced."""
+    """Choose at most so many members of each symbol, evenly spaced."""
     ends = np.append(members.first, len(members.ids))
     rows = [start + evenly_spaced(stop - start, most) for start, stop in pairwise(ends)]
-    kept = np.concatenate(rows)
-    first = np.cumsum([0, *(len(one) for one in rows[:-1])])
-    groups = None if members.groups is None else members.groups[kept]
-    return replace(members, ids=members.ids[kept], first=first, groups=groups)
+    chosen = np.concatenate(rows)
+    first = np.cumsum([0, *(len(part) for part in rows[:-1])])
+    groups = None if members.groups is None else members.groups[chosen]
+    return replace(members, ids=members.ids[chosen], first=first, groups=groups)

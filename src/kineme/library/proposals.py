@@ -51,8 +51,8 @@ class LibraryProposals:
         return len(self.by_position)
 
     def __getitem__(self, index: int) -> Proposal:
-        one = self.by_position[index]
-        return replace(one, members=self.ids[one.members], medoid=int(self.ids[one.medoid]))
+        proposal = self.by_position[index]
+        return replace(proposal, members=self.ids[proposal.members], medoid=int(self.ids[proposal.medoid]))
 
     def __iter__(self) -> Iterator[Proposal]:
         return (self[index] for index in range(len(self)))
@@ -97,17 +97,18 @@ def propose(
         return LibraryProposals(chosen, Proposals((), np.full(len(chosen), -1, dtype=np.intp), np.empty(0)))
     chosen = read.as_ids(store, chosen)
     by_symbols = ids is None and method is None and n_clusters is None
-    known = joining.known or known_symbols(store) if by_symbols else None
-    if known is not None:
-        members = described(store, chosen, known.comparison)
-        proposals = assign_described(members, known, min_members=min_members).proposals
+    classes = joining.classes or known_symbols(store) if by_symbols else None
+    if classes is not None:
+        members = described(store, chosen, classes.comparison)
+        proposals = assign_described(members, classes, min_members=min_members).proposals
     else:
         members, like = described(store, chosen), store.specification.comparison
         how = method or DEFAULT_METHOD
         people = groups_of(store, chosen)
         proposals = propose_clusters(members, how, n_clusters, groups=people, min_members=min_members, like=like)
     if ids is None:
-        proposals = _without(proposals, _rejected_before(store, chosen))
+        rejected = [version.detail.get("movements", []) for version in history(store) if version.action == "reject"]
+        proposals = _without(proposals, [np.flatnonzero(np.isin(chosen, members)) for members in rejected])
     return LibraryProposals(chosen, proposals)
 
 
@@ -129,24 +130,21 @@ def reject(store: Store, proposal: Proposal) -> int:
     return change.version
 
 
-def _rejected_before(store: Store, ids: Ids) -> list[NDArray[np.intp]]:
-    """Positions among `ids` of rejected movements, per rejection."""
-    rejected = [one.detail.get("movements", []) for one in history(store) if one.action == "reject"]
-    return [np.flatnonzero(np.isin(ids, one)) for one in rejected]
-
-
 def _without(proposed: Proposals, rejected: list[NDArray[np.intp]]) -> Proposals:
-    """The proposals that do not repeat a rejected one, renumbered."""
-    kept = [
+    """Return the proposals that do not repeat a rejected one, renumbered."""
+    remaining = [
         k
-        for k, one in enumerate(proposed.proposals)
-        if not any(np.isin(one.members, positions).mean() >= _SAME for positions in rejected)
+        for k, proposal in enumerate(proposed.proposals)
+        if not any(np.isin(proposal.members, positions).mean() >= _SAME for positions in rejected)
     ]
     number = np.full(len(proposed) + 1, -1, dtype=np.intp)
-    number[kept] = np.arange(len(kept))
+    number[remaining] = np.arange(len(remaining))
     proposals = tuple(
-        replace(one, nearest=None if one.nearest is None or number[one.nearest] < 0 else int(number[one.nearest]))
-        for one in (proposed.proposals[k] for k in kept)
+        replace(
+            proposal,
+            nearest=None if proposal.nearest is None or number[proposal.nearest] < 0 else int(number[proposal.nearest]),
+        )
+        for proposal in (proposed.proposals[k] for k in remaining)
     )
     return Proposals(proposals, number[proposed.clusters], proposed.widths)
 
@@ -159,20 +157,20 @@ class Recognized:
     ----------
     ids : dict
         Name of a symbol -> ids of the movements.
-    known : KnownClasses or None
-        By what they were recognized; None if there was nothing to recognize, or no symbol.
+    classes : KnownClasses or None
+        The symbols that they were recognized by; None if there was nothing to recognize, or no symbol.
     """
 
     ids: dict[str, Ids] = field(default_factory=dict)
-    known: KnownClasses | None = None
+    classes: KnownClasses | None = None
 
     def all_ids(self) -> Ids:
-        """Ids of all recognized movements."""
+        """Return ids of all recognized movements."""
         return np.concatenate([np.empty(0, dtype=np.int64), *self.ids.values()])
 
 
 def known_symbols(store: Store) -> KnownClasses | None:
-    """What recognizes the symbols, fitted to at most 3000 of their movements; None without any."""
+    """Fit the recognition of symbols to at most 3000 of their movements; None without any."""
     if not any(map(len, symbols(store))):
         return None
     ids, labels = evenly_many_members(store)
@@ -185,15 +183,15 @@ def known_symbols(store: Store) -> KnownClasses | None:
 def recognized(store: Store, error_rate: float = 0.05) -> Recognized:
     """Recognize the movements without a symbol; nothing is changed."""
     unlabeled = read.unlabeled_ids(store)
-    known = known_symbols(store) if len(unlabeled) else None
-    if known is None:
+    classes = known_symbols(store) if len(unlabeled) else None
+    if classes is None:
         return Recognized()
-    names = open_set_labels(known, described(store, unlabeled, known.comparison), error_rate)[0].tolist()
+    names = open_set_labels(classes, described(store, unlabeled, classes.comparison), error_rate)[0].tolist()
     ids = {
-        str(name): unlabeled[np.array([one == name for one in names])]
+        str(name): unlabeled[np.array([label == name for label in names])]
         for name in dict.fromkeys(name for name in names if name is not None)
     }
-    return Recognized(ids, known)
+    return Recognized(ids, classes)
 
 
 def assign_recognized(store: Store, joining: Recognized) -> dict[str, int]:
@@ -228,14 +226,14 @@ def review(store: Store) -> Review:
     splits = suggest_splits(members, labels, like=like)
     return Review(
         suggest_merges(members, labels, like=like),
-        tuple(one._replace(parts=(ids[one.parts[0]], ids[one.parts[1]])) for one in splits),
+        tuple(split._replace(parts=(ids[split.parts[0]], ids[split.parts[1]])) for split in splits),
     )
 
 
 def evenly_many_members(store: Store) -> tuple[Ids, NDArray[Any]]:
-    """At most 3000 members of symbols, equally many of each, and the names of their symbols."""
+    """Choose at most 3000 members of symbols, equally many of each; return them and the names of their symbols."""
     shown = [symbol for symbol in symbols(store) if len(symbol)]
     share = max(1, _MOST // max(1, len(shown)))
-    some = [one.members[evenly_spaced(len(one), share)] for one in shown]
-    labels = np.repeat(label_array([one.name for one in shown]), [len(members) for members in some])
+    some = [symbol.members[evenly_spaced(len(symbol), share)] for symbol in shown]
+    labels = np.repeat(label_array([symbol.name for symbol in shown]), [len(members) for members in some])
     return np.concatenate([np.empty(0, dtype=np.int64), *some]), labels

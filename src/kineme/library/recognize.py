@@ -20,12 +20,11 @@ from kineme.library.storage.store import Store
 from kineme.movements.trajectories.trajectory import MovementsLike, Trajectory
 from kineme.recognition.answer import Answer, Neighbor, is_one
 from kineme.recognition.conformal import calibrate
-from kineme.recognition.early.decision import Decision
 from kineme.recognition.early.hypotheses import Early, Hypotheses, as_early, hypotheses
-from kineme.recognition.early.stream import Live
+from kineme.recognition.early.stream import Decision, Live
 from kineme.recognition.known_classes import Calibrates, KnownClasses, fit_known_classes
 from kineme.recognition.two_stage_search import TwoStageSearch
-from kineme.similarity.stored_references import StoredReferences
+from kineme.similarity.references import StoredReferences
 
 #: Movements up to which every one is compared: the answer is then the recognizer's own. Processor time of 2000
 #: movements of 26 classes in space: 2.2 s until the first answer and 1.4 ms for each (two stages: 1.0 s, 3.4 ms).
@@ -36,7 +35,7 @@ _ERROR_RATE = 0.05
 
 
 class Current(NamedTuple):
-    """What recognizes the symbols of one version, and the ids of its movements."""
+    """The recognition of the symbols of one version, and the ids of its movements."""
 
     version: int
     ids: Ids
@@ -55,7 +54,7 @@ class LibraryRecognizer:
     _turn: Lock = field(default_factory=Lock)
 
     def recognize(self, X: MovementsLike, error_rate: float = 0.05) -> Answer | list[Answer]:
-        """An `Answer` for one movement, a list for many; see `ActionLibrary.recognize`."""
+        """Return an `Answer` for one movement, a list for many; see `ActionLibrary.recognize`."""
         answers = self._answers(self.current(), X, error_rate)
         return answers[0] if is_one(X) else answers
 
@@ -65,43 +64,41 @@ class LibraryRecognizer:
         return live(self._beginnings(now, as_early(early)), confidence, patience, partial(self._answer, now))
 
     def model(self) -> KnownClasses | TwoStageSearch:
-        """What recognizes the symbols as they are now: by all of their movements, or in two stages."""
+        """Return the recognition of the symbols as they are now: by all of their movements, or in two stages."""
         return self.current().model
 
     def current(self) -> Current:
-        """The model of the symbols as they are now; one thread makes it, others wait."""
+        """Return the model of the symbols as they are now; one thread makes it, others wait."""
         with self._turn:
             version = self.store.version
             if self._current is None or version != self._current.version:
                 members = members_of(self.store)
-                make = self._small if len(members.ids) <= self.exhaustive else self._large
-                self._current = Current(version, *make(members))
+                if len(members.ids) <= self.exhaustive:
+                    calibrate_by = partial(calibrated_once, self.store, members)
+                    self._current = Current(version, members.ids, known_members(self.store, members, calibrate_by))
+                else:
+                    reduced = open_cache(self.store) if self._reduced is None else updated(self.store, self._reduced)
+                    self._reduced = reduced
+                    self._current = Current(version, reduced.ids, two_stages(self.store, reduced, members))
             return self._current
 
-    def _small(self, members: Members) -> tuple[Ids, KnownClasses]:
-        return members.ids, known_members(self.store, members, partial(calibrated_once, self.store, members))
-
-    def _large(self, members: Members) -> tuple[Ids, TwoStageSearch]:
-        self._reduced = open_cache(self.store) if self._reduced is None else updated(self.store, self._reduced)
-        return self._reduced.ids, two_stages(self.store, self._reduced, members)
-
     def _beginnings(self, now: Current, early: Early) -> Begun:
-        """Of all members of a small library, of some of a large one; kept from the last time."""
+        """Prepare those of all members of a small library, of some of a large one; stored for the next time."""
         with self._turn:
-            made = self._begun
-            if made is None or (made.version, made.early) != (now.version, early):
-                known = now.model if isinstance(now.model, KnownClasses) else some_of_each_symbol(self.store)
-                made = self._begun = begun(now.version, known, early)
-            return made
+            shared = self._begun
+            if shared is None or (shared.version, shared.early) != (now.version, early):
+                classes = now.model if isinstance(now.model, KnownClasses) else some_of_each_symbol(self.store)
+                shared = self._begun = begun(now.version, classes, early)
+            return shared
 
     def _answer(self, now: Current, movement: Trajectory) -> Answer:
         return self._answers(now, movement, _ERROR_RATE)[0]
 
     def _answers(self, now: Current, X: MovementsLike, error_rate: float) -> list[Answer]:
-        """The answers with ids and names of movements instead of rows."""
+        """Return the answers with ids and names of movements instead of rows."""
         answers = now.model.recognize(X, error_rate)
         ids = np.unique([now.ids[near.index] for answer in answers for near in answer.nearest])
-        names = {one["id"]: one["name"] for one in read.records(self.store, ids)}
+        names = {record["id"]: record["name"] for record in read.records(self.store, ids)}
 
         def name(near: Neighbor) -> Neighbor:
             key = int(now.ids[near.index])
@@ -111,13 +108,13 @@ class LibraryRecognizer:
 
 
 def some_of_each_symbol(store: Store) -> KnownClasses:
-    """What recognizes symbols by at most ten members each, and 1000 in all or one of each."""
+    """Recognize symbols by at most ten members each, and 1000 in all or one of each."""
     members = members_of(store)
     return known_members(store, some_members(members, max(1, min(_OF_EACH, _MOST // len(members.names)))))
 
 
 def known_members(store: Store, members: Members, calibrate_by: Calibrates = calibrate) -> KnownClasses:
-    """What recognizes the symbols of a small library: all members, by their stored features."""
+    """Recognize the symbols of a small library by all members, with their stored features."""
     how = store.specification
     references = described_references(store, members.ids, members.labels)
     references = replace(references, demonstrations=read.movements(store, members.ids))  # few: kept in memory
@@ -127,19 +124,19 @@ def known_members(store: Store, members: Members, calibrate_by: Calibrates = cal
 
 
 def two_stages(store: Store, reduced: ReducedMovements, members: Members) -> TwoStageSearch:
-    """The recognizer of a large library."""
+    """Return the recognizer of a large library."""
     comparison = sample_comparison(store, members)
     how = comparison.specification
-    kept = [store.specification.comparison.by_rows.index(one) for one in how.by_rows]
+    columns = [store.specification.comparison.by_rows.index(representation) for representation in how.by_rows]
     ends = np.cumsum(store.specification.widths(store.n_dims or 0))
 
     def features(rows: NDArray[np.intp]) -> tuple[NDArray[Any], ...]:
         blocks = np.split(read.features(store, reduced.ids[rows]), ends[:-1], axis=1)
-        return tuple(blocks[r] for r in kept)
+        return tuple(blocks[r] for r in columns)
 
     stored = StoredReferences(
-        tuple(reduced.bases[r] for r in kept),
-        tuple(tuple(block[r] for r in kept) for block in reduced.blocks),
+        tuple(reduced.bases[r] for r in columns),
+        tuple(tuple(block[r] for r in columns) for block in reduced.blocks),
         reduced.rows(members.ids),
         members.first,
         how,
@@ -155,16 +152,16 @@ class Begun(NamedTuple):
 
     version: int
     early: Early
-    known: KnownClasses
+    classes: KnownClasses
     hypotheses: Hypotheses
 
 
-def begun(version: int, known: KnownClasses, early: Early) -> Begun:
+def begun(version: int, classes: KnownClasses, early: Early) -> Begun:
     """Prepare the beginnings of known movements."""
-    return Begun(version, early, known, hypotheses(known.comparison, known.references, early))
+    return Begun(version, early, classes, hypotheses(classes.comparison, classes.references, early))
 
 
 def live(shared: Begun, confidence: float, patience: float, recognize: Callable[[Trajectory], Answer]) -> Live:
-    """A stream; `recognize` answers to the whole movement at its end."""
-    known = shared.known
-    return Live(known.comparison, known.references, shared.hypotheses, Decision(confidence, patience), recognize)
+    """Return a stream; `recognize` answers to the whole movement at its end."""
+    classes = shared.classes
+    return Live(classes.comparison, classes.references, shared.hypotheses, Decision(confidence, patience), recognize)

@@ -47,16 +47,16 @@ class ReducedMovements:
     blocks: tuple[tuple[ReducedFeatures, ...], ...]
 
     def rows(self, ids: Ids) -> NDArray[np.intp]:
-        """Rows of the reduced features of these movements."""
+        """Return rows of the reduced features of these movements."""
         return np.searchsorted(self.ids, ids)
 
 
 def open_cache(store: Store) -> ReducedMovements:
-    """Reduced features of all movements that the library ever had: from the cache, and computed for those not in it."""
+    """Return reduced features of all movements ever stored: from the cache, and computed for those not in it."""
     path = store.folder / FILE
     reduced = _load(store, path)
-    known = int(reduced.ids[-1]) if reduced is not None else -1
-    later = _ids_after(store, known)
+    last = int(reduced.ids[-1]) if reduced is not None else -1
+    later = _ids_after(store, last)
     if reduced is not None and len(later) <= max(_FEW, _GROWN * len(reduced.ids)):
         return reduced if not len(later) else extended(store, reduced, later)
     everything = _ids_after(store, -1)
@@ -71,7 +71,7 @@ def open_cache(store: Store) -> ReducedMovements:
 
 
 def extended(store: Store, reduced: ReducedMovements, later: Ids) -> ReducedMovements:
-    """The same with the reduced features of later movements appended."""
+    """Return the same with the reduced features of later movements appended."""
     new = reduce_features(reduced.bases, _features(store, later), store.n_dims or 0)
     if len(reduced.blocks) > 1:
         pairs = zip(reduced.blocks[1], new, strict=True)
@@ -80,7 +80,7 @@ def extended(store: Store, reduced: ReducedMovements, later: Ids) -> ReducedMove
 
 
 def updated(store: Store, reduced: ReducedMovements) -> ReducedMovements:
-    """The same brought up to date with the library."""
+    """Return the same brought up to date with the library."""
     later = _ids_after(store, int(reduced.ids[-1]))
     if len(later) > max(_FEW, _GROWN * len(reduced.blocks[0][0].values)):
         return open_cache(store)
@@ -90,22 +90,27 @@ def updated(store: Store, reduced: ReducedMovements) -> ReducedMovements:
 def _ids_after(store: Store, key: int) -> Ids:
     with store.reading() as connection:
         rows = connection.execute("SELECT id FROM movement WHERE id > ? ORDER BY id", (key,))
-        return np.fromiter((one for (one,) in rows), dtype=np.int64)
+        return np.fromiter((key for (key,) in rows), dtype=np.int64)
 
 
 def _features(store: Store, ids: Ids) -> tuple[NDArray[np.float32], ...]:
-    """Rows (n, d * S) per representation."""
+    """Return rows (n, d * S) per representation."""
     ends = np.cumsum(store.specification.widths(store.n_dims or 0))
     return tuple(np.split(read.features(store, ids), ends[:-1], axis=1))
 
 
 def _layout(store: Store, n: int) -> tuple[list[tuple[type[Any], tuple[int, ...]]], int]:
-    """Types and shapes of the arrays in the file, in order, and their total bytes."""
+    """Return types and shapes of the arrays in the file, in order, and their total bytes."""
     d = store.n_dims or 0
     parts: list[tuple[type[Any], tuple[int, ...]]] = [(np.int64, (n,))]
-    for one in store.specification.comparison.by_rows:
-        k = min(N_REDUCED, one.n_points)
-        parts += [(np.float64, (one.n_points, k)), (np.float32, (n, d * k)), (np.float32, (n,)), (np.float32, (n,))]
+    for representation in store.specification.comparison.by_rows:
+        k = min(N_REDUCED, representation.n_points)
+        parts += [
+            (np.float64, (representation.n_points, k)),
+            (np.float32, (n, d * k)),
+            (np.float32, (n,)),
+            (np.float32, (n,)),
+        ]
     return parts, sum(_size(*part) for part in parts)
 
 
@@ -114,7 +119,7 @@ def _size(kind: type[Any], shape: tuple[int, ...]) -> int:
 
 
 def _arrays_in(store: Store, buffer: Bytes, n: int) -> ReducedMovements:
-    """The arrays in a buffer."""
+    """Return the arrays in a buffer."""
     arrays, offset = [], _HEADER
     for kind, shape in _layout(store, n)[0]:
         count = int(np.prod(shape))
@@ -135,8 +140,8 @@ def _fill(store: Store, buffer: Bytes, ids: Ids) -> None:
     for start in range(0, len(ids), _ROWS):
         rows = slice(start, start + _ROWS)
         some = reduce_features(reduced.bases, _features(store, ids[rows]), store.n_dims or 0)
-        for block, one in zip(reduced.blocks[0], some, strict=True):
-            for into, values in zip(block, one, strict=True):
+        for block, features in zip(reduced.blocks[0], some, strict=True):
+            for into, values in zip(block, features, strict=True):
                 into[rows] = values
 
 
@@ -171,7 +176,7 @@ def _validity_key(store: Store, version: int) -> dict[str, Any]:
 
 
 def _load(store: Store, path: Path) -> ReducedMovements | None:
-    """The reduced features in a file; None if there is no valid one."""
+    """Return the reduced features in a file; None if there is no valid one."""
     if not path.is_file():  # not a pipe, which would block
         return None
     try:
@@ -180,20 +185,19 @@ def _load(store: Store, path: Path) -> ReducedMovements | None:
         key = _validity_key(store, int(header["version"]))
         n = int(header["n"])
         fits = all(header[name] == value for name, value in key.items()) and key["at"] is not None
-        whole = len(buffer) == _HEADER + _layout(store, n)[1] and zlib.crc32(buffer[_HEADER:]) == header["crc"]
+        complete = len(buffer) == _HEADER + _layout(store, n)[1] and zlib.crc32(buffer[_HEADER:]) == header["crc"]
     except (OSError, ValueError, KeyError, TypeError, OverflowError, RecursionError, sqlite3.Error):
         return None
-    if not (fits and whole and n > 0):
+    if not (fits and complete and n > 0):
         return None
     reduced = _arrays_in(store, buffer, n)
-    return reduced if _is_plausible(reduced) else None
-
-
-def _is_plausible(reduced: ReducedMovements) -> bool:
-    """Whether the values are possible reduced features: anybody can write a file with the right checksum."""
-    return (
+    plausible = (  # anybody can write a file with the right checksum
         bool((reduced.ids == np.arange(1, len(reduced.ids) + 1)).all())
         and all(bool(np.isfinite(P).all()) and np.allclose(P.T @ P, np.eye(P.shape[1])) for P in reduced.bases)
-        and all(bool(np.isfinite(part).all()) for one in reduced.blocks[0] for part in one)
-        and all(bool((one.squares >= 0).all() and (one.residual_norms >= 0).all()) for one in reduced.blocks[0])
+        and all(bool(np.isfinite(part).all()) for features in reduced.blocks[0] for part in features)
+        and all(
+            bool((features.squares >= 0).all() and (features.residual_norms >= 0).all())
+            for features in reduced.blocks[0]
+        )
     )
+    return reduced if plausible else None

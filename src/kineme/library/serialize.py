@@ -57,7 +57,7 @@ def check(demos: Demonstrations) -> None:
 
 
 def evenly_sampled(demos: Demonstrations) -> NDArray[np.bool_]:
-    """Which movements have even time stamps, (n,)."""
+    """Tell which movements have even time stamps, (n,)."""
     if demos.movements.times is None:
         return np.ones(len(demos), dtype=bool)
     times, first, lengths = demos.times, demos.offsets[:-1], demos.lengths
@@ -69,12 +69,12 @@ def evenly_sampled(demos: Demonstrations) -> NDArray[np.bool_]:
 
 
 def relative_times(demos: Demonstrations) -> Array:
-    """Times (total,) from the start of each movement."""
+    """Return times (total,) from the start of each movement."""
     return demos.times - np.repeat(demos.times[demos.offsets[:-1]], demos.lengths)
 
 
 def serialize(demos: Demonstrations, even: NDArray[np.bool_], specification: Specification) -> SerializedRows:
-    """The rows of a batch that has been checked.
+    """Return the rows of a batch that has been checked.
 
     Raises
     ------
@@ -83,10 +83,6 @@ def serialize(demos: Demonstrations, even: NDArray[np.bool_], specification: Spe
     """
     recorded = demos.movements.recorded
     others = [] if recorded is None else to_bytes(recorded, demos.offsets, demos.channels or ())
-    return SerializedRows(_raw(demos, even), _primitives(demos, specification), _features(demos, specification), others)
-
-
-def _raw(demos: Demonstrations, even: NDArray[np.bool_]) -> list[tuple[bytes, bytes, bytes | None]]:
     starts = demos.positions[demos.offsets[:-1]]
     relative = (demos.positions - np.repeat(starts, demos.lengths, axis=0)).astype(np.float32)
     offsets = demos.offsets.tolist()
@@ -97,11 +93,13 @@ def _raw(demos: Demonstrations, even: NDArray[np.bool_]) -> list[tuple[bytes, by
             times[i] = stored_times(stamps[offsets[i] : offsets[i + 1]])
     blob, row = relative.tobytes(), 4 * demos.n_dims
     positions = [blob[row * a : row * b] for a, b in pairwise(offsets)]
-    return list(zip(_cut(starts), positions, times, strict=True))
+    raw = list(zip(_cut(starts), positions, times, strict=True))
+    rows = np.concatenate(feature_rows(demos, specification.comparison), axis=1, dtype=np.float32)
+    return SerializedRows(raw, _primitives(demos, specification), _cut(rows), others)
 
 
 def stored_times(stamps: Array) -> bytes:
-    """Times in single precision; in double if single overflows, or makes two stamps equal."""
+    """Return times in single precision; in double if single overflows, or makes two stamps equal."""
     if not _SMALL <= stamps[-1] <= _LARGE:
         return stamps.tobytes()
     short = stamps.astype(np.float32)
@@ -122,12 +120,7 @@ def _primitives(demos: Demonstrations, specification: Specification) -> list[tup
     return list(zip(_cut(boundary), _cut(weights), strict=True))
 
 
-def _features(demos: Demonstrations, specification: Specification) -> list[bytes]:
-    rows = feature_rows(demos, specification.comparison)
-    return _cut(np.concatenate(rows, axis=1, dtype=np.float32))
-
-
 def _cut(block: NDArray[np.floating]) -> list[bytes]:
-    """Each movement's bytes of a block (n, ...)."""
+    """Return each movement's bytes of a block (n, ...)."""
     blob, size = block.tobytes(), block[0].nbytes
     return [blob[k : k + size] for k in range(0, len(blob), size)]

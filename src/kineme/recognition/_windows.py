@@ -11,7 +11,7 @@ from kineme.runtime.compiled import jit
 
 @jit
 def fill_windows(times, positions, start, end, share, windows):  # type: ignore[no-untyped-def]
-    """The recording at shares of the time from `start` to `end`, (n, T, d); see `candidate_windows.resampled`."""
+    """Fill in the recording at shares of the time from `start` to `end`, (n, T, d); see `resampled`."""
     n, n_points, n_dims = windows.shape
     last = len(times) - 2
     for i in range(n):
@@ -27,7 +27,7 @@ def fill_windows(times, positions, start, end, share, windows):  # type: ignore[
 
 @jit
 def fill_size_and_slowness(samples, slow, sizes, slowness):  # type: ignore[no-untyped-def]
-    """Of paths (n, T, d) their root mean square distance from the center, and the share of steps that are slow.
+    """Fill in the distances of paths (n, T, d) from their centers, root mean square, and the shares of slow steps.
 
     See `compared_windows.size_and_slowness`.
     """

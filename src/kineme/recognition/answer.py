@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +13,8 @@ from numpy.typing import NDArray
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import Label
 from kineme.movements.trajectories.trajectory import MovementLike, MovementsLike, Trajectory
-from kineme.recognition.certainty import Certainty, certainty, in_words
 from kineme.recognition.classifiers import Classifier, NearestEach
-from kineme.recognition.confidence import class_probabilities
-from kineme.recognition.conformal import GUESSES, RULES, Calibration
+from kineme.recognition.conformal import GUESSES, RULES, Calibration, class_probabilities
 from kineme.recognition.transform import Transform, map_onto
 from kineme.reporting.table import Table, data_frame, to_html
 from kineme.similarity.comparison import Comparison
@@ -26,6 +25,12 @@ from kineme.validation import Array
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+Certainty = Literal["sure", "probably", "looks like", "new"]
+
+#: Word -> the least confidence that it takes. The guide to recognition has the shares of right answers by word.
+LEAST_CONFIDENCE = MappingProxyType({"sure": 0.999, "probably": 0.99})
 
 _SHOWN = 3  # demonstrations named in an answer
 _LISTED = 10  # classes that a notebook shows
@@ -103,12 +108,12 @@ class Answer:
 
     @property
     def promise(self) -> str:
-        """What the rule says of known movements that are called unknown, in one sentence."""
+        """Promise of the rule about known movements that are called unknown, in one sentence."""
         return RULES[self.rule]
 
     @property
     def certainty(self) -> Certainty:
-        """How sure the answer is: "sure", "probably", "looks like", or "new" if it is unknown.
+        """Certainty of the answer: "sure", "probably", "looks like", or "new" if it is unknown.
 
         Nothing is more than "looks like" where the rule is "strangers" or "guess", whatever the confidence.
         """
@@ -116,7 +121,7 @@ class Answer:
 
     @property
     def in_words(self) -> str:
-        """How sure it is and the label, such as "sure GShape"; or what the movement is most like if it is new."""
+        """Certainty and label, such as "sure GShape"; or what the movement is most like if it is new."""
         return in_words(self.certainty, str(self.label), str(self.ranked[0]))
 
     def to_pandas(self) -> Any:
@@ -181,14 +186,14 @@ class Answer:
 
 
 def is_one(X: MovementsLike) -> bool:
-    """Whether this is one movement: a `Trajectory`, or an array of shape (T,) or (T, d)."""
+    """Tell whether this is one movement: a `Trajectory`, or an array of shape (T,) or (T, d)."""
     return isinstance(X, Trajectory) or (isinstance(X, np.ndarray) and X.dtype != object and X.ndim <= 2)
 
 
 def known_labels(
     classes: NDArray[Any], scores: Array, nearest: Array, calibration: Calibration, error_rate: float
 ) -> NDArray[np.object_]:
-    """The best class of each row, among those with a p-value above the error rate if there are any; None if unknown.
+    """Choose the best class of each row, among those with a p-value above the error rate if any; None if unknown.
 
     Parameters
     ----------
@@ -205,12 +210,12 @@ def known_labels(
 
 
 def _known_labels(
-    classes: NDArray[Any], scores: Array, possible: NDArray[np.bool_], known: NDArray[np.bool_]
+    classes: NDArray[Any], scores: Array, possible: NDArray[np.bool_], are_known: NDArray[np.bool_]
 ) -> NDArray[np.object_]:
-    """The same, of classes that are possible (n, C) and movements that are known (n,)."""
+    """Choose among classes that are possible (n, C), for movements that are known (n,)."""
     possible = possible | ~possible.any(axis=1, keepdims=True)
     labels = classes.astype(object)[np.where(possible, scores, -np.inf).argmax(axis=1)]
-    labels[~known] = None
+    labels[~are_known] = None
     return np.asarray(labels)
 
 
@@ -222,16 +227,16 @@ def answers(
     demos: Demonstrations,
     error_rate: float,
 ) -> list[Answer]:
-    """An answer for each movement."""
-    found: dict[int, list[Answer]] = {}
+    """Return an answer for each movement."""
+    parts: dict[int, list[Answer]] = {}
 
     def answer(tile: Tile, compared: Compared) -> None:
         some = demos if len(compared) == len(demos) else demos[tile.start : tile.stop]
         paths = recorded_paths(some, tile.paths)
-        found[tile.start] = answers_to(compared, classifier, calibration, some, paths, error_rate)
+        parts[tile.start] = answers_to(compared, classifier, calibration, some, paths, error_rate)
 
     for_compared(comparison, references, demos, answer)
-    return [one for start in sorted(found) for one in found[start]]
+    return [each for start in sorted(parts) for each in parts[start]]
 
 
 def answers_to(
@@ -242,7 +247,7 @@ def answers_to(
     paths: Array,
     error_rate: float,
 ) -> list[Answer]:
-    """An answer for each movement of a tile that was compared; `paths` (n, d, T) are where they were recorded."""
+    """Return an answer for each movement of a compared tile; `paths` (n, d, T) are where they were recorded."""
     verdicts = verdicts_of(compared, classifier, calibration, error_rate)
     return with_transforms(verdicts, compared.comparison, compared.references.demonstrations, demos, paths)
 
@@ -266,7 +271,7 @@ class Verdict(NamedTuple):
 def verdicts_of(
     compared: Compared, classifier: Classifier, calibration: Calibration, error_rate: float
 ) -> list[Verdict]:
-    """What each movement is, from how it compares."""
+    """Tell what each movement is, from how it compares."""
     scores = classifier.scores(compared)
     p = calibration.p_values(compared.nearest, error_rate)
     calibrated = bool(calibration.calibrated(error_rate).all())
@@ -281,11 +286,11 @@ def verdicts_of(
     slices = list(references.slices())
     like = [_nearest(references, compared.log_average[i], slices[c]) for i, c in enumerate(shown.tolist())]
     share = compared.shares(np.array([near[0].index for near in like], dtype=np.intp))
-    names = [one.name for one in compared.comparison.representations]
-    known = np.array([label is not None for label in labels])
+    names = [representation.name for representation in compared.comparison.representations]
+    is_known = np.array([label is not None for label in labels])
     similar = compared.nearest_each if isinstance(classifier, NearestEach) else compared.nearest
     probabilities = class_probabilities(similar, calibration.exponent)
-    confidence = np.where(known, probabilities[np.arange(len(shown)), shown], 1.0 - p_known).tolist()
+    confidence = np.where(is_known, probabilities[np.arange(len(shown)), shown], 1.0 - p_known).tolist()
     return [
         Verdict(
             labels[i],
@@ -311,26 +316,52 @@ def with_transforms(
     demos: Demonstrations,
     paths: Array,
 ) -> list[Answer]:
-    """The answers to movements: with the transforms from those of the references that they are most like."""
-    example = np.array([one.nearest[0].index for one in verdicts], dtype=np.intp)
-    share = np.stack([one.shares for one in verdicts], axis=1)
+    """Return the answers to movements: with the transforms from those of the references that they are most like."""
+    example = np.array([verdict.nearest[0].index for verdict in verdicts], dtype=np.intp)
+    share = np.stack([verdict.shares for verdict in verdicts], axis=1)
     transforms = map_onto(comparison, references, example, demos, paths, share)
-    parts = [one._asdict() for one in verdicts]
-    for one in parts:
-        del one["shares"]
-    return [Answer(**one, transform=each) for one, each in zip(parts, transforms, strict=True)]
+    parts = [verdict._asdict() for verdict in verdicts]
+    for fields in parts:
+        del fields["shares"]
+    return [Answer(**fields, transform=each) for fields, each in zip(parts, transforms, strict=True)]
 
 
 def _by_name(names: Sequence[str], share: Array) -> dict[str, float]:
-    """Shares of the representations (R,); those of one name, which differ in resolution only, together."""
-    found = dict.fromkeys(names, 0.0)
-    for name, one in zip(names, share.tolist(), strict=True):
-        found[name] += one
-    return found
+    """Return shares of the representations (R,); those of one name, which differ in resolution only, together."""
+    by_name = dict.fromkeys(names, 0.0)
+    for name, value in zip(names, share.tolist(), strict=True):
+        by_name[name] += value
+    return by_name
 
 
 def _nearest(references: References, logs: Array, rows: slice) -> tuple[Neighbor, ...]:
-    """The nearest references of one class, which are in these rows."""
+    """Return the nearest references of one class, which are in these rows."""
     best = rows.start + np.argsort(-logs[rows], kind="stable")[:_SHOWN]
     names = references.demonstrations.names
     return tuple(Neighbor(int(i), names[i] if names else None, float(np.exp(logs[i]))) for i in best)
+
+
+def certainty(confidence: float, *, is_new: bool, is_guess: bool, is_over: bool = True) -> Certainty:
+    """Tell how sure it is that a movement is of the class that is said.
+
+    Parameters
+    ----------
+    confidence : float
+        Probability of that class if the movement is of a known one.
+    is_new : bool
+        Whether the movement is unlike every known class.
+    is_guess : bool
+        Whether too few demonstrations tell what is unlike them: the answer then is what the movement looks like.
+    is_over : bool
+        Whether the whole movement was seen. What is under way looks like a class, no more: it may go on otherwise.
+    """
+    if is_new:
+        return "new"
+    if is_guess or not is_over or confidence < LEAST_CONFIDENCE["probably"]:
+        return "looks like"
+    return "sure" if confidence >= LEAST_CONFIDENCE["sure"] else "probably"
+
+
+def in_words(word: Certainty, name: str, most_like: str) -> str:
+    """Return the word with the name that it is about: of what is new, that which it is most like."""
+    return f"new, most like {most_like}" if word == "new" else f"{word} {name}"

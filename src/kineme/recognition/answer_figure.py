@@ -61,7 +61,7 @@ def draw_answer(
             draw_movements_beside(left, paths)
         rows = bars.subplots(2, 1, height_ratios=(len(ranked), len(parts)))
         colors = [BLUE if label == shares.label else GRAY for label in ranked]
-        _draw_bars(rows[0], [str(one) for one in ranked], [shares.classes[one] for one in ranked], colors)
+        _draw_bars(rows[0], [str(label) for label in ranked], [shares.classes[label] for label in ranked], colors)
         _draw_bars(rows[1], [*parts], [*parts.values()], GRAY)
         rows[0].set(xlabel="probability, if it is known", title=drawable(shortened(shares.title, 2 * _NAME)))
         rows[1].set_xlabel("share in the similarity")
@@ -76,7 +76,7 @@ def _draw_bars(axes: Any, names: list[str], values: list[float], color: Any) -> 
 
 
 def _beside(example: Example, movement: Demonstrations, demonstrations: Demonstrations) -> Paths:
-    """The movement, and the nearest demonstration mapped onto it, begun with it."""
+    """Return the movement, and the nearest demonstration mapped onto it, begun with it."""
     i, shown, transform = example
     n_dims = len(transform.shift)
     if len(movement) != 1 or {movement.n_dims, demonstrations.n_dims} != {n_dims}:

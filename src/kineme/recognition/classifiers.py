@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from kineme.errors import SpecificationError
 from kineme.similarity.comparison import Comparison
 from kineme.similarity.described import Described
-from kineme.similarity.log_averages import LOG_MEANS
 from kineme.similarity.most_similar import most_similar
 from kineme.similarity.references import References
 from kineme.similarity.scores import Compared
 from kineme.similarity.similarity import AveragedSimilarity
+from kineme.similarity.specification import LOG_MEANS
 from kineme.validation import Array
 
 _WIDER = 2.0  # times the width: an impostor then has a similarity of exp(-0.8)
@@ -28,11 +28,11 @@ class Classifier(Protocol):
     """A fitted classifier: scores of each class."""
 
     def scores(self, compared: Compared) -> Array:
-        """A score per class, shape (n, C): larger is more like it."""
+        """Return a score per class, shape (n, C): larger is more like it."""
         ...
 
     def best(self, compared: Compared) -> NDArray[np.intp]:
-        """Index (n,) of the class with the largest score."""
+        """Return the index (n,) of the class with the largest score."""
         ...
 
 
@@ -41,11 +41,11 @@ class Nearest:
     """Each class scores as its most similar reference: the nearest neighbor by the averaged kernel."""
 
     def scores(self, compared: Compared) -> Array:
-        """Logarithm of the largest similarity to a reference of each class."""
+        """Return the logarithm of the largest similarity to a reference of each class."""
         return compared.nearest
 
     def best(self, compared: Compared) -> NDArray[np.intp]:
-        """The class of the most similar reference, without the distances that cannot change it."""
+        """Return the class of the most similar reference, without the distances that cannot change it."""
         references = compared.references
         chosen = most_similar(compared.comparison.similarity, compared.described, references.described)
         return np.searchsorted(references.first, chosen, side="right") - 1
@@ -60,11 +60,11 @@ class NearestEach:
     """
 
     def scores(self, compared: Compared) -> Array:
-        """Logarithm of the average of the largest similarities to a reference of each class."""
+        """Return the logarithm of the average of the largest similarities to a reference of each class."""
         return compared.nearest_each
 
     def best(self, compared: Compared) -> NDArray[np.intp]:
-        """Index (n,) of the class with the largest score."""
+        """Return the index (n,) of the class with the largest score."""
         if len(compared.references) == len(compared.references.classes):
             return Nearest().best(compared)
         return self.scores(compared).argmax(axis=1)
@@ -86,11 +86,11 @@ class Prototype:
     described: Described
 
     def scores(self, compared: Compared) -> Array:
-        """Logarithm of the similarity to each class's medoid."""
+        """Return the logarithm of the similarity to each class's medoid."""
         return compared.comparison.similarity.log_average(compared.described, self.described)
 
     def best(self, compared: Compared) -> NDArray[np.intp]:
-        """The class of the most similar medoid."""
+        """Return the class of the most similar medoid."""
         return most_similar(compared.comparison.similarity, compared.described, self.described)
 
 
@@ -112,23 +112,23 @@ class SupportVectors:
     model: Any
 
     def scores(self, compared: Compared) -> Array:
-        """The SVM's decision values; of two classes, the negative and the positive one."""
+        """Return the SVM's decision values; of two classes, the negative and the positive one."""
         gram = np.exp(LOG_MEANS[self.similarity.mean](self.similarity.logs_at(compared.squares)))
         values = np.asarray(self.model.decision_function(gram))
         return np.column_stack((-values, values)) if values.ndim == 1 else values
 
     def best(self, compared: Compared) -> NDArray[np.intp]:
-        """Index (n,) of the class with the largest decision value."""
+        """Return the index (n,) of the class with the largest decision value."""
         return self.scores(compared).argmax(axis=1)
 
 
 def fit_nearest(comparison: Comparison, references: References) -> Nearest:
-    """There is nothing to fit."""
+    """Fit nothing: there is nothing to fit."""
     return Nearest()
 
 
 def fit_nearest_each(comparison: Comparison, references: References) -> NearestEach:
-    """There is nothing to fit."""
+    """Fit nothing: there is nothing to fit."""
     return NearestEach()
 
 
@@ -184,5 +184,5 @@ AUTO = "nearest-each"
 
 
 def fit_classifier(name: str, comparison: Comparison, references: References) -> Classifier:
-    """The classifier of that name, or the one that "auto" stands for."""
+    """Return the classifier of that name, or the one that "auto" stands for."""
     return CLASSIFIERS[AUTO if name == "auto" else name](comparison, references)

@@ -6,6 +6,7 @@ distance is: that is estimated from some windows, which are compared completely.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import partial
@@ -13,10 +14,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import find_peaks
 
-from kineme.movements.segmentation.motion import Motion, Rows
+from kineme.movements.segmentation.motion import Motion, Rows, observe
+from kineme.movements.segmentation.segment import moving
+from kineme.movements.segmentation.table import Rest
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.recognition.candidate_windows import N_POINTS, resampled
+from kineme.movements.trajectories.movements import Movements
+from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.recognition.conformal import Calibration
 from kineme.recognition.left_out import LEAST
 from kineme.runtime.compiled import compiled_module, use_compiled
@@ -28,9 +33,19 @@ from kineme.similarity.references import References
 from kineme.similarity.scores import Compared, Score, nearest, score
 from kineme.validation import Array
 
+MIN_SAMPLES = 8  # of a window
+N_POINTS = 64  # even samples by which a window is described
+RESOLUTION = 0.04  # share of the peak speed that must be distinguished from rest
+_SHARE = 0.12  # distance of boundaries, in durations of the shortest windows between them
+_DEPTH = 0.2  # prominence, in the logarithm of speed, of a minimum that is a boundary
+_FLOOR = 0.02  # of the peak speed: lower speeds count as equally slow
+_SLOW = 0.02  # share of the peak speed below which a sample counts as at rest
+_MOST_REST = 0.6  # share of a window at rest
+_DRIFT = 0.2  # share of the peak speed: a drift that covers less path between boundaries gets none
+
 _TILE, _AT_ONCE = 4096, 256  # windows between two calls of `progress`, and those that a thread describes at a time
 _COMPLETELY = 65_536  # windows that are compared completely, evenly spaced: all those of a few minutes
-_SLOW = 0.2  # share of the mean speed of a window below which it rests
+_RESTING = 0.2  # share of the mean speed of a window below which it rests
 _COMMON = 0.2  # share of the windows of a recording whose distance to a class, or less, is common
 _OPERATIONS_PER_SAMPLE = 8  # of the size of a path
 _RARITY = 0.3  # power with which distances count in common ones
@@ -39,7 +54,7 @@ Progress = Callable[[float], object]  # takes the share that is done
 
 
 class Templates(NamedTuple):
-    """What windows are compared with."""
+    """Known movements that windows are compared with."""
 
     comparison: Comparison
     references: References
@@ -67,8 +82,8 @@ class ComparedWindows:
     slowness: Array
 
     def take(self, chosen: Any) -> ComparedWindows:
-        """The chosen windows: a mask or indices."""
-        return ComparedWindows(*(getattr(self, one.name)[chosen] for one in fields(self)))
+        """Return the chosen windows: a mask or indices."""
+        return ComparedWindows(*(getattr(self, attribute.name)[chosen] for attribute in fields(self)))
 
 
 class Candidates(NamedTuple):
@@ -89,19 +104,19 @@ class Candidates(NamedTuple):
     completely: NDArray[np.bool_]
 
     def weighted(self) -> ComparedWindows:
-        """With weighted scores."""
-        rows, scores, *others = (getattr(self.compared, one.name) for one in fields(self.compared))
+        """Return the windows with weighted scores."""
+        rows, scores, *others = (getattr(self.compared, attribute.name) for attribute in fields(self.compared))
         return ComparedWindows(rows, scores * self.weights, *others)
 
 
 def compare_candidates(
-    known: Templates, motion: Motion, rows: Rows, reach: float, progress: Progress | None = None
+    templates: Templates, motion: Motion, rows: Rows, reach: float, progress: Progress | None = None
 ) -> Candidates:
     """Compare the windows from sample rows[:, 0] to rows[:, 1] with the references.
 
     Parameters
     ----------
-    known : Templates
+    templates : Templates
     motion : Motion
     rows : ndarray of shape (n, 2)
     reach : float
@@ -112,39 +127,41 @@ def compare_candidates(
     completely = np.zeros(len(rows), dtype=bool)
     completely[evenly_spaced(len(rows), _COMPLETELY)] = True
     share = completely.mean()
-    some = compare_windows(known, motion, rows[completely], progress=_part(progress, 0.0, share))
-    weights = rarity_weights(some.scores * known.calibration.scales)
+    some = compare_windows(templates, motion, rows[completely], progress=_part(progress, 0.0, share))
+    weights = rarity_weights(some.scores * templates.calibration.scales)
     if completely.all():
         return Candidates(some, weights, completely)
-    others = compare_windows(known, motion, rows[~completely], reach / weights, _part(progress, share, 1.0 - share))
+    others = compare_windows(templates, motion, rows[~completely], reach / weights, _part(progress, share, 1.0 - share))
     order = np.argsort(np.concatenate((np.flatnonzero(completely), np.flatnonzero(~completely))))
-    both = (np.concatenate((getattr(some, one.name), getattr(others, one.name))) for one in fields(some))
+    both = (
+        np.concatenate((getattr(some, attribute.name), getattr(others, attribute.name))) for attribute in fields(some)
+    )
     return Candidates(ComparedWindows(*both).take(order), weights, completely)
 
 
 def _part(progress: Progress | None, begin: float, share: float) -> Progress | None:
-    """Progress of a part of the work."""
+    """Return progress of a part of the work."""
     return None if progress is None else lambda done: progress(min(1.0, begin + done * share))
 
 
 def compare_windows(
-    known: Templates, motion: Motion, rows: Rows, within: Array | None = None, progress: Progress | None = None
+    templates: Templates, motion: Motion, rows: Rows, within: Array | None = None, progress: Progress | None = None
 ) -> ComparedWindows:
     """Compare windows with the references, tile by tile, in threads.
 
     With `within` (C,), scores above that of the class may be lower bounds, which exceed it too.
     """
     start, end = motion.times[rows].T
-    scores = np.empty((len(rows), len(known.references.classes)))
+    scores = np.empty((len(rows), len(templates.references.classes)))
     sizes, slowness = np.empty((2, len(rows)))
-    by = nearest if within is None else _nearest_within(known, within)
+    by = nearest if within is None else _nearest_within(templates, within)
 
     def fill(begin: int, first: int, last: int) -> None:
         tile = slice(begin + first, begin + last)
         demos = Demonstrations.of_movements(resampled(motion, start[tile], end[tile]))
         paths = demos.positions.reshape(len(demos), N_POINTS, -1).transpose(0, 2, 1)
         sizes[tile], slowness[tile] = size_and_slowness(paths)
-        scores[tile] = known.calibration.scores(score(known.comparison, known.references, demos, by)[0])
+        scores[tile] = templates.calibration.scores(score(templates.comparison, templates.references, demos, by)[0])
 
     for begin in range(0, len(rows), _TILE):
         n = min(_TILE, len(rows) - begin)
@@ -154,10 +171,10 @@ def compare_windows(
     return ComparedWindows(rows, scores, np.log(end - start), sizes, slowness)
 
 
-def _nearest_within(known: Templates, within: Array) -> Score:
-    """Log similarity to the nearest reference of each class, exact where the nonconformity is within a bar (C,)."""
-    bars = np.exp(-0.5 * (within * known.calibration.scales) ** 2)
-    similarity, references = known.comparison.similarity, known.references
+def _nearest_within(templates: Templates, within: Array) -> Score:
+    """Return a score: log similarity to each class, exact where the nonconformity is within a bar (C,)."""
+    bars = np.exp(-0.5 * (within * templates.calibration.scales) ** 2)
+    similarity, references = templates.comparison.similarity, templates.references
 
     def by(compared: Compared) -> Array:
         return nearest_above(similarity, compared.described, references.described, references.first, bars)
@@ -166,20 +183,20 @@ def _nearest_within(known: Templates, within: Array) -> Score:
 
 
 def size_and_slowness(paths: Array) -> tuple[Array, Array]:
-    """Logarithm of the size of each path (n, d, T), and the share of its steps that are far below the mean step."""
+    """Return log sizes of paths (n, d, T), and the shares of their steps that are far below the mean step."""
     if use_compiled(_OPERATIONS_PER_SAMPLE * paths.size):
         size, slow = np.empty((2, len(paths)))
         samples = np.ascontiguousarray(paths.transpose(0, 2, 1))
-        compiled_module("kineme.recognition._windows").fill_size_and_slowness(samples, _SLOW, size, slow)
+        compiled_module("kineme.recognition._windows").fill_size_and_slowness(samples, _RESTING, size, slow)
         return np.log(np.maximum(size, np.finfo(float).tiny)), slow
     size = np.sqrt(paths.var(axis=2).sum(axis=1))
     steps = np.linalg.norm(np.diff(paths, axis=2), axis=1)
-    slow = (steps <= _SLOW * steps.mean(axis=1, keepdims=True)).mean(axis=1)
+    slow = (steps <= _RESTING * steps.mean(axis=1, keepdims=True)).mean(axis=1)
     return np.log(np.maximum(size, np.finfo(float).tiny)), slow
 
 
 def rarity_weights(distances: Array) -> Array:
-    """Weights (C,) of scores, larger for classes that much of the recording is near to.
+    """Return weights (C,) of scores, larger for classes that much of the recording is near to.
 
     Simple shapes are part of many movements: of a sphere drawn in space, a half is a circle. Scores of class c are
     divided by ``m_c^0.3``, with m_c the distance that a fifth of the windows is within, over the geometric mean of all
@@ -192,3 +209,172 @@ def rarity_weights(distances: Array) -> Array:
     """
     common = np.log(np.maximum(np.quantile(distances, _COMMON, axis=0), LEAST))
     return np.asarray(np.exp(_RARITY * (common.mean() - common)))
+
+
+class Durations(NamedTuple):
+    """Shortest and longest that a movement may take [s]."""
+
+    shortest: float
+    longest: float
+
+
+@dataclass(frozen=True, eq=False)
+class Windows:
+    """n windows of one recording; they overlap.
+
+    Attributes
+    ----------
+    motion : Motion
+        Of the whole recording.
+    bouts : ndarray of shape (b, 2)
+        Stretches of motion between rests: first sample, and one past the last.
+    rows : ndarray of shape (n, 2)
+        First and last sample of each window.
+    """
+
+    motion: Motion
+    bouts: Rows
+    rows: Rows
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+
+class Surroundings(NamedTuple):
+    """Ends of n windows and rests in them, each of shape (n,).
+
+    Attributes
+    ----------
+    edge_speeds : ndarray
+        Sum of the speeds at both ends, each in peak speeds and at most 1.
+    far_from_rest : ndarray
+        Sum over both ends of the distance to the nearest rest, each at most 1.
+    at_rest : ndarray
+        Share of the duration.
+    rests_inside : ndarray
+        How many rests a window spans.
+    """
+
+    edge_speeds: Array
+    far_from_rest: Array
+    at_rest: Array
+    rests_inside: Array
+
+
+def candidate_windows(recording: Trajectory, durations: Durations | None, most_bouts: int) -> Windows:
+    """Return windows between boundaries of a recording.
+
+    Boundaries are the ends of rests, minima of speed, and, where these are far apart, samples at even times. Windows up
+    to twice as long as the shortest have boundaries of their own, those up to four times as long have boundaries twice
+    as far apart, and so on, so that the number of windows grows with the logarithm of the range of durations only.
+
+    Parameters
+    ----------
+    recording : Trajectory
+    durations : Durations or None
+        None where they are unknown: from a quarter of the typical stretch between rests to four times it.
+    most_bouts : int
+        Most stretches between rests that a window may span.
+    """
+    motion = observe(recording, RESOLUTION)
+    rest = Rest()
+    bouts = moving(motion, rest.pieces(motion), rest.resolution)
+    if not len(bouts):
+        return Windows(motion, bouts, bouts)
+    t = motion.times
+    typical = float(np.median(t[bouts[:, 1] - 1] - t[bouts[:, 0]]))  # stretch between rests
+    least, most = durations or Durations(0.25 * typical, 4.0 * typical)
+    least = max(least, MIN_SAMPLES * float(np.median(np.diff(t))))
+    most = min(max(most, least), float(t[-1] - t[0]))
+    rows = [np.empty((0, 2), dtype=np.intp)]
+    n_levels = max(1, math.ceil(math.log2(most / least) - 1e-9))
+    for level in range(n_levels):
+        shortest = least * 2.0**level
+        longest = 2.0 * shortest if level < n_levels - 1 else most * (1.0 + 1e-9)
+        rows.append(_between(_boundaries(motion, bouts, _SHARE * shortest), t, shortest, longest))
+    windows = np.unique(np.concatenate(rows), axis=0)
+    around = surroundings(motion, bouts, windows)
+    return Windows(
+        motion, bouts, windows[(around.at_rest <= _MOST_REST) & (around.rests_inside < min(most_bouts, len(bouts)))]
+    )
+
+
+def _boundaries(motion: Motion, bouts: Rows, gap: float) -> Rows:
+    """Return samples about `gap` seconds apart, at ends of rests and minima of speed where there are any nearby."""
+    t = motion.times
+    slowness = -np.log(motion.speed + max(_FLOOR * motion.peak, 2.0 * motion.noise))
+    minima = find_peaks(slowness, prominence=_DEPTH)[0]
+    inside = np.zeros(len(t), dtype=bool)
+    for start, stop in bouts.tolist():
+        inside[start:stop] = True
+    ends = np.unique(np.concatenate(([0], bouts[:, 0], bouts[:, 1] - 1, [len(t) - 1])))
+    minima = minima[inside[minima]]
+    chosen = _apart(t, ends, minima[np.argsort(-slowness[minima], kind="stable")], 0.5 * gap)
+    wanted = np.diff(t[chosen]) / gap
+    path = np.append(0.0, np.cumsum(0.5 * np.diff(t) * (motion.speed[1:] + motion.speed[:-1])))
+    resting = ~inside[(chosen[:-1] + chosen[1:]) // 2]
+    drift = np.diff(path[chosen]) / (_DRIFT * motion.peak * gap)
+    wanted = np.where(resting, np.minimum(wanted, np.floor(drift)), wanted)
+    parts = np.clip(np.round(wanted), 1, np.diff(chosen)).astype(np.intp)
+    which = np.repeat(np.arange(len(parts)), parts)
+    share = (np.arange(len(which)) - np.repeat(np.cumsum(parts) - parts, parts)) / parts[which]
+    even = t[chosen[which]] + share * np.diff(t[chosen])[which]
+    return np.unique(np.append(np.minimum(np.searchsorted(t, even), len(t) - 1), len(t) - 1))
+
+
+def _apart(t: Array, always: Rows, ordered: Rows, distance: float) -> Rows:
+    """Choose samples: all of `always`, and those of the others, in order, that are no nearer than `distance` [s]."""
+    taken = np.zeros(len(t), dtype=bool)
+    taken[always] = True
+    for i in ordered.tolist():
+        low, high = np.searchsorted(t, (t[i] - distance, t[i] + distance), side="right")
+        if not taken[low:high].any():
+            taken[i] = True
+    return np.flatnonzero(taken)
+
+
+def _between(boundaries: Rows, t: Array, shortest: float, longest: float) -> Rows:
+    """Return all pairs of boundaries whose distance is from `shortest` to below `longest`, rows (n, 2)."""
+    at = t[boundaries]
+    low, high = np.searchsorted(at, at + shortest), np.searchsorted(at, at + longest)
+    count = np.maximum(high - low, 0)
+    first = np.repeat(np.arange(len(at)), count)
+    last = np.arange(len(first)) - np.repeat(np.cumsum(count) - count, count) + low[first]
+    rows = boundaries[np.column_stack((first, last))]
+    return rows[rows[:, 1] - rows[:, 0] >= MIN_SAMPLES - 1]
+
+
+def surroundings(motion: Motion, bouts: Rows, rows: Rows, reach: float = 0.15) -> Surroundings:
+    """Measure the ends of windows, and the rests between; ends are far from a rest by `reach` of the duration."""
+    t = motion.times
+    speeds = np.minimum(motion.speed / motion.peak, 1.0)
+    still = np.append(0.0, np.cumsum(np.diff(t) * (speeds[1:] <= _SLOW)))
+    lasting = t[rows[:, 1]] - t[rows[:, 0]]
+    ends = np.sort(np.concatenate((t[bouts[:, 0]], t[bouts[:, 1] - 1], [-np.inf, np.inf])))
+    times = t[rows]
+    after = np.searchsorted(ends, times)
+    distance = np.minimum(ends[after] - times, times - ends[after - 1])
+    spanned = np.searchsorted(bouts[:, 0], rows[:, 1]) - np.searchsorted(bouts[:, 1], rows[:, 0] + 1)
+    return Surroundings(
+        speeds[rows].sum(axis=1),
+        np.minimum(distance / (reach * lasting[:, None]), 1.0).sum(axis=1),
+        (still[rows[:, 1]] - still[rows[:, 0]]) / lasting,
+        np.maximum(spanned - 1, 0).astype(np.float64),
+    )
+
+
+def resampled(motion: Motion, start: Array, end: Array) -> Movements:
+    """Return the smoothed recording from `start` to `end` (n,) [s], each at `N_POINTS` even times."""
+    t, x = motion.times, motion.positions
+    share = np.linspace(0.0, 1.0, N_POINTS)
+    offsets: NDArray[np.intp] = np.arange(len(start) + 1) * N_POINTS
+    if use_compiled(_OPERATIONS_PER_SAMPLE * len(start) * N_POINTS * x.shape[1]):
+        windows = np.empty((len(start), N_POINTS, x.shape[1]))
+        fill = compiled_module("kineme.recognition._windows").fill_windows
+        fill(*map(np.ascontiguousarray, (t, x, start, end)), share, windows)
+        return Movements(windows.reshape(-1, x.shape[1]), offsets, np.asarray(end - start))
+    at = (start[:, None] + (end - start)[:, None] * share).ravel()
+    below = np.clip(np.searchsorted(t, at, side="right") - 1, 0, len(t) - 2)
+    weight = ((at - t[below]) / (t[below + 1] - t[below]))[:, None]
+    positions = x[below] * (1.0 - weight) + x[below + 1] * weight
+    return Movements(np.ascontiguousarray(positions), offsets, np.asarray(end - start))

@@ -6,7 +6,8 @@ Source: V. Vovk, A. Gammerman, G. Shafer, "Algorithmic Learning in a Random Worl
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
-from kineme.recognition.confidence import EXPONENT, fit_exponent
 from kineme.recognition.left_out import (
     LEAST,
     REACH,
@@ -37,6 +37,15 @@ from kineme.sampling import evenly_spaced
 from kineme.similarity.references import References
 from kineme.similarity.similarity import AveragedSimilarity
 from kineme.validation import Array, check_number
+
+#: Power of the ratio of distances before anything is known of it. The right classes of 20 gestures in space by five
+#: people, one to four demonstrations of each, are most likely at 14.3 with demonstrations by the same person and at
+#: 15.7 with those by others (``python -m bench --only open_set``).
+EXPONENT = 15.0
+#: By how much the logarithms of the power differ between sets of movements, about: 5 to 36 were most likely on seven.
+_SPREAD = 0.35
+_BOUNDS = (2.0, 60.0)
+_ROWS = 2000  # demonstrations that the power is fitted to, at most, evenly spaced
 
 _REPEATED = 0.1  # of the median distance to other classes: the least scale
 _CALIBRATED = 100  # demonstrations of a class that calibrate it, at most, evenly spaced
@@ -134,15 +143,15 @@ class Calibration:
     exponent: float = EXPONENT
 
     def of_those_shown(self) -> Calibration:
-        """The calibration for movements by those who showed some, whatever the groups."""
+        """Return the calibration for movements by those who showed some, whatever the groups."""
         return replace(self, between=0.0)
 
     def scores(self, nearest: Array) -> Array:
-        """Nonconformity (n, C) of movements whose log similarity to each class's nearest demonstration is given."""
+        """Return the nonconformity (n, C) of movements with these log similarities to each class's nearest one."""
         return distances(nearest) / self.scales
 
     def p_values(self, nearest: Array, error_rate: float) -> Array:
-        """P-values of each class (n, C), from as few classes as suffice to reach `error_rate`."""
+        """Return p-values of each class (n, C), from as few classes as suffice to reach `error_rate`."""
         scores = self.scores(nearest)
         result = broad_law(scores)
         for c, counted in enumerate(self._counting(error_rate)[0]):
@@ -151,7 +160,7 @@ class Calibration:
         return result
 
     def known_p_values(self, nearest: Array, error_rate: float) -> Array:
-        """P-values (n,) of all known classes together: unknown is what has one of at most `error_rate`."""
+        """Return p-values (n,) of all known classes together: unknown is what has one of at most `error_rate`."""
         return np.maximum(self._by_those_shown(nearest, error_rate), self._by_strangers(nearest))
 
     def _by_those_shown(self, nearest: Array, error_rate: float) -> Array:
@@ -169,7 +178,7 @@ class Calibration:
         return result
 
     def _by_strangers(self, nearest: Array) -> Array:
-        """P-values (n,) if somebody else made the movements; 0 where groups tell how much people differ."""
+        """Return p-values (n,) if somebody else made the movements; 0 where groups tell how much people differ."""
         if not self.between:
             return np.zeros(len(nearest))
         away = np.sort(distances(nearest), axis=1)
@@ -179,7 +188,7 @@ class Calibration:
         return broad_law(away[:, 0] / np.maximum(reaching(reach), LEAST))
 
     def rules(self, nearest: Array, error_rate: float) -> list[str]:
-        """The rule of each movement's `known_p_values`: "class", "pooled", "strangers" or "guess", see `RULES`."""
+        """Name the rule of each movement's `known_p_values`: "class", "pooled", "strangers" or "guess", see `RULES`."""
         counted = self._counting(error_rate)[1]
         chosen = [counted[c] for c in self.scores(nearest).argmin(axis=1)]
         by_strangers = (self._by_those_shown(nearest, error_rate) <= error_rate) & (
@@ -191,21 +200,25 @@ class Calibration:
         ]
 
     def calibrated(self, error_rate: float) -> NDArray[np.bool_]:
-        """Whether p-values of each class keep `error_rate`, shape (C,); elsewhere they are a guess.
+        """Tell whether p-values of each class keep `error_rate`, shape (C,); elsewhere they are a guess.
 
         They keep it where at least ``1 / error_rate - 1`` left-out scores count. One demonstration has none.
         """
         return np.array([counted is not None for counted in self._counting(error_rate)[0]])
 
     def with_least_scales(self, least: Array) -> Calibration:
-        """With scales of at least (C,); where that is more, a demonstration is as novel as such a scale makes it: 1."""
+        """Raise scales to at least (C,); where that is more, a demonstration is as novel as that makes it: 1."""
         raised = (least > self.scales).tolist()
         if not any(raised):
             return self
 
         def novel(novelties: tuple[Array, ...]) -> tuple[Array, ...]:
-            made = {id(one): np.maximum(one, 1.0) for one in novelties}  # classes share what is pooled
-            return tuple(made[id(one)] if more else one for one, more in zip(novelties, raised, strict=True))
+            raised_to_one = {
+                id(scores): np.maximum(scores, 1.0) for scores in novelties
+            }  # classes share what is pooled
+            return tuple(
+                raised_to_one[id(scores)] if more else scores for scores, more in zip(novelties, raised, strict=True)
+            )
 
         return replace(
             self,
@@ -215,7 +228,7 @@ class Calibration:
         )
 
     def select(self, classes: NDArray[np.intp]) -> Calibration:
-        """The calibration of some of the classes, in rising order."""
+        """Return the calibration of some of the classes, in rising order."""
         if len(classes) == len(self.scales):
             return self
         parts = ("own", "pooled", "own_novelties", "pooled_novelties")
@@ -223,7 +236,7 @@ class Calibration:
         return replace(self, scales=self.scales[classes], **of_some)
 
     def _counting(self, error_rate: float) -> tuple[list[Counted | None], list[Counted | None]]:
-        """What counts of the scores and of the novelties; kept for the error rate that was asked for last."""
+        """Return what counts of the scores and of the novelties; stored for the last error rate."""
         last = vars(self).get("_last_counting")
         if last is None or last[0] != error_rate:
             members = _counted(self.own, self.pooled, error_rate)
@@ -236,7 +249,7 @@ Counted = tuple[str, Array]  # a rule, and scores in rising order
 
 
 def _counted(own: Sequence[Array], pooled: Sequence[Array], error_rate: float) -> list[Counted | None]:
-    """Of each class the rule and the scores that count: its own, else those of all, else None."""
+    """Return the rule of each class and the scores that count: its own, else those of all, else None."""
     ordered: dict[int, Array] = {}  # classes share what is pooled
 
     def enough(scores: Array) -> bool:
@@ -248,13 +261,13 @@ def _counted(own: Sequence[Array], pooled: Sequence[Array], error_rate: float) -
         return ordered[id(scores)]
 
     return [
-        ("class", np.sort(one)) if enough(one) else ("pooled", of_all(every)) if enough(every) else None
-        for one, every in zip(own, pooled, strict=True)
+        ("class", np.sort(scores)) if enough(scores) else ("pooled", of_all(every)) if enough(every) else None
+        for scores, every in zip(own, pooled, strict=True)
     ]
 
 
 def _shares(calibrating: Array, scores: Array) -> Array:
-    """``(1 + #{calibrating >= score}) / (number of calibrating + 1)``, of sorted ones."""
+    """Return ``(1 + #{calibrating >= score}) / (number of calibrating + 1)``, of sorted ones."""
     above = len(calibrating) - calibrating.searchsorted(scores)
     return np.asarray((1.0 + above) / (len(calibrating) + 1.0))
 
@@ -262,7 +275,7 @@ def _shares(calibrating: Array, scores: Array) -> Array:
 def calibrate(
     similarity: AveragedSimilarity, references: References, groups: NDArray[np.intp] | None = None
 ) -> Calibration:
-    """Score references against the others, at most a hundred of each class.
+    """Return the score references against the others, at most a hundred of each class.
 
     With `groups`, the number of each reference's group, none is compared with another of its group. Where all are of
     one group nothing could be compared; they then count as movements without groups.
@@ -285,55 +298,119 @@ def calibrate(
         others.append(np.minimum.reduceat(away, references.first, axis=1))
     to_others = np.concatenate(impostors)
     typical = typical_scale(to_others, REACH if groups is None else REACH_OF_OTHERS)
-    known = {int(size): score_classes(blocks, int(size), typical) for size in np.unique(counts)}
-    scales = np.array([known[int(size)].scales[c] for c, size in enumerate(counts)])
-    novelties = {size: _novelties(scored, others, scales) for size, scored in known.items()}
-    pooled = {size: scored.pooled() for size, scored in known.items()}
-    made = Calibration(
+    by_size = {int(size): score_classes(blocks, int(size), typical) for size in np.unique(counts)}
+    scales = np.array([by_size[int(size)].scales[c] for c, size in enumerate(counts)])
+    novelties = {size: _novelties(scored, others, scales) for size, scored in by_size.items()}
+    pooled = {size: scored.pooled() for size, scored in by_size.items()}
+    # The exponent is fitted to what is left out: to as many of its own class, about, as of the others.
+    away, nearest_of = np.concatenate(others), np.repeat(np.arange(len(blocks)), [len(block) for block in others])
+    own = np.concatenate(
+        [block.nearest(n)[0] * block.shares(n) for block, n in zip(blocks, counts.tolist(), strict=True)]
+    )
+    away[np.arange(len(away)), nearest_of] = own
+    calibration = Calibration(
         scales,
         tuple(finite(block.nearest(int(n))[0] / s) for block, n, s in zip(blocks, counts, scales, strict=True)),
         tuple(pooled[int(size)] for size in counts),
         tuple(novelties[int(size)][0][novelties[int(size)][1] == c] for c, size in enumerate(counts)),
         tuple(novelties[int(size)][0] for size in counts),
         between_classes(to_others, blocks, groups),
-        _exponent(blocks, others),
+        fit_exponent(away[np.isfinite(own)], nearest_of[np.isfinite(own)]),
     )
-    return made.with_least_scales(np.full(len(counts), least_scale(to_others)))
-
-
-def _exponent(blocks: Sequence[ClassDistances], others: Sequence[Array]) -> float:
-    """The exponent fitted to what is left out: to as many of its own class, about, as of the others."""
-    away = np.concatenate(others)
-    classes = np.repeat(np.arange(len(blocks)), [len(one) for one in others])
-    own = np.concatenate([_own(block) for block in blocks])
-    away[np.arange(len(away)), classes] = own
-    return fit_exponent(away[np.isfinite(own)], classes[np.isfinite(own)])
-
-
-def _own(block: ClassDistances) -> Array:
-    """Distances to the nearest other one of the class, if as many were left as the class has."""
-    size = block.distances.shape[1]
-    return np.asarray(block.nearest(size)[0] * block.shares(size))
+    return calibration.with_least_scales(np.full(len(counts), least_scale(to_others)))
 
 
 def between_classes(to_others: Array, blocks: Sequence[ClassDistances], groups: NDArray[np.intp] | None) -> float:
-    """`Calibration.between`, from distances of demonstrations to the nearest other class and to those of their own."""
+    """Return `Calibration.between`, from distances of demonstrations to the nearest other class and to their own."""
     if groups is not None or not any(np.isfinite(block.distances).any() for block in blocks):
         return 0.0
     return typical_distance(to_others)
 
 
 def least_scale(to_others: Array) -> float:
-    """A tenth of the median distance of demonstrations to the nearest other class; 0 where there is no other."""
+    """Return a tenth of the median distance of demonstrations to the nearest other class; 0 where there is no other."""
     apart = to_others[np.isfinite(to_others)]
     return _REPEATED * float(np.median(apart)) if len(apart) else 0.0
 
 
 def _novelties(scored: Scored, others: list[Array], scales: Array) -> tuple[Array, NDArray[np.intp]]:
-    """Novelties of all demonstrations that have others of their class, and which class each is most like."""
+    """Return novelties of all demonstrations that have others of their class, and which class each is most like."""
     scores = [away / scales for away in others]  # (k, C), infinite for the own class
-    for c, (one, own, share) in enumerate(zip(scores, scored.scores, scored.shares, strict=True)):
-        one[:, c] = own * share
+    for c, (block, own, share) in enumerate(zip(scores, scored.scores, scored.shares, strict=True)):
+        block[:, c] = own * share
     every = np.concatenate(scores)[np.isfinite(np.concatenate(scored.scores))]
     like = every.argmin(axis=1)
     return every[np.arange(len(every)), like], like
+
+
+def class_probabilities(similar: Array, exponent: float = EXPONENT) -> Array:
+    """Return the probability of each class for movements that are of one of them, (n, C); rows sum to 1.
+
+    ``P(c) = d_c^(-m) / sum_j d_j^(-m)`` with d_c the distance to the nearest demonstration of class c, or to the
+    nearest in each representation, in kernel widths, and m the exponent: of two classes, the odds are the ratio of the
+    distances to the power of m. This is the estimate of densities by nearest neighbors, ``1 / d^m`` in m dimensions;
+    only m is fitted, see `fit_exponent`.
+
+    Parameters
+    ----------
+    similar : ndarray of shape (n, C)
+        Log similarity to each class, by which its label is chosen.
+    exponent : float
+    """
+    logs = _log_odds(distances(similar), exponent)
+    shares = np.exp(logs)
+    return np.asarray(shares / shares.sum(axis=1, keepdims=True))
+
+
+def fit_exponent(away: Array, classes: NDArray[np.intp]) -> float:
+    """Return the exponent by which demonstrations are most likely of their own classes.
+
+    It maximizes ``sum_i log P(c_i) - (log(m / 15) / 0.35)^2 / 2``, each demonstration left out of what it is compared
+    with; the last term is a log-normal prior. Without demonstrations it is 15.
+
+    Parameters
+    ----------
+    away : ndarray of shape (n, C)
+        Distance of each demonstration to the nearest other one of each class; infinite where there is none.
+    classes : ndarray of shape (n,)
+        The class of each.
+    """
+    if not len(away):
+        return EXPONENT
+    chosen = evenly_spaced(len(away), _ROWS)
+    away, classes = away[chosen], classes[chosen]
+    rows = np.arange(len(away))
+
+    def loss(log_exponent: float) -> float:
+        logs = _log_odds(away, math.exp(log_exponent))
+        likelihood = logs[rows, classes] - np.log(np.exp(logs).sum(axis=1))
+        return 0.5 * ((log_exponent - math.log(EXPONENT)) / _SPREAD) ** 2 - float(likelihood.sum())
+
+    low, high = (math.log(bound) for bound in _BOUNDS)
+    return math.exp(_golden_section(loss, low, high))
+
+
+def _golden_section(loss: Callable[[float], float], low: float, high: float) -> float:
+    """Return the argument with the least loss, to 1e-4: golden-section search (Kiefer 1953).
+
+    `scipy.optimize` finds the same; its import takes as long as recognizing hundreds of recordings.
+    """
+    ratio = (math.sqrt(5) - 1) / 2
+    left, right = high - ratio * (high - low), low + ratio * (high - low)
+    left_loss, right_loss = loss(left), loss(right)
+    while high - low > 1e-4:
+        if left_loss <= right_loss:
+            high, right, right_loss = right, left, left_loss
+            left = high - ratio * (high - low)
+            left_loss = loss(left)
+        else:
+            low, left, left_loss = left, right, right_loss
+            right = low + ratio * (high - low)
+            right_loss = loss(right)
+    return (low + high) / 2
+
+
+def _log_odds(away: Array, exponent: float) -> Array:
+    """Return the logarithms of ``d^(-m)``, less the largest of each row."""
+    logs = -exponent * np.log(np.maximum(away, LEAST))
+    return np.asarray(logs - logs.max(axis=1, keepdims=True))

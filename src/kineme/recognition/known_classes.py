@@ -1,4 +1,4 @@
-"""What is known of the classes, as records: the comparison, the references, a classifier and its calibration."""
+"""Known classes as records: the comparison, the references, a classifier and its calibration."""
 
 from __future__ import annotations
 
@@ -16,9 +16,8 @@ from kineme.recognition.answer import Answer, answers, known_labels
 from kineme.recognition.classifiers import Classifier, fit_classifier
 from kineme.recognition.conformal import Calibration, calibrate, check_error_rate
 from kineme.runtime.parallel import single_threaded_blas
-from kineme.similarity.comparison import Comparison
+from kineme.similarity.comparison import Comparison, fit_comparison, fit_to_references
 from kineme.similarity.described import Described
-from kineme.similarity.fit import fit_comparison, fit_to_references
 from kineme.similarity.references import References
 from kineme.similarity.scores import nearest, score
 from kineme.similarity.similarity import AveragedSimilarity
@@ -37,13 +36,13 @@ class FittedRecognizer(Protocol):
     classifier_: Classifier
 
     def calibration(self) -> Calibration:
-        """Of the p-values."""
+        """Return the calibration of the p-values."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class KnownClasses:
-    """What recognizes movements as one of C classes, or as unknown.
+    """Everything that recognizes movements as one of C classes, or as unknown.
 
     Attributes
     ----------
@@ -61,14 +60,14 @@ class KnownClasses:
     calibration: Calibration
 
     def recognize(self, movements: MovementsLike, error_rate: float = 0.05) -> list[Answer]:
-        """An answer for each movement, see `kineme.Recognizer.recognize`."""
+        """Return an answer for each movement, see `kineme.Recognizer.recognize`."""
         check_error_rate(error_rate)
         demos = self.comparison.checked(movements)
         return answers(self.comparison, self.references, self.classifier, self.calibration, demos, error_rate)
 
 
-def known_classes(known: FittedRecognizer | MovementsLike) -> KnownClasses:
-    """The records of a fitted recognizer, or those fitted to labeled movements with the defaults of `Recognizer`.
+def known_classes(symbols: FittedRecognizer | MovementsLike) -> KnownClasses:
+    """Return the records of a fitted recognizer, or those fitted to labeled movements with the default parameters.
 
     Raises
     ------
@@ -77,11 +76,11 @@ def known_classes(known: FittedRecognizer | MovementsLike) -> KnownClasses:
     TrajectoryError
         Movements without labels.
     """
-    if hasattr(known, "calibration"):
-        fitted = cast(FittedRecognizer, known)
+    if hasattr(symbols, "calibration"):
+        fitted = cast(FittedRecognizer, symbols)
         calibration = fitted.calibration()  # first: it refuses a recognizer that is not fitted
         return KnownClasses(fitted.comparison_, fitted.references_, fitted.classifier_, calibration)
-    demos = Demonstrations.of(known)
+    demos = Demonstrations.of(symbols)
     labels = check_labels(demos, None)
     return _known(*fit_comparison(ComparisonSpecification(), demos, labels), "auto")
 
@@ -95,7 +94,7 @@ def fit_known_classes(  # noqa: PLR0913, PLR0917 - what a recognizer is made of
     channels: Channels | None = None,
     calibrated: Calibrates = calibrate,
 ) -> KnownClasses:
-    """Fit to references that are described already, see `kineme.similarity.fit.fit_to_references`.
+    """Fit to references that are described already, see `kineme.similarity.comparison.fit_to_references`.
 
     With `groups`, such as people, each a number, the calibration compares no reference with another of its group.
     `channels` are what was recorded of the movements, where that is known. `calibrated` may keep calibrations.
@@ -117,9 +116,9 @@ def _known(
 
 
 def open_set_labels(
-    known: KnownClasses, described: Described, error_rate: float = 0.05
+    classes: KnownClasses, described: Described, error_rate: float = 0.05
 ) -> tuple[NDArray[np.object_], Array]:
-    """The class of each described movement by those who showed some, and its p-values.
+    """Return the class of each described movement by those who showed some, and its p-values.
 
     Returns
     -------
@@ -128,8 +127,8 @@ def open_set_labels(
     p_values : ndarray of shape (n, C)
     """
     check_error_rate(error_rate)
-    similarities, scores = score(known.comparison, known.references, described, nearest, known.classifier.scores)
-    p_values = known.calibration.p_values(similarities, error_rate)
-    calibration = known.calibration.of_those_shown()
-    labels = known_labels(known.references.classes, scores, similarities, calibration, error_rate)
+    similarities, scores = score(classes.comparison, classes.references, described, nearest, classes.classifier.scores)
+    p_values = classes.calibration.p_values(similarities, error_rate)
+    calibration = classes.calibration.of_those_shown()
+    labels = known_labels(classes.references.classes, scores, similarities, calibration, error_rate)
     return labels, p_values

@@ -34,7 +34,7 @@ FOREIGN = 3.5
 
 
 def distances(logs: Array) -> Array:
-    """``sqrt(-2 log K)``: the distance, in kernel widths, whose Gaussian is the averaged similarity K.
+    """Return ``sqrt(-2 log K)``: the distance, in kernel widths, whose Gaussian is the averaged similarity K.
 
     0 between copies: what rounding makes of them would make some more novel than others.
     """
@@ -42,12 +42,12 @@ def distances(logs: Array) -> Array:
 
 
 def broad_law(scores: Array) -> Array:
-    """``exp(-pi/4 a^2)``: share of distances above a times their mean, of normal vectors in the plane (Rayleigh)."""
+    """Return ``exp(-pi/4 a^2)``, the share of distances above a times their mean, of vectors in a plane (Rayleigh)."""
     return np.asarray(np.exp(-0.25 * math.pi * scores**2))
 
 
 def law(scores: Array) -> Array:
-    """Share of distances above `scores` times their mean, if they are lengths of normal vectors in eight dimensions.
+    """Return the share of distances above `scores` times their mean, of normal vectors in eight dimensions.
 
     ``P(chi_8 >= x) = exp(-y) (1 + y + y^2 / 2 + y^3 / 6)`` with ``y = x^2 / 2``; x is the score times the mean of
     chi_8, 2.74. It is 0.05 at 1.44 times the mean; measured were 1.36 to 1.47 times, of people's movements.
@@ -58,12 +58,12 @@ def law(scores: Array) -> Array:
 
 
 def typical_scale(impostors: Array, reach: float = REACH) -> float:
-    """The scale of classes shown once, from distances of demonstrations to the nearest other class."""
+    """Return the scale of classes shown once, from distances of demonstrations to the nearest other class."""
     return reaching(reach * typical_distance(impostors))
 
 
 def typical_distance(impostors: Array) -> float:
-    """The median of distances to the nearest other class; with one class, and so with no such distance, `FOREIGN`."""
+    """Return the median distance to the nearest other class; with one class, and so without any distance, `FOREIGN`."""
     apart = impostors[np.isfinite(impostors)]
     return float(np.median(apart)) if len(apart) else FOREIGN
 
@@ -73,12 +73,12 @@ def reaching(away: float) -> float: ...
 @overload
 def reaching(away: Array) -> Array: ...
 def reaching(away: float | Array) -> float | Array:
-    """The scale by which `broad_law` is 0.05 at these distances."""
+    """Return the scale by which `broad_law` is 0.05 at these distances."""
     return away * math.sqrt(math.pi / 4 / math.log(20))
 
 
 def check_groups(groups: ArrayLike, n: int) -> NDArray[np.intp]:
-    """Numbers of the groups, one for each of n movements.
+    """Return numbers of the groups, one for each of n movements.
 
     Raises
     ------
@@ -98,12 +98,12 @@ def check_groups(groups: ArrayLike, n: int) -> NDArray[np.intp]:
     try:
         return np.asarray(np.unique(given, return_inverse=True)[1], dtype=np.intp)
     except TypeError:
-        kinds = " and ".join(sorted({type(one).__name__ for one in given.tolist()}))
+        kinds = " and ".join(sorted({type(value).__name__ for value in given.tolist()}))
         raise TrajectoryError(f"expected groups to be all texts or all numbers, got {kinds}") from None
 
 
 def comparable_groups(groups: NDArray[np.intp] | None) -> NDArray[np.intp] | None:
-    """The groups; None where there is one alone, in which nothing could be compared: it then counts as no groups."""
+    """Return the groups; None where there is one alone, in which nothing could be compared: it counts as no groups."""
     return None if groups is None or len(np.unique(groups)) == 1 else groups
 
 
@@ -120,7 +120,7 @@ class ClassDistances:
     groups: NDArray[np.intp] | None = None
 
     def nearest(self, size: int) -> tuple[Array, Array, NDArray[np.intp]]:
-        """Distance to the nearest and second nearest of the next `size` others, in a circle, and which is nearest."""
+        """Return distances to the nearest and second nearest of the next `size` others, in a circle, and the index."""
         k, n = self.distances.shape
         circle = (self.indices[:, None] + np.arange(n)) % n
         away = np.take_along_axis(self.distances, circle, axis=1)
@@ -130,15 +130,15 @@ class ClassDistances:
         return order[:, 0], order[:, 1] if n > 1 else np.full(k, np.inf), which
 
     def counted(self, size: int) -> NDArray[np.intp]:
-        """Number of others that `nearest` compares each with, at most `size`."""
+        """Return the number of others that `nearest` compares each with, at most `size`."""
         return np.minimum(np.isfinite(self.distances).sum(axis=1), size)
 
     def shares(self, size: int) -> Array:
-        """By which each distance to the nearest shrinks, about, with `size` others instead of those `counted`."""
+        """Return shares by which distances to the nearest shrink, about, with `size` others, not those `counted`."""
         return np.asarray((np.maximum(self.counted(size), 1) / size) ** (1 / DIMENSIONS))
 
     def left_out(self, size: int) -> Array:
-        """Distances (k, k) to the nearest, row i as if i and its group did not exist; NaN where there is none."""
+        """Return distances (k, k) to the nearest, row i as if i and its group did not exist; NaN if there is none."""
         if self.groups is None:
             first, second, which = self.nearest(size)
             without = np.where(which[None, :] == self.indices[:, None], second, first)
@@ -172,26 +172,26 @@ class Scored:
     shares: tuple[Array, ...]
 
     def pooled(self) -> Array:
-        """Finite scores of all classes."""
+        """Return finite scores of all classes."""
         return finite(np.concatenate(self.scores))
 
     def pooled_novelties(self) -> Array:
-        """The same as they would be with `size` others, as far as novelties are known without the other classes."""
+        """Return these as they would be with `size` others, as far as they are known without the other classes."""
         return finite(np.concatenate([own * share for own, share in zip(self.scores, self.shares, strict=True)]))
 
 
 def score_classes(blocks: list[ClassDistances], size: int, typical: float) -> Scored:
-    """Scales of all classes and scores of all demonstrations, each against at most `size` others of its class.
+    """Return scales of all classes and scores of all demonstrations, each against at most `size` others of its class.
 
     The nearest of n movements that vary in m dimensions is at a distance that falls as n^(-1/m). With eight dimensions
     a second demonstration brings the nearest 8 % closer; measured were 5 to 13 % (``python -m bench --only open_set``).
     """
     nearest = [block.nearest(size)[0] for block in blocks]
-    known = np.concatenate(nearest)
-    known = known[np.isfinite(known)]
-    if not known.size:
+    finite_distances = np.concatenate(nearest)
+    finite_distances = finite_distances[np.isfinite(finite_distances)]
+    if not finite_distances.size:
         return Scored(np.full(len(blocks), typical), tuple(nearest), tuple(map(np.ones_like, nearest)))
-    common, scales, scores = float(known.mean()), [], []
+    common, scales, scores = float(finite_distances.mean()), [], []
     for block, own in zip(blocks, nearest, strict=True):
         among = np.where(np.isfinite(own), own, np.nan)[None]
         scales.append(max(_shrunk(among, common)[0], LEAST))
@@ -200,10 +200,10 @@ def score_classes(blocks: list[ClassDistances], size: int, typical: float) -> Sc
 
 
 def finite(scores: Array) -> Array:
-    """Scores of what has others to be compared with."""
+    """Return scores of what has others to be compared with."""
     return np.asarray(scores[np.isfinite(scores)])
 
 
 def _shrunk(values: Array, common: float) -> Array:
-    """Means of rows, NaN left out, shrunk towards the common one."""
+    """Return means of rows, NaN left out, shrunk towards the common one."""
     return np.asarray((np.nansum(values, axis=1) + _PRIOR * common) / (np.isfinite(values).sum(axis=1) + _PRIOR))

@@ -1,4 +1,4 @@
-"""Movements unlike the others of their label: wrong labels, cut recordings, failed demonstrations."""
+"""Movements unlike the others of their label: wrong labels, cut recordings, failed demonstrations; and a report."""
 
 from __future__ import annotations
 
@@ -16,14 +16,17 @@ from kineme.movements.trajectories.labels import Label
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.recognition.conformal import check_error_rate
 from kineme.recognition.left_out import LEAST, distances
+from kineme.reporting.table import Table, to_text
+from kineme.reporting.text import counted, printable
 from kineme.sampling import evenly_spaced
-from kineme.similarity.comparison import Comparison
+from kineme.similarity.comparison import Comparison, fit_comparison
 from kineme.similarity.describe import Tile, feature_rows, for_described
 from kineme.similarity.described import Described
-from kineme.similarity.fit import fit_comparison
 from kineme.similarity.references import References
 from kineme.similarity.specification import ComparisonSpecification
 from kineme.validation import Array
+
+_SHOWN = 50  # rows of the table; the rest is counted
 
 FEWEST, FEWEST_OF_LABEL = 20, 5  # movements: with fewer, nobody can tell what is usual
 _NEAREST = 3  # others whose distance counts: with one, two movements that are wrong alike would vouch for each other
@@ -63,7 +66,7 @@ class Outlier:
 
 @dataclass(frozen=True)
 class Outliers:
-    """What `find_outliers` returns.
+    """Result of `find_outliers`.
 
     Attributes
     ----------
@@ -138,7 +141,9 @@ def find_outliers(
         done += len(rows)
         if progress is not None:
             progress(done)
-    scores = scaled(own) * _contrast(np.concatenate(others))
+    scores, far = scaled(own), np.concatenate(others)
+    if np.isfinite(far).all():  # else there is one label; what is nearer than usual to another label scores more
+        scores = scores * np.sqrt(max(float(np.median(far)), LEAST) / np.maximum(far, LEAST))
     p_values = tail_p_values(scores)
     every = np.concatenate(members)
     names = np.repeat(np.array([*named, None], dtype=object)[:-1], [len(rows) for rows in members])
@@ -146,15 +151,15 @@ def find_outliers(
     chosen = chosen[np.argsort(-scores[chosen], kind="stable")]
     alike = _most_like(comparison, demos, members, every[chosen])
     label_of = dict(zip(every.tolist(), names.tolist(), strict=True)) if len(chosen) else {}
-    found = [
+    outliers = [
         Outlier(int(every[k]), names[k], float(scores[k]), float(p_values[k]), like, label_of[like])
         for k, like in zip(chosen.tolist(), alike.tolist(), strict=True)
     ]
-    return Outliers(tuple(found), checked, error_rate)
+    return Outliers(tuple(outliers), checked, error_rate)
 
 
 def tail_p_values(scores: Array) -> Array:
-    """P-values of scores by the law that their middle tells, see `find_outliers`."""
+    """Return p-values of scores by the law that their middle tells, see `find_outliers`."""
     middle, upper = np.quantile(scores, [_MIDDLE, _UPPER])
     step = max(float(upper - middle), _NARROWEST) / math.log((1 - _MIDDLE) / (1 - _UPPER))
     step *= 1 + 1 / math.sqrt(len(scores))
@@ -162,14 +167,14 @@ def tail_p_values(scores: Array) -> Array:
 
 
 def listed(p_values: Array, error_rate: float) -> NDArray[np.intp]:
-    """Indices of the p-values that Benjamini and Hochberg's procedure rejects, smallest first."""
+    """Return indices of the p-values that Benjamini and Hochberg's procedure rejects, smallest first."""
     order = np.argsort(p_values, kind="stable")
     below = np.flatnonzero(p_values[order] <= error_rate * np.arange(1, len(order) + 1) / len(order))
     return np.asarray(order[: below[-1] + 1 if len(below) else 0])
 
 
 def _owners(demos: Demonstrations, labels: Sequence[Label | None] | NDArray[Any] | None) -> dict[Any, NDArray[np.intp]]:
-    """Label -> the movements that have it."""
+    """Return the label -> the movements that have it."""
     given: Any = demos.labels if labels is None else labels
     if given is None:
         raise TrajectoryError("expected movements with labels, to compare each with the others of its label, got none")
@@ -183,7 +188,7 @@ def _owners(demos: Demonstrations, labels: Sequence[Label | None] | NDArray[Any]
 
 
 def _fitted(demos: Demonstrations, members: list[NDArray[np.intp]]) -> tuple[Comparison, References]:
-    """How movements are compared, with widths of some of them; these, with the numbers of their labels."""
+    """Fit the comparison to some of the movements; return these too, with the numbers of their labels."""
     every = np.concatenate(members)
     numbers = np.repeat(np.arange(len(members)), [len(rows) for rows in members])
     some = evenly_spaced(len(every), _FITTED)
@@ -197,7 +202,7 @@ def _described(comparison: Comparison, demos: Demonstrations, rows: NDArray[np.i
 def _distances(
     comparison: Comparison, demos: Demonstrations, rows: NDArray[np.intp], references: References, number: int
 ) -> tuple[Array, Array]:
-    """Of the movements of a label: mean distance from the nearest others of it, and distance from the nearest else."""
+    """Return mean distances of a label's movements from its nearest others, and distances from the nearest else."""
     compared = evenly_spaced(len(rows), _COMPARED)
     own = _described(comparison, demos, rows[compared])
     foreign = references.described.take(np.flatnonzero(references.labels != number))
@@ -216,34 +221,65 @@ def _distances(
     return near, far
 
 
-def _contrast(far: Array) -> Array:
-    """What a score is multiplied by: more than 1 for movements that are nearer than usual to one of another label."""
-    if not np.isfinite(far).all():  # there is one label
-        return np.ones(len(far))
-    return np.sqrt(max(float(np.median(far)), LEAST) / np.maximum(far, LEAST))
-
-
 def scaled(own: list[Array]) -> Array:
-    """Distances of the movements of each label as multiples of what is typical there."""
+    """Return distances of the movements of each label as multiples of what is typical there."""
     common = float(np.median(np.concatenate(own)))
-    scales = [(np.median(one) * len(one) + _PRIOR * common) / (len(one) + _PRIOR) for one in own]
-    return np.concatenate([one / max(scale, LEAST) for one, scale in zip(own, scales, strict=True)])
+    scales = [(np.median(away) * len(away) + _PRIOR * common) / (len(away) + _PRIOR) for away in own]
+    return np.concatenate([away / max(scale, LEAST) for away, scale in zip(own, scales, strict=True)])
 
 
 def _most_like(
-    comparison: Comparison, demos: Demonstrations, members: list[NDArray[np.intp]], asked: NDArray[np.intp]
+    comparison: Comparison, demos: Demonstrations, members: list[NDArray[np.intp]], chosen: NDArray[np.intp]
 ) -> NDArray[np.intp]:
-    """The movement nearest to each that is asked for, among up to 200 of each label."""
-    if not len(asked):
-        return asked
-    described = _described(comparison, demos, asked)
-    nearest, found = np.full(len(asked), np.inf), np.empty(len(asked), dtype=np.intp)
+    """Return the movement nearest to each that is asked for, among up to 200 of each label."""
+    if not len(chosen):
+        return chosen
+    described = _described(comparison, demos, chosen)
+    nearest, alike = np.full(len(chosen), np.inf), np.empty(len(chosen), dtype=np.intp)
     for rows in members:
         some = rows[evenly_spaced(len(rows), _COMPARED)]
         away = distances(comparison.similarity.log_average(described, _described(comparison, demos, some)))
-        away[asked[:, None] == some] = np.inf
+        away[chosen[:, None] == some] = np.inf
         closest = away.argmin(axis=1)
-        near = away[np.arange(len(asked)), closest]
-        found = np.where(near < nearest, some[closest], found)
+        near = away[np.arange(len(chosen)), closest]
+        alike = np.where(near < nearest, some[closest], alike)
         nearest = np.minimum(near, nearest)
-    return found
+    return alike
+
+
+def outliers_as_data(outliers: Outliers, names: Sequence[str]) -> dict[str, Any]:
+    """Return nested lists and dictionaries, with the names of the movements."""
+    rows = [
+        {
+            "movement": names[outlier.index], "label": outlier.label,
+            "ratio": outlier.ratio, "p_value": outlier.p_value,
+            "most_like": names[outlier.most_like], "label_of_most_like": outlier.label_of_most_like,
+        }
+        for outlier in outliers.found
+    ]  # fmt: skip
+    return {"checked": outliers.checked, "error_rate": outliers.error_rate, "found": rows}
+
+
+def outliers_as_words(outliers: Outliers, names: Sequence[str]) -> str:
+    """Return a table, the most unlike first; empty if no movement was checked."""
+    if not outliers.checked:
+        return ""
+    if not outliers.found:
+        return f"no outliers: none of {counted(outliers.checked, 'movement')} is unlike the others of its label"
+    title = (
+        f"outliers: {len(outliers.found):,} of {counted(outliers.checked, 'movement')} unlike the others of their label"
+        f" (about {100 * outliers.error_rate:.2g} % of those listed are false alarms)"
+    )
+    rows = [
+        (
+            printable(names[outlier.index]),
+            printable(str(outlier.label)),
+            f"{outlier.ratio:.1f} times",
+            f"{outlier.p_value:.1g}",
+            printable(f"{names[outlier.most_like]} ({outlier.label_of_most_like})"),
+        )
+        for outlier in outliers.found[:_SHOWN]
+    ]
+    more = len(outliers.found) - _SHOWN
+    table = to_text(Table(title, ("movement", "label", "farther than usual", "p-value", "most like"), rows))
+    return f"{table}\nand {more:,} more" if more > 0 else table

@@ -17,16 +17,14 @@ from kineme.movements.trajectories.demonstrations import Demonstrations, check_l
 from kineme.movements.trajectories.trajectory import HasDemonstrations, MovementLike, MovementsLike, Trajectory
 from kineme.recognition.answer import Answer, answers, is_one, known_labels
 from kineme.recognition.classifiers import CLASSIFIERS, SupportVectors, fit_classifier
-from kineme.recognition.confidence import class_probabilities
-from kineme.recognition.conformal import Calibration, calibrate, check_error_rate
+from kineme.recognition.conformal import Calibration, calibrate, check_error_rate, class_probabilities
 from kineme.recognition.left_out import check_groups
-from kineme.similarity.comparison import Comparison
+from kineme.runtime.compiled import load_compiled
+from kineme.similarity.comparison import Comparison, fit_comparison
 from kineme.similarity.describe import describe
 from kineme.similarity.described import Described
-from kineme.similarity.fit import fit_comparison
-from kineme.similarity.normalization import Normalization
 from kineme.similarity.references import References
-from kineme.similarity.representation import Representation, default_representations
+from kineme.similarity.representation import Normalization, Representation, default_representations
 from kineme.similarity.scores import Compared, Score, best_classes, nearest, score
 from kineme.similarity.specification import ComparisonSpecification
 from kineme.validation import Array, check_choice
@@ -35,6 +33,10 @@ if TYPE_CHECKING:
     from kineme.recognition.early.hypotheses import Early, Hypotheses
     from kineme.recognition.early.stream import Live
     from kineme.recognition.spotting import Spotted
+
+
+_NUMBERS = (4, 30, 200)  # of movements: little work and much are compiled apart
+_SAMPLES = 1000
 
 
 _PRIOR = RotationPrior()
@@ -125,7 +127,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
 
     @property
     def specification(self) -> ComparisonSpecification:
-        """How movements are compared, by the parameters alone."""
+        """Specification of the comparison, by the parameters alone."""
         given, normalization = self.representations, Normalization(self.translation, self.scale)
         return ComparisonSpecification(
             default_representations(normalization) if given is None else given,
@@ -204,21 +206,21 @@ class Recognizer(ClassifierMixin, BaseEstimator):
 
     @property
     def channels_(self) -> Channels | None:
-        """What was recorded of the movements, and is expected of those to be recognized; None if it is not known."""
+        """Channels of the movements, which are expected of those to be recognized; None if they are not known."""
         return self._fitted[0].channels
 
     def describe(self, X: MovementsLike) -> Described:
-        """Movements described as the stored ones are, ready to be compared with them."""
+        """Return movements described as the stored ones are, ready to be compared with them."""
         comparison, _ = self._fitted
         return describe(comparison.checked(X), comparison)
 
     def log_similarity(self, X: MovementsLike) -> Array:
-        """Logarithms of the averaged kernel to the stored demonstrations, shape (n, m)."""
+        """Return the logarithms of the averaged kernel to the stored demonstrations, shape (n, m)."""
         comparison, references = self._fitted
         return comparison.similarity.log_average(self.describe(X), references.described)
 
     def decision_function(self, X: MovementsLike) -> Array:
-        """Score of each class, shape (n, C): larger is more like it. Scales depend on the classifier.
+        """Return the score of each class, shape (n, C): larger is more like it. Scales depend on the classifier.
 
         Of two classes, shape (n,): the score of ``classes_[1]`` minus that of ``classes_[0]``.
         """
@@ -226,13 +228,13 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         return scores[:, 1] - scores[:, 0] if scores.shape[1] == 2 else scores
 
     def predict(self, X: MovementsLike) -> NDArray[Any]:
-        """The class with the largest score of each movement, shape (n,)."""
+        """Return the class with the largest score of each movement, shape (n,)."""
         comparison, references = self._fitted
         best = best_classes(comparison, references, comparison.checked(X), self.classifier_.best)
         return np.asarray(references.classes[best])
 
     def predict_proba(self, X: MovementsLike) -> Array:
-        """Probability of each class for movements of known classes, shape (n, C); rows sum to 1.
+        """Return the probability of each class for movements of known classes, shape (n, C); rows sum to 1.
 
         The largest is that of `predict`. By the classifiers "nearest" and "nearest-each" they are those of
         `Answer.probabilities`, see `class_probabilities`; by "prototype" they follow in the same way from the distances
@@ -246,7 +248,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         return class_probabilities(scores, self.calibration().exponent)
 
     def score(self, X: MovementsLike, y: ArrayLike | None = None, sample_weight: Any = None) -> float:
-        """Share of movements recognized as what they are; labels `y` are by default those of the demonstrations."""
+        """Return the share recognized as what they are; labels `y` are by default those of the demonstrations."""
         demos = Demonstrations.of(X)
         return float(super().score(demos, check_labels(demos, y), sample_weight))
 
@@ -274,11 +276,11 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         check_error_rate(error_rate)
         comparison, references = self._fitted
         demos = comparison.checked([X] if is_one(X) else X)
-        found = answers(comparison, references, self.classifier_, self.calibration(), demos, error_rate)
-        return found[0] if is_one(X) else found
+        every = answers(comparison, references, self.classifier_, self.calibration(), demos, error_rate)
+        return every[0] if is_one(X) else every
 
     def p_values(self, X: MovementsLike, error_rate: float = 0.05) -> Array:
-        """Conformal p-value of each movement for each class, shape (n, C), fine enough to tell `error_rate`.
+        """Return conformal p-value of each movement for each class, shape (n, C), fine enough to tell `error_rate`.
 
         With one demonstration of each class they are a guess: ``calibration().calibrated(error_rate)`` tells for which
         classes the rate holds, see `Calibration`.
@@ -287,7 +289,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         return self.calibration().p_values(self._score(X, nearest)[0], error_rate)
 
     def predict_known(self, X: MovementsLike, error_rate: float = 0.05) -> NDArray[Any]:
-        """Labels as from `predict`, among the classes whose p-value is above `error_rate`.
+        """Return labels as from `predict`, among the classes whose p-value is above `error_rate`.
 
         None, for unknown, if the movement is more novel than all but `error_rate` of the known ones, see `Calibration`.
         """
@@ -296,16 +298,16 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         return known_labels(self.classes_, scores, similarities, self.calibration(), error_rate)
 
     def novelty(self, X: MovementsLike) -> Array:
-        """Smallest nonconformity to any class, shape (n,): the larger, the less it is any known movement."""
+        """Return the smallest nonconformity to any class, shape (n,): the larger, the less it is any known movement."""
         return np.asarray(self.calibration().scores(self._score(X, nearest)[0]).min(axis=1))
 
     def calibration(self) -> Calibration:
-        """The calibration of the p-values; computed on first use, since it compares all demonstrations."""
+        """Return the calibration of the p-values; computed on first use, since it compares all demonstrations."""
         comparison, references = self._fitted
-        made = self._calibration
-        if made is None:
-            self._calibration = made = calibrate(comparison.similarity, references, vars(self).get("_groups"))
-        return made
+        calibration = self._calibration
+        if calibration is None:
+            self._calibration = calibration = calibrate(comparison.similarity, references, vars(self).get("_groups"))
+        return calibration
 
     def spot(self, recording: MovementLike, error_rate: float = 0.05, max_pieces: int = 8) -> list[Spotted]:
         """Find known movements in one long recording, with unknown between them.
@@ -340,11 +342,11 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         return spot(Templates(*self._fitted, self.calibration()), recording, error_rate, max_pieces)
 
     def predict_partial(self, X: MovementsLike, early: Early | None = None) -> NDArray[Any]:
-        """The most likely class of each movement of which only the beginning is given, shape (n,).
+        """Return the most likely class of each movement of which only the beginning is given, shape (n,).
 
         Each beginning is compared with the beginnings of every stored movement at many values of progress; see `Early`.
         """
-        from kineme.recognition.early.early import partial_shares
+        from kineme.recognition.early.evidence import partial_shares
 
         comparison, references = self._fitted
         shares = partial_shares(comparison, self._beginnings(early), X)
@@ -363,8 +365,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         early : Early, optional
             How much size, duration and timing may vary.
         """
-        from kineme.recognition.early.decision import Decision
-        from kineme.recognition.early.stream import Live
+        from kineme.recognition.early.stream import Decision, Live
 
         comparison, references = self._fitted
         beginnings = self._beginnings(early)
@@ -373,7 +374,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
 
     @property
     def _fitted(self) -> tuple[Comparison, References]:
-        """What `fit` made.
+        """Comparison and references of `fit`.
 
         Raises
         ------
@@ -383,22 +384,58 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         return self.comparison_, self.references_
 
     def _scores(self, X: MovementsLike) -> Array:
-        """Score of each class by the classifier, shape (n, C)."""
+        """Return the score of each class by the classifier, shape (n, C)."""
         return self._score(X, self._classifier_scores)[0]
 
     def _classifier_scores(self, compared: Compared) -> Array:
         return self.classifier_.scores(compared)
 
     def _score(self, X: MovementsLike, *scores: Score) -> tuple[Array, ...]:
-        """Scores (n, C) by each function; every movement is described once."""
+        """Return scores (n, C) by each function; every movement is described once."""
         comparison, references = self._fitted
         return score(comparison, references, comparison.checked(X), *scores)
 
     def _beginnings(self, early: Early | None) -> Hypotheses:
-        """The beginnings of the demonstrations, kept from the last time that the same ones were asked for."""
+        """Return the beginnings of the demonstrations, kept from the last time that the same ones were asked for."""
         from kineme.recognition.early.hypotheses import as_early, hypotheses
 
-        asked = as_early(early)
-        if self._hypotheses is None or self._hypotheses[0] != asked:  # one at a time: memory stays linear
-            self._hypotheses = asked, hypotheses(*self._fitted, asked)
+        options = as_early(early)
+        if self._hypotheses is None or self._hypotheses[0] != options:  # one at a time: memory stays linear
+            self._hypotheses = options, hypotheses(*self._fitted, options)
         return self._hypotheses[1]
+
+
+def warm_up(n_dims: Sequence[int] = (2, 3)) -> None:
+    """Compile now what recognizing movements needs, instead of in the first call.
+
+    It takes some twenty seconds on a free core, up to a minute on a busy one. Compiled functions are kept on disk, so
+    that once a machine is enough, as when an image is built, and once after an update; later processes read them in a
+    few seconds. If the environment variable ``KINEME_COMPILED`` is "never", nothing is compiled.
+
+    Parameters
+    ----------
+    n_dims : sequence of int, default (2, 3)
+        Dimensions of the movements that will be recognized; each number is compiled apart.
+
+    Examples
+    --------
+    >>> import kineme
+    >>> kineme.warm_up([2])
+    """
+    load_compiled()
+    rng = np.random.default_rng(0)
+    even = np.linspace(0, 1, _SAMPLES)
+    waves = np.sin(np.pi * even[:, None] * np.arange(1, 5))
+    for d in n_dims:
+        for n in _NUMBERS:
+            moved = waves[:: _SAMPLES // 50] @ rng.normal(size=(n, 4, d))
+            recognizer = Recognizer().fit(moved, np.arange(n) // 2)
+            recognizer.recognize(moved[:2])
+            recognizer = Recognizer().fit(moved, np.arange(n))  # labels alone skip pairs, see `most_similar`
+            recognizer.predict(moved)
+        for times in (even, even**2):  # evenly timed and not, as recordings are
+            timed = Demonstrations.from_arrays(waves @ rng.normal(size=(20, 4, d)), times=times)
+            recognizer = Recognizer().fit(timed, np.arange(len(timed)) // 2)
+            recognizer.predict_partial(timed)
+            recognizer.spot(timed[0])
+            recognizer.recognize(timed[0])

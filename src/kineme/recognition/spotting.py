@@ -16,28 +16,25 @@ from kineme.movements.segmentation.segment import as_recording, pieces_of
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import Label
 from kineme.movements.trajectories.trajectory import MovementsLike, Trajectory
-from kineme.recognition.candidate_windows import (
+from kineme.recognition.compared_windows import (
     MIN_SAMPLES,
     N_POINTS,
     RESOLUTION,
-    Durations,
-    Surroundings,
-    Windows,
-    candidate_windows,
-    resampled,
-    surroundings,
-)
-from kineme.recognition.compared_windows import (
     Candidates,
     ComparedWindows,
+    Durations,
     Progress,
+    Surroundings,
     Templates,
+    Windows,
+    candidate_windows,
     compare_candidates,
     compare_windows,
+    resampled,
     size_and_slowness,
+    surroundings,
 )
-from kineme.recognition.confidence import class_probabilities
-from kineme.recognition.conformal import Calibration, check_error_rate
+from kineme.recognition.conformal import Calibration, check_error_rate, class_probabilities
 from kineme.recognition.left_out import distances
 from kineme.sampling import evenly_spaced
 from kineme.similarity.references import References
@@ -87,7 +84,7 @@ class Spotted(NamedTuple):
 
 
 def spot(
-    known: Templates,
+    templates: Templates,
     recording: MovementsLike,
     error_rate: float,
     max_pieces: int,
@@ -100,30 +97,30 @@ def spot(
     """
     check_error_rate(error_rate)
     check_count("max_pieces", max_pieces, 1)
-    tell: Progress = progress or _tell_nobody
-    comparison, references, calibration = known = known._replace(calibration=calibration_of_cut(known))
+    tell: Progress = progress or (lambda share: None)
+    comparison, references, calibration = templates = templates._replace(calibration=calibration_of_cut(templates))
     tell(0.0)
     lasting = durations_of(references)
-    whole = _as_timed(recording) if lasting is not None else as_recording(recording)
-    whole = comparison.checked([whole], "a recording")[0]
+    timed = _as_timed(recording) if lasting is not None else as_recording(recording)
+    timed = comparison.checked([timed], "a recording")[0]
     durations = None if lasting is None else Durations(float(lasting.min()) / _FASTER, float(lasting.max()) * _SLOWER)
-    windows = candidate_windows(whole, durations, max_pieces)
+    windows = candidate_windows(timed, durations, max_pieces)
     tell(0.0)
     if not len(windows.bouts):  # nothing moves for as long as a movement takes
         return []
-    chosen, best = _chosen(known, windows, error_rate, tell)
+    chosen, best = _chosen(templates, windows, error_rate, tell)
     least = 0.0 if lasting is None else _LEAST_UNKNOWN * float(lasting.min())
-    unknown = _left_over(chosen, windows.bouts, whole.times, least)
+    unknown = _left_over(chosen, windows.bouts, timed.times, least)
     rows = np.concatenate((chosen, unknown))
     if not len(rows):
         return []
-    logs, similar = score(comparison, references, pieces_of(whole, rows), nearest, nearest_each)
+    logs, similar = score(comparison, references, pieces_of(timed, rows), nearest, nearest_each)
     p_known = calibration.known_p_values(logs, error_rate)
     confidence = 1.0 - p_known
     confidence[: len(best)] = class_probabilities(similar, calibration.exponent)[np.arange(len(best)), best]
     classes = references.classes.tolist()
     labels = [*(classes[c] for c in best.tolist()), *([None] * len(unknown))]
-    t = whole.times
+    t = timed.times
     return [
         Spotted(float(t[rows[i, 0]]), float(t[rows[i, 1] - 1]), labels[i], float(confidence[i]), float(p_known[i]))
         for i in np.argsort(rows[:, 0], kind="stable").tolist()
@@ -131,7 +128,7 @@ def spot(
 
 
 def _as_timed(recording: MovementsLike) -> Trajectory:
-    """The recording, whose time stamps are known, as those of the references are."""
+    """Return the recording, whose time stamps are known, as those of the references are."""
     if not isinstance(recording, Trajectory):
         recording = Demonstrations.of(recording)
         if recording.movements.times is None:
@@ -142,16 +139,14 @@ def _as_timed(recording: MovementsLike) -> Trajectory:
     return as_recording(recording)
 
 
-def _tell_nobody(share: float) -> None:
-    """Nobody wants to know how far it is."""
-
-
-def _chosen(known: Templates, windows: Windows, error_rate: float, progress: Progress) -> tuple[Rows, NDArray[np.intp]]:
-    """Samples of the known movements found, rows (n, 2), first and one past the last, and the class of each."""
+def _chosen(
+    templates: Templates, windows: Windows, error_rate: float, progress: Progress
+) -> tuple[Rows, NDArray[np.intp]]:
+    """Return samples of the known movements found, rows (n, 2), first and one past the last, and the class of each."""
     if not len(windows):
         return np.empty((0, 2), dtype=np.intp), np.empty(0, dtype=np.intp)
-    motion, typical = windows.motion, expected(known.references)
-    candidates = compare_candidates(known, motion, windows.rows, far(error_rate), progress)
+    motion, typical = windows.motion, expected(templates.references)
+    candidates = compare_candidates(templates, motion, windows.rows, far(error_rate), progress)
     compared = candidates.weighted()
     around = surroundings(motion, windows.bouts, compared.rows)
     manner = Manner()
@@ -164,30 +159,30 @@ def _chosen(known: Templates, windows: Windows, error_rate: float, progress: Pro
     rows = compared.rows[chosen]
     spans = motion.times[compared.rows]
     alike = np.unique(np.concatenate((chosen, *alike_windows(spans, chosen)))).astype(np.intp)
-    distances = _complete_scores(known, motion, candidates, alike) * known.calibration.scales
-    distances /= far(error_rate) * np.exp(np.log(known.calibration.scales).mean())
+    distances = _complete_scores(templates, motion, candidates, alike) * templates.calibration.scales
+    distances /= far(error_rate) * np.exp(np.log(templates.calibration.scales).mean())
     again = np.searchsorted(alike, chosen).tolist()
     classes = closest_classes(compared.take(alike), distances, typical, manner, spans[alike], again)
     return np.column_stack((rows[:, 0], rows[:, 1] + 1)), classes
 
 
-def _complete_scores(known: Templates, motion: Motion, candidates: Candidates, chosen: NDArray[np.intp]) -> Array:
-    """Nonconformity of chosen windows to every class, (n, C)."""
+def _complete_scores(templates: Templates, motion: Motion, candidates: Candidates, chosen: NDArray[np.intp]) -> Array:
+    """Return the nonconformity of chosen windows to every class, (n, C)."""
     scores = candidates.compared.scores[chosen]
     partly = ~candidates.completely[chosen]
-    scores[partly] = compare_windows(known, motion, candidates.compared.rows[chosen[partly]]).scores
+    scores[partly] = compare_windows(templates, motion, candidates.compared.rows[chosen[partly]]).scores
     return scores
 
 
 def _best_windows(rows: Rows, scored: ScoredWindows) -> list[int]:
-    """The chain of windows of largest summed score."""
+    """Return the chain of windows of largest summed score."""
     boundaries = np.unique(np.append(0, rows))
     first, last = np.searchsorted(boundaries, rows).T
     return best_chain(first, last, scored.score, len(boundaries))
 
 
 def best_chain(first: NDArray[np.intp], last: NDArray[np.intp], score: Array, n: int) -> list[int]:
-    """Windows between n boundaries that do not overlap, of largest summed score: dynamic programming."""
+    """Return windows between n boundaries that do not overlap, of largest summed score: dynamic programming."""
     positive = np.flatnonzero(score > 0)
     ordered = positive[np.argsort(last[positive], kind="stable")]
     of = np.searchsorted(last[ordered], np.arange(n + 1)).tolist()
@@ -210,12 +205,12 @@ def best_chain(first: NDArray[np.intp], last: NDArray[np.intp], score: Array, n:
     return chain[::-1]
 
 
-def _left_over(known: Rows, bouts: Rows, times: Array, least: float) -> Rows:
-    """Stretches of motion that no known movement holds, rows (n, 2), each at least `least` seconds long."""
+def _left_over(movements: Rows, bouts: Rows, times: Array, least: float) -> Rows:
+    """Return stretches of motion that no known movement holds, rows (n, 2), each at least `least` seconds long."""
     stretch = np.zeros(len(times) + 2, dtype=np.intp)  # 0 where there is none, also before and after all samples
     for i, (start, stop) in enumerate(bouts.tolist()):
         stretch[start + 1 : stop + 1] = i + 1
-    for start, stop in known.tolist():
+    for start, stop in movements.tolist():
         stretch[start + 1 : stop + 1] = 0
     edges = np.flatnonzero(np.diff(stretch))
     rows = np.column_stack((edges[:-1], edges[1:]))[stretch[edges[:-1] + 1] > 0]
@@ -223,42 +218,35 @@ def _left_over(known: Rows, bouts: Rows, times: Array, least: float) -> Rows:
     return rows[times[rows[:, 1] - 1] - times[rows[:, 0]] >= least]
 
 
-def calibration_of_cut(known: Templates) -> Calibration:
-    """The calibration for movements that are cut out of a recording; kept with that for whole movements.
+def calibration_of_cut(templates: Templates) -> Calibration:
+    """Return the calibration for movements that are cut out of a recording; kept with that for whole movements.
 
     The scale of a class is at least the mean distance of its demonstrations from themselves when 3 % of their
     duration is cut off at one end or both. A robot that repeats a movement exactly varies less than the cuts do, and
     whatever a search finds of it would be unknown. Scales of what people show are larger, and stay.
     """
-    made: Calibration | None = vars(known.calibration).get("_of_cut")
-    if made is None:
-        made = known.calibration.with_least_scales(_cut_distances(known))
-        vars(known.calibration)["_of_cut"] = made
-    return made
+    calibration: Calibration | None = vars(templates.calibration).get("_of_cut")
+    if calibration is None:
+        references = templates.references
+        movements, away = references.all_movements(), np.zeros(len(references.classes))
+        for c, own in enumerate(references.slices()):
+            chosen = own.start + evenly_spaced(own.stop - own.start, _OF_EACH)
+            long = [
+                movement for movement in (movements[int(i)] for i in chosen) if len(movement.times) >= 2 * MIN_SAMPLES
+            ]
+            if long:  # else they are too short to be cut
+                windows = [score(templates.comparison, references, _cut(movement), nearest)[0] for movement in long]
+                away[c] = float(distances(np.concatenate(windows)[:, c]).mean())
+        calibration = templates.calibration.with_least_scales(away)
+        vars(templates.calibration)["_of_cut"] = calibration
+    return calibration
 
 
-def _cut_distances(known: Templates) -> Array:
-    """Mean distance (C,) of demonstrations of each class to themselves when cut; 0 where they are too short."""
-    references = known.references
-    movements, found = references.all_movements(), np.zeros(len(references.classes))
-    for c, own in enumerate(references.slices()):
-        chosen = own.start + evenly_spaced(own.stop - own.start, _OF_EACH)
-        long = [one for one in (movements[int(i)] for i in chosen) if len(one.times) >= 2 * MIN_SAMPLES]
-        if long:
-            found[c] = _to_class(known, references, [_cut(one) for one in long], c)
-    return found
-
-
-def _to_class(known: Templates, references: References, cut: list[Demonstrations], c: int) -> float:
-    logs = np.concatenate([score(known.comparison, references, one, nearest)[0][:, c] for one in cut])
-    return float(distances(logs).mean())
-
-
-def _cut(one: Trajectory) -> Demonstrations:
-    """A movement with a little cut off, as a window of a recording."""
-    begin, end = (share * one.duration for share in np.array(_CUTS).T)
-    motion = observe(one, RESOLUTION)
-    return Demonstrations.of_movements(resampled(motion, one.times[0] + begin, one.times[-1] - end))
+def _cut(movement: Trajectory) -> Demonstrations:
+    """Return a movement with a little cut off, as a window of a recording."""
+    begin, end = (share * movement.duration for share in np.array(_CUTS).T)
+    motion = observe(movement, RESOLUTION)
+    return Demonstrations.of_movements(resampled(motion, movement.times[0] + begin, movement.times[-1] - end))
 
 
 class Expected(NamedTuple):
@@ -280,7 +268,7 @@ class Expected(NamedTuple):
 
 @dataclass(frozen=True)
 class Manner:
-    """How a recording differs from the demonstrations as a whole: logarithms of ratios; None while unknown."""
+    """Differences of a recording from the demonstrations as a whole: logarithms of ratios; None while unknown."""
 
     tempo: float | None = None
     size: float | None = None
@@ -294,30 +282,30 @@ class ScoredWindows(NamedTuple):
 
 
 def durations_of(references: References) -> Array | None:
-    """Durations of the references; None where their arrays came without time stamps, so that none is known."""
+    """Return durations of the references; None where their arrays came without time stamps, so that none is known."""
     demos = references.all_movements()
     return None if demos.movements.times is None else demos.durations
 
 
 def expected(references: References) -> Expected:
-    """Medians over the references of each class."""
+    """Return medians over the references of each class."""
     demos = references.all_movements()
     sizes, slowness = size_and_slowness(relative_rows(demos, 0, len(demos), N_POINTS))
     lasting = durations_of(references)
-    known = None if lasting is None else np.log(lasting)
+    log_durations = None if lasting is None else np.log(lasting)
 
     def medians(values: Array) -> Array:
-        return np.array([np.median(values[one]) for one in references.slices()])
+        return np.array([np.median(values[rows]) for rows in references.slices()])
 
-    return Expected(None if known is None else medians(known), medians(sizes), medians(slowness))
+    return Expected(None if log_durations is None else medians(log_durations), medians(sizes), medians(slowness))
 
 
 def alike_windows(spans: Array, chosen: list[int]) -> list[NDArray[np.intp]]:
-    """Of each chosen window, those that have nine tenths of the union with it, itself among them.
+    """Return the windows that have nine tenths of the union with each chosen one, itself among them.
 
     `spans` (n, 2) are start and end of each [s], sorted by starts.
     """
-    found = []
+    alike = []
     for i in chosen:
         start, end = spans[i]
         reach = (1.0 / _ALIKE - 1.0) * (end - start)
@@ -325,8 +313,8 @@ def alike_windows(spans: Array, chosen: list[int]) -> list[NDArray[np.intp]]:
         near = spans[first:last]
         shared = np.minimum(near[:, 1], end) - np.maximum(near[:, 0], start)
         union = np.maximum(near[:, 1], end) - np.minimum(near[:, 0], start)
-        found.append(first + np.flatnonzero(shared >= _ALIKE * union))
-    return found
+        alike.append(first + np.flatnonzero(shared >= _ALIKE * union))
+    return alike
 
 
 def closest_classes(
@@ -337,7 +325,7 @@ def closest_classes(
     spans: Array,
     chosen: list[int],
 ) -> NDArray[np.intp]:
-    """Class of each chosen window: the closest to it, or to a window that has nine tenths of the union with it.
+    """Return class of each chosen window: the closest to it, or to a window that has nine tenths of the union with it.
 
     Which window is chosen depends on its duration, its size, and what surrounds it; these differ between people. The
     class is that of the nearest demonstration, wherever exactly the movement starts and ends: the distance, not over
@@ -361,12 +349,12 @@ def closest_classes(
 
 
 def far(error_rate: float) -> float:
-    """Nonconformity at which a window counts as far."""
+    """Return the nonconformity at which a window counts as far."""
     return _REACH * math.sqrt(-4.0 / math.pi * math.log(error_rate))
 
 
 def _manner_costs(compared: ComparedWindows, typical: Expected, manner: Manner) -> Array:
-    """Costs (n, C) of another duration, and another size, than those of the class in this recording."""
+    """Return costs (n, C) of another duration, and another size, than those of the class in this recording."""
     costs = np.zeros(compared.scores.shape)
     if typical.log_durations is not None:
         ratio = compared.log_durations[:, None] - typical.log_durations
@@ -382,7 +370,7 @@ def _manner_costs(compared: ComparedWindows, typical: Expected, manner: Manner) 
 def score_windows(
     compared: ComparedWindows, typical: Expected, around: Surroundings, manner: Manner, error_rate: float
 ) -> ScoredWindows:
-    """Scores of windows, such that a chain of windows is better the larger its sum.
+    """Return scores of windows, such that a chain of windows is better the larger its sum.
 
     The cost of a window is its nonconformity to the class, in that at which a window counts as far, plus squared
     logarithms of the ratios of its duration and size to those expected, plus costs of ends in motion and of rests
@@ -402,7 +390,7 @@ def score_windows(
 
 
 def manner_of(compared: ComparedWindows, typical: Expected, chosen: list[int], best: NDArray[np.intp]) -> Manner:
-    """The manner of a recording by the windows that are chosen; its tempo is shrunk towards that demonstrated."""
+    """Estimate the manner of a recording by the windows chosen; its tempo is shrunk towards the demonstrated one."""
     if not chosen:
         return Manner()
     classes = best[chosen]

@@ -52,7 +52,7 @@ class Transform:
         return math.atan2(float(np.linalg.norm(skew)) / math.sqrt(2.0), float(np.trace(self.rotation)) - 1.0)
 
     def apply(self, positions: Array) -> Array:
-        """Positions (T, d) of the demonstration, mapped."""
+        """Return positions (T, d) of the demonstration, mapped."""
         return np.asarray(positions) @ self.matrix.T + self.shift
 
 
@@ -64,7 +64,7 @@ def map_onto(
     paths: Array,
     share: Array,
 ) -> list[Transform]:
-    """Transforms from the references `example` (n,) onto as many movements.
+    """Return transforms from the references `example` (n,) onto as many movements.
 
     Fitted to positions over the phase of the representation with the largest share (R, n), one batch for each phase.
 
@@ -78,17 +78,17 @@ def map_onto(
     # Of two representations that are equally alike, the one with the larger weight has the larger share.
     weights = comparison.similarity.weights
     alike = share if weights is None else share / np.maximum(weights, np.finfo(float).tiny)[:, None]
-    phases = np.array([one.arc_share for one in comparison.representations])[alike.argmax(axis=0)]
+    phases = np.array([representation.arc_share for representation in comparison.representations])[alike.argmax(axis=0)]
     used, which = np.unique(example, return_inverse=True)  # one example may be that of many
     stored = references[used]
     examples = recorded_paths(stored, even_paths(stored, 0, len(stored), comparison.cutoff))[which]
     ratios = (demos.durations / stored.durations[which]).tolist()
-    found: dict[int, Transform] = {}
+    transforms: dict[int, Transform] = {}
     for phase in np.unique(phases):
         chosen = np.flatnonzero(phases == phase)
         positions = replace(POSITIONS, arc_share=float(phase))
         ours, theirs = positions.along(examples[chosen]), positions.along(paths[chosen])
         maps = fit_maps(ours, theirs, comparison.normalization, comparison.procrustes)
         for i, matrix, shift, rotation, scale in zip(chosen.tolist(), *maps, strict=True):
-            found[i] = Transform(matrix, shift, scale, rotation, ratios[i])
-    return [found[i] for i in range(len(demos))]
+            transforms[i] = Transform(matrix, shift, scale, rotation, ratios[i])
+    return [transforms[i] for i in range(len(demos))]

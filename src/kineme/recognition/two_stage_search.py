@@ -18,10 +18,9 @@ from kineme.similarity.bounds import ReducedFeatures, Single, reduce_features
 from kineme.similarity.comparison import Comparison
 from kineme.similarity.describe import describe_tile, recorded_paths
 from kineme.similarity.described import Described
-from kineme.similarity.log_averages import LOG_MEANS
-from kineme.similarity.references import References
+from kineme.similarity.references import HeldReferences, OnDemand, References, Rows, StoredReferences
 from kineme.similarity.scores import Compared
-from kineme.similarity.stored_references import HeldReferences, OnDemand, Rows, StoredReferences
+from kineme.similarity.specification import LOG_MEANS
 from kineme.validation import Array
 
 _LEADING, _BEST = 3, 16  # classes, and movements of each, compared first
@@ -63,10 +62,10 @@ class TwoStageSearch:
     stored: StoredReferences
 
     def recognize(self, X: MovementsLike, error_rate: float = 0.05) -> list[Answer]:
-        """An answer for each movement; ``nearest[k].index`` is a row of the features, and names are left out."""
+        """Return an answer for each movement; ``nearest[k].index`` is a row of the features, and names are left out."""
         check_error_rate(error_rate)
         demos = self.comparison.checked(X)
-        found: list[Answer] = []
+        answers: list[Answer] = []
         held = HeldReferences(self.stored, self.comparison.similarity)
         step = max(_ASKED, min(_MOST_ASKED, _BOUNDS // len(self.stored.members)))
         for start in range(0, len(demos), step):
@@ -75,44 +74,44 @@ class TwoStageSearch:
             with single_threaded_blas():  # held once, not for each of many small products
                 verdicts = self._verdicts(tile.described, held, error_rate)
             every = OnDemand(np.arange(held.n_rows), self.stored.movements)
-            found += with_transforms(verdicts, self.comparison, every, some, recorded_paths(some, tile.paths))
-        return found
+            answers += with_transforms(verdicts, self.comparison, every, some, recorded_paths(some, tile.paths))
+        return answers
 
     def _verdicts(self, described: Described, held: HeldReferences, error_rate: float) -> list[Verdict]:
-        """What each movement is; ``nearest[k].index`` is a row of the features."""
+        """Tell what each movement is; ``nearest[k].index`` is a row of the features."""
         bounds = self.stored.bounds(self.comparison.similarity, self.reduced(described))
-        promising = [self._promising(one) for one in bounds]
+        promising = [self._promising(bound) for bound in bounds]
         held.described(self.stored.members[np.unique(np.concatenate(promising))])
-        found = []
+        verdicts = []
         for i in range(len(described)):
-            one = described.take(slice(i, i + 1))
-            chosen, _, compared = self.compare(one, bounds[i], held, promising[i])
+            movement = described.take(slice(i, i + 1))
+            chosen, _, compared = self.compare(movement, bounds[i], held, promising[i])
             owners = np.searchsorted(self.stored.first, chosen, side="right") - 1
             verdict = verdicts_of(compared, Nearest(), self.calibration.select(np.unique(owners)), error_rate)[0]
             rows = self.stored.members[chosen]
             near = tuple(replace(other, index=int(rows[other.index])) for other in verdict.nearest)
-            found.append(verdict._replace(nearest=near))
-        return found
+            verdicts.append(verdict._replace(nearest=near))
+        return verdicts
 
     def reduced(self, described: Described) -> tuple[ReducedFeatures, ...]:
-        """Reduced features of described movements."""
+        """Return reduced features of described movements."""
         rows = tuple(
-            np.concatenate((one.rows.real, one.rows.imag), axis=1) if np.iscomplexobj(one.rows) else one.rows
-            for one in described.blocks
+            np.concatenate((block.rows.real, block.rows.imag), axis=1) if np.iscomplexobj(block.rows) else block.rows
+            for block in described.blocks
         )
         return reduce_features(self.stored.bases, rows, self.comparison.n_dims)
 
     def compare(
-        self, one: Described, bounds: Single, held: HeldReferences | None = None, promising: Rows | None = None
+        self, movement: Described, bounds: Single, held: HeldReferences | None = None, promising: Rows | None = None
     ) -> tuple[Rows, Array, Compared]:
-        """Which members one movement was compared with, ascending; log similarities; the comparison with them.
+        """Return the members one movement was compared with, ascending; log similarities; the comparison with them.
 
         First the most promising of all and of each class; then whoever could still be nearer than the nearest of its
         class found so far or, in a class not compared with yet, than the nearest of all.
         """
         held = held or HeldReferences(self.stored, self.comparison.similarity)
         chosen = self._promising(bounds) if promising is None else promising
-        squares, logs = self._exact(one, held.described(self.stored.members[chosen]))
+        squares, logs = self._exact(movement, held.described(self.stored.members[chosen]))
         near = np.full(len(self.classes), logs.max())
         owners = np.searchsorted(self.stored.first, chosen, side="right") - 1
         begins = np.flatnonzero(np.diff(owners, prepend=-1))
@@ -126,12 +125,12 @@ class TwoStageSearch:
         if len(more) > n_more:
             more = np.sort(more[np.argpartition(-bounds[more], n_more)[:n_more]])
         if len(more):
-            others, other_logs = self._exact(one, held.described(self.stored.members[more]))
+            others, other_logs = self._exact(movement, held.described(self.stored.members[more]))
             chosen = np.concatenate((chosen, more))
             order = np.argsort(chosen, kind="stable")
             squares = np.concatenate((squares, others), axis=2)[:, :, order]
             chosen, logs = chosen[order], np.concatenate((logs, other_logs))[order]
-        return chosen, logs, self._compared(one, chosen).with_squares(squares)
+        return chosen, logs, self._compared(movement, chosen).with_squares(squares)
 
     def _promising(self, bounds: Single) -> Rows:
         first, counts = self.stored.first, self.stored.counts
@@ -147,17 +146,17 @@ class TwoStageSearch:
         top = [first[c] + int(bounds[first[c] : first[c] + counts[c]].argmax()) for c in classes]
         return np.unique(np.concatenate([*best, top]))
 
-    def _exact(self, one: Described, others: Described) -> tuple[Array, Array]:
-        """Squared distances (R, 1, k) and log similarities (k,) of one movement to others."""
-        squares = self.comparison.similarity.squared_distances(one, others)
+    def _exact(self, movement: Described, others: Described) -> tuple[Array, Array]:
+        """Return squared distances (R, 1, k) and log similarities (k,) of one movement to others."""
+        squares = self.comparison.similarity.squared_distances(movement, others)
         return squares, LOG_MEANS[self.comparison.mean](self.comparison.similarity.logs_at(squares))[0]
 
-    def _compared(self, one: Described, chosen: Rows) -> Compared:
-        """One movement and the members that it was compared with: these are described no more."""
+    def _compared(self, movement: Described, chosen: Rows) -> Compared:
+        """Return one movement and the members that it was compared with: these are described no more."""
         rows = self.stored.members[chosen]
         owners = np.searchsorted(self.stored.first, chosen, side="right") - 1
         demonstrations = OnDemand(rows, self.stored.movements)
         first = np.flatnonzero(np.diff(owners, prepend=-1))
-        none, labels = one.take(slice(0, 0)), self.classes[owners]
+        none, labels = movement.take(slice(0, 0)), self.classes[owners]
         references = References(demonstrations, none, labels, labels[first], first)
-        return Compared(self.comparison, references, one)
+        return Compared(self.comparison, references, movement)

@@ -11,7 +11,7 @@ from kineme.runtime.compiled import jit
 
 @jit
 def fill_normalized(paths, least, normalized):  # type: ignore[no-untyped-def]
-    """Paths (n, d, T) minus their center, divided by their size; see `normalization.Normalization.apply`.
+    """Return paths (n, d, T) minus their center, divided by their size; see `normalization.Normalization.apply`.
 
     Dimensions larger than a share `least` of the whole are divided by their own size, with infinity none.
     """
@@ -28,10 +28,10 @@ def fill_normalized(paths, least, normalized):  # type: ignore[no-untyped-def]
                 own[t] -= center
                 square += own[t] * own[t]
             squares[k] = square
-        whole = math.sqrt(squares.sum() / n_points)
+        total_size = math.sqrt(squares.sum() / n_points)
         for k in range(n_dims):
             size = math.sqrt(squares[k] / n_points)
-            size = size if size > least * whole else whole
+            size = size if size > least * total_size else total_size
             per = 1.0 / (size if size > 0.0 else 1.0)
             own, row = away[k], normalized[i, k]
             for t in range(n_points):

@@ -11,8 +11,7 @@ from kineme.dmp.styles.parameters import from_numbers, shared_label, to_numbers
 from kineme.kernels.procrustes import Procrustes
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.similarity.describe import N_POINTS, even_paths, recorded_paths
-from kineme.similarity.normalization import Normalization
-from kineme.similarity.representation import POSITIONS
+from kineme.similarity.representation import POSITIONS, Normalization
 from kineme.similarity.specification import Compares, specification_of
 from kineme.validation import Array
 
@@ -36,12 +35,12 @@ class Maps(NamedTuple):
     scales: Array
 
     def move(self, paths: Array) -> Array:
-        """Paths (n, d, T), each by its map."""
+        """Return paths (n, d, T), each by its map."""
         return np.asarray(self.matrices @ paths + self.shifts[:, :, None])
 
 
 def fit_maps(paths: Array, targets: Array, normalization: Normalization, procrustes: Procrustes) -> Maps:
-    """Maps of each path (n, d, S) onto the target of the same index (n, d, S), or onto the only one (1, d, S).
+    """Return maps of each path (n, d, S) onto the target of the same index (n, d, S), or onto the only one (1, d, S).
 
     Center onto center, size onto size, and the rotation within the limit that brings samples closest (Procrustes).
     Translation and size are mapped only if the normalization removes them.
@@ -57,7 +56,7 @@ def fit_maps(paths: Array, targets: Array, normalization: Normalization, procrus
 
 
 def maps_onto(paths: Array, onto: Array, like: Compares | None = None) -> Maps:
-    """Maps of each path (n, d, T) onto one path (d, T): the best fit over arc length within the invariances.
+    """Return maps of each path (n, d, T) onto one path (d, T): the best fit over arc length within the invariances.
 
     See `fit_maps`; it is fitted to positions at even arc lengths.
     """
@@ -67,14 +66,14 @@ def maps_onto(paths: Array, onto: Array, like: Compares | None = None) -> Maps:
 
 
 def paths_of(movements: Demonstrations | Primitives, like: Compares | None = None) -> Array:
-    """Paths at even times (n, d, T) in recorded coordinates; smoothed as for comparison, or rolled out."""
+    """Return paths at even times (n, d, T) in recorded coordinates; smoothed as for comparison, or rolled out."""
     if isinstance(movements, Primitives):
         return np.ascontiguousarray(movements.rollout(n_samples=N_POINTS).positions.transpose(0, 2, 1))
     return recorded_paths(movements, even_paths(movements, 0, len(movements), specification_of(like).cutoff))
 
 
 def moved(primitives: Primitives, maps: Maps) -> Primitives:
-    """Primitives whose paths are the mapped paths of the given ones; exact, without learning again.
+    """Return primitives whose paths are the mapped paths of the given ones; exact, without learning again.
 
     A path is linear in theta = [W, x0, g, tau v0], and the coefficients of x0 and g sum to 1 at every phase, so
     ``x -> M x + b`` is ``theta -> M theta``, with b added to x0 and to g.

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from kineme.kernels.procrustes import Procrustes
 from kineme.runtime.parallel import for_tiles
-from kineme.similarity.log_averages import LOG_MEANS
 from kineme.similarity.similarity import AveragedSimilarity
+from kineme.similarity.specification import LOG_MEANS
 from kineme.validation import Array
 
 Single = NDArray[np.float32]
@@ -38,12 +38,12 @@ class ReducedFeatures(NamedTuple):
     residual_norms: Single  # (n,), |e|
 
     def take(self, chosen: Any) -> ReducedFeatures:
-        """The chosen movements."""
+        """Return the chosen movements."""
         return ReducedFeatures(self.values[chosen], self.squares[chosen], self.residual_norms[chosen])
 
 
 def fit_bases(rows: tuple[NDArray[Any], ...], n_dims: int, n_reduced: int = N_REDUCED) -> tuple[Array, ...]:
-    """For each representation, the k functions (S, k) with most of the rows' energy: uncentered principal components.
+    """Fit k functions (S, k) with most of the rows' energy to each representation: uncentered principal components.
 
     Dimensions are pooled and nothing is centered, so that turned rows have turned reduced features. Bounds hold for any
     orthonormal basis; movements unlike those that it was fitted to only make them less tight.
@@ -73,7 +73,7 @@ def fit_bases(rows: tuple[NDArray[Any], ...], n_dims: int, n_reduced: int = N_RE
 def reduce_features(
     bases: tuple[Array, ...], rows: tuple[NDArray[Any], ...], n_dims: int
 ) -> tuple[ReducedFeatures, ...]:
-    """Reduced features of rows (n, d * S), for each representation."""
+    """Return reduced features of rows (n, d * S), for each representation."""
     reduced = []
     for P, block in zip(bases, rows, strict=True):
         x = np.asarray(block, dtype=np.float64)
@@ -86,9 +86,9 @@ def reduce_features(
 
 
 def log_bounds(
-    similarity: AveragedSimilarity, asked: tuple[ReducedFeatures, ...], stored: tuple[ReducedFeatures, ...]
+    similarity: AveragedSimilarity, queries: tuple[ReducedFeatures, ...], stored: tuple[ReducedFeatures, ...]
 ) -> Single:
-    """Upper bounds (n, m) of the logarithms of the averaged kernel.
+    """Return upper bounds (n, m) of the logarithms of the averaged kernel.
 
     With ``x = P y + e``, and R a rotation that is allowed, ``<x_a, R x_b> <= max_R <y_a, R y_b> + |e_a| |e_b|``; so
     ``d^2 >= |x_a|^2 + |x_b|^2 - 2 (max_R <y_a, R y_b> + |e_a| |e_b|)``, and an A-average grows with each kernel.
@@ -102,7 +102,7 @@ def log_bounds(
     ----------
     similarity : AveragedSimilarity
         Of all R representations, those that are compared sample by sample first.
-    asked : tuple of ReducedFeatures
+    queries : tuple of ReducedFeatures
         Of n movements, in each of the representations that are compared sample by sample; of the bases of `stored`.
     stored : tuple of ReducedFeatures
         Of m movements.
@@ -112,15 +112,15 @@ def log_bounds(
     ndarray of shape (n, m)
         In single precision, and lower by no rounding error.
     """
-    n, m = len(asked[0].values), len(stored[0].values)
+    n, m = len(queries[0].values), len(stored[0].values)
     similarity = similarity.by_rows(len(stored))
     bounds = np.empty((n, m), dtype=np.float32)
     average: Any = LOG_MEANS[similarity.mean]  # Any keeps single precision
     log_weights = similarity.log_weights()
     # Factors that do not depend on the stored movements include 1 / sigma^2.
     scaled = [
-        ReducedFeatures(*(np.asarray(part / width**2, dtype=np.float32) for part in one))
-        for one, width in zip(asked, similarity.widths, strict=True)
+        ReducedFeatures(*(np.asarray(part / width**2, dtype=np.float32) for part in features))
+        for features, width in zip(queries, similarity.widths, strict=True)
     ]
 
     def fill(start: int, stop: int) -> None:
@@ -142,7 +142,7 @@ def log_bounds(
 
 
 def _alignments(procrustes: Procrustes, A: Single, B: Single, norms: Single) -> Single:
-    """Largest inner products (m, n) of reduced features after rotation; in space, upper bounds of them.
+    """Return the largest inner products (m, n) of reduced features after rotation; in space, upper bounds of them.
 
     `norms` (m, n) are ``|a| |b|`` of the whole rows, on which the costs of rotations depend.
     """
@@ -168,7 +168,7 @@ def _alignments(procrustes: Procrustes, A: Single, B: Single, norms: Single) -> 
 
 
 def _within(re: Single, im: Single, max_angle: float) -> Single:
-    """Largest real part of ``(re + i im) exp(-i angle)`` within the angle, without an arc tangent."""
+    """Return the largest real part of ``(re + i im) exp(-i angle)`` within the angle, without an arc tangent."""
     c, s = np.float32(math.cos(max_angle)), np.float32(math.sin(max_angle))
     size = np.sqrt(re * re + im * im)
     inside = re >= c * size
@@ -179,7 +179,7 @@ def _within(re: Single, im: Single, max_angle: float) -> Single:
 
 
 def _over_rotations(C: NDArray[Any], most: Single) -> Single:
-    """Bounds of ``max_R tr(R^T C)`` over all rotations, for covariances C (3, 3, m, n) and a bound to begin with.
+    """Bound ``max_R tr(R^T C)`` over all rotations, for covariances C (3, 3, m, n) and a bound to begin with.
 
     The maximum is s_1 + s_2 +- s_3, singular values of C, the sign that of det C, and the largest root of
     ``(x^2 - |C|^2)^2 - 8 x det C - 4 |adj C|^2`` (after D. L. Theobald, Acta Crystallographica A61, 2005, who takes

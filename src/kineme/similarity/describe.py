@@ -48,7 +48,7 @@ def describe(movements: Described | MovementsLike, like: Compares | None = None)
 
 
 def describe_rows(rows: NDArray[Any], n_dims: int, like: Compares | None = None) -> Described:
-    """Feature rows of n movements that were stored, as descriptions.
+    """Return feature rows of n movements that were stored, as descriptions.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def describe_rows(rows: NDArray[Any], n_dims: int, like: Compares | None = None)
     """
     how = specification_of(like)
     rows = np.asarray(rows)
-    widths = [n_dims * one.n_points for one in how.by_rows]
+    widths = [n_dims * representation.n_points for representation in how.by_rows]
     if rows.ndim != 2 or rows.shape[1] != sum(widths) or not len(rows):
         raise TrajectoryError(
             f"expected feature rows of shape (n, {sum(widths)}) for {n_dims} dimensions and {len(widths)} "
@@ -76,20 +76,20 @@ def describe_rows(rows: NDArray[Any], n_dims: int, like: Compares | None = None)
 
 
 def prepare(rows: Iterable[NDArray[Any]], like: Compares, procrustes: Procrustes) -> Described:
-    """Rows (n, d * S), one block per representation that is compared sample by sample, ready for comparison.
+    """Return rows (n, d * S), one block per representation that is compared sample by sample, ready for comparison.
 
     In single precision: comparing with many stored movements is bound by memory, and widths are far above its error.
     What is compared pair by pair is made from the positions over arc length.
     """
     how, rows = like.specification, tuple(rows)
     blocks = tuple(procrustes.prepare(np.ascontiguousarray(block, dtype=np.float32)) for block in rows)
-    own = tuple(one.weight for one in how.representations)
+    own = tuple(representation.weight for representation in how.representations)
     if not how.by_pairs:
         return Described(blocks, procrustes, how.mean, own_weights=own)
     r = rotating(how.representations)
     single = np.ascontiguousarray(rows[r], dtype=np.float32)  # so that stored rows say the same
     shapes = shapes_of(single.reshape(len(single), procrustes.n_dims, -1))
-    measures = tuple(PAIR_QUANTITIES.index(one.quantity) for one in how.by_pairs)
+    measures = tuple(PAIR_QUANTITIES.index(representation.quantity) for representation in how.by_pairs)
     return Described(blocks, procrustes, how.mean, Pairs(blocks[r], shapes, measures), own)
 
 
@@ -99,7 +99,9 @@ def feature_rows(movements: MovementsLike, specification: ComparisonSpecificatio
     Rows (n, d * S) for each representation that is compared sample by sample.
     """
     demos = Demonstrations.of(movements)
-    rows = tuple(np.empty((len(demos), demos.n_dims * one.n_points)) for one in specification.by_rows)
+    rows = tuple(
+        np.empty((len(demos), demos.n_dims * representation.n_points)) for representation in specification.by_rows
+    )
 
     def fill(start: int, stop: int) -> None:
         for block, tile in zip(rows, _tile_rows(demos, start, stop, specification, np.float64)[1], strict=True):
@@ -152,12 +154,12 @@ def describe_paths(paths: Array, like: Compares, procrustes: Procrustes) -> Desc
 
 
 def _precision(how: ComparisonSpecification) -> DTypeLike:
-    """Single is far finer than the widths, except for paths that are far from the origin for their size."""
+    """Return single precision, far finer than the widths; double for paths far from the origin for their size."""
     return np.float32 if how.normalization.translation else np.float64
 
 
 def even_paths(demos: Demonstrations, start: int, stop: int, cutoff: float | None) -> Array:
-    """Movements start:stop, smoothed, at even times, minus their first recorded position, (stop - start, d, T).
+    """Return movements start:stop, smoothed, at even times, minus their first recorded position, (stop - start, d, T).
 
     Pauses are cut short first, see `cut_pauses`.
     """
@@ -169,31 +171,31 @@ def even_paths(demos: Demonstrations, start: int, stop: int, cutoff: float | Non
 
 
 def recorded_paths(demos: Demonstrations, paths: Array, start: int = 0) -> Array:
-    """Paths (n, d, T) of movements start:start + n, as `even_paths` gives them, moved to where they were recorded."""
+    """Move paths (n, d, T) of movements start:start + n, as from `even_paths`, to where they were recorded."""
     return paths + demos.positions[demos.offsets[start : start + len(paths)]][:, :, None]
 
 
 def _tile_rows(
     demos: Demonstrations, start: int, stop: int, how: ComparisonSpecification, dtype: DTypeLike
 ) -> tuple[Array, tuple[NDArray[Any], ...]]:
-    """Paths of movements start:stop, as `even_paths` gives them, and their feature rows as `dtype`."""
+    """Return paths of movements start:stop, as `even_paths` gives them, and their feature rows as `dtype`."""
     relative = even_paths(demos, start, stop, how.cutoff)
     paths = relative if how.normalization.translation else recorded_paths(demos, relative, start)
     return relative, _path_rows(paths, how, dtype)
 
 
 def _path_rows(paths: Array, how: ComparisonSpecification, dtype: DTypeLike) -> tuple[NDArray[Any], ...]:
-    """Feature rows of paths (n, d, T) as `dtype`."""
+    """Return feature rows of paths (n, d, T) as `dtype`."""
     normalized: dict[tuple[float, int], NDArray[Any]] = {}  # representations of equal phase share it
     rows = []
-    for one in how.by_rows:
-        phase = (one.arc_share, one.n_points)
+    for representation in how.by_rows:
+        phase = (representation.arc_share, representation.n_points)
         if phase not in normalized:
-            normalized[phase] = how.normalization.apply(one.along(paths), dtype)
-        rows.append(one.describe(normalized[phase], how.normalization.translation))
+            normalized[phase] = how.normalization.apply(representation.along(paths), dtype)
+        rows.append(representation.describe(normalized[phase], how.normalization.translation))
     return tuple(rows)
 
 
 def _tile_movements(n_dims: int) -> int:
-    """Movements of one tile."""
+    """Return movements of one tile."""
     return max(1, _TILE_SAMPLES // (n_dims * N_POINTS))

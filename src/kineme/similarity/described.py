@@ -1,4 +1,4 @@
-"""Described movements: one block of rows per representation, and what is compared pair by pair."""
+"""Described movements: one block of rows per representation, what is compared pair by pair, and squared distances."""
 
 from __future__ import annotations
 
@@ -7,14 +7,19 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from kineme.kernels.pair_distances import pair_distances
 from kineme.kernels.procrustes import Prepared, Procrustes
 from kineme.kernels.shapes import Shapes
+from kineme.validation import Array
+
+_TILE_PAIRS = 100_000  # at a time: a pair's rotation in space has nine numbers
 
 
 @dataclass(frozen=True, eq=False)
 class Pairs:
-    """What n movements are compared by pair by pair.
+    """Shapes of n movements that are compared pair by pair.
 
     Attributes
     ----------
@@ -68,11 +73,11 @@ class Described:
         return self.procrustes.n_dims
 
     def take(self, chosen: Any) -> Described:
-        """The chosen movements: a slice, a mask or indices."""
+        """Return the chosen movements: a slice, a mask or indices."""
         return self._changed(lambda arrays: arrays.take(chosen))
 
     def empty(self, n: int) -> Described:
-        """Room for n movements that are described in the same way."""
+        """Make room for n movements that are described in the same way."""
         return self._changed(lambda arrays: arrays.empty(n))
 
     def put(self, start: int, others: Described) -> None:
@@ -87,7 +92,7 @@ class Described:
             ours.rows[rows], ours.squares[rows] = theirs
 
     def select(self, representations: Iterable[int]) -> Described:
-        """The same movements in some of the representations."""
+        """Return the same movements in some of the representations."""
         chosen, n = list(representations), len(self.blocks)
         measures = tuple(self.pairs.measures[r - n] for r in chosen if r >= n) if self.pairs is not None else ()
         return replace(
@@ -98,7 +103,7 @@ class Described:
         )
 
     def _changed(self, change: Callable[[Any], Any]) -> Described:
-        """All arrays changed alike; positions that are a block as well stay one object, which is compared once."""
+        """Change all arrays alike; positions that are a block as well stay one object, which is compared once."""
         blocks = tuple(map(change, self.blocks))
         if self.pairs is None:
             return replace(self, blocks=blocks)
@@ -110,10 +115,49 @@ class Described:
         )
 
     def sizes(self) -> np.ndarray[Any, np.dtype[np.float64]]:
-        """Typical size in each representation, (R,): the median norm of rows, or the distance of opposite tangents.
+        """Return typical sizes in each representation, (R,): median norms of rows, or distances of opposite tangents.
 
         Movements that do not move have no size, and do not count; of such alone the norm is 0.
         """
         moving = [block.squares[block.squares > 0] for block in self.blocks]
         by_rows = [float(np.sqrt(np.median(squares))) if len(squares) else 0.0 for squares in moving]
         return np.array(by_rows + [2.0] * (self.n_representations - len(by_rows)))
+
+
+def squared_distances(A: Described, B: Described) -> Array:
+    """Return squared distances (R, n, m).
+
+    Sample by sample they are Procrustes distances, each after a rotation of its own; pair by pair all are measured
+    after the rotation that brings the positions over arc length closest.
+    """
+    squares = np.empty((A.n_representations, len(A), len(B)))
+    step = max(1, _TILE_PAIRS // max(1, len(B)))
+    for start in range(0, len(A), step):
+        rows = slice(start, start + step)
+        _fill(A if len(A) <= step else A.take(rows), B, squares[:, rows])
+    return squares
+
+
+def _fill(A: Described, B: Described, squares: Array) -> None:
+    n_blocks = len(A.blocks)
+    rotations = fill_by_rows(A, B, squares[:n_blocks])
+    if A.pairs is not None and B.pairs is not None:
+        measured = pair_distances(A.pairs.shapes, B.pairs.shapes, rotations)
+        squares[n_blocks:] = measured[list(A.pairs.measures)]
+
+
+def fill_by_rows(A: Described, B: Described, squares: Array) -> NDArray[np.float32] | None:
+    """Write the squared distances (R', n, m) of what is compared sample by sample; the rotations of pairs, if needed.
+
+    See `Procrustes.align` for these.
+    """
+    rotations = aligned = None
+    if A.pairs is not None and B.pairs is not None:
+        alignment, rotations = A.procrustes.align(A.pairs.positions, B.pairs.positions)
+        aligned = A.pairs.positions
+    for r, (a, b) in enumerate(zip(A.blocks, B.blocks, strict=True)):
+        if aligned is not None and a is aligned:
+            squares[r] = np.maximum(a.squares[:, None] + b.squares - 2.0 * alignment, 0.0)
+        else:
+            squares[r] = A.procrustes.squared_distances(a, b)
+    return rotations

@@ -12,11 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.kernels.pair_distances import listed_distances, pair_bounds
-from kineme.similarity.described import Described, Pairs
-from kineme.similarity.distances import fill_by_rows
-from kineme.similarity.log_averages import LOG_MEANS
+from kineme.similarity.described import Described, Pairs, fill_by_rows
 from kineme.similarity.representation import PAIR_QUANTITIES
 from kineme.similarity.similarity import AveragedSimilarity
+from kineme.similarity.specification import LOG_MEANS
 from kineme.validation import Array
 
 Single = NDArray[np.float32]
@@ -28,15 +27,15 @@ _MANY, _MOST = 0.15, 0.8  # shares of pairs in doubt from which it is faster to 
 
 
 def most_similar(similarity: AveragedSimilarity, A: Described, B: Described) -> Indices:
-    """Index (n,) of the movement of B that each of A is most similar to; of several the first."""
+    """Return the index (n,) of the movement of B that each of A is most similar to; of several the first."""
     if not _can_skip(similarity, A, B):
         return np.asarray(similarity.log_average(A, B).argmax(axis=1))
-    search, known = _by_rows(similarity, A, B)
-    each, first = np.arange(len(A)), known.argmax(axis=1)
-    logs = np.full(known.shape, -np.inf)
+    search, kernels = _by_rows(similarity, A, B)
+    each, first = np.arange(len(A)), kernels.argmax(axis=1)
+    logs = np.full(kernels.shape, -np.inf)
     logs[each, first] = search.log_averages(each, first)
     bars = _rounded(np.exp(logs[each, first]))
-    bounds = known + search.upper_bounds()
+    bounds = kernels + search.upper_bounds()
     bounds[each, first] = -1.0  # compared already
     i, j = np.divmod(np.flatnonzero(bounds >= bars[:, None]), len(B))
     logs[i, j] = search.log_averages(i, j)
@@ -44,7 +43,7 @@ def most_similar(similarity: AveragedSimilarity, A: Described, B: Described) -> 
 
 
 def nearest_above(similarity: AveragedSimilarity, A: Described, B: Described, first: Indices, bars: Array) -> Array:
-    """Log similarity (n, C) of movements A to the nearest of each class, where that reaches the bar of the class.
+    """Return log similarity (n, C) of movements A to the nearest of each class, where it reaches the bar of the class.
 
     Elsewhere it is an upper bound, which does not reach the bar either.
 
@@ -60,51 +59,48 @@ def nearest_above(similarity: AveragedSimilarity, A: Described, B: Described, fi
     bars : ndarray of shape (C,)
         Averaged kernels K, from 0 to 1.
     """
-    if not _can_skip(similarity, A, B) or (bars <= _never_bounded(similarity, B)).all():
+    if not _can_skip(similarity, A, B):
         return _nearest(similarity, A, B, first)
-    search, known = _by_rows(similarity, A, B)
+    assert B.pairs is not None
+    clouds = np.array(B.pairs.measures) == PAIR_QUANTITIES.index("cloud")  # there is no bound of their kernel:
+    if (bars <= float(_shares(similarity)[len(B.blocks) :][clouds].sum())).all():  # no K below it can be ruled out
+        return _nearest(similarity, A, B, first)
+    search, kernels = _by_rows(similarity, A, B)
     classes = np.repeat(np.arange(len(first)), np.diff(first, append=len(B)))
     least = _rounded(bars).astype(np.float32)[classes]
-    bounds = known + search.others
+    bounds = kernels + search.others
     doubtful = bounds >= least
     if doubtful.mean() > _MANY:
-        bounds = known + search.upper_bounds()
+        bounds = kernels + search.upper_bounds()
         doubtful = bounds >= least
     if doubtful.mean() > _MOST:
         return _nearest(similarity, A, B, first)
     i, j = np.divmod(np.flatnonzero(doubtful), len(B))
     bounds[i, j] = 0.0
     bounds = np.maximum.reduceat(bounds, first, axis=1)
-    found: Array = np.log(np.maximum(bounds, _SMALLEST), dtype=np.float64)
+    logs: Array = np.log(np.maximum(bounds, _SMALLEST), dtype=np.float64)
     if len(i):
-        np.maximum.at(found, (i, classes[j]), search.log_averages(i, j))
-    return found
+        np.maximum.at(logs, (i, classes[j]), search.log_averages(i, j))
+    return logs
 
 
 def _nearest(similarity: AveragedSimilarity, A: Described, B: Described, first: Indices) -> Array:
-    """By comparing all."""
+    """Compare all."""
     return np.asarray(np.maximum.reduceat(similarity.log_average(A, B), first, axis=1))
 
 
-def _never_bounded(similarity: AveragedSimilarity, B: Described) -> float:
-    """Weighted kernel of point clouds, for which there is no bound: no K below it can be ruled out."""
-    assert B.pairs is not None
-    clouds = np.array(B.pairs.measures) == PAIR_QUANTITIES.index("cloud")
-    return float(_shares(similarity)[len(B.blocks) :][clouds].sum())
-
-
 def _shares(similarity: AveragedSimilarity) -> Single:
-    """Weights (R,) of the kernels, which add up to 1."""
+    """Return weights (R,) of the kernels, which add up to 1."""
     return (np.exp(similarity.log_weights()) / len(similarity.widths)).astype(np.float32)
 
 
 def _rounded(bars: Array) -> Array:
-    """Bars that bounds reach in spite of rounding, 0 for those that are too small for single precision."""
+    """Return bars that bounds reach in spite of rounding, 0 for those that are too small for single precision."""
     return np.where(bars > _SMALLEST, (1 - _ROUNDING) * bars, 0.0)
 
 
 def _by_rows(similarity: AveragedSimilarity, A: Described, B: Described) -> tuple[_Search, Single]:
-    """What the distances of rows tell of all pairs, and the weighted sum (n, m) of their kernels."""
+    """Compare rows of all pairs; return the search, and the weighted sum (n, m) of their kernels."""
     assert A.pairs is not None
     assert B.pairs is not None
     squares = np.empty((len(A.blocks), len(A), len(B)))
@@ -113,14 +109,14 @@ def _by_rows(similarity: AveragedSimilarity, A: Described, B: Described) -> tupl
 
 
 def _can_skip(similarity: AveragedSimilarity, A: Described, B: Described) -> bool:
-    """Whether there are bounds, and enough pairs that they pay."""
+    """Tell whether there are bounds, and enough pairs that they pay."""
     elastic = A.pairs is not None and PAIR_QUANTITIES.index("elastic") in A.pairs.measures
     enough = len(A) >= _LEAST_ASKED and len(A) * len(B) >= _LEAST_PAIRS
     return elastic and similarity.mean == "arithmetic" and enough
 
 
 class _Search:
-    """What is known of all pairs (n, m): squared distances of rows (R', n, m), and rotations."""
+    """Search among all pairs (n, m) by squared distances of rows (R', n, m) and rotations."""
 
     def __init__(
         self, similarity: AveragedSimilarity, a: Pairs, b: Pairs, squares: Array, rotations: Single | None
@@ -130,11 +126,11 @@ class _Search:
         self._shares = _shares(similarity)
 
     def kernels(self, squares: NDArray[np.floating], first: int) -> Single:
-        """Weighted sum (n, m) of the kernels of some representations, from number `first` on."""
+        """Return the weighted sum (n, m) of the kernels of some representations, from number `first` on."""
         total = np.zeros(squares.shape[1:], np.float32)
-        for r, one in enumerate(squares, first):
+        for r, block in enumerate(squares, first):
             width = self._similarity.widths[r]
-            kernel = np.asarray(one * np.float32(-0.5 / width**2), dtype=np.float32)
+            kernel = np.asarray(block * np.float32(-0.5 / width**2), dtype=np.float32)
             total += self._shares[r] * np.exp(kernel, out=kernel)
         return total
 
@@ -144,12 +140,12 @@ class _Search:
         return np.float32(self._shares[len(self._squares) :].sum())
 
     def upper_bounds(self) -> Single:
-        """Upper bounds (n, m) of the weighted sum of the others."""
+        """Return upper bounds (n, m) of the weighted sum of the others."""
         bounds = pair_bounds(self._a.shapes, self._b.shapes, self._rotations)
         return self.kernels(bounds[list(self._a.measures)], len(self._squares))
 
     def log_averages(self, i: Indices, j: Indices) -> Array:
-        """Logarithms (k,) of the averaged kernels of some pairs."""
+        """Return the logarithms (k,) of the averaged kernels of some pairs."""
         rotations = None if self._rotations is None else self._rotations[i, j]
         measured = listed_distances(self._a.shapes, self._b.shapes, i, j, rotations)[list(self._a.measures)]
         squares: Array = np.concatenate((self._squares[:, i, j], measured))

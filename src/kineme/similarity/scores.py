@@ -14,8 +14,8 @@ from kineme.runtime.parallel import for_tiles
 from kineme.similarity.comparison import Comparison
 from kineme.similarity.describe import Tile, for_described
 from kineme.similarity.described import Described
-from kineme.similarity.log_averages import LOG_MEANS, SHARES
 from kineme.similarity.references import References
+from kineme.similarity.specification import LOG_MEANS, SHARES
 from kineme.validation import Array
 
 _TILE_PAIRS = 1_000_000  # similarities at a time: memory stays linear in the stored movements
@@ -40,10 +40,10 @@ class Compared:
         return len(self.described)
 
     def with_squares(self, squares: Array) -> Compared:
-        """The same with `squares` that were computed before."""
-        known = replace(self)
-        vars(known)["squares"] = squares
-        return known
+        """Return the same with `squares` that were computed before."""
+        same = replace(self)
+        vars(same)["squares"] = squares
+        return same
 
     @cached_property
     def squares(self) -> Array:
@@ -72,7 +72,7 @@ class Compared:
         return LOG_MEANS[self.comparison.mean](each)
 
     def shares(self, chosen: NDArray[np.intp]) -> Array:
-        """Share of each representation in the similarity to one chosen (n,) reference each, (R, n)."""
+        """Return the share of each representation in the similarity to one chosen (n,) reference each, (R, n)."""
         return SHARES[self.comparison.mean](self.logs[:, np.arange(len(self)), chosen])
 
 
@@ -80,35 +80,35 @@ Score = Callable[[Compared], Array]
 
 
 def nearest(compared: Compared) -> Array:
-    """Log similarity to the nearest reference of each class, (n, C)."""
+    """Return log similarity to the nearest reference of each class, (n, C)."""
     return compared.nearest
 
 
 def nearest_each(compared: Compared) -> Array:
-    """Log similarity to each class, in each representation to its own nearest reference of the class, (n, C)."""
+    """Return log similarity to each class, in each representation to its own nearest reference of the class, (n, C)."""
     return compared.nearest_each
 
 
 def score(
     comparison: Comparison, references: References, movements: Demonstrations | Described, *scores: Score
 ) -> tuple[Array, ...]:
-    """Scores (n, C), one array for each of the functions, of movements that are described once, tile by tile."""
-    found = tuple(np.empty((len(movements), len(references.classes))) for _ in scores)
+    """Return scores (n, C), one array for each of the functions, of movements that are described once, tile by tile."""
+    arrays = tuple(np.empty((len(movements), len(references.classes))) for _ in scores)
 
     def fill(start: int, compared: Compared) -> None:
-        for array, by in zip(found, scores, strict=True):
+        for array, by in zip(arrays, scores, strict=True):
             array[start : start + len(compared)] = by(compared)
 
     if isinstance(movements, Described):
-        whole = movements
+        described = movements
         for_tiles(
-            lambda a, b: fill(a, Compared(comparison, references, whole.take(slice(a, b)))),
-            len(whole),
+            lambda a, b: fill(a, Compared(comparison, references, described.take(slice(a, b)))),
+            len(described),
             tile_rows(references),
         )
     else:
         for_compared(comparison, references, movements, lambda tile, compared: fill(tile.start, compared))
-    return found
+    return arrays
 
 
 def best_classes(
@@ -117,14 +117,14 @@ def best_classes(
     movements: Demonstrations,
     best: Callable[[Compared], NDArray[np.intp]],
 ) -> NDArray[np.intp]:
-    """Index (n,) of the class of each movement, as the function finds them tile by tile."""
-    found = np.empty(len(movements), np.intp)
+    """Return the index (n,) of the class of each movement, as the function finds them tile by tile."""
+    classes = np.empty(len(movements), np.intp)
 
     def fill(tile: Tile, compared: Compared) -> None:
-        found[tile.start : tile.stop] = best(compared)
+        classes[tile.start : tile.stop] = best(compared)
 
     for_compared(comparison, references, movements, fill)
-    return found
+    return classes
 
 
 def for_compared(
@@ -141,5 +141,5 @@ def for_compared(
 
 
 def tile_rows(references: References) -> int:
-    """Movements to compare at a time."""
+    """Return movements to compare at a time."""
     return max(1, _TILE_PAIRS // len(references))

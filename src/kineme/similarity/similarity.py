@@ -11,10 +11,8 @@ from kineme.errors import SpecificationError
 from kineme.kernels.procrustes import Procrustes
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.similarity.describe import describe
-from kineme.similarity.described import Described
-from kineme.similarity.distances import squared_distances
-from kineme.similarity.log_averages import LOG_MEANS
-from kineme.similarity.specification import Compares
+from kineme.similarity.described import Described, squared_distances
+from kineme.similarity.specification import LOG_MEANS, Compares
 from kineme.similarity.widths import gap_widths
 from kineme.validation import Array
 
@@ -49,26 +47,26 @@ class AveragedSimilarity:
     weights: Array | None = None
 
     def squared_distances(self, A: Described, B: Described) -> Array:
-        """Squared distances in each representation, shape (R, n, m)."""
+        """Return squared distances in each representation, shape (R, n, m)."""
         return squared_distances(A, B)
 
     def logs_at(self, squares: Array) -> Array:
-        """Logarithms of each representation's kernel times R times its weight, of squared distances (R, n, m)."""
+        """Return logarithms of each kernel times R times its weight, of squared distances (R, n, m)."""
         logs = np.asarray(squares / (-2.0 * self.widths**2)[:, None, None])
         if self.weights is not None and (self.weights != self.weights[0]).any():
             logs += self.log_weights()[:, None, None]
         return logs
 
     def logs(self, A: Described, B: Described) -> Array:
-        """Logarithms of each representation's kernel times R times its weight, shape (R, n, m)."""
+        """Return the logarithms of each representation's kernel times R times its weight, shape (R, n, m)."""
         return self.logs_at(self.squared_distances(A, B))
 
     def log_average(self, A: Described, B: Described) -> Array:
-        """Logarithms of the averaged kernel, shape (n, m)."""
+        """Return the logarithms of the averaged kernel, shape (n, m)."""
         return LOG_MEANS[self.mean](self.logs(A, B))
 
     def by_rows(self, n: int) -> AveragedSimilarity:
-        """The average over the first n representations alone; of equal weights where theirs are all 0."""
+        """Return the average over the first n representations alone; of equal weights where theirs are all 0."""
         if n == len(self.widths):
             return self
         weights = None if self.weights is None or not self.weights[:n].any() else self.weights[:n]
@@ -76,21 +74,21 @@ class AveragedSimilarity:
         return replace(self, widths=self.widths[:n], weights=weights)
 
     def log_weights(self) -> Array:
-        """Logarithms of R times the weights, (R,): -inf for positions of weight 0, which give the rotation."""
+        """Return logarithms of R times the weights, (R,): -inf for positions of weight 0, which give the rotation."""
         if self.weights is None:
             return np.zeros(len(self.widths))
         with np.errstate(divide="ignore"):
             return np.asarray(np.log(len(self.weights) * self.weights))
 
     def widened(self, factor: float) -> AveragedSimilarity:
-        """The same average of kernels `factor` times as wide."""
+        """Return the same average of kernels `factor` times as wide."""
         return replace(self, widths=factor * self.widths)
 
 
 def similarities(
     movements: Described | MovementsLike, like: Compares | None = None, widths: ArrayLike | None = None
 ) -> Array:
-    """The averaged kernel ``K(a, b)`` between all movements, shape (n, n), from 0 to 1 and 1 on the diagonal.
+    """Return the averaged kernel ``K(a, b)`` between all movements, shape (n, n), from 0 to 1 and 1 on the diagonal.
 
     Parameters
     ----------
@@ -108,7 +106,7 @@ def similarities(
 
 
 def averaged(described: Described, widths: ArrayLike | None = None) -> AveragedSimilarity:
-    """The averaged kernel at the widths given, or at those that the movements themselves suggest, see `gap_widths`.
+    """Return the averaged kernel at the widths given, or at those that the movements suggest, see `gap_widths`.
 
     Raises
     ------
@@ -125,7 +123,7 @@ def averaged(described: Described, widths: ArrayLike | None = None) -> AveragedS
 
 
 def compare(similarity: AveragedSimilarity, A: Described, B: Described) -> Array:
-    """The averaged kernel between movements, shape (n, m)."""
+    """Return the averaged kernel between movements, shape (n, m)."""
     K = np.empty((len(A), len(B)))
     step = max(1, _TILE_PAIRS // max(1, len(B)))
     for start in range(0, len(A), step):

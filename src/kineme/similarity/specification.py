@@ -1,19 +1,59 @@
-"""The specification of a comparison: its parameters, without estimates from movements."""
+"""The specification of a comparison: its parameters, without estimates from movements.
+
+Kernels are averaged by their logarithms here; `kineme.kernels.average` has the same averages of the kernels themselves,
+with what is proved of each.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
+
+import numpy as np
 
 from kineme.errors import SpecificationError
 from kineme.kernels.procrustes import Procrustes
 from kineme.kernels.soft_rotation import RotationPrior
 from kineme.movements.preparation.smooth import Smooth
-from kineme.similarity.log_averages import LOG_MEANS
-from kineme.similarity.normalization import Normalization
-from kineme.similarity.representation import DEFAULT_REPRESENTATIONS, Representation, check_representations
-from kineme.validation import check_choice, check_number
+from kineme.similarity.representation import (
+    DEFAULT_REPRESENTATIONS,
+    Normalization,
+    Representation,
+    check_representations,
+)
+from kineme.validation import Array, check_choice, check_number
+
+
+def _log_mean_exp(logs: Array) -> Array:
+    top = logs.max(axis=0)
+    return np.asarray(np.log(np.mean(np.exp(logs - top), axis=0)) + top)
+
+
+#: Name -> A-average (paper's reference [10]) of kernels given by their logarithms, over the first axis.
+LOG_MEANS: dict[str, Callable[[Array], Array]] = {
+    "arithmetic": _log_mean_exp,
+    "geometric": lambda logs: np.asarray(logs.mean(axis=0)),
+    "harmonic": lambda logs: -_log_mean_exp(-logs),
+    "quadratic": lambda logs: 0.5 * _log_mean_exp(2.0 * logs),
+    "min": lambda logs: np.asarray(logs.min(axis=0)),
+}
+
+
+def _softmax(logs: Array) -> Array:
+    weights = np.exp(logs - logs.max(axis=0))
+    return np.asarray(weights / weights.sum(axis=0))
+
+
+#: Name -> share of each kernel in the average, d log K / d log k_r: none negative, their sum over the first axis 1.
+SHARES: dict[str, Callable[[Array], Array]] = {
+    "arithmetic": _softmax,
+    "geometric": lambda logs: np.full(logs.shape, 1.0 / len(logs)),
+    "harmonic": lambda logs: _softmax(-logs),
+    "quadratic": lambda logs: _softmax(2.0 * logs),
+    "min": lambda logs: (np.arange(len(logs))[:, None] == logs.argmin(axis=0)).astype(float),
+}
 
 
 @dataclass(frozen=True)
@@ -73,7 +113,7 @@ class ComparisonSpecification:
     @property
     def by_rows(self) -> tuple[Representation, ...]:
         """The representations that are compared sample by sample; they come first."""
-        return tuple(one for one in self.representations if not one.in_pairs)
+        return tuple(representation for representation in self.representations if not representation.in_pairs)
 
     @property
     def by_pairs(self) -> tuple[Representation, ...]:
@@ -86,7 +126,7 @@ class ComparisonSpecification:
         return self
 
     def procrustes(self, n_dims: int) -> Procrustes:
-        """The distance between rows of movements of `n_dims` dimensions."""
+        """Return the distance between rows of movements of `n_dims` dimensions."""
         if self.max_angle is not None and 0 <= self.max_angle - math.pi <= 1e-12 and n_dims in (2, 3):
             return Procrustes(n_dims, math.pi, RotationPrior(0.0))  # no limit: the fast way
         if self.max_angle is not None:
@@ -101,21 +141,21 @@ class Compares(Protocol):
 
     @property
     def specification(self) -> ComparisonSpecification:
-        """How movements are compared."""
+        """Specification of the comparison."""
         ...
 
 
 def specification_of(like: Compares | None) -> ComparisonSpecification:
-    """The specification that `like` is or has; the default one for None.
+    """Return the specification that `like` is or has; the default one for None.
 
     Raises
     ------
     SpecificationError
         `like` has none, or one with a parameter out of its range.
     """
-    found = ComparisonSpecification() if like is None else getattr(like, "specification", None)
-    if not isinstance(found, ComparisonSpecification):
+    specification = ComparisonSpecification() if like is None else getattr(like, "specification", None)
+    if not isinstance(specification, ComparisonSpecification):
         raise SpecificationError(
             f"expected like to be a kineme.Recognizer, a Comparison, a ComparisonSpecification or None, got {like!r}"
         )
-    return found
+    return specification

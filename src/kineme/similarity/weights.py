@@ -25,22 +25,26 @@ Representations = tuple[Representation, ...]
 def own_weights(
     similarity: AveragedSimilarity, described: Described, labels: NDArray[Any], representations: Representations
 ) -> Array:
-    """The weights of the representations themselves, in the arithmetic mean; equal ones in the others."""
-    own = np.array([one.weight for one in representations]) if similarity.mean == "arithmetic" else None
+    """Return the weights of the representations themselves, in the arithmetic mean; equal ones in the others."""
+    own = (
+        np.array([representation.weight for representation in representations])
+        if similarity.mean == "arithmetic"
+        else None
+    )
     return equal_weights(similarity, described, labels, representations) if own is None else own / own.sum()
 
 
 def equal_weights(
     similarity: AveragedSimilarity, described: Described, labels: NDArray[Any], representations: Representations
 ) -> Array:
-    """The same weight for each."""
+    """Return the same weight for each."""
     return np.full(len(representations), 1.0 / len(representations))
 
 
 def fitted_weights(
     similarity: AveragedSimilarity, described: Described, labels: NDArray[Any], representations: Representations
 ) -> Array:
-    """Half of the weight as `aligned_weights` fits it, half as the representations' own weights.
+    """Return half of the weight as `aligned_weights` fits it, half as the representations' own weights.
 
     The fitted weights are those of representations that separate the training movements. A representation that does
     not help on them may still be needed for perturbations that they do not contain, so each keeps half of its own.
@@ -59,7 +63,7 @@ def fitted_weights(
 
 
 def aligned_weights(similarity: AveragedSimilarity, described: Described, labels: NDArray[Any]) -> Array:
-    """Weights w >= 0 with which the average of the kernels is most like the kernel of the labels.
+    """Return weights w >= 0 with which the average of the kernels is most like the kernel of the labels.
 
     Minimizes ``|sum_r w_r K_r - Y|`` over all pairs of different movements, K_r and Y (1 for a pair of one class, else
     0) centered, which up to its length is the w of largest alignment (Cortes, Mohri, Rostamizadeh, "Algorithms for
@@ -85,7 +89,7 @@ def aligned_weights(similarity: AveragedSimilarity, described: Described, labels
     chosen = evenly_spaced(len(labels), _ROWS)
     some = described.take(chosen)
     same = (labels[chosen, None] == labels[None, chosen]).astype(float)
-    kernels = np.stack([_centered(one) for one in np.exp(similarity.logs(some, some))], axis=1)
+    kernels = np.stack([_centered(kernel) for kernel in np.exp(similarity.logs(some, some))], axis=1)
     weights, _ = nnls(kernels, _centered(same))
     weights = np.where(weights >= _LEAST * weights.sum(), weights, 0.0)
     if not weights.any():  # no kernel is aligned with that of the labels
@@ -94,7 +98,7 @@ def aligned_weights(similarity: AveragedSimilarity, described: Described, labels
 
 
 def given_weights(weights: ArrayLike, n: int) -> Array:
-    """A user's weights, scaled to a sum of 1.
+    """Return a user's weights, scaled to a sum of 1.
 
     Raises
     ------
@@ -123,7 +127,7 @@ WEIGHTS: dict[str, Callable[[AveragedSimilarity, Described, NDArray[Any], Repres
 
 
 def _centered(gram: Array) -> Array:
-    """The pairs of different movements, after rows and columns are centered."""
+    """Return the pairs of different movements, after rows and columns are centered."""
     gram, n = gram.copy(), len(gram)
     # So that the diagonal does not change the means.
     np.fill_diagonal(gram, (gram.sum(axis=1) - gram.diagonal()) / (n - 1))

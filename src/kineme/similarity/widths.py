@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
 from kineme.sampling import evenly_spaced
-from kineme.similarity.described import Described
-from kineme.similarity.distances import squared_distances
+from kineme.similarity.described import Described, squared_distances
 from kineme.validation import Array
 
 #: Width as a share of the typical distance to the nearest movement of another class, an impostor.
@@ -27,7 +26,7 @@ _NO_IMPOSTOR = 0.1  # width where no two beginnings differ
 
 
 def impostor_widths(described: Described, labels: NDArray[np.generic]) -> Array:
-    """Width sigma_r of each representation: a share of the typical distance to the nearest movement of another class.
+    """Estimate the width sigma_r of each representation: a share of the typical distance to the nearest other class.
 
     At 0.4 of it, a movement at the distance of an impostor has a similarity of exp(-3), under 0.05: movements closer
     than the nearest impostor have nearly all influence. With one class, any other movement is the impostor. If classes
@@ -47,7 +46,7 @@ def impostor_widths(described: Described, labels: NDArray[np.generic]) -> Array:
     some, owners = described.take(chosen), labels[chosen]
     sizes = some.sizes()
     nearest = zip(_nearest_of_others(some, owners, chosen), sizes, strict=True)
-    widths = [_share_of_median(one, _SAME * size, SHARE) for one, size in nearest]
+    widths = [_share_of_median(distances, _SAME * size, SHARE) for distances, size in nearest]
     if all(width is None for width in widths):
         raise SpecificationError(
             "expected training movements that differ, got one movement or all the same; add demonstrations"
@@ -57,7 +56,7 @@ def impostor_widths(described: Described, labels: NDArray[np.generic]) -> Array:
 
 
 def lone_widths(described: Described, quantities: Sequence[str]) -> Array:
-    """Width sigma_r of each representation, (R,), of one movement alone: a share of its size, see `ALONE`.
+    """Return the width sigma_r of each representation, (R,), of one movement alone: a share of its size, see `ALONE`.
 
     Raises
     ------
@@ -71,7 +70,7 @@ def lone_widths(described: Described, quantities: Sequence[str]) -> Array:
 
 
 def beginning_widths(beginnings: Described, labels: NDArray[np.generic]) -> Array:
-    """Widths (R,) for m movements with G beginnings each, which follow each other: rows (m * G).
+    """Return widths (R,) for m movements with G beginnings each, which follow each other: rows (m * G).
 
     The same share of the typical distance from a beginning to the nearest one of another class, at any progress. 0.1
     where no two beginnings differ.
@@ -80,12 +79,15 @@ def beginning_widths(beginnings: Described, labels: NDArray[np.generic]) -> Arra
     chosen = evenly_spaced(len(labels), _BEGUN_MOVEMENTS)
     rows = (chosen[:, None] * n_progress + np.arange(n_progress)).ravel()
     owners, movements = np.repeat(labels[chosen], n_progress), np.repeat(chosen, n_progress)
-    found = [_share_of_median(one, 0.0, SHARE) for one in _nearest_of_others(beginnings.take(rows), owners, movements)]
-    return np.array([_NO_IMPOSTOR if width is None else width for width in found])
+    widths = [
+        _share_of_median(distances, 0.0, SHARE)
+        for distances in _nearest_of_others(beginnings.take(rows), owners, movements)
+    ]
+    return np.array([_NO_IMPOSTOR if width is None else width for width in widths])
 
 
 def gap_widths(described: Described) -> Array:
-    """Width sigma_r of each representation: 0.4 of the typical distance to the first movement beyond a gap.
+    """Return the width sigma_r of each representation: 0.4 of the typical distance to the first movement beyond a gap.
 
     `impostor_widths` takes that share of the distance to the nearest movement of another class. Without labels the
     class is told by its edge: sorted by distance, ``d_1 <= d_2 <= ...``, the neighbors of a movement are first those of
@@ -125,7 +127,7 @@ def gap_widths(described: Described) -> Array:
 
 
 def median_distances(described: Described) -> Array:
-    """Median distance of two different movements in each representation, (R,); NaN for one movement."""
+    """Return the median distance of two different movements in each representation, (R,); NaN for one movement."""
     pairs = ~np.eye(len(described), dtype=bool)
     if not pairs.any():
         return np.full(described.n_representations, np.nan)
@@ -137,21 +139,21 @@ def _nearest_of_others(described: Described, owners: NDArray[np.generic], each: 
     own = owners[:, None] == owners
     if own.all():
         own = each[:, None] == each
-    found = []
+    nearest = []
     for squares in squared_distances(described, described):
         squares[own] = np.inf
-        found.append(np.sqrt(squares.min(axis=1, initial=np.inf)))
-    return found
+        nearest.append(np.sqrt(squares.min(axis=1, initial=np.inf)))
+    return nearest
 
 
 def _share_of_median(distances: Array, same: float, share: float) -> float | None:
-    """The `share` of the median of those distances that are finite and above `same`; None if none is."""
+    """Return the `share` of the median of those distances that are finite and above `same`; None if none is."""
     apart = distances[np.isfinite(distances) & (distances > same)]
     return share * float(np.median(apart)) if len(apart) else None
 
 
 def _beyond_the_gap(ordered: Array, same: float) -> Array:
-    """First distance (k,) beyond the largest ratio, of distances (k, n - 1) in rising order."""
+    """Return first distance (k,) beyond the largest ratio, of distances (k, n - 1) in rising order."""
     ordered = np.maximum(ordered, same)
     last = max(2, (ordered.shape[1] + 1) // 2)
     logs = np.log(np.maximum(ordered[:, :last], np.finfo(np.float64).tiny))  # all are 0 where nothing moves

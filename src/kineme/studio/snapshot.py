@@ -28,10 +28,10 @@ from kineme.movements.preparation import pauses
 from kineme.movements.preparation.smooth import spline_matrix
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.recognition import left_out
-from kineme.recognition.certainty import LEAST_CONFIDENCE
+from kineme.recognition.answer import LEAST_CONFIDENCE
 from kineme.recognition.classifiers import Classifier, Nearest, NearestEach, Prototype, fit_prototype
 from kineme.recognition.conformal import GUESSES, Calibration
-from kineme.recognition.early import evidence, prefixes
+from kineme.recognition.early import evidence
 from kineme.recognition.early import hypotheses as beginnings
 from kineme.recognition.early.hypotheses import Early, hypotheses
 from kineme.recognition.known_classes import FittedRecognizer, KnownClasses, known_classes
@@ -267,7 +267,7 @@ def early_part(known: KnownClasses, early: Early | None = None) -> dict[str, Any
         "numbers": {
             **_numbers(evidence, "COMPARED", "WIDENED", "ROTATION", "SPEED_SPREAD", "PROGRESS", "POWER", "NEGLIGIBLE"),
             **_numbers(beginnings, "MOST_ODDS", "PRIOR_ODDS", "LOG_UNKNOWN", "TEMPER", "EXPLAINING"),
-            **_numbers(prefixes, "LAST", "LEAST_SPEED"),
+            **_numbers(beginnings, "LAST", "LEAST_SPEED"),
         },
     }
 

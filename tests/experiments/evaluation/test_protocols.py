@@ -7,7 +7,7 @@ import pytest
 
 from kineme.cli.evaluate import _QUICK_SHOTS
 from kineme.movements.preparation.perturbations import Perturbation
-from kineme.recognition.early.early import cut
+from kineme.recognition.early.evidence import cut
 from kineme.recognition.recognizer import Recognizer
 from kineme_experiments.evaluation import person_protocols
 from kineme_experiments.evaluation import score_split as scoring

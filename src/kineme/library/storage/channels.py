@@ -20,12 +20,12 @@ from kineme.validation import Array
 
 
 def channels_to_text(channels: Channels) -> str:
-    """JSON: a list of objects with the fields of `Channel`."""
+    """Return JSON: a list of objects with the fields of `Channel`."""
     return json.dumps(channels_to_data(channels), ensure_ascii=True)
 
 
 def channels_of_text(text: str, n_dims: int, path: Path) -> Channels:
-    """The inverse, for the library at `path`; refused unless it is channels of so many dimensions."""
+    """Return the inverse, for the library at `path`; refused unless it is channels of so many dimensions."""
     try:
         return channels_from_data(json.loads(text), n_dims)
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
@@ -36,57 +36,55 @@ def channels_of_text(text: str, n_dims: int, path: Path) -> Channels:
 
 
 def other_columns(channels: Channels) -> list[int]:
-    """The columns that are stored beside the positions: of orientations and discrete channels."""
+    """Return the columns that are stored beside the positions: of orientations and discrete channels."""
     return [
         k
-        for one, columns in zip(channels, columns_of(channels), strict=True)
-        if one.kind in ("orientation", "discrete")
+        for channel, columns in zip(channels, columns_of(channels), strict=True)
+        if channel.kind in ("orientation", "discrete")
         for k in range(columns.start, columns.stop)
     ]
 
 
 def to_bytes(recorded: Array, offsets: NDArray[np.intp], channels: Channels) -> list[bytes]:
-    """The other columns of each movement in single precision."""
+    """Return the other columns of each movement in single precision."""
     others = recorded[:, other_columns(channels)].astype(np.float32)
     row, blob, ends = others.shape[1] * others.itemsize, others.tobytes(), offsets.tolist()
     return [blob[row * first : row * stop] for first, stop in pairwise(ends)]
 
 
 def with_channels(stored: Movements, channels: Channels, rows: Sequence[Row]) -> Movements:
-    """Stored movements with their channels; rows of the table "recorded" for those that positions do not say.
+    """Return stored movements with their channels; rows of the table "recorded" for those that positions do not say.
 
     Raises
     ------
     DataError
         A row of another size.
     """
-    known = replace(stored, channels=channels, dimensions=learned_names(channels))
+    movements = replace(stored, channels=channels, dimensions=learned_names(channels))
     if is_plain(channels):
-        return known
+        return movements
     size = 4 * len(other_columns(channels))
     for row, n in zip(rows, np.diff(stored.offsets).tolist(), strict=True):
         if len(row[1]) != size * n:
             raise strange("recorded", row)
-    return replace(known, recorded=_from_bytes([row[1] for row in rows], stored.positions, stored.offsets, channels))
+    return replace(
+        movements, recorded=_from_bytes([row[1] for row in rows], stored.positions, stored.offsets, channels)
+    )
 
 
 def _from_bytes(blobs: Sequence[bytes], positions: Array, offsets: NDArray[np.intp], channels: Channels) -> Array:
-    """What was recorded (total, columns): the stored columns, and the positions where they say it."""
+    """Return what was recorded (total, columns): the stored columns, and the positions where they say it."""
     others = other_columns(channels)
-    recorded = np.empty((len(positions), sum(len(one.columns) for one in channels)))
+    recorded = np.empty((len(positions), sum(len(channel.columns) for channel in channels)))
     recorded[:, others] = np.frombuffer(b"".join(blobs), np.float32).reshape(-1, len(others))
-    kinds = [one.kind for one in channels for _ in one.columns]
+    kinds = [channel.kind for channel in channels for _ in channel.columns]
     for k in (k for k in others if kinds[k] == "discrete"):
-        recorded[:, k] = _in_fewest_digits(recorded[:, k])
+        # The shortest decimals that round to the stored single precision: 0.08, and not 0.0799999982.
+        starts = np.flatnonzero(np.diff(recorded[:, k], prepend=np.nan))  # of the stretches in which a value holds
+        values, which = np.unique(recorded[starts, k].astype(np.float32), return_inverse=True)
+        exact = np.array([float(str(value)) for value in values])[which]
+        recorded[:, k] = np.repeat(exact, np.diff(starts, append=len(recorded)))
     plain = [k for k in range(recorded.shape[1]) if k not in others]
-    learned = [one.kind != "orientation" for one in channels for _ in one.coordinates]
+    learned = [channel.kind != "orientation" for channel in channels for _ in channel.coordinates]
     recorded[:, plain] = positions[:, learned]
     return canonical(recorded, offsets, channels)
-
-
-def _in_fewest_digits(stored: Array) -> Array:
-    """Values of single precision as the shortest decimals that round to them: 0.08, and not 0.0799999982."""
-    starts = np.flatnonzero(np.diff(stored, prepend=np.nan))  # of the stretches in which a value holds
-    values, which = np.unique(stored[starts].astype(np.float32), return_inverse=True)
-    exact = np.array([float(str(value)) for value in values])[which]
-    return np.repeat(exact, np.diff(starts, append=len(stored)))

@@ -82,7 +82,7 @@ _DEFINITIONS = "SELECT type, name, tbl_name, sql FROM sqlite_master ORDER BY typ
 
 
 def connect(path: Path, mode: str, wait: float) -> Connection:
-    """A connection in ``mode`` "ro", "rw" or "rwc"; transactions are begun explicitly."""
+    """Return a connection in ``mode`` "ro", "rw" or "rwc"; transactions are begun explicitly."""
     address = f"file:{quote(os.fsencode(path))}?mode={mode}"
     if mode == "ro" and _cannot_keep_a_log(path):
         address += "&immutable=1"
@@ -102,7 +102,7 @@ def connect(path: Path, mode: str, wait: float) -> Connection:
 
 
 def _cannot_keep_a_log(path: Path) -> bool:
-    """Whether the folder is read-only for this user and has no log: then SQLite cannot lock, and must read without.
+    """Tell whether the folder is read-only for this user and has no log: SQLite cannot lock then, and reads without.
 
     SQLite then assumes that the file does not change. If another user writes to it meanwhile, rows are refused as
     damaged until the library is opened again.
@@ -142,7 +142,7 @@ def check_alone(path: Path) -> None:
 
 
 def check_kind(connection: sqlite3.Connection, path: Path) -> int:
-    """The schema version; refuses another program's database, a later version, and definitions that are not ours."""
+    """Return the schema version; refuse another program's database, a later version, definitions that are not ours."""
     if connection.execute("PRAGMA application_id").fetchone()[0] != APPLICATION_ID:
         got = "another program's database" if path.stat().st_size else "an empty file"
         raise DataError(
@@ -167,7 +167,7 @@ def _check_definitions(connection: sqlite3.Connection, path: Path, version: int)
     stored = connection.execute(f"{_DEFINITIONS} LIMIT {len(expected) + 1}").fetchall()
     if stored == expected and encoding == "UTF-8":
         return
-    strange = [one for one in stored if one not in expected]
+    strange = [definition for definition in stored if definition not in expected]
     got = f"the {strange[0][0]} {strange[0][1]!r}, which is none of them" if strange else "fewer"
     raise DataError(
         f"expected {path} to define the tables and indexes of a library and nothing else, got "
@@ -177,7 +177,7 @@ def _check_definitions(connection: sqlite3.Connection, path: Path, version: int)
 
 
 def checked_meta(connection: sqlite3.Connection, path: Path) -> dict[str, str]:
-    """The rows of the table `meta`, after a check that the definitions of the tables are undamaged."""
+    """Return the rows of the table `meta`, after a check that the definitions of the tables are undamaged."""
     try:
         meta: dict[str, str] = dict(select(connection, "meta"))
         if meta.keys() >= META and meta["schema"] == schema_seal(connection):
@@ -189,7 +189,7 @@ def checked_meta(connection: sqlite3.Connection, path: Path) -> dict[str, str]:
 
 
 def _statements(version: int) -> tuple[str, ...]:
-    """The statements that create a library of this schema version; equal in every character to those of migration."""
+    """Return the statements that create a library of this schema version, equal in every character to migration's."""
     return (*CREATE, *(statement for earlier in range(1, version) for statement in MIGRATIONS[earlier]))
 
 
@@ -214,13 +214,13 @@ def migrate(connection: sqlite3.Connection, path: Path) -> None:
 
 
 def schema_seal(connection: sqlite3.Connection) -> str:
-    """A checksum of the tables' definitions."""
+    """Return a checksum of the tables' definitions."""
     return str(zlib.crc32(repr(connection.execute(_DEFINITIONS).fetchall()).encode()))
 
 
 @contextmanager
 def transaction(connection: sqlite3.Connection) -> Iterator[None]:
-    """An atomic transaction. It waits for the write lock at its beginning, never later."""
+    """Return an atomic transaction. It waits for the write lock at its beginning, never later."""
     connection.execute("BEGIN IMMEDIATE")
     try:
         yield
@@ -232,7 +232,7 @@ def transaction(connection: sqlite3.Connection) -> Iterator[None]:
 
 
 def as_folder(folder: Any) -> Path:
-    """The folder of a library that exists or is to be created.
+    """Return the folder of a library that exists or is to be created.
 
     Raises
     ------
@@ -274,7 +274,7 @@ def _remove_old_leftovers(folder: Path) -> None:
 
 
 def _is_library(path: Path) -> bool:
-    """Whether a file begins like a library."""
+    """Tell whether a file begins like a library."""
     if path.is_symlink() or not path.is_file():
         return False
     with path.open("rb") as file:

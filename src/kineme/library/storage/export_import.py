@@ -152,7 +152,7 @@ def _named(beside: Path, source: Path) -> Iterator[None]:
 
 @contextmanager
 def _new(target: Path) -> Iterator[Path]:
-    """As `new_database`, with errors for users."""
+    """Return `new_database`, with errors for users."""
     if not target.parent.is_dir():
         raise DataError(f"expected a folder {target.parent} to write {target.name} into, there is none; create it")
     try:

@@ -29,7 +29,7 @@ _ROWS = 4096  # rows fetched at a time
 
 
 def all_ids(store: Store) -> Ids:
-    """Ids of all movements, ascending."""
+    """Return ids of all movements, ascending."""
     with store.reading() as connection:
         moment = store.moment(connection)
         query = f"SELECT id FROM movement WHERE {ALIVE} ORDER BY id"
@@ -37,7 +37,7 @@ def all_ids(store: Store) -> Ids:
 
 
 def unlabeled_ids(store: Store) -> Ids:
-    """Ids of the movements without a symbol, ascending."""
+    """Return ids of the movements without a symbol, ascending."""
     members = f"SELECT movement FROM member WHERE {ALIVE}"
     query = f"SELECT id FROM movement WHERE {ALIVE} AND id NOT IN ({members}) ORDER BY id"
     with store.reading() as connection:
@@ -46,13 +46,13 @@ def unlabeled_ids(store: Store) -> Ids:
 
 
 def count(store: Store) -> int:
-    """Number of movements."""
+    """Return the number of movements."""
     with store.reading() as connection:
         return store.moment(connection).movements
 
 
 def _column(connection: sqlite3.Connection, query: str, version: int, expected: int) -> Ids:
-    """Ids from a query; refused if their number is wrong."""
+    """Return ids from a query; refused if their number is wrong."""
     ids = np.array([key for (key,) in connection.execute(query, {"v": version})], dtype=np.int64)
     last, n = connection.execute("SELECT coalesce(max(id), 0), count(*) FROM movement").fetchone()
     if len(ids) != expected or last != n or (np.diff(ids) <= 0).any():
@@ -61,7 +61,7 @@ def _column(connection: sqlite3.Connection, query: str, version: int, expected: 
 
 
 def as_ids(store: Store, ids: Any) -> Ids:
-    """A user's ids as an array; all must be in the library.
+    """Return a user's ids as an array; all must be in the library.
 
     Raises
     ------
@@ -90,20 +90,21 @@ def as_ids(store: Store, ids: Any) -> Ids:
 
 
 def records(store: Store, ids: Ids) -> list[dict[str, Any]]:
-    """Rows of the table `movement`, as dictionaries, in the order of `ids`."""
+    """Return rows of the table `movement`, as dictionaries, in the order of `ids`."""
     wanted, order = _sorted(ids)
     rows = [row for chunk in _chunks(store, "movement", "id", wanted) for row in chunk]
     return [dict(zip(COLUMNS["movement"], rows[i], strict=True)) for i in order.tolist()]
 
 
 def movements(store: Store, ids: Ids, labels: Sequence[str | None] | None = None) -> Demonstrations:
-    """The recordings, in the order of `ids`; with labels if every one has a label."""
+    """Return the recordings, in the order of `ids`; with labels if every one has a label."""
     wanted, order = _sorted(ids)
     about = records(store, wanted)
-    d, lengths = store.n_dims or 0, np.array([one["n_samples"] for one in about])
+    d, lengths = store.n_dims or 0, np.array([record["n_samples"] for record in about])
     offsets = np.concatenate(([0], np.cumsum(lengths)))
-    _check_total(store, about, 4 * d * int(offsets[-1]))
-    t0, durations = (np.array([one[name] for one in about]) for name in ("t0", "duration"))
+    if 4 * d * int(offsets[-1]) > store.size:  # no memory for more samples than the file could contain
+        raise strange("movement", (max(about, key=lambda record: int(record["n_samples"]))["id"],))
+    t0, durations = (np.array([record[name] for record in about]) for name in ("t0", "duration"))
     positions = np.empty((offsets[-1], d))
     stamps: dict[int, bytes] = {}
     done = 0
@@ -121,7 +122,12 @@ def movements(store: Store, ids: Ids, labels: Sequence[str | None] | None = None
         stamps.update((done + k, row[3]) for k, row in enumerate(rows) if row[3] is not None)
         done = part.stop
     times = _times(stamps, offsets, t0, durations) if stamps or t0.any() else None
-    _check_increasing(times, offsets, wanted)
+    if times is not None:
+        increasing = times[1:] > times[:-1]
+        increasing[offsets[1:-1] - 1] = True  # from one movement to the next
+        if not increasing.all():
+            first = int(np.searchsorted(offsets, np.argmin(increasing), side="right")) - 1
+            raise strange("raw", (wanted[first],))
     stored = Movements(positions, offsets, durations, times, None, _names(about))
     if channels := store.channels:
         chunks = () if is_plain(channels) else _chunks(store, "recorded", "movement", wanted)
@@ -131,12 +137,6 @@ def movements(store: Store, ids: Ids, labels: Sequence[str | None] | None = None
     return Demonstrations.of_movements(replace(stored, labels=_labels(labels)))
 
 
-def _check_total(store: Store, about: Sequence[dict[str, Any]], size: int) -> None:
-    """Refuse to allocate memory for more samples than the files could contain."""
-    if size > store.size:
-        raise strange("movement", (max(about, key=lambda one: int(one["n_samples"]))["id"],))
-
-
 def _check_finite(table: str, rows: Sequence[Row], block: NDArray[Any], lengths: Any = 1) -> None:
     """Refuse rows with values that are not finite; `lengths` are the numbers of block rows per row of the table."""
     if not (good := np.isfinite(block).all(axis=1)).all():
@@ -144,17 +144,8 @@ def _check_finite(table: str, rows: Sequence[Row], block: NDArray[Any], lengths:
         raise strange(table, rows[int(np.searchsorted(first, np.argmin(good), side="right"))])
 
 
-def _check_increasing(times: Array | None, offsets: NDArray[np.intp], keys: Ids) -> None:
-    if times is None:
-        return
-    increasing = times[1:] > times[:-1]
-    increasing[offsets[1:-1] - 1] = True  # from one movement to the next
-    if not increasing.all():
-        raise strange("raw", (keys[int(np.searchsorted(offsets, np.argmin(increasing), side="right")) - 1],))
-
-
 def _times(stamps: dict[int, bytes], offsets: NDArray[np.intp], t0: Array, durations: Array) -> Array:
-    """Time stamps of all samples: the stored ones, and even ones for movements without."""
+    """Return the time stamps of all samples: the stored ones, and even ones for movements without."""
     lengths = np.diff(offsets)
     k = np.arange(offsets[-1]) - np.repeat(offsets[:-1], lengths)
     times: Array = np.repeat(t0, lengths) + np.repeat(durations / (lengths - 1), lengths) * k
@@ -165,7 +156,7 @@ def _times(stamps: dict[int, bytes], offsets: NDArray[np.intp], t0: Array, durat
 
 
 def features(store: Store, ids: Ids) -> NDArray[np.float32]:
-    """Rows of all representations that are compared sample by sample, concatenated, shape (k, sum of d * S)."""
+    """Return rows of all representations that are compared sample by sample, concatenated, shape (k, sum of d * S)."""
     wanted, order = _sorted(ids)
     width, done = sum(store.specification.widths(store.n_dims or 0)), 0
     result = np.empty((len(wanted), width), dtype=np.float32)
@@ -178,7 +169,7 @@ def features(store: Store, ids: Ids) -> NDArray[np.float32]:
 
 
 def primitives(store: Store, ids: Ids, labels: Sequence[str | None] | None = None) -> Primitives:
-    """The primitives, in the order of `ids`; with labels if every one has a label."""
+    """Return the primitives, in the order of `ids`; with labels if every one has a label."""
     wanted, order = _sorted(ids)
     dmp, d = store.specification.dmp, store.n_dims or 0
     about = records(store, ids)
@@ -194,7 +185,7 @@ def primitives(store: Store, ids: Ids, labels: Sequence[str | None] | None = Non
         starts=boundary[:, 0],
         goals=boundary[:, 1],
         velocities=boundary[:, 2],
-        durations=np.array([one["duration"] for one in about]),
+        durations=np.array([record["duration"] for record in about]),
         extents=boundary[:, 3],
         labels=_labels(labels),
         names=_names(about),
@@ -203,7 +194,7 @@ def primitives(store: Store, ids: Ids, labels: Sequence[str | None] | None = Non
 
 
 def _concatenated(table: str, rows: Sequence[Row], column: int, kind: Any, width: int) -> NDArray[Any]:
-    """The bytes of a column as an array (rows, width)."""
+    """Return the bytes of a column as an array (rows, width)."""
     size = np.dtype(kind).itemsize * width
     for row in rows:
         if len(row[column]) != size:
@@ -216,11 +207,11 @@ def _labels(labels: Sequence[str | None] | None) -> NDArray[Any] | None:
 
 
 def _names(about: Sequence[dict[str, Any]]) -> tuple[str, ...]:
-    return tuple(one["name"] or f"movement {one['id']}" for one in about)
+    return tuple(record["name"] or f"movement {record['id']}" for record in about)
 
 
 def names_of(store: Store, ids: Ids) -> list[str | None]:
-    """The name of each movement's symbol; None for movements without."""
+    """Return the name of each movement's symbol; None for movements without."""
     keys = {"keys": listed(ids), "v": store.as_of}
     with store.reading() as connection:
         names = {state[1]: state[2] for state in select(connection, "symbol_state", ALIVE, {"v": store.as_of})}
@@ -232,7 +223,7 @@ def names_of(store: Store, ids: Ids) -> list[str | None]:
 
 
 def groups(store: Store, ids: Ids) -> NDArray[np.object_]:
-    """Who showed each movement, shape (k,); None where that is not known."""
+    """Return who showed each movement, shape (k,); None where that is not known."""
     people: dict[int, str] = {}
     for k in range(0, len(ids), _ROWS):
         with store.reading() as connection:
@@ -243,7 +234,7 @@ def groups(store: Store, ids: Ids) -> NDArray[np.object_]:
 
 
 def people_by_movement(connection: sqlite3.Connection, keys: Sequence[int], version: int) -> dict[int, str]:
-    """Movement -> who showed it, of those of which that was known at a version."""
+    """Return movement -> who showed it, of those of which that was known at a version."""
     if not has_table(connection, "shown_by") or not connection.execute("SELECT 1 FROM shown_by LIMIT 1").fetchone():
         return {}
     keyed = {"keys": listed(keys), "v": version}
@@ -251,7 +242,7 @@ def people_by_movement(connection: sqlite3.Connection, keys: Sequence[int], vers
 
 
 def _chunks(store: Store, table: str, column: str, wanted: Ids) -> Iterator[list[Row]]:
-    """Rows of a table with ascending keys, in chunks."""
+    """Return rows of a table with ascending keys, in chunks."""
     for k in range(0, len(wanted), _ROWS):
         with store.reading() as connection:
             rows = select(connection, table, among(column), {"keys": listed(wanted[k : k + _ROWS])})
@@ -262,7 +253,7 @@ def _chunks(store: Store, table: str, column: str, wanted: Ids) -> Iterator[list
 
 
 def _sorted(ids: Ids) -> tuple[Ids, NDArray[np.intp]]:
-    """The unique ids, ascending, and the position of each of `ids` among them."""
+    """Return the unique ids, ascending, and the position of each of `ids` among them."""
     if not len(ids):
         raise SpecificationError("expected at least one movement, got none: the library or the symbol has none yet")
     wanted, order = np.unique(ids, return_inverse=True)

@@ -20,17 +20,13 @@ ALIVE = "added <= :v AND (removed IS NULL OR removed > :v)"
 
 
 def seal(table: str, row: Row) -> int:
-    """CRC-32 over all columns of a row, its key first."""
+    """Return CRC-32 over all columns of a row, its key first."""
     if table in (*BLOBS, *OPTIONAL_BLOBS):
-        return _seal_blobs(row)
+        crc: int = row[0] & 0xFFFFFFFF
+        for blob in row[1:]:
+            crc = zlib.crc32(blob or b"", crc)
+        return crc
     return zlib.crc32(repr(row).encode())
-
-
-def _seal_blobs(row: Row) -> int:
-    crc: int = row[0] & 0xFFFFFFFF
-    for blob in row[1:]:
-        crc = zlib.crc32(blob or b"", crc)
-    return crc
 
 
 def insert(connection: sqlite3.Connection, table: str, rows: Sequence[Row]) -> None:
@@ -51,7 +47,7 @@ def insert(connection: sqlite3.Connection, table: str, rows: Sequence[Row]) -> N
 def select(
     connection: sqlite3.Connection, table: str, where: str = "TRUE", parameters: dict[str, Any] | None = None
 ) -> list[Row]:
-    """Rows of a table ordered by key, with checked seals and values, without the seals.
+    """Return rows of a table ordered by key, with checked seals and values, without the seals.
 
     Raises
     ------
@@ -68,12 +64,12 @@ def select(
 
 
 def has_table(connection: sqlite3.Connection, table: str) -> bool:
-    """Whether a library has a table: one of an earlier version that is only read lacks the later ones."""
+    """Tell whether a library has a table: one of an earlier version that is only read lacks the later ones."""
     return bool(connection.execute("PRAGMA user_version").fetchone()[0] >= SINCE.get(table, 1))
 
 
 def sealed(table: str, row: Row) -> bool:
-    """Whether a row matches its seal, which is its last column."""
+    """Tell whether a row matches its seal, which is its last column."""
     try:
         return seal(table, row[:-1]) == row[-1]
     except TypeError:  # a value of another type than was stored
@@ -81,17 +77,17 @@ def sealed(table: str, row: Row) -> bool:
 
 
 def damaged(table: str, row: Row) -> DataError:
-    """The error for a row whose seal does not match."""
+    """Return the error for a row whose seal does not match."""
     return damage(f"{row_name(table, row[0])} as stored", "damaged bytes")
 
 
 def strange(table: str, row: Row) -> DataError:
-    """The error for a row that matches its seal but has an invalid value."""
+    """Return the error for a row that matches its seal but has an invalid value."""
     return damage(f"{row_name(table, row[0])} as a library stores it", "values that no library holds")
 
 
 def parsed(text: str) -> Any:
-    """JSON as plain data.
+    """Return JSON as plain data.
 
     Raises
     ------
@@ -105,7 +101,7 @@ def parsed(text: str) -> Any:
 
 
 def parsed_column(table: str, row: Row, column: str, kind: type) -> Any:
-    """The JSON of a column, which must be a list or an object.
+    """Return the JSON of a column, which must be a list or an object.
 
     Raises
     ------
@@ -122,7 +118,7 @@ def parsed_column(table: str, row: Row, column: str, kind: type) -> Any:
 
 
 def damage(expected: str, got: str) -> DataError:
-    """The error for damage, with a description."""
+    """Return the error for damage, with a description."""
     return DataError(
         f"expected {expected}, got {got}; kineme library verify names all that is damaged: "
         "take the file from a backup or an export"
@@ -130,7 +126,7 @@ def damage(expected: str, got: str) -> DataError:
 
 
 def row_name(table: str, key: Any) -> str:
-    """The name of a row in messages."""
+    """Return the name of a row in messages."""
     of_movement = {
         "raw": "the samples",
         "primitive": "the primitive",
@@ -141,12 +137,12 @@ def row_name(table: str, key: Any) -> str:
 
 
 def among(column: str, name: str = "keys") -> str:
-    """SQL condition that `column` is in the list that is passed as parameter `name`, see `listed`."""
+    """Return SQL condition that `column` is in the list that is passed as parameter `name`, see `listed`."""
     return f"{column} IN (SELECT value FROM json_each(:{name}))"
 
 
 def listed(values: Iterable[Any]) -> str:
-    """Numbers or texts as the parameter of `among`."""
+    """Return numbers or texts as the parameter of `among`."""
     return json.dumps([value if isinstance(value, str) else int(value) for value in values])
 
 
@@ -158,13 +154,13 @@ def retire(connection: sqlite3.Connection, table: str, rows: Sequence[Row], vers
 
 
 def next_key(connection: sqlite3.Connection, table: str) -> int:
-    """The key of the next row of a table; keys are never reused."""
+    """Return the key of the next row of a table; keys are never reused."""
     largest = connection.execute(f"SELECT max({COLUMNS[table][0]}) FROM {table}").fetchone()[0]
     return (largest or 0) + 1
 
 
 def as_text(value: Any) -> str:
-    """Text that the database can store: bytes that are not Unicode, as in some file names, are escaped."""
+    """Return text that the database can store: bytes that are not Unicode, as in some file names, are escaped."""
     text = str(value).encode("utf-8", "backslashreplace").decode("utf-8")
     check_text("a name", text, MAX_TEXT)
     return text

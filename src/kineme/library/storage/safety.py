@@ -46,8 +46,8 @@ _ON = ("SQLITE_DBCONFIG_DEFENSIVE",)
 
 
 def size_of(path: Path) -> int:
-    """Bytes of a database and of its log."""
-    return sum(one.stat().st_size for one in (path, path.with_name(path.name + "-wal")) if one.exists())
+    """Return bytes of a database and of its log."""
+    return sum(file.stat().st_size for file in (path, path.with_name(path.name + "-wal")) if file.exists())
 
 
 def defend(connection: sqlite3.Connection) -> None:
@@ -58,7 +58,7 @@ def defend(connection: sqlite3.Connection) -> None:
 
 
 def defend_foreign(connection: sqlite3.Connection, path: Path) -> None:
-    """As `defend`, for a file that has not been checked: read only, with no value larger than the file."""
+    """Defend against a file that has not been checked: read only, with no value larger than the file."""
     defend(connection)
     connection.execute("PRAGMA query_only = ON")
     connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, max(1 << 20, min(path.stat().st_size, (1 << 31) - 1)))
@@ -92,7 +92,7 @@ class Watched(sqlite3.Connection):
         self.set_progress_handler(self._is_endless, _STEPS)
 
     def execute(self, *statement: Any) -> sqlite3.Cursor:
-        """As `sqlite3.Connection.execute`."""
+        """Execute a statement within the limits."""
         self._checks = 0
         return super().execute(*statement)
 
@@ -103,7 +103,7 @@ class Watched(sqlite3.Connection):
 
     @contextmanager
     def stopping(self, too_much: Callable[[], bool]) -> Iterator[None]:
-        """Within the context, interrupt also once `too_much()` is true."""
+        """Interrupt, within the context, also once `too_much()` is true."""
         self._too_much = too_much
         try:
             yield
@@ -112,13 +112,13 @@ class Watched(sqlite3.Connection):
 
 
 def limited(connection: Watched, path: Path) -> AbstractContextManager[None]:
-    """Within the context, interrupt also once all statements together take too long for the size of the file."""
+    """Interrupt, within the context, also once all statements together take too long for the size of the file."""
     end = time.monotonic() + _SECONDS + size_of(path) / _BYTES_PER_SECOND
     return connection.stopping(lambda: time.monotonic() > end)
 
 
 def limited_copy(connection: Watched, path: Path, copy: Path) -> AbstractContextManager[None]:
-    """Within the context, interrupt also once the copy is far larger than the file."""
+    """Interrupt, within the context, also once the copy is far larger than the file."""
     most = 2 * size_of(path) + _ROOM
     return connection.stopping(lambda: size_of(copy) > most)
 
@@ -153,7 +153,7 @@ def register(sleeper: Sleeper) -> None:
 
 @contextmanager
 def awake() -> Iterator[None]:
-    """Context manager that holds off forks; a thread may enter it several times."""
+    """Hold off forks within the context, which a thread may enter several times."""
     me = get_ident()
     _enter(me)
     try:
@@ -175,13 +175,13 @@ class Connection(Watched):
         return self
 
     def close(self) -> None:
-        """As `sqlite3.Connection.close`."""
+        """Close the connection, and hold off forks no more."""
         super().close()
         self.allow_forks()
 
 
 def open_connection(address: str | Path, **options: Any) -> Connection:
-    """``sqlite3.connect``, for a connection that holds off forks."""
+    """Return ``sqlite3.connect``, for a connection that holds off forks."""
     me = get_ident()
     _enter(me)
     try:
@@ -194,7 +194,7 @@ def open_connection(address: str | Path, **options: Any) -> Connection:
 
 
 def is_lost(path: Path) -> bool:
-    """Whether a library file was open in the parent at the fork, and could not be closed."""
+    """Tell whether a library file was open in the parent at the fork, and could not be closed."""
     return bool(_lost) and path.exists() and _identity(path) in _lost
 
 
@@ -224,7 +224,7 @@ def _leave(thread: int) -> None:
 
 @contextmanager
 def _all_asleep() -> Iterator[None]:
-    """Before a fork: wait until no thread reads or writes, and close all connections."""
+    """Wait, before a fork, until no thread reads or writes, and close all connections."""
     global _forking  # noqa: PLW0603
     with _changed:
         _forking = get_ident()

@@ -238,9 +238,9 @@ CHECKS: dict[str, dict[str, Check]] = {
 
 #: Table -> the condition that is checked whenever a row is read, and the one of import and `verify`.
 GOOD = {
-    table: f"({' AND '.join(one.quick or one.condition for one in checks.values())}) IS TRUE"
+    table: f"({' AND '.join(check.quick or check.condition for check in checks.values())}) IS TRUE"
     for table, checks in CHECKS.items()
 }
 ALL_GOOD = {
-    table: f"({' AND '.join(one.condition for one in checks.values())}) IS TRUE" for table, checks in CHECKS.items()
+    table: f"({' AND '.join(check.condition for check in checks.values())}) IS TRUE" for table, checks in CHECKS.items()
 }

@@ -1,4 +1,4 @@
-"""Sources of movements: a file as it was when it was read."""
+"""Sources of movements: a file as it was when it was read, and what was read from the files of a library."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Source:
 
     @classmethod
     def of_file(cls, path: str | Path, kind: str = "", options: Mapping[str, Any] | None = None) -> Source:
-        """The source of a file as it is now."""
+        """Return the source of a file as it is now."""
         with Path(path).open("rb") as file:
             sha256 = hashlib.file_digest(file, "sha256").hexdigest()
             size = file.tell()
@@ -58,19 +58,19 @@ class Source:
 
 
 def known_sources(store: Store) -> Known:
-    """The topics and frames that the movements were read from, and their columns."""
+    """Return the topics and frames that the movements were read from, and their columns."""
     with store.reading() as connection:
         texts = connection.execute("SELECT DISTINCT options FROM source").fetchall()
-    told = [_choice(text) for (text,) in texts]
-    choices = tuple(dict.fromkeys(one for one in told if any(one)))
+    every = [_choice(text) for (text,) in texts]
+    choices = tuple(dict.fromkeys(choice for choice in every if any(choice)))
     if (channels := store.channels) is None:
         return Known(choices)
-    moving = recorded_names(tuple(one for one in channels if one.coordinates))
-    return Known(choices, recorded_names(channels), sum(one.kind == "orientation" for one in channels), moving)
+    moving = recorded_names(tuple(channel for channel in channels if channel.coordinates))
+    return Known(choices, recorded_names(channels), sum(channel.kind == "orientation" for channel in channels), moving)
 
 
 def _choice(text: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Topics and frames among the options of a source; none of what is no such option."""
+    """Return topics and frames among the options of a source; none of what is no such option."""
     try:
         options = json.loads(text)
     except (ValueError, RecursionError):
@@ -81,4 +81,4 @@ def _choice(text: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 def _names(value: object) -> tuple[str, ...]:
     several = [value] if isinstance(value, str) else value if isinstance(value, list) else []
-    return tuple(one for one in several if isinstance(one, str))
+    return tuple(name for name in several if isinstance(name, str))

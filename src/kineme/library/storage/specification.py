@@ -13,8 +13,7 @@ from kineme.dmp.persistence import specification_from_dict, specification_to_dic
 from kineme.errors import DataError, KinemeError, SpecificationError
 from kineme.kernels.soft_rotation import RotationPrior
 from kineme.library.storage.rows import parsed
-from kineme.similarity.normalization import Normalization
-from kineme.similarity.representation import ROW_REPRESENTATIONS, Representation
+from kineme.similarity.representation import ROW_REPRESENTATIONS, Normalization, Representation
 from kineme.similarity.specification import Compares, ComparisonSpecification
 from kineme.similarity.weights import WEIGHTS
 from kineme.validation import check_choice, check_number
@@ -34,7 +33,7 @@ class Recognizes(Compares, Protocol):
 
 @dataclass(frozen=True)
 class Specification:
-    """How the movements of a library are compared and recognized, and how they move again.
+    """Specification of how the movements of a library are compared and recognized, and how they move again.
 
     Attributes
     ----------
@@ -72,7 +71,7 @@ class Specification:
 
     @classmethod
     def of(cls, recognizer: Recognizes | None, dmp: DMP | None, default: Specification | None = None) -> Specification:
-        """From a recognizer and a DMP; None for those of the default.
+        """Make one from a recognizer and a DMP; None for those of the default.
 
         Raises
         ------
@@ -93,17 +92,17 @@ class Specification:
         return self.comparison.representations
 
     def widths(self, n_dims: int) -> tuple[int, ...]:
-        """Numbers per movement in the stored rows: of each representation that is compared sample by sample."""
-        return tuple(n_dims * one.n_points for one in self.comparison.by_rows)
+        """Return numbers per movement in the stored rows: of each representation that is compared sample by sample."""
+        return tuple(n_dims * representation.n_points for representation in self.comparison.by_rows)
 
     def recognizer(self) -> Recognizer:
-        """A recognizer, not fitted, that compares and recognizes movements in this way."""
+        """Return a recognizer, not fitted, that compares and recognizes movements in this way."""
         from kineme.recognition.recognizer import Recognizer
 
         return Recognizer(**self._parameters())
 
     def _parameters(self) -> dict[str, Any]:
-        """The parameters of that recognizer."""
+        """Return the parameters of that recognizer."""
         how = self.comparison
         return {
             "representations": how.representations,
@@ -118,58 +117,49 @@ class Specification:
         }
 
     def to_json(self) -> dict[str, str]:
-        """Two documents: ``recognizer`` and ``dmp``."""
+        """Return two documents: ``recognizer`` and ``dmp``."""
         prior = self.comparison.prior
         parameters = self._parameters() | {
-            "representations": [asdict(one) for one in self.representations],
+            "representations": [asdict(representation) for representation in self.representations],
             "rotation_prior": None if prior is None else asdict(prior),
         }
         return {"recognizer": json.dumps(parameters), "dmp": json.dumps(specification_to_dict(self.dmp))}
 
     @classmethod
     def from_json(cls, meta: dict[str, str], path: Path) -> Specification:
-        """What `to_json` wrote into the library at `path`; every parameter is checked as if a user had typed it."""
+        """Read what `to_json` wrote into the library at `path`; parameters are checked as if a user had typed them."""
         try:
             parameters, dmp = parsed(meta["recognizer"]), parsed(meta["dmp"])
-            parameters["representations"] = tuple(Representation(**one) for one in parameters["representations"])
+            parameters["representations"] = tuple(Representation(**fields) for fields in parameters["representations"])
             if parameters.get("rotation_prior") is not None:
                 prior = parameters["rotation_prior"]
                 vertical = prior["vertical"]
                 parameters["rotation_prior"] = RotationPrior(
                     prior["concentration"], None if vertical is None else tuple(vertical), prior["tilt"]
                 )
-            made = cls._from_parameters(specification_from_dict(DMP, dmp), **parameters)
+            if not isinstance(weights := parameters.get("weights", "auto"), str):
+                parameters["weights"] = tuple(map(float, weights))
+            normalization = Normalization(parameters.pop("translation", True), parameters.pop("scale", "path"))
+            comparison = ComparisonSpecification(
+                parameters.pop("representations", ROW_REPRESENTATIONS),
+                normalization,
+                parameters.pop("cutoff", 10.0),
+                parameters.pop("max_angle", None),
+                parameters.pop("mean", "arithmetic"),
+                parameters.pop("rotation_prior", None),
+            )
+            specification = cls(comparison, dmp=specification_from_dict(DMP, dmp), **parameters)
         except (AttributeError, KeyError, TypeError, ValueError, OverflowError) as error:
             reason = error if isinstance(error, KinemeError) else f"{type(error).__name__}: {error}"
             raise DataError(
                 f"expected {path} to say how its movements are described, got a specification that does not fit "
                 f"({reason}); take the file from a backup or an export that you trust"
             ) from error
-        return made
-
-    @classmethod
-    def _from_parameters(  # noqa: PLR0913 - those of a recognizer
-        cls,
-        dmp: DMP,
-        *,
-        representations: tuple[Representation, ...] = ROW_REPRESENTATIONS,
-        max_angle: float | None = None,
-        scale: str = "path",
-        translation: bool = True,
-        cutoff: float | None = 10.0,
-        mean: str = "arithmetic",
-        classifier: str = "auto",
-        weights: str | Sequence[float] = "auto",
-        rotation_prior: RotationPrior | None = None,
-    ) -> Specification:
-        """As `_parameters` gives them; earlier versions wrote some of them."""
-        normalization = Normalization(translation, scale)
-        how = ComparisonSpecification(representations, normalization, cutoff, max_angle, mean, rotation_prior)
-        return cls(how, classifier, weights if isinstance(weights, str) else tuple(map(float, weights)), dmp)
+        return specification
 
 
 def as_n_dims(text: str, path: Path) -> int:
-    """The number of dimensions from the stored text in the library at `path`."""
+    """Return the number of dimensions from the stored text in the library at `path`."""
     if not (text.isascii() and text.isdecimal() and len(text) <= len(str(_MOST)) and 0 < int(text) <= _MOST):
         raise DataError(
             f"expected {path} to say how many dimensions its movements have, from 1 to {_MOST}, got {text[:40]!r}; "

@@ -100,10 +100,10 @@ class Store:
             self._writer = None
 
     def carried_over(self) -> list[sqlite3.Connection]:
-        """The connections that were open at a fork; see `safety`."""
+        """Return the connections that were open at a fork; see `safety`."""
         if self._closed or self._asleep:
             return []
-        return [one for one in (self._writer, self._reader) if one is not None]
+        return [connection for connection in (self._writer, self._reader) if connection is not None]
 
     def _wake(self) -> None:
         with self._waking:
@@ -173,7 +173,7 @@ class Store:
 
     @property
     def channels(self) -> Channels | None:
-        """What the movements were recorded as; None before the first one, and where that is not known."""
+        """Channels that the movements were recorded as; None before the first one, and where that is not known."""
         with self.reading() as connection:
             rows = select(connection, "meta", "key = 'channels'")
         return channels_of_text(rows[0][1], self.n_dims or 0, self.path) if rows else None
@@ -279,7 +279,7 @@ class Store:
 
 
 def history(store: Store) -> tuple[Version, ...]:
-    """Every change up to the version shown, the first one first."""
+    """Return every change up to the version shown, the first one first."""
     with store.reading() as connection:
         rows = select(connection, "version", "id <= :v", {"v": store.as_of})
     return tuple(Version(row[0], row[1], row[2], parsed_column("version", row, "detail", dict)) for row in rows)
@@ -318,7 +318,7 @@ class Moment:
 
 
 def moment_at(connection: sqlite3.Connection, version: int) -> Moment:
-    """The last version up to the given one.
+    """Return the last version up to the given one.
 
     Raises
     ------

@@ -75,7 +75,7 @@ class Symbol:
 
 
 def symbols(store: Store) -> tuple[Symbol, ...]:
-    """All symbols, by name."""
+    """Return all symbols, by name."""
     with store.reading() as connection:
         moment = store.moment(connection)
         states = select(connection, "symbol_state", ALIVE, {"v": moment.version})
@@ -85,20 +85,20 @@ def symbols(store: Store) -> tuple[Symbol, ...]:
 
 
 def count(store: Store) -> int:
-    """Number of symbols, whose members are not read."""
+    """Return the number of symbols, whose members are not read."""
     with store.reading() as connection:
         return store.moment(connection).symbols
 
 
 def symbol(store: Store, who: str) -> Symbol:
-    """The symbol of that name or id."""
+    """Return the symbol of that name or id."""
     with store.reading() as connection:
         moment = store.moment(connection)
         return _with_members(connection, moment, [state_of(connection, who, moment.version)])[0]
 
 
 def exists(store: Store, who: object) -> bool:
-    """Whether there is a symbol of that name or id."""
+    """Tell whether there is a symbol of that name or id."""
     try:
         with store.reading() as connection:
             return bool(state_of(connection, str(who), store.as_of))
@@ -107,7 +107,7 @@ def exists(store: Store, who: object) -> bool:
 
 
 def state_of(connection: sqlite3.Connection, who: str, version: int) -> Row:
-    """The row of `symbol_state` of a name or, where no symbol has that name, of an id.
+    """Return the row of `symbol_state` of a name or, where no symbol has that name, of an id.
 
     Raises
     ------
@@ -124,15 +124,16 @@ def state_of(connection: sqlite3.Connection, who: str, version: int) -> Row:
             return states[0]
     names = [name for (name,) in connection.execute(f"SELECT name FROM symbol_state WHERE {ALIVE}", {"v": version})]
     like = difflib.get_close_matches(str(who)[:_ALIKE], [name[:_ALIKE] for name in names], 3) or sorted(names)[:5]
-    known = f"there are {len(names)}, such as {', '.join(map(repr, like))}" if names else "the library has none"
-    raise SpecificationError(f"expected the name or id of a symbol, got {who!r}; {known}")
+    others = f"there are {len(names)}, such as {', '.join(map(repr, like))}" if names else "the library has none"
+    raise SpecificationError(f"expected the name or id of a symbol, got {who!r}; {others}")
 
 
 def _with_members(connection: sqlite3.Connection, moment: Moment, states: Sequence[Row]) -> list[Symbol]:
     records = [dict(zip(COLUMNS["symbol_state"], row, strict=True)) for row in states]
     keys = [record["symbol"] for record in records]
     about = {
-        key: (name, made) for key, name, made in select(connection, "symbol", among("key"), {"keys": listed(keys)})
+        key: (name, created)
+        for key, name, created in select(connection, "symbol", among("key"), {"keys": listed(keys)})
     }
     if lost := set(keys) - about.keys():
         raise damaged("symbol", (min(lost),))
@@ -181,17 +182,17 @@ def check_name(name: Any) -> str:
 
 
 def keys_by_name(change: Change, names: Iterable[str]) -> tuple[dict[str, int], tuple[str, ...]]:
-    """Name or id -> key of its symbol, and the names whose symbols were created."""
+    """Return the name or id -> key of its symbol, and the names whose symbols were created."""
     names = list(names)
-    known = "FROM symbol_state JOIN symbol ON symbol.key = symbol_state.symbol WHERE removed IS NULL"
+    alive = "FROM symbol_state JOIN symbol ON symbol.key = symbol_state.symbol WHERE removed IS NULL"
     keys: dict[str, int] = {}
     for column in ("symbol.id", "name"):  # a name takes precedence over an id, as in `state_of`
-        query = f"SELECT {column}, symbol.key {known} AND {among(column)}"
+        query = f"SELECT {column}, symbol.key {alive} AND {among(column)}"
         keys |= dict(change.connection.execute(query, {"keys": listed(names)}))
-    made = tuple(name for name in names if name not in keys)
-    for name in made:
+    new = tuple(name for name in names if name not in keys)
+    for name in new:
         keys[name] = make(change, name)
-    return keys, made
+    return keys, new
 
 
 def make(change: Change, name: str, parents: Sequence[str] = ()) -> int:
@@ -212,7 +213,7 @@ def add_members(change: Change, pairs: Sequence[tuple[int, int]], how: str) -> N
 
 
 def symbol_report(store: Store, who: str) -> dict[str, Any]:
-    """A symbol as plain data.
+    """Return a symbol as plain data.
 
     Returns
     -------
@@ -224,18 +225,18 @@ def symbol_report(store: Store, who: str) -> dict[str, Any]:
     members = []
     if len(shown):
         about = records(store, shown.members)
-        files = _files(store, sorted({one["source"] for one in about if one["source"] is not None}))
+        files = _files(store, sorted({record["source"] for record in about if record["source"] is not None}))
         people = groups(store, shown.members).tolist()
-        for one, movement, person in zip(about, movements(store, shown.members), people, strict=True):
+        for record, movement, person in zip(about, movements(store, shown.members), people, strict=True):
             members.append(
                 {
-                    "id": one["id"],
-                    "name": one["name"],
-                    "source": files.get(one["source"]),
-                    "place": one["place"],
+                    "id": record["id"],
+                    "name": record["name"],
+                    "source": files.get(record["source"]),
+                    "place": record["place"],
                     "person": person,
-                    "samples": one["n_samples"],
-                    "duration": one["duration"],
+                    "samples": record["n_samples"],
+                    "duration": record["duration"],
                     "start": movement.positions[0].tolist(),
                     "goal": movement.positions[-1].tolist(),
                 }
@@ -251,7 +252,7 @@ def symbol_report(store: Store, who: str) -> dict[str, Any]:
 
 
 def _files(store: Store, keys: list[int]) -> dict[int, str]:
-    """Key of a source -> its path, as given."""
+    """Return the key of a source -> its path, as given."""
     with store.reading() as connection:
         rows = select(connection, "source", among("id"), {"keys": listed(keys)})
     path = COLUMNS["source"].index("path")

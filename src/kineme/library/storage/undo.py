@@ -12,12 +12,11 @@ from kineme.library.storage.rows import ALIVE, Row, among, has_table, listed, ne
 from kineme.library.storage.schema import BLOBS, COLUMNS, CONTINUES, OPTIONAL_BLOBS, RESTORE, RETURNS, UNDO
 from kineme.library.storage.store import NOW, Change, Store
 
-_MOVEMENT = {name: k for k, name in enumerate(COLUMNS["movement"])}
-_STATE = {name: k for k, name in enumerate(COLUMNS["symbol_state"])}
+_DIGEST, _PROTOTYPE = COLUMNS["movement"].index("digest"), COLUMNS["symbol_state"].index("prototype")
 
 
 class Undone(NamedTuple):
-    """What `undo` did: it made `version`, whose state is that of version `to`.
+    """Result of `undo`: it made `version`, whose state is that of version `to`.
 
     `action` is what it took back; "restore" where it was asked for that version.
     """
@@ -38,40 +37,34 @@ def undo(store: Store, expected: int | None = None, to: int | None = None) -> Un
                 f"expected to {what} version {expected}, the library is at version {last} by now; "
                 f"look at what has changed, and {'undo' if to is None else 'restore'} again"
             )
-        action, back = _last_change(change.connection, last) if to is None else (RESTORE, _earlier(change, to))
+        if to is None:
+            undone = _effective(change.connection, last)
+            if undone == 0:
+                raise SpecificationError(
+                    "expected a change to take back, the library has none left; nothing was changed"
+                )
+            action, back = _version(change.connection, undone)[2], _begin(change.connection, undone) - 1
+        else:
+            if not (isinstance(to, Integral) and not isinstance(to, bool) and 0 <= to < last):
+                raise SpecificationError(f"expected a version before {last} to restore, got {to!r}; see history()")
+            action, back = RESTORE, int(to)
+            if _effective(change.connection, back, RETURNS) == _effective(change.connection, last, RETURNS):
+                raise SpecificationError(
+                    f"expected a version to restore, the library is as at version {to}; nothing was changed"
+                )
         detail |= {"to": back}
         _return_to(change, back)
     return Undone(change.version, back, action)
 
 
-def _last_change(connection: sqlite3.Connection, last: int) -> tuple[str, int]:
-    """The action to take back, and the version before it."""
-    undone = _effective(connection, last)
-    if undone == 0:
-        raise SpecificationError("expected a change to take back, the library has none left; nothing was changed")
-    return _version(connection, undone)[2], _begin(connection, undone) - 1
-
-
-def _earlier(change: Change, to: int) -> int:
-    """The version to restore, checked: an earlier one, with another state."""
-    last = change.version - 1
-    if not (isinstance(to, Integral) and not isinstance(to, bool) and 0 <= to < last):
-        raise SpecificationError(f"expected a version before {last} to restore, got {to!r}; see history()")
-    if _effective(change.connection, int(to), RETURNS) == _effective(change.connection, last, RETURNS):
-        raise SpecificationError(
-            f"expected a version to restore, the library is as at version {to}; nothing was changed"
-        )
-    return int(to)
-
-
 def can_undo(store: Store) -> bool:
-    """Whether there is a change to take back."""
+    """Tell whether there is a change to take back."""
     with store.reading() as connection:
         return not store.read_only and _effective(connection, store.moment(connection).version) > 0
 
 
 def _effective(connection: sqlite3.Connection, version: int, returns: tuple[str, ...] = (UNDO,)) -> int:
-    """The version whose change the library is at: that of the state that an undo returned to, else the version.
+    """Return the version whose change the library is at: that of the state that an undo returned to, else the version.
 
     With `RETURNS`, the first version that had its state, as far as the history says so.
     """
@@ -85,7 +78,7 @@ def _effective(connection: sqlite3.Connection, version: int, returns: tuple[str,
 
 
 def _begin(connection: sqlite3.Connection, version: int) -> int:
-    """The first of the versions in a row that one call made."""
+    """Return the first of the versions in a row that one call made."""
     while version > 1:
         row = _version(connection, version)
         if parsed_column("version", row, "detail", dict).get(CONTINUES) != version - 1:
@@ -104,61 +97,45 @@ def _return_to(change: Change, version: int) -> None:
     then, now = (_rows(change, "member", at) for at in (version, NOW))
     wanted = {(ids[row[1]], row[2], row[3]) for row in then}
     change.retire("member", [row for row in now if row[1:4] not in wanted])
-    _return_states(change, version, ids)
-    have = {row[1:4] for row in now}
-    new = sorted(wanted - have)
+    states_then, states = (_rows(change, "symbol_state", at) for at in (version, NOW))
+    before = {
+        (*row[1:_PROTOTYPE], ids.get(row[_PROTOTYPE]), *row[_PROTOTYPE + 1 : -2]) for row in states_then
+    }  # names, descriptions and prototypes as they were
+    change.retire("symbol_state", [row for row in states if row[1:-2] not in before])
+    key = next_key(change.connection, "symbol_state")
+    new = sorted(before - {row[1:-2] for row in states}, key=lambda row: int(row[0]))
+    change.insert("symbol_state", [(key + k, *row, change.version, None) for k, row in enumerate(new)])
     key = next_key(change.connection, "member")
-    change.insert("member", [(key + k, *one, change.version, None) for k, one in enumerate(new)])
-    _retire_movements(change, set(ids.values()))
+    new = sorted(wanted - {row[1:4] for row in now})
+    change.insert("member", [(key + k, *row, change.version, None) for k, row in enumerate(new)])
+    alive = set(ids.values())
+    change.retire("movement", [row for row in _rows(change, "movement", NOW) if row[0] not in alive])
 
 
 def _return_movements(change: Change, version: int) -> dict[int, int]:
-    """The id now of every movement of that version; those that are not there any more are stored again."""
+    """Return the id now of every movement of that version; those that are not there any more are stored again."""
     then, now = (_rows(change, "movement", at) for at in (version, NOW))
-    digest = _MOVEMENT["digest"]
-    alive = {row[digest]: row[0] for row in now}
-    lost = [row for row in then if row[digest] not in alive]
+    alive = {row[_DIGEST]: row[0] for row in now}
+    lost = [row for row in then if row[_DIGEST] not in alive]
     key = next_key(change.connection, "movement")
     again = {row[0]: key + k for k, row in enumerate(lost)}
-    _free_places(change, lost, now)
+    # Movements that were learned later leave the places of the lost ones in their files. What refers to them is of no
+    # earlier version, and is retired with all that is not.
+    places = {row[1:3] for row in lost if row[1] is not None}
+    change.retire("movement", [row for row in now if row[1] is not None and row[1:3] in places])
     change.insert("movement", [(again[row[0]], *row[1:-2], change.version, None) for row in lost])
     _copy(change, again)
-    return {row[0]: again.get(row[0], alive.get(row[digest], 0)) for row in then}
-
-
-def _free_places(change: Change, lost: list[Row], now: list[Row]) -> None:
-    """Remove movements that were learned later from the positions of the lost ones in their files.
-
-    What refers to them is of no earlier version, and is retired with all that is not.
-    """
-    at = {row[1:3] for row in lost if row[1] is not None}
-    change.retire("movement", [row for row in now if row[1] is not None and row[1:3] in at])
+    return {row[0]: again.get(row[0], alive.get(row[_DIGEST], 0)) for row in then}
 
 
 def _copy(change: Change, again: Mapping[int, int]) -> None:
-    """The samples, primitives, features and people of movements, for their new ids."""
+    """Copy the samples, primitives, features and people of movements to their new ids."""
     keys = {"keys": listed(again)}
     for table in (*BLOBS, *OPTIONAL_BLOBS, "shown_by"):
         if again and has_table(change.connection, table):
             for row in select(change.connection, table, among("movement"), keys):
                 later = (*row[1:-1], change.version) if table == "shown_by" else row[1:]
                 change.insert(table, [(again[row[0]], *later)])
-
-
-def _return_states(change: Change, version: int, ids: Mapping[int, int]) -> None:
-    """Names, descriptions and prototypes of the symbols as they were."""
-    prototype = _STATE["prototype"]
-    then, now = (_rows(change, "symbol_state", at) for at in (version, NOW))
-    wanted = {(*row[1:prototype], ids.get(row[prototype]), *row[prototype + 1 : -2]) for row in then}
-    change.retire("symbol_state", [row for row in now if row[1:-2] not in wanted])
-    have = {row[1:-2] for row in now}
-    key = next_key(change.connection, "symbol_state")
-    new = sorted(wanted - have, key=lambda one: int(one[0]))
-    change.insert("symbol_state", [(key + k, *one, change.version, None) for k, one in enumerate(new)])
-
-
-def _retire_movements(change: Change, kept: set[int]) -> None:
-    change.retire("movement", [row for row in _rows(change, "movement", NOW) if row[0] not in kept])
 
 
 def _rows(change: Change, table: str, version: int) -> list[Row]:

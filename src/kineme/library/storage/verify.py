@@ -40,8 +40,6 @@ Strange = Iterator[tuple[Any, str]]
 
 _SLACK = 1e-5  # of the duration: tolerance of the last stamp, in single precision
 
-_FINITE = "numbers that are not finite"
-
 
 def _version(rows: Sequence[Row]) -> Strange:
     for key, _, action, text, *_ in rows:
@@ -52,14 +50,6 @@ def _version(rows: Sequence[Row]) -> Strange:
             yield key, "a rejection without its list of movements"
         elif action in RETURNS and not (type(detail.get("to")) is int and 0 <= detail["to"] < key):
             yield key, f"an action {action} without the earlier version that it returned to"
-
-
-def _source(rows: Sequence[Row]) -> Strange:
-    yield from ((row[0], "options that are no JSON object") for row in rows if not isinstance(_json(row[6]), dict))
-
-
-def _symbol_state(rows: Sequence[Row]) -> Strange:
-    yield from ((row[0], "parents that are no JSON list of ids") for row in rows if not _are(str, _json(row[6])))
 
 
 def _json(text: str) -> Any:
@@ -73,43 +63,37 @@ def _are(kind: type, values: Any) -> bool:
     return isinstance(values, list) and all(type(value) is kind for value in values)
 
 
-def _primitive(rows: Sequence[Row]) -> Strange:
-    yield from _not_finite(rows, 1, np.float64)
-    yield from _not_finite(rows, 2, np.float32)
+def _not_finite(rows: Sequence[Row], *kinds: Any) -> Strange:
+    """Find rows with numbers that are not finite; `kinds` are the types of the columns behind the key."""
+    for column, kind in enumerate(kinds, start=1):
 
+        def finite(blobs: Sequence[bytes], kind: Any = kind) -> bool:
+            blob = b"".join(blobs)
+            return len(blob) % np.dtype(kind).itemsize == 0 and bool(np.isfinite(np.frombuffer(blob, kind)).all())
 
-def _feature(rows: Sequence[Row]) -> Strange:
-    yield from _not_finite(rows, 1, np.float32)
-
-
-def _not_finite(rows: Sequence[Row], column: int, kind: Any) -> Strange:
-    size = np.dtype(kind).itemsize
-    if all(len(row[column]) % size == 0 for row in rows) and _finite([row[column] for row in rows], kind):
-        return
-    for row in rows:
-        if len(row[column]) % size or not _finite([row[column]], kind):
-            yield row[0], _FINITE
-
-
-def _finite(blobs: Sequence[bytes], kind: Any) -> bool:
-    return bool(np.isfinite(np.frombuffer(b"".join(blobs), kind)).all())
+        sizes_fit = all(len(row[column]) % np.dtype(kind).itemsize == 0 for row in rows)
+        if not (sizes_fit and finite([row[column] for row in rows])):
+            yield from ((row[0], "numbers that are not finite") for row in rows if not finite([row[column]]))
 
 
 #: Table -> the check of its contents.
 CONTENTS: dict[str, Callable[[Sequence[Row]], Strange]] = {
     "version": _version,
-    "source": _source,
-    "symbol_state": _symbol_state,
-    "primitive": _primitive,
-    "feature": _feature,
-    "recorded": _feature,
+    "source": lambda rows: (
+        (row[0], "options that are no JSON object") for row in rows if not isinstance(_json(row[6]), dict)
+    ),
+    "symbol_state": lambda rows: (
+        (row[0], "parents that are no JSON list of ids") for row in rows if not _are(str, _json(row[6]))
+    ),
+    "primitive": lambda rows: _not_finite(rows, np.float64, np.float32),
+    "feature": lambda rows: _not_finite(rows, np.float32),
+    "recorded": lambda rows: _not_finite(rows, np.float32),
 }
 
 
 def samples(connection: sqlite3.Connection, rows: Sequence[Row], n_dims: int) -> Strange:
-    """Like the functions of `CONTENTS`, for ascending rows of the table `raw`, compared with the rows of movements."""
-    yield from _not_finite(rows, 1, np.float64)
-    yield from _not_finite(rows, 2, np.float32)
+    """Check ascending rows of the table `raw` like the functions of `CONTENTS`, beside the rows of movements."""
+    yield from _not_finite(rows, np.float64, np.float32)
     query = f"SELECT id, n_samples, t0, duration FROM movement WHERE id BETWEEN ? AND ? AND {GOOD['movement']}"
     about = {row[0]: row[1:] for row in connection.execute(query, (rows[0][0], rows[-1][0]))}
     fitting = [row for row in rows if row[0] in about and len(row[2]) == 4 * n_dims * about[row[0]][0]]
@@ -130,7 +114,7 @@ def samples(connection: sqlite3.Connection, rows: Sequence[Row], n_dims: int) ->
 def _stamps(rows: Sequence[Row], about: Sequence[tuple[Any, ...]], kind: Any) -> Strange:
     """Check that stamps (total,) begin at zero, increase strictly, also with t0 added, and end at the duration."""
     relative: Array = np.frombuffer(b"".join(row[3] for row in rows), kind).astype(np.float64)
-    lengths, t0, durations = (np.array([one[k] for one in about]) for k in range(3))
+    lengths, t0, durations = (np.array([movement[k] for movement in about]) for k in range(3))
     ends = np.cumsum(lengths)
     times = relative + np.repeat(t0, lengths)
     steps: NDArray[np.bool_] = np.append(times[1:] > times[:-1], True)
@@ -142,8 +126,7 @@ def _stamps(rows: Sequence[Row], about: Sequence[tuple[Any, ...]], kind: Any) ->
     )
 
 
-Whole = NDArray[np.int64]
-Found = Iterator[tuple[str, int, str]]  # table, key, what is wrong
+Table = NDArray[np.int64]
 
 _SHOWN = 100  # messages per check
 _BATCH_BYTES = 1 << 24  # of rows whose contents are checked together
@@ -175,11 +158,15 @@ class Problem:
         return self.text
 
 
+def _problem(table: str, key: Any, words: str) -> Problem:
+    return Problem(table, key, f"{row_name(table, key)}: {words}")
+
+
 Check = Callable[[sqlite3.Connection], Iterator[Problem]]
 
 
 def verify(store: Store, *, pages: bool = True) -> list[Problem]:
-    """All problems of the library at one moment; an empty list if there are none.
+    """Return all problems of the library at one moment; an empty list if there are none.
 
     `pages` is False if the pages of the file have been checked already.
     """
@@ -193,7 +180,7 @@ def verify(store: Store, *, pages: bool = True) -> list[Problem]:
             _sizes(store),
         ]
         problems = [problem for check in checks for problem in _all_of(check, connection)]
-        return problems or _all_of(_lives, connection)  # relations between rows are checked only if each row is valid
+        return problems or _all_of(lives, connection)  # relations between rows are checked only if each row is valid
 
 
 def blame(store: Store, error: BaseException) -> None:
@@ -214,7 +201,7 @@ def blame(store: Store, error: BaseException) -> None:
 
 
 def _is_ours(trace: TracebackType | None) -> bool:
-    """Whether an error comes from this chapter, and not from the program around it."""
+    """Tell whether an error comes from this chapter, and not from the program around it."""
     modules = []
     while trace is not None:
         modules.append(str(trace.tb_frame.f_globals.get("__name__")))
@@ -223,7 +210,7 @@ def _is_ours(trace: TracebackType | None) -> bool:
 
 
 def _all_of(check: Check, connection: sqlite3.Connection) -> list[Problem]:
-    """All problems that a check finds; an error that stops it is one too."""
+    """Return all problems that a check finds; an error that stops it is one too."""
     problems: list[Problem] = []
     try:
         for problem in check(connection):
@@ -266,54 +253,53 @@ def _rows(table: str, store: Store) -> Check:
 
 
 def _broken(table: str, row: Row) -> list[Problem]:
-    """The problem of a row that does not match its seal."""
-    return [] if sealed(table, row) else [Problem(table, row[0], f"{row_name(table, row[0])}: damaged bytes")]
+    """Return the problem of a row that does not match its seal."""
+    return [] if sealed(table, row) else [_problem(table, row[0], "damaged bytes")]
 
 
 def _strange(connection: sqlite3.Connection, table: str, key: Any) -> Iterator[Problem]:
-    """The problems of a row with invalid values."""
+    """Return the problems of a row with invalid values."""
     checks = CHECKS[table]
-    fits = ", ".join(f"({one.condition}) IS TRUE" for one in checks.values())
+    fits = ", ".join(f"({check.condition}) IS TRUE" for check in checks.values())
     row = connection.execute(f"SELECT {fits} FROM {table} WHERE {COLUMNS[table][0]} IS ?", (key,)).fetchone()
-    for (column, one), good in zip(checks.items(), row or (), strict=False):
+    for (column, check), good in zip(checks.items(), row or (), strict=False):
         if not good:
-            yield Problem(table, key, f"{row_name(table, key)}: {column} is not {one.words}")
+            yield _problem(table, key, f"{column} is not {check.words}")
 
 
 def _contents(connection: sqlite3.Connection, table: str, rows: list[Row], store: Store) -> Iterator[Problem]:
     if not rows:
         return
-    invalid = samples(connection, rows, store.n_dims or 0) if table == "raw" else CONTENTS.get(table, _nothing)(rows)
-    yield from (Problem(table, key, f"{row_name(table, key)}: holds {words}") for key, words in invalid)
-
-
-def _nothing(rows: Sequence[Row]) -> Iterator[tuple[Any, str]]:
-    yield from ()
+    if table == "raw":
+        invalid = samples(connection, rows, store.n_dims or 0)
+    else:
+        invalid = CONTENTS[table](rows) if table in CONTENTS else iter(())
+    yield from (_problem(table, key, f"holds {words}") for key, words in invalid)
 
 
 def _one_by_one(connection: sqlite3.Connection, table: str) -> Iterator[Problem]:
-    """The movements whose rows cannot be read, in a table that cannot be read as a whole."""
+    """Return the movements whose rows cannot be read, in a table that cannot be read as a whole."""
     if table not in BLOBS:
         return
     for (key,) in connection.execute("SELECT id FROM movement").fetchall():
         try:
             row = connection.execute(f"SELECT *, movement FROM {table} WHERE movement = ?", (key,)).fetchone()
         except (sqlite3.Error, UnicodeDecodeError) as error:
-            yield Problem(table, key, f"{row_name(table, key)}: cannot be read ({error})")
+            yield _problem(table, key, f"cannot be read ({error})")
         else:
             yield from _broken(table, row[:-1]) if row is not None else ()
 
 
 def _references(connection: sqlite3.Connection) -> Iterator[Problem]:
     for table, key, parent, _ in connection.execute("PRAGMA foreign_key_check"):
-        yield Problem(table, key, f"{row_name(table, key)}: refers to a row of table {parent} that is not there")
+        yield _problem(table, key, f"refers to a row of table {parent} that is not there")
 
 
 def _completeness(connection: sqlite3.Connection) -> Iterator[Problem]:
     for table in BLOBS:
         query = f"SELECT id FROM movement WHERE id NOT IN (SELECT movement FROM {table}) LIMIT {_SHOWN}"
         for (key,) in connection.execute(query):
-            yield Problem(table, key, f"{row_name(table, key)}: not there")
+            yield _problem(table, key, "not there")
     for table in ("version", "movement"):
         last, n = connection.execute(f"SELECT coalesce(max(id), 0), count(*) FROM {table}").fetchone()
         if last != n:
@@ -325,10 +311,6 @@ def _completeness(connection: sqlite3.Connection) -> Iterator[Problem]:
         )
     if n and "n_dims" not in keys:
         yield Problem("meta", "n_dims", "row n_dims of table meta: not there")
-
-
-def _lives(connection: sqlite3.Connection) -> Iterator[Problem]:
-    yield from (Problem(table, key, f"{row_name(table, key)}: {words}") for table, key, words in lives(connection))
 
 
 def _sizes(store: Store) -> Check:
@@ -350,12 +332,12 @@ def _sizes(store: Store) -> Check:
                 continue
             query = f"SELECT id FROM {table} JOIN movement ON id = movement WHERE NOT ({fits}) LIMIT {_SHOWN}"
             for (key,) in connection.execute(query):
-                yield Problem(table, key, f"{row_name(table, key)}: of the wrong size")
+                yield _problem(table, key, "of the wrong size")
 
     return check
 
 
-def lives(connection: sqlite3.Connection) -> Found:
+def lives(connection: sqlite3.Connection) -> Iterator[Problem]:
     """Find contradictions between the lifetimes of rows. Expects a library whose rows are valid one by one."""
     yield from _counted(connection)
     movement = _columns(connection, "movement", "id")
@@ -368,11 +350,11 @@ def lives(connection: sqlite3.Connection) -> Found:
     yield from _apart("symbol_state", state, "the symbol has two states at a time", gaps, returned)
     yield from _apart("symbol_state", _named(connection), "two symbols have its name at a time")
     yield from _within("member", member, movement, "its movement")
-    yield from _within("member", symbol, _whole_lives(state), "its symbol")
+    yield from _within("member", symbol, _spans(state), "its symbol")
     yield from _within("symbol_state", _columns(connection, "symbol_state", "prototype"), movement, "its prototype")
 
 
-def _counted(connection: sqlite3.Connection) -> Found:
+def _counted(connection: sqlite3.Connection) -> Iterator[Problem]:
     """Check the number of rows that are alive, which each version states."""
     names = list(COUNTED.values())
     said = _table(connection, f"SELECT id, {', '.join(names)} FROM version ORDER BY id", 1 + len(names))
@@ -384,22 +366,22 @@ def _counted(connection: sqlite3.Connection) -> Found:
             at = _table(connection, query, 2)
             alive[at[:, 0]] += sign * at[:, 1]
         wrong = np.flatnonzero(np.cumsum(alive)[1:] != said[:, 1 + names.index(name)])
-        yield from (("version", int(said[k, 0]), f"counts other {name} than there are") for k in wrong)
+        yield from (_problem("version", int(said[k, 0]), f"counts other {name} than there are") for k in wrong)
 
 
-def _table(connection: sqlite3.Connection, query: str, width: int) -> Whole:
+def _table(connection: sqlite3.Connection, query: str, width: int) -> Table:
     return np.array(connection.execute(query).fetchall(), dtype=np.int64).reshape(-1, width)
 
 
-def _columns(connection: sqlite3.Connection, table: str, whose: str) -> Whole:
-    """Rows (key, owner, added, removed), ordered by owner, then by time."""
+def _columns(connection: sqlite3.Connection, table: str, whose: str) -> Table:
+    """Return rows (key, owner, added, removed), ordered by owner, then by time."""
     query = f"SELECT id, {whose}, added, coalesce(removed, {LARGEST_ID}) FROM {table} WHERE {whose} IS NOT NULL"
     rows = _table(connection, query, 4)
     return rows[np.lexsort((rows[:, 3], rows[:, 2], rows[:, 1]))]
 
 
-def _named(connection: sqlite3.Connection) -> Whole:
-    """As `_columns`, with the names numbered."""
+def _named(connection: sqlite3.Connection) -> Table:
+    """Return `_columns` of the names of symbols, numbered."""
     rows = connection.execute(f"SELECT id, name, added, coalesce(removed, {LARGEST_ID}) FROM symbol_state").fetchall()
     numbers: dict[str, int] = {}
     lives = [(key, numbers.setdefault(name, len(numbers)), *life) for key, name, *life in rows]
@@ -407,36 +389,36 @@ def _named(connection: sqlite3.Connection) -> Whole:
     return table[np.lexsort((table[:, 3], table[:, 2], table[:, 1]))]
 
 
-def _apart(table: str, rows: Whole, words: str, gaps: str = "", returned: Sequence[int] = ()) -> Found:
+def _apart(table: str, rows: Table, words: str, gaps: str = "", returned: Sequence[int] = ()) -> Iterator[Problem]:
     """Check that lifetimes of one owner do not overlap; and have no gaps, if `gaps` says what one would mean.
 
     At the versions of `returned` a gap may end.
     """
     same = rows[1:, 1] == rows[:-1, 1]
-    yield from ((table, int(key), words) for key in rows[1:][same & (rows[1:, 2] < rows[:-1, 3]), 0])
+    yield from (_problem(table, int(key), words) for key in rows[1:][same & (rows[1:, 2] < rows[:-1, 3]), 0])
     if gaps:
         later = same & (rows[1:, 2] > rows[:-1, 3]) & ~np.isin(rows[1:, 2], returned)
-        yield from ((table, int(key), f"the symbol {gaps}") for key in rows[1:][later, 0])
+        yield from (_problem(table, int(key), f"the symbol {gaps}") for key in rows[1:][later, 0])
 
 
-def _whole_lives(rows: Whole) -> Whole:
-    """One row per owner, from its first to its last version."""
+def _spans(rows: Table) -> Table:
+    """Return one row per owner, from its first to its last version."""
     owners, first = np.unique(rows[:, 1], return_index=True)
     last = np.append(first[1:], len(rows)) - 1
     return np.stack([owners, owners, rows[first, 2], rows[last, 3]], axis=1) if len(rows) else rows
 
 
-def _within(table: str, rows: Whole, owners: Whole, whose: str) -> Found:
+def _within(table: str, rows: Table, owners: Table, whose: str) -> Iterator[Problem]:
     """Check that a row is alive only while the row that it refers to is."""
     if not len(rows):
         return
     place = np.searchsorted(owners[:, 1], rows[:, 1])
     there: Any = np.zeros(len(rows), dtype=bool)
-    known = place < len(owners)
-    referred = owners[place[known]]
-    part = rows[known]
+    referring = place < len(owners)
+    referred = owners[place[referring]]
+    part = rows[referring]
     never = part[:, 2] == part[:, 3]
-    there[known] = (referred[:, 1] == part[:, 1]) & (
+    there[referring] = (referred[:, 1] == part[:, 1]) & (
         never | ((referred[:, 2] <= part[:, 2]) & (part[:, 3] <= referred[:, 3]))
     )
-    yield from ((table, int(key), f"is there when {whose} is not") for key in rows[~there, 0])
+    yield from (_problem(table, int(key), f"is there when {whose} is not") for key in rows[~there, 0])

@@ -3,19 +3,34 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from kineme.errors import SpecificationError
 from kineme.kernels.pair_distances import pair_distances
-from kineme.kernels.procrustes import Procrustes
-from kineme.recognition.early.hypotheses import EXPLAINING, Hypotheses, positive
-from kineme.recognition.early.prefixes import Prefixes, beginnings, describe_prefixes
-from kineme.similarity.describe import describe_paths
+from kineme.movements.preparation.pauses import without_pauses
+from kineme.movements.preparation.resample import arc_length_phase, relative_rows
+from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
+from kineme.movements.trajectories.trajectory import MovementsLike
+from kineme.recognition.early.hypotheses import (
+    EXPLAINING,
+    Hypotheses,
+    Prefixes,
+    beginnings,
+    describe_prefixes,
+    positive,
+)
+from kineme.similarity.comparison import Comparison
+from kineme.similarity.describe import describe_paths, even_paths
 from kineme.similarity.described import Described
-from kineme.similarity.log_averages import LOG_MEANS
-from kineme.validation import Array
+from kineme.similarity.specification import LOG_MEANS
+from kineme.validation import MIN_SAMPLES, Array
+
+_TILE = 2_000_000  # hypotheses compared at a time
+_N_SAMPLES = 200  # of a whole movement, of which `cut` takes the first
 
 COMPARED = 200  # hypotheses compared pair by pair, and the best one of each class
 WIDENED = 2.0  # widths of positions where they choose those
@@ -45,7 +60,7 @@ def describe_begun(stored: Hypotheses, paths: Array, starts: Array, durations: A
 
 
 def log_evidence(stored: Hypotheses, begun: Begun) -> Array:
-    """Logarithm of the evidence for each hypothesis, shape (n, m * G); -inf where another is far more likely.
+    """Return logarithm of the evidence for each hypothesis, shape (n, m * G); -inf where another is far more likely.
 
     ``log mean_r exp(-d_r^2 / (2 sigma_r^2))`` over elastic path and point cloud, after the rotation that brings the
     positions closest, plus the logarithms of the density of that rotation, of a normal density of log size and log
@@ -63,14 +78,14 @@ def log_evidence(stored: Hypotheses, begun: Begun) -> Array:
     evidence = np.full(rough.shape, -np.inf)
     for i in range(len(rough)):
         chosen = _choose(stored, rough[i])
-        one = begun.described.take(slice(i, i + 1))
-        evidence[i, chosen] = _near(stored, one, chosen) + priors[i, chosen] - np.logaddexp(0.0, odds[i])
+        movement = begun.described.take(slice(i, i + 1))
+        evidence[i, chosen] = _near(stored, movement, chosen) + priors[i, chosen] - np.logaddexp(0.0, odds[i])
         _add_over(stored, begun.paths[i : i + 1], evidence[i], priors[i] - np.logaddexp(0.0, -odds[i]))
     return evidence
 
 
 def _log_priors(stored: Hypotheses, begun: Begun) -> Array:
-    """Logarithms of the densities of size, duration, timing, speed at the end, and progress."""
+    """Return the logarithms of the densities of size, duration, timing, speed at the end, and progress."""
     sizes = np.log(positive(begun.prefixes.lengths))[:, None] - stored.log_lengths
     longer = np.log(positive(begun.durations))[:, None] - stored.log_durations
     timing = begun.prefixes.timing
@@ -94,25 +109,21 @@ def _choose(stored: Hypotheses, rough: Array) -> NDArray[np.intp]:
     return np.flatnonzero((rough >= least) | (rough >= best))
 
 
-def _near(stored: Hypotheses, one: Described, chosen: NDArray[np.intp]) -> Array:
-    """Logarithm of the averaged kernel of elastic path and point cloud, times the density of the rotation."""
+def _near(stored: Hypotheses, movement: Described, chosen: NDArray[np.intp]) -> Array:
+    """Return logarithm of the averaged kernel of elastic path and point cloud, times the density of the rotation."""
     others = stored.described.take(chosen)
-    assert one.pairs is not None
+    assert movement.pairs is not None
     assert others.pairs is not None
-    _, rotations = stored.procrustes.align(one.pairs.positions, others.pairs.positions)
-    squares = pair_distances(one.pairs.shapes, others.pairs.shapes, rotations)[list(one.pairs.measures), 0]
+    _, rotations = stored.procrustes.align(movement.pairs.positions, others.pairs.positions)
+    squares = pair_distances(movement.pairs.shapes, others.pairs.shapes, rotations)[list(movement.pairs.measures), 0]
     logs = squares.astype(float) / (-2.0 * stored.widths[1:, None] ** 2)
-    return LOG_MEANS["arithmetic"](logs) + _log_rotations(stored.procrustes, rotations)
-
-
-def _log_rotations(procrustes: Procrustes, rotations: NDArray[np.float32] | None) -> Array:
-    """Logarithms (k,) of the prior density of rotations (1, k, ...), 0 for none."""
-    if procrustes.prior is None or rotations is None:
-        return np.zeros(1)
-    F = procrustes.prior.matrix(procrustes.n_dims)
+    average = LOG_MEANS["arithmetic"](logs)
+    if stored.procrustes.prior is None or rotations is None:
+        return average
+    F = stored.procrustes.prior.matrix(stored.procrustes.n_dims)
     R = rotations[0].astype(float)
-    product = R[:, 0] * np.trace(F) if procrustes.n_dims == 2 else np.einsum("kij,ij->k", R, F)
-    return np.asarray(ROTATION * (product - np.trace(F)))
+    product = R[:, 0] * np.trace(F) if stored.procrustes.n_dims == 2 else np.einsum("kij,ij->k", R, F)
+    return np.asarray(average + ROTATION * (product - np.trace(F)))
 
 
 def _add_over(stored: Hypotheses, path: Array, evidence: Array, priors: Array) -> None:
@@ -128,8 +139,8 @@ def _add_over(stored: Hypotheses, path: Array, evidence: Array, priors: Array) -
     if most.max() < evidence.max() - NEGLIGIBLE:
         return
     rotations = stored.comparison if stored.early.max_angle is None else stored
-    whole = describe_paths(path, stored.comparison, rotations.procrustes)
-    similar = POWER * stored.comparison.similarity.log_average(whole, stored.references.described)[0]
+    described = describe_paths(path, stored.comparison, rotations.procrustes)
+    similar = POWER * stored.comparison.similarity.log_average(described, stored.references.described)[0]
     log_counts = np.log(counts)
     over = np.logaddexp.reduce(most + similar - np.repeat(log_counts, counts))
     parts = np.split(similar, stored.first[1:])
@@ -137,3 +148,54 @@ def _add_over(stored: Hypotheses, path: Array, evidence: Array, priors: Array) -
     shares = similar[best] - np.logaddexp.reduce(similar[best])
     at = best * G + G - 1
     evidence[at] = np.logaddexp(evidence[at], over + shares + log_counts + math.log(G / EXPLAINING))
+
+
+def partial_shares(comparison: Comparison, stored: Hypotheses, X: MovementsLike) -> Array:
+    """Return share of each class, and, last, of an unknown movement, in the evidence of each beginning: (n, C + 1)."""
+    demos = comparison.checked(X)
+    step = max(1, _TILE // len(stored.prefixes.lengths))
+    return np.concatenate(
+        [_shares(comparison, stored, demos[start : start + step]) for start in range(0, len(demos), step)]
+    )
+
+
+def _shares(comparison: Comparison, stored: Hypotheses, demos: Demonstrations) -> Array:
+    demos = without_pauses(demos, 0, len(demos)) or demos
+    paths = even_paths(demos, 0, len(demos), comparison.cutoff)
+    starts = demos.positions[demos.offsets[:-1]]
+    return stored.shares(log_evidence(stored, describe_begun(stored, paths, starts, demos.durations)))
+
+
+def cut(movements: MovementsLike, fraction: float) -> Demonstrations:
+    """Return the beginnings of movements until a share of their path's length, at even times."""
+    demos = Demonstrations.of(movements)
+    if not 0 < fraction <= 1:
+        raise SpecificationError(f"expected a fraction above 0 and at most 1, got {fraction!r}")
+    paths = relative_rows(demos, 0, len(demos), _N_SAMPLES)
+    ends = np.maximum((arc_length_phase(paths) <= fraction + 1e-12).sum(axis=1), MIN_SAMPLES)
+    seconds = demos.durations / (_N_SAMPLES - 1)
+    return Demonstrations.from_arrays(
+        [path[:, :end].T for path, end in zip(paths, ends, strict=True)],
+        demos.labels,
+        [step * np.arange(end) for step, end in zip(seconds, ends, strict=True)],
+    )
+
+
+class PredictsPartial(Protocol):
+    """A recognizer, or whatever else names movements by their beginnings."""
+
+    def predict_partial(self, X: MovementsLike) -> NDArray[Any]:
+        """Return the most likely class of each beginning, shape (n,)."""
+        ...
+
+
+def earliness(
+    recognizer: PredictsPartial,
+    X: MovementsLike,
+    y: ArrayLike | None = None,
+    fractions: Sequence[float] = (0.3, 0.5, 0.7, 1.0),
+) -> Array:
+    """Return the share of movements recognized after each fraction of their path, shape (len(fractions),)."""
+    demos = Demonstrations.of(X)
+    labels = check_labels(demos, y)
+    return np.array([np.mean(recognizer.predict_partial(cut(demos, fraction)) == labels) for fraction in fractions])

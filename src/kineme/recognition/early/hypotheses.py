@@ -1,9 +1,13 @@
-"""Hypotheses about a movement under way: which stored movement, how much of it, and whether it is over."""
+"""Hypotheses about a movement under way: which stored movement, how much of it, and whether it is over.
+
+Beginnings of movements are described independently of position and size.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,13 +15,24 @@ from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
 from kineme.kernels.procrustes import Procrustes
+from kineme.kernels.shapes import ElasticSpec, shapes_of
 from kineme.movements.preparation.pauses import without_pauses
-from kineme.recognition.early.prefixes import Prefixes, beginnings, describe_prefixes, smooth_paths
+from kineme.movements.preparation.resample import arc_length_phase
+from kineme.movements.preparation.smooth import Smooth
+from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.similarity.comparison import Comparison
-from kineme.similarity.described import Described
+from kineme.similarity.describe import N_POINTS, even_paths
+from kineme.similarity.described import Described, Pairs
 from kineme.similarity.references import References
+from kineme.similarity.representation import PAIR_QUANTITIES
 from kineme.similarity.widths import SHARE, beginning_widths
 from kineme.validation import Array, check_count, check_number
+
+N_PREFIX = ElasticSpec().n_segments + 1  # samples along the arc length of a beginning: the ends of segments
+LAST = 0.02  # share of a beginning's time in which the speed at its end is measured
+LEAST_SPEED = 0.01  # of the mean speed
+#: What beginnings are compared by pair by pair.
+_PAIRS = tuple(PAIR_QUANTITIES.index(quantity) for quantity in ("elastic", "cloud"))
 
 _LEAST_SPREAD = 0.4  # of the logarithm of the speed, where there are few movements
 MOST_ODDS = 10.0  # of the logarithm of the likelihood ratio: the speed alone settles nothing
@@ -41,7 +56,7 @@ _KNOWN_SIZE = 0.1  # spread where the recognizer leaves sizes as they are
 
 @dataclass(frozen=True)
 class Early:
-    """How movements are recognized before they are over.
+    """Options of recognizing movements before they are over.
 
     Parameters
     ----------
@@ -78,7 +93,7 @@ class Early:
 
 
 def as_early(early: Any) -> Early:
-    """The user's options, or the defaults for None."""
+    """Return the user's options, or the defaults for None."""
     if early is not None and not isinstance(early, Early):
         raise SpecificationError(
             f"expected early to be kineme.recognition.early.hypotheses.Early(...) or None, got {early!r}"
@@ -132,7 +147,7 @@ class Hypotheses(NamedTuple):
     first: NDArray[np.intp]
 
     def log_classes(self, evidence: Array) -> Array:
-        """Logarithm of the evidence for each class (n, C), and, last, for an unknown movement: shape (n, C + 1).
+        """Return logarithm of the evidence for each class (n, C), and, last, for an unknown movement: shape (n, C + 1).
 
         Summed over progress, which is not known, and averaged over a class's movements: a beginning that several
         movements explain, each in several ways, is better explained than one that fits a single one by chance.
@@ -142,11 +157,11 @@ class Hypotheses(NamedTuple):
         sums = np.add.reduceat(np.exp(evidence - top), self.first * G, axis=1)
         counts = np.diff(self.first, append=len(self.durations)) * (G / EXPLAINING)
         with np.errstate(divide="ignore"):
-            known = np.log(sums / counts) + top
-        return np.column_stack((known, np.full(len(evidence), LOG_UNKNOWN)))
+            logs = np.log(sums / counts) + top
+        return np.column_stack((logs, np.full(len(evidence), LOG_UNKNOWN)))
 
     def shares(self, evidence: Array) -> Array:
-        """Share of each class, and, last, of an unknown movement, in the evidence to the power of 0.8: (n, C + 1)."""
+        """Return the share of each class, and, last, of an unknown movement, in the evidence to 0.8: (n, C + 1)."""
         logs = TEMPER * self.log_classes(evidence)
         shares = np.exp(logs - logs.max(axis=1, keepdims=True))
         return np.asarray(shares / shares.sum(axis=1, keepdims=True))
@@ -182,25 +197,25 @@ def hypotheses(comparison: Comparison, references: References, early: Early) -> 
     )
 
 
-def beginning_procrustes(whole: Procrustes, max_angle: float | None) -> Procrustes:
-    """How beginnings are rotated: by at most an angle, or as whole movements, by default less readily in the plane.
+def beginning_procrustes(procrustes: Procrustes, max_angle: float | None) -> Procrustes:
+    """Limit rotations of beginnings: by an angle, or as those of whole movements, by default less readily in the plane.
 
     A beginning is often nearly straight, and the same as any other one if it may be rotated freely.
     """
     if max_angle is not None:
-        return Procrustes(whole.n_dims, max_angle)
-    if whole.prior is None or whole.prior.concentration is not None:
-        return whole
-    return replace(whole, prior=replace(whole.prior, concentration=_CONCENTRATION))
+        return Procrustes(procrustes.n_dims, max_angle)
+    if procrustes.prior is None or procrustes.prior.concentration is not None:
+        return procrustes
+    return replace(procrustes, prior=replace(procrustes.prior, concentration=_CONCENTRATION))
 
 
 def positive(values: Array) -> Array:
-    """The values, at least the smallest positive number."""
+    """Return the values, at least the smallest positive number."""
     return np.maximum(values, np.finfo(float).tiny)
 
 
 class Ending(NamedTuple):
-    """How fast stored movements are at their end and before it: mean and spread of the logarithm of the speed.
+    """Speed of stored movements at their end and before it: mean and spread of its logarithm.
 
     Speeds are shares of the mean speed so far, see `Prefixes`.
     """
@@ -209,7 +224,7 @@ class Ending(NamedTuple):
     before: tuple[float, float]
 
     def log_odds(self, speeds: Array) -> Array:
-        """Logarithm of the odds that movements of these speeds are over, between -13 and 7.
+        """Return the logarithm of the odds that movements of these speeds are over, between -13 and 7.
 
         The likelihood ratio of two normal densities, times prior odds of 0.05. Being slower than at a typical end is no
         evidence against one, nor is being faster than typical before the end evidence for one. Where movements were
@@ -221,9 +236,93 @@ class Ending(NamedTuple):
 
 
 def ending(speeds: Array) -> Ending:
-    """From the speeds (m, G) at the ends of beginnings of m movements, the last of which are whole."""
+    """Estimate it from the speeds (m, G) at the ends of beginnings of m movements, the last of which are whole."""
     return Ending(_moments(speeds[:, -1]), _moments(speeds[:, :-1]))
 
 
 def _moments(speeds: Array) -> tuple[float, float]:
     return float(speeds.mean()), max(float(speeds.std()), _LEAST_SPREAD)
+
+
+class Prefixes(NamedTuple):
+    """G beginnings of each of n movements; S samples each, evenly spaced along their own arc length.
+
+    Attributes
+    ----------
+    positions : ndarray of shape (n * G, d * S)
+        Minus their mean, at root mean square distance 1 from it; rows have norm 1.
+    timing : ndarray of shape (n * G, S)
+        Time at each sample as a share of the beginning's, divided by sqrt(S): squared distances are mean squares.
+    sizes, lengths : ndarray of shape (n * G,)
+        Root mean square distance from the mean, and length of the path, in the unit of the data.
+    elapsed : ndarray of shape (n * G,)
+        Time that the beginning takes, as a share of the movement's.
+    end_speeds : ndarray of shape (n * G,)
+        Logarithm of the speed at the end by the mean speed.
+    """
+
+    positions: Array
+    timing: Array
+    sizes: Array
+    lengths: Array
+    elapsed: Array
+    end_speeds: Array
+
+
+def smooth_paths(movements: Demonstrations, cutoff: float | None) -> Array:
+    """Return movements as the recognizer smooths them, minus their start, at even times, shape (n, d, T)."""
+    paths = even_paths(movements, 0, len(movements), cutoff)
+    return paths - paths[:, :, :1]
+
+
+@lru_cache(maxsize=8)
+def smoother(cutoff: float) -> Array:
+    """Return the smoothing spline on T even samples as a matrix (T, T): it is linear, so it acts on unit vectors."""
+    units = Demonstrations.from_arrays([np.eye(N_POINTS)])
+    matrix = Smooth(cutoff).apply(units).positions
+    matrix.setflags(write=False)
+    return matrix
+
+
+def beginnings(paths: Array, progress: Array) -> Prefixes:
+    """Describe the beginnings of smooth, evenly timed paths (n, d, T) until each share (G,) of their arc length.
+
+    The path is compared along its arc length, so that hesitation does not deform it; when the samples were
+    reached is kept apart, as `timing`.
+    """
+    n, d, n_samples = paths.shape
+    phase = arc_length_phase(paths)
+    shift = 2.0 * np.arange(n)[:, None, None]  # one increasing parameter for all movements
+    targets = (progress[:, None] * np.linspace(0.0, 1.0, N_PREFIX) + shift).ravel()
+    knots = (phase + shift[:, 0]).ravel()
+    shape = (n * len(progress), N_PREFIX)
+    along = np.stack([np.interp(targets, knots, paths[:, k].ravel()).reshape(shape) for k in range(d)], axis=1)
+    elapsed = np.interp(targets, knots, np.tile(np.linspace(0.0, 1.0, n_samples), n)).reshape(shape)
+    chords = np.sqrt((np.diff(along, axis=2) ** 2).sum(axis=1))
+    centered = along - along.mean(axis=2, keepdims=True)
+    sizes = np.sqrt((centered**2).sum(axis=1).mean(axis=1))
+    even, ends = np.linspace(0.0, 1.0, n_samples), (1.0 - LAST) * elapsed[:, -1].reshape(n, -1)
+    before = np.stack([np.interp(end, even, path) for end, path in zip(ends, phase, strict=True)])
+    return Prefixes(
+        (centered / (_nonzero(sizes) * np.sqrt(N_PREFIX))[:, None, None]).reshape(len(along), -1),
+        elapsed / (_nonzero(elapsed[:, -1:]) * np.sqrt(N_PREFIX)),
+        sizes,
+        chords.sum(axis=1),
+        elapsed[:, -1],
+        np.asarray(np.log(np.maximum((1.0 - before / progress) / LAST, LEAST_SPEED)).ravel()),
+    )
+
+
+def describe_prefixes(prefixes: Prefixes, procrustes: Procrustes) -> Described:
+    """Return beginnings ready for comparison: positions sample by sample, elastic paths and point clouds pair by pair.
+
+    In single precision, which is far finer than any width.
+    """
+    rows = prefixes.positions
+    positions = procrustes.prepare(rows.astype(np.float32))
+    shapes = shapes_of(math.sqrt(N_PREFIX) * rows.reshape(len(rows), -1, N_PREFIX))
+    return Described((positions,), procrustes, pairs=Pairs(positions, shapes, _PAIRS))
+
+
+def _nonzero(values: Array) -> Array:
+    return np.where(values > 0, values, 1.0)

@@ -8,12 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from kineme.movements.trajectories.labels import Label
-from kineme.recognition.certainty import Certainty, certainty, in_words
+from kineme.recognition.answer import Certainty, certainty, in_words
 from kineme.validation import Array
 
 
 class LiveStatus(Flag):
-    """What happened in an update; members combine. Nothing here is an exception: the stream goes on."""
+    """Events of an update; members combine. Nothing here is an exception: the stream goes on."""
 
     UNDECIDED = auto()
     DECIDED = auto()
@@ -86,7 +86,7 @@ class LiveState(NamedTuple):
 
     @property
     def certainty(self) -> Certainty | None:
-        """How sure it is so far: "looks like", or "new" where unknown has the largest share; None before a movement.
+        """Certainty so far: "looks like", or "new" where unknown has the largest share; None before a movement.
 
         What begins like a known movement may go on otherwise, so that no more is said before the end.
         """
@@ -98,12 +98,12 @@ class LiveState(NamedTuple):
     @property
     def probabilities(self) -> dict[Label, float]:
         """Probability of each class if the movement is of a known one, most likely first: as that of an `Answer`."""
-        known = max(1.0 - self.unknown, np.finfo(float).tiny)
-        return {one.label: one.confidence / known for one in self.ranked}
+        share = max(1.0 - self.unknown, np.finfo(float).tiny)
+        return {guess.label: guess.confidence / share for guess in self.ranked}
 
     @property
     def in_words(self) -> str:
-        """What the movement looks like so far: the decided class, or the most likely one."""
+        """Words for what the movement looks like so far: the decided class, or the most likely one."""
         word = self.certainty
         if word is None:
             return "nothing yet"

@@ -1,32 +1,31 @@
-"""Recognition while a movement is still under way."""
+"""Recognition while a movement is still under way, and the decision for a label, with hysteresis."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from kineme.errors import SpecificationError
 from kineme.movements.channels.channel import Channels, is_plain, recorded_names
 from kineme.movements.channels.incremental import IncrementalCoordinates
 from kineme.movements.preparation.pauses import cut_pauses
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.recognition.answer import Answer
-from kineme.recognition.early.decision import Decision
 from kineme.recognition.early.evidence import describe_begun, log_evidence
-from kineme.recognition.early.hypotheses import Hypotheses
+from kineme.recognition.early.hypotheses import Hypotheses, Prefixes, smoother
 from kineme.recognition.early.live_state import Guess, LiveState, LiveStatus
-from kineme.recognition.early.prefixes import Prefixes, smoother
 from kineme.runtime.compiled import load_compiled
 from kineme.runtime.parallel import single_threaded_blas
 from kineme.similarity.comparison import Comparison
 from kineme.similarity.describe import N_POINTS
 from kineme.similarity.references import References
-from kineme.validation import MIN_SAMPLES, Array
+from kineme.validation import MIN_SAMPLES, Array, check_number
 
 N_REMAINING = 20  # samples of the predicted path
 
@@ -51,32 +50,28 @@ class Live:
         recognize: Callable[[Trajectory], Answer],
     ) -> None:
         self._comparison = comparison
-        self._references = references
         self._hypotheses = hypotheses
         self._decision = decision
         self._recognize = recognize
         self._path = BoundedPath(CAPACITY, comparison.n_dims)
-        self._samples = Samples(comparison.channels, comparison.n_dims)
+        self._incoming = Samples(comparison.channels, comparison.n_dims)
         self._classes = references.classes.tolist()
         self.reset()
-        self._rehearse()
-
-    def _rehearse(self) -> None:
-        """Recognize a stored movement once: loading code on first use would delay the stream by 0.3 s."""
+        # A stored movement is recognized now: loading code on first use would delay the stream by 0.3 s.
         load_compiled()
-        example = self._references.demonstrations[np.zeros(1, dtype=np.intp)]
+        example = references.demonstrations[np.zeros(1, dtype=np.intp)]
         self.update(example.times, example.positions)
         self.reset()
 
     @property
     def channels(self) -> Channels | None:
-        """What the recorded columns are that `update` takes; None if that is not known."""
+        """Channels of the recorded columns that `update` takes; None if they are not known."""
         return self._comparison.channels
 
     def reset(self) -> None:
         """Forget the movement; the next sample begins a new one."""
         self._path.clear()
-        self._samples.clear()
+        self._incoming.clear()
         self._decision.clear()
         self.skipped = 0
         self._leader, self._progress = -1, 0.0
@@ -92,17 +87,21 @@ class Live:
             Positions; or the recorded columns of the `channels`, in their order, quaternions and grippers too, which
             are converted as those of a whole movement.
         """
-        status = self._take_in(t, x)
+        times, positions, status, skipped = self._incoming.take(t, x)
+        for time, position in zip(times.tolist(), positions, strict=True):
+            self._path.append(time, position)
+        self.skipped += skipped
         if self._path.per_row > 1:
             status |= LiveStatus.AVERAGED
-        kept = self._path.kept()
-        if len(kept) < MIN_SAMPLES or not np.ptp(kept[:, 1:], axis=0).any():
-            return self._nothing(status | LiveStatus.TOO_SHORT)
+        samples = self._path.kept()
+        if len(samples) < MIN_SAMPLES or not np.ptp(samples[:, 1:], axis=0).any():
+            status |= LiveStatus.TOO_SHORT | LiveStatus.UNDECIDED
+            return LiveState((), 1.0, None, 0.0, None, None, math.nan, self.skipped, status)
         with single_threaded_blas():  # held once, not for each of many small products
-            return self._estimate(kept, status)
+            return self._estimate(samples, status)
 
     def finish(self) -> Answer:
-        """The answer of `Recognizer.recognize` to the whole movement.
+        """Return the answer of `Recognizer.recognize` to the whole movement.
 
         Raises
         ------
@@ -112,31 +111,24 @@ class Live:
         return self._recognize(self.movement())
 
     def movement(self) -> Trajectory:
-        """The movement so far, as `finish` recognizes it: without what was skipped, and averaged beyond 4096 samples.
+        """Return the movement so far, as `finish` recognizes it: without what was skipped, averaged after 4096 samples.
 
         Raises
         ------
         TrajectoryError
             Fewer than four samples could be used.
         """
-        kept = self._path.kept()
-        whole = Demonstrations([Trajectory(kept[:, 0].copy(), kept[:, 1:].copy())])
+        samples = self._path.kept()
+        movement = Demonstrations([Trajectory(samples[:, 0].copy(), samples[:, 1:].copy())])
         if self.channels is not None and is_plain(self.channels):  # converted already, and averaged since
-            whole = Demonstrations.of_movements(replace(whole.movements, channels=self.channels))
-        return whole[0]
+            movement = Demonstrations.of_movements(replace(movement.movements, channels=self.channels))
+        return movement[0]
 
-    def _take_in(self, t: ArrayLike, x: ArrayLike) -> LiveStatus:
-        times, positions, status, skipped = self._samples.take(t, x)
-        for time, position in zip(times.tolist(), positions, strict=True):
-            self._path.append(time, position)
-        self.skipped += skipped
-        return status
-
-    def _estimate(self, kept: Array, status: LiveStatus) -> LiveState:
-        elapsed = float(kept[-1, 0] - kept[0, 0])
-        times, positions = _without_pauses(kept)
+    def _estimate(self, samples: Array, status: LiveStatus) -> LiveState:
+        elapsed = float(samples[-1, 0] - samples[0, 0])
+        times, positions = _without_pauses(samples)
         even = self._smooth(times, positions)
-        so_far = describe_begun(self._hypotheses, even, kept[:1, 1:], times[-1:] - times[0])
+        so_far = describe_begun(self._hypotheses, even, samples[:1, 1:], times[-1:] - times[0])
         evidence = log_evidence(self._hypotheses, so_far)
         shares = self._hypotheses.shares(evidence)[0]
         order = np.argsort(-shares[:-1], kind="stable")
@@ -146,7 +138,7 @@ class Live:
         ahead = forecast(self._hypotheses, evidence[0], shown, so_far.prefixes, float(so_far.durations[0]))
         self._progress = max(ahead.progress, self._progress if shown == self._leader else 0.0)
         self._leader = shown
-        path = kept[-1, 1:] + ahead.path
+        path = samples[-1, 1:] + ahead.path
         return LiveState(
             tuple(Guess(self._classes[c], float(shares[c])) for c in order.tolist()),
             float(shares[-1]),
@@ -154,27 +146,23 @@ class Live:
             min(self._progress, 1.0),
             path,
             path[-1],
-            float(kept[-1, 0]) + ahead.seconds,
+            float(samples[-1, 0]) + ahead.seconds,
             self.skipped,
             status | (LiveStatus.UNDECIDED if decided is None else LiveStatus.DECIDED),
         )
 
     def _smooth(self, times: Array, positions: Array) -> Array:
-        """The samples so far, at even times and smoothed like the stored movements: (1, d, T)."""
+        """Return the samples so far, at even times and smoothed like the stored movements: (1, d, T)."""
         targets = np.linspace(times[0], times[-1], N_POINTS)
         even = np.stack([np.interp(targets, times, column - column[0]) for column in positions.T])
         cutoff = self._comparison.cutoff
         return np.asarray(even if cutoff is None else even @ smoother(float(cutoff)).T)[None]
 
-    def _nothing(self, status: LiveStatus) -> LiveState:
-        status |= LiveStatus.UNDECIDED
-        return LiveState((), 1.0, None, 0.0, None, None, math.nan, self.skipped, status)
 
-
-def _without_pauses(kept: Array) -> tuple[Array, Array]:
-    """Times and positions of samples (k, 1 + d), as those of stored movements are described."""
-    times, positions = np.ascontiguousarray(kept[:, 0]), np.ascontiguousarray(kept[:, 1:])
-    cut = cut_pauses(times, positions, np.array([0, len(kept)]))
+def _without_pauses(samples: Array) -> tuple[Array, Array]:
+    """Return times and positions of samples (k, 1 + d), as those of stored movements are described."""
+    times, positions = np.ascontiguousarray(samples[:, 0]), np.ascontiguousarray(samples[:, 1:])
+    cut = cut_pauses(times, positions, np.array([0, len(samples)]))
     return (times, positions) if cut is None else cut[:2]
 
 
@@ -204,7 +192,9 @@ class BoundedPath:
         if self._pending < self.per_row:
             return
         if self._count == len(self._rows) - 1:
-            self._halve()
+            even = self._count // 2 * 2
+            self._rows[: even // 2] = 0.5 * (self._rows[0:even:2] + self._rows[1:even:2])
+            self._count, self.per_row = even // 2, 2 * self.per_row
             if self._pending < self.per_row:
                 return
         self._rows[self._count] = self._sum / self._pending
@@ -212,13 +202,8 @@ class BoundedPath:
         self._sum[:] = 0.0
         self._pending = 0
 
-    def _halve(self) -> None:
-        even = self._count // 2 * 2
-        self._rows[: even // 2] = 0.5 * (self._rows[0:even:2] + self._rows[1:even:2])
-        self._count, self.per_row = even // 2, 2 * self.per_row
-
     def kept(self) -> Array:
-        """Times and positions (k, 1 + d); they share memory, and are valid until the next sample."""
+        """Return times and positions (k, 1 + d); they share memory, and are valid until the next sample."""
         if self.last is None or self.per_row == 1:
             return self._rows[: self._count]
         if self._count and self._rows[self._count - 1, 0] >= self.last[0]:
@@ -236,7 +221,7 @@ class Forecast(NamedTuple):
 
 
 def forecast(stored: Hypotheses, evidence: Array, label: int, begun: Prefixes, duration: float) -> Forecast:
-    """Progress and time left on average over a class's hypotheses, the path from its best one.
+    """Return progress and time left on average over a class's hypotheses, the path from its best one.
 
     Parameters
     ----------
@@ -284,7 +269,7 @@ class Samples:
     def __init__(self, channels: Channels | None, n_dims: int) -> None:
         self._n_dims = n_dims
         self._n_columns = n_dims if channels is None else len(recorded_names(channels))
-        plain = channels is None or all(one.kind == "position" for one in channels)
+        plain = channels is None or all(channel.kind == "position" for channel in channels)
         self._coordinates = None if channels is None or plain else IncrementalCoordinates(channels)
         self.clear()
 
@@ -296,7 +281,7 @@ class Samples:
             self._coordinates.clear()
 
     def take(self, t: ArrayLike, x: ArrayLike) -> tuple[Array, Array, LiveStatus, int]:
-        """Times (k,) and coordinates (k, d) that can be used, what is wrong with others, and how many those are.
+        """Return times (k,) and coordinates (k, d) that can be used, what is wrong with others, and how many those are.
 
         Of a call in a wrong shape one is counted.
         """
@@ -308,17 +293,21 @@ class Samples:
         widths = (self._n_dims, self._n_columns) if self._width is None else (self._width,)
         if times.ndim != 1 or rows.ndim != 2 or len(rows) != len(times) or rows.shape[1] not in widths:
             return np.empty(0), np.empty((0, self._n_dims)), LiveStatus.WRONG_SHAPE, 1
-        kept, status = self._usable(times, rows)
-        if kept.any():
-            self._width, self._last = rows.shape[1], float(times[kept][-1])
-        return times[kept], self._converted(rows[kept]), status, int((~kept).sum())
+        coordinates = self._coordinates if rows.shape[1] == self._n_columns else None
+        unit = np.ones(len(rows), dtype=bool) if coordinates is None else coordinates.usable(rows)
+        usable, status = self._usable(times, rows, unit)
+        if usable.any():
+            self._width, self._last = rows.shape[1], float(times[usable][-1])
+        positions = rows[usable]
+        if coordinates is not None and len(positions):
+            positions = coordinates.take(positions)
+        return times[usable], positions, status, int((~usable).sum())
 
-    def _usable(self, times: Array, rows: Array) -> tuple[NDArray[np.bool_], LiveStatus]:
-        """Which samples are finite, later than those before, and have quaternions of norm 1."""
+    def _usable(self, times: Array, rows: Array, unit: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], LiveStatus]:
+        """Tell which samples are finite, later than those before, and have quaternions of norm 1 (`unit`)."""
         status = LiveStatus(0)
         finite = np.isfinite(times) & np.isfinite(rows).all(axis=1)
-        unit = self._are_unit(rows)
-        kept, last = np.zeros(len(times), dtype=bool), self._last
+        usable, last = np.zeros(len(times), dtype=bool), self._last
         for k, time in enumerate(times.tolist()):
             if not finite[k]:
                 status |= LiveStatus.NOT_FINITE
@@ -327,16 +316,46 @@ class Samples:
             elif not unit[k]:
                 status |= LiveStatus.NOT_UNIT
             else:
-                kept[k], last = True, time
-        return kept, status
+                usable[k], last = True, time
+        return usable, status
 
-    def _converts(self, rows: Array) -> IncrementalCoordinates | None:
-        return self._coordinates if rows.shape[1] == self._n_columns else None
 
-    def _are_unit(self, rows: Array) -> NDArray[np.bool_]:
-        made = self._converts(rows)
-        return np.ones(len(rows), dtype=bool) if made is None else made.usable(rows)
+@dataclass
+class Decision:
+    """Decide for a label after it has been confident for a while; change it only for one that is so for longer.
 
-    def _converted(self, rows: Array) -> Array:
-        made = self._converts(rows)
-        return rows if made is None or not len(rows) else made.take(rows)
+    Parameters
+    ----------
+    confidence : float
+        Needed to decide, above 0.5 and below 1: two labels never have it at the same time.
+    patience : float
+        How long it must be held, as a share of the time since the stream began; twice as long to change a decision.
+    """
+
+    confidence: float = 0.9
+    patience: float = 0.05
+    label: int | None = field(default=None, init=False)
+    _candidate: int | None = field(default=None, init=False)
+    _since: float = field(default=0.0, init=False)
+
+    def __post_init__(self) -> None:
+        check_number("confidence", self.confidence, above=0.5)
+        check_number("patience", self.patience, least=0.0)
+        if self.confidence >= 1:
+            raise SpecificationError(f"expected confidence below 1, got {self.confidence!r}")
+
+    def clear(self) -> None:
+        """Forget the decision."""
+        self.label = self._candidate = None
+
+    def update(self, elapsed: float, leader: int, share: float) -> int | None:
+        """Return the decided label after the leader's share of the evidence at a time since the start."""
+        if share < self.confidence or leader == self.label:
+            self._candidate = None
+            return self.label
+        if leader != self._candidate:
+            self._candidate, self._since = leader, elapsed
+        needed = self.patience * elapsed * (1 if self.label is None else 2)
+        if elapsed - self._since >= needed and (elapsed > self._since or self.patience == 0):
+            self.label, self._candidate = leader, None
+        return self.label

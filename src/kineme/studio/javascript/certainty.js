@@ -1,4 +1,4 @@
-// How sure an answer is, in one of four words, as kineme.recognition.certainty says it; thresholds are the snapshot's.
+// How sure an answer is, in one of four words, as kineme.recognition.answer says it; thresholds are the snapshot's.
 
 /**
  * @param {Object<string, number>} least word -> the least confidence that it takes
