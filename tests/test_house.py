@@ -7,6 +7,7 @@ import io
 import re
 import subprocess
 import tokenize
+from collections import Counter
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -59,6 +60,47 @@ def test_files_and_functions_are_short():
         for node in _functions_of(path)
     }
     assert not {name: length for name, length in lengths.items() if length > MAX_FUNCTION}
+
+
+#: Limits of the package. They are lowered as it gets lighter, and never raised in passing.
+BUDGET = {
+    "files": 400,
+    "lines": 61_500,
+    "lines of imports in code": 0.115,
+    "private functions called once": 0.125,
+    "empty names": 0.015,
+    "docstrings that begin with a clause": 0.04,
+}
+#: Names that say nothing of what they hold.
+_EMPTY = {"one", "found", "made", "known", "told", "asked", "kept", "whole"}
+_CLAUSES = {"what", "whether", "how", "which", "where", "that", "who", "why", "as", "if", "when"}
+
+
+def test_the_package_stays_within_its_budget():
+    """Limits of the whole: where one is reached, something is to be said in less."""
+    paths = sorted((ROOT / "src" / "kineme").rglob("*.py"))
+    nodes = [node for path in paths for node in ast.walk(_tree(path))]
+    lines = sum(path.read_text().count("\n") for path in paths)
+    imports = [node for node in nodes if isinstance(node, (ast.Import, ast.ImportFrom))]
+    functions = [node.name for node in nodes if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))]
+    uses = Counter(node.id for node in nodes if isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Store))
+    uses.update(node.attr for node in nodes if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Load))
+    private = [name for name in functions if re.match(r"_(?!_)", name)]
+    bound = [node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)]
+    bound += [node.arg for node in nodes if isinstance(node, ast.arg)]
+    documented = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+    first_words = [text.split()[0].strip("`,.").lower() for node in nodes if isinstance(node, documented)
+                   if (text := ast.get_docstring(node))]  # fmt: skip
+    spent = {
+        "files": len(paths),
+        "lines": lines,
+        "lines of imports in code": sum(node.end_lineno - node.lineno + 1 for node in imports)
+        / sum(len(_code_lines(path)) for path in paths),
+        "private functions called once": sum(uses[name] == 1 for name in private) / len(functions),
+        "empty names": sum(name in _EMPTY for name in bound) / len(bound),
+        "docstrings that begin with a clause": sum(word in _CLAUSES for word in first_words) / len(first_words),
+    }
+    assert not {what: (value, BUDGET[what]) for what, value in spent.items() if value > BUDGET[what]}
 
 
 _CHANGE = {"LibraryRecognizer", "Batch", "Decision"}  # what is remembered between calls

@@ -51,13 +51,13 @@ def test_of_the_two_timings_the_shorter_that_passes_is_taken(monkeypatch, along_
         preflight, trajectory = SimpleNamespace(passed=passed, slower=1.5), SimpleNamespace(duration=duration)
         return SimpleNamespace(name=name, factor=1.1, preflight=preflight, trajectory=trajectory)
 
-    def slowed(untimed, course, most, follows=False):
+    def slowed(planned, course, most, follows=False):
         return made("along path", *along_path) if follows else made("as shown", *as_shown)
 
     monkeypatch.setattr(robot_movement, "fastest", lambda robot, joints: "a parameterization")
     monkeypatch.setattr(robot_movement, "_slowed", slowed)
-    untimed = SimpleNamespace(robot=None, joints=None, rate=100.0)
-    assert robot_movement.with_timing(untimed, "fastest").name == chosen
+    planned = SimpleNamespace(robot=None, joints=None, rate=100.0)
+    assert robot_movement.with_timing(planned, "fastest").name == chosen
 
 
 def test_what_a_refusal_promises_holds():

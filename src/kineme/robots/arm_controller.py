@@ -32,7 +32,7 @@ _LONGEST = 1.0  # farther than this nothing is asked of one step [m]
 
 
 class ArmStatus(Flag):
-    """Whether an arm follows its movement, and what holds it back; members combine. ``ArmStatus(0)``: it follows.
+    """State of an arm that follows its movement, and what holds it back; members combine. ``ArmStatus(0)``: it follows.
 
     The limits are those that bound some joint in this step, named while the arm lags. Limits of position, velocity and
     acceleration are kept; a torque is reported and not changed.
@@ -166,12 +166,12 @@ class ArmController:
         self.state = self._report(movement)
         return self.state
 
-    def step(self, **told: Any) -> ArmState:
+    def step(self, **options: Any) -> ArmState:
         """Move on by the controller's dt.
 
         Parameters
         ----------
-        **told
+        **options
             As to `kineme.control.Controller.step`: goal, goal_velocity, obstacles, tempo, ...; but for dt. Where the
             controller has ``feedback="phase"``, position is by default that of the tip.
 
@@ -180,11 +180,11 @@ class ArmController:
         SpecificationError
             A dt.
         """
-        if "dt" in told:
+        if "dt" in options:
             raise SpecificationError("expected no dt: an arm moves in steps of its controller's dt")
-        if self._waits and "position" not in told:
-            told["position"] = self._tip()
-        movement = self.controller.step(**told)
+        if self._waits and "position" not in options:
+            options["position"] = self._tip()
+        movement = self.controller.step(**options)
         self._ik.step(*self._pose(movement))
         self.state = self._report(movement)
         return self.state
@@ -206,15 +206,15 @@ class ArmController:
         return columns[:3], self._rotation if len(columns) == 3 else np.array(matrix_one(columns[3:].tolist()))
 
     def _tip(self) -> Array:
-        """Where the tip is, in the columns of the movement."""
+        """Return the pose of the tip in the columns of the movement."""
         return self._ik.tip_pose[: len(self.state.movement.position)]
 
     def _nearest_start(self) -> Array:
         position, rotation = self._pose(self.controller.state)
         what = f"the start of the movement, {point_in_words(position)} m"
-        found = reaching_postures(self.robot, position, rotation, self._ik.costs, what)
-        away = np.abs(found - self.robot.rest).max(axis=1)
-        return np.asarray(found[int(np.argmin(away))])
+        postures = reaching_postures(self.robot, position, rotation, self._ik.costs, what)
+        away = np.abs(postures - self.robot.rest).max(axis=1)
+        return np.asarray(postures[int(np.argmin(away))])
 
 
 def _rotation(orientation: ArrayLike) -> Array:
@@ -249,9 +249,6 @@ class LiveKinematics(InverseKinematics):
     def __init__(self, robot: Robot, orientation: str, time_step: float) -> None:
         self._braking, self._dt = Braking(robot, time_step), time_step
         super().__init__(robot, orientation)
-        from qpsolvers import Problem
-
-        self._problem = Problem
         self._weights = np.concatenate((np.ones(3), self.costs))
         self._still = np.zeros(robot.n_joints)
         self._turns = np.zeros(3) if is_partial(robot) else self.costs
@@ -265,7 +262,9 @@ class LiveKinematics(InverseKinematics):
 
     def start_from(self, position: Array, rotation: Array) -> None:
         """The pose to follow is there now."""
-        self._wanted = self._pose(rotation, position)
+        import pinocchio
+
+        self._wanted = pinocchio.SE3(rotation, position)
 
     @property
     def error(self) -> float:
@@ -275,18 +274,22 @@ class LiveKinematics(InverseKinematics):
     @property
     def turned(self) -> float:
         """Angle of the tip from how it was asked to be turned [rad], of what is followed."""
-        return math.hypot(*(self._turns * self._log(self._at.rotation.T @ self._wanted.rotation)))
+        import pinocchio
+
+        return math.hypot(*(self._turns * pinocchio.log3(self._at.rotation.T @ self._wanted.rotation)))
 
     @property
     def reasons(self) -> Reasons:
-        """Which limits bound the last step."""
+        """The limits that bound the last step."""
         return self._braking.reasons(self._allowed, self._before, self.velocities)
 
     def step(self, position: Array, rotation: Array) -> Array:
         """Follow the pose to where it is after one more step of time; joint positions (n,) then."""
-        last, self._wanted, self._before = self._wanted, self._pose(rotation, position), self.velocities
+        import pinocchio
+
+        last, self._wanted, self._before = self._wanted, pinocchio.SE3(rotation, position), self.velocities
         self._allowed = self._braking.range(self._configuration.q, self._before)
-        change = self._within(self._allowed, *self._asked(last))
+        change = self._within(self._allowed, *self._least_squares(last))
         # The solver keeps limits to 1e-6 only; where it finds nothing, the joints brake.
         self.velocities = self._allowed.nearest(self._still if change is None else change / self._dt)
         self.accelerations = (self.velocities - self._before) / self._dt
@@ -295,11 +298,13 @@ class LiveKinematics(InverseKinematics):
         self._at = self._configuration.get_transform_frame_to_world(self.robot.tip)
         return self.q
 
-    def _asked(self, last: Any) -> tuple[Array, Array]:
-        """What this step asks of the joints: ``|A dq|^2 / 2 - b dq`` is least, as `A' A` (n, n) and b (n,)."""
+    def _least_squares(self, last: Any) -> tuple[Array, Array]:
+        """Return what this step asks of the joints, least of ``|A dq|^2 / 2 - b dq``, as `A' A` (n, n) and b (n,)."""
+        import pinocchio
+
         at, wanted, q = self._at, self._wanted, self._configuration.q
         back = at.rotation.T
-        away, turn = _bounded(last.translation - at.translation), self._log(back @ last.rotation)
+        away, turn = _bounded(last.translation - at.translation), pinocchio.log3(back @ last.rotation)
         gap = self._weights * np.concatenate((back @ away, turn))
         distance = math.hypot(*gap)
         J = self._weights[:, None] * self._configuration.get_frame_jacobian(self.robot.tip)
@@ -309,18 +314,20 @@ class LiveKinematics(InverseKinematics):
         closing = np.linalg.solve(curvature, J.T @ gap) if distance > _CLOSED else self._still
         share, share_to_rest = self._shares(np.array((closing, to_rest)))
         moved = back @ (share * away + _bounded(wanted.translation - last.translation))
-        turned = self._log(self._exp(share * turn) @ (last.rotation.T @ wanted.rotation))
+        turned = pinocchio.log3(pinocchio.exp3(share * turn) @ (last.rotation.T @ wanted.rotation))
         way = self._weights * np.concatenate((moved, turned))
         return curvature, J.T @ way + POSTURE_COST**2 * share_to_rest * to_rest
 
     def _within(self, allowed: Range, curvature: Array, slope: Array) -> Array | None:
         """The change of the joints (n,) that a step asks for, within a range of velocities."""
-        problem = self._problem(curvature, -slope, lb=allowed.least * self._dt, ub=allowed.most * self._dt)
-        found = self._solve(problem, solver="daqp")
-        return np.asarray(found.x) if found.found and found.x is not None else None
+        from qpsolvers import Problem, solve_problem
+
+        problem = Problem(curvature, -slope, lb=allowed.least * self._dt, ub=allowed.most * self._dt)
+        solution = solve_problem(problem, solver="daqp")
+        return np.asarray(solution.x) if solution.found and solution.x is not None else None
 
     def _shares(self, changes: Array) -> Array:
-        """How much of changes of the joints (m, n) one step may take so that it can be braked where they end."""
+        """Return how much of changes of the joints (m, n) one step may take so that it can be braked where they end."""
         sizes = np.abs(changes)
         fastest = brakeable(sizes, _SHARE * self._braking.change, self._dt)
         ways = np.minimum(fastest, self.robot.velocity) * self._dt
@@ -367,7 +374,7 @@ class Range(NamedTuple):
 
 
 class Reasons(NamedTuple):
-    """Which limits a velocity meets, of any joint."""
+    """The limits that a velocity meets, of any joint."""
 
     position: bool
     velocity: bool
@@ -404,7 +411,7 @@ class Braking:
         return Range(np.minimum(least, most), most)  # they differ by rounding where only one velocity is left
 
     def reasons(self, allowed: Range, before: Array, after: Array) -> Reasons:
-        """Which limits keep a velocity `after` (n,) one of `before` within the range."""
+        """Tell which limits keep a velocity `after` (n,) one of `before` within the range."""
         at_end = (after >= allowed.most) | (after <= allowed.least)
         changed = np.abs(after - before) >= self.change * _AT
         fastest = np.abs(after) >= self.robot.velocity * _AT

@@ -60,7 +60,7 @@ _AGAIN = (
     "then other.learn(library.movements(symbol.name)) for every symbol in library.symbols()"
 )
 
-FORMAT, VERSION = "kineme-snapshot", 1
+FORMAT, VERSION = "kineme-snapshot", 2
 _KINDS = ("float64", "float32", "int32")
 _ALIGNMENT = 8  # bytes: arrays in JavaScript begin at multiples of the size of their numbers
 

@@ -17,7 +17,7 @@ _ALWAYS = 0.9  # of random postures in which a pair of shapes touches: it touche
 
 
 class Along(NamedTuple):
-    """What an arm does at the T samples of a trajectory."""
+    """Kinematics, torques and contacts of an arm at the T samples of a trajectory."""
 
     tip_positions: Array  # (T, 3) [m]
     tip_rotations: Array  # (T, 3, 3)
@@ -36,7 +36,7 @@ def along(robot: Robot, trajectory: JointTrajectory) -> Along:
     tip = model.getFrameId(robot.tip)
     n_samples, n = trajectory.positions.shape
     positions, rotations, heights = (np.empty((n_samples, *shape)) for shape in ((3,), (3, 3), (n + 1,)))
-    jacobians, holding, whole = np.empty((n_samples, 6, n)), np.empty((n_samples, n)), np.empty((n_samples, n))
+    jacobians, holding, total = np.empty((n_samples, 6, n)), np.empty((n_samples, n)), np.empty((n_samples, n))
     samples = zip(trajectory.positions, trajectory.velocities, trajectory.accelerations, strict=True)
     for t, (q, v, a) in enumerate(samples):
         pinocchio.computeJointJacobians(model, data, q)
@@ -46,10 +46,10 @@ def along(robot: Robot, trajectory: JointTrajectory) -> Along:
         positions[t], rotations[t] = data.oMf[tip].translation, data.oMf[tip].rotation
         heights[t] = [*(data.oMi[j].translation[2] for j in range(1, model.njoints)), positions[t, 2]]
         holding[t] = pinocchio.computeGeneralizedGravity(model, data, q)
-        whole[t] = pinocchio.rnea(model, data, q, v, a)
+        total[t] = pinocchio.rnea(model, data, q, v, a)
     singular = np.asarray(np.linalg.svd(jacobians, compute_uv=False)[:, min(6, n) - 1], dtype=np.float64)
     contacts = contacts_of(robot, trajectory.positions)
-    return Along(positions, rotations, heights, singular, holding, whole - holding, contacts)
+    return Along(positions, rotations, heights, singular, holding, total - holding, contacts)
 
 
 class Contact(NamedTuple):
@@ -70,18 +70,18 @@ def contacts_of(robot: Robot, positions: Array) -> tuple[Contact, ...]:
     data, shapes = robot.model.createData(), geometry.createData()
     for request, margin in zip(shapes.collisionRequests, margins, strict=True):
         request.security_margin = margin
-    found: dict[int, int] = {}
+    first_samples: dict[int, int] = {}
     for t, q in enumerate(positions):
         if pinocchio.computeCollisions(robot.model, data, geometry, shapes, q, False):
             for k, result in enumerate(shapes.collisionResults):
                 if result.isCollision():
-                    found.setdefault(k, t)
+                    first_samples.setdefault(k, t)
     pairs = geometry.collisionPairs
 
     def link(shape: int) -> str:
         return str(robot.model.frames[geometry.geometryObjects[shape].parentFrame].name)
 
-    return tuple(Contact(t, link(pairs[k].first), link(pairs[k].second)) for k, t in found.items())
+    return tuple(Contact(t, link(pairs[k].first), link(pairs[k].second)) for k, t in first_samples.items())
 
 
 @lru_cache(maxsize=8)
@@ -111,7 +111,7 @@ def _pair_geometry(robot: Robot) -> tuple[Any, tuple[float, ...]]:
 
 
 def _touching(robot: Robot, geometry: Any, postures: Array, margin: float) -> Array:
-    """Whether each pair of shapes is closer than the margin [m], in each posture: (T, pairs)."""
+    """Tell of each pair of shapes whether it is closer than the margin [m], in each posture: (T, pairs)."""
     import pinocchio
 
     data, shapes = robot.model.createData(), geometry.createData()

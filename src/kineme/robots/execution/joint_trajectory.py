@@ -1,4 +1,4 @@
-"""What is sent to an arm: joint positions and their rates over time."""
+"""Trajectories that are sent to an arm: joint positions and rates over time, also between samples."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ _SLACK = 1 + 1e-6
 def preflight(
     robot: Robot, trajectory: JointTrajectory, path: TaskPath | None = None, follow: str = "full"
 ) -> Preflight:
-    """Every check of a trajectory.
+    """Make every check of a trajectory.
 
     Parameters
     ----------
@@ -65,9 +65,7 @@ def preflight(
     dense = trajectory if len(times) == len(trajectory) else between(trajectory, times)
     state = along(robot, dense)
     checks = [*_positions(robot, trajectory), *_rates(robot, trajectory), *_torques(robot, dense, state)]
-    checks += between_samples(robot, trajectory)
-    checks += [_jumps(robot, trajectory), _stands(robot, trajectory)]
-    checks += [_singularity(dense, state), _collision(dense, state), *_below(robot, dense, state)]
+    checks += [*between_samples(robot, trajectory), *_of_the_arm(robot, trajectory, dense, state)]
     if path is not None:
         checks += tracking(robot, trajectory, path, follow, (times, state))
     return Preflight(tuple(checks), tuple(_unchecked(robot)))
@@ -115,6 +113,9 @@ def _torques(robot: Robot, trajectory: JointTrajectory, state: Along) -> Iterato
         total = np.abs(holding + moving)
         t = int(np.argmax(total))
         passed = bool(total[t] <= limit * _SLACK)
+        room = limit - holding * np.sign(moving)  # what is left in the direction in which the movement pushes
+        is_hopeless = np.any((np.abs(holding) > limit) | (room <= 0))
+        slower = math.inf if is_hopeless else float(np.sqrt(np.max(np.abs(moving) / room)))
         yield Check(
             "torque",
             robot.joints[j],
@@ -123,59 +124,41 @@ def _torques(robot: Robot, trajectory: JointTrajectory, state: Along) -> Iterato
             limit,
             "N" if robot.units[j] == "m" else "Nm",
             passed,
-            _slower_for(holding, moving, limit),
+            slower,
         )
 
 
-def _slower_for(holding: Array, moving: Array, limit: float) -> float:
-    room = limit - holding * np.sign(moving)  # what is left in the direction in which the movement pushes
-    if np.any((np.abs(holding) > limit) | (room <= 0)):
-        return math.inf
-    return float(np.sqrt(np.max(np.abs(moving) / room)))
+def _of_the_arm(robot: Robot, trajectory: JointTrajectory, dense: JointTrajectory, state: Along) -> Iterator[Check]:
+    """Check jumps and standing at both ends; then singularity, self-collision and how far the arm goes below its base.
 
-
-def _jumps(robot: Robot, trajectory: JointTrajectory) -> Check:
+    A table may be at the base, which nobody says.
+    """
     gaps = np.diff(trajectory.times)[:, None]
     expected = (trajectory.velocities[1:] + trajectory.velocities[:-1]) / 2 * gaps
     off = np.abs(np.diff(trajectory.positions, axis=0) - expected)
-    t, j = np.unravel_index(int(np.argmax(off)), off.shape)
-    worst, unit = float(off[t, j]), unit_of(robot, int(j))
-    slower = max(1.0, math.sqrt(worst / _JUMP))
-    return Check("jump", robot.joints[j], _at(trajectory, int(t)), worst, _JUMP, unit, worst <= _JUMP, slower)
-
-
-def _stands(robot: Robot, trajectory: JointTrajectory) -> Check:
+    t, j = map(int, np.unravel_index(int(np.argmax(off)), off.shape))
+    worst, unit, slower = float(off[t, j]), unit_of(robot, j), max(1.0, math.sqrt(float(off[t, j]) / _JUMP))
+    yield Check("jump", robot.joints[j], _at(trajectory, t), worst, _JUMP, unit, worst <= _JUMP, slower)
     shares = np.abs(trajectory.velocities[[0, -1]]) / robot.velocity
-    end, j = np.unravel_index(int(np.argmax(shares)), shares.shape)
-    worst, unit = float(shares[end, j]), "of the velocity limit"
-    passed = worst <= STANDS
-    slower = 1.0 if passed else math.inf
-    return Check(
-        "standing at the ends", robot.joints[j], _at(trajectory, -int(end)), worst, STANDS, unit, passed, slower
-    )
-
-
-def _singularity(trajectory: JointTrajectory, state: Along) -> Check:
+    end, j = map(int, np.unravel_index(int(np.argmax(shares)), shares.shape))
+    worst, where, time = float(shares[end, j]), robot.joints[j], _at(trajectory, -end)
+    slower = 1.0 if worst <= STANDS else math.inf
+    unit = "of the velocity limit"
+    yield Check("standing at the ends", where, time, worst, STANDS, unit, worst <= STANDS, slower)
     t = int(np.argmin(state.smallest_singular_values))
-    worst = float(state.smallest_singular_values[t])
-    return Check("singularity", "tip", _at(trajectory, t), worst, math.nan, f"(singular below {_SINGULAR:g})", True)
-
-
-def _below(robot: Robot, trajectory: JointTrajectory, state: Along) -> list[Check]:
-    """How far a joint or the tip goes below the base, where a table may be; whether one is there, nobody says."""
-    t, j = np.unravel_index(int(np.argmin(state.heights)), state.heights.shape)
-    lowest = float(state.heights[t, j])
-    where = (*robot.joints, "tip")[j]
-    unit = "m (the base stands at 0)"
-    return [Check("lowest point", where, _at(trajectory, int(t)), lowest, math.nan, unit, True)] if lowest < 0 else []
-
-
-def _collision(trajectory: JointTrajectory, state: Along) -> Check:
-    if not state.contacts:
-        return Check("self-collision", "none", 0.0, 0, 0, "contacts", True)
-    t, first, second = min(state.contacts)
-    n, links = len(state.contacts), f"{first} and {second}"
-    return Check("self-collision", links, _at(trajectory, t), n, 0, "contacts", False, math.inf)
+    worst, unit = float(state.smallest_singular_values[t]), f"(singular below {_SINGULAR:g})"
+    yield Check("singularity", "tip", _at(dense, t), worst, math.nan, unit, True)
+    if state.contacts:
+        t, first, second = min(state.contacts)
+        n, links = len(state.contacts), f"{first} and {second}"
+        yield Check("self-collision", links, _at(dense, t), n, 0, "contacts", False, math.inf)
+    else:
+        yield Check("self-collision", "none", 0.0, 0, 0, "contacts", True)
+    t, j = map(int, np.unravel_index(int(np.argmin(state.heights)), state.heights.shape))
+    lowest, where = float(state.heights[t, j]), (*robot.joints, "tip")[j]
+    if lowest < 0:
+        unit = "m (the base stands at 0)"
+        yield Check("lowest point", where, _at(dense, int(t)), lowest, math.nan, unit, True)
 
 
 def _unchecked(robot: Robot) -> Iterator[str]:
@@ -285,7 +268,7 @@ class Preflight:
 
     @property
     def passed(self) -> bool:
-        """Whether every check passed."""
+        """True where every check passed."""
         return all(check.passed for check in self.checks)
 
     @property
@@ -332,9 +315,9 @@ def _verdict(check: Check) -> str:
 
 
 def tracking(
-    robot: Robot, trajectory: JointTrajectory, path: TaskPath, follow: str, known: tuple[Array, Along]
+    robot: Robot, trajectory: JointTrajectory, path: TaskPath, follow: str, dense: tuple[Array, Along]
 ) -> Iterator[Check]:
-    """How far the tip is from its path, and how far turned from it.
+    """Check how far the tip is from its path, and how far turned from it.
 
     Arms of fewer than six joints follow an orientation only as far as the position allows: of theirs, and of what is
     not followed at all, the angle has no limit.
@@ -344,10 +327,15 @@ def tracking(
     path : TaskPath
         At times of the trajectory.
     follow : {"full", "axis", "free"}
-    known : times (m,) and what the arm does then
+    dense : times (m,) and what the arm does then
         Where those times end with the path's, nothing is computed again.
     """
-    positions, rotations = _tips(robot, trajectory, path.times, *known)
+    times, state = dense
+    n = len(path.times)
+    if np.array_equal(times[-n:], path.times):
+        positions, rotations = state.tip_positions[-n:], state.tip_rotations[-n:]
+    else:
+        positions, rotations = kinematics(robot, between(trajectory, path.times).positions)[:2]
     off = np.linalg.norm(positions - path.positions, axis=1)
     turned = np.degrees(_angles(rotations, path.rotations, follow))
     t, r = int(np.argmax(off)), int(np.argmax(turned))
@@ -359,13 +347,6 @@ def tracking(
     passed = not angle > limit
     slower = 1.0 if passed else math.inf
     yield Check("turned away", "tip", float(path.times[r]), angle, limit, "deg", passed, slower)
-
-
-def _tips(robot: Robot, trajectory: JointTrajectory, times: Array, known: Array, state: Along) -> tuple[Array, Array]:
-    """Positions (T, 3) and rotations (T, 3, 3) of the tip at those times."""
-    if np.array_equal(known[-len(times) :], times):
-        return state.tip_positions[-len(times) :], state.tip_rotations[-len(times) :]
-    return kinematics(robot, between(trajectory, times).positions)[:2]
 
 
 def _angles(rotations: Array, wanted: Array, follow: str) -> Array:

@@ -1,4 +1,4 @@
-"""How fast a path q(s) is followed: its parameter s as a function of the time t of the arm."""
+"""Timing of a path q(s), its parameter s over the time of the arm: as generated, the fastest, approaches."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def approach(robot: Robot, start: Array, end: Array, rate: float, factor: float 
 
 
 def knows_masses(robot: Robot) -> bool:
-    """Whether the model says what its links weigh."""
+    """Tell whether the model says what its links weigh."""
     return float(sum(inertia.mass for inertia in robot.model.inertias)) > 0
 
 
@@ -139,7 +139,7 @@ class Torques:
         return np.array(self._inverse_dynamics(self._model, self._data, q, velocities, accelerations))
 
     def exceeded(self, torques: Array) -> bool:
-        """Whether a joint would need more than it has; False where that is not known."""
+        """Tell whether a joint would need more than it has; False where that is not known."""
         return bool((np.abs(torques) > self._most).any())
 
 

@@ -52,17 +52,12 @@ class InverseKinematics:
         check_robot(robot)
         check_choice("orientation", orientation, list(ORIENTATIONS))
         try:
-            import pinocchio
-            from pink import Configuration, build_ik
+            import qpsolvers  # noqa: F401 - so that the message names the extra
             from pink.limits import ConfigurationLimit
             from pink.tasks import FrameTask, PostureTask
-            from qpsolvers import solve_problem
         except ImportError as error:
             raise DataError("expected the package pin-pink for arms; pip install 'kineme[robot]'") from error
         self.robot = robot
-        self._pose, self._columns = pinocchio.SE3, pinocchio.SE3ToXYZQUAT
-        self._log, self._exp = pinocchio.log3, pinocchio.exp3
-        self._program, self._solve, self._configuration_of = build_ik, solve_problem, Configuration
         self._data = robot.model.createData()
         partial = _PARTIAL if is_partial(robot) else 1.0
         self.costs = partial * np.array(ORIENTATIONS[orientation])
@@ -82,10 +77,11 @@ class InverseKinematics:
         SpecificationError
             Joints outside their limits.
         """
+        from pink import Configuration
+
         robot = self.robot
         check_start(robot, q)
-        q = np.clip(q, robot.lower, robot.upper)
-        self._configuration = self._configuration_of(robot.model, self._data, q)
+        self._configuration = Configuration(robot.model, self._data, np.clip(q, robot.lower, robot.upper))
 
     @property
     def q(self) -> Array:
@@ -94,18 +90,21 @@ class InverseKinematics:
 
     @property
     def tip_position(self) -> Array:
-        """Where the tip is (3,) [m]."""
+        """Position of the tip (3,) [m]."""
         return np.array(self._configuration.get_transform_frame_to_world(self.robot.tip).translation)
 
     @property
     def tip_rotation(self) -> Array:
-        """How the tip is turned (3, 3)."""
+        """Rotation of the tip (3, 3)."""
         return np.array(self._configuration.get_transform_frame_to_world(self.robot.tip).rotation)
 
     @property
     def tip_pose(self) -> Array:
         """Position and orientation (w, x, y, z) of the tip (7,)."""
-        return np.array(self._columns(self._configuration.get_transform_frame_to_world(self.robot.tip))[_WXYZ])
+        import pinocchio
+
+        pose = self._configuration.get_transform_frame_to_world(self.robot.tip)
+        return np.array(pinocchio.SE3ToXYZQUAT(pose)[_WXYZ])
 
     @property
     def error(self) -> float:
@@ -114,7 +113,7 @@ class InverseKinematics:
         return float(np.linalg.norm(self.tip_position - wanted))
 
     def step(self, position: Array, rotation: Array) -> Array:
-        """Move towards a pose by one step; joint positions (n,) after it."""
+        """Move towards a pose by one step, and return the joint positions (n,) after it."""
         self._aim(position, rotation)
         self._advance()
         return self.q
@@ -129,7 +128,7 @@ class InverseKinematics:
         return self.q
 
     def follow(self, positions: Array, rotations: Array) -> Array:
-        """Joint positions (T, n) along poses that lie close to one another.
+        """Return joint positions (T, n) along poses that lie close to one another.
 
         One step for each pose, from where the joints would be if they went on as between the two poses before: the
         error of a step is quadratic in how far it goes, so this one is of the fourth order in the time between samples.
@@ -150,28 +149,28 @@ class InverseKinematics:
 
     def _aim(self, position: Array, rotation: Array) -> None:
         """Set the pose that the tip is to have; with its z axis alone, that of the shortest turn."""
+        import pinocchio
+
         if self.costs[2] == 0 < self.costs[0]:
             here = self.tip_rotation
             turn = distances((np.zeros((1, 3)), here[None]), (np.zeros(3), rotation), self.costs)[0, 3:]
-            rotation = here @ self._exp(turn)
-        self._tip.set_target(self._pose(rotation, position))
+            rotation = here @ pinocchio.exp3(turn)
+        self._tip.set_target(pinocchio.SE3(rotation, position))
 
     def _advance(self) -> float:
-        """One step towards the target of the tip; the largest change of a joint."""
-        change = self._change()
-        if change is None:
+        """Take one step towards the target of the tip, and return the largest change of a joint."""
+        from pink import build_ik
+        from qpsolvers import solve_problem
+
+        problem = build_ik(self._configuration, (self._tip, self._posture), 1.0, _DAMPING, self._limits)
+        solution = solve_problem(problem, solver="daqp")
+        if not solution.found or solution.x is None:  # as of a pose beyond all numbers
             return 0.0
+        change = np.asarray(solution.x)
         self._configuration.integrate_inplace(change, 1.0)
         return float(np.abs(change).max())
 
-    def _change(self) -> Array | None:
-        """The change of the joints (n,) that a step asks for; None without one, as of a pose beyond all numbers."""
-        tasks = (self._tip, self._posture)
-        problem = self._program(self._configuration, tasks, 1.0, _DAMPING, self._limits)
-        found = self._solve(problem, solver="daqp")
-        return np.asarray(found.x) if found.found and found.x is not None else None
-
 
 def is_partial(robot: Robot) -> bool:
-    """Whether the arm has fewer joints than a pose has coordinates: it follows orientations as far as it can."""
+    """Tell whether the arm has fewer joints than a pose has coordinates: it follows orientations as far as it can."""
     return robot.n_joints < _COORDINATES

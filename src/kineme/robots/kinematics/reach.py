@@ -1,4 +1,4 @@
-"""Whether an arm reaches the poses of a movement: where not, and by how far."""
+"""Reach of an arm: poses of a movement that it does not reach, and by how far."""
 
 from __future__ import annotations
 

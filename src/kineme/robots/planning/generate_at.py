@@ -19,7 +19,7 @@ from kineme.robots.planning.roles import Roles, Scales, roles_of, scales_of
 from kineme.validation import Array, as_numbers
 
 
-class Generated(NamedTuple):
+class GeneratedMovement(NamedTuple):
     """A movement of the tip, or of the joints, with the discrete channels of its recording."""
 
     movement: Trajectory  # [m] or [rad]; of the tip alone or, (T, 7), with its orientations w, x, y, z
@@ -28,7 +28,7 @@ class Generated(NamedTuple):
 
 
 class _Frame(NamedTuple):
-    """Where n recorded positions lie in the frame of the robot: the recorded start at the origin, scaled by units."""
+    """Place of n recorded positions in the frame of the robot: the recorded start at the origin, scaled by units."""
 
     start: Array  # (n,), as recorded
     units: Array  # (n,), meters or radians for one of each
@@ -53,7 +53,7 @@ def generate_at(  # noqa: PLR0913 - one parameter per option
     joints: Robot | None = None,
     joint_units: str | None = None,
     plane: str = "xy",
-) -> Generated:
+) -> GeneratedMovement:
     """Generate a movement with start and goal in the frame of a robot.
 
     Parameters
@@ -82,11 +82,22 @@ def generate_at(  # noqa: PLR0913 - one parameter per option
     another number of coordinates; of a movement of two dimensions, a goal in another plane.
     """
     roles = roles_of(learned.primitive.channels, len(learned.columns), "joints" if joints else "tip", joints)
-    _check_tip(roles, learned, joints is not None)
     n = len(roles.positions)
+    if joints is None and n not in (2, 3):
+        raise TrajectoryError(
+            f"expected two or three positions of the tip, got {n} among {', '.join(learned.columns)}; choose columns, "
+            "or say that it is a movement of the joints (joints=True, --joints)"
+        )
     begin, end = (_point(point, name, n if joints else 3) for point, name in ((at, "at"), (goal, "goal")))
     axes = list(PLANES[plane]) if n == 2 and not joints else list(range(n))
-    _check_plane(begin, end, axes)
+    if begin is not None and end is not None and len(axes) < len(end):
+        across = ({0, 1, 2} - {*axes}).pop()
+        if abs(end[across] - begin[across]) > TRACKED:
+            raise SpecificationError(
+                f"expected the goal of a movement of two dimensions in the plane of its start, {'xyz'[across]} = "
+                f"{begin[across]:g} m, got {end[across]:g}; give both the same, or choose another plane (plane=, "
+                "--plane)"
+            )
     shown = generate(learned, MovementOptions(duration=duration, rate=rate)).columns["positions"]
     start = shown[0, roles.positions]
     scales = Scales(np.full(n, scale), np.zeros(n)) if scale is not None else scales_of(roles, joints, joint_units)
@@ -96,54 +107,28 @@ def generate_at(  # noqa: PLR0913 - one parameter per option
     if (way := _point(displacement, "displacement", n)) is not None:
         target = _goal_as_recorded(shown[-1], roles, start + way)
     options = MovementOptions(goal=target, duration=duration, rate=rate, meet_goal=target is not None)
-    made = generate(learned, options).columns
-    moved = frame.to_robot(made["positions"][:, roles.positions])
+    generated = generate(learned, options).columns
+    recorded = generated["positions"]
+    moved = frame.to_robot(recorded[:, roles.positions])
     through = end if begin is None else begin
     if through is not None and len(through) > n:
-        moved = _in_space(moved, axes, through)
+        flat, moved = moved, np.tile(through, (len(moved), 1))  # in the plane through that point
+        moved[:, axes] = flat
     if roles.orientation is not None and moved.shape[1] == 3:
         channel, columns = roles.orientation
-        moved = np.column_stack((moved, as_wxyz(made["positions"][:, columns], channel)))
+        moved = np.column_stack((moved, as_wxyz(recorded[:, columns], channel)))
     steps, continuous = (
-        {name: made["positions"][:, column] for name, column in columns.items()}
+        {name: recorded[:, column] for name, column in columns.items()}
         for columns in (roles.discrete, roles.continuous)
     )
-    return Generated(Trajectory(times=made["times"], positions=moved), steps, continuous)
+    return GeneratedMovement(Trajectory(times=generated["times"], positions=moved), steps, continuous)
 
 
 def _goal_as_recorded(end: Array, roles: Roles, goal: Array) -> Array:
-    """The goal in all columns that move: the positions as asked for, the others as they are demonstrated."""
-    wanted = end.copy()
-    wanted[roles.positions] = goal
-    return np.asarray(wanted[roles.moving])
-
-
-def _check_plane(begin: Array | None, end: Array | None, axes: list[int]) -> None:
-    """Refuse a goal that lies beside the plane in which a movement of two dimensions is executed from its start."""
-    if begin is None or end is None or len(axes) == len(end):
-        return
-    across = ({0, 1, 2} - {*axes}).pop()
-    if abs(end[across] - begin[across]) > TRACKED:
-        raise SpecificationError(
-            f"expected the goal of a movement of two dimensions in the plane of its start, {'xyz'[across]} = "
-            f"{begin[across]:g} m, got {end[across]:g}; give both the same, or choose another plane (plane=, --plane)"
-        )
-
-
-def _in_space(flat: Array, axes: list[int], through: Array) -> Array:
-    """A movement of two dimensions (T, 2) in the plane through a point (3,), shape (T, 3)."""
-    points = np.tile(through, (len(flat), 1))
-    points[:, axes] = flat
-    return points
-
-
-def _check_tip(roles: Roles, learned: Learned, joints: bool) -> None:
-    if not joints and len(roles.positions) not in (2, 3):
-        raise TrajectoryError(
-            f"expected two or three positions of the tip, got {len(roles.positions)} among "
-            f"{', '.join(learned.columns)}; choose columns, or say that it is a movement of the joints (joints=True, "
-            "--joints)"
-        )
+    """Return the goal in all columns that move: positions as asked for, the others as they are demonstrated."""
+    end = end.copy()
+    end[roles.positions] = goal
+    return np.asarray(end[roles.moving])
 
 
 def _point(point: ArrayLike | None, name: str, n: int) -> Array | None:

@@ -29,8 +29,8 @@ from kineme.robots.planning.robot_movement import (
     FASTEST_RATE,
     SLOWEST_RATE,
     TIMINGS,
+    PlannedPath,
     RobotMovement,
-    Untimed,
     with_timing,
 )
 from kineme.robots.planning.roles import JOINT_UNITS, SPACES, check_plausible, roles_of, scales_of, space_of
@@ -129,7 +129,7 @@ def move(  # noqa: PLR0913 - one parameter per option
     check_switch("force", force)
     request = request_of(movement, robot, space, steps, continuous, joint_units)
     stands = robot.rest if start is None else _posture(start, robot)
-    untimed = Untimed(
+    planned = PlannedPath(
         robot,
         CubicSpline(request.times, request.positions),
         None,
@@ -143,48 +143,48 @@ def move(  # noqa: PLR0913 - one parameter per option
     if request.space == "joints":
         if not force:
             refuse_outside(robot, request.times, request.positions)
-        made = _timed(untimed, timing)
+        result = _timed(planned, timing)
         if not force:
-            refuse_failed(made, untimed, timing)
-        return made
+            refuse_failed(result, planned, timing)
+        return result
     ik = InverseKinematics(robot, follow)
-    return _along(ik, path_of_the_tip(ik, request, orientation, plane), place, untimed, timing, force)
+    return _along(ik, path_of_the_tip(ik, request, orientation, plane), place, planned, timing, force)
 
 
 def _along(
-    ik: InverseKinematics, path: TaskPath, place: str, untimed: Untimed, timing: str, force: bool
+    ik: InverseKinematics, path: TaskPath, place: str, planned: PlannedPath, timing: str, force: bool
 ) -> RobotMovement:
     """Return the first way along the path that passes its checks; with `force`, the first.
 
     Of ways that are slower than what was demonstrated, the fastest.
     """
-    failed: list[tuple[RobotMovement, Untimed]] = []
+    failed: list[tuple[RobotMovement, PlannedPath]] = []
     slower: list[RobotMovement] = []
     errors: list[TrajectoryError] = []
     lost = False
-    for way in ways_along(ik, untimed.follow):
+    for way in ways_along(ik, planned.follow):
         if way.sought and not lost:
             break
         try:
-            joints, placed = way.joints(path, place, untimed.start)
+            joints, placed = way.joints(path, place, planned.start)
             if not force:
                 check_reached(ik.robot, placed, joints(placed.times), way.ik.costs, TRACKED)
-            solved = untimed._replace(joints=joints, path=placed)
-            made = _timed(solved, timing)
+            solved = planned._replace(joints=joints, path=placed)
+            result = _timed(solved, timing)
         except TrajectoryError as error:
             errors.append(error)
             lost |= not isinstance(error, OutOfReachError)
             continue
-        passed = made.preflight.passed
-        if force or (passed and (timing == "generated" or made.factor <= _SLOWER)):
-            return made
-        lost |= loses_its_path(made) or _hurries(solved)
+        passed = result.preflight.passed
+        if force or (passed and (timing == "generated" or result.factor <= _SLOWER)):
+            return result
+        lost |= loses_its_path(result) or _hurries(solved)
         if passed:
-            slower.append(made)
+            slower.append(result)
         else:
-            failed.append((made, solved))
+            failed.append((result, solved))
     if slower:
-        return min(slower, key=lambda made: made.factor)
+        return min(slower, key=lambda result: result.factor)
     if not failed:
         raise errors[0]
     nearest = min(failed, key=lambda way: way[0].preflight.slower if _hurries(way[1]) else 0.0)
@@ -192,16 +192,16 @@ def _along(
     return nearest[0]
 
 
-def _hurries(untimed: Untimed) -> bool:
-    """Whether the joints accelerate many times as hard at one place of the path as along it in the mean."""
-    shares = np.abs(untimed.joints(untimed.joints.x, 2) / untimed.robot.acceleration).max(axis=1)
+def _hurries(planned: PlannedPath) -> bool:
+    """Tell whether the joints accelerate many times as hard at one place of the path as along it in the mean."""
+    shares = np.abs(planned.joints(planned.joints.x, 2) / planned.robot.acceleration).max(axis=1)
     return bool(shares.max() > _HURRIED * shares.mean())
 
 
-def _timed(untimed: Untimed, timing: str) -> RobotMovement:
-    """The movement with its timing, and the units of the arm's joints beside it."""
-    made = with_timing(untimed, timing)
-    return replace(made, trajectory=replace(made.trajectory, units=untimed.robot.units))
+def _timed(planned: PlannedPath, timing: str) -> RobotMovement:
+    """Time the movement, and put the units of the arm's joints beside it."""
+    result = with_timing(planned, timing)
+    return replace(result, trajectory=replace(result.trajectory, units=planned.robot.units))
 
 
 def _posture(start: ArrayLike, robot: Robot) -> Array:
@@ -215,20 +215,20 @@ def _posture(start: ArrayLike, robot: Robot) -> Array:
 def path_of_the_tip(
     ik: InverseKinematics, request: Request, orientation: ArrayLike | None = None, plane: str = "xy"
 ) -> TaskPath:
-    """The poses that are asked for; where an orientation or a third coordinate is missing, that of the tip at rest."""
+    """Return the poses that are asked for; a missing orientation or third coordinate is that of the tip at rest."""
     turned = request.orientations if orientation is None else orientation
     at_rest = quaternion_of(ik.tip_rotation)
     return task_path(request.times, request.positions, at_rest if turned is None else turned, plane, ik.tip_position)
 
 
 class Way(NamedTuple):
-    """How the joints may follow a movement; it is solved when it is asked for."""
+    """A way in which the joints may follow a movement; it is solved when it is asked for."""
 
     ik: InverseKinematics
     sought: bool  # by `pursue`, among many postures: that takes as long as fifty others
 
     def joints(self, path: TaskPath, place: str, stands: Array) -> tuple[CubicSpline, TaskPath]:
-        """The joints over time, and the path at its place, for an arm that stands at `stands` (n,).
+        """Solve the joints over time, and place the path, for an arm that stands at `stands` (n,).
 
         The posture at the start, and a place that is free, are those with which the whole movement costs least.
 
@@ -239,10 +239,10 @@ class Way(NamedTuple):
         chosen = choose(self.ik.robot, path, self.ik.costs, stands)
         path = path._replace(positions=path.positions + chosen.shift)
         if self.sought:
-            found = pursue(self.ik.robot, path, self.ik.costs)
-            if found is None:
+            way = pursue(self.ik.robot, path, self.ik.costs)
+            if way is None:
                 raise TrajectoryError(f"{self.ik.robot.name} reaches no way along this movement")
-            return CubicSpline(found[1].times, found[0]), found[1]
+            return CubicSpline(way[1].times, way[0]), way[1]
         for n in _SAMPLES:
             dense = path if len(path.times) >= n else path.at(np.linspace(0.0, path.times[-1], n))
             self.ik.reset(chosen.start)
@@ -283,17 +283,17 @@ class Request(NamedTuple):
 def request_of(
     movement: Any, robot: Robot, space: str, steps: Any = None, continuous: Any = None, joint_units: str | None = None
 ) -> Request:
-    """What `move` was given, as one movement; `steps` and `continuous` besides such channels of its own.
+    """Read the arguments of `move` as one movement; `steps` and `continuous` besides such channels of its own.
 
     Raises TrajectoryError: several movements, several orientations, joints of another number, or steps of another
     length; SpecificationError: steps that are no dict.
     """
     if isinstance(movement, Primitives | PosePrimitives):
         movement = movement.rollout()
-    one = as_recording(movement)
-    columns = np.asarray(one.recorded, dtype=float)
-    space = space_of(one.channels, columns, robot) if space == "auto" else space
-    roles = roles_of(one.channels, columns.shape[1], space, robot)
+    recording = as_recording(movement)
+    times, columns = recording.times, np.asarray(recording.recorded, dtype=float)
+    space = space_of(recording.channels, columns, robot) if space == "auto" else space
+    roles = roles_of(recording.channels, columns.shape[1], space, robot)
     if space == "joints" and len(roles.positions) != robot.n_joints:
         raise TrajectoryError(
             f"expected a movement of the {robot.n_joints} joints of {robot.name}, got {len(roles.positions)} columns; "
@@ -304,24 +304,17 @@ def request_of(
     if space == "joints":
         check_plausible(positions, robot)
     turned = None if roles.orientation is None else as_wxyz(columns[:, roles.orientation[1]], roles.orientation[0])
-    known = sorted(
-        {*roles.discrete, *_given(steps), *roles.continuous, *_given(continuous, "continuous")} & set(robot.joints)
+    recorded, others = (
+        {name: columns[:, k] for name, k in channels.items()} for channels in (roles.discrete, roles.continuous)
     )
-    if known:
-        raise TrajectoryError(f"expected other channels of other names than the joints have, got {known[0]!r}")
-    others = {name: columns[:, k] for name, k in roles.continuous.items()}
-    recorded = {name: columns[:, k] for name, k in roles.discrete.items()}
-    return Request(
-        one.times - one.times[0],
-        space,
-        positions,
-        turned,
-        {name: _one_for_each(one.times, values, name) for name, values in {**recorded, **_given(steps)}.items()},
-        {
-            name: _one_for_each(one.times, values, name)
-            for name, values in {**others, **_given(continuous, "continuous")}.items()
-        },
+    steps, continuous = {**recorded, **_given(steps)}, {**others, **_given(continuous, "continuous")}
+    if taken := sorted({*steps, *continuous} & set(robot.joints)):
+        raise TrajectoryError(f"expected other channels of other names than the joints have, got {taken[0]!r}")
+    steps, continuous = (
+        {name: _one_for_each(times, values, name) for name, values in channels.items()}
+        for channels in (steps, continuous)
     )
+    return Request(times - times[0], space, positions, turned, steps, continuous)
 
 
 def _given(steps: Any, what: str = "steps") -> Mapping[str, Any]:

@@ -1,14 +1,14 @@
-"""Why an arm cannot execute a movement, in words: which joint, when, and how far beyond its limit."""
+"""Refusals of movements that an arm cannot execute, in words: which joint, when, and how far beyond its limit."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from kineme.errors import SpecificationError, TrajectoryError
-from kineme.robots.execution.preflight import SAMPLING, Check, Preflight
+from kineme.robots.execution.preflight import SAMPLING, Preflight
 from kineme.robots.kinematics.reach import point_in_words
 from kineme.robots.models.robot import Robot
-from kineme.robots.planning.robot_movement import FASTEST_RATE, RobotMovement, Untimed, with_timing
+from kineme.robots.planning.robot_movement import FASTEST_RATE, PlannedPath, RobotMovement, with_timing
 from kineme.validation import Array
 
 _OF_SAMPLING = ("jump", "tracking", "turned away", "steps")  # may be mended by more samples
@@ -46,67 +46,63 @@ def refuse_outside(robot: Robot, times: Array, joints: Array) -> None:
         )
 
 
-def loses_its_path(made: RobotMovement) -> bool:
-    """Whether the joints left their path or jumped, so that another way along it may be better."""
-    return any(check.what in _LOST for check in made.preflight.failed)
+def loses_its_path(movement: RobotMovement) -> bool:
+    """Tell whether the joints left their path or jumped, so that another way along it may be better."""
+    return any(check.what in _LOST for check in movement.preflight.failed)
 
 
-def refuse_failed(made: RobotMovement, untimed: Untimed, timing: str) -> None:
+def refuse_failed(movement: RobotMovement, planned: PlannedPath, timing: str) -> None:
     """Refuse a movement that did not pass its checks.
 
     Raises InfeasibleError: a check that did not pass, with the least duration that works.
     """
-    if not made.preflight.passed:
-        raise InfeasibleError(_refusal(made, remedy(made, untimed, timing)), made.preflight)
-
-
-def _refusal(made: RobotMovement, helps: str) -> str:
-    failed = made.preflight.failed
-    lines = [
-        f"{c.what} of {c.where} at {c.time:.2f} s{_wanted_at(made, c)}: {c.worst:.3g}, limit {c.limit:.3g} {c.unit}"
-        for c in failed[:_NAMED]
-    ]
+    failed, path = movement.preflight.failed, movement.path
+    if not failed:
+        return
+    lines = []
+    for check in failed[:_NAMED]:
+        target = ""  # of the tip when it was farthest from there
+        if check.what == "tracking" and path is not None:
+            position = path.positions[int(np.argmin(np.abs(path.times - check.time)))]
+            target = f", from {point_in_words(position)} m"
+        place = f"{check.what} of {check.where} at {check.time:.2f} s{target}"
+        lines.append(f"{place}: {check.worst:.3g}, limit {check.limit:.3g} {check.unit}")
     more = f" and {len(failed) - _NAMED} more" if len(failed) > _NAMED else ""
-    return f"{made.robot.name} cannot execute this: {'; '.join(lines)}{more}. {helps}"
+    raise InfeasibleError(
+        f"{movement.robot.name} cannot execute this: {'; '.join(lines)}{more}. {remedy(movement, planned, timing)}",
+        movement.preflight,
+    )
 
 
-def _wanted_at(made: RobotMovement, check: Check) -> str:
-    """Where the tip was to be when it was farthest from there."""
-    if check.what != "tracking" or made.path is None:
-        return ""
-    position = made.path.positions[int(np.argmin(np.abs(made.path.times - check.time)))]
-    return f", from {point_in_words(position)} m"
-
-
-def remedy(made: RobotMovement, untimed: Untimed, timing: str) -> str:
-    """What was tried and works, in words: more samples, a lower speed, or both."""
-    failed, duration = made.preflight.failed, made.trajectory.duration - made.begins
-    finer = untimed._replace(rate=min(_MORE * untimed.rate, FASTEST_RATE))
+def remedy(movement: RobotMovement, planned: PlannedPath, timing: str) -> str:
+    """Write what was tried and works: more samples, a lower speed, or both."""
+    failed, duration = movement.preflight.failed, movement.trajectory.duration - movement.begins
+    finer = planned._replace(rate=min(_MORE * planned.rate, FASTEST_RATE))
     sampled = any(check.what in _OF_SAMPLING or check.what.endswith(SAMPLING) for check in failed)
-    if not sampled and not np.isfinite(made.preflight.slower):
-        return _elsewhere(made)
+    if not sampled and not np.isfinite(movement.preflight.slower):
+        return _elsewhere(movement)
     more = f"{finer.rate:g} samples per second (rate=, --rate)"
     if sampled and _tried(finer, timing) is not None:
         return f"Choose a higher rate, as of {more}"
-    itself = untimed._replace(rate=min(untimed.rate, _ENOUGH))
-    for one, besides in ((itself, ""), (finer, f", at {more}"))[: 2 if sampled else 1]:
-        slower = None if timing == "slowed" else _tried(one, "slowed")
+    itself = planned._replace(rate=min(planned.rate, _ENOUGH))
+    for path, besides in ((itself, ""), (finer, f", at {more}"))[: 2 if sampled else 1]:
+        slower = None if timing == "slowed" else _tried(path, "slowed")
         if slower is not None:
             slow = "slow it down (timing='slowed', --slow-down)"
             return f"It works in {slower:.3g} s instead of {duration:.3g}{besides}: {slow}"
-    if not np.isfinite(made.preflight.slower):
-        return _elsewhere(made)
+    if not np.isfinite(movement.preflight.slower):
+        return _elsewhere(movement)
     return "No speed helps, or only a very low one: look at the movement for jumps, or choose another posture"
 
 
-def _elsewhere(made: RobotMovement) -> str:
-    return OTHER_JOINTS if made.path is None else _ELSEWHERE
+def _elsewhere(movement: RobotMovement) -> str:
+    return OTHER_JOINTS if movement.path is None else _ELSEWHERE
 
 
-def _tried(untimed: Untimed, timing: str) -> float | None:
-    """Duration of the movement with another timing [s], if that passes."""
+def _tried(planned: PlannedPath, timing: str) -> float | None:
+    """Return the duration of the movement with another timing [s], if that passes."""
     try:
-        made = with_timing(untimed, timing, _TRIED)
+        movement = with_timing(planned, timing, _TRIED)
     except (SpecificationError, TrajectoryError):
         return None
-    return made.trajectory.duration - made.begins if made.preflight.passed else None
+    return movement.trajectory.duration - movement.begins if movement.preflight.passed else None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from types import MappingProxyType
@@ -12,7 +12,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from kineme.robots.execution.joint_trajectory import JointTrajectory, dense_times, joined
-from kineme.robots.execution.preflight import SAMPLING, Check, Preflight, Steps, preflight, steps_kept
+from kineme.robots.execution.preflight import SAMPLING, Preflight, Steps, preflight, steps_kept
 from kineme.robots.execution.timing import LONGEST, Timed, approach, as_generated, fastest, n_samples, sampled
 from kineme.robots.kinematics.task_path import TaskPath
 from kineme.robots.models.robot import Robot
@@ -31,7 +31,7 @@ _LEAST_CHANGE = 0.005  # of a change of the duration, which is said to three dig
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RobotMovement:
-    """What `move` made.
+    """The result of `move`: a movement on an arm, with its checks.
 
     Attributes
     ----------
@@ -64,14 +64,15 @@ class RobotMovement:
         return f"RobotMovement({self.robot.name!r}, {duration_in_words(self)})"
 
 
-def duration_in_words(made: RobotMovement) -> str:
-    """How long it takes, with how much of that is approach, and how many times as long as generated, if it is."""
-    slower = f", {made.factor:.3g} times as long as generated" if abs(made.factor - 1) > _LEAST_CHANGE else ""
-    return f"{made.trajectory.duration:.2f} s, of which {made.begins:.2f} s of approach{slower}"
+def duration_in_words(movement: RobotMovement) -> str:
+    """Write the duration, with the share of the approach, and how many times as long as generated it is."""
+    factor = movement.factor
+    slower = f", {factor:.3g} times as long as generated" if abs(factor - 1) > _LEAST_CHANGE else ""
+    return f"{movement.trajectory.duration:.2f} s, of which {movement.begins:.2f} s of approach{slower}"
 
 
-class Untimed(NamedTuple):
-    """What is executed, whatever its timing."""
+class PlannedPath(NamedTuple):
+    """A path of the joints and all that goes with it, whatever its timing."""
 
     robot: Robot
     joints: CubicSpline  # (n,) over the time of the movement
@@ -84,7 +85,7 @@ class Untimed(NamedTuple):
     continuous: Mapping[str, Array] = MappingProxyType({})  # channels that move and are no joints, (T,)
 
 
-def with_timing(untimed: Untimed, timing: str, most: int = LONGEST) -> RobotMovement:
+def with_timing(planned: PlannedPath, timing: str, most: int = LONGEST) -> RobotMovement:
     """The movement with that timing; "slowed" and "fastest" as slow as it passes, if any speed does.
 
     Where the fastest timing along the path is slower than the movement itself, it is that.
@@ -92,108 +93,92 @@ def with_timing(untimed: Untimed, timing: str, most: int = LONGEST) -> RobotMove
     Raises SpecificationError: more than a million samples; slowed down, more than `most`; TrajectoryError: the fastest
     timing of a movement in which no joint moves.
     """
-    robot, joints, rate = untimed.robot, untimed.joints, untimed.rate
+    robot, joints, rate = planned.robot, planned.joints, planned.rate
     itself = partial(as_generated, robot, joints, rate)
     if timing == "generated":
-        return _checked(untimed, itself(1.0))
+        return _checked(planned, itself(1.0))
     if timing == "slowed":
-        return _slowed(untimed, itself, most)
+        return _slowed(planned, itself, most)
     parameterization = fastest(robot, joints)
     if parameterization is None:
-        return _slowed(untimed, itself, most)
-    made = _slowed(untimed, partial(sampled, robot, parameterization, rate), most, follows=True)
-    if made.factor <= 1 or not np.isfinite(made.preflight.slower):
-        return made
-    other = _slowed(untimed, itself, most)
-    return min((made, other), key=lambda one: (not one.preflight.passed, one.trajectory.duration))
+        return _slowed(planned, itself, most)
+    result = _slowed(planned, partial(sampled, robot, parameterization, rate), most, follows=True)
+    if result.factor <= 1 or not np.isfinite(result.preflight.slower):
+        return result
+    other = _slowed(planned, itself, most)
+    return min((result, other), key=lambda each: (not each.preflight.passed, each.trajectory.duration))
 
 
-def _slowed(untimed: Untimed, course: Callable[[float], Timed], most: int, follows: bool = False) -> RobotMovement:
+def _slowed(planned: PlannedPath, course: Callable[[float], Timed], most: int, follows: bool = False) -> RobotMovement:
     """The movement as many times as slowly as its course is at the least factor from 1 on with which it passes.
 
     What the checks of one factor demand is the next one, if it lies between the largest that fails and the least that
     passes. With `follows` it is the speed that leads the tip off its path.
     """
-    robot, joints, factor = untimed.robot, untimed.joints, 1.0
-    made = first = _checked(untimed, course(factor))
+    robot, joints, factor = planned.robot, planned.joints, 1.0
+    # The accelerations of a cubic spline are largest at its knots. Few samples say too much.
+    velocities, accelerations = (np.abs(joints(joints.x, order)).max(axis=0) for order in (1, 2))
+    enough = float(max((velocities / robot.velocity).max(), np.sqrt((accelerations / robot.acceleration).max())))
+    result = first = _checked(planned, course(factor))
     fails, passes, passing = 1.0, np.inf, None
     for k in range(_ROUNDS):
-        if made.preflight.passed:
-            passes, passing = factor, made
-            if factor == 1 or passes / fails < _CLOSE or _used(made) * _CLOSE > 1:
+        if result.preflight.passed:
+            passes, passing = factor, result
+            # The share of the limits that speed is up to, as a factor of the duration.
+            used = max(c.slower for c in result.preflight.checks if c.what.removesuffix(SAMPLING) in _OF_SPEED)
+            if factor == 1 or passes / fails < _CLOSE or used * _CLOSE > 1:
                 break
-            factor *= max(_used(made), float(np.sqrt(fails / factor)))
+            factor *= max(used, float(np.sqrt(fails / factor)))
         else:
-            needed = _needed(untimed, made, follows)
+            needed = _needed(result, follows)
             if not np.isfinite(needed):
                 break
             fails = factor
-            factor *= max(min(needed, _least(robot, joints, factor)), 1 + _A_LITTLE * 2**k)
+            factor *= max(min(needed, max(2.0, enough / factor)), 1 + _A_LITTLE * 2**k)  # 2 at least, for torques
             if factor >= passes:
                 factor = float(np.sqrt(fails * passes))
-        n_samples(factor * float(joints.x[-1]), untimed.rate, most)
-        made = _checked(untimed, course(factor))
-    return passing or (made if np.isfinite(_needed(untimed, made, follows)) else first)
+        n_samples(factor * float(joints.x[-1]), planned.rate, most)
+        result = _checked(planned, course(factor))
+    return passing or (result if np.isfinite(_needed(result, follows)) else first)
 
 
-def _needed(untimed: Untimed, made: RobotMovement, follows: bool) -> float:
-    """How many times slower the checks that failed demand; a distance from the path falls with the square of it."""
-    return max(
-        (_off_path(c) if follows and c.what == "tracking" else c.slower for c in made.preflight.failed), default=1.0
+def _needed(movement: RobotMovement, follows: bool) -> float:
+    """Return how many times slower failed checks demand; a distance from the path falls with the square of it."""
+    factors = (
+        float(np.sqrt(check.worst / check.limit)) if follows and check.what == "tracking" else check.slower
+        for check in movement.preflight.failed
     )
+    return max(factors, default=1.0)
 
 
-def _off_path(check: Check) -> float:
-    return float(np.sqrt(check.worst / check.limit))
+def _checked(planned: PlannedPath, movement: Timed) -> RobotMovement:
+    """Join the approach and the movement, and check both; the approach is slow enough for torques."""
+    result = _assembled(planned, movement)
+    slower = max((check.slower for check in result.preflight.failed if check.time < result.begins), default=1.0)
+    return _assembled(planned, movement, slower * _APPROACH) if 1 < slower < np.inf else result
 
 
-def _used(made: RobotMovement) -> float:
-    """What share of the limits that speed is up to the movement takes, as a factor of its duration."""
-    return max(c.slower for c in made.preflight.checks if c.what.removesuffix(SAMPLING) in _OF_SPEED)
-
-
-def _least(robot: Robot, joints: CubicSpline, factor: float) -> float:
-    """How many times slower than with `factor` velocities and accelerations must be; 2 at least, for torques.
-
-    The accelerations of a cubic spline are largest at its knots. Few samples say too much.
-    """
-    velocities, accelerations = (np.abs(joints(joints.x, order)).max(axis=0) for order in (1, 2))
-    needed = max((velocities / robot.velocity).max(), np.sqrt((accelerations / robot.acceleration).max()))
-    return max(2.0, float(needed) / factor)
-
-
-def _checked(untimed: Untimed, movement: Timed) -> RobotMovement:
-    """The approach and the movement, and the checks of both; the approach slow enough for torques."""
-    made = _assembled(untimed, movement)
-    slower = max((check.slower for check in made.preflight.failed if check.time < made.begins), default=1.0)
-    return _assembled(untimed, movement, slower * _APPROACH) if 1 < slower < np.inf else made
-
-
-def _assembled(untimed: Untimed, movement: Timed, longer: float = 1.0) -> RobotMovement:
-    robot, generated = untimed.robot, movement.generated
-    in_force = np.searchsorted(untimed.step_times, generated + 1e-9, "right") - 1
-    steps = {name: values[in_force] for name, values in untimed.steps.items()}
-    along = {name: np.interp(generated, untimed.step_times, x) for name, x in untimed.continuous.items()}
+def _assembled(planned: PlannedPath, movement: Timed, longer: float = 1.0) -> RobotMovement:
+    robot, generated = planned.robot, movement.generated
+    in_force = np.searchsorted(planned.step_times, generated + 1e-9, "right") - 1
+    steps = {name: values[in_force] for name, values in planned.steps.items()}
+    along = {name: np.interp(generated, planned.step_times, x) for name, x in planned.continuous.items()}
     second = replace(movement.trajectory, steps=steps | along)
-    first = approach(robot, untimed.start, second.positions[0], untimed.rate, longer)
-    whole = joined(first, second)
-    times = dense_times(robot, whole)
-    times = times[np.searchsorted(times, first.duration - 1e-9) :]
-    report = preflight(robot, whole, _wanted(untimed, movement, times, first.duration), untimed.follow)
-    report = replace(report, checks=(*report.checks, *_steps(untimed, whole)))
-    wanted = _wanted(untimed, movement, first.duration + second.times, first.duration)
-    return RobotMovement(robot, whole, wanted, report, first.duration, second.duration / float(generated[-1]))
+    first = approach(robot, planned.start, second.positions[0], planned.rate, longer)
+    trajectory = joined(first, second)
 
+    def target_poses(times: Array) -> TaskPath | None:
+        if planned.path is None:
+            return None
+        at = PchipInterpolator(movement.trajectory.times, generated)(times - first.duration)
+        return planned.path.at(np.clip(at, 0.0, generated[-1]))._replace(times=times)
 
-def _steps(untimed: Untimed, trajectory: JointTrajectory) -> Iterator[Check]:
-    velocities = untimed.joints(untimed.step_times, 1)
-    for name, values in untimed.steps.items():
-        yield steps_kept(untimed.robot, trajectory, Steps(name, values, velocities))
-
-
-def _wanted(untimed: Untimed, movement: Timed, times: Array, begins: float) -> TaskPath | None:
-    """The poses of the tip at times of the trajectory, in which the movement begins at `begins` [s]."""
-    if untimed.path is None:
-        return None
-    generated = PchipInterpolator(movement.trajectory.times, movement.generated)(times - begins)
-    return untimed.path.at(np.clip(generated, 0.0, movement.generated[-1]))._replace(times=times)
+    times = dense_times(robot, trajectory)
+    report = preflight(
+        robot, trajectory, target_poses(times[np.searchsorted(times, first.duration - 1e-9) :]), planned.follow
+    )
+    velocities = planned.joints(planned.step_times, 1)
+    kept = (steps_kept(robot, trajectory, Steps(name, values, velocities)) for name, values in planned.steps.items())
+    report = replace(report, checks=(*report.checks, *kept))
+    path, factor = target_poses(first.duration + second.times), second.duration / float(generated[-1])
+    return RobotMovement(robot, trajectory, path, report, first.duration, factor)

@@ -1,4 +1,4 @@
-"""What an arm does with each column of a recording: its tip goes there, its joints do, or it is a step."""
+"""Roles of the columns of a recording for an arm: positions of its tip or of its joints, or steps."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def roles_of(channels: Channels | None, n_columns: int, space: str, robot: Robot
         turned = (quaternion, slice(3, 7)) if posed else None
         return Roles(positions, (), turned, {}, {}, list(range(n_columns)))
     at = list(zip(channels, columns_of(channels), strict=True))
-    along = [(one, columns.start) for one, columns in at if one.kind in _KINDS[space]]
+    along = [(channel, columns.start) for channel, columns in at if channel.kind in _KINDS[space]]
     angles = [channel.name for channel in channels if channel.kind == "angle" and space == "tip"]
     if angles:
         raise TrajectoryError(
@@ -75,22 +75,23 @@ def roles_of(channels: Channels | None, n_columns: int, space: str, robot: Robot
             "convert them to columns qw, qx, qy, qz or leave them out (columns=, in the shell --columns, --exclude); "
             "of a gripper say --kind gripper=discrete, of joints --joints"
         )
-    orientations = [(one, columns) for one, columns in at if one.kind == "orientation" and space == "tip"]
+    orientations = [pair for pair in at if pair[0].kind == "orientation" and space == "tip"]
     if len(orientations) > 1:
-        named = ", ".join(one.name for one, _ in orientations)
+        named = ", ".join(channel.name for channel, _ in orientations)
         raise TrajectoryError(f"expected one orientation of the tip, got {named}; read the columns of one of them")
-    discrete = {one.name: columns.start for one, columns in at if one.kind == "discrete"}
-    moving = [k for one, columns in at if one.kind != "discrete" for k in range(columns.start, columns.stop)]
-    joints = None if robot is None or space != "joints" else joints_among([one.name for one, _ in along], robot)
+    discrete = {channel.name: columns.start for channel, columns in at if channel.kind == "discrete"}
+    moving = [k for channel, columns in at if channel.kind != "discrete" for k in range(columns.start, columns.stop)]
+    names = [channel.name for channel, _ in along]
+    joints = None if robot is None or space != "joints" else joints_among(names, robot)
     continuous = {}
     if joints is not None:
-        continuous = {one.name: column for k, (one, column) in enumerate(along) if k not in joints}
+        continuous = {channel.name: column for k, (channel, column) in enumerate(along) if k not in joints}
         along = [along[k] for k in joints]
     elif robot is not None and space == "joints" and len(along) == robot.n_joints:
-        check_order([one.name for one, _ in along], robot)
+        check_order(names, robot)
     return Roles(
         [column for _, column in along],
-        tuple(one for one, _ in along),
+        tuple(channel for channel, _ in along),
         orientations[0] if orientations else None,
         discrete,
         continuous,
@@ -180,7 +181,7 @@ def check_plausible(positions: Array, robot: Robot) -> None:
 
 
 def space_of(channels: Channels | None, columns: Array, robot: Robot) -> str:
-    """Whether recorded columns (T, m) move the joints of this arm or its tip.
+    """Tell whether recorded columns (T, m) move the joints of this arm or its tip.
 
     The joints: columns with the names of its joints, as many angles as the arm has joints, or as many columns, of which
     nothing is known and which are neither points nor poses.
@@ -197,7 +198,7 @@ def space_of(channels: Channels | None, columns: Array, robot: Robot) -> str:
 
 
 def joints_among(names: Sequence[str], robot: Robot) -> list[int] | None:
-    """Which of the columns is each joint of an arm, by its name; None unless every joint has exactly one.
+    """Find the column of each joint of an arm, by its name; None unless every joint has exactly one.
 
     Units, what stands before the name of the joint as that of a feature or a topic, the ``.pos`` of LeRobot's drivers,
     and the side of one arm of two, as ``left_elbow_flex``, are no part of it. Without such names, those columns are
@@ -214,7 +215,7 @@ def joints_among(names: Sequence[str], robot: Robot) -> list[int] | None:
     if (exact := _single(places)) is not None:
         return exact
     if all(places) and {*names} == {names[k] for place in places for k in place}:
-        joint, several = max(zip(robot.joints, places, strict=True), key=lambda one: len(one[1]))
+        joint, several = max(zip(robot.joints, places, strict=True), key=lambda pair: len(pair[1]))
         raise TrajectoryError(
             f"expected one column for each joint, got {', '.join(names[k] for k in several)} for {joint}; choose with "
             f"columns=, in the shell --columns '{plain[several[0]].removesuffix(joint)}*'"
@@ -290,7 +291,7 @@ def _differing(columns: Sequence[_Words], joints: Sequence[_Words]) -> list[int]
 
 
 def _different(names: Sequence[_Words]) -> list[_Words]:
-    """What is left of each name without the words with which all begin, and those in which all end."""
+    """Return what is left of each name without the words with which all begin, and those in which all end."""
     shortest = min(map(len, names))
     first = next((k for k in range(shortest) if len({words[k] for words in names}) > 1), shortest)
     last = next((k for k in range(shortest - first) if len({words[-1 - k] for words in names}) > 1), shortest - first)

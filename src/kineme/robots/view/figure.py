@@ -18,18 +18,18 @@ _LEAST_SPAN = 0.05  # of what the limits allow: so much of it is drawn at least,
 _LONGEST = 34  # letters of the name of a joint
 
 
-def draw_robot_movement(made: RobotMovement) -> Figure:
+def draw_robot_movement(movement: RobotMovement) -> Figure:
     """The path of the tip, wanted and executed, and each joint over time with its limits."""
-    trajectory, robot = made.trajectory, made.robot
+    trajectory, robot = movement.trajectory, movement.robot
     n = robot.n_joints + len(trajectory.steps)
     figure = new_figure(8.4, max(3.6, 1.0 + _ROW * n))
     left, right = figure.subfigures(1, 2, width_ratios=(1.0, 1.25))  # type: ignore[misc]
-    _draw_path(left, made)
+    _draw_path(left, movement)
     rows = right.subplots(n, 1, sharex=True, squeeze=False)[:, 0]
     for j, axes in enumerate(rows[: robot.n_joints]):
-        _draw_joint(axes, made, j)
+        _draw_joint(axes, movement, j)
     for axes, (name, values) in zip(rows[robot.n_joints :], trajectory.steps.items(), strict=True):
-        axes.axvspan(0, made.begins, color=GRAY, alpha=0.12, linewidth=0)
+        axes.axvspan(0, movement.begins, color=GRAY, alpha=0.12, linewidth=0)
         axes.step(trajectory.times, values, color=BLUE, where="post")
         _name(axes, _short(name))
     rows[-1].set_xlabel("time [s]")
@@ -37,12 +37,12 @@ def draw_robot_movement(made: RobotMovement) -> Figure:
     return figure
 
 
-def _draw_path(figure: Any, made: RobotMovement) -> None:
-    executed, first = kinematics(made.robot, made.trajectory.positions)[0], made.first
+def _draw_path(figure: Any, movement: RobotMovement) -> None:
+    executed, first = kinematics(movement.robot, movement.trajectory.positions)[0], movement.first
     axes = figure.add_subplot(projection="3d")
     axes.plot(*executed[: first + 1].T, color=GRAY, linestyle=":", label="approach")
-    if made.path is not None:
-        axes.plot(*made.path.positions.T, color=ORANGE, linewidth=4, alpha=0.5, label="wanted")
+    if movement.path is not None:
+        axes.plot(*movement.path.positions.T, color=ORANGE, linewidth=4, alpha=0.5, label="wanted")
     axes.plot(*executed[first:].T, color=BLUE, label="executed")
     axes.scatter(*executed[first], color=BLUE, s=24, label="start")
     axes.scatter(*executed[-1], color=BLUE, s=40, marker="*", label="goal")
@@ -52,13 +52,13 @@ def _draw_path(figure: Any, made: RobotMovement) -> None:
         axes.locator_params(axis=name, nbins=4 if extent > extents.max() / 2 else 2)  # numbers side by side
         getattr(axes, f"set_{name}label")(f"{name} [m]")
     figure.legend(loc="outside lower center", ncols=3)
-    figure.suptitle(f"tip of {drawable(made.robot.name)}", fontsize=9)
+    figure.suptitle(f"tip of {drawable(movement.robot.name)}", fontsize=9)
 
 
-def _draw_joint(axes: Any, made: RobotMovement, j: int) -> None:
-    robot, times, values = made.robot, made.trajectory.times, made.trajectory.positions[:, j]
+def _draw_joint(axes: Any, movement: RobotMovement, j: int) -> None:
+    robot, times, values = movement.robot, movement.trajectory.times, movement.trajectory.positions[:, j]
     lower, upper = float(robot.lower[j]), float(robot.upper[j])
-    axes.axvspan(0, made.begins, color=GRAY, alpha=0.12, linewidth=0)
+    axes.axvspan(0, movement.begins, color=GRAY, alpha=0.12, linewidth=0)
     axes.plot(times, values, color=BLUE)
     room = 0.3 * max(float(np.ptp(values)), 0.5)
     for limit in (lower, upper):

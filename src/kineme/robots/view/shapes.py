@@ -1,4 +1,4 @@
-"""What of an arm is drawn: its links and joints as a URDF without names, and the meshes of its links."""
+"""Drawing of an arm: its links and joints as a URDF without names, and the meshes of its links."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _THIN, _THICK = 0.01, 0.05  # bounds of that radius [m]
 
 
 class Shapes(NamedTuple):
-    """What is drawn. Links are called l0, l1, ... and joints j0, j1, ...: no name of the file is in the text."""
+    """Shapes of an arm. Links are called l0, l1, ... and joints j0, j1, ...: no name of the file is in the text."""
 
     urdf: str
     meshes: tuple[Mesh, ...]  # a file name in `urdf` is an index into them
@@ -52,18 +52,18 @@ def shapes_of(robot: Robot) -> Shapes:
     drawn = {name: drawer.of(link) for name, link in zip(links, root.findall("link"), strict=True)}
     nothing = not any(drawn.values())
     bare = [name for name in links if not drawn[name] and (nothing or name in drawer.without)]
-    made = ElementTree.Element("robot", name="arm")
+    arm = ElementTree.Element("robot", name="arm")
     for i, (name, link) in enumerate(links.items()):
-        to = ElementTree.SubElement(made, "link", name=link)
+        to = ElementTree.SubElement(arm, "link", name=link)
         shapes = drawn[name] if name not in bare else list(_cylinders(root, name))
         for shape in shapes:
             set_color(shape, _GRAYS[i % 2])
         to.extend(shapes)
     moving = {str(joint.get("name")): joint for joint in root.findall("joint") if joint.get("name") in robot.joints}
     for joint in root.findall("joint"):
-        made.append(_joint(joint, joints[str(joint.get("name"))], links, str(joint.get("name")) in moving))
+        arm.append(_joint(joint, joints[str(joint.get("name"))], links, str(joint.get("name")) in moving))
     return Shapes(
-        ElementTree.tostring(made, "unicode"),
+        ElementTree.tostring(arm, "unicode"),
         tuple(drawer.meshes),
         tuple(joints[name] for name in robot.joints),
         links[robot.tip],
@@ -74,15 +74,15 @@ def shapes_of(robot: Robot) -> Shapes:
 def _joint(given: Element, name: str, links: dict[str, str], moves: bool) -> Element:
     """The joint; one that the arm does not move is fixed where the model has it, at 0."""
     kind = ("prismatic" if given.get("type") == "prismatic" else "revolute") if moves else "fixed"
-    made = ElementTree.Element("joint", name=name, type=kind)
-    made.append(origin_of(given))
+    joint = ElementTree.Element("joint", name=name, type=kind)
+    joint.append(origin_of(given))
     for end in ("parent", "child"):
-        found = given.find(end)
-        ElementTree.SubElement(made, end, link=links["" if found is None else str(found.get("link"))])
+        link = given.find(end)
+        ElementTree.SubElement(joint, end, link=links["" if link is None else str(link.get("link"))])
     axis = given.find("axis")
     values = [] if axis is None else finite_numbers(axis.get("xyz"), 3)
-    ElementTree.SubElement(made, "axis", xyz=as_text(values if any(values) else [1.0, 0.0, 0.0]))
-    return made
+    ElementTree.SubElement(joint, "axis", xyz=as_text(values if any(values) else [1.0, 0.0, 0.0]))
+    return joint
 
 
 def _cylinders(root: Element, link: str) -> Iterator[Element]:
@@ -95,13 +95,13 @@ def _cylinders(root: Element, link: str) -> Iterator[Element]:
         length = math.hypot(x, y, z)
         if length < 1e-3:
             continue
-        made = ElementTree.Element("visual")
+        visual = ElementTree.Element("visual")
         turned = [0.0, math.acos(z / length), math.atan2(y, x)]
-        ElementTree.SubElement(made, "origin", xyz=as_text([x / 2, y / 2, z / 2]), rpy=as_text(turned))
+        ElementTree.SubElement(visual, "origin", xyz=as_text([x / 2, y / 2, z / 2]), rpy=as_text(turned))
         radius = min(max(_THICKNESS * length, _THIN), _THICK)
         shape = ElementTree.Element("cylinder", radius=as_text([radius]), length=as_text([length]))
-        ElementTree.SubElement(made, "geometry").append(shape)
-        yield made
+        ElementTree.SubElement(visual, "geometry").append(shape)
+        yield visual
 
 
 class Mesh(NamedTuple):
@@ -129,9 +129,9 @@ class LinkShapes:
     def of(self, link: Element) -> list[Element]:
         """The visual shapes of a link, or else its collision shapes; none where they cannot be drawn."""
         for tag in ("visual", "collision"):
-            found = [shape for one in link.findall(tag) if (shape := self._shape(one)) is not None]
-            if found:
-                return found
+            shapes = [shape for given in link.findall(tag) if (shape := self._shape(given)) is not None]
+            if shapes:
+                return shapes
         if link.find("visual") is not None or link.find("collision") is not None:
             self.without.append(str(link.get("name")))
         return []
@@ -141,16 +141,16 @@ class LinkShapes:
         shape = None if geometry is None or len(geometry) == 0 else self._geometry(geometry[0])
         if shape is None:
             return None
-        made = ElementTree.Element("visual")
-        made.append(origin_of(given))
-        ElementTree.SubElement(made, "geometry").append(shape)
+        visual = ElementTree.Element("visual")
+        visual.append(origin_of(given))
+        ElementTree.SubElement(visual, "geometry").append(shape)
         color = given.find("material/color")
         if color is None and (material := given.find("material")) is not None:
             color = self.colors.get(material.get("name"))
         values = [] if color is None else finite_numbers(color.get("rgba"), 4)
         if values:
-            set_color(made, tuple(min(max(value, 0.0), 1.0) for value in values))
-        return made
+            set_color(visual, tuple(min(max(value, 0.0), 1.0) for value in values))
+        return visual
 
     def _geometry(self, given: Element) -> Element | None:
         if given.tag == "mesh":
@@ -197,8 +197,8 @@ def root_with_shapes(robot: Robot) -> Element:
         return root
     links = {link.get("name"): link for link in shown.findall("link")}
     for mesh in shown.iterfind("link/visual/geometry/mesh"):
-        found = find_mesh(mesh.get("filename", ""), path)
-        mesh.set("filename", "" if found is None else str(found))
+        file = find_mesh(mesh.get("filename", ""), path)
+        mesh.set("filename", "" if file is None else str(file))
     for link in root.findall("link"):
         like = links.get(link.get("name"))
         if like is not None and like.find("visual") is not None:
@@ -210,7 +210,7 @@ def root_with_shapes(robot: Robot) -> Element:
 
 
 def robots_folder() -> Path | None:
-    """Where the package has its robots; None where it is not installed."""
+    """Find the folder of the robots of the package; None where it is not installed."""
     try:
         folder = Path(str(distribution(_PACKAGE).locate_file(_ROBOTS)))
     except PackageNotFoundError:

@@ -32,7 +32,7 @@ _SCENE = "vendor/scene.min.js"
 _LICENSES = ("vendor/LICENSE-three.txt", "vendor/LICENSE-urdf-loader.txt")
 
 
-def write_view(path: str | Path, made: RobotMovement) -> Path:
+def write_view(path: str | Path, movement: RobotMovement) -> Path:
     """Write a page in which the arm moves: one HTML file that opens in a browser without server and network.
 
     The page shows the arm with the visual shapes of its URDF, the path that was wanted and the one that is executed,
@@ -44,7 +44,7 @@ def write_view(path: str | Path, made: RobotMovement) -> Path:
     ----------
     path : str or Path
         Replaced if it is there.
-    made : RobotMovement
+    movement : RobotMovement
         From `move`.
 
     Returns
@@ -58,66 +58,56 @@ def write_view(path: str | Path, made: RobotMovement) -> Path:
     OSError
         The folder is missing, read-only or full.
     """
-    return write_atomically(Path(path), view_page(made).encode())
+    return write_atomically(Path(path), view_page(movement).encode())
 
 
-def view_page(made: RobotMovement) -> str:
+def view_page(movement: RobotMovement) -> str:
     """The text of the page."""
-    shapes = shapes_of(made.robot)
+    shapes = shapes_of(movement.robot)
     scripts = {"scene": _asset(_SCENE), "viewer": _asset("page/viewer.js")}
     style = _asset("page/viewer.css")
+    n_failed = len(movement.preflight.failed)
+    checks = f"{counted(n_failed, 'check')} FAILED." if n_failed else "All checks passed."
     parts = {
         **scripts,
         "style": style,
-        "policy": _policy(list(scripts.values()), style),
-        "title": in_markup(f"{made.robot.name} moves"),
-        "summary": in_markup(_summary(made)),
-        "notes": _notes(made, shapes.stand_ins),
-        "charts": charts(made),
-        "preflight": _preflight(made),
-        "data": as_script_data(scene_data(made, shapes)),
+        "policy": (
+            f"default-src 'none'; script-src {' '.join(map(_hash, scripts.values()))}; style-src {_hash(style)}; "
+            "img-src data:; base-uri 'none'; form-action 'none'"
+        ),
+        "title": in_markup(f"{movement.robot.name} moves"),
+        "summary": in_markup(f"{duration_in_words(movement)}. {checks}"),
+        "notes": _notes(movement, shapes.stand_ins),
+        "charts": charts(movement),
+        "preflight": _preflight(movement),
+        "data": as_script_data(scene_data(movement, shapes)),
         "licenses": "\n\n".join(in_markup(_asset(name)) for name in _LICENSES),
     }
-    return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], _asset("page/page.html"))
+    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], _asset("page/page.html"))
 
 
 def _asset(name: str) -> str:
     return (_FOLDER / name).read_text(encoding="utf-8")
 
 
-def _policy(scripts: list[str], style: str) -> str:
-    allowed = " ".join(map(_hash, scripts))
-    return (
-        f"default-src 'none'; script-src {allowed}; style-src {_hash(style)}; img-src data:; "
-        "base-uri 'none'; form-action 'none'"
-    )
-
-
 def _hash(text: str) -> str:
     return f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'"
 
 
-def _summary(made: RobotMovement) -> str:
-    result = (
-        "All checks passed." if made.preflight.passed else f"{counted(len(made.preflight.failed), 'check')} FAILED."
-    )
-    return f"{duration_in_words(made)}. {result}"
-
-
-def _notes(made: RobotMovement, stand_ins: tuple[str, ...]) -> str:
-    notes = list(made.robot.assumed)
+def _notes(movement: RobotMovement, stand_ins: tuple[str, ...]) -> str:
+    notes = list(movement.robot.assumed)
     if stand_ins:
         why = "their meshes are not there, no STL or COLLADA files, or too large to be in this page"
         notes.append(f"drawn as cylinders up to the next joint: {', '.join(map(printable, stand_ins))}; {why}")
-    if len(made.trajectory) > MOST_SAMPLES:
-        notes.append(f"{MOST_SAMPLES:,} of {len(made.trajectory):,} samples are in this page")
+    if len(movement.trajectory) > MOST_SAMPLES:
+        notes.append(f"{MOST_SAMPLES:,} of {len(movement.trajectory):,} samples are in this page")
     return "".join(f"<li>{in_markup(note)}</li>" for note in notes)
 
 
-def _preflight(made: RobotMovement) -> str:
-    """The table of checks; rows of those that failed stand first and carry a class."""
-    table = preflight_table(made.preflight)
-    rows = sorted(zip(made.preflight.checks, table.rows, strict=True), key=lambda pair: pair[0].passed)
+def _preflight(movement: RobotMovement) -> str:
+    """Write the table of checks; rows of those that failed stand first and carry a class."""
+    table = preflight_table(movement.preflight)
+    rows = sorted(zip(movement.preflight.checks, table.rows, strict=True), key=lambda pair: pair[0].passed)
     heads = "".join(f'<th scope="col">{in_markup(head or "result")}</th>' for head in table.columns)
     lines = "".join(_row(cells, check.passed) for check, cells in rows)
     return f"<table><thead><tr>{heads}</tr></thead><tbody>\n{lines}</tbody></table><p>{in_markup(table.reading)}</p>"
@@ -129,17 +119,17 @@ def _row(cells: tuple[str, ...], passed: bool) -> str:
     return f'{opened}<th scope="row">{in_markup(cells[0])}</th>{values}</tr>\n'
 
 
-def charts(made: RobotMovement) -> str:
+def charts(movement: RobotMovement) -> str:
     """A figure for each joint, from its lower limit to its upper one, and for each discrete channel."""
-    trajectory, robot = made.trajectory, made.robot
+    trajectory, robot = movement.trajectory, movement.robot
     columns = zip(trajectory.joints, trajectory.positions.T, robot.lower, robot.upper, robot.units, strict=True)
-    figures = [_chart(made, name, values, (low, high), unit) for name, values, low, high, unit in columns]
-    return "\n".join(figures + [_chart(made, name, values, None, "") for name, values in trajectory.steps.items()])
+    figures = [_chart(movement, name, values, (low, high), unit) for name, values, low, high, unit in columns]
+    return "\n".join(figures + [_chart(movement, name, values, None, "") for name, values in trajectory.steps.items()])
 
 
-def _chart(made: RobotMovement, name: str, values: Array, limits: tuple[float, float] | None, unit: str) -> str:
-    times = made.trajectory.times
-    kept = evenly_spaced(len(times), _POINTS)
+def _chart(movement: RobotMovement, name: str, values: Array, limits: tuple[float, float] | None, unit: str) -> str:
+    times = movement.trajectory.times
+    shown = evenly_spaced(len(times), _POINTS)
     low, high = (float(values.min()), float(values.max()))
     if limits is not None:
         low, high = min(low, limits[0]), max(high, limits[1])
@@ -149,46 +139,43 @@ def _chart(made: RobotMovement, name: str, values: Array, limits: tuple[float, f
     def y(value: Array) -> Array:
         return np.asarray(HEIGHT - _EDGE - scale * (value - low))
 
-    x, drawn = times[kept] * across, y(values[kept])
+    x, drawn = times[shown] * across, y(values[shown])
     if limits is None:  # a value holds until the next one
         x, drawn = np.repeat(x, 2)[1:], np.repeat(drawn, 2)[:-1]
     line = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, drawn, strict=True))
-    lines = "" if limits is None else "".join(_level(float(y(np.asarray(limit)))) for limit in limits)
-    shown = "" if limits is None else f"limits {limits[0]:.3g} to {limits[1]:.3g} {unit}"
+    levels = [float(y(np.asarray(limit))) for limit in limits or ()]
+    lines = "".join(f'<line class="limit" x2="{WIDTH:g}" y1="{level:.1f}" y2="{level:.1f}"/>' for level in levels)
+    range_text = "" if limits is None else f"limits {limits[0]:.3g} to {limits[1]:.3g} {unit}"
     extent = f"from {values.min():.3g} to {values.max():.3g} {unit}".strip()
-    words = in_markup(f"{name} over time: {extent}{'; ' + shown if shown else ''}")
+    words = in_markup(f"{name} over time: {extent}{'; ' + range_text if range_text else ''}")
     return (
         f'<figure class="chart"><figcaption><span class="name">{in_markup(name)}</span> '
         f'<output data-unit="{unit}"></output></figcaption>'
         f'<svg viewBox="0 0 {WIDTH:g} {HEIGHT:g}" preserveAspectRatio="none" role="img" aria-label="{words}">'
-        f'<rect class="approach" width="{made.begins * across:.1f}" height="{HEIGHT:g}"/>{lines}'
+        f'<rect class="approach" width="{movement.begins * across:.1f}" height="{HEIGHT:g}"/>{lines}'
         f'<polyline class="joint" points="{line}"/><line class="cursor" y2="{HEIGHT:g}"/></svg>'
-        f'<p class="limits">{shown or "a discrete channel"}</p></figure>'
+        f'<p class="limits">{range_text or "a discrete channel"}</p></figure>'
     )
 
 
-def _level(y: float) -> str:
-    return f'<line class="limit" x2="{WIDTH:g}" y1="{y:.1f}" y2="{y:.1f}"/>'
-
-
-def scene_data(made: RobotMovement, shapes: Shapes) -> dict[str, Any]:
+def scene_data(movement: RobotMovement, shapes: Shapes) -> dict[str, Any]:
     """Times, joint positions [rad, m] and positions of the tip [m], rounded to a millionth."""
-    trajectory = made.trajectory
-    kept = evenly_spaced(len(trajectory), MOST_SAMPLES)
-    tip = kinematics(made.robot, trajectory.positions)[0]
-    wanted = np.empty((0, 3)) if made.path is None else made.path.positions
+    trajectory = movement.trajectory
+    sent = evenly_spaced(len(trajectory), MOST_SAMPLES)
+    tip = kinematics(movement.robot, trajectory.positions)[0]
+    wanted = np.empty((0, 3)) if movement.path is None else movement.path.positions
     return {
         "urdf": shapes.urdf,
         "meshes": [{"kind": mesh.kind, "content": b64encode(mesh.content).decode()} for mesh in shapes.meshes],
         "joints": shapes.joints,
         "tip": shapes.tip,
-        "times": _rounded(trajectory.times[kept]),
-        "positions": _rounded(trajectory.positions[kept]),
-        "steps": [_rounded(values[kept]) for values in trajectory.steps.values()],
-        "executed": _rounded(tip[kept]),
+        "times": _rounded(trajectory.times[sent]),
+        "positions": _rounded(trajectory.positions[sent]),
+        "steps": [_rounded(values[sent]) for values in trajectory.steps.values()],
+        "executed": _rounded(tip[sent]),
         "wanted": _rounded(wanted[evenly_spaced(len(wanted), MOST_SAMPLES)] if len(wanted) else wanted),
-        "begins": round(made.begins, 6),
-        "start": _rounded(tip[made.first]),
+        "begins": round(movement.begins, 6),
+        "start": _rounded(tip[movement.first]),
         "goal": _rounded(tip[-1]),
         "colors": {"executed": BLUE, "wanted": ORANGE, "approach": GRAY, "goal": GREEN},
     }
