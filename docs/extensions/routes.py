@@ -22,9 +22,9 @@ def pages() -> Iterator[tuple[str, str]]:
 
 def description() -> dict[str, Any]:
     """The interface as OpenAPI; no library is opened."""
-    from kineme.studio.server.app import ABOUT, REFUSALS, ROUTERS, Described
+    from kineme.studio.server.app import ABOUT, REFUSALS, ROUTERS, StudioApp
 
-    app = Described(title="kineme studio", description=ABOUT, responses=REFUSALS)
+    app = StudioApp(title="kineme studio", description=ABOUT, responses=REFUSALS)
     for router in ROUTERS:
         app.include_router(router)
     return app.openapi()
