@@ -76,9 +76,9 @@ _TABLE = (
 def _spellings(names: str) -> Iterator[str]:
     """Names, also in the plural where an (s) says so, and as the British write them."""
     for name in names.split():
-        for one in (name, f"{name[:-5]}re(s)") if name.endswith("meter(s)") else (name,):
-            singular = one.removesuffix("(s)")
-            yield from (singular, f"{singular}s") if one != singular else (one,)
+        for spelling in (name, f"{name[:-5]}re(s)") if name.endswith("meter(s)") else (name,):
+            singular = spelling.removesuffix("(s)")
+            yield from (singular, f"{singular}s") if spelling != singular else (spelling,)
 
 
 #: Spelling in lower case -> unit.

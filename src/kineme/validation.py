@@ -79,7 +79,7 @@ def as_numbers(values: ArrayLike, who: str, expected: str = "an array of numbers
     refuse_lossy(values, who)
     try:
         array = np.asarray(values)
-        hidden = array.dtype.kind == "O" and any(isinstance(one, (complex, np.complexfloating)) for one in array.flat)
+        hidden = array.dtype.kind == "O" and any(isinstance(item, (complex, np.complexfloating)) for item in array.flat)
         numbers = None if hidden or array.dtype.kind == "c" else array.astype(np.float64, copy=False)
     except (TypeError, ValueError, OverflowError) as error:
         raise TrajectoryError(f"{who}: expected {expected}, got {error}") from error
@@ -169,7 +169,7 @@ def check_times(times: Array, offsets: NDArray[np.intp], names: Sequence[str | N
 def _count_short_steps(times: Array) -> int:
     """Count the stamps (total,) that follow the one before by less than `SHORTEST_STEP`."""
     blocks = (times[i : i + _STAMPS_AT_ONCE + 1] for i in range(0, len(times), _STAMPS_AT_ONCE))
-    return sum(int(np.count_nonzero(np.diff(one) < SHORTEST_STEP)) for one in blocks)
+    return sum(int(np.count_nonzero(np.diff(block) < SHORTEST_STEP)) for block in blocks)
 
 
 def too_small(positions: Array, offsets: NDArray[np.intp]) -> list[tuple[int, float]]:

@@ -73,16 +73,18 @@ def evaluate(data: tuple[str, ...], protocols: tuple[str, ...], methods: tuple[s
     settings = Settings(splits, options["seed"], tuple(options["shots"]) or (_QUICK_SHOTS if quick else ()))
     _check_read(data)
     reading = partial(read, options={name: options[name] for name in LAYOUT_OPTIONS})
-    sets = _numbered([load_data(one, reading) for one in data])
-    for name, reason in ((name, reason) for one in sets for name, reason in one.left_out.items()):
+    sets = _numbered([load_data(data_set, reading) for data_set in data])
+    for name, reason in ((name, reason) for data_set in sets for name, reason in data_set.left_out.items()):
         write(f"left out {name}: {reason}", err=True)
     runner = Runner(options["jobs"] or n_threads(), _progress)
     evaluations = []
-    for one in sets:
-        asked = protocols or tuple(name for name, each in PROTOCOLS.items() if each.runs_by_default(one))
-        evaluations.append(run(one, (asked, contenders), settings, out / one.name if len(sets) > 1 else out, runner))
-        _print(one.name if len(sets) > 1 else "", evaluations[-1])
-    _print_summary(summarize([one.name for one in sets], evaluations, out), evaluations[0].files[0])
+    for data_set in sets:
+        chosen = protocols or tuple(name for name, each in PROTOCOLS.items() if each.runs_by_default(data_set))
+        evaluations.append(
+            run(data_set, (chosen, contenders), settings, out / data_set.name if len(sets) > 1 else out, runner)
+        )
+        _print(data_set.name if len(sets) > 1 else "", evaluations[-1])
+    _print_summary(summarize([data_set.name for data_set in sets], evaluations, out), evaluations[0].files[0])
 
 
 def _check_read(data: tuple[str, ...]) -> None:
@@ -98,10 +100,12 @@ def _check_read(data: tuple[str, ...]) -> None:
 
 def _numbered(sets: list[Any]) -> list[Any]:
     """Data sets with names of their own: those of one name are numbered."""
-    names = [one.name for one in sets]
+    names = [data_set.name for data_set in sets]
     return [
-        one._replace(name=f"{one.name}-{names[: k + 1].count(one.name)}") if names.count(one.name) > 1 else one
-        for k, one in enumerate(sets)
+        data_set._replace(name=f"{data_set.name}-{names[: k + 1].count(data_set.name)}")
+        if names.count(data_set.name) > 1
+        else data_set
+        for k, data_set in enumerate(sets)
     ]
 
 

@@ -49,7 +49,7 @@ def inspect(
     contents = contents_of_all(files, options["follow_links"])
     unlike: tuple[int, ...] = ()
     recorded: Any = None
-    found: dict[str, Any] = {}
+    inspections: dict[str, Any] = {}
     try:
         recorded = read(recordings, options)
     except DataError as error:
@@ -61,11 +61,11 @@ def inspect(
         summary = summarize(recorded)
         texts = [as_words(summary)]
         if outliers:
-            unlike, found, words = _outliers(recorded, error_rate)
+            unlike, inspections, words = _outliers(recorded, error_rate)
             texts += [words] if words else []
         if plot is not None:
             _draw(recorded, unlike, plot)
-    data = as_data(summary) | found | ({"contents": contents_as_data(contents)} if contents else {})
+    data = as_data(summary) | inspections | ({"contents": contents_as_data(contents)} if contents else {})
     say(as_json, data, lambda: "\n\n".join([*contents_as_words(contents), *texts]))
     if recorded is None:
         click.get_current_context().exit(1)
@@ -81,13 +81,13 @@ def _outliers(recorded: Any, error_rate: float) -> tuple[tuple[int, ...], dict[s
     names = recorded.short_names
     try:
         with tqdm(total=len(names), desc="comparing", unit="movement", leave=False, disable=None) as bar:
-            found = find_outliers(recorded, recorded.labels, error_rate, lambda done: bar.update(done - bar.n))
+            outliers = find_outliers(recorded, recorded.labels, error_rate, lambda done: bar.update(done - bar.n))
     except KinemeError as error:
         return (), {}, f"outliers were not looked for: {error}"
     return (
-        tuple(one.index for one in found.found),
-        {"outliers": outliers_as_data(found, names)},
-        outliers_as_words(found, names),
+        tuple(outlier.index for outlier in outliers.found),
+        {"outliers": outliers_as_data(outliers, names)},
+        outliers_as_words(outliers, names),
     )
 
 

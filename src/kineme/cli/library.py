@@ -34,7 +34,7 @@ def list_symbols(folder: Path, version: int | None, as_json: bool) -> None:
     with opened(folder) as actions:
         shown = actions if version is None else actions.at(version)
         symbols, unlabeled = shown.symbols(), len(shown.unlabeled())
-        people = Counter(one for one in shown.groups().tolist() if one is not None)
+        people = Counter(person for person in shown.groups().tolist() if person is not None)
         data = {
             "movements": len(shown),
             "unlabeled": unlabeled,
@@ -234,17 +234,17 @@ def brief(symbol: Any) -> dict[str, Any]:
 def _report_text(data: dict[str, Any]) -> str:
     from kineme.reporting.table import Table, to_text
 
-    told = any(one["person"] for one in data["members"])
+    with_people = any(member["person"] for member in data["members"])
     rows = [
-        (str(one["id"]), printable(one["name"] or ""), printable(one["source"] or ""),
-         *((printable(one["person"] or ""),) if told else ()), f"{one['duration']:.3g}",
-         _point(one["start"], one), _point(one["goal"], one))
-        for one in data["members"]
+        (str(member["id"]), printable(member["name"] or ""), printable(member["source"] or ""),
+         *((printable(member["person"] or ""),) if with_people else ()), f"{member['duration']:.3g}",
+         _point(member["start"], member), _point(member["goal"], member))
+        for member in data["members"]
     ]  # fmt: skip
     head = f"{printable(data['name'])}  {data['id']}"
     if data["description"]:
         head += f"\n{printable(data['description'])}"
-    person = ("person",) if told else ()
+    person = ("person",) if with_people else ()
     return to_text(Table(head, ("movement", "name", "file", *person, "duration [s]", "start", "goal"), rows))
 
 

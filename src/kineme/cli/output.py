@@ -32,7 +32,7 @@ def check_new(path: Path | None, force: bool, *inputs: str | Path, remedy: str =
     """
     if path is None or str(path) == "-" or not path.exists():
         return
-    if any(Path(one).exists() and path.samefile(one) for one in inputs):
+    if any(Path(source).exists() and path.samefile(source) for source in inputs):
         raise click.UsageError(f"expected another file to write than the input {printable(path)}")
     if not force and path.is_file():
         raise click.UsageError(f"expected a new file to write, {printable(path)} is there; write over it with {remedy}")

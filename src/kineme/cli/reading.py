@@ -163,22 +163,22 @@ def read(paths: Path | Sequence[Path], options: dict[str, Any], library: Any = N
     from kineme.io.reading.recordings import read_paths
     from kineme.movements.tables.layout import Layout
 
-    known = {name.removesuffix("_column"): value for name, value in options.items()}
-    rule = NameRule(known.pop("label_pattern", None), known.pop("label_by", None))
-    how = {name: known.pop(name, False) for name in ("follow_links", "trim")}
-    how["join"] = bool(known.pop("join_files", False))
+    layout_options = {name.removesuffix("_column"): value for name, value in options.items()}
+    rule = NameRule(layout_options.pop("label_pattern", None), layout_options.pop("label_by", None))
+    how = {name: layout_options.pop(name, False) for name in ("follow_links", "trim")}
+    how["join"] = bool(layout_options.pop("join_files", False))
     for name in ("fill_gaps", "rows"):  # libraries store what was given
-        if known.get(name) is None:
-            known.pop(name, None)
+        if layout_options.get(name) is None:
+            layout_options.pop(name, None)
     if library is not None:
         from kineme.library.storage.source import known_sources
 
-        known["reference"] = known_sources(library.store)
-    known["kinds"] = dict(known.get("kinds") or ()) or None
+        layout_options["reference"] = known_sources(library.store)
+    layout_options["kinds"] = dict(layout_options.get("kinds") or ()) or None
     several = [paths] if isinstance(paths, Path) else list(paths)
-    files = [one for one in several if str(one) != "-"]
+    files = [path for path in several if str(path) != "-"]
     given = None if len(files) == len(several) else (STANDARD_INPUT, read_limited(sys.stdin.buffer))
-    return read_paths(files, Layout(**known), rule, **how, progress=_watched, standard_input=given)
+    return read_paths(files, Layout(**layout_options), rule, **how, progress=_watched, standard_input=given)
 
 
 def known_choices(parsed: Any, options: dict[str, Any], learned: Any) -> list[str]:
@@ -190,12 +190,14 @@ def known_choices(parsed: Any, options: dict[str, Any], learned: Any) -> list[st
     from kineme.movements.tables.layout import AS_KNOWN
 
     sentences = [
-        f"Read {one.layout.removesuffix(AS_KNOWN)}, as the movements of the library; say --topic or --frame for others"
-        for one in dict(parsed.detected)
-        if one.layout.endswith(AS_KNOWN)
+        f"Read {how.layout.removesuffix(AS_KNOWN)}, as the movements of the library; say --topic or --frame for others"
+        for how in dict(parsed.detected)
+        if how.layout.endswith(AS_KNOWN)
     ]
     columns = None if options["columns"] or learned is None else recorded_names(learned)
-    aside = sorted({name for one in dict(parsed.detected) if one.columns == columns for name in one.ignored if name})
+    aside = sorted(
+        {name for detected in dict(parsed.detected) if detected.columns == columns for name in detected.ignored if name}
+    )
     if aside:
         sentences.append(
             f"Read the columns of the library alone, {_some(columns or ())}, without {_some(aside)}; say --columns for "
@@ -292,17 +294,17 @@ def differences(learned: Any, asked: Any) -> list[str]:
     """
     from kineme.movements.channels.detect import name_of
 
-    if learned is None or not any(one.coordinates for one in learned):
+    if learned is None or not any(channel.coordinates for channel in learned):
         return []
     if asked is None:
         return [
             "The recordings do not agree in the names of their columns, which are taken in their order as those of the "
-            f"library: {_some([one.name for one in learned])}"
+            f"library: {_some([channel.name for channel in learned])}"
         ]
     moving = [[channel for channel in channels if channel.coordinates] for channels in (asked, learned)]
-    by_name = {name_of(one.name).lower(): one for one in moving[0]}
-    if all(name_of(one.name).lower() in by_name for one in moving[1]):
-        moving[0] = [by_name[name_of(one.name).lower()] for one in moving[1]]
+    by_name = {name_of(channel.name).lower(): channel for channel in moving[0]}
+    if all(name_of(channel.name).lower() in by_name for channel in moving[1]):
+        moving[0] = [by_name[name_of(channel.name).lower()] for channel in moving[1]]
     pairs = list(zip(*moving, strict=False))
     sentences = []
     if other := [pair for pair in pairs if name_of(pair[0].name).lower() != name_of(pair[1].name).lower()]:

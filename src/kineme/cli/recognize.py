@@ -53,7 +53,9 @@ def recognize(
         notes += differences(library.channels, parsed.demonstrations.channels)
         stored = {symbol.name: symbol.id for symbol in library.symbols()}
     data = {
-        "movements": [_as_data(source, one, stored, top) for source, one in zip(parsed.sources, answers, strict=True)],
+        "movements": [
+            _as_data(source, answer, stored, top) for source, answer in zip(parsed.sources, answers, strict=True)
+        ],
         "notes": notes,
         "problems": [str(problem) for problem in parsed.problems],
     }
@@ -86,7 +88,10 @@ def _as_data(source: Any, answer: Any, ids: dict[str, str], top: int) -> dict[st
         "promise": answer.promise,
         "calibrated": answer.calibrated,
         "ranked": [_ranked(answer, name) for name in answer.ranked[:top]],
-        "like": [{"movement": one.index, "name": one.name, "similarity": one.similarity} for one in answer.nearest],
+        "like": [
+            {"movement": neighbor.index, "name": neighbor.name, "similarity": neighbor.similarity}
+            for neighbor in answer.nearest
+        ],
         "transform": {
             "matrix": transform.matrix.tolist(),
             "shift": transform.shift.tolist(),
@@ -102,17 +107,17 @@ def _text(data: dict[str, Any], error_rate: float, problems: list[str]) -> str:
     from kineme.reporting.table import Table, to_text
 
     rows = []
-    for one in data["movements"]:
-        name = f"{one['recording']} {one['place']}".strip()
-        others = ", ".join(printable(each["symbol"]) for each in one["ranked"])
+    for movement in data["movements"]:
+        name = f"{movement['recording']} {movement['place']}".strip()
+        others = ", ".join(printable(each["symbol"]) for each in movement["ranked"])
         rows.append(
-            (printable(name), "unknown" if one["symbol"] is None else printable(one["symbol"]),
-             one["certainty"], others, printable(one["like"][0]["name"] or one["like"][0]["movement"]),
-             "" if one["symbol"] is None else _relative(one["transform"]))
+            (printable(name), "unknown" if movement["symbol"] is None else printable(movement["symbol"]),
+             movement["certainty"], others, printable(movement["like"][0]["name"] or movement["like"][0]["movement"]),
+             "" if movement["symbol"] is None else _relative(movement["transform"]))
         )  # fmt: skip
     heads = ("recording", "symbol", "how sure", "ranked", "most like", "relative to it")
     lines = [to_text(Table("", heads, rows)), *map(printable, data["notes"])]
-    if any(one["rule"] == "guess" for one in data["movements"]):
+    if any(movement["rule"] == "guess" for movement in data["movements"]):
         needed = math.ceil(1 / error_rate - 1 - 1e-9)
         lines.append(
             "Which movements are unknown is a guess: too few demonstrations tell how much movements of one symbol "

@@ -81,10 +81,12 @@ def _check_parameters(by: str, chosen: dict[str, Any]) -> None:
 
     from kineme.movements.segmentation.table import SEGMENTERS
 
-    known = [field.name for field in fields(SEGMENTERS[by])]
+    parameters = [field.name for field in fields(SEGMENTERS[by])]
     for name in chosen:
-        if name not in known:
-            flags = ", ".join(f"--{one.replace('_', '-')}" for one in known if one in _PARAMETERS)
+        if name not in parameters:
+            flags = ", ".join(
+                f"--{parameter.replace('_', '-')}" for parameter in parameters if parameter in _PARAMETERS
+            )
             raise click.UsageError(f"expected parameters of --by {by}: {flags}; got --{name.replace('_', '-')}")
 
 
@@ -94,9 +96,9 @@ def _cut(parsed: Any, by: str, chosen: dict[str, Any], problems: list[str]) -> t
     from kineme.movements.segmentation.segment import segment as cut_one
 
     cut, movements = [], []
-    for one, source in zip(parsed.demonstrations, parsed.sources, strict=True):
+    for demonstration, source in zip(parsed.demonstrations, parsed.sources, strict=True):
         try:
-            cut.append(cut_one(one, by, **chosen))
+            cut.append(cut_one(demonstration, by, **chosen))
         except TrajectoryError as error:
             problems.append(f"{source.path} {source.place}".strip() + f": {error}")
         else:
@@ -112,7 +114,9 @@ def _files(cut: list[Any], movements: list[Any], output: Path | None, form: str)
         return []
     stems = distinct_stems(movements)
     return [
-        output / f"{stem}-{k:03d}.{form}" for stem, one in zip(stems, cut, strict=True) for k in range(1, len(one) + 1)
+        output / f"{stem}-{k:03d}.{form}"
+        for stem, segmentation in zip(stems, cut, strict=True)
+        for k in range(1, len(segmentation) + 1)
     ]
 
 
@@ -120,7 +124,7 @@ def _write(cut: list[Any], files: list[Path], output: Path) -> None:
     from kineme.io.writing.write_movement import write_movement
 
     output.mkdir(parents=True, exist_ok=True)
-    pieces = (piece for one in cut for piece in one)
+    pieces = (piece for segmentation in cut for piece in segmentation)
     for path, piece in zip(files, pieces, strict=True):
         write_movement(path, piece)
 
@@ -138,8 +142,8 @@ def _draw(cut: list[Any], path: Path) -> None:
 def _as_data(cut: list[Any], movements: list[Any], files: list[Path]) -> list[dict[str, Any]]:
     rows = [
         {"recording": path, "place": place, "piece": k, "start": start, "end": end, "duration": end - start}
-        for one, (path, place) in zip(cut, movements, strict=True)
-        for k, (start, end) in enumerate(one.cuts.tolist(), 1)
+        for segmentation, (path, place) in zip(cut, movements, strict=True)
+        for k, (start, end) in enumerate(segmentation.cuts.tolist(), 1)
     ]
     return [row | {"file": str(file)} for row, file in zip(rows, files, strict=True)] if files else rows
 

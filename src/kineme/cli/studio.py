@@ -56,7 +56,9 @@ def _say(folder: Path, address: str, read_only: bool) -> None:
 
 def _has_display() -> bool:
     """Whether a browser with windows can be opened: one of the terminal would take the terminal."""
-    return sys.platform in {"darwin", "win32"} or any(os.environ.get(one) for one in ("DISPLAY", "WAYLAND_DISPLAY"))
+    return sys.platform in {"darwin", "win32"} or any(
+        os.environ.get(variable) for variable in ("DISPLAY", "WAYLAND_DISPLAY")
+    )
 
 
 @click.command(short_help="A library as one HTML page: draw, recognize, drag.")
@@ -76,11 +78,11 @@ def page(folder: Path, output: Path, title: str | None, most: int | None, as_jso
 
     check_new(output, force)
     with opened(folder) as library:
-        made = write_page(output, library, title, most, replace=force)
-    header, size = made.header, output.stat().st_size
+        result = write_page(output, library, title, most, replace=force)
+    header, size = result.header, output.stat().st_size
     counts = {"symbols": len(header["classes"]), "movements": header["n_movements"], "of": header["n_all"]}
     text = (
-        f"{printable(output)}: {summary_of(made)}, {size / 1e6:.2f} MB; "
+        f"{printable(output)}: {summary_of(result)}, {size / 1e6:.2f} MB; "
         "open it in a browser, it needs no server and no network"
     )
     say(as_json, {"file": str(output), "bytes": size, **counts}, lambda: text)

@@ -48,8 +48,12 @@ def schema() -> None:
 def nearest(symbol: str, k: int, folder: Path, as_json: bool) -> None:
     """List the symbols most similar to one."""
     with opened(folder) as actions:
-        data = [one._asdict() for one in actions.nearest(symbol, k)]
-    say(as_json, data, lambda: "\n".join(f"{one['distance']:.3f}  {printable(one['symbol'])}" for one in data))
+        data = [neighbor._asdict() for neighbor in actions.nearest(symbol, k)]
+    say(
+        as_json,
+        data,
+        lambda: "\n".join(f"{neighbor['distance']:.3f}  {printable(neighbor['symbol'])}" for neighbor in data),
+    )
 
 
 @click.command(short_help="List the symbols that lie between two.")
@@ -60,7 +64,7 @@ def nearest(symbol: str, k: int, folder: Path, as_json: bool) -> None:
 def between(first: str, second: str, folder: Path, as_json: bool) -> None:
     """List the symbols that lie between two, the smallest detour first."""
     with opened(folder) as actions:
-        data = [one._asdict() for one in actions.between(first, second)]
+        data = [middle._asdict() for middle in actions.between(first, second)]
     say(
         as_json,
         data,
@@ -86,8 +90,8 @@ def draw(path: Path, folder: Path, as_json: bool) -> None:
     say(as_json, data, lambda: f"wrote {printable(path)}: {counted(len(data['symbols']), 'symbol')}")
 
 
-def _lies(one: dict[str, Any]) -> str:
-    return f"{one['share']:.0%} of the way, detour {one['excess']:.0%}  {printable(one['symbol'])}"
+def _lies(row: dict[str, Any]) -> str:
+    return f"{row['share']:.0%} of the way, detour {row['excess']:.0%}  {printable(row['symbol'])}"
 
 
 def _write(data: dict[str, Any], output: Path) -> None:
@@ -145,19 +149,22 @@ def review(folder: Path, as_json: bool) -> None:
     with opened(folder) as actions:
         suggested = actions.review()
     data = {
-        "merges": [one._asdict() for one in suggested.merges],
-        "splits": [{**one._asdict(), "parts": [part.tolist() for part in one.parts]} for one in suggested.splits],
+        "merges": [suggestion._asdict() for suggestion in suggested.merges],
+        "splits": [
+            {**suggestion._asdict(), "parts": [part.tolist() for part in suggestion.parts]}
+            for suggestion in suggested.splits
+        ],
     }
 
     def text() -> str:
         lines = [
-            f"{printable(one.first)} and {printable(one.second)} could be one: they overlap by {one.overlap:.2f}"
-            for one in suggested.merges
+            f"{printable(merge.first)} and {printable(merge.second)} could be one: they overlap by {merge.overlap:.2f}"
+            for merge in suggested.merges
         ]
         lines += [
-            f"{printable(one.symbol)} could be two: {len(one.parts[0])} movements, and "
-            + ", ".join(map(str, one.parts[1].tolist()))
-            for one in suggested.splits
+            f"{printable(suggestion.symbol)} could be two: {len(suggestion.parts[0])} movements, and "
+            + ", ".join(map(str, suggestion.parts[1].tolist()))
+            for suggestion in suggested.splits
         ]
         return "\n".join(lines) or "the symbols are well apart, and none falls into two clusters"
 

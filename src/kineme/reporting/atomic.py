@@ -122,9 +122,9 @@ def remove_leftovers(path: Path) -> None:
 
 
 def _remove_if_idle(path: Path) -> None:
-    known = path.lstat()
-    own = not hasattr(os, "getuid") or known.st_uid == os.getuid()
-    if own and stat.S_ISREG(known.st_mode) and time.time() - known.st_mtime > _IDLE:
+    status = path.lstat()
+    own = not hasattr(os, "getuid") or status.st_uid == os.getuid()
+    if own and stat.S_ISREG(status.st_mode) and time.time() - status.st_mtime > _IDLE:
         path.unlink()
 
 

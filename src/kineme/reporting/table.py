@@ -41,7 +41,7 @@ def to_text(table: Table, width: int | None = None) -> str:
     by default. Where the output goes elsewhere, nothing is cut but names of more than 120 letters, and only the last
     column is wrapped.
     """
-    lines = [(*(_cell(one) for one in row[:-1]), printable(row[-1])) for row in (table.columns, *table.rows)]
+    lines = [(*(_cell(cell) for cell in row[:-1]), printable(row[-1])) for row in (table.columns, *table.rows)]
     natural = [max(width_of(row[k]) for row in lines) for k in range(len(table.columns))]
     columns = _terminal_width() if width is None else width
     title = printable_lines(table.title)
@@ -84,7 +84,7 @@ def _narrowed(lines: Sequence[tuple[str, ...]], natural: list[int], width: int) 
     for least in (words, [min(word, _NARROW) for word in words]):
         if sum(least) <= width:
             limit = next(n for n in range(max(natural), 0, -1) if _total(natural, least, n) <= width)
-            widths = [max(low, min(one, limit)) for one, low in zip(natural, least, strict=True)]
+            widths = [max(low, min(column, limit)) for column, low in zip(natural, least, strict=True)]
             for k in range(len(widths)):  # what is left over by whole columns
                 widths[k] += max(0, min(natural[k] - widths[k], width - sum(widths)))
             return widths
@@ -92,7 +92,7 @@ def _narrowed(lines: Sequence[tuple[str, ...]], natural: list[int], width: int) 
 
 
 def _total(natural: list[int], least: list[int], limit: int) -> int:
-    return sum(max(low, min(one, limit)) for one, low in zip(natural, least, strict=True))
+    return sum(max(low, min(column, limit)) for column, low in zip(natural, least, strict=True))
 
 
 def _aligned(row: tuple[str, ...], widths: list[int]) -> list[str]:
@@ -168,7 +168,7 @@ def fitted(text: str, width: int) -> str:
 def wrapped(text: str, width: int) -> list[str]:
     """Lines of at most `width` columns, cut at blanks; words that are wider are shortened."""
     lines: list[str] = []
-    for word in (fitted(one, width) for one in text.split()):
+    for word in (fitted(word_of_text, width) for word_of_text in text.split()):
         if lines and width_of(lines[-1]) + 1 + width_of(word) <= width:
             lines[-1] += f" {word}"
         else:

@@ -63,10 +63,10 @@ class _Cache(FunctionCache):
         )
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        found = super().load_overload(sig, target_context)
-        if found is None:
+        overload = super().load_overload(sig, target_context)
+        if overload is None:
             self._compiling()
-        return found
+        return overload
 
 
 class _Files(IndexDataCacheFile):

@@ -97,24 +97,24 @@ class Snapshot:
         return json.dumps(document, allow_nan=False, separators=(",", ":")).replace("<", r"\u003c")
 
 
-def recognition_parts(known: KnownClasses) -> Snapshot:
+def recognition_parts(classes: KnownClasses) -> Snapshot:
     """Header and arrays of what recognizes movements.
 
     Raises SpecificationError: a classifier, or a limit of rotations in space, that the runtime does not have.
     """
-    demos = known.references.all_movements()
-    comparison, comparison_arrays = _comparison(known.comparison, known.references.described.pairs)
-    calibration, calibration_arrays = _calibration(known.calibration)
+    demos = classes.references.all_movements()
+    comparison, comparison_arrays = _comparison(classes.comparison, classes.references.described.pairs)
+    calibration, calibration_arrays = _calibration(classes.calibration)
     header = {
-        "n_movements": len(known.references),
-        "classes": [str(name) for name in known.references.classes.tolist()],
-        "first": known.references.first.tolist(),
+        "n_movements": len(classes.references),
+        "classes": [str(name) for name in classes.references.classes.tolist()],
+        "first": classes.references.first.tolist(),
         "comparison": comparison,
         "calibration": calibration,
         "certainty": dict(LEAST_CONFIDENCE),
-        **_classifier(known.classifier),
+        **_classifier(classes.classifier),
     }
-    paths = even_paths(demos, 0, len(demos), known.comparison.cutoff)
+    paths = even_paths(demos, 0, len(demos), classes.comparison.cutoff)
     arrays: dict[str, NDArray[Any]] = {
         "paths": paths.astype(np.float32),
         "starts": _starts(demos),
@@ -134,8 +134,8 @@ def _comparison(how: Comparison, pairs: Any) -> tuple[dict[str, Any], dict[str, 
     by_rows = [representation for representation in representations if not representation.in_pairs]
     rows = []
     arrays: dict[str, NDArray[Any]] = {}
-    for r, one in enumerate(by_rows):
-        row, more = _row_representation(one, r)
+    for r, representation in enumerate(by_rows):
+        row, more = _row_representation(representation, r)
         rows.append(row)
         arrays |= more
     n = len(representations)
@@ -161,16 +161,20 @@ def _comparison(how: Comparison, pairs: Any) -> tuple[dict[str, Any], dict[str, 
     return header, arrays
 
 
-def _row_representation(one: Representation, r: int) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+def _row_representation(representation: Representation, r: int) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
     """What is compared sample by sample: its parameters, and the matrices that describing needs."""
-    row: dict[str, Any] = {"quantity": one.quantity, "arc_share": one.arc_share, "n_points": one.n_points}
+    row: dict[str, Any] = {
+        "quantity": representation.quantity,
+        "arc_share": representation.arc_share,
+        "n_points": representation.n_points,
+    }
     arrays: dict[str, NDArray[Any]] = {}
-    if one.quantity == "forcing":
+    if representation.quantity == "forcing":
         row["operator"] = f"operator {r}"
-        arrays[row["operator"]] = forcing_operator(one, np.dtype(np.float32))
-    if one.arc_share == 0 and (N_POINTS - 1) % (one.n_points - 1):
+        arrays[row["operator"]] = forcing_operator(representation, np.dtype(np.float32))
+    if representation.arc_share == 0 and (N_POINTS - 1) % (representation.n_points - 1):
         row["resample"] = f"resample {r}"
-        arrays[row["resample"]] = spline_matrix(N_POINTS, one.n_points)
+        arrays[row["resample"]] = spline_matrix(N_POINTS, representation.n_points)
     return row, arrays
 
 
@@ -239,8 +243,8 @@ def _calibration(calibration: Calibration) -> tuple[dict[str, Any], dict[str, ND
     }
     arrays: dict[str, NDArray[Any]] = {"scales": np.asarray(calibration.scales, dtype=np.float64)}
     for name, several in parts.items():
-        arrays[name] = np.concatenate([np.sort(one) for one in several])
-        arrays[f"{name} ends"] = np.cumsum([len(one) for one in several]).astype(np.int32)
+        arrays[name] = np.concatenate([np.sort(scores) for scores in several])
+        arrays[f"{name} ends"] = np.cumsum([len(scores) for scores in several]).astype(np.int32)
     header = {
         "between": calibration.between,
         "exponent": calibration.exponent,
@@ -250,20 +254,20 @@ def _calibration(calibration: Calibration) -> tuple[dict[str, Any], dict[str, ND
     return {"pooled": [numbers[pair] for pair in shared], **header}, arrays
 
 
-def early_part(known: KnownClasses, early: Early | None = None) -> dict[str, Any]:
+def early_part(classes: KnownClasses, early: Early | None = None) -> dict[str, Any]:
     """Header of early recognition: spreads, rotations, widths, and how fast movements are at their end."""
-    made = hypotheses(known.comparison, known.references, early or Early())
-    spreads = {name: getattr(made.early, name) for name in ("size_spread", "duration_spread", "timing_spread")}
-    assert made.described.pairs is not None
+    described = hypotheses(classes.comparison, classes.references, early or Early())
+    spreads = {name: getattr(described.early, name) for name in ("size_spread", "duration_spread", "timing_spread")}
+    assert described.described.pairs is not None
     return {
-        "n_progress": made.early.n_progress,
+        "n_progress": described.early.n_progress,
         **{name: None if math.isinf(value) else value for name, value in spreads.items()},
-        "own_rotations": made.early.max_angle is not None,
-        "rule": rotation_rule(made.procrustes),
-        "shapes": pair_rule(made.described.pairs.shapes),
-        "widths": made.widths.tolist(),
-        "over": list(made.ending.over),
-        "before": list(made.ending.before),
+        "own_rotations": described.early.max_angle is not None,
+        "rule": rotation_rule(described.procrustes),
+        "shapes": pair_rule(described.described.pairs.shapes),
+        "widths": described.widths.tolist(),
+        "over": list(described.ending.over),
+        "before": list(described.ending.before),
         "numbers": {
             **_numbers(evidence, "COMPARED", "WIDENED", "ROTATION", "SPEED_SPREAD", "PROGRESS", "POWER", "NEGLIGIBLE"),
             **_numbers(beginnings, "MOST_ODDS", "PRIOR_ODDS", "LOG_UNKNOWN", "TEMPER", "EXPLAINING"),
@@ -338,22 +342,22 @@ def snapshot_of_library(library: ActionLibrary, most: int | None = None, early: 
     members = members_of(store)
     fitting = MOST_NUMBERS // (N_POINTS * (store.n_dims or 1))
     taken = some_members(members, fitting if most is None else most)
-    known = known_members(store, taken)
+    classes = known_members(store, taken)
     prototypes = [prototype_of(store, symbol(store, str(name))) for name in members.names]
     primitives = read.primitives(store, np.array(prototypes, dtype=np.int64))
-    made = _snapshot(known, primitives, early)
-    made.header["n_all"] = len(members.ids)
-    made.header["ids"] = taken.ids.tolist()
-    made.header["channels"] = None if store.channels is None else [channel.name for channel in store.channels]
-    return made
+    snapshot = _snapshot(classes, primitives, early)
+    snapshot.header["n_all"] = len(members.ids)
+    snapshot.header["ids"] = taken.ids.tolist()
+    snapshot.header["channels"] = None if store.channels is None else [channel.name for channel in store.channels]
+    return snapshot
 
 
 def snapshot_of_recognizer(recognizer: FittedRecognizer, dmp: DMP | None = None) -> Snapshot:
     """A fitted recognizer, with a primitive of the medoid of each class."""
-    known = known_classes(recognizer)
-    demos = known.references.all_movements()
-    medoids = fit_prototype(known.comparison, known.references).medoids
-    return _snapshot(known, (dmp or DMP()).learn(demos[medoids]))
+    classes = known_classes(recognizer)
+    demos = classes.references.all_movements()
+    medoids = fit_prototype(classes.comparison, classes.references).medoids
+    return _snapshot(classes, (dmp or DMP()).learn(demos[medoids]))
 
 
 def some_members(members: Members, most: int) -> Members:
@@ -375,7 +379,7 @@ def some_members(members: Members, most: int) -> Members:
     return Members(members.ids[chosen], members.names, first, groups)
 
 
-def _snapshot(known: KnownClasses, primitives: Primitives, early: Early | None = None) -> Snapshot:
-    recognition, movements = recognition_parts(known), movement_parts(primitives)
-    header: dict[str, Any] = {**recognition.header, **movements.header, "early": early_part(known, early)}
+def _snapshot(classes: KnownClasses, primitives: Primitives, early: Early | None = None) -> Snapshot:
+    recognition, movements = recognition_parts(classes), movement_parts(primitives)
+    header: dict[str, Any] = {**recognition.header, **movements.header, "early": early_part(classes, early)}
     return Snapshot(header, recognition.arrays | movements.arrays)

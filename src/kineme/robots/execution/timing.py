@@ -246,6 +246,6 @@ def _by_length(robot: Robot, path: CubicSpline) -> tuple[CubicSpline, Array, Arr
         raise TrajectoryError(f"{robot.name}: expected a movement, the joints stand still")
     least, most = _KNOTS
     knots = min(max(math.ceil(lengths[-1] / _APART), least), most)
-    kept = np.concatenate(([True], np.diff(np.floor(lengths / lengths[-1] * knots)) > 0))
-    kept[-1] = True
-    return CubicSpline(lengths[kept], joints[kept]), generated, lengths
+    begins_knot = np.concatenate(([True], np.diff(np.floor(lengths / lengths[-1] * knots)) > 0))
+    begins_knot[-1] = True
+    return CubicSpline(lengths[begins_knot], joints[begins_knot]), generated, lengths

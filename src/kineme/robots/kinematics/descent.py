@@ -141,14 +141,14 @@ def postures(robot: Robot, position: Array, rotation: Array, turn_costs: Array, 
     Two that differ by less than 0.3 rad in every joint count as one. The most exact comes first; if none comes within
     0.1 mm, it is alone.
     """
-    found = descend(robot, _starts(robot, n_starts), position, rotation, turn_costs, _STEPS)
-    order = np.argsort(found.errors, kind="stable")
-    kept = [int(order[0])]
+    reached = descend(robot, _starts(robot, n_starts), position, rotation, turn_costs, _STEPS)
+    order = np.argsort(reached.errors, kind="stable")
+    distinct = [int(order[0])]
     for i in order[1:]:
-        apart = np.abs(found.joints[kept] - found.joints[i]).max(axis=1)
-        if found.errors[i] <= _TOLERANCE and apart.min() > _APART:
-            kept.append(int(i))
-    return Reached(found.joints[kept], found.errors[kept])
+        apart = np.abs(reached.joints[distinct] - reached.joints[i]).max(axis=1)
+        if reached.errors[i] <= _TOLERANCE and apart.min() > _APART:
+            distinct.append(int(i))
+    return Reached(reached.joints[distinct], reached.errors[distinct])
 
 
 @lru_cache(maxsize=8)

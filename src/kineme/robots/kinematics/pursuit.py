@@ -53,8 +53,8 @@ def pursue(robot: Robot, path: TaskPath, turn_costs: Array) -> tuple[Array, Task
     least, best = np.inf, None
     for share in _BEGINS:
         begin = round(share * last)
-        found = postures(robot, path.positions[begin], path.rotations[begin], turn_costs, _SEEDS)
-        starts = np.repeat(found.joints[found.errors <= _NEARLY][:_WAYS], len(_PULLS), axis=0)
+        seeds = postures(robot, path.positions[begin], path.rotations[begin], turn_costs, _SEEDS)
+        starts = np.repeat(seeds.joints[seeds.errors <= _NEARLY][:_WAYS], len(_PULLS), axis=0)
         joints = np.tile(starts, (last + 1, 1, 1))
         errors = np.full(joints.shape[:2], np.inf)
         for order in (range(begin, last + 1), range(begin, -1, -1)):
@@ -106,8 +106,8 @@ def _follow(robot: Robot, path: TaskPath, turn_costs: Array, order: range, joint
         pose = path.positions[t], path.rotations[t]
         moved, off = _newton(robot, ahead, pull, pose, (turn_costs, lower, upper))
         joints[t, ways], errors[t, ways] = moved, off
-        kept = off <= _LOST
-        ways, before, q = ways[kept], q[kept], moved[kept]
+        near = off <= _LOST
+        ways, before, q = ways[near], q[near], moved[near]
         if len(ways) == 0:
             return
 

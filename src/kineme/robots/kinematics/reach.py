@@ -28,12 +28,12 @@ def reaching_postures(robot: Robot, position: Array, rotation: Array, turn_costs
 
     Raises OutOfReachError: there is none: where, and by how far.
     """
-    found = postures(robot, position, rotation, turn_costs)
-    if found.errors[0] > _REACHED:
-        found = postures(robot, position, rotation, turn_costs, _SEEDS)
-    if found.errors[0] > _REACHED:
-        raise OutOfReachError(_unreachable(robot, what, float(found.errors[0])))
-    return found.joints
+    reached = postures(robot, position, rotation, turn_costs)
+    if reached.errors[0] > _REACHED:
+        reached = postures(robot, position, rotation, turn_costs, _SEEDS)
+    if reached.errors[0] > _REACHED:
+        raise OutOfReachError(_unreachable(robot, what, float(reached.errors[0])))
+    return reached.joints
 
 
 def check_reached(robot: Robot, path: TaskPath, joints: Array, turn_costs: Array, tolerance: float) -> None:

@@ -178,7 +178,9 @@ def _assembled(planned: PlannedPath, movement: Timed, longer: float = 1.0) -> Ro
         robot, trajectory, target_poses(times[np.searchsorted(times, first.duration - 1e-9) :]), planned.follow
     )
     velocities = planned.joints(planned.step_times, 1)
-    kept = (steps_kept(robot, trajectory, Steps(name, values, velocities)) for name, values in planned.steps.items())
-    report = replace(report, checks=(*report.checks, *kept))
+    step_checks = (
+        steps_kept(robot, trajectory, Steps(name, values, velocities)) for name, values in planned.steps.items()
+    )
+    report = replace(report, checks=(*report.checks, *step_checks))
     path, factor = target_poses(first.duration + second.times), second.duration / float(generated[-1])
     return RobotMovement(robot, trajectory, path, report, first.duration, factor)
