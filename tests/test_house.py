@@ -65,11 +65,11 @@ def test_files_and_functions_are_short():
 #: Limits of the package. They are lowered as it gets lighter, and never raised in passing.
 BUDGET = {
     "files": 400,
-    "lines": 61_500,
-    "lines of imports in code": 0.115,
-    "private functions called once": 0.125,
-    "empty names": 0.015,
-    "docstrings that begin with a clause": 0.04,
+    "lines": 61_000,
+    "lines of imports in code": 0.112,
+    "private functions called once": 0.12,
+    "empty names": 0.01,
+    "docstrings that begin with a clause": 0.02,
 }
 #: Names that say nothing of what they hold.
 _EMPTY = {"one", "found", "made", "known", "told", "asked", "kept", "whole"}
