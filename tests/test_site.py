@@ -67,7 +67,7 @@ def test_every_route_of_the_studio_is_on_its_page():
     for path, ways in described["paths"].items():
         assert all(f"### {way.upper()} {path}\n" in text for way in ways)
     assert all(f"\n### {name}\n" in text for name in described["components"]["schemas"])
-    assert "Takes [Wanted](#json-Wanted)." in text
+    assert "Takes [RolloutRequest](#json-RolloutRequest)." in text
     assert "| `error_rate` (optional) | number; above 0; below 1; default `0.05` |" in text
 
 

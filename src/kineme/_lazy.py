@@ -18,7 +18,7 @@ def names_in(stub: str) -> dict[str, tuple[str, str]]:
 
 
 def lazy_names(module: str) -> tuple[Callable[[str], object], Callable[[], list[str]], list[str]]:
-    """What a module assigns to ``__getattr__, __dir__, __all__`` so that it has the names of its stub.
+    """Return what a module assigns to ``__getattr__, __dir__, __all__`` so that it has the names of its stub.
 
     Parameters
     ----------

@@ -27,7 +27,7 @@ _REACH = 0.6  # share of the typical distance to another symbol, where no two mo
 
 @dataclass(frozen=True, eq=False)
 class Assignment:
-    """What new movements are.
+    """Names of new movements, and proposals for the others.
 
     Attributes
     ----------
@@ -98,7 +98,7 @@ def assign(
 def assign_described(
     described: Described, classes: KnownClasses, error_rate: float = 0.05, min_members: int = 3
 ) -> Assignment:
-    """As `assign`, of movements that are described in the representations of what is known."""
+    """Assign movements that are described in the representations of the known classes, see `assign`."""
     labels, p_values = open_set_labels(classes, described, error_rate)
     unknown = np.flatnonzero([label is None for label in labels])
     proposals = _among_unknown(classes, described.take(unknown), min_members)

@@ -198,7 +198,7 @@ def spectral(similar: Array, n_clusters: int, min_members: int = 1) -> Clusters:
 
 
 def _half(distances: Array, min_members: int) -> NDArray[np.bool_]:
-    """Whether each of n movements is in the second of two parts, both of at least `min_members`.
+    """Tell which of n movements are in the second of two parts, both of at least `min_members`.
 
     Average linkage is cut into so many clusters that two are large enough; each movement goes with the nearer of them.
     If none of its cuts is such, each goes with the nearer of the two that are farthest apart, in equal parts.

@@ -34,7 +34,7 @@ _FLAT = 1e-9  # of the path: what members differ by when only rounding tells the
 
 @dataclass(frozen=True)
 class SymbolName:
-    """What a symbol is called.
+    """Name, id and history of a symbol.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ def ground(
     medoid: int | None = None,
     like: Compares | None = None,
 ) -> dict[str, Any]:
-    """What a symbol does, as plain data that JSON can hold; `grounding_schema` describes it.
+    """Describe what a symbol does, as plain data that JSON can hold; `grounding_schema` is its schema.
 
     Parameters
     ----------

@@ -192,7 +192,7 @@ def extend(
 
 
 def radii(K: Array, proposals: Proposals) -> Array:
-    """How far ``1 - K`` a movement of each cluster may be from its nearest member, shape (c,).
+    """Return how far ``1 - K`` a movement of each cluster may be from its nearest member, shape (c,).
 
     As far as any member is from its nearest neighbor in the cluster, so that another movement of the same class is
     beyond it once in m + 1 times; but at least as far as 95 % of the members of all clusters, since the largest of few

@@ -45,7 +45,7 @@ class Recording(click.Path):
 
 
 class Level(click.ParamType):  # type: ignore[type-arg]
-    """What a label comes from: task, folder, or a level of folders."""
+    """Source of labels: task, folder, or a level of folders."""
 
     name = "task|folder|LEVEL"
 
@@ -282,7 +282,7 @@ def _chosen(several: Any, options: dict[str, Any]) -> Any:
 
 
 def _is_symbol(source: str, folder: Path | None) -> bool:
-    """Whether SOURCE is a symbol: with --library always; with a library from the environment, unless a file exists."""
+    """Tell whether SOURCE is a symbol: with --library always; with one from the environment, unless a file exists."""
     given = click.get_current_context().get_parameter_source("folder")
     return folder is not None and (given != ParameterSource.ENVIRONMENT or not Path(source).exists())
 

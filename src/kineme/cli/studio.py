@@ -55,7 +55,7 @@ def _say(folder: Path, address: str, read_only: bool) -> None:
 
 
 def _has_display() -> bool:
-    """Whether a browser with windows can be opened: one of the terminal would take the terminal."""
+    """Tell whether a browser with windows can be opened: one of the terminal would take the terminal."""
     return sys.platform in {"darwin", "win32"} or any(
         os.environ.get(variable) for variable in ("DISPLAY", "WAYLAND_DISPLAY")
     )

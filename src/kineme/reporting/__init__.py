@@ -1,1 +1,1 @@
-"""How results are shown and written: text, tables, figures, HTML pages, whole files."""
+"""Results, shown and written: text, tables, figures, HTML pages, whole files."""

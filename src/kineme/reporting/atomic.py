@@ -129,7 +129,7 @@ def _remove_if_idle(path: Path) -> None:
 
 
 def _is_at_work(process: int) -> bool:
-    """Whether a process of that id runs on this machine; True where that cannot be found out."""
+    """Tell whether a process of that id runs on this machine; True where that cannot be found out."""
     if os.name != "posix":  # on Windows, signal 0 would end the process
         return True
     try:

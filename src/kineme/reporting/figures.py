@@ -57,7 +57,7 @@ class _PyplotFigure(Figure):
 
 
 def figure_to_show(width: float, height: float) -> Figure:
-    """As `new_figure`, but of `matplotlib.pyplot` where the caller has imported that, whose ``show`` then shows it."""
+    """Make a figure as `new_figure` does, but of `matplotlib.pyplot` where the caller has imported it, to be shown."""
     if (pyplot := sys.modules.get("matplotlib.pyplot")) is None:
         return new_figure(width, height)
     import matplotlib

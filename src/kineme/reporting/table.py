@@ -182,7 +182,7 @@ def widest_word(text: str) -> int:
 
 
 def _beginning(text: str, width: int) -> str:
-    """As many characters as fit."""
+    """Cut a text to as many characters as fit."""
     used = 0
     for k, mark in enumerate(text):
         used += _columns(mark)

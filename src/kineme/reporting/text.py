@@ -51,17 +51,17 @@ def _escape(text: str) -> str:
 
 
 def printable_lines(text: Any) -> str:
-    """As `printable`, for text of several lines."""
+    """Make text of several lines printable, see `printable`."""
     return "\n".join(map(_escape, str(text).split("\n")))
 
 
 def drawable(name: Any) -> str:
-    """As `printable`, for Matplotlib: dollar signs are escaped, since they would start a formula."""
+    """Make text printable for Matplotlib: dollar signs are escaped too, since they would start a formula."""
     return printable(name).replace("$", r"\$")
 
 
 def in_markup(text: Any) -> str:
-    """As `printable_lines`, for HTML and XML."""
+    """Escape printable lines for HTML and XML."""
     return escape(printable_lines(text))
 
 

@@ -1,1 +1,1 @@
-"""How work is done: compiled loops or their NumPy twins, threads over tiles, forks."""
+"""Means of computing: compiled loops or their NumPy twins, threads over tiles, forks."""

@@ -43,7 +43,7 @@ _tell: list[Callable[[], object]] = []  # what is called before the first functi
 
 
 def use_compiled(n_operations: int, now: int | None = None) -> bool:
-    """Whether a job of about `n_operations` elementary operations should run compiled; if so, Numba has been loaded.
+    """Tell whether a job of about `n_operations` elementary operations runs compiled; if so, Numba has been loaded.
 
     Numba is imported for a job that is large enough to repay the import, and also once small jobs together have cost as
     much: many small calls then take at most twice the time that compiling at once would have taken. `now` is the part

@@ -67,7 +67,7 @@ _ALIGNMENT = 8  # bytes: arrays in JavaScript begin at multiples of the size of 
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """What the runtime in `kineme.studio.javascript` computes with.
+    """Header and arrays that the runtime in `kineme.studio.javascript` computes with.
 
     Attributes
     ----------
@@ -162,7 +162,7 @@ def _comparison(how: Comparison, pairs: Any) -> tuple[dict[str, Any], dict[str, 
 
 
 def _row_representation(representation: Representation, r: int) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
-    """What is compared sample by sample: its parameters, and the matrices that describing needs."""
+    """Write what is compared sample by sample: its parameters, and the matrices that describing needs."""
     row: dict[str, Any] = {
         "quantity": representation.quantity,
         "arc_share": representation.arc_share,
@@ -190,7 +190,7 @@ def _numbers(module: ModuleType, *names: str) -> dict[str, float]:
 
 
 def rotation_rule(procrustes: Procrustes) -> dict[str, Any]:
-    """How movements are rotated.
+    """Write how movements are rotated.
 
     Raises SpecificationError: By at most an angle, in space.
     """
@@ -205,7 +205,7 @@ def rotation_rule(procrustes: Procrustes) -> dict[str, Any]:
 
 
 def pair_rule(shapes: Shapes) -> dict[str, Any]:
-    """How segments and points are compared."""
+    """Write how segments and points are compared."""
     elastic, cloud = shapes.elastic, shapes.cloud
     return {
         "n_segments": elastic.n_segments,
