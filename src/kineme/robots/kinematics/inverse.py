@@ -52,7 +52,8 @@ class InverseKinematics:
         check_robot(robot)
         check_choice("orientation", orientation, list(ORIENTATIONS))
         try:
-            import qpsolvers  # noqa: F401 - so that the message names the extra
+            import pink  # noqa: F401 - so that the message names the extra
+            import qpsolvers  # noqa: F401
             from pink.limits import ConfigurationLimit
             from pink.tasks import FrameTask, PostureTask
         except ImportError as error:
