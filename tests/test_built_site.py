@@ -83,7 +83,7 @@ MESSAGES = {
     "expected a library in actions, found no library.sqlite there; make one by learning": "expected a library in",
     "Error: expected a file or folder of recordings, found nothing at wave/": "expected a file or folder of recordings",
     "topic /tf: each of its messages is a movement of its own, expected it alone": "topic …: each of its messages",
-    "expected the package pyarrow to write LeRobot; pip install 'kineme[parquet]'": "expected the package pyarrow",
+    "expected the package pyarrow to write LeRobot; pip install 'kineme[parquet]'": "expected the package … to …",
     "expected a MATLAB file of version 7.2 or earlier, got 7.3; save it with -v7": "expected a MATLAB file of version",
     "walk.trc: expected frame 12 next, got frame 14": "expected frame … next",
     "expected one place at 0.5, got two via points there: [1. 2.] and [3. 4.]": "expected one place at",
