@@ -1,4 +1,4 @@
-"""Everything about a controlled movement that no step changes."""
+"""A controlled movement: what no step changes, its via points, and the goal that it follows."""
 
 from __future__ import annotations
 
