@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from itertools import zip_longest
 from shutil import get_terminal_size
 from statistics import fmean
@@ -191,6 +192,7 @@ def _beginning(text: str, width: int) -> str:
     return text
 
 
+@lru_cache(maxsize=4096)
 def _columns(mark: str) -> int:
     if category(mark) in {"Mn", "Me"}:
         return 0

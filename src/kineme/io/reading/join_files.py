@@ -168,7 +168,8 @@ def _together(files: Sequence[FileRead]) -> list[str]:
     if len(files) < 2:
         return []
     durations = [end - begin for begin, end in map(_span, files)]
-    long = [k for k, duration in enumerate(durations) if duration >= _SHARED * float(np.median(durations))]
+    shortest = _SHARED * float(np.median(durations))
+    long = [k for k, duration in enumerate(durations) if duration >= shortest]
     densest = max(long, key=lambda k: len(_times(files[k])) / durations[k])
     begin, end = _span(files[densest])
     shared = [

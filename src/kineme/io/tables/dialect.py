@@ -280,5 +280,7 @@ def _kind(cells: Sequence[str], comma: bool) -> str:
     filled = [cell for cell in cells if not is_missing(cell)] or [cell for cell in cells if cell.lower() == "none"]
     if filled and all(map(is_date, filled)):
         return "date"
+    if all(map(_NUMBER.fullmatch, filled)):
+        return "number"
     n_numbers = sum(is_number(cell, comma) or bool(marks_within(cell)) for cell in filled)
     return "number" if 2 * n_numbers >= len(filled) else "text"

@@ -56,15 +56,21 @@ def _fill_shortened(times, positions, steps, moving):  # type: ignore[no-untyped
     """Steps of one movement, as far as they count, and which samples are left; whether anything changes."""
     last = len(times) - 1
     usual = _fill_steps(times, steps)
-    reach, rests = _fill_resting(positions, moving)
-    if not rests and not _may_have_gaps(steps, usual):
-        return False
+    reach, rests, between = _fill_resting(positions, moving)
     motion, path = 0.0, 0.0
     for j in range(last):
         if moving[j]:
             motion += min(steps[j], usual)
-            path += np.sqrt(_squared_distance(positions, j, j + 1))
+    gaps = _may_have_gaps(steps, usual, motion)
+    if not gaps and not rests:
+        return False
+    if gaps or between:  # a path takes long to measure, and rests at the ends do not depend on it
+        for j in range(last):
+            if moving[j]:
+                path += np.sqrt(_squared_distance(positions, j, j + 1))
     pace = motion / path if path > 0 else 0.0  # seconds for a unit of length
+    if not gaps:
+        return _shorten_rests(steps, moving, motion, REST * reach * pace)
     changes = False
     before = 0.0
     for j in range(last):
@@ -95,13 +101,11 @@ def _fill_steps(times, steps):  # type: ignore[no-untyped-def]
 
 
 @jit
-def _may_have_gaps(steps, usual):  # type: ignore[no-untyped-def]
-    """Tell whether a step may be a gap in a movement without rests, before its path is measured, which takes long."""
+def _may_have_gaps(steps, usual, motion):  # type: ignore[no-untyped-def]
+    """Tell whether a step may be a gap, before the path is measured: lengths only make gaps fewer."""
     if usual == np.inf:
         return False
-    motion, before = 0.0, 0.0
-    for j in range(len(steps)):
-        motion += min(steps[j], usual)
+    before = 0.0
     for j in range(len(steps) - 1):
         if steps[j] > EQUAL * max(usual, min(GAP * max(before, steps[j + 1]), PAUSE * motion)):
             return True
@@ -111,19 +115,28 @@ def _may_have_gaps(steps, usual):  # type: ignore[no-untyped-def]
 
 @jit
 def _fill_resting(positions, moving):  # type: ignore[no-untyped-def]
-    """Mark the samples of one movement after which it rests as not kept, for now; its reach; whether it rests."""
+    """Mark the samples of one movement after which it rests as not kept, for now.
+
+    Its reach, whether it rests, and whether it rests anywhere but at its ends.
+    """
     n, window, size = len(positions), SHORTEST, 0.0
     while 2 * WINDOWS * window <= n:
         window *= 2
     for j in range(1, n):
         size = max(size, _squared_distance(positions, 0, j))
     most_apart = RADIUS * RADIUS * size
-    until, rests = 0, False
-    for j in range(n):
-        if j + window <= n and _is_still(positions, j, window, most_apart):
-            until, rests = j + window - 1, True
+    until, n_rests, begin = 0, 0, 0  # the last sample and the first one of the newest rest
+    for j in range(n - window + 1):  # the last sample of a window settles it for most windows
+        last = _squared_distance(positions, j, j + window - 1)
+        if last <= most_apart and _is_still(positions, j, window, most_apart):
+            if j > until or n_rests == 0:
+                n_rests, begin = n_rests + 1, j
+            until = j + window - 1
         moving[j] = j >= until
-    return np.sqrt(size), rests
+    for j in range(max(n - window + 1, 0), n):
+        moving[j] = j >= until
+    n_at_ends = int(not moving[0]) + int(begin > 0 and until == n - 1)
+    return np.sqrt(size), n_rests > 0, n_rests > n_at_ends
 
 
 @jit
@@ -151,8 +164,8 @@ def _shorten_rests(steps, moving, motion, most):  # type: ignore[no-untyped-def]
 
 @jit
 def _is_still(positions, begin, window, most_apart):  # type: ignore[no-untyped-def]
-    """Tell whether the samples of a window stay near its first; its last settles it for most windows."""
-    for j in range(begin + window - 1, begin, -1):  # noqa: SIM110 - Numba compiles no generators
+    """Tell whether the samples of a window stay near its first."""
+    for j in range(begin + 1, begin + window - 1):  # noqa: SIM110 - Numba compiles no generators
         if _squared_distance(positions, begin, j) > most_apart:
             return False
     return True
