@@ -45,24 +45,12 @@ def most_in_passing() -> int:
 
 
 def check_expanded(n_bytes: int, what: str = "a file") -> None:
-    """Refuse a size in memory above the limit.
-
-    Raises
-    ------
-    DataError
-        The message names the limit and how to raise it.
-    """
+    """Refuse a size in memory above the limit."""
     _check(n_bytes, max_file_bytes(), what)
 
 
 def check_in_passing(n_bytes: int, what: str) -> None:
-    """Refuse what is in memory on the way only, and above the limit on that.
-
-    Raises
-    ------
-    DataError
-        As of `check_expanded`.
-    """
+    """Refuse what is in memory on the way only, and above the limit on that."""
     _check(n_bytes, most_in_passing(), what)
 
 

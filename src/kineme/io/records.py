@@ -60,22 +60,12 @@ def in_shell(names: Sequence[str]) -> str:
 
 
 class Contents(NamedTuple):
-    """A list of things in a recording, as a table.
+    """A list of things in a recording, as a table."""
 
-    Attributes
-    ----------
-    name : str
-        What they are: ``"topics"``.
-    heads : tuple of str
-    rows : tuple of tuple of str or int
-    note : str
-        What should be known about the list.
-    """
-
-    name: str
+    name: str  # what they are: ``"topics"``
     heads: tuple[str, ...]
     rows: tuple[tuple[str | int, ...], ...]
-    note: str = ""
+    note: str = ""  # what should be known about the list
 
 
 @contextmanager

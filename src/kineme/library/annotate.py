@@ -52,13 +52,6 @@ def annotate(
         As in `Recognizer.spot`.
     progress : callable, optional
         Called now and then with the seconds of recordings that are done.
-
-    Raises
-    ------
-    SpecificationError
-        No movement belongs to a symbol, or an error rate out of range.
-    TrajectoryError
-        The recordings have other columns than those of the library.
     """
     classes = some_of_each_symbol(store)
     classes.comparison.checked(recordings.demonstrations[:1], "recordings")  # all of them have the same columns

@@ -160,13 +160,7 @@ def _part(demos: Demonstrations, start: int, stop: int) -> Demonstrations:
 
 
 def _in_columns_of(store: Store, demos: Demonstrations) -> Demonstrations:
-    """Convert columns without channels, or of the same names, to those of the library; generated ones as learned.
-
-    Raises
-    ------
-    TrajectoryError
-        Other names, or units that cannot be converted.
-    """
+    """Convert columns without channels, or of the same names, to those of the library; generated ones as learned."""
     ours, n_dims = store.channels, store.n_dims
     if demos.channels is None:
         fits = ours is not None and demos.n_dims == len(recorded_names(ours))
@@ -326,7 +320,6 @@ def learn_recordings(  # noqa: PLR0913, PLR0917 - those of `ActionLibrary.learn`
     ----------
     store : Store
         The library, ``ActionLibrary.store``.
-    recordings : Recordings
     options : mapping, optional
         Options of the reader. The same file read with other options is another source.
     labels : sequence of n str or None, optional

@@ -39,13 +39,7 @@ class Members:
 
 
 def members_of(store: Store) -> Members:
-    """Return all movements that belong to a symbol.
-
-    Raises
-    ------
-    SpecificationError
-        There is none.
-    """
+    """Return all movements that belong to a symbol."""
     with store.reading() as connection:
         query = f"SELECT movement, symbol FROM member WHERE {ALIVE}"
         try:

@@ -36,13 +36,7 @@ class SerializedRows:
 
 
 def check(demos: Demonstrations) -> None:
-    """Refuse movements that cannot be stored, before any is stored.
-
-    Raises
-    ------
-    TrajectoryError
-        A movement that does not move, or one whose extent single precision cannot hold.
-    """
+    """Refuse movements that cannot be stored, before any is stored."""
     first = demos.offsets[:-1]
     extents = np.maximum.reduceat(demos.positions, first) - np.minimum.reduceat(demos.positions, first)
     check_movement(demos, demos.positions[first], extents)
@@ -74,13 +68,7 @@ def relative_times(demos: Demonstrations) -> Array:
 
 
 def serialize(demos: Demonstrations, even: NDArray[np.bool_], specification: Specification) -> SerializedRows:
-    """Return the rows of a batch that has been checked.
-
-    Raises
-    ------
-    TrajectoryError
-        Weights so large that single precision cannot hold them.
-    """
+    """Return the rows of a batch that has been checked."""
     recorded = demos.movements.recorded
     others = [] if recorded is None else to_bytes(recorded, demos.offsets, demos.channels or ())
     starts = demos.positions[demos.offsets[:-1]]

@@ -35,13 +35,7 @@ NORM_TOLERANCE = 0.01
 
 
 def as_quaternions(q: ArrayLike) -> Array:
-    """Quaternions (..., 4) of any norm as float64.
-
-    Raises
-    ------
-    TrajectoryError
-        Not real numbers, or of another shape.
-    """
+    """Quaternions (..., 4) of any norm as float64."""
     q = as_numbers(q, "quaternions")
     if q.ndim == 0 or q.shape[-1] != 4:
         raise TrajectoryError(f"expected quaternions (w, x, y, z) of shape (..., 4), got shape {q.shape}")
@@ -144,13 +138,7 @@ def angle_between(a: ArrayLike, b: ArrayLike) -> NDArray[np.float64]:
 
 
 def as_vectors(p: ArrayLike) -> Array:
-    """Rotation vectors, or their rates (..., 3), as float64.
-
-    Raises
-    ------
-    TrajectoryError
-        Not real numbers, or of another shape.
-    """
+    """Rotation vectors, or their rates (..., 3), as float64."""
     p = as_numbers(p, "rotation vectors")
     if p.ndim == 0 or p.shape[-1] != 3:
         raise TrajectoryError(f"expected vectors of shape (..., 3), got shape {p.shape}")
@@ -207,13 +195,7 @@ def slerp(start: ArrayLike, end: ArrayLike, share: ArrayLike) -> Array:
 
 
 def matrices_of(q: ArrayLike) -> Array:
-    """Rotation matrices (..., 3, 3) of unit quaternions (..., 4).
-
-    Raises
-    ------
-    TrajectoryError
-        Not of shape (..., 4), or not of norm 1; see `normalized`.
-    """
+    """Rotation matrices (..., 3, 3) of unit quaternions (..., 4)."""
     from scipy.spatial.transform import Rotation  # reading files needs no SciPy
 
     q = normalized(q)

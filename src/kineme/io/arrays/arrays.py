@@ -44,11 +44,6 @@ def arrays_movements(arrays: Mapping[str, Any], layout: Layout, kind: str) -> Pa
     and ``z`` that are all (T,) are the coordinates of one movement; ``columns`` (d,) names the coordinates.
     Where there are no times, a rate (``fps``, ``dt``, ...) gives them; else movements of ``positions`` (n, T, d) and
     ``positions_0`` are evenly sampled over one second.
-
-    Raises
-    ------
-    DataError
-        No positions, or arrays that do not fit together.
     """
     arrays = _axes_stacked(arrays)
     key = first_named(arrays, POSITIONS)
@@ -116,13 +111,7 @@ def parsed_arrays(
 
 
 def check_first_axis(shapes: Iterable[tuple[int, ...]]) -> None:
-    """Refuse movements (T, d) without stamps that have more dimensions than samples: time may run along the last axis.
-
-    Raises
-    ------
-    DataError
-        Such a movement.
-    """
+    """Refuse movements (T, d) without stamps of more dimensions than samples: time may run along the last axis."""
     if wide := [shape for shape in shapes if shape[0] < math.prod(shape[1:])]:
         raise DataError(
             f"expected samples along the first axis of each movement, got shape {wide[0]}, more dimensions than "
@@ -137,11 +126,6 @@ def sets_or_points(xs: list[Array], every: int | None) -> list[Array]:
     Nobody says which axis is time, but places change less from sample to sample than from point to point, and less than
     between movements that are not all but equal. As many samples as `every` says are a movement. Points have several
     coordinates: of one there are movements.
-
-    Raises
-    ------
-    DataError
-        The first axis may be time.
     """
     if len(xs) < MIN_SAMPLES or len({x.shape for x in xs}) > 1 or not 1 < math.prod(xs[0].shape[1:]) <= len(xs[0]):
         return xs

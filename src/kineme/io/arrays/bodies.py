@@ -79,11 +79,6 @@ def body_movements(arrays: Mapping[str, Any], layout: Layout, kind: str) -> Pars
 
     Rotation vectors become quaternions, so that turns beyond pi do not jump. ``split_points`` (n + 1,) of LocoMuJoCo
     divides them into n movements.
-
-    Raises
-    ------
-    DataError
-        Neither times nor a rate, and no step as `layout.units`; or columns that are not there.
     """
     body = next((body for find in _KINDS if (body := find(arrays)) is not None), None)
     if body is None:

@@ -31,12 +31,6 @@ def hdf5_movements(path: Path, layout: Layout) -> Parsed:
     """The movements in an HDF5 file: groups of data sets of one length; only those that are needed are read.
 
     Data sets that lie in other files are passed over: a file from elsewhere must not make the program read others.
-
-    Raises
-    ------
-    DataError
-        Not such a file, damaged, without movements, with several vectors of which none is chosen, or the package that
-        reads it is not installed; the message names the extra.
     """
     with needs("h5py", "read HDF5", "hdf5"):
         import h5py

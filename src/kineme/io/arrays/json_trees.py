@@ -283,13 +283,7 @@ def _array(values: list[Any]) -> Any:
 
 
 def json_messages(path: Path, layout: Layout) -> Parsed:
-    """The movement of a topic. Its times are those in the messages, or where they have none those of the recording.
-
-    Raises
-    ------
-    DataError
-        The package mcap is not installed, the file is damaged, no topic in JSON, or several of which none is chosen.
-    """
+    """The movement of a topic. Its times are those in the messages, or where they have none those of the recording."""
     with needs("mcap", "read MCAP", "ros"):
         from mcap.records import Channel, Message
 

@@ -51,11 +51,6 @@ def read_demos(data: bytes) -> Demos:
     """Read all demonstrations of a MATLAB file of version 5 to 7.2.
 
     ``demos`` is a structure, an array of structures or a cell array of them. Other variables are ignored.
-
-    Raises
-    ------
-    DataError
-        Not such a file, or damaged, or without ``demos``.
     """
     if data[:8] == b"\x89HDF\r\n\x1a\n" or data[:10] == b"MATLAB 7.3":
         raise DataError("expected a MATLAB file of version 7.2 or earlier, got 7.3; save it with -v7")
@@ -117,11 +112,6 @@ def mat_movements(data: bytes, layout: Layout) -> Parsed:
 
     Structures with times hold one movement; cells and arrays of structures hold many. Matrices among the variables
     count only beside times or a rate, or where the caller gives the step between samples.
-
-    Raises
-    ------
-    DataError
-        Not such a file, damaged, without movements, or with several arrays of coordinates of which none is chosen.
     """
     variables = _variables(data)
     if "demos" in variables or not variables:

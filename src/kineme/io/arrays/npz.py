@@ -38,7 +38,6 @@ class Npz(Mapping[str, NDArray[Any]]):
 
     Parameters
     ----------
-    data : bytes
     path : Path
         For messages.
 
@@ -101,13 +100,7 @@ class Npz(Mapping[str, NDArray[Any]]):
 
 
 def array_of_npy(data: bytes, path: Path) -> NDArray[Any]:
-    """The array in the bytes of an npy file.
-
-    Raises
-    ------
-    DataError
-        Not such a file, damaged, larger in memory than `kineme.io.limits` allows, or one of Python objects.
-    """
+    """The array in the bytes of an npy file."""
     try:
         return _decoded(data, "it", path, check_expanded)
     except DataError:

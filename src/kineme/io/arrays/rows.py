@@ -53,11 +53,6 @@ def row_movements(data: bytes, layout: Layout) -> Parsed:
     column `layout.label`; by default in the first or the last one if it holds words, or a whole number beside a whole
     number of samples.
     Cells that are empty or NaN at the end of a line pad it.
-
-    Raises
-    ------
-    DataError
-        Nothing says what the coordinates of a sample are, or no movements.
     """
     lines, heads = _table(data)
     names = _names(layout, heads)
@@ -152,11 +147,6 @@ def series_movements(data: bytes, layout: Layout) -> Parsed:
 
     The columns of a movement are separated by colons, its values by commas, each alone or as ``(time,value)``; the
     label is last where ``@classLabel`` says so. A value of ``@targetLabel`` is no label.
-
-    Raises
-    ------
-    DataError
-        No such file, or no movements.
     """
     check_expanded(len(data) + _CELL * data.count(b","))
     flags, body = _head(data)

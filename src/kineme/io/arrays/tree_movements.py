@@ -40,11 +40,6 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: Style = NAMES, m
     many : {"refuse", "take"}
         What is done with several arrays of more than one column in a movement if `layout` chooses none: they may mean
         different things, such as states and commands, or be parts of one state.
-
-    Raises
-    ------
-    DataError
-        No movements; several arrays, none of them chosen; or no times where they are needed.
     """
     movements = [movement for movement in movements_in(tree, style) if movement.entries]
     if not movements:

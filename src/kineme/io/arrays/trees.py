@@ -62,13 +62,7 @@ class Rate(NamedTuple):
     hertz: float  # NaN where the file says several that differ, which are named
 
     def stamps(self, n: int) -> Any:
-        """The times [s] of n samples.
-
-        Raises
-        ------
-        DataError
-            The file says several rates.
-        """
+        """The times [s] of n samples."""
         if math.isnan(self.hertz):
             raise DataError(
                 f"expected one rate, got {self.name}; say the seconds between two samples with units=, in the shell "

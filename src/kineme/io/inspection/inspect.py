@@ -64,32 +64,17 @@ class LabelSummary(NamedTuple):
 
 
 class Inspection(NamedTuple):
-    """The result of `inspect`.
-
-    Attributes
-    ----------
-    movements, files, dimensions : int
-    labels : tuple of LabelSummary
-        In alphabetic order, those without a label last.
-    detected : tuple of (Detected, int)
-    channels : tuple of Channel or None
-        What the columns are, where all files have the same.
-    duplicates : tuple of tuple of str
-        Names of movements that are the same, sample for sample.
-    problems : tuple of Problem
-    notes : tuple of str
-        Hints that a person should check.
-    """
+    """The result of `inspect`."""
 
     movements: int
     files: int
     dimensions: int
-    labels: tuple[LabelSummary, ...]
+    labels: tuple[LabelSummary, ...]  # in alphabetic order, those without a label last
     detected: tuple[tuple[Detected, int], ...]
-    channels: Channels | None
-    duplicates: tuple[tuple[str, ...], ...]
+    channels: Channels | None  # what the columns are, where all files have the same
+    duplicates: tuple[tuple[str, ...], ...]  # names of movements that are the same, sample for sample
     problems: tuple[Problem, ...]
-    notes: tuple[str, ...]
+    notes: tuple[str, ...]  # hints that a person should check
 
 
 def nothing_read(file: str, reason: str) -> Inspection:

@@ -50,26 +50,13 @@ class Motion(NamedTuple):
 
 
 class Column(NamedTuple):
-    """The column of a version that carries texts.
-
-    Attributes
-    ----------
-    name : str
-    feature : dict
-        Its entry in meta/info.json.
-    type_in : callable
-        Schema of a shard -> type of the column, whether the shard has it or not.
-    leaves : callable
-        Type -> paths of its parts in a Parquet file.
-    extended : callable
-        See `with_language`.
-    """
+    """The column of a version that carries texts."""
 
     name: str
-    feature: dict[str, Any]
-    type_in: Callable[[Any], Any]
-    leaves: Callable[[Any], list[str]]
-    extended: Callable[[Any, Any, Any, Any], Any]
+    feature: dict[str, Any]  # its entry in meta/info.json
+    type_in: Callable[[Any], Any]  # schema of a shard -> type of the column, whether the shard has it or not
+    leaves: Callable[[Any], list[str]]  # type -> paths of its parts in a Parquet file
+    extended: Callable[[Any, Any, Any, Any], Any]  # see `with_language`
 
 
 def copy_with_motions(source: Path, target: Path, motions: Mapping[int, Sequence[Motion]]) -> None:
@@ -86,11 +73,6 @@ def copy_with_motions(source: Path, target: Path, motions: Mapping[int, Sequence
         Folders; the second exists and is empty.
     motions : mapping of int to sequence of Motion
         Number of an episode -> its texts.
-
-    Raises
-    ------
-    DataError
-        An episode that is not there, or a damaged shard; the message names it.
     """
     info = read_info(source)
     column = COLUMNS[info.version]
@@ -137,11 +119,6 @@ def write_shard(source: Path, target: Path, motions: Mapping[int, Sequence[Motio
 
     Texts of others stay, before those that are added; those of this package are replaced. All other columns, what the
     file says of itself, its groups of rows and its compression are those of the source.
-
-    Raises
-    ------
-    DataError
-        A column of that name which is none of LeRobot's, or a damaged file.
     """
     import pyarrow as pa
     from pyarrow import parquet

@@ -34,32 +34,16 @@ _WIDE_FIELD = re.compile(r"\{[^}]*(\d{3}|\{)")  # in a data_path: {chunk_index:3
 
 
 class Info(NamedTuple):
-    """A data set of LeRobot.
+    """A data set of LeRobot."""
 
-    Attributes
-    ----------
-    version : int
-        2: a file for each episode. 3: many episodes in a file.
-    fps : float
-    heads : dict of str to tuple of str
-        Feature of numbers -> the names of its entries; one empty name where the feature is a single number.
-    others : tuple of str
-        Features that cannot be coordinates: images, texts.
-    data_path : str
-        Where the shards are, in the syntax of `str.format`.
-    episodes : int or None
-        How many it says that there are.
-    chunk : int
-        Episodes in a chunk, for version 2.
-    """
-
-    version: int
+    version: int  # 2: a file for each episode. 3: many episodes in a file.
     fps: float
+    # Feature of numbers -> the names of its entries; one empty name where the feature is a single number.
     heads: dict[str, tuple[str, ...]]
-    others: tuple[str, ...]
-    data_path: str
-    episodes: int | None
-    chunk: int
+    others: tuple[str, ...]  # features that cannot be coordinates: images, texts
+    data_path: str  # where the shards are, in the syntax of `str.format`
+    episodes: int | None  # how many it says that there are
+    chunk: int  # episodes in a chunk, for version 2
 
     @property
     def vectors(self) -> dict[str, int]:
@@ -77,13 +61,7 @@ def read_json(path: Path, what: str) -> Any:
 
 
 def read_info(folder: Path) -> Info:
-    """Read meta/info.json.
-
-    Raises
-    ------
-    DataError
-        It is damaged, of another program, or of a version that is not read.
-    """
+    """Read meta/info.json."""
     info = read_json(folder / MARKER, MARKER)
     description = info if isinstance(info, Mapping) else {}
     said, features = str(description.get("codebase_version", "")), description.get("features")
@@ -136,31 +114,17 @@ def _names(names: Any) -> list[str]:
 
 
 class Episodes(NamedTuple):
-    """The declarations of the episodes, in their order.
+    """The declarations of the episodes, in their order."""
 
-    Attributes
-    ----------
-    numbers, lengths : ndarray of shape (n,)
-    shards : list of n str
-        The file that holds each, relative to the data set.
-    problems : list of str
-        What of meta/episodes could not be read.
-    """
-
+    # numbers and lengths: shape (n,)
     numbers: NDArray[np.int64]
     lengths: NDArray[np.int64]
-    shards: list[str]
-    problems: list[str]
+    shards: list[str]  # the file that holds each, relative to the data set
+    problems: list[str]  # what of meta/episodes could not be read
 
 
 def read_episodes(folder: Path, info: Info) -> Episodes:
-    """The episodes as meta/episodes says.
-
-    Raises
-    ------
-    DataError
-        It is missing, or none of it can be read, or it names shards outside of the data set.
-    """
+    """The episodes as meta/episodes says."""
     problems: list[str] = []
     places: tuple[NDArray[np.int64], ...]
     if info.version == 2:

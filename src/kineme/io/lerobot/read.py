@@ -40,11 +40,6 @@ def lerobot_movements(folder: Path, layout: Layout) -> Parsed:
     The coordinates are the entries of ``observation.state``, or of the features that ``columns`` names: whole ones or
     single entries. A movement is an episode, its place is ``episode 12``, its label the text of its task. Where the
     stamps are those of frames at the declared rate, to 0.1 ms, exactly these are taken.
-
-    Raises
-    ------
-    DataError
-        No such data set or a damaged description; no feature to choose, or none of that name; pyarrow is not installed.
     """
     with needs("pyarrow", "read Parquet", "parquet"):
         import pyarrow  # noqa: F401
@@ -248,24 +243,15 @@ def _taken(frames: Frames, mask: NDArray[np.bool_]) -> Frames:
 
 
 class Frames(NamedTuple):
-    """Consecutive frames: their features side by side, and what tells them apart.
+    """Consecutive frames: their features side by side, and what tells them apart."""
 
-    Attributes
-    ----------
-    values : ndarray of shape (T, d)
-    episodes, frames, tasks : ndarray of shape (T,)
-    stamps : ndarray of shape (T,)
-        Seconds since the beginning of the episode, as they are stored.
-    faults : dict
-        Row -> what is wrong there.
-    """
-
-    values: Array
+    values: Array  # shape (T, d)
+    # episodes, frames, tasks: shape (T,)
     episodes: NDArray[np.int64]
     frames: NDArray[np.int64]
     tasks: NDArray[np.int64]
-    stamps: Array
-    faults: dict[int, str]
+    stamps: Array  # shape (T,); seconds since the beginning of the episode, as they are stored
+    faults: dict[int, str]  # row -> what is wrong there
 
 
 def read_shard(folder: Path, shard: str, features: Mapping[str, int], taken: int) -> list[Frames]:
@@ -277,11 +263,6 @@ def read_shard(folder: Path, shard: str, features: Mapping[str, int], taken: int
         Features that are read, with their widths.
     taken : int
         Bytes that earlier shards take, for the limit.
-
-    Raises
-    ------
-    DataError
-        There is no such file, it is damaged, or lacks a feature; the message names it.
     """
     import pyarrow as pa
     from pyarrow import parquet

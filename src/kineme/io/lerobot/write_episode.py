@@ -54,11 +54,6 @@ def write_episode(
     -------
     int
         Number of the episode.
-
-    Raises
-    ------
-    DataError
-        The extra ``parquet`` is not installed; or a data set of another version, with other features or another rate.
     """
     with needs("pyarrow", "write LeRobot", "parquet"):
         import pyarrow  # noqa: F401 - so that the message names the extra

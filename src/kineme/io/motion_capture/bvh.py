@@ -25,13 +25,7 @@ _MOST_CHANNELS = 10_000
 
 
 def read_bvh_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
-    """The channels of a BVH file and its time stamps, from the time of a frame.
-
-    Raises
-    ------
-    DataError
-        Not such a file, or a truncated or damaged one; the message names the line.
-    """
+    """The channels of a BVH file and its time stamps, from the time of a frame."""
     check_expanded(3 * len(data))
     lines = data.decode("utf-8", "replace").lstrip("\ufeff").splitlines()
     if not lines or next((line.strip() for line in lines if line.strip()), "").upper() != "HIERARCHY":

@@ -32,12 +32,6 @@ def read_c3d_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
 
     Poses of segments beside points, and what a model computed instead of places, as the angles of joints, are left
     aside unless columns name them.
-
-    Raises
-    ------
-    DataError
-        Not a C3D file, damaged, without points, or the package that reads it is not installed; the message names the
-        extra.
     """
     with needs("c3d", "read C3D files", "mocap"):
         import c3d

@@ -40,39 +40,17 @@ STAMP = "time [s]"  # head of the times
 
 
 class ExportHead(NamedTuple):
-    """The head of an export, above its samples.
+    """The head of an export, above its samples."""
 
-    Attributes
-    ----------
-    maker : str
-        Such as ``"OptiTrack"``.
-    separator : str or None
-        None: blanks.
-    heads : tuple of str
-        One per column; empty for columns that are not coordinates, such as residuals.
-    measured_in : tuple of str
-        Unit of each column, empty if unknown.
-    first : int
-        Line of the first sample, counted from 0.
-    end : int or None
-        Line after the last sample; None: the samples reach to the end of the file.
-    rate : float or None
-        Samples per second, where the head says it.
-    zeros_are_gaps : bool
-        Whether three zeros in place of a marker mean that it was not found.
-    packed : bool
-        Whether cells hold several numbers between commas; `heads` has one for each number.
-    """
-
-    maker: str
-    separator: str | None
-    heads: tuple[str, ...]
-    measured_in: tuple[str, ...]
-    first: int
-    end: int | None = None
-    rate: float | None = None
-    zeros_are_gaps: bool = False
-    packed: bool = False
+    maker: str  # such as ``"OptiTrack"``
+    separator: str | None  # None: blanks
+    heads: tuple[str, ...]  # one per column; empty for columns that are not coordinates, such as residuals
+    measured_in: tuple[str, ...]  # unit of each column, empty if unknown
+    first: int  # line of the first sample, counted from 0
+    end: int | None = None  # line after the last sample; None: the samples reach to the end of the file
+    rate: float | None = None  # samples per second, where the head says it
+    zeros_are_gaps: bool = False  # whether three zeros in place of a marker mean that it was not found
+    packed: bool = False  # whether cells hold several numbers between commas; `heads` has one for each number
 
     @property
     def is_timed(self) -> bool:

@@ -89,11 +89,6 @@ def read_mvnx_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
     """The columns of an MVNX file: ``Pelvis.position.x``, ``Pelvis.orientation.w``, ``jRightElbow.angle.x``, ...
 
     Unless columns are chosen, angles of joints are learned only where there are no segments. What a frame lacks is NaN.
-
-    Raises
-    ------
-    DataError
-        Not such a file, damaged, or with a document type or entities, which none has.
     """
     check_expanded(3 * len(data))
     content = _parsed(data)

@@ -51,7 +51,6 @@ def check_block(block: Block, file: str, layout: Layout, columns: Sequence[str])
 
     Parameters
     ----------
-    block : Block
     file : str
         Name of the file in the problems.
     layout : Layout
@@ -245,7 +244,6 @@ def fill_gaps(block: Block, columns: Sequence[str], layout: Layout) -> Block:
     ----------
     block : Block
         NaN stands for a missing value; the stamps of each movement increase.
-    columns : sequence of d str
     layout : Layout
         `fill_gaps` is the longest gap that is filled [s], `kinds` what columns are.
     """

@@ -20,30 +20,15 @@ _NAMED = 3  # paths that a message names
 
 
 class Entry(NamedTuple):
-    """A file, or a folder that is one data set.
-
-    Attributes
-    ----------
-    path : Path
-    relative : Path
-        In the folder that was given; the name alone of what was given itself.
-    name : str
-        In the result: with the path that was given, where several were.
-    """
+    """A file, or a folder that is one data set."""
 
     path: Path
-    relative: Path
-    name: str
+    relative: Path  # in the folder that was given; the name alone of what was given itself
+    name: str  # in the result: with the path that was given, where several were
 
 
 def entries_of(paths: Sequence[Path], follow_links: bool = False) -> tuple[list[Entry], list[Problem]]:
-    """All files of files, folders and patterns such as ``optitrack/*.csv``, each once, and problems.
-
-    Raises
-    ------
-    DataError
-        One path alone is given, and nothing is there.
-    """
+    """All files of files, folders and patterns such as ``optitrack/*.csv``, each once, and problems."""
     entries: dict[Path, Entry] = {}
     problems: list[Problem] = []
     alone = is_alone(paths)

@@ -35,47 +35,25 @@ class Format(NamedTuple):
 
     A reader of a path keeps only what it returns, so that files may be larger than the memory; it alone checks
     `kineme.io.limits`, against what it keeps. `read_bytes` or `read_path` is given, never both.
-
-    Attributes
-    ----------
-    read_bytes, read_path : callable or None
-    label_is_stem : bool
-        Whether the name of the file is the label of its movements.
-    contents : callable, optional
-        What a file holds besides what is read of it, for formats that hold more than one recording.
-    has_lines : bool
-        Whether it is text, of which each line may be a movement.
     """
 
     read_bytes: Callable[[bytes, Layout], Parsed] | None = None
     read_path: Callable[[Path, Layout], Parsed] | None = None
-    label_is_stem: bool = False
+    label_is_stem: bool = False  # whether the name of the file is the label of its movements
+    # What a file holds besides what is read of it, for formats that hold more than one recording.
     contents: Callable[[Path], list[Contents]] | None = None
-    has_lines: bool = False
+    has_lines: bool = False  # whether it is text, of which each line may be a movement
 
 
 class DataSet(NamedTuple):
-    """A folder that is one source: its files have a meaning only together.
+    """A folder that is one source: its files have a meaning only together."""
 
-    Attributes
-    ----------
-    marker : str
-        Path of the file that makes a folder such a data set.
-    beside : tuple of str
-        Patterns of file names in the folder, one of which must be there too; empty if the marker is enough.
-    parts : tuple of str
-        Patterns of the files that are read; their bytes identify the source.
-    format : Format
-        It reads the path of the folder.
-    says : bytes
-        What is among the first bytes of the marker, where other programs write files of that name.
-    """
-
-    marker: str
+    marker: str  # path of the file that makes a folder such a data set
+    # Patterns of file names in the folder, one of which must be there too; empty if the marker is enough.
     beside: tuple[str, ...]
-    parts: tuple[str, ...]
-    format: Format
-    says: bytes = b""
+    parts: tuple[str, ...]  # patterns of the files that are read; their bytes identify the source
+    format: Format  # it reads the path of the folder
+    says: bytes = b""  # what is among the first bytes of the marker, where other programs write files of that name
 
     def files(self, folder: Path) -> list[Path]:
         """The files that are read, sorted; hidden ones are passed over."""

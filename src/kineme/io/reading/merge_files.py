@@ -152,7 +152,6 @@ def merge_files(
 
     Parameters
     ----------
-    files : sequence of FileRead
     where : str
         What is read, for the message.
     problems : sequence of Problem
@@ -163,11 +162,6 @@ def merge_files(
         What a quaternion that is not of norm 1 costs.
     by_number : bool, default False
         Whether the columns of the files were chosen by their numbers, so that other names are no problem.
-
-    Raises
-    ------
-    DataError
-        There is none.
     """
     reported = [*problems, *(problem for file in files for problem in file.problems)]
     full = [file for file in files if file.block is not None and len(file.block.labels)]
@@ -253,11 +247,6 @@ def with_channels(
     are positions or angles, without the wraps of angles, and then nothing is known of the channels; else they are
     problems. A quaternion that is not of norm 1 costs its movement, or with `skip`
     ``"sample"`` that sample alone.
-
-    Raises
-    ------
-    SpecificationError
-        See `find_channels`.
     """
     same, nameless, problems = in_one_set(files, by_number)
     channels = _channels_of(same, given)
@@ -362,11 +351,6 @@ def each_person(path: Path, sources: Sequence[Source]) -> list[str | None]:
         The folder or file that was read.
     sources : sequence of Source
         Of the movements.
-
-    Raises
-    ------
-    DataError
-        Not one person for each movement of a file.
     """
     of_file = cache(lambda name: _people_in(path / name if path.is_dir() else path))
     return [source.person or _person(source, of_file(source.path)) for source in sources]

@@ -41,11 +41,6 @@ class NameRule:
     label_by : {"task", "folder"} or int, optional
         ``"task"``: the label in the recording alone, as the tasks of LeRobot; ``"folder"``: the innermost folder, also
         of a file that is given alone; a number: the folder so many levels up, 1 for the innermost.
-
-    Raises
-    ------
-    SpecificationError
-        A pattern that cannot be understood, or both name the label.
     """
 
     label_pattern: str | None = None

@@ -59,11 +59,9 @@ def read_file(path: Path, relative: Path, layout: Layout, follow_links: bool = F
 
     Parameters
     ----------
-    path : Path
     relative : Path
         Path in the result. Its innermost folder is the label of movements without one in the file, unless the format
         takes the name of the file itself.
-    layout : Layout
     follow_links : bool, default False
         Whether links in a data set that lead out of it are read.
     """
@@ -157,13 +155,7 @@ def _sha256(parts: Sequence[Path], path: Path) -> str:
 
 
 def format_of(path: Path) -> Format:
-    """The row of `FORMATS` for a file's extension.
-
-    Raises
-    ------
-    DataError
-        No format has that extension; the message lists those that exist.
-    """
+    """The row of `FORMATS` for a file's extension."""
     form = FORMATS.get(path.suffix.lower())
     if path.suffix.lower() in _SPREADSHEETS:
         raise DataError(f"expected a table of text, got the spreadsheet {path.name}; save its sheet as .csv")
@@ -196,13 +188,7 @@ def _reason(error: BaseException) -> str:
 
 
 def in_blocks(parsed: Parsed, every: int) -> Parsed:
-    """Cut each movement of a file into movements of `every` samples.
-
-    Raises
-    ------
-    DataError
-        A movement whose number of samples is not divisible by it: nobody knows where the others begin.
-    """
+    """Cut each movement of a file into movements of `every` samples."""
     block = parsed.block
     lengths = np.diff(block.offsets)
     if (odd := np.flatnonzero(lengths % every)).size:
@@ -233,11 +219,6 @@ def select_columns(parse: Callable[[Layout], Parsed], layout: Layout) -> Parsed:
     Where nobody chooses columns, those of the movements to compare with are read, if the file has all of them; and a
     column without any value is left aside. Columns that are chosen by their numbers are those in that order, whatever
     their names.
-
-    Raises
-    ------
-    DataError
-        Some columns of the movements to compare with are there, others are not; or no column is left.
     """
     names = layout.reference.columns if layout.reference is not None and layout.coordinates is None else ()
     if names and not any(name.isdecimal() for name in names):

@@ -52,25 +52,16 @@ _NOTHING = frozenset({"", "-", "?", UNKNOWN, "none", "nan", "null"})  # labels t
 
 
 class LabelRow(NamedTuple):
-    """A row of a table of labels.
+    """A row of a table of labels."""
 
-    Attributes
-    ----------
-    start, end : float
-        In seconds.
-    label : str or None
-    recording, place : str
-        Which recording, and which movement of it; empty where the table does not say.
-    line : int
-        Row of the table, from 1.
-    """
-
+    # start and end: in seconds
     start: float
     end: float
     label: str | None
+    # recording and place: which recording, and which movement of it; empty where the table does not say
     recording: str
     place: str
-    line: int
+    line: int  # row of the table, from 1
 
 
 class Heads(NamedTuple):
@@ -86,13 +77,7 @@ class Heads(NamedTuple):
 
 
 def heads_of(cells: Sequence[str]) -> Heads | None:
-    """The roles of the columns of a table with these heads; None if they are none.
-
-    Raises
-    ------
-    DataError
-        No column of labels; or a start and an end in another unit than of time, as frames.
-    """
+    """The roles of the columns of a table with these heads; None if they are none."""
     names = [cell.strip().strip('"#').strip().lower() for cell in cells]
     either = [[k for k, name in enumerate(names) if wanted.match(name)] for wanted in (_START, _END)]
     starts, ends = ([k for k in some if _is_time(names[k])] for some in either)
@@ -145,13 +130,7 @@ def heads_of_cells(cells: Sequence[str]) -> Heads | None:
 
 
 def row_of(cells: Sequence[str], heads: Heads, line: int) -> LabelRow:
-    """A row as a record.
-
-    Raises
-    ------
-    DataError
-        Times that are none, or an end before the start; the message names the line.
-    """
+    """A row as a record."""
     if len(cells) <= max(heads.start, heads.end, heads.label):
         raise DataError(f"line {line}: expected start, end and label, got {list(cells)}")
     start, end = (_time_in(cells[k], unit) for k, unit in zip((heads.start, heads.end), heads.units, strict=True))
@@ -194,19 +173,11 @@ _MILLISECONDS = Heads(0, 1, 2, None, None, ("ms", "ms"), True)
 
 
 class LabelTable(NamedTuple):
-    """Labels beside a recording.
+    """Labels beside a recording."""
 
-    Attributes
-    ----------
-    name : str
-        Of the file.
-    rows : tuple of LabelRow
-    since_start : bool
-        Whether times count from the first sample, as in ELAN and Audacity; else they are by the recording's clock.
-    """
-
-    name: str
+    name: str  # of the file
     rows: tuple[LabelRow, ...]
+    # Whether times count from the first sample, as in ELAN and Audacity; else they are by the recording's clock.
     since_start: bool
 
 
@@ -219,13 +190,6 @@ def read_labels(path: Path) -> LabelTable:
         ``.eaf`` is a document of ELAN, ``.json`` a list of objects; anything else is a table whose cells are separated
         by tabs, semicolons or commas. With heads, these name the columns; without, as Audacity and ELAN export tables,
         the first two times are start and end, and the last column is the label.
-
-    Raises
-    ------
-    DataError
-        No such table; the message names the file, and the line if there is one.
-    OSError
-        The file cannot be read.
     """
     with path.open("rb") as file:
         data = read_limited(file)
@@ -297,11 +261,6 @@ def labeled_pieces(recordings: Recordings, table: LabelTable) -> Recordings:
     of it, and would fit counted from its first sample, are taken so. Columns named recording and place say which
     recording a row is of; without them there must be one. A stretch outside of its recording, of fewer than four
     samples, or labeled twice is a problem, and so are rows of recordings that are not there.
-
-    Raises
-    ------
-    DataError
-        Several recordings, and a table that does not say which row is of which; no stretch at all.
     """
     demos, rows = recordings.demonstrations, table.rows
     if len(demos) > 1 and not any(row.recording or row.place for row in rows):

@@ -61,24 +61,13 @@ def notes_on_sampling(recordings: Recordings) -> list[str]:
 
 
 class Sampling(NamedTuple):
-    """One row per movement; arrays of shape (n,).
+    """One row per movement; arrays of shape (n,)."""
 
-    Attributes
-    ----------
-    rates : ndarray
-        One over the median step between samples [Hz].
-    jitters : ndarray
-        Root mean square deviation of the steps from the median step, as a share of it; gaps are not counted.
-    gaps : ndarray
-        Number of steps longer than `GAP` median steps.
-    longest : ndarray
-        The longest step [s].
-    """
-
-    rates: Array
+    rates: Array  # one over the median step between samples [Hz]
+    # Root mean square deviation of the steps from the median step, as a share of it; gaps are not counted.
     jitters: Array
-    gaps: NDArray[np.intp]
-    longest: Array
+    gaps: NDArray[np.intp]  # number of steps longer than `GAP` median steps
+    longest: Array  # the longest step [s]
 
 
 def sampling_of(demonstrations: Demonstrations) -> Sampling:

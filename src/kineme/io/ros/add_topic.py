@@ -31,16 +31,10 @@ def copy_with_topic(source: Path, target: Path, name: str, texts: Callable[[int,
 
     Parameters
     ----------
-    source, target : Path
     name : str
         The topic.
     texts : callable
         Of the times of the first and of the last message of the bag [ns].
-
-    Raises
-    ------
-    DataError
-        The bag cannot be opened, has that topic, or takes none: damaged, without index, or compressed as a whole.
     """
     with open_bag(source) as bag:
         chosen = texts(int(bag.reader.start_time), int(bag.reader.end_time) - 1)
@@ -136,31 +130,17 @@ def _compressed(raw: bytes) -> bytes:
 
 
 class AddedTopic(NamedTuple):
-    """Messages of the type std_msgs/String.
-
-    Attributes
-    ----------
-    name : str
-    definition, digest : str
-        Of the type: its text, and its checksum in this version of ROS.
-    messages : tuple of (int, bytes)
-        Time of recording [ns] and bytes of each, in the order of time.
-    """
+    """Messages of the type std_msgs/String."""
 
     name: str
+    # definition and digest: of the type, its text, and its checksum in this version of ROS
     definition: str
     digest: str
-    messages: tuple[tuple[int, bytes], ...]
+    messages: tuple[tuple[int, bytes], ...]  # time of recording [ns] and bytes of each, in the order of time
 
 
 def added_topic(bag: Bag, name: str, texts: Sequence[tuple[int, str]]) -> AddedTopic:
-    """Texts with their times of recording [ns] as messages of that bag's version of ROS.
-
-    Raises
-    ------
-    DataError
-        The bag has a topic of that name.
-    """
+    """Texts with their times of recording [ns] as messages of that bag's version of ROS."""
     if any(topic.name == name for topic in bag.topics):
         raise DataError(f"expected a bag without the topic {name}, got one that has it; annotate the recording itself")
     store: Any = standard_types(bag.version)
@@ -217,13 +197,7 @@ def _compressed_by_lz4(data: bytes) -> bytes:
 
 
 def copy_mcap(source: Path, target: Path, added: AddedTopic, compression: str) -> None:
-    """Write a copy of an MCAP file with a topic more: messages, attachments and metadata in their order.
-
-    Raises
-    ------
-    DataError
-        The package mcap is not installed, or the file is damaged.
-    """
+    """Write a copy of an MCAP file with a topic more: messages, attachments and metadata in their order."""
     with needs("mcap", "copy MCAP files", "ros"):
         from mcap import records
         from mcap.writer import CompressionType, Writer
@@ -265,13 +239,7 @@ def copy_mcap(source: Path, target: Path, added: AddedTopic, compression: str) -
 
 
 def copy_sqlite(source: Path, target: Path, added: AddedTopic) -> None:
-    """Write a copy of a database of ROS 2 with a topic more, in the columns that its version has.
-
-    Raises
-    ------
-    DataError
-        The database refuses it.
-    """
+    """Write a copy of a database of ROS 2 with a topic more, in the columns that its version has."""
     copyfile(source, target)
     about = {"name": added.name, "type": TEXT, "serialization_format": "cdr", "offered_qos_profiles": ""}
     meaning = {"topic_type": TEXT, "encoding": "ros2msg", "encoded_message_definition": added.definition}

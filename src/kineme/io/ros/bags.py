@@ -54,41 +54,19 @@ class Topic(NamedTuple):
 
 
 class Bag(NamedTuple):
-    """An open bag.
+    """An open bag."""
 
-    Attributes
-    ----------
-    kind : str
-        Such as ``"ROS 1 bag"``.
-    topics : tuple of Topic
-        In alphabetic order. A topic that carries several types occurs once for each.
-    reader : object
-        Of rosbags.
-    version : {1, 2}
-        Of ROS.
-    remedy : str
-        What may help if the bag is damaged.
-    compression : {"", "file", "message"}
-        What is compressed each for itself, apart from chunks.
-    """
-
-    kind: str
-    topics: tuple[Topic, ...]
-    reader: Any
-    version: int
-    remedy: str
-    compression: str = ""
+    kind: str  # such as ``"ROS 1 bag"``
+    topics: tuple[Topic, ...]  # in alphabetic order. A topic that carries several types occurs once for each.
+    reader: Any  # of rosbags
+    version: int  # one of 1, 2; of ROS
+    remedy: str  # what may help if the bag is damaged
+    compression: str = ""  # one of "", "file", "message"; what is compressed each for itself, apart from chunks
 
 
 @contextmanager
 def open_bag(path: Path) -> Iterator[Bag]:
-    """Open a bag, a file or a folder.
-
-    Raises
-    ------
-    DataError
-        No bag, damaged, of a kind that rosbags does not read, or rosbags is not installed; the message names the extra.
-    """
+    """Open a bag, a file or a folder."""
     with needs("rosbags", "read bags of ROS", "ros"):
         from rosbags.rosbag1 import Reader as Reader1
         from rosbags.rosbag2 import Reader as Reader2
@@ -138,11 +116,6 @@ def messages_of(bag: Bag, topics: Sequence[Topic]) -> Iterator[tuple[int, int, b
     """Index of the topic, time of recording [ns since 1970] and bytes of every message of some topics.
 
     They come in the order of that time.
-
-    Raises
-    ------
-    DataError
-        The bag is damaged from here on.
     """
     connections = [connection for topic in topics for connection in topic.connections]
     if not connections:  # none would mean all to rosbags
@@ -182,11 +155,6 @@ def check_records(path: Path) -> bytes:
     Returns the profile of an MCAP file, ``b"ros2"`` of one of ROS 2; nothing of other files.
 
     Records are passed over by their lengths. Other damage is left to rosbags, which may find its way by the index.
-
-    Raises
-    ------
-    DataError
-        The message names what may help.
     """
     magic = _MAGIC[path.suffix.lower()]
     with path.open("rb") as file:

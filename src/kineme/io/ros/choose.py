@@ -43,14 +43,7 @@ class Choice(NamedTuple):
 
 
 def choose(bag: Bag, layout: Layout) -> Choice:
-    """Choose the topics and frames to read.
-
-    Raises
-    ------
-    DataError
-        A topic that is not there or cannot be read; nothing that can be read; or several topics where none is named.
-        The message lists the topics.
-    """
+    """Choose the topics and frames to read."""
     frames = tuple(pair_of(frame) for frame in layout.frames)
     named = [_named(bag, name) for name in layout.topics]
     topics = tuple(topic for topic in named if topic.type not in TRANSFORMS)
@@ -264,13 +257,7 @@ def connected_graph(bag: Bag, topics: Sequence[Topic], wanted: Sequence[Edge], m
 
 
 def chain(graph: Graph, parent: str, child: str) -> list[Step]:
-    """The transforms from one frame to another.
-
-    Raises
-    ------
-    DataError
-        There is no such frame, or no way between them; the message lists the frames.
-    """
+    """The transforms from one frame to another."""
     edges = graph.edges
     frames = sorted({frame for edge in edges for frame in edge})
     for frame in (parent, child):
@@ -323,13 +310,7 @@ def _reached(edges: Sequence[Edge], start: str) -> set[str]:
 
 
 def bag_contents(path: Path) -> list[Contents]:
-    """Topics with types, numbers of messages and how they are read; and frames with numbers of transforms.
-
-    Raises
-    ------
-    DataError
-        The bag cannot be opened.
-    """
+    """Topics with types, numbers of messages and how they are read; and frames with numbers of transforms."""
     with open_bag(path) as bag:
         rows = tuple((topic.name, topic.type, topic.n_messages, _read_as(bag, topic)) for topic in bag.topics)
         topics = Contents("topics", ("topic", "type", "messages", "read as"), rows)

@@ -54,17 +54,10 @@ def expand(compression: str, data: bytes, size: int, what: str = "a chunk") -> b
 
     Parameters
     ----------
-    compression : {"zstd", "lz4", "bz2"}
-    data : bytes
     size : int
         How many bytes they should become; it is checked against the limit on files first.
     what : str
         They are, for messages.
-
-    Raises
-    ------
-    DataError
-        They become more, or more than a file may take, or are cut off.
     """
     check_in_passing(size, what)
     parts, n_bytes = [], 0
@@ -102,13 +95,7 @@ def _decompressor(compression: str) -> Callable[[], Any]:
 
 
 def bound_chunks_of_ros_1(reader: Any) -> None:
-    """Bound every chunk of an open bag of ROS 1.
-
-    Raises
-    ------
-    DataError
-        A chunk is larger than a file may be.
-    """
+    """Bound every chunk of an open bag of ROS 1."""
     for at, chunk in reader.chunks.items():
         check_in_passing(chunk.datasize, f"a chunk at byte {at:,}")
         reader.chunks[at] = chunk._replace(decompressor=partial(_expand_of_ros_1, reader.bio, at))
@@ -154,13 +141,7 @@ def bound_chunks_of_mcap() -> None:
 
 
 def check_overlaps(storage: Any, topics: Sequence[str]) -> None:
-    """Refuse an MCAP file of which too much must be in memory at once: chunks whose times overlap are read together.
-
-    Raises
-    ------
-    DataError
-        All chunks of a time with messages of these topics take more than a file may.
-    """
+    """Refuse an MCAP file of which too much must be in memory at once: chunks whose times overlap are read together."""
     ids = [connection.id for connection in storage.connections if connection.topic in topics]
     chunks = [chunk for chunk in getattr(storage, "chunks", ()) if any(chunk.channel_count.get(k, 0) for k in ids)]
     begins = [(chunk.message_start_time, 0, max(chunk.uncompressed_size, chunk.compressed_size)) for chunk in chunks]
@@ -184,11 +165,6 @@ def expanded_folder(path: Path) -> Iterator[Folder]:
     """The folder, or one with its files expanded.
 
     A folder that is none of ROS 2, or whose files are missing, is left to rosbags to refuse.
-
-    Raises
-    ------
-    DataError
-        A file expands to more than 64 times its size and the limit on files.
     """
     about = _information(path)
     mode = str(about.get("compression_mode", "")).lower().replace("none", "")

@@ -30,21 +30,13 @@ TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 
 
 class MessageType(NamedTuple):
-    """The way in which messages of a type are read.
+    """The way in which messages of a type are read."""
 
-    Attributes
-    ----------
-    row : callable or None
-        Message -> heads and numbers of one sample; no heads: the message holds no sample.
-    path : callable or None
-        Message -> heads, stamps [ns] and rows of a whole movement. `row` or `path` is given.
-    has_header : bool
-        Whether a message tells its own time.
-    """
-
+    # Message -> heads and numbers of one sample; no heads: the message holds no sample.
     row: Callable[[Any], tuple[Heads, Row]] | None = None
+    # Message -> heads, stamps [ns] and rows of a whole movement. `row` or `path` is given.
     path: Callable[[Any], tuple[Heads, list[int], list[Row]]] | None = None
-    has_header: bool = False
+    has_header: bool = False  # whether a message tells its own time
 
 
 def nanoseconds_of(time: Any) -> int:
@@ -227,13 +219,7 @@ class NumberFields:
 
 
 def number_fields(bag: Bag, topic: Topic) -> NumberFields:
-    """The numbers of a topic, by the definition in the bag or, where it holds none, by that of the standard type.
-
-    Raises
-    ------
-    DataError
-        No definition, a damaged one, one with texts of wide characters, or several that differ; or no numbers.
-    """
+    """The numbers of a topic, by the definition in the bag or, where it holds none, by that of the standard type."""
     definitions = {connection.msgdef.data: connection.msgdef for connection in topic.connections}
     where = f"topic {topic.name}: expected the definition of {topic.type}"
     if len(definitions) > 1:
@@ -332,13 +318,7 @@ def _layout(formats: str, phase: int, order: str) -> struct.Struct:
 
 
 def decoder_of(bag: Bag, topic: Topic) -> Callable[[bytes], Any]:
-    """Return the function that decodes the bytes of a message; it raises `ValueError` if they are none.
-
-    Raises
-    ------
-    DataError
-        The bag holds the type in another version than the standard one.
-    """
+    """Return the function that decodes the bytes of a message; it raises `ValueError` if they are none."""
     store = standard_types(bag.version)
     expected = _digest(store, bag.version, topic.type)
     for connection in topic.connections:

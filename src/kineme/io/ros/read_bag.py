@@ -50,13 +50,7 @@ _CLOCKS = ("header.stamp", "recorded")  # columns of the time stamps
 
 
 def read_bag(path: Path, layout: Layout) -> Parsed:
-    """Read what `layout` asks for of a bag of ROS 1 or ROS 2.
-
-    Raises
-    ------
-    DataError
-        No bag, damaged, or nothing that can be read without being asked for; the message names topics or frames.
-    """
+    """Read what `layout` asks for of a bag of ROS 1 or ROS 2."""
     with open_bag(path) as bag:
         choice = choose(bag, layout)
         paths = [topic for topic in choice.topics if topic.type in TYPES and TYPES[topic.type].path]
@@ -136,14 +130,7 @@ def _parsed(table: Table, roles: Roles, layout: Layout, about: tuple[str, str, s
 def read_transforms(
     bag: Bag, topics: Sequence[Topic], wanted: Sequence[Edge], skip: str
 ) -> tuple[list[Stream], list[str]]:
-    """The pose of each child frame in its parent frame, and what was left out.
-
-    Raises
-    ------
-    DataError
-        A frame that is not there, no way between two frames, nothing that moves between them; or damage, where `skip`
-        is ``"movement"``.
-    """
+    """The pose of each child frame in its parent frame, and what was left out."""
     if not topics:
         raise DataError("expected a topic of transforms, such as /tf, got none")
     graph = connected_graph(bag, topics, wanted)
@@ -258,27 +245,14 @@ def _at(seconds: Array, start: int, stream: Stream, of_headers: bool) -> Array:
 
 
 class Paths(NamedTuple):
-    """The movements of a topic, one after the other.
-
-    Attributes
-    ----------
-    topic : Topic
-    heads : tuple of d str
-    values : ndarray of shape (total, d)
-    times : ndarray of shape (total,) or None
-        In seconds; None if the points of a movement have no stamps of their own.
-    time : str
-        What the stamps are called.
-    lengths, places : list of n int
-        Number of points, and number of the message.
-    left_out : list of str
-    """
+    """The movements of a topic, one after the other."""
 
     topic: Topic
     heads: Heads
-    values: Array
-    times: Array | None
-    time: str
+    values: Array  # shape (total, d)
+    times: Array | None  # shape (total,); in seconds; None if the points of a movement have no stamps of their own
+    time: str  # what the stamps are called
+    # lengths and places: number of points, and number of the message
     lengths: list[int]
     places: list[int]
     left_out: list[str]
@@ -295,11 +269,6 @@ def read_paths(bag: Bag, topic: Topic, skip: str) -> Paths:
     """The movements of a topic. Of those with different columns, the most frequent are read.
 
     A message that cannot be read costs its own movement, whatever `skip` says.
-
-    Raises
-    ------
-    DataError
-        No movement.
     """
     groups: dict[Heads, _Group] = {}
     left_out: list[str] = []

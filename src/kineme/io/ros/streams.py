@@ -34,28 +34,14 @@ TOLERANCE = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Stream:
-    """Samples of a topic or of a transform, in the order of the recording.
+    """Samples of a topic or of a transform, in the order of the recording."""
 
-    Attributes
-    ----------
-    name : str
-        Of the topic, or the frames of the transform.
-    heads : tuple of d str
-    values : ndarray of shape (n, d)
-    recorded : ndarray of shape (n,)
-        When each message was recorded [ns since 1970].
-    stamped : ndarray of shape (n,) or None
-        The stamps in the headers of the messages [ns]; None if they have no headers.
-    why : str
-        Why there are no such stamps, where it is not for want of headers.
-    """
-
-    name: str
+    name: str  # of the topic, or the frames of the transform
     heads: Heads
-    values: Array
-    recorded: Stamps
-    stamped: Stamps | None
-    why: str = ""
+    values: Array  # shape (n, d)
+    recorded: Stamps  # shape (n,); when each message was recorded [ns since 1970]
+    stamped: Stamps | None  # shape (n,); the stamps in the headers of the messages [ns]; None if they have no headers
+    why: str = ""  # why there are no such stamps, where it is not for want of headers
 
 
 class Samples(NamedTuple):
@@ -95,11 +81,6 @@ def read_streams(
 
     Messages of one topic may have different columns, as the states of joints that several nodes publish. They are
     streams of their own where they share no column; of those that do, the most frequent are read.
-
-    Raises
-    ------
-    DataError
-        A topic without samples; or damage, where `skip` is ``"movement"``.
     """
     opened = [_open(bag, topic) for topic in topics]
     left_out: list[str] = []
@@ -306,11 +287,6 @@ def merge_streams(streams: Sequence[Stream], of_headers: bool) -> tuple[Stream, 
 
     Samples of the first stream before another one begins, or after it ends, are left out. Columns are prefixed with
     the name of their stream where names occur twice.
-
-    Raises
-    ------
-    DataError
-        Streams that share no time.
     """
     first = streams[0]
     if len(streams) == 1:

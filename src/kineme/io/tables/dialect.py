@@ -77,13 +77,7 @@ def is_skipped(line: str) -> bool:
 
 
 def check_line(line: str) -> None:
-    """Refuse a line that is too long to be one of a table, before it is split.
-
-    Raises
-    ------
-    DataError
-        More than 4 MiB, or more than 100,000 columns.
-    """
+    """Refuse a line that is too long to be one of a table, before it is split."""
     if len(line) <= _SHORT:
         return
     check_expanded(_CELL * len(line), "lines")

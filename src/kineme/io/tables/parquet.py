@@ -36,11 +36,6 @@ def read_parquet_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
 
     A column of lists counts as one column for each number in them, ``state.0``, ``state.1``. Without a choice such
     columns are coordinates only where no plain ones are, and ``observation.state`` always is.
-
-    Raises
-    ------
-    DataError
-        Not a Parquet file, damaged, or the package that reads it is not installed; the message names the extra.
     """
     with needs("pyarrow", "read Parquet", "parquet"):
         import pyarrow as pa

@@ -51,11 +51,6 @@ def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:  # noqa
     Separated by comma, semicolon, tab or blanks; with a head line or without; quoted or not; with decimal commas
     where the separator is another mark. Empty lines and comments are skipped, see `Dialect.is_sample`. A head may stand
     in the last comment, as `numpy.savetxt` writes it.
-
-    Raises
-    ------
-    DataError
-        Not text, no samples, or no columns of numbers.
     """
     _check_lines(data)
     encoding = _encoding(data)

@@ -40,11 +40,6 @@ def write_elan(path: Path, annotations: Sequence[Annotation], source: Path | Non
     """Write a document with the tier ``symbol`` and, below it, tiers with p-values and confidences.
 
     Times are milliseconds since the first sample. Unknown motion is annotated as ``unknown``.
-
-    Raises
-    ------
-    DataError
-        A time before the first sample: the format has no negative times.
     """
     root = Element(
         "ANNOTATION_DOCUMENT",
@@ -212,27 +207,15 @@ Write = Callable[[Path, Sequence[Annotation], Path | None], Path]
 
 
 class Writer(NamedTuple):
-    """A format of annotations.
+    """A format of annotations."""
 
-    Attributes
-    ----------
-    write : callable
-        See `Write`.
-    endings : tuple of str
-        Endings of paths that ask for it.
-    several : bool
-        Whether one file holds the annotations of several movements. Else there is a file for each.
-    copies : callable, optional
-        Whether it writes a copy of a recording, given by its path, with the annotations inside. A path without ending
-        asks for the first writer that says so of the recording.
-    check : callable, optional
-        It takes the path to write and that recording, and raises a `DataError` if no copy can be written there.
-    """
-
-    write: Write
-    endings: tuple[str, ...]
-    several: bool = True
+    write: Write  # see `Write`
+    endings: tuple[str, ...]  # endings of paths that ask for it
+    several: bool = True  # whether one file holds the annotations of several movements. Else there is a file for each.
+    # Whether it writes a copy of a recording, given by its path, with the annotations inside. A path without ending
+    # asks for the first writer that says so of the recording.
     copies: Callable[[Path], bool] | None = None
+    # It takes the path to write and that recording, and raises a `DataError` if no copy can be written there.
     check: Callable[[Path, Path], None] | None = None
 
 
@@ -248,13 +231,7 @@ WRITERS: dict[str, Writer] = {
 
 
 def writer_of(path: Path, name: str | None, sources: Sequence[Path]) -> Writer:
-    """The writer of that name; without a name, by the ending of the path, or by the only recording.
-
-    Raises
-    ------
-    DataError
-        Nothing says what to write, or a copy of several recordings is asked for.
-    """
+    """The writer of that name; without a name, by the ending of the path, or by the only recording."""
     if name is not None:
         writer = WRITERS[name]
     else:
@@ -295,11 +272,6 @@ def targets_of(
         All movements that are annotated.
     name : str, optional
         Key of `WRITERS`.
-
-    Raises
-    ------
-    DataError
-        See `writer_of`; several movements for one file of a format that holds one.
     """
     writer = writer_of(path, name, sources)
     if writer.check is not None:
@@ -332,13 +304,6 @@ def write_annotations(
     -------
     list of Path
         What was written.
-
-    Raises
-    ------
-    DataError
-        See `targets_of`.
-    OSError
-        A file that cannot be written.
     """
     groups: dict[Movement, list[Annotation]] = {key: [] for key in movements or ()}
     for annotation in annotations:

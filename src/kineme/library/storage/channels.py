@@ -53,13 +53,7 @@ def to_bytes(recorded: Array, offsets: NDArray[np.intp], channels: Channels) -> 
 
 
 def with_channels(stored: Movements, channels: Channels, rows: Sequence[Row]) -> Movements:
-    """Return stored movements with their channels; rows of the table "recorded" for those that positions do not say.
-
-    Raises
-    ------
-    DataError
-        A row of another size.
-    """
+    """Return stored movements with their channels; rows of the table "recorded" for those that positions do not say."""
     movements = replace(stored, channels=channels, dimensions=learned_names(channels))
     if is_plain(channels):
         return movements

@@ -232,13 +232,7 @@ def transaction(connection: sqlite3.Connection) -> Iterator[None]:
 
 
 def as_folder(folder: Any) -> Path:
-    """Return the folder of a library that exists or is to be created.
-
-    Raises
-    ------
-    SpecificationError
-        No path, or one without a name: an empty text would be the current folder.
-    """
+    """Return the folder of a library that exists or is to be created."""
     name = os.fsdecode(folder) if isinstance(folder, str | os.PathLike) else ""
     if not name.strip() or "\0" in name:
         raise SpecificationError(f"expected the folder of a library, got {folder!r}; the current one is '.'")

@@ -67,12 +67,6 @@ def import_(path: str | Path, folder: str | Path, wait: float = 10.0) -> Path:
 
     The file may come from anywhere: a copy of it is checked, by a connection on which nothing in the file can run, and
     becomes a library only if its definitions and values are those of a library.
-
-    Raises
-    ------
-    DataError
-        The folder has a library already; the file is not an export, is a library in use, is damaged, contains invalid
-        values, or is of a later schema version.
     """
     source, target = Path(path), as_folder(folder) / FILE
     _check_file(source)

@@ -61,13 +61,7 @@ def _column(connection: sqlite3.Connection, query: str, version: int, expected: 
 
 
 def as_ids(store: Store, ids: Any) -> Ids:
-    """Return a user's ids as an array; all must be in the library.
-
-    Raises
-    ------
-    SpecificationError
-        Not whole numbers, an empty list, or no such movement at this version.
-    """
+    """Return a user's ids as an array; all must be in the library."""
     wanted = np.atleast_1d(np.asarray(ids))
     if wanted.dtype.kind not in "iu" or wanted.ndim != 1 or not len(wanted):
         raise SpecificationError(f"expected ids of movements, whole numbers, at least one, got {ids!r}")

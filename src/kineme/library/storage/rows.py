@@ -47,13 +47,7 @@ def insert(connection: sqlite3.Connection, table: str, rows: Sequence[Row]) -> N
 def select(
     connection: sqlite3.Connection, table: str, where: str = "TRUE", parameters: dict[str, Any] | None = None
 ) -> list[Row]:
-    """Return rows of a table ordered by key, with checked seals and values, without the seals.
-
-    Raises
-    ------
-    DataError
-        A row is damaged or invalid; the message names it.
-    """
+    """Return rows of a table ordered by key, with checked seals and values, without the seals."""
     columns = COLUMNS[table]
     query = f"SELECT {', '.join(columns)}, crc, {GOOD[table]} FROM {table} WHERE {where} ORDER BY {columns[0]}"
     rows = connection.execute(query, parameters or {}).fetchall()
@@ -101,13 +95,7 @@ def parsed(text: str) -> Any:
 
 
 def parsed_column(table: str, row: Row, column: str, kind: type) -> Any:
-    """Return the JSON of a column, which must be a list or an object.
-
-    Raises
-    ------
-    DataError
-        Anything else; the message names the row.
-    """
+    """Return the JSON of a column, which must be a list or an object."""
     try:
         value = parsed(row[COLUMNS[table].index(column)])
     except ValueError:

@@ -45,11 +45,6 @@ class Specification:
         Of the representations, as of `kineme.Recognizer`.
     dmp : DMP
         Of the primitives.
-
-    Raises
-    ------
-    SpecificationError
-        A classifier or weights that no recognizer could be made with.
     """
 
     comparison: ComparisonSpecification = field(default_factory=ComparisonSpecification)
@@ -71,13 +66,7 @@ class Specification:
 
     @classmethod
     def of(cls, recognizer: Recognizes | None, dmp: DMP | None, default: Specification | None = None) -> Specification:
-        """Make one from a recognizer and a DMP; None for those of the default.
-
-        Raises
-        ------
-        SpecificationError
-            A parameter of the recognizer that no movement could be recognized with.
-        """
+        """Make one from a recognizer and a DMP; None for those of the default."""
         default = cls() if default is None else default
         dmp = default.dmp if dmp is None else dmp
         if recognizer is None:

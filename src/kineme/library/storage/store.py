@@ -44,7 +44,6 @@ class Store:
         Path of the database. Caches that can be built again may be beside it.
     specification : Specification, optional
         Specification of a library that is created if it does not exist.
-    read_only : bool
     as_of : int, optional
         Show the library as it was at this version; implies `read_only`.
     wait : float
@@ -146,13 +145,7 @@ class Store:
 
     @property
     def size(self) -> int:
-        """Bytes of the database and of its log.
-
-        Raises
-        ------
-        DataError
-            The file was moved, deleted or replaced.
-        """
+        """Bytes of the database and of its log."""
         self._check_there("read")
         return size_of(self.path)
 
@@ -183,11 +176,6 @@ class Store:
         """Context manager: the connection to read from, which sees only committed versions.
 
         One thread reads at a time; it may nest readings.
-
-        Raises
-        ------
-        DataError
-            The library was closed, or is not to be used in this process.
         """
         with safety.awake(), in_plain_words(self.path, self.wait):
             # Before the lock: in a forked child, a thread that does not exist may hold it.
@@ -208,13 +196,7 @@ class Store:
 
     @contextmanager
     def writing(self, action: str, detail: dict[str, Any] | None = None) -> Iterator[Change]:
-        """Context manager: one transaction, which becomes one version; `detail` is stored in the history.
-
-        Raises
-        ------
-        DataError
-            Opened for reading only, the file vanished, the disk is full, another process writes for too long.
-        """
+        """Context manager: one transaction, which becomes one version; `detail` is stored in the history."""
         detail = {} if detail is None else detail
         with safety.awake(), in_plain_words(self.path, self.wait):
             # Before the lock: in a forked child, a thread that does not exist may hold it.
@@ -318,13 +300,7 @@ class Moment:
 
 
 def moment_at(connection: sqlite3.Connection, version: int) -> Moment:
-    """Return the last version up to the given one.
-
-    Raises
-    ------
-    DataError
-        Its row is damaged.
-    """
+    """Return the last version up to the given one."""
     last = connection.execute("SELECT max(id) FROM version WHERE id <= :v", {"v": version}).fetchone()[0]
     if last is None:
         return Moment(0)

@@ -107,13 +107,7 @@ def exists(store: Store, who: object) -> bool:
 
 
 def state_of(connection: sqlite3.Connection, who: str, version: int) -> Row:
-    """Return the row of `symbol_state` of a name or, where no symbol has that name, of an id.
-
-    Raises
-    ------
-    SpecificationError
-        No such symbol; the message lists similar names.
-    """
+    """Return the row of `symbol_state` of a name or, where no symbol has that name, of an id."""
     conditions = ("name = :who", "symbol IN (SELECT key FROM symbol WHERE id = :who)")
     for condition in conditions if isinstance(who, str) else ():
         try:

@@ -184,13 +184,7 @@ def verify(store: Store, *, pages: bool = True) -> list[Problem]:
 
 
 def blame(store: Store, error: BaseException) -> None:
-    """Raise an error of Python while a library is used as the library's, if it does not verify; else return.
-
-    Raises
-    ------
-    DataError
-        The message names the first problem.
-    """
+    """Raise an error of Python while a library is used as the library's, if it does not verify; else return."""
     if isinstance(error, KinemeError) or not isinstance(error, MISFITS) or not _is_ours(error.__traceback__):
         return
     if problems := verify(store):

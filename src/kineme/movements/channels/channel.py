@@ -112,11 +112,6 @@ def check_alike(several: Sequence[Channels | None], what: str = "part") -> None:
         Of each part those that are learned, in the order of its columns; None where they are not known.
     what : str, default "part"
         What the message calls one of them.
-
-    Raises
-    ------
-    TrajectoryError
-        Channels that differ from those of the first part whose channels are known.
     """
     detected = [(i, channels) for i, channels in enumerate(several) if channels is not None]
     for i, channels in detected[1:]:

@@ -36,17 +36,10 @@ _ROTATION = re.compile(r"(?P<joint>.+)\.(?P<axis>[xyz])rotation", re.I)
 
 
 class Columns(NamedTuple):
-    """The columns of a recording.
-
-    Attributes
-    ----------
-    heads : tuple of m str
-    units : tuple of m str or None
-        Their units as the file says them; None where it does not.
-    """
+    """The columns of a recording."""
 
     heads: tuple[str, ...]
-    units: tuple[str | None, ...]
+    units: tuple[str | None, ...]  # their units as the file says them; None where it does not
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -98,16 +91,8 @@ def columns_like(positions: Array, ours: Columns, wanted: Columns, known_units: 
 
     Parameters
     ----------
-    positions : ndarray of shape (total, m)
-    ours, wanted : Columns
     known_units : bool, default True
         Refuse columns without a unit beside those with one; else they count as in that unit.
-
-    Raises
-    ------
-    TrajectoryError
-        A name that is not there, a unit that cannot be converted, or rotations about the same axes one after the other
-        in another order, which are other angles of the same turn.
     """
     place = {name: k for k, name in enumerate(ours.names)}
     missing = [head for head, name in zip(wanted.heads, wanted.names, strict=True) if name not in place]
@@ -142,13 +127,7 @@ def numbers_by_name(heads: Sequence[str], names: Sequence[str]) -> list[int | No
 
 
 def conversion(head: str, ours: str | None, wanted: str | None, known_units: bool) -> tuple[Unit, Unit] | None:
-    """The units to convert from and to; None where they are the same, or where one is not known and need not be.
-
-    Raises
-    ------
-    TrajectoryError
-        Units that cannot be converted.
-    """
+    """The units to convert from and to; None where they are the same, or where one is not known and need not be."""
     if (ours or "").strip().lower() == (wanted or "").strip().lower() or (None in (ours, wanted) and not known_units):
         return None
     here, there = unit_named(ours or ""), unit_named(wanted or "")
@@ -167,11 +146,6 @@ def in_one_unit(detected: Detected, block: Block) -> tuple[Detected, Block]:
 
     A column that is converted is named with its new unit, ``y [mm]``; `Detected.converted` says what it was. Columns
     without a unit stay as they are.
-
-    Raises
-    ------
-    DataError
-        One quantity twice in two units, as ``x_mm`` and ``x_m``.
     """
     wanted = _conversions(detected.columns, detected.measured_in)
     if not wanted:

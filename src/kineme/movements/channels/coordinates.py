@@ -23,7 +23,7 @@ _UNSTEADY = 3.0  # a step through the border is at most so many times the longes
 _UNEVEN = 0.01  # of a period: by so much an angle that turns evenly steps differently through the border, if rounded
 _JUMP = 0.75  # of a period: a step at least this long is a wrap, and no motion
 
-_LEVER = 0.2  # m
+_LEVER = 0.2
 _ROUNDING = 1e-15  # deviation from norm 1 that is that of the last digit
 
 
@@ -56,8 +56,6 @@ def canonical(columns: Array, offsets: NDArray[np.intp], channels: Channels) -> 
     ----------
     columns : ndarray of shape (total, m)
         All movements, one after the other; the norms of quaternions have been checked.
-    offsets : ndarray of shape (n + 1,)
-    channels : Channels
     """
     result = np.array(columns, dtype=np.float64, order="C")
     for channel, rows in zip(channels, columns_of(channels), strict=True):
@@ -98,11 +96,6 @@ def learned(columns: Array, offsets: NDArray[np.intp], channels: Channels) -> Ar
     from one reference it has no limit of a full turn, and it does not depend on what came before a movement but for
     an offset. A tool that is mounted differently changes nothing; a scene that is turned turns it as it turns a path.
     Beside positions it is multiplied by `lever_of` them, so that all coordinates are lengths.
-
-    Raises
-    ------
-    SpecificationError
-        Discrete channels alone: nothing moves.
     """
     if all(channel.kind == "discrete" for channel in channels):
         raise SpecificationError(

@@ -83,7 +83,6 @@ def find_channels(
 
     Parameters
     ----------
-    heads : sequence of m str
     columns : ndarray of shape (total, m)
         All movements, one after the other.
     offsets : ndarray of shape (n + 1,)
@@ -233,13 +232,7 @@ def quaternion_of(columns: Sequence[int], order: str) -> Quaternion:
 def find_quaternions(
     heads: Sequence[str], free: Sequence[int], columns: Array, offsets: NDArray[np.intp]
 ) -> list[Quaternion]:
-    """The quaternions in the columns `free`: four w, x, y, z of one name, or four that are numbered.
-
-    Raises
-    ------
-    SpecificationError
-        Numbered ones that may begin or end with the scalar; see `_order_of`.
-    """
+    """The quaternions in the columns `free`: four w, x, y, z of one name, or four that are numbered."""
     quaternions = []
     for (stem, _), parts in _groups(_COMPONENT, heads, free).items():
         if {*parts} == {*"wxyz"} and (bool(_NAMES & {*words_of(stem)}) or _unit_norms(columns[:, [*parts.values()]])):
@@ -283,11 +276,6 @@ def _order_of(heads: Sequence[str], q: Array, offsets: NDArray[np.intp]) -> str:
 
     Many programs write quaternions with a scalar that is not negative. Its column then stays so on both sides of
     every change of sign, which the other end of the quaternion does not.
-
-    Raises
-    ------
-    SpecificationError
-        Nothing tells.
     """
     changes = (q[1:] * q[:-1]).sum(axis=1) < 0
     changes[offsets[1:-1] - 1] = False

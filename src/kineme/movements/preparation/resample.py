@@ -102,10 +102,6 @@ def arc_length_phase(paths: Array, share: float = 1.0) -> Array:
         Smooth the paths first: noise adds length, and at 3 % of the extent it is longer than the movement itself.
     share : float, default 1.0
         Weight of the arc length: 1 is arc length, 0 is time.
-
-    Returns
-    -------
-    ndarray of shape (n, T)
     """
     n, _, n_samples = paths.shape
     time = np.linspace(0.0, 1.0, n_samples)

@@ -76,11 +76,6 @@ def observe(recording: Trajectory, resolution: float) -> Motion:
     recording : Trajectory
     resolution : float
         Speed that must be distinguished from rest, as a share of the peak speed.
-
-    Raises
-    ------
-    TrajectoryError
-        Fewer than eight samples, or a recording without motion.
     """
     who = f"recording {recording.name!r}" if recording.name else "recording"
     if len(recording) < _MIN_SAMPLES:

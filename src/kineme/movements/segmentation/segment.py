@@ -86,13 +86,7 @@ def as_segmenter(by: str | Segmenter, parameters: dict[str, Any]) -> Segmenter:
 
 
 def as_recording(recording: MovementsLike) -> Trajectory:
-    """One recording as a `Trajectory`.
-
-    Raises
-    ------
-    TrajectoryError
-        Several movements, or what `Demonstrations.of` refuses.
-    """
+    """One recording as a `Trajectory`."""
     if isinstance(recording, Trajectory):
         return recording
     several = Demonstrations.of(recording)

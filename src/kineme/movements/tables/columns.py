@@ -79,11 +79,6 @@ def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, nam
         The caller's choices; they take precedence.
     named : bool, default True
         Whether the file has heads. If not, the first column of numbers is time and the others are coordinates.
-
-    Raises
-    ------
-    DataError
-        No or several columns of times, no coordinates, or a column that is not there; the message lists what is.
     """
     if layout.excluded and (excluded := excluded_numbers(heads, layout.excluded)):
         heads = ["" if k in excluded else head for k, head in enumerate(heads)]

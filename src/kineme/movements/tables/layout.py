@@ -33,89 +33,45 @@ AS_KNOWN = ", as the movements to compare with"
 
 @dataclass(frozen=True)
 class Known:
-    """The origin of movements that were read before, for recordings that are compared with them.
+    """The origin of movements that were read before, for recordings that are compared with them."""
 
-    Attributes
-    ----------
-    choices : tuple of (tuple of str, tuple of str)
-        Topics and frames of bags, each choice as it was asked for.
-    columns : tuple of str
-        Their columns; empty if these are not known.
-    n_orientations : int
-        How many quaternions are among the columns.
-    moving : tuple of str
-        The columns without those that are discrete.
-    """
-
+    # Topics and frames of bags, each choice as it was asked for.
     choices: tuple[tuple[tuple[str, ...], tuple[str, ...]], ...] = ()
-    columns: tuple[str, ...] = ()
-    n_orientations: int = 0
-    moving: tuple[str, ...] = ()
+    columns: tuple[str, ...] = ()  # their columns; empty if these are not known
+    n_orientations: int = 0  # how many quaternions are among the columns
+    moving: tuple[str, ...] = ()  # the columns without those that are discrete
 
 
 @dataclass(frozen=True)
 class Layout:
-    """The roles of the columns. None: detect them from heads and numbers, and report them.
+    """The roles of the columns. None: detect them from heads and numbers, and report them."""
 
-    Attributes
-    ----------
-    time : str or int, optional
-        Column of the time stamps.
-    columns : str or int or sequence of them, optional
-        Columns of the coordinates, in that order.
-    movement : str or int or sequence of them, optional
-        Columns that tell the movements of a long table apart.
-    label : str or int, optional
-        Column that names the action.
-    units : str or float, optional
-        Unit of the time stamps, of time in `kineme.units.UNITS`, or the number of seconds in one unit. As a number, it
-        is the step between samples of a file that has no time stamps at all.
-    skip : {"movement", "sample"}
-        What is dropped for a missing or repeated sample: its whole movement, or the sample alone.
-    kinds : mapping, optional
-        Heads of columns, separated by commas, -> "position", "angle" or "discrete"; of four -> "wxyz" or "xyzw", the
-        order of a quaternion. What several heads begin with, before a dot, stands for all of them.
-    topic : str or sequence of str, optional
-        Topics of a bag; of several, the others are interpolated to the stamps of the first.
-    frame : str or sequence of str, optional
-        Pairs of frames of a bag, as ``"parent:child"``: the pose of the child in the parent.
-    person : str or int, optional
-        Column that names who showed a movement; another movement begins where it changes.
-
-    reference : Known, optional
-        What the movements to compare with were read from: the default of topic and frame where a bag has several.
-    exclude : str or int or sequence of them, optional
-        Columns that are left aside, whatever else chooses them; one that a file does not have is no matter to it.
-    fill_gaps : float
-        Longest gap [s] that is filled, from the value before it to the value after it; 0 fills none.
-    rows : bool
-        Whether each line of a text is a movement, see `kineme.io.arrays.rows`; `columns` then name the coordinates
-        of a sample.
-    every : int, optional
-        Number of samples of a movement, where a recording holds one after the other.
-
-    Raises
-    ------
-    SpecificationError
-        An unknown unit or choice, a gap that is no number of seconds from 0, blocks of fewer than `MIN_SAMPLES`
-        samples, or columns that rows do not have.
-    """
-
-    time: Column | None = None
-    columns: Column | Sequence[Column] | None = None
-    movement: Column | Sequence[Column] | None = None
-    label: Column | None = None
+    time: Column | None = None  # column of the time stamps
+    columns: Column | Sequence[Column] | None = None  # columns of the coordinates, in that order
+    movement: Column | Sequence[Column] | None = None  # columns that tell the movements of a long table apart
+    label: Column | None = None  # column that names the action
+    # Unit of the time stamps, of time in `kineme.units.UNITS`, or the number of seconds in one unit. As a number, it
+    # is the step between samples of a file that has no time stamps at all.
     units: str | float | None = None
-    skip: str = "movement"
+    skip: str = "movement"  # what a missing or repeated sample costs: its "movement", or the "sample" alone
+    # Heads of columns, separated by commas, -> "position", "angle" or "discrete"; of four -> "wxyz" or "xyzw", the
+    # order of a quaternion. What several heads begin with, before a dot, stands for all of them.
     kinds: Mapping[str, str] | None = None
+    # Topics of a bag; of several, the others are interpolated to the stamps of the first.
     topic: str | Sequence[str] | None = None
+    # Pairs of frames of a bag, as ``"parent:child"``: the pose of the child in the parent.
     frame: str | Sequence[str] | None = None
-    person: Column | None = None
+    person: Column | None = None  # column that names who showed a movement; another movement begins where it changes
+    # What the movements to compare with were read from: the default of topic and frame where a bag has several.
     reference: Known | None = None
+    # Columns that are left aside, whatever else chooses them; one that a file does not have is no matter to it.
     exclude: Column | Sequence[Column] | None = None
+    # Longest gap [s] that is filled, from the value before it to the value after it; 0 fills none.
     fill_gaps: float = FILL_GAPS
+    # Whether each line of a text is a movement, see `kineme.io.arrays.rows`; `columns` then name the coordinates of a
+    # sample.
     rows: bool = False
-    every: int | None = None
+    every: int | None = None  # number of samples of a movement, where a recording holds one after the other
 
     def __post_init__(self) -> None:
         check_choice("skip", self.skip, SKIP)
@@ -225,21 +181,11 @@ class Detected(NamedTuple):
 
 
 class Repair(NamedTuple):
-    """The repair of values that one movement lacks.
+    """The repair of values that one movement lacks."""
 
-    Attributes
-    ----------
-    filled : int
-        Number of samples of which values are interpolated.
-    longest : float
-        Longest gap that was filled, from the sample before to the sample after [s].
-    cropped : float
-        Time at both ends that was left out, since columns have no values there [s].
-    """
-
-    filled: int = 0
-    longest: float = 0.0
-    cropped: float = 0.0
+    filled: int = 0  # number of samples of which values are interpolated
+    longest: float = 0.0  # longest gap that was filled, from the sample before to the sample after [s]
+    cropped: float = 0.0  # time at both ends that was left out, since columns have no values there [s]
 
 
 def no_lines(row: int) -> None:
@@ -248,39 +194,19 @@ def no_lines(row: int) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Movements of one file, one after the other, not yet checked.
+    """Movements of one file, one after the other, not yet checked."""
 
-    Attributes
-    ----------
-    positions : ndarray of shape (total, d)
-    times : ndarray of shape (total,) or None
-        In seconds. None: evenly sampled over one second, as `Demonstrations.from_arrays` takes it.
-    offsets : ndarray of shape (n + 1,)
-    labels : list of n str or None
-    places : list of n str
-        Which movement of the file; empty if there is but one.
-    rows : ndarray of shape (total,) or None
-        Row of the file that each sample comes from, if not in order.
-    line_of : callable
-        Row of the file -> its line, counted from 1, or None.
-    faults : dict
-        Row of the file -> what is wrong there.
-    people : list of n str or None, optional
-        Who showed each movement.
-    repairs : list of n Repair, optional
-        What was done about missing values.
-    """
-
-    positions: Array
+    positions: Array  # shape (total, d)
+    # shape (total,); in seconds. None: evenly sampled over one second, as `Demonstrations.from_arrays` takes it.
     times: Array | None
-    offsets: NDArray[np.intp]
+    offsets: NDArray[np.intp]  # shape (n + 1,)
     labels: list[str | None]
-    places: list[str]
-    rows: NDArray[np.intp] | None = None
-    line_of: Callable[[int], int | None] = no_lines
-    faults: dict[int, str] | None = None
-    people: list[str | None] | None = None
-    repairs: list[Repair] | None = None
+    places: list[str]  # which movement of the file; empty if there is but one
+    rows: NDArray[np.intp] | None = None  # shape (total,); row of the file that each sample comes from, if not in order
+    line_of: Callable[[int], int | None] = no_lines  # row of the file -> its line, counted from 1, or None
+    faults: dict[int, str] | None = None  # row of the file -> what is wrong there
+    people: list[str | None] | None = None  # who showed each movement
+    repairs: list[Repair] | None = None  # what was done about missing values
 
     def row(self, k: int) -> int:
         """Row of the file that sample k comes from."""
@@ -288,18 +214,11 @@ class Block:
 
 
 class Parsed(NamedTuple):
-    """The content of one file or data frame.
-
-    Attributes
-    ----------
-    detected : Detected
-    block : Block
-    left_out : tuple of str
-        Why parts of it could not be read: topics, episodes. Each becomes a problem of the file.
-    """
+    """The content of one file or data frame."""
 
     detected: Detected
     block: Block
+    # Why parts of it could not be read: topics, episodes. Each becomes a problem of the file.
     left_out: tuple[str, ...] = ()
 
 

@@ -36,54 +36,27 @@ _NUMBERS = (Real, Decimal)
 
 
 class Segments(NamedTuple):
-    """Movements that a file itself tells apart, one after the other: groups, episodes, keys.
+    """Movements that a file itself tells apart, one after the other: groups, episodes, keys."""
 
-    Attributes
-    ----------
-    offsets : ndarray of shape (n + 1,)
-        Rows of the table at which the movements begin and end.
-    places : list of n str
-        Which movement of the file.
-    labels : list of n str or None
-    """
-
-    offsets: NDArray[np.intp]
-    places: list[str]
+    offsets: NDArray[np.intp]  # shape (n + 1,); rows of the table at which the movements begin and end
+    places: list[str]  # which movement of the file
     labels: list[str | None]
 
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Columns of numbers and of texts.
-
-    Attributes
-    ----------
-    heads : tuple of str
-    columns : sequence of ndarray of shape (rows,)
-        Columns of numbers as float64, NaN for missing ones; other columns as objects.
-    n_rows : int
-    line_of : callable
-        Row -> its line in the file, counted from 1, or None.
-    faults : dict
-        Row -> what is wrong there.
-    dates_in : str, optional
-        Unit of the time stamps where they are dates or durations, whatever the head says.
-    measured_in : sequence of str
-        Unit of each column where the file says it, else empty; or nothing at all.
-    segments : Segments, optional
-    maker : str
-        Whose layout the file has, such as ``"Vicon"``; empty for a plain table.
-    """
+    """Columns of numbers and of texts."""
 
     heads: tuple[str, ...]
+    # shape (rows,); columns of numbers as float64, NaN for missing ones; other columns as objects.
     columns: Sequence[Any]
     n_rows: int
-    line_of: Callable[[int], int | None]
-    faults: dict[int, str] = field(default_factory=dict)
-    dates_in: str | None = None
-    measured_in: Sequence[str] = ()
+    line_of: Callable[[int], int | None]  # row -> its line in the file, counted from 1, or None
+    faults: dict[int, str] = field(default_factory=dict)  # row -> what is wrong there
+    dates_in: str | None = None  # unit of the time stamps where they are dates or durations, whatever the head says
+    measured_in: Sequence[str] = ()  # unit of each column where the file says it, else empty; or nothing at all
     segments: Segments | None = None
-    maker: str = ""
+    maker: str = ""  # whose layout the file has, such as ``"Vicon"``; empty for a plain table
 
 
 def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Parsed:
@@ -234,12 +207,6 @@ def parse_data_frame(frame: Any, layout: Layout) -> Parsed:
     """The movements of a data frame: one, or many that are told apart by columns.
 
     The levels of a pandas index that have a name, or hold dates, count as columns that cannot be coordinates.
-
-    Raises
-    ------
-    DataError
-        No column of times that is named so or that `layout` names, several of them, no coordinates, no rows, or
-        something else than numbers where numbers are needed.
     """
     read = [(head, _values(series), inside) for head, series, inside in _columns(frame)]
     heads = tuple(head for head, _, _ in read)

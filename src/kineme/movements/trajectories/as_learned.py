@@ -47,12 +47,6 @@ def as_learned(
       order, discrete ones left aside; units are converted. Else what is lacking is said.
 
     `what` they are called in messages.
-
-    Raises
-    ------
-    TrajectoryError
-        Channels of other names or kinds, another number of columns, a unit that cannot be converted, names that were
-        learned in another place, or columns of a quaternion that is not of norm 1.
     """
     if isinstance(movements, (list, tuple)) and _of_several_channels(movements):
         return _one_by_one(movements, learned, n_dims, what)
@@ -129,13 +123,7 @@ def of_columns(demos: Demonstrations, learned: Channels) -> Demonstrations:
 
 
 def by_names(demos: Demonstrations, learned: Channels, known_units: bool = True) -> Demonstrations:
-    """Movements whose channels have the names of `learned`, in that order and unit, and of those kinds.
-
-    Raises
-    ------
-    TrajectoryError
-        See `kineme.movements.channels.column_match.columns_like`.
-    """
+    """Movements whose channels have the names of `learned`, in that order and unit, and of those kinds."""
     raw = as_recorded(demos)
     ours, wanted = columns_recorded(demos.channels or ()), columns_recorded(learned)
     positions = np.ascontiguousarray(columns_like(raw.positions, ours, wanted, known_units))

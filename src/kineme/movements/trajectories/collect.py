@@ -68,13 +68,7 @@ def collect_trajectories(trajectories: Sequence[Trajectory]) -> Movements:
 
 
 def _in_columns_of_first(trajectories: list[Trajectory]) -> list[Trajectory]:
-    """Trajectories whose columns have the names of the first one's in its order and units; the others as they are.
-
-    Raises
-    ------
-    TrajectoryError
-        Columns of the same names in units that cannot be converted.
-    """
+    """Trajectories whose columns have the names of the first one's in its order and units; the others as they are."""
     every = {id(trajectory.channels): trajectory.channels for trajectory in trajectories}
     channels = trajectories[0].channels if trajectories else None
     if len(every) < 2 or channels is None:

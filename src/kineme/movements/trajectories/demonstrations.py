@@ -330,13 +330,7 @@ def require_labels(demonstrations: Demonstrations) -> NDArray[Any]:
 
 
 def check_labels(demos: Demonstrations, y: Any) -> NDArray[Any]:
-    """Labels `y`, or those of the demonstrations: one per movement, texts or numbers, none of them empty.
-
-    Raises
-    ------
-    TrajectoryError
-        No labels, another number of them, an empty or missing one; the message names the movement.
-    """
+    """Labels `y`, or those of the demonstrations: one per movement, texts or numbers, none of them empty."""
     labels = require_labels(demos) if y is None else label_array(y, len(demos), demos.names)
     for i, label in enumerate(labels.tolist()):
         if isinstance(label, (list, tuple, dict)) or (isinstance(label, str) and not label.strip()):

@@ -97,13 +97,7 @@ def _key(drawn: _Drawn) -> list[Any]:
 
 
 def draw_movements_into(axes: Axes, paths: Paths) -> None:
-    """The path, or the only dimension over time, in axes of the caller's.
-
-    Raises
-    ------
-    SpecificationError
-        No axes of matplotlib, axes in the plane for a movement in space or the reverse, or more than three dimensions.
-    """
+    """The path, or the only dimension over time, in axes of the caller's."""
     d = paths.n_dims
     if not isinstance(axes, Axes):
         raise SpecificationError(f"expected ax to be an Axes of matplotlib, got {type(axes).__name__}; write plt.gca()")

@@ -35,12 +35,6 @@ def label_array(labels: Any, n: int | None = None, names: Sequence[str | None] |
         Expected number of labels; by default any.
     names : sequence of n str or None, optional
         Names of the movements, for messages.
-
-    Raises
-    ------
-    TrajectoryError
-        Another number of labels, a missing one (None, NaN), or texts and numbers together; the message names the
-        movement.
     """
     if not isinstance(labels, np.ndarray):  # `np.asarray` of a list would convert numbers beside texts to texts
         labels = np.asarray(labels) if hasattr(labels, "__array__") else np.array(labels, dtype=object)

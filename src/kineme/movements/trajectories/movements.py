@@ -239,13 +239,7 @@ def _usual_steps(times: Array, offsets: NDArray[np.intp]) -> Array:
 
 
 def of_channels(recorded: Movements, channels: Channels) -> Movements:
-    """Movements whose positions are the recorded columns, as movements of these channels.
-
-    Raises
-    ------
-    TrajectoryError
-        A quaternion that is not of norm 1; the message names the movement and the sample.
-    """
+    """Movements whose positions are the recorded columns, as movements of these channels."""
     for channel, rows, norms in off_norm(recorded.positions, channels):
         raise TrajectoryError(
             f"{_place(recorded, int(rows[0]))}: expected unit quaternions in {', '.join(channel.columns)}, got norm "
