@@ -43,12 +43,9 @@ def fuse(squares: Array, weights: ArrayLike | None = None) -> Array:
     representations. W is the mean of the P_r, added up over 7 and 15 neighbors: few for classes of a few movements, and
     many so that the movements of several people connect. Means are weighted.
 
-    Parameters
-    ----------
-    squares : ndarray of shape (R, n, n)
-        Squared distances, for at least three movements. Representations in which no two differ are left out.
-    weights : array_like of shape (R,), optional
-        Of the representations in each mean, above 0; equal by default.
+    - `squares` (R, n, n): squared distances, for at least three movements. Representations in which no two differ are
+      left out.
+    - `weights` (R,): of the representations in each mean, above 0; equal by default.
     """
     differ, weights = _differing(squares, weights)
     return np.asarray(sum(_fused(differ, weights, neighbors) for neighbors in NEIGHBORS))
@@ -161,10 +158,7 @@ def count_by_eigengap(similar: Array) -> int:
 
     Of the normalized similarities ``D^-1/2 W D^-1/2``. With c clusters that nothing connects, c eigenvalues are 1.
 
-    Parameters
-    ----------
-    similar : ndarray of shape (n, n)
-        Symmetric similarities W of at least three movements, at least 0, and 0 on the diagonal.
+    `similar` (n, n): symmetric similarities W of at least three movements, at least 0, and 0 on the diagonal.
     """
     n = len(similar)
     values = eigh(_normalized(similar), eigvals_only=True)[::-1]
@@ -247,8 +241,6 @@ def count_clusters(distances: Array, repeats: int = 20, seed: int = 0) -> int:
     Every c from 2 to n / 2 is tried, since a cluster is more than one movement; among many movements a geometric series
     of c first, then those around the best.
 
-    References
-    ----------
     U. von Luxburg, "Clustering stability: an overview", Foundations and Trends in Machine Learning 2, 2010.
     """
     n = len(distances)
@@ -354,20 +346,11 @@ def stabilities(
 ) -> Array:
     """Mean, over subsets, of each cluster's largest Jaccard coefficient with a cluster found there.
 
-    Parameters
-    ----------
-    distances : ndarray of shape (n, n)
-    clusters : ndarray of shape (n,)
-        0, 1, ...; -1 is none.
-    again : callable
-        From distances (m, m) of a subset to its clusters.
-    repeats : int
-    seed : int
+    - `distances` (n, n).
+    - `clusters` (n,): 0, 1, ...; -1 is none.
+    - `again`: from distances (m, m) of a subset to its clusters.
 
-    Returns
-    -------
-    ndarray of shape (c,)
-        From 0 to 1; Hennig takes 0.75 for a valid, stable cluster, and below 0.5 for none.
+    Returns (c,): from 0 to 1; Hennig takes 0.75 for a valid, stable cluster, and below 0.5 for none.
     """
     c = int(clusters.max(initial=-1)) + 1
     coefficients = np.full((repeats, c), np.nan)

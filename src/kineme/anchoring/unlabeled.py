@@ -204,14 +204,9 @@ def link_people(similar: Array, near: Array, people: NDArray[np.intp]) -> Array:
     nearest neighbors", Nature Biotechnology 36, 2018. A person's repetitions are each other's nearest neighbors; among
     the nearest of all movements there may be none by another person, so neighbors are taken from each person in turn.
 
-    Parameters
-    ----------
-    similar : ndarray of shape (n, n)
-        W, as `kineme.anchoring.clustering.fuse` gives it.
-    near : ndarray of shape (n, n)
-        By which the nearest are found; greater is nearer.
-    people : ndarray of shape (n,)
-        Who made each movement, as numbers.
+    - `similar` (n, n): W, as `kineme.anchoring.clustering.fuse` gives it.
+    - `near` (n, n): by which the nearest are found; greater is nearer.
+    - `people` (n,): who made each movement, as numbers.
     """
     n = len(similar)
     share = np.zeros((n, n))  # 1 / p

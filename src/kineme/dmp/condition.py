@@ -35,22 +35,12 @@ class Conditioned(NamedTuple):
 def condition(factor: Array, observed: Array, deviation: float | Array = 0.0) -> Conditioned:
     """Condition a Gaussian with covariance ``factor.T @ factor`` on observations of ``observed @ numbers``.
 
-    Parameters
-    ----------
-    factor : ndarray of shape (r, p)
-    observed : ndarray of shape (k, p)
-        A, the linear functions that are observed.
-    deviation : float or ndarray of shape (k,), default 0.0
-        s, standard deviation of each observation, in its own unit; 0 is exact.
+    - `factor` (r, p).
+    - `observed` (k, p): A, the linear functions that are observed.
+    - `deviation` (k,): s, standard deviation of each observation, in its own unit; 0 is exact.
 
-    Returns
-    -------
-    Conditioned
-
-    Raises
-    ------
-    SpecificationError
-        Exact observations of which one follows from the others, or of what the covariance does not allow to vary.
+    Raises `SpecificationError`: exact observations of which one follows from the others, or of what the covariance does
+    not allow to vary.
     """
     whitened = factor @ observed.T  # B (r, k)
     r, k = whitened.shape

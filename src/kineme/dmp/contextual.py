@@ -221,19 +221,14 @@ def _standardized(C: Array, center: Array, scale: Array) -> Array:
 class Smoother:
     """Regression of numbers on parameters.
 
-    Attributes
-    ----------
-    name : {"average", "linear", "gaussian-process"}
-        No dependence; least squares of [1, c]; the same trend and a Gaussian process around it with the covariance
-        ``exp(-|c - c'|^2 / (2 l^2))`` of parameters in units of their standard deviation.
-    length_scale : float, optional
-        l.
-    noise : float, optional
-        Variance of a demonstration that the parameters do not explain, as a share of the process's.
+    - `name` ({"average", "linear", "gaussian-process"}): no dependence; least squares of [1, c]; the same trend and a
+      Gaussian process around it with the covariance ``exp(-|c - c'|^2 / (2 l^2))`` of parameters in units of their
+      standard deviation.
+    - `noise`: variance of a demonstration that the parameters do not explain, as a share of the process's.
     """
 
     name: str
-    length_scale: float | None = None
+    length_scale: float | None = None  # l
     noise: float | None = None
 
     def __str__(self) -> str:
@@ -293,11 +288,8 @@ def _covariance(smoother: Smoother, A: Array, B: Array) -> Array:
 def demonstrated_parameters(parameters: ArrayLike, n: int) -> Array:
     """The parameters (n, k) of n demonstrations, as a copy.
 
-    Raises
-    ------
-    TrajectoryError
-        Another number or shape, not finite, equal in all demonstrations or in all but one, or depending on each other;
-        fewer than k + 2 demonstrations.
+    Raises `TrajectoryError`: another number or shape, not finite, equal in all demonstrations or in all but one, or
+    depending on each other; fewer than k + 2 demonstrations.
     """
     C = as_numbers(parameters, "parameters")
     C = C[:, None] if C.ndim == 1 else C
@@ -334,10 +326,7 @@ def demonstrated_parameters(parameters: ArrayLike, n: int) -> Array:
 def task_parameters(parameters: ArrayLike, k: int) -> Array:
     """Parameters (m, k) of m tasks to generate for.
 
-    Raises
-    ------
-    TrajectoryError
-        Another number than the k demonstrated ones, or not finite.
+    Raises `TrajectoryError`: another number than the k demonstrated ones, or not finite.
     """
     C = as_numbers(parameters, "parameters")
     C = C.reshape(-1, 1) if k == 1 and C.ndim < 2 else np.atleast_2d(C)
@@ -349,10 +338,7 @@ def task_parameters(parameters: ArrayLike, k: int) -> Array:
 def check_range(C: Array, shown: Array) -> None:
     """Refuse parameters (m, k) outside the box around the demonstrated ones (n, k).
 
-    Raises
-    ------
-    SpecificationError
-        The first such parameter, and how far beyond the range it is.
+    Raises `SpecificationError`: the first such parameter, and how far beyond the range it is.
     """
     lowest, highest = shown.min(axis=0), shown.max(axis=0)
     beyond = np.maximum(np.maximum(lowest - C, C - highest), 0.0)

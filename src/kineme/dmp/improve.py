@@ -280,10 +280,8 @@ def _check_options(  # noqa: PLR0913, PLR0917 - the options of improve, in its o
 def checked_costs(costs: ArrayLike, n: int, update: int) -> Array:
     """The costs (n,) of the movements of an update, as a copy.
 
-    Raises
-    ------
-    SpecificationError
-        Another number of costs, or costs that are NaN or infinite; with the number of the movement.
+    Raises `SpecificationError`: another number of costs, or costs that are NaN or infinite; with the number of the
+    movement.
     """
     paid = as_numbers(costs, "cost", f"{n} numbers, the cost of each movement")
     if paid.shape != (n,):

@@ -160,10 +160,7 @@ def laid_out_poses(movements: Sequence[PosePrimitives], shift: bool) -> tuple[li
 
     A shifted part is turned as a tool that is mounted otherwise: its angular velocities stay.
 
-    Raises
-    ------
-    TrajectoryError
-        Orientations farther than a full turn from the last one, about an axis that changes.
+    Raises `TrajectoryError`: orientations farther than a full turn from the last one, about an axis that changes.
     """
     rolled: list[PoseRollout] = []
     for movement in movements:
@@ -260,10 +257,7 @@ def within(stretch: tuple[float, float], name: str) -> tuple[float, float]:
 def fitting_specification(parts: Sequence[Primitives | PosePrimitives], n_basis: float) -> DMP:
     """The specification of the first part, with which a path that was generated is fitted as it is.
 
-    Raises
-    ------
-    SpecificationError
-        More than 2,000 basis functions.
+    Raises `SpecificationError`: more than 2,000 basis functions.
     """
     first = parts[0].dmp
     least = max(part.dmp.n_points for part in parts)
@@ -330,16 +324,9 @@ def carried_over(
 ) -> Primitives:
     """The movements with the labels and names that all their parts have in common, and with their channels.
 
-    Parameters
-    ----------
-    made : Primitives
-        n movements.
-    parts : sequence of Primitives or PosePrimitives
-        The p parts, each of n movements.
-    when : sequence of ndarray of shape (n, 2 or more)
-        Of each part, at even shares of its duration: when that is, as a share of the duration of the whole.
-    switches : ndarray of shape (p - 1, n)
-        From when on discrete channels are those of the next part.
+    `made`: n movements; `parts`: the p parts, each of n movements; `when` (n, 2 or more): of each part, at even shares
+    of its duration: when that is, as a share of the duration of the whole; `switches` (p - 1, n): from when on discrete
+    channels are those of the next part.
     """
     labels, names = [part.labels for part in parts], [part.names for part in parts]
     first = labels[0]

@@ -128,14 +128,8 @@ def in_primitive(point: Array, about: RecordedAs) -> Array:
 def in_recording(columns: Array, about: RecordedAs, i: int, shares: Array) -> Array:
     """Movement i in the columns of a primitive (T, d), in all columns of the recording.
 
-    Parameters
-    ----------
-    columns : ndarray of shape (T, d)
-    about : RecordedAs
-    i : int
-        Which movement of the batch the steps of discrete channels are taken from.
-    shares : ndarray of shape (T,)
-        When, as a share of the duration.
+    `columns` (T, d); `i`: which movement of the batch the steps of discrete channels are taken from; `shares` (T,):
+    when, as a share of the duration.
     """
     values = None if about.steps is None else about.steps.at(i, shares)
     parts, plain, turned, discrete = [], 0, len(about.plain), 0
@@ -156,15 +150,8 @@ def in_recording(columns: Array, about: RecordedAs, i: int, shares: Array) -> Ar
 def with_recorded(movements: Movements, about: RecordedAs, shares: Array, n_primitives: int) -> Movements:
     """Movements of T samples each in the columns of primitives, with their channels.
 
-    Parameters
-    ----------
-    movements : Movements
-        All of T samples.
-    about : RecordedAs
-    shares : ndarray of shape (T,)
-        When the samples are, as a share of the duration.
-    n_primitives : int
-        One, for all movements, or one for each.
+    `movements`: all of T samples; `shares` (T,): when the samples are, as a share of the duration; `n_primitives`: one,
+    for all movements, or one for each.
     """
     named = {"channels": about.channels, "dimensions": learned_names(about.channels)}
     if is_plain(about.channels):
@@ -179,21 +166,11 @@ def with_recorded(movements: Movements, about: RecordedAs, shares: Array, n_prim
 
 @dataclass(frozen=True, eq=False)
 class DiscreteSteps:
-    """Values of the discrete channels of n movements, and since when.
+    """Values of the discrete channels of n movements, and since when."""
 
-    Attributes
-    ----------
-    values : ndarray of shape (m, c)
-        Values of the c columns: of each movement at its start, and wherever one changes.
-    shares : ndarray of shape (m,)
-        When, as a share of the duration: 0 at the start of each movement, 1 at its end.
-    offsets : ndarray of shape (n + 1,)
-        Movement i has the steps ``offsets[i]:offsets[i + 1]``.
-    """
-
-    values: Array
-    shares: Array
-    offsets: NDArray[np.intp]
+    values: Array  # (m, c), values of the c columns: of each movement at its start, and wherever one changes
+    shares: Array  # (m,), when, as a share of the duration: 0 at the start of each movement, 1 at its end
+    offsets: NDArray[np.intp]  # (n + 1,), movement i has the steps ``offsets[i]:offsets[i + 1]``
 
     def __post_init__(self) -> None:
         for name in ("values", "shares", "offsets"):

@@ -14,10 +14,6 @@ def checked_pair(A: ArrayLike, B: ArrayLike | None) -> tuple[Rows, Rows | None]:
     """Check two sets of rows; B becomes None where both are the same object.
 
     scikit-learn calls ``kernel(X, X)`` with its training rows; recognizing that saves half of the work.
-
-    Returns
-    -------
-    A, B : read-only C-contiguous arrays of one dtype, (n_A, p) and (n_B, p), or B None
     """
     if B is None or B is A:
         return checked_rows(A, "A"), None
@@ -34,11 +30,8 @@ def checked_pair(A: ArrayLike, B: ArrayLike | None) -> tuple[Rows, Rows | None]:
 def checked_rows(X: ArrayLike, name: str = "X") -> Rows:
     """Rows (n, p) as a read-only C-contiguous array; float32 stays, all else becomes float64.
 
-    Raises
-    ------
-    SpecificationError
-        Not numbers, not two-dimensional, no column, or a value that is NaN, infinite or so large
-        that its square would overflow.
+    Raises `SpecificationError`: not numbers, not two-dimensional, no column, or a value that is NaN, infinite or so
+    large that its square would overflow.
     """
     rows = np.asarray(X)
     if rows.ndim != 2:

@@ -29,22 +29,13 @@ TileSums = Callable[[Rows, Rows, Any, Rows], None]
 class Term:
     """The term that one coordinate adds to the sum: g(d(x, y)), with one constant c.
 
-    Attributes
-    ----------
-    twin : callable
-        The definition, ``twin(x, y, c)`` over arrays.
-    load_compiled : callable
-        Returns the compiled loop; called only if it is used, because it imports Numba.
-    cost : int
-        Elementary operations of NumPy per evaluation of the twin.
-    symmetric : bool
-        Whether term(x, y) always equals term(y, x).
+    `load_compiled`: returns the compiled loop; called only if it is used, because it imports Numba.
     """
 
-    twin: Callable[[Rows, Rows, Any], Any]
+    twin: Callable[[Rows, Rows, Any], Any]  # the definition, ``twin(x, y, c)`` over arrays
     load_compiled: Callable[[], TileSums]
-    cost: int = 4
-    symmetric: bool = True
+    cost: int = 4  # elementary operations of NumPy per evaluation of the twin
+    symmetric: bool = True  # whether term(x, y) always equals term(y, x)
 
 
 def _builtin(name: str) -> Callable[[], TileSums]:
@@ -69,15 +60,10 @@ CANBERRA = Term(_canberra, _builtin("canberra_sums"), cost=8)
 def fill_gram(term: Term, c: float, finish: Callable[[Rows], object], A: Rows, B: Rows | None, gram: Rows) -> None:
     """Write h(sums of `term` over coordinates) to `gram`, tile by tile, in threads.
 
-    Parameters
-    ----------
-    term : Term
-    c : float
-        The constant of the term.
-    finish : callable
-        h of Eq. (5): changes a tile of sums in place.
-    A, B : arrays (n_A, p), (n_B, p), or B None for a symmetric Gram matrix of A
-    gram : array (n_A, n_B)
+    - `c`: the constant of the term.
+    - `finish`: h of Eq. (5): changes a tile of sums in place.
+    - `A`, `B` (n_A, p), (n_B, p).
+    - `gram` (n_A, n_B).
     """
     mirrored = B is None and term.symmetric
     A = contiguous(A, A.dtype)

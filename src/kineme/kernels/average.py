@@ -16,26 +16,13 @@ from kineme.runtime.parallel import for_tiles
 
 @dataclass(frozen=True)
 class Mean:
-    """One A-average.
+    """One A-average."""
 
-    Attributes
-    ----------
-    average : callable
-        Similarities (d, ...) to their average (...).
-    formula : str
-    psd : {"always", "infinitely divisible", "not claimed"}
-        For which positive semi-definite kernels the average is proved positive semi-definite.
-    reason : str
-        The proof, or why there is none.
-    nonnegative : bool
-        Whether it is defined for non-negative similarities only.
-    """
-
-    average: Callable[[Rows], Rows]
+    average: Callable[[Rows], Rows]  # similarities (d, ...) to their average (...)
     formula: str
-    psd: str
-    reason: str
-    nonnegative: bool = False
+    psd: str  # for which positive semi-definite kernels the average is proved positive semi-definite
+    reason: str  # the proof, or why there is none
+    nonnegative: bool = False  # whether it is defined for non-negative similarities only
 
 
 def _geometric(similarities: Rows) -> Rows:

@@ -39,23 +39,12 @@ _PAIR_OPERATIONS = 10_000  # elementary operations of the plain twins per pair
 def pair_distances(A: Shapes, B: Shapes, rotations: NDArray[Any] | None = None) -> Floats:
     """Squared distances (3, n, m) of every movement of A with every one of B: elastic, turning, point cloud.
 
-    Parameters
-    ----------
-    A, B : Shapes
-        n and m movements with the same dimensions d and specifications.
-    rotations : array (n, m, d, d) or, in the plane, (n, m, 2), optional
-        Matrices R, or cosines and sines, that rotate B's movement onto A's, float32 fastest. By default nothing is
-        rotated.
+    - `A`, `B`: n and m movements with the same dimensions d and specifications.
+    - `rotations` (n, m, d, d) or, in the plane, (n, m, 2): matrices R, or cosines and sines, that rotate B's movement
+      onto A's, float32 fastest. By default nothing is rotated.
 
-    Returns
-    -------
-    array (3, n, m) of float32
-        In units of the movements' squared size. The turning distance does not depend on the rotation.
-
-    Raises
-    ------
-    SpecificationError
-        Dimensions, specifications or the shape of the rotations do not fit.
+    In units of the movements' squared size. The turning distance does not depend on the rotation.
+    Raises `SpecificationError`: dimensions, specifications or the shape of the rotations do not fit.
     """
     return _grid(A, B, rotations, (_fill_compiled, _fill_plain), _TILE_PAIRS)
 

@@ -55,24 +55,16 @@ class Procrustes:
     `kernels.rotation`, the root of a quartic with a prior. In one dimension, and with ``max_angle = 0``, it is the
     Euclidean distance.
 
-    Parameters
-    ----------
-    n_dims : int
-        Dimensions d of the movements; rows are dimension-major, x_1 ... x_S, y_1 ... y_S, Eq. (9).
-    max_angle : float
-        Largest rotation [rad], 0 to pi. Choose it as small as the application allows: with pi, N and Z are the
-        same, and with more than a right angle, V and caret. Beyond three dimensions only 0 is possible.
-    prior : RotationPrior, optional
-        Instead of a limit, with ``max_angle=pi``, in two and three dimensions.
+    - `n_dims`: dimensions d of the movements; rows are dimension-major, x_1 ... x_S, y_1 ... y_S, Eq. (9).
+    - `max_angle`: largest rotation [rad], 0 to pi. Choose it as small as the application allows: with pi, N and Z are
+      the same, and with more than a right angle, V and caret. Beyond three dimensions only 0 is possible.
 
-    References
-    ----------
     B. K. P. Horn, "Closed-form solution of absolute orientation using unit quaternions", JOSA A 4(4), 1987.
     """
 
     n_dims: int
     max_angle: float = math.pi / 3
-    prior: RotationPrior | None = None
+    prior: RotationPrior | None = None  # instead of a limit, with ``max_angle=pi``, in two and three dimensions
 
     def __post_init__(self) -> None:
         check_number("max_angle", self.max_angle, least=0.0, smallest=0.0)
@@ -123,10 +115,7 @@ class Procrustes:
 
         Under a limit in space, these are the best free rotations, turned back to the limit.
 
-        Returns
-        -------
-        alignment : ndarray of shape (n, m)
-        rotations : ndarray of shape (n, m, 2) with cosine and sine in the plane, (n, m, 3, 3) in space, None without
+        Returns `alignment` (n, m); `rotations` (n, m, 2) with cosine and sine in the plane, (n, m, 3, 3) in space.
         """
         if self.max_angle == 0 or self.n_dims not in (2, 3):
             return self.alignment(A, B), None

@@ -54,18 +54,12 @@ MOST_POINTS = 32  # of a cloud: the matched ones are bits of an integer
 class ElasticSpec:
     """Options of comparing segments by dynamic time warping; see `kineme.kernels.shapes`.
 
-    Attributes
-    ----------
-    n_segments : int
-        Segments of a path, at least 3.
-    band : int
-        A segment is matched with segments at most so many numbers away (Sakoe & Chiba 1978).
-    position_weight, turning_weight : float
-        Weights of the squared differences of midpoints and of turning angles / pi; that of tangents is 1.
+    `position_weight`, `turning_weight`: weights of the squared differences of midpoints and of turning angles / pi;
+    that of tangents is 1.
     """
 
-    n_segments: int = 33
-    band: int = 6
+    n_segments: int = 33  # segments of a path, at least 3
+    band: int = 6  # a segment is matched with segments at most so many numbers away (Sakoe & Chiba 1978)
     position_weight: float = 0.5
     turning_weight: float = 8.0
 
@@ -80,16 +74,11 @@ class ElasticSpec:
 class CloudSpec:
     """Options of comparing points as a cloud; see `kineme.kernels.shapes`.
 
-    Attributes
-    ----------
-    n_points : int
-        Points of a path, 3 to 32.
-    turning_weight, line_weight : float
-        Weights of the squared difference of turning angles / pi and of the squared sine between the tangents' lines;
-        that of positions is 1.
+    `turning_weight`, `line_weight`: weights of the squared difference of turning angles / pi and of the squared sine
+    between the tangents' lines; that of positions is 1.
     """
 
-    n_points: int = 20
+    n_points: int = 20  # points of a path, 3 to 32
     turning_weight: float = 16.0
     line_weight: float = 0.75
 
@@ -110,20 +99,14 @@ def _at_least(name: str, value: float, least: int) -> None:
 class Shapes:
     """n movements in d dimensions as segments and points: C-contiguous arrays of float32, made by `shapes_of`.
 
-    Attributes
-    ----------
-    tangents, midpoints : arrays (n, n_segments, d)
-        Unit vectors along the segments, zero for a segment of length zero, and their midpoints.
-    turning : array (n, n_segments)
-        Angle between the tangents before and after a segment, divided by pi; 0 at both ends, and wherever one of the
-        three has no direction.
-    points, point_tangents : arrays (n, n_points, d)
-        Points, and unit vectors along the central differences there (one-sided at the ends), zero for a difference of
-        zero.
-    point_turning : array (n, n_points)
-        Angle between the steps to and from a point, divided by pi; 0 at both ends, and where one has length zero.
-    elastic : ElasticSpec
-    cloud : CloudSpec
+    - `tangents`, `midpoints` (n, n_segments, d): unit vectors along the segments, zero for a segment of length zero,
+      and their midpoints.
+    - `turning` (n, n_segments): angle between the tangents before and after a segment, divided by pi; 0 at both ends,
+      and wherever one of the three has no direction.
+    - `points`, `point_tangents` (n, n_points, d): points, and unit vectors along the central differences there
+      (one-sided at the ends), zero for a difference of zero.
+    - `point_turning` (n, n_points): angle between the steps to and from a point, divided by pi; 0 at both ends, and
+      where one has length zero.
     """
 
     tangents: Floats
@@ -175,13 +158,8 @@ class Shapes:
 def shapes_of(paths: NDArray[Any], elastic: ElasticSpec | None = None, cloud: CloudSpec | None = None) -> Shapes:
     """Segments and points of paths (n, d, S), computed in double precision.
 
-    Parameters
-    ----------
-    paths : array (n, d, S)
-        Positions at even steps along arc length, centered, with a root mean square distance of 1 from the mean; zeros
-        for a movement without extent. At least two positions.
-    elastic : ElasticSpec, optional
-    cloud : CloudSpec, optional
+    `paths` (n, d, S): positions at even steps along arc length, centered, with a root mean square distance of 1 from
+    the mean; zeros for a movement without extent. At least two positions.
     """
     n, d, n_positions = paths.shape
     shapes = _room(n, d, elastic or ElasticSpec(), cloud or CloudSpec())
@@ -257,11 +235,7 @@ def _angles(a: Array, b: Array) -> Array:
 def elastic_squares(A: Shapes, B: Shapes, first: Indices, second: Indices, rotations: Array | None) -> Array:
     """Squared elastic and turning distances (2, k) of k pairs: A's movement ``first[i]`` and B's ``second[i]``.
 
-    Parameters
-    ----------
-    A, B : Shapes
-    first, second : arrays (k,) of indices
-    rotations : array (k, d, d), or None for none
+    `first`, `second` (k,); `rotations` (k, d, d).
     """
     sums = [_warped(costs, A.elastic.band) for costs in _costs(A, B, first, second, rotations)]
     return np.stack(sums) / A.elastic.n_segments
@@ -309,11 +283,7 @@ def _warped(costs: Array, band: int) -> Array:
 def cloud_squares(A: Shapes, B: Shapes, first: Indices, second: Indices, rotations: Array | None) -> Array:
     """Squared distances (k,) of k pairs: A's movement ``first[i]`` and B's ``second[i]``.
 
-    Parameters
-    ----------
-    A, B : Shapes
-    first, second : arrays (k,) of indices
-    rotations : array (k, d, d), or None for none
+    `first`, `second` (k,); `rotations` (k, d, d).
     """
     x, y = A.points[first].astype(float), rotated(B.points[second], rotations)
     t, u = A.point_tangents[first].astype(float), rotated(B.point_tangents[second], rotations)

@@ -182,23 +182,14 @@ class Canberra(Kernel):
 class KernelRow:
     """One kernel that can be built from its name.
 
-    Attributes
-    ----------
-    kernel : type
-        Called without arguments it takes its widths from the data.
-    formula, equation : str
-        Equation number of the paper, empty where the paper has none.
-    psd : bool
-        Whether it is proved positive semi-definite for all its parameters.
-    infinitely_divisible : bool
-        Whether its powers k^t, t > 0, are proved so too.
+    `formula`, `equation`: equation number of the paper, empty where the paper has none.
     """
 
-    kernel: type[Kernel]
+    kernel: type[Kernel]  # called without arguments it takes its widths from the data
     formula: str
     equation: str
-    psd: bool
-    infinitely_divisible: bool
+    psd: bool  # whether it is proved positive semi-definite for all its parameters
+    infinitely_divisible: bool  # whether its powers k^t, t > 0, are proved so too
 
     @property
     def widths(self) -> tuple[str, ...]:

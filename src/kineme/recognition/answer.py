@@ -195,15 +195,8 @@ def known_labels(
 ) -> NDArray[np.object_]:
     """Choose the best class of each row, among those with a p-value above the error rate if any; None if unknown.
 
-    Parameters
-    ----------
-    classes : ndarray of shape (C,)
-    scores : ndarray of shape (n, C)
-        By the classifier.
-    nearest : ndarray of shape (n, C)
-        Log similarity to the nearest demonstration of each class.
-    calibration : Calibration
-    error_rate : float
+    `classes` (C,); `scores` (n, C): by the classifier; `nearest` (n, C): log similarity to the nearest demonstration of
+    each class.
     """
     p, p_known = calibration.p_values(nearest, error_rate), calibration.known_p_values(nearest, error_rate)
     return _known_labels(classes, scores, p > error_rate, p_known > error_rate)
@@ -344,16 +337,12 @@ def _nearest(references: References, logs: Array, rows: slice) -> tuple[Neighbor
 def certainty(confidence: float, *, is_new: bool, is_guess: bool, is_over: bool = True) -> Certainty:
     """Tell how sure it is that a movement is of the class that is said.
 
-    Parameters
-    ----------
-    confidence : float
-        Probability of that class if the movement is of a known one.
-    is_new : bool
-        Whether the movement is unlike every known class.
-    is_guess : bool
-        Whether too few demonstrations tell what is unlike them: the answer then is what the movement looks like.
-    is_over : bool
-        Whether the whole movement was seen. What is under way looks like a class, no more: it may go on otherwise.
+    - `confidence`: probability of that class if the movement is of a known one.
+    - `is_new`: whether the movement is unlike every known class.
+    - `is_guess`: whether too few demonstrations tell what is unlike them: the answer then is what the movement looks
+      like.
+    - `is_over`: whether the whole movement was seen. What is under way looks like a class, no more: it may go on
+      otherwise.
     """
     if is_new:
         return "new"

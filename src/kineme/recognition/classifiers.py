@@ -100,15 +100,9 @@ class SupportVectors:
 
     The kernels are twice as wide as for the nearest neighbor, which should depend on the closest movement alone. An SVM
     combines many movements, which needs similarities of different demonstrations that are not almost zero.
-
-    Attributes
-    ----------
-    similarity : AveragedSimilarity
-        With the wider kernels.
-    model : sklearn.svm.SVC
     """
 
-    similarity: AveragedSimilarity
+    similarity: AveragedSimilarity  # with the wider kernels
     model: Any
 
     def scores(self, compared: Compared) -> Array:
@@ -149,10 +143,7 @@ def fit_prototype(comparison: Comparison, references: References) -> Prototype:
 def fit_support_vectors(comparison: Comparison, references: References) -> SupportVectors:
     """Fit an SVM to the Gram matrix of the references.
 
-    Raises
-    ------
-    SpecificationError
-        References of one class.
+    Raises `SpecificationError`: references of one class.
     """
     from sklearn.svm import SVC
 

@@ -65,18 +65,11 @@ class Templates(NamedTuple):
 class ComparedWindows:
     """n windows, compared with C classes.
 
-    Attributes
-    ----------
-    rows : ndarray of shape (n, 2)
-        First and last sample.
-    scores : ndarray of shape (n, C)
-        Nonconformity to each class.
-    log_durations, log_sizes, slowness : ndarray of shape (n,)
-        Slowness is the share of the duration that is slow.
+    `log_durations`, `log_sizes`, `slowness` (n,): slowness is the share of the duration that is slow.
     """
 
-    rows: Rows
-    scores: Array
+    rows: Rows  # (n, 2), first and last sample
+    scores: Array  # (n, C), nonconformity to each class
     log_durations: Array
     log_sizes: Array
     slowness: Array
@@ -89,18 +82,12 @@ class ComparedWindows:
 class Candidates(NamedTuple):
     """n windows, compared as far as it can matter.
 
-    Attributes
-    ----------
-    compared : ComparedWindows
-    weights : ndarray of shape (C,)
-        What the scores of each class are to be multiplied by, see `rarity_weights`.
-    completely : ndarray of bool, shape (n,)
-        Whether all scores of a window are known. Those of the others that exceed the reach, once weighted, are lower
-        bounds that exceed it too.
+    `completely` (n,): whether all scores of a window are known. Those of the others that exceed the reach, once
+    weighted, are lower bounds that exceed it too.
     """
 
     compared: ComparedWindows
-    weights: Array
+    weights: Array  # (C,), what the scores of each class are to be multiplied by, see `rarity_weights`
     completely: NDArray[np.bool_]
 
     def weighted(self) -> ComparedWindows:
@@ -114,15 +101,8 @@ def compare_candidates(
 ) -> Candidates:
     """Compare the windows from sample rows[:, 0] to rows[:, 1] with the references.
 
-    Parameters
-    ----------
-    templates : Templates
-    motion : Motion
-    rows : ndarray of shape (n, 2)
-    reach : float
-        Weighted nonconformity beyond which a window counts as far, however far it is.
-    progress : callable, optional
-        Called now and then with the share of the windows that is compared.
+    `rows` (n, 2); `reach`: weighted nonconformity beyond which a window counts as far, however far it is; `progress`:
+    called now and then with the share of the windows that is compared.
     """
     completely = np.zeros(len(rows), dtype=bool)
     completely[evenly_spaced(len(rows), _COMPLETELY)] = True
@@ -202,10 +182,7 @@ def rarity_weights(distances: Array) -> Array:
     divided by ``m_c^0.3``, with m_c the distance that a fifth of the windows is within, over the geometric mean of all
     classes.
 
-    Parameters
-    ----------
-    distances : ndarray of shape (n, C)
-        Of windows to the nearest demonstration of each class.
+    `distances` (n, C): of windows to the nearest demonstration of each class.
     """
     common = np.log(np.maximum(np.quantile(distances, _COMMON, axis=0), LEAST))
     return np.asarray(np.exp(_RARITY * (common.mean() - common)))
@@ -220,45 +197,23 @@ class Durations(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Windows:
-    """n windows of one recording; they overlap.
+    """n windows of one recording; they overlap."""
 
-    Attributes
-    ----------
-    motion : Motion
-        Of the whole recording.
-    bouts : ndarray of shape (b, 2)
-        Stretches of motion between rests: first sample, and one past the last.
-    rows : ndarray of shape (n, 2)
-        First and last sample of each window.
-    """
-
-    motion: Motion
-    bouts: Rows
-    rows: Rows
+    motion: Motion  # of the whole recording
+    bouts: Rows  # (b, 2), stretches of motion between rests: first sample, and one past the last
+    rows: Rows  # (n, 2), first and last sample of each window
 
     def __len__(self) -> int:
         return len(self.rows)
 
 
 class Surroundings(NamedTuple):
-    """Ends of n windows and rests in them, each of shape (n,).
+    """Ends of n windows and rests in them, each of shape (n,)."""
 
-    Attributes
-    ----------
-    edge_speeds : ndarray
-        Sum of the speeds at both ends, each in peak speeds and at most 1.
-    far_from_rest : ndarray
-        Sum over both ends of the distance to the nearest rest, each at most 1.
-    at_rest : ndarray
-        Share of the duration.
-    rests_inside : ndarray
-        How many rests a window spans.
-    """
-
-    edge_speeds: Array
-    far_from_rest: Array
-    at_rest: Array
-    rests_inside: Array
+    edge_speeds: Array  # sum of the speeds at both ends, each in peak speeds and at most 1
+    far_from_rest: Array  # sum over both ends of the distance to the nearest rest, each at most 1
+    at_rest: Array  # share of the duration
+    rests_inside: Array  # how many rests a window spans
 
 
 def candidate_windows(recording: Trajectory, durations: Durations | None, most_bouts: int) -> Windows:
@@ -268,13 +223,8 @@ def candidate_windows(recording: Trajectory, durations: Durations | None, most_b
     to twice as long as the shortest have boundaries of their own, those up to four times as long have boundaries twice
     as far apart, and so on, so that the number of windows grows with the logarithm of the range of durations only.
 
-    Parameters
-    ----------
-    recording : Trajectory
-    durations : Durations or None
-        None where they are unknown: from a quarter of the typical stretch between rests to four times it.
-    most_bouts : int
-        Most stretches between rests that a window may span.
+    `durations`: none where they are unknown: from a quarter of the typical stretch between rests to four times it;
+    `most_bouts`: most stretches between rests that a window may span.
     """
     motion = observe(recording, RESOLUTION)
     rest = Rest()

@@ -117,30 +117,20 @@ class Calibration:
     demonstration to the nearest other class, or at two thirds of the movement's own distance to the second nearest
     class, if that is less. ``python -m bench --only open_set`` measures all this.
 
-    Attributes
-    ----------
-    scales : ndarray of shape (C,)
-        The s_c.
-    own : tuple of C ndarrays
-        Of each class, the scores of its demonstrations.
-    pooled : tuple of C ndarrays
-        For each class, the scores of all demonstrations, each scored against as many as the class has.
-    own_novelties, pooled_novelties : tuple of C ndarrays
-        The same of novelties; of `sampled_calibration` the scores of members, which are not smaller.
-    between : float
-        The median distance, in kernel widths, from a demonstration to the nearest other class; 0 where groups tell how
-        much people differ, and where each class has one demonstration.
-    exponent : float
-        Power of the ratio of distances by which classes are likely, see `class_probabilities`.
+    - `pooled`: for each class, the scores of all demonstrations, each scored against as many as the class has.
+    - `own_novelties`, `pooled_novelties`: the same of novelties; of `sampled_calibration` the scores of members, which
+      are not smaller.
+    - `between`: the median distance, in kernel widths, from a demonstration to the nearest other class; 0 where groups
+      tell how much people differ, and where each class has one demonstration.
     """
 
-    scales: Array
-    own: tuple[Array, ...]
+    scales: Array  # (C,), the s_c
+    own: tuple[Array, ...]  # of each class, the scores of its demonstrations
     pooled: tuple[Array, ...]
     own_novelties: tuple[Array, ...]
     pooled_novelties: tuple[Array, ...]
     between: float = 0.0
-    exponent: float = EXPONENT
+    exponent: float = EXPONENT  # power of the ratio of distances by which classes are likely, see `class_probabilities`
 
     def of_those_shown(self) -> Calibration:
         """Return the calibration for movements by those who showed some, whatever the groups."""
@@ -351,11 +341,7 @@ def class_probabilities(similar: Array, exponent: float = EXPONENT) -> Array:
     distances to the power of m. This is the estimate of densities by nearest neighbors, ``1 / d^m`` in m dimensions;
     only m is fitted, see `fit_exponent`.
 
-    Parameters
-    ----------
-    similar : ndarray of shape (n, C)
-        Log similarity to each class, by which its label is chosen.
-    exponent : float
+    `similar` (n, C): log similarity to each class, by which its label is chosen.
     """
     logs = _log_odds(distances(similar), exponent)
     shares = np.exp(logs)
@@ -368,12 +354,9 @@ def fit_exponent(away: Array, classes: NDArray[np.intp]) -> float:
     It maximizes ``sum_i log P(c_i) - (log(m / 15) / 0.35)^2 / 2``, each demonstration left out of what it is compared
     with; the last term is a log-normal prior. Without demonstrations it is 15.
 
-    Parameters
-    ----------
-    away : ndarray of shape (n, C)
-        Distance of each demonstration to the nearest other one of each class; infinite where there is none.
-    classes : ndarray of shape (n,)
-        The class of each.
+    - `away` (n, C): distance of each demonstration to the nearest other one of each class; infinite where there is
+      none.
+    - `classes` (n,): the class of each.
     """
     if not len(away):
         return EXPONENT

@@ -69,12 +69,8 @@ class KnownClasses:
 def known_classes(symbols: FittedRecognizer | MovementsLike) -> KnownClasses:
     """Return the records of a fitted recognizer, or those fitted to labeled movements with the default parameters.
 
-    Raises
-    ------
-    sklearn.exceptions.NotFittedError
-        A recognizer that is not fitted.
-    TrajectoryError
-        Movements without labels.
+    Raises `sklearn.exceptions.NotFittedError` (a recognizer that is not fitted) and `TrajectoryError` (movements
+    without labels).
     """
     if hasattr(symbols, "calibration"):
         fitted = cast(FittedRecognizer, symbols)
@@ -120,11 +116,8 @@ def open_set_labels(
 ) -> tuple[NDArray[np.object_], Array]:
     """Return the class of each described movement by those who showed some, and its p-values.
 
-    Returns
-    -------
-    labels : ndarray of n labels or None
-        The best class with a p-value above `error_rate`; None, unknown, as in `Calibration.known_p_values`.
-    p_values : ndarray of shape (n, C)
+    Returns `labels`: the best class with a p-value above `error_rate`; None, unknown, as in
+    `Calibration.known_p_values`; `p_values` (n, C).
     """
     check_error_rate(error_rate)
     similarities, scores = score(classes.comparison, classes.references, described, nearest, classes.classifier.scores)

@@ -80,10 +80,7 @@ def reaching(away: float | Array) -> float | Array:
 def check_groups(groups: ArrayLike, n: int) -> NDArray[np.intp]:
     """Return numbers of the groups, one for each of n movements.
 
-    Raises
-    ------
-    TrajectoryError
-        Not one group for each movement, or texts beside numbers.
+    Raises `TrajectoryError`: not one group for each movement, or texts beside numbers.
     """
     given = np.asarray(groups)
     if given.shape != (n,):
@@ -156,20 +153,13 @@ class ClassDistances:
 class Scored:
     """Classes compared as if each had `size` demonstrations.
 
-    Attributes
-    ----------
-    scales : ndarray of shape (C,)
-        Of the classes.
-    scores : tuple of C ndarrays
-        Of each class, its calibrating demonstrations' distances to the nearest other of the class, over the scale from
-        which they are left out; infinite where there is no other.
-    shares : tuple of C ndarrays
-        By which these shrink, about, if there are `size` others instead of the number at hand.
+    `scores`: of each class, its calibrating demonstrations' distances to the nearest other of the class, over the scale
+    from which they are left out; infinite where there is no other.
     """
 
-    scales: Array
+    scales: Array  # (C,), of the classes
     scores: tuple[Array, ...]
-    shares: tuple[Array, ...]
+    shares: tuple[Array, ...]  # by which these shrink, about, if there are `size` others instead of the number at hand
 
     def pooled(self) -> Array:
         """Return finite scores of all classes."""

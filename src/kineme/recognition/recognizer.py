@@ -376,9 +376,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     def _fitted(self) -> tuple[Comparison, References]:
         """Comparison and references of `fit`.
 
-        Raises
-        ------
-        sklearn.exceptions.NotFittedError
+        Raises `sklearn.exceptions.NotFittedError`.
         """
         check_is_fitted(self, "comparison_")
         return self.comparison_, self.references_

@@ -250,20 +250,11 @@ def _cut(movement: Trajectory) -> Demonstrations:
 
 
 class Expected(NamedTuple):
-    """Typical movements of C classes, each of shape (C,).
+    """Typical movements of C classes, each of shape (C,)."""
 
-    Attributes
-    ----------
-    log_durations : ndarray or None
-        None where no time stamps were given.
-    log_sizes : ndarray
-    slowness : ndarray
-        Share of the duration that is slow.
-    """
-
-    log_durations: Array | None
+    log_durations: Array | None  # none where no time stamps were given
     log_sizes: Array
-    slowness: Array
+    slowness: Array  # share of the duration that is slow
 
 
 @dataclass(frozen=True)
@@ -331,18 +322,8 @@ def closest_classes(
     class is that of the nearest demonstration, wherever exactly the movement starts and ends: the distance, not over
     the scale of the class, and a quarter of the costs of duration and size.
 
-    Parameters
-    ----------
-    compared : ComparedWindows
-        n windows, sorted by starts.
-    distances : ndarray of shape (n, C)
-        To the nearest demonstration of each class, in that at which a window counts as far.
-    typical : Expected
-    manner : Manner
-    spans : ndarray of shape (n, 2)
-        Start and end of each window [s].
-    chosen : list of int
-        Windows.
+    `compared`: n windows, sorted by starts; `distances` (n, C): to the nearest demonstration of each class, in that at
+    which a window counts as far; `spans` (n, 2): start and end of each window [s]; `chosen`: windows.
     """
     costs = distances + _MANNER * _manner_costs(compared, typical, manner)
     return np.array([costs[near].min(axis=0).argmin() for near in alike_windows(spans, chosen)], dtype=np.intp)

@@ -23,22 +23,12 @@ class Transform:
 
     With sizes of both per dimension, ``matrix = diag(size) R diag(1 / size_demonstration)``; with one size for all
     dimensions, ``matrix = scale R``. What the recognizer does not take out stays 0, or 1, here.
-
-    Attributes
-    ----------
-    matrix : ndarray of shape (d, d)
-    shift : ndarray of shape (d,)
-    scale : ndarray of shape (d,)
-        Equal numbers unless sizes are per dimension.
-    rotation : ndarray of shape (d, d)
-        R.
-    duration_ratio : float
     """
 
-    matrix: Array
-    shift: Array
-    scale: Array
-    rotation: Array
+    matrix: Array  # (d, d)
+    shift: Array  # (d,)
+    scale: Array  # (d,), equal numbers unless sizes are per dimension
+    rotation: Array  # (d, d), R
     duration_ratio: float
 
     @property
@@ -68,12 +58,7 @@ def map_onto(
 
     Fitted to positions over the phase of the representation with the largest share (R, n), one batch for each phase.
 
-    Parameters
-    ----------
-    demos : Demonstrations
-        The movements.
-    paths : ndarray of shape (n, d, T)
-        Of the movements, where they were recorded.
+    `demos`: the movements; `paths` (n, d, T): of the movements, where they were recorded.
     """
     # Of two representations that are equally alike, the one with the larger weight has the larger share.
     weights = comparison.similarity.weights

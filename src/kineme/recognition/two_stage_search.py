@@ -45,20 +45,11 @@ class TwoStageSearch:
     On bent handwriting (``python -m bench --only library``; one busy core), of 100 movements asked among 40,000 in the
     plane and of 40 among 10,000 in space, all got the class of comparing all; an answer took 8 ms and 10 ms of
     processor time.
-
-    Attributes
-    ----------
-    comparison : Comparison
-        Fitted to a sample.
-    calibration : Calibration
-        Of all classes.
-    classes : ndarray of shape (C,)
-    stored : StoredReferences
     """
 
-    comparison: Comparison
-    calibration: Calibration
-    classes: NDArray[Any]
+    comparison: Comparison  # fitted to a sample
+    calibration: Calibration  # of all classes
+    classes: NDArray[Any]  # (C,)
     stored: StoredReferences
 
     def recognize(self, X: MovementsLike, error_rate: float = 0.05) -> list[Answer]:

@@ -232,18 +232,8 @@ class LiveKinematics(InverseKinematics):
     from the pose the step is damped in proportion to the distance, so that an arm stretched towards a pose out of reach
     comes to rest.
 
-    Parameters
-    ----------
-    robot : Robot
-    orientation : {"full", "axis", "free"}
-        See `InverseKinematics`.
-    time_step : float
-        Of a step [s].
-
-    Attributes
-    ----------
-    velocities, accelerations : ndarray of shape (n,)
-        Of the joints in the last step; 0 at first.
+    `orientation` ({"full", "axis", "free"}): see `InverseKinematics`; `time_step`: of a step [s]. `velocities`,
+    `accelerations` (n,): of the joints in the last step; 0 at first.
     """
 
     def __init__(self, robot: Robot, orientation: str, time_step: float) -> None:
@@ -348,14 +338,8 @@ def brakeable(distance: Array, change: Array, dt: float) -> Array:
     ``distance <= dt change m (m + 1) / 2``. For short steps that is ``sqrt(2 change / dt distance)``, which alone would
     overshoot by up to a step.
 
-    Parameters
-    ----------
-    distance : ndarray of shape (..., n)
-        What is left, from 0.
-    change : ndarray of shape (n,)
-        Largest change of velocity in one step.
-    dt : float
-        Time of a step [s].
+    `distance` (..., n): what is left, from 0; `change` (n,): largest change of velocity in one step; `dt`: time of a
+    step [s].
     """
     steps = distance / (change * dt)
     m = np.maximum(1.0, np.ceil(0.5 * (np.sqrt(1.0 + 8.0 * steps) - 1.0)))
@@ -392,11 +376,7 @@ class Braking:
     the Null Space", IEEE Transactions on Robotics 31(3), 2015; A. Del Prete, "Joint Position and Velocity Bounds in
     Discrete-Time Acceleration/Torque Control of Robot Arms", IEEE Robotics and Automation Letters 3(1), 2018.
 
-    Parameters
-    ----------
-    robot : Robot
-    dt : float
-        Time of a step [s].
+    `dt`: time of a step [s].
     """
 
     def __init__(self, robot: Robot, dt: float) -> None:

@@ -17,22 +17,12 @@ from kineme.validation import Array
 
 
 class Maps(NamedTuple):
-    """n affine maps ``x -> matrix x + shift``, each ``matrix = scale R``, or ``diag(size) R diag(1 / own size)``.
+    """n affine maps ``x -> matrix x + shift``, each ``matrix = scale R``, or ``diag(size) R diag(1 / own size)``."""
 
-    Attributes
-    ----------
-    matrices : ndarray of shape (n, d, d)
-    shifts : ndarray of shape (n, d)
-    rotations : ndarray of shape (n, d, d)
-        R.
-    scales : ndarray of shape (n, d)
-        Size over own size: equal numbers unless sizes are per dimension.
-    """
-
-    matrices: Array
-    shifts: Array
-    rotations: Array
-    scales: Array
+    matrices: Array  # (n, d, d)
+    shifts: Array  # (n, d)
+    rotations: Array  # (n, d, d), R
+    scales: Array  # (n, d), size over own size: equal numbers unless sizes are per dimension
 
     def move(self, paths: Array) -> Array:
         """Return paths (n, d, T), each by its map."""

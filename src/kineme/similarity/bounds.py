@@ -48,19 +48,9 @@ def fit_bases(rows: tuple[NDArray[Any], ...], n_dims: int, n_reduced: int = N_RE
     Dimensions are pooled and nothing is centered, so that turned rows have turned reduced features. Bounds hold for any
     orthonormal basis; movements unlike those that it was fitted to only make them less tight.
 
-    Parameters
-    ----------
-    rows : tuple of R ndarrays of shape (n, d * S)
-        As from `describe.feature_rows`.
-    n_dims : int
-        Dimensions d of the movements.
-    n_reduced : int, default 12
-        k, or S where that is smaller.
-
-    Returns
-    -------
-    tuple of R ndarrays of shape (S, k)
-        With orthonormal columns, those of most energy first.
+    `rows`, R of shape (n, d * S): as from `describe.feature_rows`; `n_dims`: dimensions d of the movements;
+    `n_reduced`: k, or S where that is smaller. Returns R of shape (S, k): with orthonormal columns, those of most
+    energy first.
     """
     bases = []
     for block in rows:
@@ -98,19 +88,12 @@ def log_bounds(
     Of an average with representations that are compared pair by pair, these are bounds of the average over the others
     alone, not of the whole: a pair can be more alike than its bound.
 
-    Parameters
-    ----------
-    similarity : AveragedSimilarity
-        Of all R representations, those that are compared sample by sample first.
-    queries : tuple of ReducedFeatures
-        Of n movements, in each of the representations that are compared sample by sample; of the bases of `stored`.
-    stored : tuple of ReducedFeatures
-        Of m movements.
+    - `similarity`: of all R representations, those that are compared sample by sample first.
+    - `queries`: of n movements, in each of the representations that are compared sample by sample; of the bases of
+      `stored`.
+    - `stored`: of m movements.
 
-    Returns
-    -------
-    ndarray of shape (n, m)
-        In single precision, and lower by no rounding error.
+    Returns (n, m): in single precision, and lower by no rounding error.
     """
     n, m = len(queries[0].values), len(stored[0].values)
     similarity = similarity.by_rows(len(stored))

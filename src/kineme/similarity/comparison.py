@@ -34,23 +34,14 @@ from kineme.validation import check_choice
 class Comparison:
     """Everything that is needed to describe and compare movements; made by `fit_comparison`.
 
-    Attributes
-    ----------
-    representations : tuple of R Representation
-        Those with a weight above 0, and positions over arc length if pairs are rotated by them.
-    normalization : Normalization
-    cutoff : float or None
-        Movements are smoothed below this many cycles each; None for not at all.
-    similarity : AveragedSimilarity
-        With the distance, the widths, the weights and the average.
-    channels : tuple of Channel or None
-        What was recorded of the movements that it was fitted to; None if that is not known.
+    - `representations`: those with a weight above 0, and positions over arc length if pairs are rotated by them.
+    - `channels`: what was recorded of the movements that it was fitted to; None if that is not known.
     """
 
     representations: tuple[Representation, ...]
     normalization: Normalization
-    cutoff: float | None
-    similarity: AveragedSimilarity
+    cutoff: float | None  # movements are smoothed below this many cycles each; None for not at all
+    similarity: AveragedSimilarity  # with the distance, the widths, the weights and the average
     channels: Channels | None = None
 
     @property
@@ -82,10 +73,7 @@ class Comparison:
 
         `what` they are called in messages.
 
-        Raises
-        ------
-        TrajectoryError
-            Movements of another number of dimensions, or of channels of other kinds.
+        Raises `TrajectoryError`: movements of another number of dimensions, or of channels of other kinds.
         """
         return as_learned(movements, self.channels, self.n_dims, what)
 
@@ -111,27 +99,13 @@ def fit_comparison(
 ) -> tuple[Comparison, References]:
     """Describe movements, and estimate widths and weights from them.
 
-    Parameters
-    ----------
-    specification : ComparisonSpecification
-    demos : Demonstrations
-    labels : ndarray of shape (m,)
-        The class of each.
-    weights : {"auto", "equal", "fitted"} or sequence of R numbers, default "auto"
-        "auto" takes the weights of the representations; "fitted" estimates them, see `fitted_weights`.
+    - `labels` (m,): the class of each.
+    - `weights` ({"auto", "equal", "fitted"} or sequence of R numbers, default "auto"): "auto" takes the weights of the
+      representations; "fitted" estimates them, see `fitted_weights`.
 
-    Returns
-    -------
-    comparison : Comparison
-        With the representations that have a weight above 0, and with positions over arc length if any of them is
-        compared pair by pair.
-    references : References
-        The movements, ordered by class.
-
-    Raises
-    ------
-    SpecificationError
-        Weights that do not fit the specification, or movements that are all the same.
+    Returns `comparison`: with the representations that have a weight above 0, and with positions over arc length if any
+    of them is compared pair by pair; `references`: the movements, ordered by class. Raises `SpecificationError`:
+    weights that do not fit the specification, or movements that are all the same.
     """
     demos = Demonstrations.of_movements(in_coordinates(demos.movements), demos.steps)
     order = np.argsort(labels, kind="stable")

@@ -19,45 +19,22 @@ _TILE_PAIRS = 100_000  # at a time: a pair's rotation in space has nine numbers
 
 @dataclass(frozen=True, eq=False)
 class Pairs:
-    """Shapes of n movements that are compared pair by pair.
+    """Shapes of n movements that are compared pair by pair."""
 
-    Attributes
-    ----------
-    positions : Prepared
-        Positions over arc length, which give the rotation of a pair.
-    shapes : Shapes
-    measures : tuple of int
-        Which of the distances that `kineme.kernels.pair_distances` gives, in order.
-    """
-
-    positions: Prepared
+    positions: Prepared  # positions over arc length, which give the rotation of a pair
     shapes: Shapes
-    measures: tuple[int, ...]
+    measures: tuple[int, ...]  # which of the distances that `kineme.kernels.pair_distances` gives, in order
 
 
 @dataclass(frozen=True, eq=False)
 class Described:
-    """n movements in each of R representations, ready for comparison.
+    """n movements in each of R representations, ready for comparison."""
 
-    Attributes
-    ----------
-    blocks : tuple of Prepared
-        One block of n rows for each representation that is compared sample by sample.
-    procrustes : Procrustes
-        The distance between rows.
-    mean : str
-        The A-average over representations.
-    pairs : Pairs or None
-        For the representations after those, which are compared pair by pair.
-    own_weights : tuple of float, or None
-        The weights of the representations themselves; equal if None.
-    """
-
-    blocks: tuple[Prepared, ...]
-    procrustes: Procrustes
-    mean: str = "arithmetic"
-    pairs: Pairs | None = None
-    own_weights: tuple[float, ...] | None = None
+    blocks: tuple[Prepared, ...]  # one block of n rows for each representation that is compared sample by sample
+    procrustes: Procrustes  # the distance between rows
+    mean: str = "arithmetic"  # the A-average over representations
+    pairs: Pairs | None = None  # for the representations after those, which are compared pair by pair
+    own_weights: tuple[float, ...] | None = None  # the weights of the representations themselves; equal if None
 
     def __len__(self) -> int:
         return len((self.blocks[0] if self.pairs is None else self.pairs.positions).rows)

@@ -47,17 +47,8 @@ def nearest_above(similarity: AveragedSimilarity, A: Described, B: Described, fi
 
     Elsewhere it is an upper bound, which does not reach the bar either.
 
-    Parameters
-    ----------
-    similarity : AveragedSimilarity
-    A : Described
-        n movements.
-    B : Described
-        m movements of C classes, ordered by class.
-    first : ndarray of shape (C,)
-        Index of the first movement of each class.
-    bars : ndarray of shape (C,)
-        Averaged kernels K, from 0 to 1.
+    `A`: n movements; `B`: m movements of C classes, ordered by class; `first` (C,): index of the first movement of each
+    class; `bars` (C,): averaged kernels K, from 0 to 1.
     """
     if not _can_skip(similarity, A, B):
         return _nearest(similarity, A, B, first)

@@ -36,26 +36,13 @@ class IndexedMovements(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class References:
-    """Stored movements of C classes, ordered by class.
-
-    Attributes
-    ----------
-    demonstrations : Demonstrations, or what gives them when indexed by an array
-    described : Described
-        Their rows, ready for comparison.
-    labels : ndarray of shape (m,)
-        The class of each, sorted.
-    classes : ndarray of shape (C,)
-        The labels, each once, sorted.
-    first : ndarray of shape (C,)
-        Index of the first movement of each class.
-    """
+    """Stored movements of C classes, ordered by class."""
 
     demonstrations: IndexedMovements
-    described: Described
-    labels: NDArray[Any]
-    classes: NDArray[Any]
-    first: NDArray[np.intp]
+    described: Described  # their rows, ready for comparison
+    labels: NDArray[Any]  # (m,), the class of each, sorted
+    classes: NDArray[Any]  # (C,), the labels, each once, sorted
+    first: NDArray[np.intp]  # (C,), index of the first movement of each class
 
     @classmethod
     def of(cls, demonstrations: IndexedMovements, described: Described, labels: NDArray[Any]) -> References:
@@ -85,30 +72,16 @@ class References:
 class StoredReferences:
     """Movements of C classes that are not held in memory.
 
-    Attributes
-    ----------
-    bases : tuple of R ndarrays (S, k)
-    reduced : tuple of tuples of R ReducedFeatures
-        One or several blocks, one after the other.
-    members : ndarray of shape (m,)
-        Rows of the reduced features that belong to a class, ordered by class.
-    first : ndarray of shape (C,)
-        Where in `members` each class begins.
-    specification : ComparisonSpecification
-        How the features are described.
-    features : callable
-        From rows of the reduced features to their feature rows per representation, see `describe.feature_rows`.
-    movements : callable
-        From rows of the reduced features to `Demonstrations`.
+    `features`: from rows of the reduced features to their feature rows per representation, see `describe.feature_rows`.
     """
 
-    bases: tuple[Array, ...]
-    reduced: tuple[tuple[ReducedFeatures, ...], ...]
-    members: Rows
-    first: Rows
-    specification: ComparisonSpecification
+    bases: tuple[Array, ...]  # R of shape (S, k)
+    reduced: tuple[tuple[ReducedFeatures, ...], ...]  # one or several blocks, one after the other
+    members: Rows  # (m,), rows of the reduced features that belong to a class, ordered by class
+    first: Rows  # (C,), where in `members` each class begins
+    specification: ComparisonSpecification  # how the features are described
     features: Callable[[Rows], tuple[NDArray[Any], ...]]
-    movements: Callable[[Rows], Demonstrations]
+    movements: Callable[[Rows], Demonstrations]  # from rows of the reduced features to `Demonstrations`
 
     @cached_property
     def counts(self) -> Rows:
@@ -140,13 +113,7 @@ class StoredReferences:
 
 
 class HeldReferences:
-    """Stored references that are described once: movements asked about together are compared with many of the same.
-
-    Parameters
-    ----------
-    stored : StoredReferences
-    similarity : AveragedSimilarity
-    """
+    """Stored references that are described once: movements asked about together are compared with many of the same."""
 
     def __init__(self, stored: StoredReferences, similarity: AveragedSimilarity) -> None:
         self._stored, self._similarity = stored, similarity

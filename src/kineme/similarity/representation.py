@@ -196,15 +196,11 @@ def forcing_operator(representation: Representation, dtype: np.dtype[Any]) -> ND
 class Normalization:
     """Translation and scale; rotation belongs to the comparison, see `kernels.procrustes.Procrustes`.
 
-    Parameters
-    ----------
-    translation : bool, default True
-        Remove the position. Movements that differ only in their position become equal.
-    scale : {"path", "per-dimension", "none"}, default "path"
-        "path" divides by the root mean square distance from the center, one number for all dimensions: a dot and a
-        circle become equal. "per-dimension" divides each dimension by its own: a circle and an ellipse become equal
-        too. "none" keeps the size, which must be 1e-15 to 1e15 in the unit of the data: movements are compared in
-        single precision, where squares of other sizes overflow or underflow.
+    - `translation`: remove the position. Movements that differ only in their position become equal.
+    - `scale` ({"path", "per-dimension", "none"}, default "path"): "path" divides by the root mean square distance from
+      the center, one number for all dimensions: a dot and a circle become equal. "per-dimension" divides each dimension
+      by its own: a circle and an ellipse become equal too. "none" keeps the size, which must be 1e-15 to 1e15 in the
+      unit of the data: movements are compared in single precision, where squares of other sizes overflow or underflow.
     """
 
     translation: bool = True

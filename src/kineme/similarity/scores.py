@@ -23,14 +23,7 @@ _TILE_PAIRS = 1_000_000  # similarities at a time: memory stays linear in the st
 
 @dataclass(frozen=True, eq=False)
 class Compared:
-    """n described movements, compared with m references of C classes.
-
-    Attributes
-    ----------
-    comparison : Comparison
-    references : References
-    described : Described
-    """
+    """n described movements, compared with m references of C classes."""
 
     comparison: Comparison
     references: References

@@ -30,21 +30,12 @@ class AveragedSimilarity:
 
     The arithmetic mean is positive semi-definite where each k_r is: with ``max_angle = 0`` and representations that are
     compared sample by sample. Procrustes distances and those of pairs are not Euclidean, and no claim is made for them.
-
-    Attributes
-    ----------
-    procrustes : Procrustes
-    widths : ndarray of shape (R,)
-        The sigma_r.
-    mean : str
-    weights : ndarray of shape (R,) or None
-        At least 0, summing to 1; equal if None.
     """
 
     procrustes: Procrustes
-    widths: Array
+    widths: Array  # (R,), the sigma_r
     mean: str = "arithmetic"
-    weights: Array | None = None
+    weights: Array | None = None  # (R,) or None, at least 0, summing to 1; equal if None
 
     def squared_distances(self, A: Described, B: Described) -> Array:
         """Return squared distances in each representation, shape (R, n, m)."""

@@ -62,34 +62,20 @@ class ComparisonSpecification:
 
     Kernel widths and weights are estimated from movements, see `Comparison`.
 
-    Parameters
-    ----------
-    representations : tuple of R Representation
-        Those compared sample by sample first. By default positions over arc length, forcing term over time, elastic
-        path, turning angles, and point cloud.
-    normalization : Normalization
-        The normalization of translation and size.
-    cutoff : float or None, default 10.0
-        Movements are smoothed below this many cycles each, see `Smooth`; None for recordings without noise.
-    max_angle : float, optional
-        Largest rotation [rad] between movements of one class, instead of the prior; 0 for none.
-    mean : {"arithmetic", "geometric", "harmonic", "quadratic", "min"}, default "arithmetic"
-        The A-average over representations.
-    prior : RotationPrior or None
-        How rare rotations are, in two and three dimensions, if there is no `max_angle`. None is a limit
-        of pi/3.
+    - `representations`: those compared sample by sample first. By default positions over arc length, forcing term over
+      time, elastic path, turning angles, and point cloud.
+    - `cutoff`: movements are smoothed below this many cycles each, see `Smooth`; None for recordings without noise.
+    - `max_angle`: largest rotation [rad] between movements of one class, instead of the prior; 0 for none.
+    - `prior`: how rare rotations are, in two and three dimensions, if there is no `max_angle`. None is a limit of pi/3.
 
-    Raises
-    ------
-    SpecificationError
-        A parameter out of its range, or `max_angle` and a prior that is not the default.
+    Raises `SpecificationError`: a parameter out of its range, or `max_angle` and a prior that is not the default.
     """
 
     representations: tuple[Representation, ...] = DEFAULT_REPRESENTATIONS
-    normalization: Normalization = field(default_factory=Normalization)
+    normalization: Normalization = field(default_factory=Normalization)  # the normalization of translation and size
     cutoff: float | None = 10.0
     max_angle: float | None = None
-    mean: str = "arithmetic"
+    mean: str = "arithmetic"  # the A-average over representations
     prior: RotationPrior | None = field(default_factory=RotationPrior)
 
     def __post_init__(self) -> None:
@@ -148,10 +134,7 @@ class Compares(Protocol):
 def specification_of(like: Compares | None) -> ComparisonSpecification:
     """Return the specification that `like` is or has; the default one for None.
 
-    Raises
-    ------
-    SpecificationError
-        `like` has none, or one with a parameter out of its range.
+    Raises `SpecificationError`: `like` has none, or one with a parameter out of its range.
     """
     specification = ComparisonSpecification() if like is None else getattr(like, "specification", None)
     if not isinstance(specification, ComparisonSpecification):

@@ -49,10 +49,7 @@ def fitted_weights(
     The fitted weights are those of representations that separate the training movements. A representation that does
     not help on them may still be needed for perturbations that they do not contain, so each keeps half of its own.
 
-    Raises
-    ------
-    SpecificationError
-        Another mean than the arithmetic one, which weights are fitted for.
+    Raises `SpecificationError`: another mean than the arithmetic one, which weights are fitted for.
     """
     if similarity.mean != "arithmetic":
         raise SpecificationError(
@@ -70,19 +67,11 @@ def aligned_weights(similarity: AveragedSimilarity, described: Described, labels
     learning kernels based on centered alignment", Journal of Machine Learning Research 13, 2012, Proposition 9). The
     diagonal is left out: a movement is like itself in every representation, which distinguishes none.
 
-    Parameters
-    ----------
-    similarity : AveragedSimilarity
-        Of equal weights.
-    described : Described
-        In R representations.
-    labels : ndarray of shape (n,)
-        In the order of the rows; at most 500 evenly spaced movements are compared.
+    - `similarity`: of equal weights.
+    - `described`: in R representations.
+    - `labels` (n,): in the order of the rows; at most 500 evenly spaced movements are compared.
 
-    Returns
-    -------
-    ndarray of shape (R,)
-        Summing to 1; weights below 0.02 are 0.
+    Returns (R,): summing to 1; weights below 0.02 are 0.
     """
     from scipy.optimize import nnls
 
@@ -100,10 +89,7 @@ def aligned_weights(similarity: AveragedSimilarity, described: Described, labels
 def given_weights(weights: ArrayLike, n: int) -> Array:
     """Return a user's weights, scaled to a sum of 1.
 
-    Raises
-    ------
-    SpecificationError
-        Not one finite number from 0 for each of the n representations, or all 0.
+    Raises `SpecificationError`: not one finite number from 0 for each of the n representations, or all 0.
     """
     try:
         array = np.asarray(weights, dtype=np.float64)

@@ -33,14 +33,7 @@ def impostor_widths(described: Described, labels: NDArray[np.generic]) -> Array:
     coincide, as N and Z do under any rotation, the width is a hundredth of the movements' size. Estimated from at most
     500 evenly spaced movements, which bounds the cost.
 
-    Returns
-    -------
-    ndarray of shape (R,)
-
-    Raises
-    ------
-    SpecificationError
-        All movements are the same, or there is only one.
+    Returns (R,). Raises `SpecificationError`: all movements are the same, or there is only one.
     """
     chosen = evenly_spaced(len(labels), _ROWS)
     some, owners = described.take(chosen), labels[chosen]
@@ -58,10 +51,7 @@ def impostor_widths(described: Described, labels: NDArray[np.generic]) -> Array:
 def lone_widths(described: Described, quantities: Sequence[str]) -> Array:
     """Return the width sigma_r of each representation, (R,), of one movement alone: a share of its size, see `ALONE`.
 
-    Raises
-    ------
-    SpecificationError
-        The movement does not move.
+    Raises `SpecificationError`: the movement does not move.
     """
     sizes = described.sizes()
     if not sizes[: len(described.blocks)].all():
@@ -99,14 +89,7 @@ def gap_widths(described: Described) -> Array:
     This is the gap by which agglomerative clusterings are cut (the largest step of merge heights), looked for around
     each movement by itself, where the scale is local.
 
-    Returns
-    -------
-    ndarray of shape (R,)
-
-    Raises
-    ------
-    SpecificationError
-        Fewer than three movements, or all the same.
+    Returns (R,). Raises `SpecificationError`: fewer than three movements, or all the same.
     """
     n = len(described)
     if n < 3:

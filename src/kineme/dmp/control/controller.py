@@ -293,14 +293,8 @@ class Clock:
     The phase is normalized time u; that of a rhythm counts from `begin` and stays below 1, so that it is as exact after
     a million periods as in the first.
 
-    Attributes
-    ----------
-    time : float
-        Seconds since the start.
-    u : float
-        The phase, of a rhythm within its period.
-    progress : float
-        The phase since the start.
+    `time`: seconds since the start; `u`: the phase, of a rhythm within its period; `progress`: the phase since the
+    start.
     """
 
     __slots__ = ("_begin", "_periodic", "_phase", "_seconds", "_turns", "progress", "time", "u")

@@ -161,14 +161,10 @@ def steering(
 ) -> Array:
     """The sum of all obstacles' terms (d,).
 
-    Parameters
-    ----------
-    state : ndarray of shape (2, d)
-        Position and dx/du.
-    obstacles, velocities : ndarray of shape (m, d)
-        Positions and their derivatives with respect to u.
-    rounding : float, default 0.0
-        An obstacle within this distance is at the position; one so little beside the line behind it has no effect.
+    - `state` (2, d): position and dx/du.
+    - `obstacles`, `velocities` (m, d): positions and their derivatives with respect to u.
+    - `rounding`: an obstacle within this distance is at the position; one so little beside the line behind it has no
+      effect.
     """
     r, v = obstacles - state[0], state[1] - velocities  # (m, d)
     speed, distance = np.linalg.norm(v, axis=1), np.linalg.norm(r, axis=1)

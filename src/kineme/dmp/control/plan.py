@@ -50,49 +50,23 @@ class Plan:
 
         x'' = K (g - x) - D x' + ratio scale_f(u) + coupling(u) g,        ' = d/du.
 
-    Attributes
-    ----------
-    dmp : DMP or RhythmicDMP
-        The specification: stiffness, damping, and the terms from which `shape` is mixed.
-    mixing : ndarray of shape (N + 1, d + 1)
-        From the terms of the specification, its basis functions and the coupling, to `shape`.
-    ratio : callable
-        What scale f is multiplied by for a goal (d,); not finite where the formulation cannot go.
-    origin : ndarray of shape (d,)
-        From where positions and goals count; x0 of a discrete movement.
-    goal : ndarray of shape (d,)
-        The first goal.
-    state : ndarray of shape (2, d)
-        The first position and dx/du.
-    duration : float
-        Of u = 1 [s].
-    settle : float
-        Distance within which the movement has settled, by default.
-    n_positions : int
-        The leading dimensions that are coordinates of one point, in which obstacles lie.
-    begin : float
-        u of the first state.
-    periodic : bool
-        Whether `shape` repeats itself after u = 1; then the movement never settles.
-    longest_step : float
-        At most so many durations in one step.
-    via : ViaPlaces, optional
-        Its via points, which obstacles, goals and measurements may lead it away from.
+    - `mixing` (N + 1, d + 1): from the terms of the specification, its basis functions and the coupling, to `shape`.
+    - `ratio`: what scale f is multiplied by for a goal (d,); not finite where the formulation cannot go.
     """
 
-    dmp: Any
+    dmp: Any  # the specification: stiffness, damping, and the terms from which `shape` is mixed
     mixing: Array
     ratio: Callable[[Array], Array]
-    origin: Array
-    goal: Array
-    state: Array
-    duration: float
-    settle: float
-    n_positions: int
-    begin: float = 0.0
-    periodic: bool = False
-    longest_step: float = 1.0
-    via: ViaPlaces | None = None
+    origin: Array  # (d,), from where positions and goals count; x0 of a discrete movement
+    goal: Array  # (d,), the first goal
+    state: Array  # (2, d), the first position and dx/du
+    duration: float  # of u = 1 [s]
+    settle: float  # distance within which the movement has settled, by default
+    n_positions: int  # the leading dimensions that are coordinates of one point, in which obstacles lie
+    begin: float = 0.0  # u of the first state
+    periodic: bool = False  # whether `shape` repeats itself after u = 1; then the movement never settles
+    longest_step: float = 1.0  # at most so many durations in one step
+    via: ViaPlaces | None = None  # its via points, which obstacles, goals and measurements may lead it away from
 
     @cached_property
     def K(self) -> float:
@@ -152,12 +126,8 @@ def check_controlled(plan: Any, dt: Any) -> None:
 class FilteredValue:
     """Numbers that approach a target with a time constant, ``filter dx/dt = target - x``, or jump without one.
 
-    Attributes
-    ----------
-    target : ndarray of shape (d,)
-        What was set last.
-    lag : ndarray of shape (d,) or None
-        Value in force minus target; None where it has arrived.
+    - `target` (d,): what was set last.
+    - `lag` (d,) or None: value in force minus target; None where it has arrived.
     """
 
     def __init__(self, target: Array, time_constant: float | None) -> None:
@@ -200,10 +170,7 @@ class MovingGoal(FilteredValue):
     to the target is weighted by 1 - s, so that it begins without a jump, wherever the formulation does so with goals.
     Scale f belongs to where the goal will be at the end.
 
-    Attributes
-    ----------
-    velocity : ndarray of shape (d,) or None
-        Per second; None at rest.
+    `velocity` (d,) or None: per second; None at rest.
     """
 
     def __init__(self, plan: Plan, target: Array, time_constant: float | None) -> None:

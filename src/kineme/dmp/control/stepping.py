@@ -141,14 +141,7 @@ def advance(
     the midpoint rule: their term, held over a first half step, gives the state in the middle, whose term is held over
     the whole; so the error falls as du^2.
 
-    Parameters
-    ----------
-    state : ndarray of shape (2, d)
-        Relative to the origin.
-
-    Returns
-    -------
-    ndarray of shape (3, d)
+    `state` (2, d): relative to the origin. Returns (3, d).
     """
     with np.errstate(all="ignore"):  # the caller looks at the result
         push = influences.push

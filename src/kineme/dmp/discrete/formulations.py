@@ -138,15 +138,9 @@ FORMULATIONS = {
 def safe_amplitudes(amplitudes: Array, extents: Array, names: Sequence[str | None] | None, feature: str) -> Array:
     """Return `amplitudes` g - x0 (n, d) if none is zero.
 
-    Raises
-    ------
-    DegenerateMovementError
-        Where g = x0 in a dimension: a closed or a flat movement.
-
-    Warns
-    -----
-    DegenerateMovementWarning
-        Once, with a count, for movements whose g is closer to x0 than 1 % of the movement's largest extent.
+    Raises `DegenerateMovementError`: where g = x0 in a dimension: a closed or a flat movement. Warns
+    `DegenerateMovementWarning`: once, with a count, for movements whose g is closer to x0 than 1 % of the movement's
+    largest extent.
     """
     relative = np.abs(amplitudes) / extents.max(axis=1, keepdims=True)
     zero = relative <= ZERO

@@ -161,16 +161,9 @@ def modulated(
 ) -> Rollout:
     """The movement through the via points, with the end velocity and within the limits.
 
-    Parameters
-    ----------
-    movement : Rollout
-        As asked for otherwise.
-    via, end_velocity, position_limits
-        As in `Primitives.rollout`.
-    factor : ndarray of shape (r, d, N), optional
-        Of the covariance of the demonstrations' scaled weights.
-    measured : sequence of Measured
-        Dimensions whose distances are measured together, when it is said how far movements are led away.
+    `movement`: as asked for otherwise; `via`, `end_velocity`, `position_limits`: as in `Primitives.rollout`; `factor`
+    (r, d, N): of the covariance of the demonstrations' scaled weights; `measured`: dimensions whose distances are
+    measured together, when it is said how far movements are led away.
     """
     if via is None and end_velocity is None and position_limits is None:
         return movement

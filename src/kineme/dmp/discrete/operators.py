@@ -102,10 +102,7 @@ def spring_damper_response(
     The state is propagated from one time to the next by the matrix exponential, which is exact for any step; the
     forcing enters by Gauss-Legendre quadrature of the convolution integral with 8 nodes per interval, of order 16.
 
-    Parameters
-    ----------
-    u : ndarray of shape (T,)
-        Even normalized times from 0.
+    `u` (T,): even normalized times from 0.
     """
     n_steps = max(1, math.ceil(_STEPS_PER_BASIS * (basis.n_basis - 1) * (u[1] - u[0])))
     h = (u[1] - u[0]) / n_steps
@@ -234,12 +231,7 @@ def trajectory_regression(response: Response, stiffness: float, ridge: float) ->
     Minimizes ``mean (y - Phi W - goal (g - x0) - velocity v0)^2 + ridge mean (diff^2 W / K)^2`` over W and v0:
     no numerical derivative of the data occurs.
 
-    Returns
-    -------
-    weights : ndarray of shape (N, T)
-        From y = x - x0 to W.
-    velocity : ndarray of shape (T,)
-        From y to v0.
+    Returns `weights` (N, T): from y = x - x0 to W; `velocity` (T,): from y to v0.
     """
     n_points, n_basis = response.Phi[0].shape
     columns, curvature = trajectory_columns(response, stiffness)
@@ -253,12 +245,8 @@ def trajectory_regression(response: Response, stiffness: float, ridge: float) ->
 def trajectory_columns(response: Response, stiffness: float) -> tuple[Array, Array]:
     """Return what `trajectory_regression` fits a path with and what it keeps small, both per square root of their rows.
 
-    Returns
-    -------
-    columns : ndarray of shape (T, N + 1)
-        Paths of W / K, comparable to y, and of v0.
-    curvature : ndarray of shape (N - 2, N + 1)
-        Second differences of W / K; times the square root of the ridge they are rows of the least-squares problem.
+    Returns `columns` (T, N + 1): paths of W / K, comparable to y, and of v0; `curvature` (N - 2, N + 1): second
+    differences of W / K; times the square root of the ridge they are rows of the least-squares problem.
     """
     n_points, n_basis = response.Phi[0].shape
     columns = np.column_stack((response.Phi[0] * stiffness, response.velocity[0])) / np.sqrt(n_points)

@@ -39,10 +39,8 @@ def within_limits(
     `points` (1 or n, k, d) are those at which it is held, `slack` (K,) how
     loosely, as a share of what each deviates under the covariance: more points of a stretch than can be met are held.
 
-    Raises
-    ------
-    SpecificationError
-        Limits of the wrong shape or order; a start, goal or via point outside; a movement that cannot stay inside.
+    Raises `SpecificationError`: limits of the wrong shape or order; a start, goal or via point outside; a movement that
+    cannot stay inside.
     """
     low, high = as_limits(limits, movement.starts.shape[1])
     dmp = movement.primitives.dmp
@@ -86,10 +84,7 @@ def within_limits(
 def as_limits(limits: tuple[ArrayLike, ArrayLike], n_dims: int) -> tuple[Array, Array]:
     """Limits (low, high), each (d,), of numbers or arrays.
 
-    Raises
-    ------
-    SpecificationError
-        No two numbers or (d,) arrays, or low that is not below high.
+    Raises `SpecificationError`: no two numbers or (d,) arrays, or low that is not below high.
     """
     try:
         low, high = (np.broadcast_to(as_numbers(limit, "position_limits"), n_dims) for limit in limits)

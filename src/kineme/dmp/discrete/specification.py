@@ -69,15 +69,9 @@ class Specification(SpringDamper):
 
 @dataclass(frozen=True)
 class ExponentialPhase:
-    """Exponential decay ``tau ds/dt = -alpha s``, so ``s(u) = exp(-alpha u)`` with ``u = t / tau`` (Section 2.1).
+    """Exponential decay ``tau ds/dt = -alpha s``, so ``s(u) = exp(-alpha u)`` with ``u = t / tau`` (Section 2.1)."""
 
-    Parameters
-    ----------
-    end : float, default 0.01
-        The phase at the end of the movement, s(tau), between 0 and 1; ``alpha = -ln(end)``.
-    """
-
-    end: float = 0.01
+    end: float = 0.01  # the phase at the end of the movement, s(tau), between 0 and 1; ``alpha = -ln(end)``
 
     def __post_init__(self) -> None:
         check_number("phase_end", self.end, above=0.0, smallest=0.0)

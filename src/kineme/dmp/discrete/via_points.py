@@ -49,23 +49,14 @@ SHARES = Span(1.0, False, _FORM, "{:g} of the duration", _BOUNDS)
 def via_points(via: ViaLike, n_dims: int, learned: Learned | None = None, span: Span = SHARES) -> ViaPoints:
     """Check what a user wrote; see `Primitives.rollout`.
 
-    Parameters
-    ----------
-    via : as in `Primitives.rollout`
-    n_dims : int
-        Of the points as they are written.
-    learned : callable, optional
-        ``learned(times, points)`` gives points (n, k, n_dims) at times (k,) in the coordinates that are learned, if
-        these are others.
-    span : Span, default SHARES
-        What the times are; those of the result are shares of it.
+    - `via` as in `Primitives.rollout`.
+    - `n_dims`: of the points as they are written.
+    - `learned`: ``learned(times, points)`` gives points (n, k, n_dims) at times (k,) in the coordinates that are
+      learned, if these are others.
+    - `span`: what the times are; those of the result are shares of it.
 
-    Raises
-    ------
-    SpecificationError
-        No list of pairs, a time outside ]0, 1[, two places at one time.
-    TrajectoryError
-        Points of the wrong shape, infinite, or without any number; batches of different lengths.
+    Raises `SpecificationError` (no list of pairs, a time outside ]0, 1[, two places at one time) and `TrajectoryError`
+    (points of the wrong shape, infinite, or without any number; batches of different lengths).
     """
     if isinstance(via, (str, bytes)) or not isinstance(via, (Sequence, np.ndarray)):
         raise SpecificationError(f"expected {span.form}, got {via!r}")

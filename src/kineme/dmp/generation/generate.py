@@ -28,37 +28,23 @@ _MET = 0.01  # of the extent: a via point that is missed by more is said
 class MovementOptions:
     """Options of a new movement; None leaves it as demonstrated.
 
-    Attributes
-    ----------
-    start, goal : ndarray of shape (d,), optional
-        In the columns of the recording that are not discrete, in their order.
-    duration : float, optional
-        tau [s].
-    rate : float
-        Samples per second, at least.
-    settle : float, optional
-        Continue until within this distance of the goal.
-    obstacles : ndarray of shape (m, d), optional
-        Points to steer around.
-    meet_goal : bool
-        Whether the movement ends exactly at its goal, with the velocity that it has at the demonstrated one. Otherwise
-        it comes as close as the primitive brings it, to some hundredths of the way between the two goals.
-    via : tuple of (share, ndarray of shape (d,))
-        Points to pass, and when as shares of the duration, between 0 and 1; as start and goal. Obstacles lead away
-        from them; the movement is aimed beside them for it, and what is missed all the same is said.
-    avoidance : ObstacleAvoidance, optional
-        How strongly it steers around obstacles.
+    - `start`, `goal` (d,): in the columns of the recording that are not discrete, in their order.
+    - `meet_goal`: whether the movement ends exactly at its goal, with the velocity that it has at the demonstrated one.
+      Otherwise it comes as close as the primitive brings it, to some hundredths of the way between the two goals.
+    - `via`, pairs of a share and a point: points to pass, and when as shares of the duration, between 0 and 1; as start
+      and goal. Obstacles lead away from them; the movement is aimed beside them for it, and what is missed all the same
+      is said.
     """
 
     start: Array | None = None
     goal: Array | None = None
-    duration: float | None = None
-    rate: float = 100.0
-    settle: float | None = None
-    obstacles: Array | None = None
+    duration: float | None = None  # tau [s]
+    rate: float = 100.0  # samples per second, at least
+    settle: float | None = None  # continue until within this distance of the goal
+    obstacles: Array | None = None  # (m, d), points to steer around
     meet_goal: bool = False
     via: tuple[tuple[float, Array], ...] = ()
-    avoidance: ObstacleAvoidance | None = None
+    avoidance: ObstacleAvoidance | None = None  # how strongly it steers around obstacles
 
 
 class Generated(NamedTuple):
@@ -74,16 +60,10 @@ def generate(learned: Learned, options: MovementOptions) -> Generated:
     Orientations are quaternions of norm 1, with angular velocities in the world frame; discrete channels step where
     they did, at the same share of the duration.
 
-    Raises
-    ------
-    SpecificationError
-        An option that cannot be met; among them obstacles that keep the movement from its goal, more samples than fit
-        into memory, and numbers that are not finite: a robot gets no movement that was not checked.
-
-    Warns
-    -----
-    ExtrapolationWarning
-        A via point that obstacles make the movement miss by more than 1 % of its extent: which, and by how much.
+    Raises `SpecificationError`: an option that cannot be met; among them obstacles that keep the movement from its
+    goal, more samples than fit into memory, and numbers that are not finite: a robot gets no movement that was not
+    checked. Warns `ExtrapolationWarning`: a via point that obstacles make the movement miss by more than 1 % of its
+    extent: which, and by how much.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # refused below
         start, goal = (checked_point(learned, getattr(options, name), name) for name in ("start", "goal"))
@@ -110,17 +90,8 @@ def generate(learned: Learned, options: MovementOptions) -> Generated:
 def checked_point(learned: Learned, point: Array | None, name: str) -> Array | None:
     """A start or goal in the columns of the recording that move, in those of the primitive.
 
-    Parameters
-    ----------
-    learned : Learned
-    point : ndarray of shape (columns,) or None
-    name : str
-        What the message calls it.
-
-    Raises
-    ------
-    SpecificationError
-        Another number of values, or such that no movement can start or end there.
+    `point` (columns,) or None; `name`: what the message calls it. Raises `SpecificationError`: another number of
+    values, or such that no movement can start or end there.
     """
     if point is None:
         return None

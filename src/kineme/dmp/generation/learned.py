@@ -24,18 +24,10 @@ SAVED = ".kineme"  # file extension of saved primitives
 
 @dataclass(frozen=True, eq=False)
 class Learned:
-    """A primitive, and its demonstration where that is known.
+    """A primitive, and its demonstration where that is known."""
 
-    Attributes
-    ----------
-    primitive : Primitives or PosePrimitives
-        A batch of one.
-    demonstration : Trajectory or None
-        As it was recorded; its channels say what the columns are.
-    """
-
-    primitive: Primitives | PosePrimitives
-    demonstration: Trajectory | None = None
+    primitive: Primitives | PosePrimitives  # a batch of one
+    demonstration: Trajectory | None = None  # as it was recorded; its channels say what the columns are
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -77,10 +69,7 @@ class Learned:
 def learn_one(demonstration: Trajectory, dmp: DMP) -> Learned:
     """The primitive of a recording, whatever it holds; with orientations it is one of poses.
 
-    Raises
-    ------
-    TrajectoryError
-        A movement that cannot be learned.
+    Raises `TrajectoryError`: a movement that cannot be learned.
     """
     return Learned((PoseDMP(dmp) if has_orientation(demonstration) else dmp).learn([demonstration]), demonstration)
 
@@ -93,10 +82,7 @@ def has_orientation(demonstration: Trajectory) -> bool:
 def load_saved(path: Path) -> Primitives | PosePrimitives:
     """Saved primitives of either kind.
 
-    Raises
-    ------
-    DataError, FileNotFoundError
-        See `Primitives.load`.
+    Raises `DataError` or `FileNotFoundError`: see `Primitives.load`.
     """
     is_pose = path.is_file() and kind_of(path) == PosePrimitives.KIND
     return PosePrimitives.load(path) if is_pose else Primitives.load(path)

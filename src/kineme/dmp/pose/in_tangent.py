@@ -21,10 +21,7 @@ _ROUNDING = 1e-9  # of the largest position: so far is no way
 def checked_poses(option: ArrayLike | None, name: str, n_positions: int, n_columns: int) -> Array | None:
     """Poses (1 or n, n_columns) with quaternions of norm 1.
 
-    Raises
-    ------
-    TrajectoryError
-        Another shape; a quaternion that is none.
+    Raises `TrajectoryError`: another shape; a quaternion that is none.
     """
     poses = per_movement(option, name, n_columns)
     if poses is None:
@@ -39,10 +36,7 @@ def checked_poses(option: ArrayLike | None, name: str, n_positions: int, n_colum
 def rates_in_tangent(velocity: ArrayLike | None, places: Array, n_positions: int, name: str) -> Array | None:
     """Rates (n, p + 3 k) of positions and rotation vectors at places of this shape, of linear and angular velocities.
 
-    Raises
-    ------
-    TrajectoryError
-        Another shape, or another number of movements.
+    Raises `TrajectoryError`: another shape, or another number of movements.
     """
     option = per_movement(velocity, name, places.shape[1])
     if option is None:
@@ -75,18 +69,9 @@ def changes_in_tangent(
 def via_poses(movement: Rollout, references: Array, via: ViaLike | None) -> ViaPoints | None:
     """Via points (d,) of poses in the coordinates of a tangent movement: each orientation the vector nearest its path.
 
-    Parameters
-    ----------
-    movement : Rollout
-        In positions and rotation vectors.
-    references : ndarray of shape (1 or n, 4 k)
-        The orientations that the rotation vectors refer to.
-    via : as in `PosePrimitives.rollout`
-
-    Raises
-    ------
-    SpecificationError, TrajectoryError
-        As `via_points`; quaternions that are none, or of which some numbers are free.
+    `movement`: in positions and rotation vectors; `references` (1 or n, 4 k): the orientations that the rotation
+    vectors refer to; `via` as in `PosePrimitives.rollout`. Raises `SpecificationError` or `TrajectoryError`: as
+    `via_points`; quaternions that are none, or of which some numbers are free.
     """
     if via is None:
         return None
@@ -126,10 +111,8 @@ def limits_of_positions(
 ) -> tuple[Array, Array] | None:
     """Limits (low, high) of the positions as those of all coordinates, of which rotation vectors have none.
 
-    Raises
-    ------
-    SpecificationError
-        Limits of orientations alone; limits that are no two numbers, or (p,) of p positions; low not below high.
+    Raises `SpecificationError`: limits of orientations alone; limits that are no two numbers, or (p,) of p positions;
+    low not below high.
     """
     if limits is None:
         return None

@@ -83,10 +83,7 @@ def _to_tangent(demos: Demonstrations, k: int) -> tuple[Demonstrations, Array]:
 def with_orientations_last(movements: MovementsLike) -> tuple[Demonstrations, int]:
     """Movements in columns with the orientations (w, x, y, z) last, and how many these are.
 
-    Raises
-    ------
-    TrajectoryError
-        Movements without known channels that are of other than 4 or 7 columns.
+    Raises `TrajectoryError`: movements without known channels that are of other than 4 or 7 columns.
     """
     demos = Demonstrations.of(movements)
     k = sum(channel.kind == "orientation" for channel in demos.channels or ())
@@ -98,10 +95,7 @@ def with_orientations_last(movements: MovementsLike) -> tuple[Demonstrations, in
 def as_poses(movements: MovementsLike) -> Demonstrations:
     """Movements of 4 columns (w, x, y, z) or 7, a position before it; see `to_tangent`.
 
-    Raises
-    ------
-    TrajectoryError
-        Another number of columns, or channels that are no pose.
+    Raises `TrajectoryError`: another number of columns, or channels that are no pose.
     """
     demos = Demonstrations.of(movements)
     if demos.channels is not None and not is_plain(demos.channels):
@@ -180,25 +174,13 @@ def unwrapped(q: Array, offsets: NDArray[np.intp], where: Callable[[int], str]) 
     the one that continues its neighbor's, so that a tool that turns 4 rad about an axis gets
     4 rad and not 2 pi - 4 rad the other way. The signs of the quaternions do not matter.
 
-    Parameters
-    ----------
-    q : ndarray of shape (total, 4)
-        All movements, one after the other, each ending at 1; consecutive samples less than half a turn apart.
-    offsets : ndarray of shape (n + 1,)
-        Where each movement begins.
-    where : callable
-        Names the movement and the sample of a row, for the message.
+    - `q` (total, 4): all movements, one after the other, each ending at 1; consecutive samples less than half a turn
+      apart.
+    - `offsets` (n + 1,): where each movement begins.
+    - `where`: names the movement and the sample of a row, for the message.
 
-    Returns
-    -------
-    ndarray of shape (total, 3)
-        Rotation vectors [rad].
-
-    Raises
-    ------
-    TrajectoryError
-        A full turn or more from the last sample about an axis that changes: there is no continuous rotation vector
-        then, since at 2 pi all axes are the same orientation.
+    Returns (total, 3): rotation vectors [rad]. Raises `TrajectoryError`: a full turn or more from the last sample about
+    an axis that changes: there is no continuous rotation vector then, since at 2 pi all axes are the same orientation.
     """
     movement = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
     last = (offsets[1:] - 1)[movement]

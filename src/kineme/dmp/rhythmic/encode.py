@@ -162,18 +162,11 @@ def fold(rows: Array, cycles: Array, lengths: NDArray[np.intp], most: int, dimen
     For a whole number of periods the series is the Fourier series of the average period. For a fractional number it
     still uses every sample, has no jump where the recording begins and ends, and its mean is that of whole periods.
 
-    Parameters
-    ----------
-    rows : ndarray of shape (n, d, R)
-        Even samples.
-    cycles : ndarray of shape (n,)
-        Periods per recording.
-    lengths : ndarray of shape (n,)
-        Recorded samples; no harmonic above the sampling of a period is used.
-    most : int
-        Largest number of harmonics H.
-    dimension : int or None
-        Dimension whose first harmonic defines the phase; None for the one with the largest.
+    - `rows` (n, d, R): even samples.
+    - `cycles` (n,): periods per recording.
+    - `lengths` (n,): recorded samples; no harmonic above the sampling of a period is used.
+    - `most`: largest number of harmonics H.
+    - `dimension`: dimension whose first harmonic defines the phase; None for the one with the largest.
     """
     n_harmonics = np.clip(_RESOLVED * (lengths - 1) / cycles, 1, most).astype(np.intp)
     mean = rows.mean(axis=2, keepdims=True)
@@ -290,12 +283,8 @@ def find_cycles(rows: Array, lengths: NDArray[np.intp]) -> Periodicity:
     period does, and a little of the noise. The residual variance of a fit is divided by its share of residual degrees
     of freedom, ``1 - 1 / cycles``.
 
-    Parameters
-    ----------
-    rows : ndarray of shape (n, d, R)
-        Even samples.
-    lengths : ndarray of shape (n,)
-        Recorded samples of each; bounds the harmonics that can be seen.
+    - `rows` (n, d, R): even samples.
+    - `lengths` (n,): recorded samples of each; bounds the harmonics that can be seen.
     """
     rough = candidates(rows, lengths)
     chosen = np.isfinite(rough)

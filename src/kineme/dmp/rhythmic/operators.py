@@ -100,14 +100,9 @@ class HarmonicFit(NamedTuple):
 def fit_harmonics(rows: Array, cycles: Array, n_harmonics: NDArray[np.intp]) -> HarmonicFit:
     """Fit each recording by a Fourier series that runs through `cycles` periods from its first to its last sample.
 
-    Parameters
-    ----------
-    rows : ndarray of shape (n, d, R)
-        Even samples.
-    cycles : ndarray of shape (n,)
-        Periods per recording; any positive number.
-    n_harmonics : ndarray of shape (n,)
-        Highest harmonic of each; the coefficients above it are 0.
+    - `rows` (n, d, R): even samples.
+    - `cycles` (n,): periods per recording; any positive number.
+    - `n_harmonics` (n,): highest harmonic of each; the coefficients above it are 0.
     """
     n_samples, top = rows.shape[2], int(n_harmonics.max())
     theta = (2 * np.pi / (n_samples - 1)) * cycles[:, None] * np.arange(n_samples)

@@ -354,12 +354,7 @@ def plan_of(
 def refuse_others(what: str, options: Mapping[str, object]) -> None:
     """Refuse options that a rhythm does not have.
 
-    Raises
-    ------
-    SpecificationError
-        An option of discrete movements.
-    TypeError
-        Another name, as of any function.
+    Raises `SpecificationError` (an option of discrete movements) and `TypeError` (another name, as of any function).
     """
     for name, value in options.items():
         if name not in _INSTEAD:

@@ -227,10 +227,7 @@ def _samples(
 def modulated(movement: RhythmicRollout, via: ViaLike | ViaPoints | None) -> RhythmicRollout:
     """The movement on the limit cycle that passes the via points; see `RhythmicPrimitives.rollout`.
 
-    Raises
-    ------
-    SpecificationError, TrajectoryError
-        As `via_points`; an amplitude of 0.
+    Raises `SpecificationError` or `TrajectoryError`: as `via_points`; an amplitude of 0.
     """
     if via is None:
         return movement

@@ -60,10 +60,7 @@ def updated(
 ) -> Updated:
     """Condition the mean and the factors of an average on positions and velocities.
 
-    Raises
-    ------
-    SpecificationError
-        What cannot be met, or only with a duration that is no movement's.
+    Raises `SpecificationError`: what cannot be met, or only with a duration that is no movement's.
     """
     d, n_numbers = factor.shape[1:]
     rows = _rows(primitive.dmp, d, kinds)

@@ -322,13 +322,7 @@ def tracking(
     Arms of fewer than six joints follow an orientation only as far as the position allows: of theirs, and of what is
     not followed at all, the angle has no limit.
 
-    Parameters
-    ----------
-    path : TaskPath
-        At times of the trajectory.
-    follow : {"full", "axis", "free"}
-    dense : times (m,) and what the arm does then
-        Where those times end with the path's, nothing is computed again.
+    `path`: at times of the trajectory; `dense`: where those times end with the path's, nothing is computed again.
     """
     times, state = dense
     n = len(path.times)

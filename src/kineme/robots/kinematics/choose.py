@@ -36,16 +36,8 @@ class Choice(NamedTuple):
 def choose_posture(robot: Robot, path: TaskPath, turn_costs: Array, stands: Array) -> Choice:
     """The posture at the start from which the whole movement costs least, with the way to it.
 
-    Parameters
-    ----------
-    robot : Robot
-    path : TaskPath
-    turn_costs : ndarray of shape (3,)
-        As `InverseKinematics.costs`.
-    stands : ndarray of shape (n,)
-        Where the joints stand: 0.1 is added for each radian of the joint that has farthest to go.
-
-    Raises TrajectoryError: no posture reaches the start: where and by how far.
+    `turn_costs` (3,): as `InverseKinematics.costs`; `stands` (n,): where the joints stand: 0.1 is added for each radian
+    of the joint that has farthest to go. Raises TrajectoryError: no posture reaches the start: where and by how far.
     """
     starts = reaching_postures(robot, path.positions[0], path.rotations[0], turn_costs, pose_in_words(path, 0))
     total = _costs_of_movements(robot, path, starts, np.zeros((len(starts), 3)), turn_costs)

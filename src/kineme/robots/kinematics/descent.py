@@ -42,16 +42,8 @@ def descend(
     A step minimizes ``|p - p*|^2 + |c log(R' R*)|^2 + (0.0001 |q - rest|)^2`` to first order, as those of
     `InverseKinematics` do; joints that come to a stop stay there, and the others do their part.
 
-    Parameters
-    ----------
-    robot : Robot
-    joints : ndarray of shape (m, n)
-        Where to start.
-    positions, rotations : ndarray of shape (m, 3) and (m, 3, 3), or one for all
-        The poses.
-    turn_costs : ndarray of shape (3,)
-        c, of turning about x, y, z of the tip [1/rad], besides 1 per meter.
-    n_steps : int
+    `joints` (m, n): where to start; `positions`, `rotations` (m, 3) and (m, 3, 3): the poses; `turn_costs` (3,): c, of
+    turning about x, y, z of the tip [1/rad], besides 1 per meter.
     """
     q = np.array(joints, dtype=float)
     weights = np.concatenate((np.ones(3), turn_costs))
@@ -74,14 +66,8 @@ def step_within(
 
     Joints that would pass a limit stop there, and the others are solved again.
 
-    Parameters
-    ----------
-    slopes : ndarray of shape (m, 6, n)
-        A
-    error : ndarray of shape (m, 6)
-    costs : drift of shape (m, n), pull and damping of shape (m,)
-    range_left : two ndarrays of shape (m, n)
-        The least and the largest change x.
+    `slopes` (m, 6, n): A; `error` (m, 6); `costs`: drift (m, n), pull and damping (m,); `range_left`, two of (m, n):
+    the least and the largest change x.
     """
     drift, pull, damping = costs
     diagonal = (pull + damping)[:, None, None] * np.eye(drift.shape[1])

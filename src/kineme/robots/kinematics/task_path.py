@@ -38,16 +38,11 @@ def task_path(
 ) -> TaskPath:
     """Positions of two or three dimensions, and orientations, as poses.
 
-    Parameters
-    ----------
-    times : ndarray of shape (T,)
-    positions : ndarray of shape (T, 2) or (T, 3)
-    orientation : array_like of shape (4,) or (T, 4)
-        Unit quaternion w, x, y, z of the tip, one for all samples or one for each.
-    plane : {"xy", "xz", "yz"}
-        Where the two axes of a two-dimensional movement lie.
-    through : array_like of shape (3,), optional
-        A point of that plane; the origin if it is not given.
+    - `times` (T,).
+    - `positions` (T, 2) or (T, 3).
+    - `orientation` (4,) or (T, 4): unit quaternion w, x, y, z of the tip, one for all samples or one for each.
+    - `plane` ({"xy", "xz", "yz"}): where the two axes of a two-dimensional movement lie.
+    - `through` (3,): a point of that plane; the origin if it is not given.
 
     Raises TrajectoryError: positions of another number of dimensions; an orientation of another shape, or not of norm
     1; SpecificationError: an unknown plane.

@@ -56,27 +56,16 @@ def generate_at(  # noqa: PLR0913 - one parameter per option
 ) -> GeneratedMovement:
     """Generate a movement with start and goal in the frame of a robot.
 
-    Parameters
-    ----------
-    learned : Learned
-    at, goal : array_like of shape (3,), optional
-        Start and goal of the tip [m]; of the joints, with as many numbers as they are. By default as demonstrated; a
-        goal is then that from the demonstrated start.
-    duration : float, optional
-        [s]
-    displacement : array_like of shape (n,), optional
-        Goal minus start, in the unit of the recording, instead of a goal.
-    scale : float, optional
-        Meters (of the joints radians) for one unit of the recording, as 0.001 for millimeters; by default as the heads
-        of its columns say, and where they do not, 1.
-    rate : float, default 100
-        Samples per second, at least.
-    joints : Robot, optional
-        It is a movement of the joints of this arm; without, one of the tip.
-    joint_units : {"deg", "rad", "percent"}, optional
-        Of columns of joints that say no unit; see `move`.
-    plane : {"xy", "xz", "yz"}
-        Where the axes of a movement of two dimensions lie.
+    - `at`, `goal` (3,): start and goal of the tip [m]; of the joints, with as many numbers as they are. By default as
+      demonstrated; a goal is then that from the demonstrated start.
+    - `duration`: [s].
+    - `displacement` (n,): goal minus start, in the unit of the recording, instead of a goal.
+    - `scale`: meters (of the joints radians) for one unit of the recording, as 0.001 for millimeters; by default as the
+      heads of its columns say, and where they do not, 1.
+    - `rate`: samples per second, at least.
+    - `joints`: it is a movement of the joints of this arm; without, one of the tip.
+    - `joint_units` ({"deg", "rad", "percent"}, optional): of columns of joints that say no unit; see `move`.
+    - `plane` ({"xy", "xz", "yz"}): where the axes of a movement of two dimensions lie.
 
     Raises TrajectoryError: a movement of the tip without two or three positions; SpecificationError: a start or goal of
     another number of coordinates; of a movement of two dimensions, a goal in another plane.
