@@ -53,9 +53,9 @@ def _ending_near_its_start(x: np.ndarray) -> np.ndarray:
     return x - u**2 * (x[-1] - x[0] - 1.0)
 
 
-def _learn(formulation: str, demos: kineme.Demonstrations) -> kineme.Primitives:
+def _learn(formulation: str, demos: kineme.Demonstrations) -> kineme.dmp.Primitives:
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", kineme.DegenerateMovementWarning)
+        warnings.simplefilter("ignore", kineme.errors.DegenerateMovementWarning)
         return kineme.DMP(formulation).learn(demos)
 
 
@@ -116,7 +116,7 @@ def adapting() -> Figure:
     left.set(title="(a) conditioned on a position", xlabel="share of the duration", ylabel="y [mm]", xlim=(0, 1))
 
     heights = np.array([0.1, 0.2, 0.35, 0.5])
-    model = kineme.Contextual().fit([lifted(height) for height in heights], parameters=heights)
+    model = kineme.dmp.Contextual().fit([lifted(height) for height in heights], parameters=heights)
     between = model.primitive(np.linspace(0.1, 0.5, 9)).rollout().positions
     middle.plot(*between.transpose(2, 1, 0), color=ORANGE, linewidth=1)
     middle.plot(
@@ -141,7 +141,7 @@ def lifted(height: float) -> np.ndarray:
     return np.column_stack((u, height * np.sin(np.pi * u) ** 2))
 
 
-def wall(rollout: kineme.Rollout) -> np.ndarray:
+def wall(rollout: kineme.dmp.Rollout) -> np.ndarray:
     """Depth inside of a wall, and a little for acceleration."""
     x, y = rollout.positions[:, :, 0], rollout.positions[:, :, 1]
     inside = np.where(np.abs(x - 0.5) < 0.08, np.maximum(0.33 - y, 0.0), 0.0)

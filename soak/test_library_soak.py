@@ -13,7 +13,8 @@ import pytest
 from library_crashes import BATCH, check_what_is_left, draw_batch, kill_while_learning
 from library_samples import contents, draw_movements
 
-from kineme import ActionLibrary, DataError
+from kineme import ActionLibrary
+from kineme.errors import DataError
 from kineme.library.storage.connection import FILE
 
 KILLS, KILLS_OF_ONE_LIBRARY = 100, 10

@@ -129,7 +129,7 @@ def _limit_memory(beyond):
 
 
 def _answer(call):
-    from kineme import KinemeError
+    from kineme.errors import KinemeError
 
     (module, _, name), arguments = call[0].partition(":"), call[1]
     try:

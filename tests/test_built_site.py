@@ -72,7 +72,7 @@ QUESTIONS = {
     "recognize while it is made": "tutorials/recognize-live",
     "load_lasa": "reference/generated/kineme.load_lasa",
     "kineme annotate": "reference/generated/kineme-annotate",
-    "Primitives.rollout": "reference/generated/kineme.Primitives",
+    "Primitives.rollout": "reference/generated/kineme.dmp.Primitives",
     "Recognizer": "reference/generated/kineme.Recognizer",
 }
 #: Error messages with what stood in them -> how the entry of the page of messages begins.

@@ -11,7 +11,8 @@ import warnings
 import numpy as np
 import pytest
 
-from kineme import DMP, ActionLibrary, DataError, Trajectory
+from kineme import DMP, ActionLibrary, Trajectory
+from kineme.errors import DataError
 from kineme.kernels import Laplacian
 from kineme.library.storage import safety
 from kineme.runtime import compiled, forks, parallel

@@ -19,5 +19,5 @@ def test_every_name_is_explained():
 
 def test_what_a_stream_is_and_says_has_public_names():
     for stream in (kineme.Recognizer.stream, kineme.ActionLibrary.stream):
-        assert stream.__annotations__["return"] in kineme.__all__
-    assert kineme.Live.update.__annotations__["return"] in kineme.__all__
+        assert stream.__annotations__["return"] in kineme.recognition.__all__
+    assert kineme.recognition.Live.update.__annotations__["return"] in kineme.recognition.__all__

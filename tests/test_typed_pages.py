@@ -27,13 +27,13 @@ import numpy as np
 
 demos = kineme.load_lasa()
 movement: kineme.Trajectory = demos[0]
-primitives: kineme.Primitives = kineme.DMP().learn(demos)
-rollout: kineme.Rollout = primitives.rollout(goal=np.zeros(2))
-cut: kineme.Segmentation = kineme.segment(movement)
-read: kineme.Recordings = kineme.read_recordings("recordings/")
+primitives: kineme.dmp.Primitives = kineme.DMP().learn(demos)
+rollout: kineme.dmp.Rollout = primitives.rollout(goal=np.zeros(2))
+cut: kineme.movements.Segmentation = kineme.segment(movement)
+read: kineme.io.Recordings = kineme.read_recordings("recordings/")
 recognizer = kineme.Recognizer().fit(read)
-answer: kineme.Answer = recognizer.recognize(movement)
-answers: list[kineme.Answer] = recognizer.recognize(demos)
+answer: kineme.recognition.Answer = recognizer.recognize(movement)
+answers: list[kineme.recognition.Answer] = recognizer.recognize(demos)
 for held in (demos, read, cut, rollout):
     many: kineme.Demonstrations = kineme.Demonstrations.of(held)
 for array in (movement.positions, [movement.positions], [[0.0, 1.0, 2.0, 4.0]]):
@@ -50,8 +50,8 @@ with kineme.ActionLibrary("actions", create=True) as library:
     library.learn(read)
     reveal_type(library.recognize(movement))
 chosen: kineme.DMP = kineme.DMP().choose(demos).dmp
-between: kineme.Primitives = kineme.Contextual().fit(demos, parameters=np.arange(7.0)).primitive(0.5)
-better: kineme.Improvement = kineme.improve(primitives[:1], lambda rollout: rollout.positions[:, -1, 0])
+between: kineme.dmp.Primitives = kineme.dmp.Contextual().fit(demos, parameters=np.arange(7.0)).primitive(0.5)
+better: kineme.dmp.Improvement = kineme.improve(primitives[:1], lambda rollout: rollout.positions[:, -1, 0])
 passing: kineme.styles.AveragePrimitive = kineme.styles.average(primitives).condition(t=0.5, position=[0.0, 1.0])
 reveal_type(recognizer.spot(movement))
 reveal_type(recognizer.stream().update(0.0, [0.0, 0.0]))

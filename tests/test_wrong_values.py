@@ -18,10 +18,8 @@ import kineme
 from kineme import (
     DMP,
     ActionLibrary,
-    Contextual,
     Demonstrations,
     DMPFeatures,
-    KinemeError,
     Recognizer,
     Resample,
     RhythmicDMP,
@@ -31,8 +29,10 @@ from kineme import (
     TrimRest,
     kernels,
 )
+from kineme.dmp import Contextual
 from kineme.dmp.control.options import ObstacleAvoidance
-from kineme.features.random_binning import RandomBinning
+from kineme.errors import KinemeError
+from kineme.kernels.random_binning import RandomBinning
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.recognition.early.hypotheses import Early
 from kineme.similarity.representation import Representation
@@ -141,7 +141,7 @@ def _average():
 
 def _condition(**wish):
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", kineme.ExtrapolationWarning)
+        warnings.simplefilter("ignore", kineme.errors.ExtrapolationWarning)
         made = _average().condition(**({"t": 0.5, "position": [1.0, 2.0]} | wish))
     _finite(made.primitive.rollout().positions, made.factor, made.deviation())
 

@@ -45,7 +45,7 @@ def pages() -> Iterator[tuple[str, str]]:
 def _page(sections: dict[tuple[str, ...], dict[str, None]]) -> Iterator[str]:
     yield "# Error messages\n"
     yield "What kineme may answer, from its code: what was expected, what came instead and, where it is not plain,"
-    yield "what to do. … stands for what differs. Each is a `kineme.KinemeError`, or one of Python's own.\n"
+    yield "what to do. … stands for what differs. Each is a `kineme.errors.KinemeError`, or one of Python's own.\n"
     for (title, *read), messages in sections.items():
         if messages:
             yield f"## {title}\n\nRead {', '.join(f'[](../../{page})' for page in read)}.\n"

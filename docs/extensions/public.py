@@ -46,10 +46,12 @@ class Public(NamedTuple):
 
 
 def _listed(module: ModuleType) -> list[Public]:
-    stub = Path(str(module.__file__)).with_suffix(".pyi").read_text(encoding="utf-8")
+    stub = Path(str(module.__file__)).with_suffix(".pyi")
+    if not stub.exists():
+        return [Public(module.__name__, name, module.__name__, "Classes") for name in module.__all__]
     return [
         Public(module.__name__, name, home, title)
-        for title, lines in re.findall(r"^# ([^\n]+)\n((?:from .*\n)+)", stub, re.MULTILINE)
+        for title, lines in re.findall(r"^# ([^\n]+)\n((?:from .*\n)+)", stub.read_text(encoding="utf-8"), re.MULTILINE)
         for name, (home, _) in names_in(lines).items()
     ]
 

@@ -16,7 +16,7 @@ u = np.linspace(0, 1, 100)
 demo = np.column_stack((u, 0.1 * np.sin(np.pi * u) ** 2))
 
 
-def cost(rollout: kineme.Rollout) -> np.ndarray:
+def cost(rollout: kineme.dmp.Rollout) -> np.ndarray:
     """Depth inside of the wall [m], and a little for acceleration, for each variant."""
     x, y = rollout.positions[:, :, 0], rollout.positions[:, :, 1]
     inside = np.where(np.abs(x - 0.5) < 0.08, np.maximum(0.33 - y, 0.0), 0.0)

@@ -14,14 +14,14 @@ import kineme
 u = np.linspace(0, 1, 100)
 heights = np.array([0.1, 0.2, 0.35, 0.5])
 demos = [kineme.Trajectory((1 + h) * u, np.column_stack((u, h * np.sin(np.pi * u) ** 2))) for h in heights]
-task = kineme.Contextual().fit(demos, parameters=heights)
+task = kineme.dmp.Contextual().fit(demos, parameters=heights)
 print(f"{task.smoother_}, error at a height left out: {1000 * task.leave_one_out_error_:.1f} mm")
 
 # %%
 # Asked for a height outside of those shown, it refuses, and says how far outside.
 try:
     task.primitive(0.8)
-except kineme.KinemeError as error:
+except kineme.errors.KinemeError as error:
     print(error)
 
 # %%

@@ -29,7 +29,7 @@ names = [
 demos = kineme.load_lasa(names)
 primitives = kineme.DMP().learn(demos)
 prototypes = [anchoring.prototype(primitives[demos.labels == name]).primitive for name in names]
-prototypes = kineme.Primitives.concatenate(prototypes)
+prototypes = kineme.dmp.Primitives.concatenate(prototypes)
 space = anchoring.conceptual_space(names, prototypes.rollout())
 
 # %%

@@ -14,7 +14,9 @@ from kineme import anchoring
 
 names = ["Angle", "heee", "Khamesh", "Leaf_1", "Sharpc", "Snake", "Trapezoid", "Worm"]
 demos = kineme.load_lasa(names)
-varied = kineme.Perturbation(shift=1.0, scale=1.0, rotation=np.radians(20), warp=0.35, noise=0.005).apply(demos, 0)
+varied = kineme.movements.Perturbation(shift=1.0, scale=1.0, rotation=np.radians(20), warp=0.35, noise=0.005).apply(
+    demos, 0
+)
 unlabeled = kineme.Demonstrations.from_arrays([movement.positions for movement in varied])
 
 proposals = anchoring.propose(unlabeled)

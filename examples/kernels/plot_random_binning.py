@@ -23,7 +23,7 @@ exact = kernel(rows) / kernel.m
 figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3.4))
 size = {}
 for n_shifts, color in ((1, "0.75"), (4, "C4"), (32, "C0")):
-    Z = kineme.RandomBinning(m=kernel.m, n_shifts=n_shifts).fit_transform(rows)
+    Z = kineme.kernels.RandomBinning(m=kernel.m, n_shifts=n_shifts).fit_transform(rows)
     product = (Z @ Z.T).toarray() / kernel.m
     left.plot(exact.ravel()[::17], product.ravel()[::17], ".", color=color, markersize=2, label=f"{n_shifts} grids")
     size[n_shifts] = Z.nnz / len(rows)

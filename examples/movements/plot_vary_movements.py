@@ -2,8 +2,8 @@
 The same movement elsewhere, larger, turned, hurried
 ====================================================
 
-How much does a method bear? `kineme.Perturbation` changes movements in ways that keep what they are, by amounts that
-you choose, and the same seed gives the same movements.
+How much does a method bear? `kineme.movements.Perturbation` changes movements in ways that keep what they are, by
+amounts that you choose, and the same seed gives the same movements.
 """
 
 import matplotlib.pyplot as plt
@@ -13,12 +13,12 @@ import kineme
 
 demo = kineme.load_lasa(["BendedLine"])[:1]
 kinds = {
-    "translation": kineme.Perturbation(shift=0.6),
-    "size": kineme.Perturbation(scale=1.0),
-    "rotation": kineme.Perturbation(rotation=np.pi / 3),
-    "timing": kineme.Perturbation(warp=0.8),
-    "noise": kineme.Perturbation(noise=0.006),
-    "all of them": kineme.Perturbation(0.6, 1.0, np.pi / 3, 0.8, 0.006),
+    "translation": kineme.movements.Perturbation(shift=0.6),
+    "size": kineme.movements.Perturbation(scale=1.0),
+    "rotation": kineme.movements.Perturbation(rotation=np.pi / 3),
+    "timing": kineme.movements.Perturbation(warp=0.8),
+    "noise": kineme.movements.Perturbation(noise=0.006),
+    "all of them": kineme.movements.Perturbation(0.6, 1.0, np.pi / 3, 0.8, 0.006),
 }
 
 # %%

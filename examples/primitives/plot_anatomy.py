@@ -35,7 +35,7 @@ middle.set(title="weighted, they add up to the forcing term", xlabel="time / dur
 middle.legend()
 right.plot(u, demo[0].positions[np.linspace(0, 999, 200).astype(int), 1], color="0.8", linewidth=6, label="shown")
 right.plot(u, primitive.rollout().positions[0, :, 1], label="moved again")
-alone = kineme.Primitives(**{**vars(primitive), "scaled_weights": 0 * primitive.scaled_weights})
+alone = kineme.dmp.Primitives(**{**vars(primitive), "scaled_weights": 0 * primitive.scaled_weights})
 right.plot(u, alone.rollout(velocity=[0, 0]).positions[0, :, 1], "--", label="spring alone")
 right.set(title="which bends the way to the goal", xlabel="time / duration", ylabel="y [mm]")
 right.legend()

@@ -14,7 +14,9 @@ import kineme
 demos = kineme.load_lasa()
 recognizer = kineme.Recognizer().fit(demos[::7])
 others = demos[np.arange(len(demos)) % 7 == 3]
-varied = kineme.Perturbation(shift=2.0, scale=1.0, rotation=np.radians(20), warp=0.35, noise=0.01).apply(others, 1)
+varied = kineme.movements.Perturbation(shift=2.0, scale=1.0, rotation=np.radians(20), warp=0.35, noise=0.01).apply(
+    others, 1
+)
 answers = recognizer.predict(varied)
 print(f"{np.mean(answers == others.labels):.0%} of {len(varied)} recognized")
 

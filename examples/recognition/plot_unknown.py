@@ -13,7 +13,7 @@ import kineme
 
 demos = kineme.load_lasa()
 known, strange = demos[:91], demos[91:]
-varied = kineme.Perturbation(rotation=np.radians(20), warp=0.35, noise=0.01)
+varied = kineme.movements.Perturbation(rotation=np.radians(20), warp=0.35, noise=0.01)
 train = np.arange(91) % 7 < 5  # five demonstrations of each known shape
 recognizer = kineme.Recognizer().fit(varied.apply(known[train], 0))
 

@@ -14,8 +14,9 @@ import numpy as np
 from scipy.interpolate import BPoly
 
 from bench.rows import Row
-from kineme import DMP, Rollout, Trajectory, load_lasa
+from kineme import DMP, Trajectory, load_lasa
 from kineme.datasets.lasa import LASA_26
+from kineme.dmp import Rollout
 from kineme.errors import TrajectoryError
 from kineme.robots import JointTrajectory, Robot, load, move
 from kineme.robots.execution.timing import Torques

@@ -10,8 +10,8 @@ import numpy as np
 import kineme
 from bench.movements import SEED, Array
 from bench.rows import Row
-from kineme.features.random_binning import RandomBinning
 from kineme.kernels import TruncatedEuclidean
+from kineme.kernels.random_binning import RandomBinning
 
 N_SAMPLES, N_TEST, PASSES = 20, 5_000, 3
 NOISE = 0.5  # of the spread of each number over the recordings: hard enough to tell sizes of training sets apart

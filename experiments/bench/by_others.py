@@ -29,7 +29,9 @@ def measure(quick: bool) -> list[Row]:
     for turned, movements in (("as recorded", gestures), ("turned about the vertical", _turned(gestures))):
         for shots in (1, 4):
             for known, prior in (("vertical not given", None), ("vertical given", VERTICAL)):
-                found = _accuracy(movements, shots, 2 * draws, rotation_prior=kineme.RotationPrior(vertical=prior))
+                found = _accuracy(
+                    movements, shots, 2 * draws, rotation_prior=kineme.recognition.RotationPrior(vertical=prior)
+                )
                 rows.append(Row(f"{turned}, {known}, {shots} by others", "of 1", found))
     return rows
 

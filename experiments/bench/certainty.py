@@ -30,7 +30,7 @@ ALIKE = ("V", "I")
 class Answered(NamedTuple):
     """An answer, what is right, and whether that is of a known kind."""
 
-    answer: kineme.Answer
+    answer: kineme.recognition.Answer
     label: str
     is_known: bool
 

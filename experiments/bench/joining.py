@@ -10,8 +10,9 @@ import numpy as np
 
 from bench.movements import Array
 from bench.rows import Row
-from kineme import DMP, Primitives, Rollout, couple, join, load_lasa
+from kineme import DMP, couple, join, load_lasa
 from kineme.datasets.lasa import LASA_30
+from kineme.dmp import Primitives, Rollout
 from kineme.dmp.condition import condition
 from kineme.dmp.discrete.operators import decoder, smoothness_factor
 

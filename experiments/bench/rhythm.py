@@ -11,7 +11,8 @@ from sklearn.neighbors import KNeighborsClassifier
 
 from bench.rhythm_data import load_basic_motions, load_clip, period_of, repeated
 from bench.rows import Row
-from kineme import DataError, Demonstrations, DMPFeatures, RhythmicDMP, RhythmicFeatures
+from kineme import Demonstrations, DMPFeatures, RhythmicDMP, RhythmicFeatures
+from kineme.errors import DataError
 
 SEED = 7
 SPEC = RhythmicDMP()

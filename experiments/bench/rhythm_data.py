@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from kineme import DataError, Demonstrations, Trajectory
+from kineme import Demonstrations, Trajectory
+from kineme.errors import DataError
 
 # A frame: its duration, the root's position and quaternion, then the joints; (w, x, y, z), or one angle of a hinge.
 _JOINTS = {"chest": 8, "neck": 12, "right hip": 16, "right knee": 20, "right ankle": 21, "right shoulder": 25}

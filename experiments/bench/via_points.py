@@ -19,11 +19,13 @@ import numpy as np
 
 from bench.movements import Array
 from bench.rows import Row
-from kineme import DMP, ExtrapolationWarning, Primitives, Rollout, load_lasa
+from kineme import DMP, load_lasa
 from kineme.datasets.lasa import LASA_30
+from kineme.dmp import Primitives, Rollout
 from kineme.dmp.condition import condition
 from kineme.dmp.discrete.modulate import SLACK, changes
 from kineme.dmp.discrete.operators import decoder, decoder_at, smoothness_factor, trajectory_columns
+from kineme.errors import ExtrapolationWarning
 
 DEMONSTRATIONS = 7  # of each set
 STEPS = 480  # of a path, so that even times of 1, 3 and 5 points are among its samples

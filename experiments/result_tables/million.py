@@ -74,6 +74,7 @@ def _svm() -> str:
     found = figures("binning")
     seconds, accuracy, exact = (found[what] for what in _SVM)
     return (
-        f"A linear SVM on `kineme.RandomBinning` features of a million movements trains in {seconds:.0f} s, with "
-        f"accuracy {accuracy:.3f}; a kernel SVM of 4,000 movements has {exact:.3f} (`python -m bench --only binning`)."
+        f"A linear SVM on `kineme.kernels.RandomBinning` features of a million movements trains in {seconds:.0f} s, "
+        f"with accuracy {accuracy:.3f}; a kernel SVM of 4,000 movements has {exact:.3f} "
+        "(`python -m bench --only binning`)."
     )

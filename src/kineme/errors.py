@@ -11,11 +11,21 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
+__all__ = [
+    "DataError",
+    "DegenerateMovementError",
+    "DegenerateMovementWarning",
+    "ExtrapolationWarning",
+    "KinemeError",
+    "SpecificationError",
+    "TrajectoryError",
+]
+
 _HEARD: ContextVar[list[str] | None] = ContextVar("kineme_heard", default=None)
 
 
 class KinemeError(Exception):
-    """Base class: ``except kineme.KinemeError`` catches all of them."""
+    """Base class: ``except kineme.errors.KinemeError`` catches all of them."""
 
 
 class TrajectoryError(KinemeError, ValueError):

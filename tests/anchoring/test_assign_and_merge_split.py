@@ -139,11 +139,13 @@ def test_many_members_speak_through_some(monkeypatch):
 
 def test_what_cannot_be_compared():
     demos = draw_kinds([4, 4])
-    with pytest.raises(kineme.SpecificationError, match=r"one label for each of the 8 movements, got shape \(2,\)"):
+    with pytest.raises(
+        kineme.errors.SpecificationError, match=r"one label for each of the 8 movements, got shape \(2,\)"
+    ):
         suggest_merges(demos, ["a", "b"])
-    with pytest.raises(kineme.SpecificationError, match="expected least to be a number above 0, got 0"):
+    with pytest.raises(kineme.errors.SpecificationError, match="expected least to be a number above 0, got 0"):
         suggest_merges(demos, demos.labels, least=0)
     with pytest.raises(
-        kineme.SpecificationError, match="expected min_members to be a whole number of at least 2, got 1"
+        kineme.errors.SpecificationError, match="expected min_members to be a whole number of at least 2, got 1"
     ):
         assign(demos, demos, min_members=1)

@@ -91,11 +91,11 @@ def test_what_is_higher_than_wide_stands_upright():
 def test_pictures_of_other_movements():
     demos = draw_kinds([5, 4])
     proposals = propose(demos)
-    with pytest.raises(kineme.SpecificationError, match="at least 5, got 3"):
+    with pytest.raises(kineme.errors.SpecificationError, match="at least 5, got 3"):
         draw_proposal(demos[:3], proposals[0])
-    with pytest.raises(kineme.SpecificationError, match=r"expected the 9 movements .* got 8"):
+    with pytest.raises(kineme.errors.SpecificationError, match=r"expected the 9 movements .* got 8"):
         draw_proposals(demos[:8], proposals)
-    with pytest.raises(kineme.SpecificationError, match="expected 2 prototypes, one per symbol, got 3"):
+    with pytest.raises(kineme.errors.SpecificationError, match="expected 2 prototypes, one per symbol, got 3"):
         draw_map(conceptual_space("ab", demos[:2]), demos[:3])
 
 

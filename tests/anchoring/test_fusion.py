@@ -8,9 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sklearn.metrics import adjusted_rand_score
 
-from kineme import Demonstrations, TrajectoryError
+from kineme import Demonstrations
 from kineme.anchoring.clustering import NEIGHBORS, components, count_by_eigengap, fuse, set_apart, spectral
 from kineme.anchoring.unlabeled import by_shape, link_people, propose
+from kineme.errors import TrajectoryError
 from kineme.similarity.describe import describe
 from kineme.similarity.described import squared_distances
 from kineme.similarity.representation import ROW_REPRESENTATIONS

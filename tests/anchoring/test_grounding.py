@@ -112,7 +112,7 @@ def test_too_few_or_equal_demonstrations_have_no_style():
     assert ground(WAVE, primitives)["styles"] is None
     assert ground(WAVE, primitives[[0, 0, 0, 0]])["styles"] is None
     with pytest.raises(
-        kineme.SpecificationError, match=r"expected no style, since the 2 demonstrations of 'wave'.*got \[0.0\]"
+        kineme.errors.SpecificationError, match=r"expected no style, since the 2 demonstrations of 'wave'.*got \[0.0\]"
     ):
         primitive_from(ground(WAVE, primitives), [0.0])
 
@@ -122,7 +122,7 @@ def test_units_of_each_dimension():
     assert ground(WAVE, primitives)["units"] == {"position": None, "time": "s"}
     assert ground(WAVE, primitives, units="mm")["units"]["position"] == ["mm", "mm"]
     assert ground(WAVE, primitives, units=["m", "rad"])["units"]["position"] == ["m", "rad"]
-    with pytest.raises(kineme.TrajectoryError, match=r"a unit for each of 2 dimensions, got 1: \['m'\]"):
+    with pytest.raises(kineme.errors.TrajectoryError, match=r"a unit for each of 2 dimensions, got 1: \['m'\]"):
         ground(WAVE, primitives, units=["m"])
 
 
@@ -149,17 +149,19 @@ def test_preprocessing_travels_along():
 def test_what_is_no_grounding(spoil, message):
     grounding = _read_back(ground(WAVE, _learn(3)))
     spoil(grounding)
-    with pytest.raises(kineme.DataError, match=message):
+    with pytest.raises(kineme.errors.DataError, match=message):
         primitive_from(grounding)
 
 
 def test_what_cannot_be_grounded():
     primitives = _learn(3)
-    with pytest.raises(kineme.TrajectoryError, match="at least one demonstration of 'wave', got none"):
+    with pytest.raises(kineme.errors.TrajectoryError, match="at least one demonstration of 'wave', got none"):
         ground(WAVE, primitives[[]])
-    with pytest.raises(kineme.SpecificationError, match=r"expected by to be one of \['medoid', 'mean'\], got 'best'"):
+    with pytest.raises(
+        kineme.errors.SpecificationError, match=r"expected by to be one of \['medoid', 'mean'\], got 'best'"
+    ):
         ground(WAVE, primitives, by="best")
-    with pytest.raises(kineme.DataError, match=r"expected a grounding, a mapping .* got 'list'"):
+    with pytest.raises(kineme.errors.DataError, match=r"expected a grounding, a mapping .* got 'list'"):
         primitive_from([])
 
 

@@ -188,19 +188,23 @@ def test_widths_without_labels_are_near_those_with_labels():
     ],
 )  # fmt: skip
 def test_parameters_out_of_range(wrong, message):
-    with pytest.raises(kineme.SpecificationError, match=message):
+    with pytest.raises(kineme.errors.SpecificationError, match=message):
         propose(draw_kinds([4, 4, 4]), **wrong)
 
 
 def test_movements_that_cannot_be_told_apart():
     demos = draw_kinds([4, 4])
-    with pytest.raises(kineme.SpecificationError, match=r"expected at least 3 movements .* got 2"):
+    with pytest.raises(kineme.errors.SpecificationError, match=r"expected at least 3 movements .* got 2"):
         propose(demos[:2])
-    with pytest.raises(kineme.SpecificationError, match="got copies of one movement"):
+    with pytest.raises(kineme.errors.SpecificationError, match="got copies of one movement"):
         propose(demos[[0, 0, 0, 0]])
-    with pytest.raises(kineme.SpecificationError, match=r"expected widths to be 5 numbers above 0.* got \[1.0, -1.0\]"):
+    with pytest.raises(
+        kineme.errors.SpecificationError, match=r"expected widths to be 5 numbers above 0.* got \[1.0, -1.0\]"
+    ):
         similarities(demos, widths=[1.0, -1.0])
-    with pytest.raises(kineme.TrajectoryError, match=r"expected feature rows of shape \(n, 400\).* got shape \(8, 5\)"):
+    with pytest.raises(
+        kineme.errors.TrajectoryError, match=r"expected feature rows of shape \(n, 400\).* got shape \(8, 5\)"
+    ):
         describe_rows(np.zeros((8, 5)), 2)
     with pytest.raises(IndexError, match="one of 2 proposals, got 2"):
         propose(demos)[2]

@@ -73,13 +73,13 @@ def test_betweenness_on_a_line():
 def test_questions_that_have_no_answer():
     demos = draw_kinds([1, 1, 1])
     space = conceptual_space("abc", demos)
-    with pytest.raises(kineme.SpecificationError, match=r"one of the symbols \['a', 'b', 'c'\], got 'z'"):
+    with pytest.raises(kineme.errors.SpecificationError, match=r"one of the symbols \['a', 'b', 'c'\], got 'z'"):
         space.nearest("z")
-    with pytest.raises(kineme.SpecificationError, match="expected two different symbols, got 'a' twice"):
+    with pytest.raises(kineme.errors.SpecificationError, match="expected two different symbols, got 'a' twice"):
         space.between("a", "a")
-    with pytest.raises(kineme.SpecificationError, match="expected eps to be a number of at least 0, got -1"):
+    with pytest.raises(kineme.errors.SpecificationError, match="expected eps to be a number of at least 0, got -1"):
         space.between("a", "b", eps=-1)
-    with pytest.raises(kineme.SpecificationError, match="got 3 prototypes for 3 symbols, 2 of them different"):
+    with pytest.raises(kineme.errors.SpecificationError, match="got 3 prototypes for 3 symbols, 2 of them different"):
         conceptual_space("aba", demos)
 
 

@@ -145,7 +145,7 @@ def test_a_quaternion_that_is_no_rotation_stays_none_in_a_joined_recording(tmp_p
     q = turned(t).as_quat()
     q[20] *= 0.5
     table(tmp_path / "one" / "Orientation.csv", ["qx", "qy", "qz", "qw"], t, q.tolist())
-    with pytest.raises(kineme.DataError, match=r"the first that is none: one: expected unit quaternions"):
+    with pytest.raises(kineme.errors.DataError, match=r"the first that is none: one: expected unit quaternions"):
         kineme.read_recordings(tmp_path, join_files=True)
     read = kineme.read_recordings(tmp_path, join_files=True, skip="sample")
     assert len(read) == 1
@@ -168,7 +168,7 @@ def test_files_that_last_elsewhere_are_problems_and_files_alone_stay_as_they_are
 def test_columns_and_kinds_of_a_joined_recording_are_chosen_by_their_names(folder):
     read = kineme.read_recordings(folder, join_files=True, kinds={"Accelerometer.z": "discrete"})
     assert read.demonstrations.channels[0].kind == "discrete"
-    with pytest.raises(kineme.KinemeError):
+    with pytest.raises(kineme.errors.KinemeError):
         kineme.read_recordings(folder, join_files=True, kinds={"Barometer.z": "discrete"})
 
 
@@ -185,7 +185,7 @@ def test_columns_of_a_joined_recording_are_those_that_are_chosen_or_known(folder
     assert left == ["Accelerometer.z", "Accelerometer.y", "Accelerometer.x", "Gyroscope.y", "Gyroscope.x"]
     alone = kineme.read_recordings(folder / "nod", join_files=True, columns="Accelerometer.x").demonstrations
     assert len(alone.times) == len(clock(100, 0.05, 2))  # no file without chosen columns crops it
-    with pytest.raises(kineme.DataError, match=r"expected columns like 'Barometer.\*'"):
+    with pytest.raises(kineme.errors.DataError, match=r"expected columns like 'Barometer.\*'"):
         columns(folder, columns="Barometer.*")
     alone = tmp_path / "alone" / "nod.csv"
     table(alone, ["x", "y", "z"], clock(50, 0, 2), spatial(clock(50, 0, 2)).tolist())

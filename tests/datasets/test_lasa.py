@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from kineme import DataError, KinemeError, SpecificationError, TrajectoryError, load_lasa
+from kineme import load_lasa
 from kineme.datasets import LASA_26, PAPER_LETTERS, lasa
+from kineme.errors import DataError, KinemeError, SpecificationError, TrajectoryError
 
 
 @pytest.fixture

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kineme import SpecificationError
 from kineme.dmp.condition import condition
+from kineme.errors import SpecificationError
 
 
 @pytest.mark.parametrize("deviation", [0.0, 0.3, np.array([0.0, 0.1, 2.0])])

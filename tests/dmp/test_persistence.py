@@ -84,7 +84,7 @@ def test_a_file_of_another_kind_is_refused(tmp_path, kind, other):
     if kind == other:
         assert len(cls.load(path)) == 3
         return
-    with pytest.raises(kineme.DataError, match=rf"x to hold {kind}, got '{other}'"):
+    with pytest.raises(kineme.errors.DataError, match=rf"x to hold {kind}, got '{other}'"):
         cls.load(path)
 
 
@@ -94,7 +94,7 @@ def test_a_truncated_file_is_refused(tmp_path, kind, kept):
     primitives = KINDS[kind]()
     path = primitives.save(tmp_path / "x")
     path.write_bytes(path.read_bytes()[: int(kept * path.stat().st_size)])
-    with pytest.raises(kineme.DataError, match="truncated"):
+    with pytest.raises(kineme.errors.DataError, match="truncated"):
         type(primitives).load(path)
 
 
@@ -132,7 +132,7 @@ def test_contents_that_do_not_fit_are_refused(tmp_path, kind, change, words):
     primitives = KINDS[kind]()
     path = primitives.save(tmp_path / "x")
     _rewrite(path, **change)
-    with pytest.raises(kineme.DataError, match=rf"x to hold complete {kind}, got .*{words}"):
+    with pytest.raises(kineme.errors.DataError, match=rf"x to hold complete {kind}, got .*{words}"):
         type(primitives).load(path)
 
 
@@ -140,7 +140,7 @@ def test_poses_need_three_or_six_dimensions(tmp_path):
     path = poses(n_basis=12).save(tmp_path / "x")
     flat = {name: np.zeros((3, 2)) for name in ("starts", "goals", "velocities", "extents")}
     _rewrite(path, scaled_weights=np.zeros((3, 2, 12)), **flat)
-    with pytest.raises(kineme.DataError, match="3 or 6 dimensions, have 2"):
+    with pytest.raises(kineme.errors.DataError, match="3 or 6 dimensions, have 2"):
         PosePrimitives.load(path)
 
 
@@ -154,26 +154,28 @@ def test_concatenation_undoes_a_split(kind):
 @every_kind
 def test_batches_of_different_specifications_do_not_mix(kind):
     a, b = KINDS[kind](n_basis=12), KINDS[kind](n_basis=13)
-    with pytest.raises(kineme.SpecificationError, match=r"batch 1: expected n_basis=12 as in batch 0, got 13; .*again"):
+    with pytest.raises(
+        kineme.errors.SpecificationError, match=r"batch 1: expected n_basis=12 as in batch 0, got 13; .*again"
+    ):
         type(a).concatenate([a, b])
 
 
 @every_kind
 def test_only_batches_of_the_same_kind_can_be_concatenated(kind):
     a = KINDS[kind]()
-    with pytest.raises(kineme.TrajectoryError, match=rf"{type(a).__name__}, got str"):
+    with pytest.raises(kineme.errors.TrajectoryError, match=rf"{type(a).__name__}, got str"):
         type(a).concatenate([a, "b"])
-    with pytest.raises(kineme.TrajectoryError, match="got none"):
+    with pytest.raises(kineme.errors.TrajectoryError, match="got none"):
         type(a).concatenate([])
 
 
 def test_labels_and_dimensions_must_agree_to_be_concatenated():
     a = kineme.DMP().learn(kineme.Demonstrations.from_arrays(np.arange(40.0).reshape(1, 20, 2) ** 2, ["a"]))
     b = kineme.DMP().learn(np.arange(40.0).reshape(1, 20, 2) ** 2)
-    with pytest.raises(kineme.TrajectoryError, match="labels on every batch or on none, got them on 1 of 2"):
-        kineme.Primitives.concatenate([a, b])
-    with pytest.raises(kineme.TrajectoryError, match="batch 1: expected 2 dimensions as in batch 0, got 1"):
-        kineme.Primitives.concatenate([b, kineme.DMP().learn([np.arange(20.0) ** 2])])
+    with pytest.raises(kineme.errors.TrajectoryError, match="labels on every batch or on none, got them on 1 of 2"):
+        kineme.dmp.Primitives.concatenate([a, b])
+    with pytest.raises(kineme.errors.TrajectoryError, match="batch 1: expected 2 dimensions as in batch 0, got 1"):
+        kineme.dmp.Primitives.concatenate([b, kineme.DMP().learn([np.arange(20.0) ** 2])])
 
 
 def test_labels_must_be_of_one_type_to_be_concatenated():
@@ -181,9 +183,9 @@ def test_labels_must_be_of_one_type_to_be_concatenated():
         kineme.DMP().learn(kineme.Demonstrations.from_arrays(np.arange(40.0).reshape(1, 20, 2) ** 2, [label]))
         for label in ("a", 1)
     )
-    with pytest.raises(kineme.TrajectoryError, match="labels of one type, got texts, int64"):
-        kineme.Primitives.concatenate([a, b])
-    assert len(kineme.Primitives.concatenate(one for one in (a, a))) == 2
+    with pytest.raises(kineme.errors.TrajectoryError, match="labels of one type, got texts, int64"):
+        kineme.dmp.Primitives.concatenate([a, b])
+    assert len(kineme.dmp.Primitives.concatenate(one for one in (a, a))) == 2
 
 
 @every_kind

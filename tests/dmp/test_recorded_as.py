@@ -135,7 +135,7 @@ def test_several_orientations_step_as_they_roll_out():
 def test_an_orientation_learned_as_its_rotation_has_channels_and_no_way_back(tmp_path):
     primitives = kineme.DMP().learn(recordings(TWO_HANDS))
     assert primitives.channels == TWO_HANDS
-    assert kineme.Primitives.load(primitives.save(tmp_path / "x.kineme")).channels == TWO_HANDS
+    assert kineme.dmp.Primitives.load(primitives.save(tmp_path / "x.kineme")).channels == TWO_HANDS
     assert primitives.rollout().channels == TWO_HANDS
     assert primitives.rollout().demonstrations.channels is None
 
@@ -163,10 +163,10 @@ def test_rhythms_keep_names(tmp_path):
 
 def test_batches_of_other_channels_lose_them():
     a, b = learned("plain")[0], kineme.DMP().learn(recordings((PLAIN[1], PLAIN[0], GRIPPER)))
-    with pytest.raises(kineme.TrajectoryError, match="their order differs"):
-        kineme.Primitives.concatenate([a, b])
+    with pytest.raises(kineme.errors.TrajectoryError, match="their order differs"):
+        kineme.dmp.Primitives.concatenate([a, b])
     others = tuple(Channel(name, "position", (name,)) for name in ("hip", "knee"))
-    assert kineme.Primitives.concatenate([a, kineme.DMP().learn(recordings((*others, GRIPPER)))]).channels is None
+    assert kineme.dmp.Primitives.concatenate([a, kineme.DMP().learn(recordings((*others, GRIPPER)))]).channels is None
 
 
 def test_files_of_before_channels_are_read():
@@ -192,8 +192,8 @@ def test_steps_that_are_none_are_refused(tmp_path, name, spoil):
         arrays = dict(archive)
     arrays[name] = spoil(arrays[name])
     np.savez(path, **arrays)
-    with pytest.raises(kineme.DataError, match=name):
-        kineme.Primitives.load(path)
+    with pytest.raises(kineme.errors.DataError, match=name):
+        kineme.dmp.Primitives.load(path)
 
 
 def test_what_is_made_of_primitives_knows_what_was_recorded():
@@ -208,7 +208,7 @@ def test_what_is_made_of_primitives_knows_what_was_recorded():
         average.sample(3, seed=0),
         average.condition(t=0.5, position=point).primitive,
         average.blend(average, 0.5).primitive,
-        kineme.Contextual().fit(primitives, parameters=np.arange(5.0)).primitive([0.5, 1.5]),
+        kineme.dmp.Contextual().fit(primitives, parameters=np.arange(5.0)).primitive([0.5, 1.5]),
         better.primitive,
     )
     for one in made:
@@ -240,7 +240,7 @@ def test_a_join_keeps_the_gripper_of_each_part():
 def test_a_batch_of_which_some_steps_are_unknown_has_none():
     primitives = kineme.DMP().learn(recordings(PLAIN, 4))
     average = kineme.styles.average(primitives).primitive
-    some = kineme.Primitives.concatenate([average, primitives])
+    some = kineme.dmp.Primitives.concatenate([average, primitives])
     assert some.channels == PLAIN
     assert some.to_recording is None
     assert len(some.rollout().positions) == 5

@@ -194,15 +194,17 @@ def test_a_picture_is_drawn_into_axes_of_ones_own(make_movement, d):
     legend = right.get_legend()
     assert [text.get_text() for text in legend.get_texts()] == ["start", "end"] if d > 1 else legend is None
     right.figure.savefig(io.BytesIO())
-    with pytest.raises(kineme.SpecificationError, match=rf"expected ax with .* for {d} dimensions, got projection"):
+    with pytest.raises(
+        kineme.errors.SpecificationError, match=rf"expected ax with .* for {d} dimensions, got projection"
+    ):
         rollout.plot(wrong)
 
 
 def test_axes_that_cannot_hold_a_picture_are_refused(make_movement):
     rollout = kineme.DMP(n_basis=10).learn([make_movement(1, 4)[1]]).rollout()
-    with pytest.raises(kineme.SpecificationError, match="at most 3 dimensions for one ax, got 4; leave ax out"):
+    with pytest.raises(kineme.errors.SpecificationError, match="at most 3 dimensions for one ax, got 4; leave ax out"):
         rollout.plot(Figure().subplots())
-    with pytest.raises(kineme.SpecificationError, match="expected ax to be an Axes of matplotlib, got Figure"):
+    with pytest.raises(kineme.errors.SpecificationError, match="expected ax to be an Axes of matplotlib, got Figure"):
         rollout.plot(Figure())
 
 
@@ -232,7 +234,9 @@ def test_a_table_without_labels_has_none(monkeypatch):
 
 def test_a_table_needs_pandas(rollout, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(kineme.DataError, match="expected the package pandas for a data frame; pip install pandas"):
+    with pytest.raises(
+        kineme.errors.DataError, match="expected the package pandas for a data frame; pip install pandas"
+    ):
         rollout.to_pandas()
 
 

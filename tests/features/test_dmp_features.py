@@ -12,17 +12,8 @@ from sklearn.model_selection import GridSearchCV, cross_val_score
 from sklearn.neighbors import KNeighborsClassifier
 from sklearn.pipeline import Pipeline, make_pipeline
 
-from kineme import (
-    DMP,
-    DegenerateMovementError,
-    Demonstrations,
-    DMPFeatures,
-    KinemeError,
-    Smooth,
-    SpecificationError,
-    TrajectoryError,
-    TrimRest,
-)
+from kineme import DMP, Demonstrations, DMPFeatures, Smooth, TrimRest
+from kineme.errors import DegenerateMovementError, KinemeError, SpecificationError, TrajectoryError
 
 FEATURES = ("shape-attractor", "forcing", "weights")
 

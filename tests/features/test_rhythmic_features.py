@@ -9,7 +9,8 @@ from sklearn.model_selection import cross_val_score
 from sklearn.neighbors import KNeighborsClassifier
 from sklearn.pipeline import make_pipeline
 
-from kineme import Demonstrations, RhythmicDMP, RhythmicFeatures, Trajectory, TrajectoryError
+from kineme import Demonstrations, RhythmicDMP, RhythmicFeatures, Trajectory
+from kineme.errors import TrajectoryError
 
 
 def _circle_or_eight(kind, rng):

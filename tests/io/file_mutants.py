@@ -210,7 +210,11 @@ def _saved(cls):
         return learned.save(Path(folder) / "saved").read_bytes()
 
 
-_SAVED = {"primitives.kineme": kineme.Primitives, "rhythm.kineme": RhythmicPrimitives, "poses.kineme": PosePrimitives}
+_SAVED = {
+    "primitives.kineme": kineme.dmp.Primitives,
+    "rhythm.kineme": RhythmicPrimitives,
+    "poses.kineme": PosePrimitives,
+}
 
 
 @functools.cache
@@ -461,7 +465,7 @@ def _read_lerobot(folder, data):
     n = check_recordings(kineme.read_recordings(folder))
     target = folder.parent / "copy"
     target.mkdir()
-    with contextlib.suppress(kineme.KinemeError):
+    with contextlib.suppress(kineme.errors.KinemeError):
         copy_with_motions(folder, target, {0: [Motion(0.0, OWN + "}")]})
         check_recordings(kineme.read_recordings(target))
     return n

@@ -305,7 +305,7 @@ def test_without_texts_it_is_a_plain_copy(tmp_path, kind):
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_topic_of_that_name_is_not_mixed_with_ours(tmp_path, kind):
     once = copied(recorded(tmp_path, kind), tmp_path / ("a.bag" if kind == "ros1" else "a"))
-    with pytest.raises(kineme.DataError, match="without the topic /kineme/annotations, got one that has it"):
+    with pytest.raises(kineme.errors.DataError, match="without the topic /kineme/annotations, got one that has it"):
         copied(once, tmp_path / f"b{once.suffix}")
 
 
@@ -322,7 +322,7 @@ def test_files_that_are_compressed_as_a_whole_are_refused(tmp_path):
     about = whole["rosbag2_bagfile_information"]
     about |= {"compression_mode": "file", "compression_format": "zstd", "relative_file_paths": ["run.mcap.zstd"]}
     yaml.dump(whole, source / "metadata.yaml")
-    with pytest.raises(kineme.DataError, match=r"not compressed as a whole.*ros2 bag convert"):
+    with pytest.raises(kineme.errors.DataError, match=r"not compressed as a whole.*ros2 bag convert"):
         copied(source, tmp_path / "b")
 
 
@@ -353,6 +353,9 @@ def test_a_damaged_bag_is_copied_or_refused_by_name(tmp_path, kind):
         damaged.write_bytes(spoiled.tobytes())
         try:
             copied(damaged, tmp_path / f"{k}{file.suffix}")
-        except (kineme.DataError, MemoryError):  # rosbags believes any length; readers of files answer for memory
+        except (
+            kineme.errors.DataError,
+            MemoryError,
+        ):  # rosbags believes any length; readers of files answer for memory
             refused += 1
     assert refused

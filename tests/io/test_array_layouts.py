@@ -76,7 +76,7 @@ def _saved(folder, kind):
 def test_joints_over_time_are_no_movements_of_joints(tmp_path, kind):
     path = _saved(tmp_path, kind)
     with pytest.raises(
-        kineme.DataError, match=r"shape \(40, 7, 3\), which may be one .* say every=40 if it is, every=7 if"
+        kineme.errors.DataError, match=r"shape \(40, 7, 3\), which may be one .* say every=40 if it is, every=7 if"
     ):
         read_recordings(path, units=0.02)
     (one,) = read_recordings(path, units=0.02, every=40).demonstrations
@@ -163,7 +163,7 @@ def test_dates_and_durations_keep_their_unit():
     ],
 )
 def test_arrays_that_do_not_fit_together(arrays, words):
-    with pytest.raises(kineme.DataError, match=words):
+    with pytest.raises(kineme.errors.DataError, match=words):
         read(arrays)
 
 
@@ -179,7 +179,7 @@ def test_a_bad_movement_among_arrays_costs_itself_alone():
 
 @pytest.mark.parametrize("shape", [(9, 6, 40), (6, 40)])
 def test_arrays_of_more_dimensions_than_samples_say_which_axis_to_move(shape):
-    with pytest.raises(kineme.DataError, match=r"got shape \(6, 40\), .* save np.moveaxis\(array, 1, 2\)"):
+    with pytest.raises(kineme.errors.DataError, match=r"got shape \(6, 40\), .* save np.moveaxis\(array, 1, 2\)"):
         read({"positions_0": np.ones(shape)} if len(shape) == 2 else {"positions": np.ones(shape)})
     right = np.cumsum(np.ones((9, 6, 40)), axis=1)
     assert read({"positions": right}, units=0.02).demonstrations.lengths.tolist() == [6] * 9
@@ -200,7 +200,7 @@ def test_json_knows_the_same_layouts(tmp_path):
 
 
 def test_json_nested_without_end_is_a_problem():
-    with pytest.raises(kineme.DataError, match=r"a\.json: expected times and positions, got lists within lists"):
+    with pytest.raises(kineme.errors.DataError, match=r"a\.json: expected times and positions, got lists within lists"):
         read_recordings_from_bytes(b"[" * 10**6, "a.json", Layout())
 
 
@@ -214,12 +214,12 @@ def test_json_nested_without_end_is_a_problem():
     ],
 )
 def test_entries_of_json_that_are_no_numbers_are_named(positions, words):
-    with pytest.raises(kineme.KinemeError, match=words):
+    with pytest.raises(kineme.errors.KinemeError, match=words):
         read_recordings_from_bytes(b'{"times": [0, 1, 2, 3], "positions": %s}' % positions.encode(), "a.json", Layout())
 
 
 def test_a_reason_is_one_line():
-    with pytest.raises(kineme.DataError, match=r"got no entry 'positions' but \['a b', 'c\\nd'\]$") as caught:
+    with pytest.raises(kineme.errors.DataError, match=r"got no entry 'positions' but \['a b', 'c\\nd'\]$") as caught:
         read_recordings_from_bytes(b'{"a b": 1, "c\\nd": 2}', "a.json", Layout())
     assert "\n" not in str(caught.value)
 
@@ -258,10 +258,10 @@ def test_demos_of_any_number_labeled_by_the_file_or_by_the_name_in_it(tmp_path, 
     ],
 )
 def test_other_matlab_files_are_refused(tmp_path, content, words):
-    with pytest.raises(kineme.DataError, match=words):
+    with pytest.raises(kineme.errors.DataError, match=words):
         read_recordings(matlab(tmp_path / "a.mat", content))
 
 
 def test_newer_matlab_files_are_named():
-    with pytest.raises(kineme.DataError, match=r"7\.2 or earlier, got 7\.3; save it with -v7"):
+    with pytest.raises(kineme.errors.DataError, match=r"7\.2 or earlier, got 7\.3; save it with -v7"):
         read_recordings_from_bytes(b"MATLAB 7.3 MAT-file" + b" " * 200, "a.mat", Layout())

@@ -195,7 +195,7 @@ def test_bytes_that_are_cut_off_are_refused():
         data = compress(bytes(range(200)) * 50)
         assert expand(name, data, 10_000) == bytes(range(200)) * 50
         assert expand(name, data + data, 20_000) == bytes(range(200)) * 100
-        with pytest.raises(kineme.DataError, match="cut off"):
+        with pytest.raises(kineme.errors.DataError, match="cut off"):
             expand(name, data[:-9], 10_000)
-        with pytest.raises(kineme.DataError, match="expands to 9,999 bytes, got one that expands to more"):
+        with pytest.raises(kineme.errors.DataError, match="expands to 9,999 bytes, got one that expands to more"):
             expand(name, data, 9_999)

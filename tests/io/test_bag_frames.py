@@ -118,7 +118,7 @@ def test_frames_and_topics_are_put_side_by_side(tmp_path):
     np.testing.assert_allclose(movement.recorded[:, :7], base, atol=1e-12)
     np.testing.assert_allclose(movement.recorded[:, 14], range(60), atol=1e-6)
     with pytest.raises(
-        kineme.DataError, match=r"got /joints .*, /tf .*; the pose of one frame .* --frame parent:child"
+        kineme.errors.DataError, match=r"got /joints .*, /tf .*; the pose of one frame .* --frame parent:child"
     ):
         read_recordings(path)
 
@@ -130,7 +130,7 @@ def test_frames_that_are_not_there_or_not_connected_are_listed(tmp_path):
     path = write_bag(tmp_path, "mcap", messages)
 
     def refused(frame, message):
-        with pytest.raises(kineme.DataError, match=re.escape(message)):
+        with pytest.raises(kineme.errors.DataError, match=re.escape(message)):
             read_recordings(path, frame=frame)
 
     refused("world:hnd", "expected a frame 'hnd' (did you mean hand?), got the frames ['base', 'camera', 'cup', 'hand'")
@@ -173,7 +173,9 @@ def test_rotations_that_are_none_and_other_parents_are_named(tmp_path):
     ]
     rows[:, 3:] = 0.0
     messages = [tf(m, ns, ("world", "hand", row)) for ns, row in zip(stamps(), rows, strict=True)]
-    with pytest.raises(kineme.DataError, match=r"transform world:hand: expected rotations of norm 1, got 0 in 50"):
+    with pytest.raises(
+        kineme.errors.DataError, match=r"transform world:hand: expected rotations of norm 1, got 0 in 50"
+    ):
         read_recordings(write_bag(tmp_path, "mcap", messages, "none"), frame="world:hand")
 
 
@@ -181,13 +183,15 @@ def test_transforms_that_share_no_time_are_named(tmp_path):
     m, rows = Maker("mcap"), pose_rows()
     messages = [tf(m, ns, ("a", "b", row)) for ns, row in zip(stamps(), rows, strict=True)]
     messages += [tf(m, ns + 9 * SECOND, ("b", "c", row)) for ns, row in zip(stamps(), rows, strict=True)]
-    with pytest.raises(kineme.DataError, match=r"frames a:c: expected transforms that are known at the same time"):
+    with pytest.raises(
+        kineme.errors.DataError, match=r"frames a:c: expected transforms that are known at the same time"
+    ):
         read_recordings(write_bag(tmp_path, "mcap", messages), frame="a:c")
 
 
 def test_a_bag_without_transforms_is_named(tmp_path):
     path = write_bag(tmp_path, "mcap", [("/chat", START, Maker("mcap").string("x"))])
-    with pytest.raises(kineme.DataError, match=r"expected a topic of transforms, such as /tf, got none"):
+    with pytest.raises(kineme.errors.DataError, match=r"expected a topic of transforms, such as /tf, got none"):
         read_recordings(path, frame="a:b")
 
 

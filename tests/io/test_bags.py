@@ -133,10 +133,10 @@ def test_several_topics_are_put_side_by_side_at_the_stamps_of_the_first(tmp_path
     assert how.columns == ("g", "a")
     assert problems == ["10 samples of /grip before /arm begins or after it ends"]
     with pytest.raises(
-        kineme.DataError, match=r"got /arm \(sensor_msgs/msg/JointState, 40 messages\), /grip .*--topic /a"
+        kineme.errors.DataError, match=r"got /arm \(sensor_msgs/msg/JointState, 40 messages\), /grip .*--topic /a"
     ):
         read_recordings(path)
-    with pytest.raises(kineme.DataError, match=r"topic '/gripp' \(did you mean /grip\?\)"):
+    with pytest.raises(kineme.errors.DataError, match=r"topic '/gripp' \(did you mean /grip\?\)"):
         read_recordings(path, topic="/gripp")
 
 
@@ -181,9 +181,9 @@ def test_columns_of_stamps_and_joints_are_chosen_by_name(tmp_path):
     _, how, _ = only(path, columns=["id", "time"], time="recorded")
     assert (how.columns, how.time, how.units_from) == (("id", "time"), "recorded", "as asked for")
     assert how.ignored == ("label", "index_0")
-    with pytest.raises(kineme.DataError, match="expected a column 'x', got the columns"):
+    with pytest.raises(kineme.errors.DataError, match="expected a column 'x', got the columns"):
         read_recordings(path, columns="x")
-    with pytest.raises(kineme.DataError, match="expected movements that are told apart by messages"):
+    with pytest.raises(kineme.errors.DataError, match="expected movements that are told apart by messages"):
         read_recordings(path, label="label")
 
 
@@ -261,7 +261,7 @@ def test_a_quaternion_that_is_none_costs_the_movement_or_its_sample(tmp_path):
         tmp_path, "mcap", [("/p", ns, m.pose_stamped(ns, r)) for ns, r in zip(stamps(), rows, strict=True)]
     )
     said = r"topic /p: expected orientations of norm 1, got the norm 0 in message 7; 1 more like this"
-    with pytest.raises(kineme.DataError, match=rf"{said}; to keep the others, say skip='sample'"):
+    with pytest.raises(kineme.errors.DataError, match=rf"{said}; to keep the others, say skip='sample'"):
         read_recordings(path)
     movement, _, problems = only(path, skip="sample")
     np.testing.assert_array_equal(movement.recorded, np.delete(rows, [7, 9], axis=0))
@@ -271,24 +271,30 @@ def test_a_quaternion_that_is_none_costs_the_movement_or_its_sample(tmp_path):
         np.testing.assert_array_equal(movement.recorded, rows[:, :3])
         assert problems == []
     for columns in (["position", "orientation"], ["position.x", "orientation.w"], [0, 1]):
-        with pytest.raises(kineme.DataError, match=said):
+        with pytest.raises(kineme.errors.DataError, match=said):
             read_recordings(path, columns=columns)
 
 
 def test_a_topic_of_another_type_is_named(tmp_path):
     m = Maker("mcap")
     path = write_bag(tmp_path, "mcap", [("/chat", START + k, m.string("x")) for k in range(5)])
-    with pytest.raises(kineme.DataError, match=r"a topic of movements, got /chat \(std_msgs/msg/String, 5 messages\)"):
+    with pytest.raises(
+        kineme.errors.DataError, match=r"a topic of movements, got /chat \(std_msgs/msg/String, 5 messages\)"
+    ):
         read_recordings(path)
-    with pytest.raises(kineme.DataError, match=r"/chat: expected numbers in messages of std_msgs/msg/String, got none"):
+    with pytest.raises(
+        kineme.errors.DataError, match=r"/chat: expected numbers in messages of std_msgs/msg/String, got none"
+    ):
         read_recordings(path, topic="/chat")
 
 
 def test_an_empty_topic_is_named(tmp_path):
     path = write_bag(tmp_path, "mcap", [("/joints", "sensor_msgs/msg/JointState", None)])
-    with pytest.raises(kineme.DataError, match=r"topic /joints: expected samples of .*JointState, got no messages"):
+    with pytest.raises(
+        kineme.errors.DataError, match=r"topic /joints: expected samples of .*JointState, got no messages"
+    ):
         read_recordings(path, topic="/joints")
-    with pytest.raises(kineme.DataError, match=r"got /joints \(sensor_msgs/msg/JointState, 0 messages\)"):
+    with pytest.raises(kineme.errors.DataError, match=r"got /joints \(sensor_msgs/msg/JointState, 0 messages\)"):
         read_recordings(path)
 
 
@@ -300,7 +306,9 @@ def test_the_limit_is_on_the_numbers_that_are_kept(tmp_path, monkeypatch):
     monkeypatch.setenv(VARIABLE, "100000")
     assert len(read_recordings(path)) == 1
     many = [("/joints", START + k, m.joint_state(START + k, list("abc"), [k] * 3)) for k in range(2**14)]
-    with pytest.raises(kineme.DataError, match=f"a topic that takes at most 100,000 bytes of memory.*{VARIABLE}"):
+    with pytest.raises(
+        kineme.errors.DataError, match=f"a topic that takes at most 100,000 bytes of memory.*{VARIABLE}"
+    ):
         read_recordings(write_bag(tmp_path, "mcap", many, "many"))
 
 
@@ -309,5 +317,5 @@ def test_without_rosbags_the_error_names_the_extra(tmp_path, monkeypatch):
 
     path = write_bag(tmp_path, "mcap", [("/chat", START, Maker("mcap").string("x"))])
     monkeypatch.setitem(sys.modules, "rosbags.rosbag1", None)
-    with pytest.raises(kineme.DataError, match=r"expected the package rosbags .*; pip install 'kineme\[ros\]'"):
+    with pytest.raises(kineme.errors.DataError, match=r"expected the package rosbags .*; pip install 'kineme\[ros\]'"):
         read_recordings(path)

@@ -153,5 +153,5 @@ def test_a_bag_of_ros_1_that_was_cut_off(bag, tmp_path):
     path = tmp_path / "cut.bag"
     at = data.index(b"index_pos=") + len(b"index_pos=")
     path.write_bytes(data[:at] + bytes(8) + data[at + 8 : len(data) // 2])
-    with pytest.raises(kineme.DataError, match=r"cut\.bag: expected .* not indexed.*; .* run rosbag reindex"):
+    with pytest.raises(kineme.errors.DataError, match=r"cut\.bag: expected .* not indexed.*; .* run rosbag reindex"):
         read_recordings(path)

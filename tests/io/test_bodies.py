@@ -76,7 +76,9 @@ def test_parts_of_a_pose_are_joined_in_the_order_of_the_joints(save):
 
 def test_a_pose_without_a_rate_needs_the_step_and_a_given_step_wins(save):
     path = save(poses=walk(72), betas=np.zeros(10), trans=walk(3))
-    with pytest.raises(kineme.DataError, match=r"expected the rate of poses beside it, .* say the seconds between two"):
+    with pytest.raises(
+        kineme.errors.DataError, match=r"expected the rate of poses beside it, .* say the seconds between two"
+    ):
         kineme.read_recordings(path)
     assert kineme.read_recordings(path, units=0.5).demonstrations.durations == pytest.approx([(N - 1) * 0.5])
     path = save(poses=walk(72), fps=30)
@@ -110,14 +112,14 @@ def test_positions_of_mujoco_begin_with_the_pose_of_a_free_root_and_split_points
     arm = np.hstack((walk(3), 0.95 * turn, walk(2)))  # nine joints, by chance nearly a quaternion among them
     assert kineme.read_recordings(save(qpos=arm, fps=50)).demonstrations.dimensions[:2] == ("qpos.0", "qpos.1")
     for cuts in ([1, 20, N], [0, 20, N - 1], [0, 30, 20, N]):
-        with pytest.raises(kineme.DataError, match="expected split_points that rise from 0 to 60"):
+        with pytest.raises(kineme.errors.DataError, match="expected split_points that rise from 0 to 60"):
             kineme.read_recordings(save(qpos=qpos, frequency=100.0, split_points=cuts))
 
 
 def test_a_quaternion_of_a_root_that_does_not_say_its_order_is_not_guessed(save):
     turn = Rotation.from_rotvec(walk(3)).as_quat()
     path = save(fps=30, root_pos=walk(3), root_rot=turn, dof_pos=walk(2))
-    with pytest.raises(kineme.SpecificationError, match="its scalar w, got numbers; say kinds="):
+    with pytest.raises(kineme.errors.SpecificationError, match="its scalar w, got numbers; say kinds="):
         kineme.read_recordings(path)
     read = kineme.read_recordings(path, kinds={"root_rot": "xyzw"})
     got = Rotation.from_quat(read.demonstrations.recorded[:, 3:7]).as_matrix()

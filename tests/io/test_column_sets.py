@@ -173,7 +173,9 @@ def test_data_frames_of_several_units_are_converted_with_a_warning():
 
 def test_one_column_in_two_units_is_refused_and_kinds_are_said_by_the_heads_of_the_file(tmp_path):
     table(tmp_path / "twice.csv", ["x_mm", "y_mm", "x_m"], PATH)
-    with pytest.raises(kineme.DataError, match=r"got \['x_mm', 'x_m'\], which are one in several units.*--exclude"):
+    with pytest.raises(
+        kineme.errors.DataError, match=r"got \['x_mm', 'x_m'\], which are one in several units.*--exclude"
+    ):
         kineme.read_recordings(tmp_path)
     recordings = kineme.read_recordings(tmp_path, exclude="x_mm")
     assert recordings.demonstrations.dimensions == ("y_mm", "x [mm]")

@@ -72,7 +72,7 @@ def test_dates_that_are_not_understood_are_no_names_before_the_times():
     for stamp in ("01/05/2024 10:00:01.000", "5.1.2024 9:00", "10:00:01.000 ->"):
         text = "\n".join(f"{stamp},{u},{np.sin(u)}" for u in U)
         with pytest.raises(
-            kineme.DataError, match=r"expected times such as .* in the first column, got .* write them so"
+            kineme.errors.DataError, match=r"expected times such as .* in the first column, got .* write them so"
         ):
             read_recordings_from_bytes(text.encode(), "a.csv", Layout())
     text = "\n".join(f"arm2,{u},{np.sin(u)}" for u in U)
@@ -98,5 +98,5 @@ def test_a_number_within_reach_of_the_others_is_a_value(tmp_path, reach):
 
 def test_long_stretches_of_such_a_number_are_refused_as_gaps(tmp_path):
     lost = np.where((U > 0.2) & (U < 0.8), -9999, np.sin(U))
-    with pytest.raises(kineme.KinemeError, match=r"got nothing in .*--fill-gaps"):
+    with pytest.raises(kineme.errors.KinemeError, match=r"got nothing in .*--fill-gaps"):
         kineme.read_recordings(_written(tmp_path / "a.csv", ["y"], {"x": lost}))

@@ -59,7 +59,7 @@ def test_damage_on_the_way_costs_the_movement_or_what_comes_after(tmp_path, kind
     data[at : at + 3000] = b"\xff" * 3000
     file.write_bytes(data)
     with pytest.raises(
-        kineme.DataError, match=r"run(\.bag)?: topic /joints: .*; to keep the others, say skip='sample'"
+        kineme.errors.DataError, match=r"run(\.bag)?: topic /joints: .*; to keep the others, say skip='sample'"
     ):
         read_recordings(path)
     read = read_recordings(path, skip="sample")
@@ -78,12 +78,16 @@ def test_messages_that_are_none_are_counted(tmp_path, kind):
         messages.append(("/joints", ns, message))
     messages.append(("/odd", START, m.joint_state(START, ["a", "b"], [1])))
     path = write_bag(tmp_path, kind, messages)
-    with pytest.raises(kineme.DataError, match=r"topic /joints: message 7: .*; 1 more like this; to keep the others"):
+    with pytest.raises(
+        kineme.errors.DataError, match=r"topic /joints: message 7: .*; 1 more like this; to keep the others"
+    ):
         read_recordings(path, topic="/joints")
     read = read_recordings(path, skip="sample", topic="/joints")
     assert read.demonstrations.lengths.tolist() == [48]
     assert read.problems[0].reason.startswith("topic /joints: message 7: ")
-    with pytest.raises(kineme.DataError, match=r"topic /odd: message 0: expected a position for each joint, got 2"):
+    with pytest.raises(
+        kineme.errors.DataError, match=r"topic /odd: message 0: expected a position for each joint, got 2"
+    ):
         read_recordings(path, topic="/odd")
 
 
@@ -109,7 +113,7 @@ def test_huge_sparse_files_are_refused_at_once(tmp_path, ending, first):
     with path.open("wb") as file:
         file.write(magic[ending] if first == "magic" else first)
         file.truncate(10 * 2**30)
-    with pytest.raises(kineme.DataError, match=rf"run\{ending}: expected"):
+    with pytest.raises(kineme.errors.DataError, match=rf"run\{ending}: expected"):
         read_recordings(path)
 
 
@@ -123,7 +127,9 @@ def test_a_sparse_mcap_that_ends_as_one_is_refused_at_once(tmp_path):
         file.truncate(10 * 2**30)
         file.seek(0, os.SEEK_END)
         file.write(b"\x02\x14" + bytes(7 + 20) + data[-8:])
-    with pytest.raises(kineme.DataError, match=r"sparse\.mcap: expected a record of MCAP at byte \d+, got zeros"):
+    with pytest.raises(
+        kineme.errors.DataError, match=r"sparse\.mcap: expected a record of MCAP at byte \d+, got zeros"
+    ):
         read_recordings(path)
 
 
@@ -160,7 +166,7 @@ def test_file_names_in_metadata_that_are_paths_lead_nowhere(tmp_path):
     (path / "metadata.yaml").write_text(text.replace("run.mcap", "../secret.mcap"))
     (path / "beside.mcap").write_bytes(b"")
     assert secret.exists()
-    with pytest.raises(kineme.DataError, match="Some database files are missing"):
+    with pytest.raises(kineme.errors.DataError, match="Some database files are missing"):
         read_recordings(path)
 
 
@@ -205,7 +211,9 @@ def test_another_version_of_a_type_is_refused(tmp_path):
     md5 = b"3066dcd76a6cfaef579bd0f34173e9fd"
     assert data.count(md5) == 2
     path.write_bytes(data.replace(md5, b"0" * 32))
-    with pytest.raises(kineme.DataError, match=r"topic /joints: expected messages of the standard type .*JointState"):
+    with pytest.raises(
+        kineme.errors.DataError, match=r"topic /joints: expected messages of the standard type .*JointState"
+    ):
         read_recordings(path)
 
 
@@ -233,13 +241,15 @@ def test_a_damaged_transform_topic_is_named(tmp_path):
     m = Maker("mcap")
     messages = [("/tf", START + k * SECOND, ("tf2_msgs/msg/TFMessage", b"\0\1\0\0\xff\xff")) for k in range(4)]
     path = write_bag(tmp_path, "mcap", messages)
-    with pytest.raises(kineme.DataError, match=r"expected a frame 'a', got .*"):
+    with pytest.raises(kineme.errors.DataError, match=r"expected a frame 'a', got .*"):
         read_recordings(path, frame="a:b")
     messages += [
         ("/tf", s, m.tf(m.transform_stamped(s, "a", "b", r))) for s, r in zip(stamps(), pose_rows(), strict=True)
     ]
     path = write_bag(tmp_path, "mcap", messages, "some")
-    with pytest.raises(kineme.DataError, match=r"topic /tf: message \d+: .*; 3 more like this; to keep the others"):
+    with pytest.raises(
+        kineme.errors.DataError, match=r"topic /tf: message \d+: .*; 3 more like this; to keep the others"
+    ):
         read_recordings(path, frame="a:b")
     read = read_recordings(path, frame="a:b", skip="sample")
     assert read.demonstrations.lengths.tolist() == [50]
@@ -249,7 +259,9 @@ def test_a_damaged_transform_topic_is_named(tmp_path):
 def test_a_cut_file_of_a_folder_is_named(tmp_path):
     path = a_bag(tmp_path, "mcap")
     file_of(path).write_bytes(file_of(path).read_bytes()[:-100])
-    with pytest.raises(kineme.DataError, match=r"run: run\.mcap: expected an MCAP file that was closed.*mcap recover"):
+    with pytest.raises(
+        kineme.errors.DataError, match=r"run: run\.mcap: expected an MCAP file that was closed.*mcap recover"
+    ):
         read_recordings(path)
 
 
@@ -260,7 +272,9 @@ def test_a_chunk_of_gigabytes_that_are_zeros_is_refused_at_once(tmp_path):
     with path.open("wb") as file:
         file.write(data[:at] + struct.pack("<L", 4 * 10**9) + data[at + 4 :])
         file.truncate(10 * 2**30)
-    with pytest.raises(kineme.DataError, match=r"run\.bag: expected a bag .*, got: records that contradict each other"):
+    with pytest.raises(
+        kineme.errors.DataError, match=r"run\.bag: expected a bag .*, got: records that contradict each other"
+    ):
         read_recordings(path)
 
 
@@ -270,7 +284,7 @@ def test_stamps_of_two_clocks_are_said_with_the_way_out(tmp_path):
     messages += [("/tool", ns, m.pose_stamped(ns, row)) for ns, row in zip(stamps(), rows, strict=True)]
     path = write_bag(tmp_path, "mcap", messages)
     expected = r"got none: /sim from 0 to 0.49 s, /tool from 1700000000 to 1700000000.49 s; .* --time recorded"
-    with pytest.raises(kineme.DataError, match=expected):
+    with pytest.raises(kineme.errors.DataError, match=expected):
         read_recordings(path, topic=["/sim", "/tool"])
     (movement,) = read_recordings(path, topic=["/sim", "/tool"], time="recorded").demonstrations
     np.testing.assert_array_equal(movement.recorded[:, 0], range(50))

@@ -59,7 +59,7 @@ def test_a_data_set_given_directly_is_one_source_under_its_own_name(toy, monkeyp
     assert read.sources[0].size == sum((where / name).stat().st_size for name in ("about.json", "a.bin", "parts/b.bin"))
     monkeypatch.chdir(where)
     assert {one.path for one in read_recordings(".").sources} == {"set"}
-    with pytest.raises(kineme.DataError, match="episode 2"):
+    with pytest.raises(kineme.errors.DataError, match="episode 2"):
         read_recording(where)
 
 
@@ -85,7 +85,7 @@ def test_without_what_must_lie_beside_the_marker_it_is_a_folder_of_files(toy):
     where = toy()
     (where / "a.bin").unlink()
     assert data_set_of(where) is None
-    with pytest.raises(kineme.DataError, match=r"found none; 3 could not be read, the first about\.json"):
+    with pytest.raises(kineme.errors.DataError, match=r"found none; 3 could not be read, the first about\.json"):
         read_recordings(where)
 
 
@@ -95,7 +95,9 @@ def test_links_out_of_a_data_set_are_refused_unless_they_are_asked_for(tmp_path,
     (tmp_path / "elsewhere").write_text("b")
     (where / "parts" / "b.bin").unlink()
     (where / "parts" / "b.bin").symlink_to(tmp_path / "elsewhere")
-    with pytest.raises(kineme.DataError, match=r"set: parts/b\.bin is a link that leads out of the folder; .*--follow"):
+    with pytest.raises(
+        kineme.errors.DataError, match=r"set: parts/b\.bin is a link that leads out of the folder; .*--follow"
+    ):
         read_recordings(where)
     assert len(read_recordings(where, follow_links=True)) == 2
 

@@ -74,7 +74,7 @@ def test_the_limit_has_a_default_and_can_be_set(monkeypatch):
     assert max_file_bytes() == 12
     for wrong in ("0", "-1", "4 GiB", "", "1e9"):
         monkeypatch.setenv(VARIABLE, wrong)
-        with pytest.raises(kineme.SpecificationError, match=f"{VARIABLE} to be a whole number of bytes above 0"):
+        with pytest.raises(kineme.errors.SpecificationError, match=f"{VARIABLE} to be a whole number of bytes above 0"):
             max_file_bytes()
 
 
@@ -93,23 +93,25 @@ LARGE = {
 def test_what_expands_beyond_the_limit_is_refused_by_name(monkeypatch, name):
     monkeypatch.setenv(VARIABLE, str(2**18))
     assert len(LARGE[name]) < 2**18
-    with pytest.raises(kineme.DataError, match=rf"at most 262,144 bytes of memory, .* set .* variable {VARIABLE}"):
+    with pytest.raises(
+        kineme.errors.DataError, match=rf"at most 262,144 bytes of memory, .* set .* variable {VARIABLE}"
+    ):
         read(LARGE[name], name)
 
 
 def test_a_saved_model_has_the_same_limit(tmp_path, monkeypatch):
     path = kineme.DMP(n_basis=9).learn([np.sin(np.arange(90.0))[:, None]]).save(tmp_path / "x")
     monkeypatch.setenv(VARIABLE, "10000")
-    assert len(kineme.Primitives.load(path)) == 1
+    assert len(kineme.dmp.Primitives.load(path)) == 1
     monkeypatch.setenv(VARIABLE, str(path.stat().st_size - 1))
-    with pytest.raises(kineme.DataError, match=VARIABLE):
-        kineme.Primitives.load(path)
+    with pytest.raises(kineme.errors.DataError, match=VARIABLE):
+        kineme.dmp.Primitives.load(path)
     with zipfile.ZipFile(path) as whole:
         members = [(name, whole.read(name) + bytes(2**20)) for name in whole.namelist()]
     path.write_bytes(archive(*members))
     monkeypatch.setenv(VARIABLE, "100000")
-    with pytest.raises(kineme.DataError, match=VARIABLE):
-        kineme.Primitives.load(path)
+    with pytest.raises(kineme.errors.DataError, match=VARIABLE):
+        kineme.dmp.Primitives.load(path)
 
 
 def test_arrays_that_nobody_needs_are_not_read(monkeypatch):
@@ -155,7 +157,7 @@ ODD = {
 
 @pytest.mark.parametrize("name", ODD)
 def test_odd_archives_are_refused(name):
-    with pytest.raises(kineme.DataError, match=r"a\.npz: expected"):
+    with pytest.raises(kineme.errors.DataError, match=r"a\.npz: expected"):
         read(ODD[name])
 
 
@@ -171,7 +173,7 @@ def test_numbers_of_every_type_and_order_are_read(dtype, order):
 
 def test_texts_that_are_none_are_refused():
     labels = headed("(1,)", "'<U2'", struct.pack("<II", 0x61, 0x110000))
-    with pytest.raises(kineme.DataError, match="texts in 'labels' that are none"):
+    with pytest.raises(kineme.errors.DataError, match="texts in 'labels' that are none"):
         read(archive(("positions.npy", entry(X[None])), ("labels.npy", labels)))
 
 
@@ -179,7 +181,7 @@ def test_texts_that_are_none_are_refused():
 @pytest.mark.parametrize("offsets", [[0, 8, 4, 12], [0, 255, 12]])
 def test_offsets_that_decrease_are_refused_in_every_type(dtype, offsets):
     x = np.random.default_rng(0).normal(size=(12, 2))
-    with pytest.raises(kineme.DataError, match="whole numbers that do not decrease"):
+    with pytest.raises(kineme.errors.DataError, match="whole numbers that do not decrease"):
         read(npz(positions=x, times=np.arange(12) / 100, offsets=np.array(offsets, dtype)))
     whole = read(npz(positions=x, times=np.arange(12) / 100, offsets=np.array([0, 4, 12], dtype)))
     assert whole.demonstrations.lengths.tolist() == [4, 8]
@@ -206,21 +208,21 @@ def test_labels_of_json_are_texts_each_by_itself(labels, expected):
 
 @pytest.mark.parametrize("labels", [["a", ["b"], "c"], ["a", {"b": 1}, "c"], ["a", float("nan"), "c"]])
 def test_labels_of_json_that_are_no_names_are_refused(labels):
-    with pytest.raises(kineme.DataError, match="expected labels that are texts or numbers, got"):
+    with pytest.raises(kineme.errors.DataError, match="expected labels that are texts or numbers, got"):
         read(as_json(labels=labels), "a.json")
 
 
 def test_entries_of_json_that_occur_twice_are_refused():
     data = as_json()[:-1] + b', "positions": 1}'
-    with pytest.raises(kineme.DataError, match="expected each entry once, got 'positions' several times"):
+    with pytest.raises(kineme.errors.DataError, match="expected each entry once, got 'positions' several times"):
         read(data, "a.json")
 
 
 def test_deeply_nested_headers_of_saved_models_are_refused(tmp_path):
     for text in ("[" * 100_000, '{"format":' * 50_000, '{"format": "kineme", "version": 1, "kind": "primitives"}'):
         np.savez(tmp_path / "x.npz", header=np.frombuffer(text.encode(), np.uint8))
-        with pytest.raises(kineme.DataError, match="expected"):
-            kineme.Primitives.load(tmp_path / "x.npz")
+        with pytest.raises(kineme.errors.DataError, match="expected"):
+            kineme.dmp.Primitives.load(tmp_path / "x.npz")
 
 
 def test_the_standard_input_has_the_limit(monkeypatch):
@@ -231,7 +233,7 @@ def test_the_standard_input_has_the_limit(monkeypatch):
             return b"0" * size
 
     monkeypatch.setenv(VARIABLE, str(2**22))
-    with pytest.raises(kineme.DataError, match="expected a stream that takes at most 4,194,304 bytes"):
+    with pytest.raises(kineme.errors.DataError, match="expected a stream that takes at most 4,194,304 bytes"):
         read_limited(Endless())
     assert read_limited(io.BytesIO(b"12")) == b"12"
 
@@ -239,7 +241,7 @@ def test_the_standard_input_has_the_limit(monkeypatch):
 def test_a_limit_that_is_no_number_is_told_before_anything_is_read(tmp_path, monkeypatch):
     (tmp_path / "a.csv").write_text("t,x\n")
     monkeypatch.setenv(VARIABLE, "much")
-    with pytest.raises(kineme.SpecificationError, match=VARIABLE):
+    with pytest.raises(kineme.errors.SpecificationError, match=VARIABLE):
         read_recordings(tmp_path)
 
 
@@ -250,7 +252,9 @@ def test_stamps_out_of_range_are_refused(skip):
     found = read(f"id,t,x\n{good}{bad}".encode(), "a.csv", units="s", skip=skip)
     assert found.demonstrations.lengths.tolist() == [4]  # of the other, three samples are left at most
     assert "expected times up to 1e+50 s, got -1.5e+308 at sample 0" in found.problems[0].reason
-    with pytest.raises(kineme.TrajectoryError, match=r"trajectory 0: expected times up to 1e\+50, got -1.5e\+308"):
+    with pytest.raises(
+        kineme.errors.TrajectoryError, match=r"trajectory 0: expected times up to 1e\+50, got -1.5e\+308"
+    ):
         kineme.Demonstrations.from_arrays([np.zeros((4, 1))], times=[np.array([-1.5e308, 0, 1, 1.5e308])])
 
 
@@ -261,7 +265,7 @@ def test_dates_that_are_none_are_missing_samples(unit):
     )
     dates[0] = "NaT"
     data = npz(positions=X, times=dates)
-    with pytest.raises(kineme.DataError, match="expected finite times, got nan at sample 0"):
+    with pytest.raises(kineme.errors.DataError, match="expected finite times, got nan at sample 0"):
         read(data)
     assert read(data, skip="sample").demonstrations.lengths.tolist() == [5]
 
@@ -269,19 +273,19 @@ def test_dates_that_are_none_are_missing_samples(unit):
 @pytest.mark.parametrize("dates", [np.arange(6) * 10**17, np.arange(6) * 10**10])
 @pytest.mark.parametrize("kind", ["M", "m"])
 def test_dates_that_wrap_around_are_refused(dates, kind):
-    with pytest.raises(kineme.DataError, match="expected dates from 1678 to 2262 or durations of that size"):
+    with pytest.raises(kineme.errors.DataError, match="expected dates from 1678 to 2262 or durations of that size"):
         read(npz(positions=X, times=dates.astype(f"{kind}8[s]")))
 
 
 def test_numbers_beyond_float64_are_infinite():
-    with pytest.raises(kineme.DataError, match="expected finite positions, got"):
+    with pytest.raises(kineme.errors.DataError, match="expected finite positions, got"):
         read(npz(positions=X.astype(np.longdouble) + np.longdouble("1e4000"), times=T))
-    with pytest.raises(kineme.DataError, match="expected finite times, got inf"):
+    with pytest.raises(kineme.errors.DataError, match="expected finite times, got inf"):
         read(b"t,x\n1e308,1\n1.1e308,2\n1.2e308,3\n1.3e308,4\n", "a.csv", units=100.0)
 
 
 def test_labels_that_are_records_are_refused():
-    with pytest.raises(kineme.DataError, match="expected labels that are texts or numbers, got"):
+    with pytest.raises(kineme.errors.DataError, match="expected labels that are texts or numbers, got"):
         read(npz(positions=np.stack((X, X)), labels=np.zeros(2, [("a", "f8")])))
 
 
@@ -294,10 +298,10 @@ def test_labels_that_are_records_are_refused():
     ],
 )
 def test_files_and_arrays_have_one_range(rows, reason):
-    with pytest.raises(kineme.DataError, match=reason):
+    with pytest.raises(kineme.errors.DataError, match=reason):
         read(f"t,x\n{rows}\n".encode(), "a.csv")
     t, x = np.array([row.split(",") for row in rows.split("\n")], dtype=float).T
     with pytest.raises(
-        kineme.TrajectoryError, match=reason.partition(" at ")[0].replace(" s at", " s").removesuffix(" s")
+        kineme.errors.TrajectoryError, match=reason.partition(" at ")[0].replace(" s at", " s").removesuffix(" s")
     ):
         kineme.Demonstrations.from_arrays([x[:, None]], times=[t])

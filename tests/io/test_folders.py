@@ -129,7 +129,9 @@ def test_a_file_beyond_the_limit_costs_itself_alone(tmp_path, monkeypatch):
     assert "at most 20,000 bytes of memory, got one that takes 1,099,511,627,776" in read.problems[0].reason
     assert "set the environment variable KINEME_MAX_FILE_BYTES to more" in read.problems[0].reason
     monkeypatch.setenv("KINEME_MAX_FILE_BYTES", "a lot")
-    with pytest.raises(kineme.SpecificationError, match=r"KINEME_MAX_FILE_BYTES to be a whole number .* got 'a lot'"):
+    with pytest.raises(
+        kineme.errors.SpecificationError, match=r"KINEME_MAX_FILE_BYTES to be a whole number .* got 'a lot'"
+    ):
         read_recordings(tmp_path)
 
 
@@ -233,5 +235,5 @@ def test_progress_sees_every_file(tmp_path):
 def test_reading_a_missing_file_as_one_recording_is_the_usual_error(tmp_path):
     with pytest.raises(FileNotFoundError):
         recordings_module.read_recording(tmp_path / "a.csv")
-    with pytest.raises(kineme.DataError, match="found nothing at"):
+    with pytest.raises(kineme.errors.DataError, match="found nothing at"):
         read_recordings(tmp_path / "a.csv")

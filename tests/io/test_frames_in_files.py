@@ -35,7 +35,7 @@ def test_every_orient_of_json_is_read(tmp_path, orient):
 @pytest.mark.parametrize("orient", ["columns", "index", "split"])
 def test_an_index_is_a_column_and_one_of_dates_the_times(tmp_path, orient):
     FRAME.set_index("t").to_json(tmp_path / "a.json", orient=orient)
-    with pytest.raises(kineme.KinemeError, match="'index', 'x', 'y'"):
+    with pytest.raises(kineme.errors.KinemeError, match="'index', 'x', 'y'"):
         kineme.read_recordings(tmp_path / "a.json")
     _same(tmp_path / "a.json", time="index")
     dated = FRAME.set_index(pd.to_datetime(1.7e9 + U, unit="s")).drop(columns="t")
@@ -45,7 +45,7 @@ def test_an_index_is_a_column_and_one_of_dates_the_times(tmp_path, orient):
 
 def test_values_alone_say_no_times(tmp_path):
     FRAME.to_json(tmp_path / "a.json", orient="values")
-    with pytest.raises(kineme.KinemeError, match="expected times beside the positions"):
+    with pytest.raises(kineme.errors.KinemeError, match="expected times beside the positions"):
         kineme.read_recordings(tmp_path / "a.json")
 
 
@@ -63,7 +63,7 @@ def test_values_alone_say_no_times(tmp_path):
 )
 def test_what_is_no_frame_is_refused(tmp_path, entries):
     (tmp_path / "a.json").write_text(json.dumps(entries))
-    with pytest.raises(kineme.KinemeError, match="expected"):
+    with pytest.raises(kineme.errors.KinemeError, match="expected"):
         kineme.read_recordings(tmp_path / "a.json")
 
 

@@ -154,7 +154,7 @@ def test_units_of_movements_without_times_are_read_and_must_agree(tmp_path):
     assert [one.unit for one in read.demonstrations.channels] == ["mm", "mm"]
     with h5py.File(path, "a") as file:
         file["nod"].attrs["units"] = "m"
-    with pytest.raises(kineme.KinemeError, match="unit"):
+    with pytest.raises(kineme.errors.KinemeError, match="unit"):
         kineme.read_recordings(path, units=0.1)
 
 

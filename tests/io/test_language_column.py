@@ -177,7 +177,9 @@ def test_a_column_of_json(tmp_path, source):
 
 def test_another_column_of_that_name_is_refused(tmp_path, source):
     with_rows(source, lambda k: ["a"])
-    with pytest.raises(kineme.DataError, match=r"file-000\.parquet: expected rows with role, content.*got list<"):
+    with pytest.raises(
+        kineme.errors.DataError, match=r"file-000\.parquet: expected rows with role, content.*got list<"
+    ):
         copied(source, tmp_path / "named")
 
 
@@ -261,22 +263,22 @@ def test_another_column_of_that_name_in_version_2_is_refused(tmp_path, values, w
     path = source / "data/chunk-000/episode_000001.parquet"
     table = parquet.read_table(path)
     parquet.write_table(table.append_column(MOTION_TEXTS, pa.array(values * len(table))), path)
-    with pytest.raises(kineme.DataError, match=rf"episode_000001\.parquet: expected {words}"):
+    with pytest.raises(kineme.errors.DataError, match=rf"episode_000001\.parquet: expected {words}"):
         copied(source, tmp_path / "named")
 
 
 def test_an_episode_that_is_not_there(tmp_path, source):
-    with pytest.raises(kineme.DataError, match="expected an episode of the data set, got 7"):
+    with pytest.raises(kineme.errors.DataError, match="expected an episode of the data set, got 7"):
         copied(source, tmp_path / "named", {7: [Motion(0.0, "a")]})
 
 
 def test_a_damaged_description_is_not_copied(tmp_path, source):
     (source / "meta" / "episodes" / "chunk-000" / "file-001.parquet").write_bytes(b"cut")
-    with pytest.raises(kineme.DataError, match=r"expected a whole data set to copy: expected file-001\.parquet"):
+    with pytest.raises(kineme.errors.DataError, match=r"expected a whole data set to copy: expected file-001\.parquet"):
         copied(source, tmp_path / "named")
 
 
 def test_a_damaged_shard_is_named(tmp_path, source):
     (source / SHARDS[1]).write_bytes((source / SHARDS[1]).read_bytes()[:-200])
-    with pytest.raises(kineme.DataError, match=r"file-001\.parquet"):
+    with pytest.raises(kineme.errors.DataError, match=r"file-001\.parquet"):
         copied(source, tmp_path / "named")

@@ -31,9 +31,9 @@ def test_velocities_of_thousands_of_columns_are_left_aside():
 
 
 def test_a_message_shows_some_of_thousands_of_columns():
-    with pytest.raises(kineme.DataError, match=r"got the columns .* and 7961 more; say which") as caught:
+    with pytest.raises(kineme.errors.DataError, match=r"got the columns .* and 7961 more; say which") as caught:
         choose_roles([*HEADS[1:], "w"], ["number"] * len(HEADS), Layout())
     assert len(str(caught.value)) < 2000
-    with pytest.raises(kineme.DataError, match=r"no entry 'positions' but .* and 1960 more") as caught:
+    with pytest.raises(kineme.errors.DataError, match=r"no entry 'positions' but .* and 1960 more") as caught:
         read_recordings_from_bytes(b"{" + b",".join(b'"q%d":1' % k for k in range(2000)) + b"}", "a.json", Layout())
     assert len(str(caught.value)) < 2000

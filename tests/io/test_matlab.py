@@ -91,7 +91,7 @@ def test_the_file_that_killed_the_reader():
     for at in range(128, len(whole), 8):
         for kind in (0, 8, 10, 11, 14, 16, 19, 255, 65535):
             spoiled = whole[:at] + struct.pack("<H", kind) + whole[at + 2 :]
-            with suppress(kineme.DataError):
+            with suppress(kineme.errors.DataError):
                 assert len(read_demos(spoiled).times[0]) <= len(T)
 
 
@@ -100,7 +100,7 @@ def test_a_compressed_bomb_is_not_expanded(monkeypatch):
     assert len(bomb) < 2**17
     monkeypatch.setenv(VARIABLE, str(2**20))
     assert len(read_demos(bomb).times) == 1  # nobody needs the 32 MiB beside
-    with pytest.raises(kineme.DataError, match=rf"at most 1,048,576 bytes of memory, got one .*{VARIABLE}"):
+    with pytest.raises(kineme.errors.DataError, match=rf"at most 1,048,576 bytes of memory, got one .*{VARIABLE}"):
         read_demos(saved(True, demos=one(np.zeros((2**22, 1)), np.zeros(2**22))))
 
 
@@ -116,16 +116,16 @@ def test_what_compressed_data_say_of_themselves_is_not_believed():
         b"",
     ):
         packed = zlib.compress(spoiled)
-        with pytest.raises(kineme.DataError, match="expected a"):
+        with pytest.raises(kineme.errors.DataError, match="expected a"):
             read_demos(whole[:128] + struct.pack("<II", 15, len(packed)) + packed)
-    with pytest.raises(kineme.DataError, match="truncated"):
+    with pytest.raises(kineme.errors.DataError, match="truncated"):
         read_demos(whole[:-4])
 
 
 def test_a_file_that_was_cut_is_refused_wherever_that_was():
     whole = saved(demos=one(), beside=np.arange(9.0))
     for at in range(0, len(whole) - 1, 7):
-        with pytest.raises(kineme.DataError, match="expected a MATLAB file with 'demos', got"):
+        with pytest.raises(kineme.errors.DataError, match="expected a MATLAB file with 'demos', got"):
             read_demos(whole[:at])
 
 

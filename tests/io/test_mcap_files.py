@@ -45,7 +45,9 @@ def test_an_mcap_without_an_index(tmp_path):
     messages = poses()
     messages[20], messages[30] = messages[30], messages[20]
     path = write_mcap(tmp_path / "b.mcap", messages, **unindexed)
-    with pytest.raises(kineme.DataError, match=r"b\.mcap: topic /tool: after 21 messages: .*not in timestamp order"):
+    with pytest.raises(
+        kineme.errors.DataError, match=r"b\.mcap: topic /tool: after 21 messages: .*not in timestamp order"
+    ):
         read_recordings(path)
 
 
@@ -59,7 +61,9 @@ def test_an_mcap_whose_messages_are_not_in_order(tmp_path):
 def test_an_mcap_of_another_robot_system_is_named(tmp_path):
     for profile in ("", "px4"):
         path = write_mcap(tmp_path / "a.mcap", poses(), profile=profile, encoding="protobuf")
-        with pytest.raises(kineme.DataError, match=r"an MCAP file of ROS 2, or .* in JSON, got messages in .*as CSV"):
+        with pytest.raises(
+            kineme.errors.DataError, match=r"an MCAP file of ROS 2, or .* in JSON, got messages in .*as CSV"
+        ):
             read_recordings(path)
 
 
@@ -74,13 +78,13 @@ def test_messages_in_json_are_samples(tmp_path, compression):
     path = write_json_mcap(
         tmp_path / "a.mcap", {"/hand": PLACES, "/stamped": stamped}, compression=CompressionType[compression]
     )
-    with pytest.raises(kineme.DataError, match=r"got the topics \['/hand', '/stamped'\]; say which .*--topic"):
+    with pytest.raises(kineme.errors.DataError, match=r"got the topics \['/hand', '/stamped'\]; say which .*--topic"):
         read_recordings(path)
     for topic, step in (("/hand", 0.05), ("/stamped", 0.1)):
         (one,) = read_recordings(path, topic=topic).demonstrations
         np.testing.assert_array_equal(one.recorded, [[k / 7, k * k / 9, k / 3] for k in range(30)])
         np.testing.assert_allclose(np.diff(one.times), step, atol=1e-6)
-    with pytest.raises(kineme.DataError, match="messages that are objects, got b'3'"):
+    with pytest.raises(kineme.errors.DataError, match="messages that are objects, got b'3'"):
         read_recordings(write_json_mcap(tmp_path / "b.mcap", {"/n": [3] * 9}))
 
 
@@ -88,7 +92,7 @@ def test_messages_in_json_take_no_more_memory_than_a_file_may(tmp_path, monkeypa
     path = write_json_mcap(tmp_path / "a.mcap", {"/hand": [{"x": 0.0, "t": k, "note": "a" * 5000} for k in range(99)]})
     assert path.stat().st_size < 50_000
     monkeypatch.setenv("KINEME_MAX_FILE_BYTES", "100000")
-    with pytest.raises(kineme.DataError, match="messages in JSON that takes at most 100,000 bytes"):
+    with pytest.raises(kineme.errors.DataError, match="messages in JSON that takes at most 100,000 bytes"):
         read_recordings(path)
 
 
@@ -102,11 +106,15 @@ def test_a_chunk_of_messages_in_json_expands_no_further_than_it_says(tmp_path):
     )
     data[chunk + 25 : chunk + 33] = (100).to_bytes(8, "little")
     path.write_bytes(data)
-    with pytest.raises(kineme.DataError, match="a chunk that expands to 100 bytes, got one that expands to more"):
+    with pytest.raises(
+        kineme.errors.DataError, match="a chunk that expands to 100 bytes, got one that expands to more"
+    ):
         read_recordings(path)
 
 
 def test_an_mcap_with_an_encoding_that_rosbags_does_not_know_names_it(tmp_path):
     path = write_mcap(tmp_path / "a.mcap", poses(), encoding="jsonschema")
-    with pytest.raises(kineme.DataError, match=r"a\.mcap: expected .*, got: 'jsonschema', which rosbags does not know"):
+    with pytest.raises(
+        kineme.errors.DataError, match=r"a\.mcap: expected .*, got: 'jsonschema', which rosbags does not know"
+    ):
         read_recordings(path)

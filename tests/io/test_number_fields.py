@@ -159,7 +159,7 @@ def test_damaged_messages_are_named_and_the_others_read(tmp_path, kind):
     cut = [("/n", START + SECOND, ("std_msgs/msg/Float64", b"\x00\x01\x00\x00" + bytes(3)))]
     path = write_bag(tmp_path, kind, [*good, *cut])
     assert len(kineme.read_recordings(path, skip="sample").demonstrations[0]) == 9
-    with pytest.raises(kineme.DataError, match=r"topic /n: message 9: expected a std_msgs/msg/Float64"):
+    with pytest.raises(kineme.errors.DataError, match=r"topic /n: message 9: expected a std_msgs/msg/Float64"):
         kineme.read_recordings(path)
     from kineme.io.ros.bags import open_bag
     from kineme.io.ros.number_fields import number_fields
@@ -196,7 +196,7 @@ def test_definitions_that_say_no_numbers_are_refused(tmp_path, text, words):
         one = writer.add_connection("/odd", "my_msgs/msg/Odd", msgdef=text, rihs01="RIHS01_" + "0" * 64)
         for ns in stamps(9):
             writer.write(one, ns, b"\x00\x01\x00\x00" + bytes(64))
-    with pytest.raises(kineme.DataError, match=words):
+    with pytest.raises(kineme.errors.DataError, match=words):
         kineme.read_recordings(tmp_path / "run", topic="/odd")
     assert bag_contents(tmp_path / "run")[0].rows[0][3] == "nothing: no numbers"
 
@@ -205,7 +205,7 @@ def test_definitions_that_differ_are_refused():
     said = SimpleNamespace(name="MSG")
     kinds = [SimpleNamespace(msgdef=SimpleNamespace(data=f"{kind} x", format=said)) for kind in ("float64", "float32")]
     topic = SimpleNamespace(name="/a", type="my_msgs/msg/A", connections=kinds)
-    with pytest.raises(kineme.DataError, match="got several that differ; convert the topic to CSV"):
+    with pytest.raises(kineme.errors.DataError, match="got several that differ; convert the topic to CSV"):
         number_fields(SimpleNamespace(version=2), topic)
     topic.connections = kinds[:1]
     assert number_fields(SimpleNamespace(version=2), topic).heads == ("x",)

@@ -69,19 +69,19 @@ def test_missing_values_cost_their_movement_or_themselves():
 
 
 def test_columns_of_something_else_are_refused_by_name():
-    with pytest.raises(kineme.DataError, match=r"expected numbers in the column 'x', got .*list"):
+    with pytest.raises(kineme.errors.DataError, match=r"expected numbers in the column 'x', got .*list"):
         read({"time": T, "x": [["one"]] * 6}, columns="x")
 
 
 def test_without_the_package_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "pyarrow", None)
-    with pytest.raises(kineme.DataError, match=r"pip install 'kineme\[parquet\]'"):
+    with pytest.raises(kineme.errors.DataError, match=r"pip install 'kineme\[parquet\]'"):
         read_recordings_from_bytes(b"PAR1", "a.parquet", Layout())
 
 
 @pytest.mark.parametrize("columns", [("time", "x"), ("label", "time", "x"), ("demo", "time", "x")])
 def test_a_table_without_rows_is_refused(columns):
-    with pytest.raises(kineme.DataError, match="expected samples, got a table without rows"):
+    with pytest.raises(kineme.errors.DataError, match="expected samples, got a table without rows"):
         read({name: pa.array([], pa.float64()) for name in columns})
 
 
@@ -109,14 +109,14 @@ def test_names_may_be_missing_and_dictionaries_differ(chunked):
     ],
 )
 def test_labels_that_are_no_names(column, words):
-    with pytest.raises(kineme.DataError, match=words):
+    with pytest.raises(kineme.errors.DataError, match=words):
         read({"label": column, "time": T, "x": X})
 
 
 def test_columns_of_one_name_are_refused():
     sink = io.BytesIO()
     parquet.write_table(pa.Table.from_arrays([pa.array(T), pa.array(X), pa.array(-X)], ["time", "x", "x"]), sink)
-    with pytest.raises(kineme.DataError, match="expected columns of different names, got 'x' 2 times"):
+    with pytest.raises(kineme.errors.DataError, match="expected columns of different names, got 'x' 2 times"):
         read_recordings_from_bytes(sink.getvalue(), "a.parquet", Layout())
 
 
@@ -131,7 +131,7 @@ def test_a_bomb_is_not_expanded(monkeypatch):
     sink = io.BytesIO()
     parquet.write_table(pa.table(columns), sink, compression="zstd")
     monkeypatch.setenv("KINEME_MAX_FILE_BYTES", str(len(sink.getvalue()) + 2**18))
-    with pytest.raises(kineme.DataError, match="KINEME_MAX_FILE_BYTES"):
+    with pytest.raises(kineme.errors.DataError, match="KINEME_MAX_FILE_BYTES"):
         read_recordings_from_bytes(sink.getvalue(), "a.parquet", Layout(units="ms"))
 
 
@@ -147,7 +147,7 @@ def test_numbers_of_names_that_are_not_there_are_damage(which):
     """pyarrow reads such pages and does not look."""
     names = pa.DictionaryArray.from_arrays(pa.array(which), pa.array(["wave"]), safe=False)
     with pytest.raises(
-        kineme.DataError, match=r"expected names in 'label', got numbers of names that are not there: damaged"
+        kineme.errors.DataError, match=r"expected names in 'label', got numbers of names that are not there: damaged"
     ):
         _texts(pa.chunked_array([names]), "label")
 
@@ -162,7 +162,7 @@ def test_lists_are_one_column_for_each_number_where_they_are_meant():
     assert read(both, columns="dq").demonstrations.dimensions == ("dq.0", "dq.1")
     assert read(both, columns=["x", "q.1"]).demonstrations.dimensions == ("x", "q.1")
     del both["x"]
-    with pytest.raises(kineme.DataError, match=r"one column of lists, or plain columns, got dq, q; say which"):
+    with pytest.raises(kineme.errors.DataError, match=r"one column of lists, or plain columns, got dq, q; say which"):
         read(both)
     lerobot = {"observation.state": state, "action": state, "timestamp": T, "frame_index": range(6)}
     assert read(lerobot).demonstrations.dimensions == ("observation.state.0", "observation.state.1")
@@ -173,7 +173,7 @@ def test_lists_of_other_lengths_and_missing_ones_cost_their_samples():
     table = {"time": np.arange(8) / 10, "q": pa.array(rows, pa.list_(pa.float64()))}
     found = read(table, skip="sample")
     assert found.demonstrations.lengths.tolist() == [5]
-    with pytest.raises(kineme.DataError, match="expected 2 numbers in 'q', got 1"):
+    with pytest.raises(kineme.errors.DataError, match="expected 2 numbers in 'q', got 1"):
         read(table)
     nested = pa.array([[[1.0, 2.0], [3.0, k]] for k in range(6)], pa.list_(pa.list_(pa.float64())))
     assert read({"time": T, "pose": nested}).demonstrations.n_dims == 4
@@ -190,6 +190,6 @@ def test_a_written_movement_has_the_heads_of_csv(tmp_path):
 
 def test_writing_without_pyarrow_names_the_extra(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyarrow", None)
-    with pytest.raises(kineme.DataError, match=r"pip install 'kineme\[parquet\]'"):
+    with pytest.raises(kineme.errors.DataError, match=r"pip install 'kineme\[parquet\]'"):
         kineme.write_movement(tmp_path / "x.parquet", {"times": T, "positions": X[:, None]})
     assert not list(tmp_path.iterdir())

@@ -56,7 +56,9 @@ def test_what_was_detected_is_told(tmp_path):
 
 
 def test_one_file_of_many_movements_is_refused_where_one_is_expected(tmp_path):
-    with pytest.raises(kineme.DataError, match=r"expected one movement in .*all\.csv, got 21; .*read_recordings"):
+    with pytest.raises(
+        kineme.errors.DataError, match=r"expected one movement in .*all\.csv, got 21; .*read_recordings"
+    ):
         read_recording(lasa_files.long_csv(tmp_path))
 
 
@@ -89,13 +91,15 @@ def test_labels_are_on_all_demonstrations_or_on_none_but_always_with_the_sources
 
 
 def test_nothing_to_read_is_an_error_with_the_first_reason(tmp_path):
-    with pytest.raises(kineme.DataError, match="found nothing at 'nowhere'"):
+    with pytest.raises(kineme.errors.DataError, match="found nothing at 'nowhere'"):
         read_recordings("nowhere")
-    with pytest.raises(kineme.DataError, match=r"expected recordings in .*, found none$"):
+    with pytest.raises(kineme.errors.DataError, match=r"expected recordings in .*, found none$"):
         read_recordings(tmp_path)
     (tmp_path / "a.csv").write_text("time,x\n0,1\n")
     (tmp_path / "b.gif").write_text("")
-    with pytest.raises(kineme.DataError, match=r"2 could not be read, the first a\.csv: expected at least 4 samples"):
+    with pytest.raises(
+        kineme.errors.DataError, match=r"2 could not be read, the first a\.csv: expected at least 4 samples"
+    ):
         read_recordings(tmp_path)
 
 
@@ -110,7 +114,7 @@ def test_garbage_under_any_name_is_a_problem_never_a_crash(tmp_path, ending, dat
     read = read_recordings(tmp_path)
     assert [one.file for one in read.problems] == [f"bad{ending}"]
     assert len(read) == 1
-    with pytest.raises(kineme.DataError, match=rf"bad\{ending}: \w+"):
+    with pytest.raises(kineme.errors.DataError, match=rf"bad\{ending}: \w+"):
         read_recording(tmp_path / f"bad{ending}")
 
 
@@ -126,7 +130,7 @@ def test_a_file_cut_or_altered_anywhere_gives_a_movement_or_a_problem(tmp_path, 
         path.write_bytes(damaged)
         try:
             read_recordings(path)
-        except kineme.DataError:
+        except kineme.errors.DataError:
             continue
 
 
@@ -139,5 +143,5 @@ def test_a_file_cut_or_altered_anywhere_gives_a_movement_or_a_problem(tmp_path, 
     ],
 )
 def test_unknown_choices_are_refused(tmp_path, option, words):
-    with pytest.raises(kineme.SpecificationError, match=words):
+    with pytest.raises(kineme.errors.SpecificationError, match=words):
         read_recordings(tmp_path, **option)

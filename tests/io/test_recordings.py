@@ -62,7 +62,7 @@ def test_whatever_holds_one_movement_is_written(tmp_path):
     text = write_movement(tmp_path / "x.csv", rollout).read_text()
     assert text.splitlines()[0] == "time,x,y,v_x,v_y,a_x,a_y"
     np.testing.assert_array_equal(read_recording(tmp_path / "x.csv").positions, rollout.positions[0])
-    with pytest.raises(kineme.TrajectoryError, match="expected one recording, got 2 movements"):
+    with pytest.raises(kineme.errors.TrajectoryError, match="expected one recording, got 2 movements"):
         write_movement(tmp_path / "x.csv", [movement, movement])
 
 
@@ -90,24 +90,24 @@ def test_columns_are_named(tmp_path):
 )
 def test_files_that_are_not_what_their_name_says(tmp_path, name, content, words):
     (tmp_path / name).write_text(content)
-    with pytest.raises(kineme.DataError, match=words):
+    with pytest.raises(kineme.errors.DataError, match=words):
         read_recording(tmp_path / name)
 
 
 def test_bytes_that_are_no_text(tmp_path):
     (tmp_path / "a.csv").write_bytes(b"\xff\x00\x01" * 9)
-    with pytest.raises(kineme.DataError, match=r"a\.csv: expected text, got bytes that are none"):
+    with pytest.raises(kineme.errors.DataError, match=r"a\.csv: expected text, got bytes that are none"):
         read_recording(tmp_path / "a.csv")
 
 
 def test_numbers_that_are_no_movement_name_the_file(tmp_path):
     (tmp_path / "a.json").write_text(json.dumps({"times": [0, 1, 1, 2], "positions": [1, 2, 3, 4]}))
-    with pytest.raises(kineme.TrajectoryError, match=r"a\.json: expected strictly increasing times"):
+    with pytest.raises(kineme.errors.TrajectoryError, match=r"a\.json: expected strictly increasing times"):
         read_recording(tmp_path / "a.json")
 
 
 def test_writing_to_an_unknown_ending_is_refused(tmp_path):
-    with pytest.raises(kineme.DataError, match=r"\.csv, \.npz, \.json, \.parquet, got '\.xls'"):
+    with pytest.raises(kineme.errors.DataError, match=r"\.csv, \.npz, \.json, \.parquet, got '\.xls'"):
         write_movement(tmp_path / "a.xls", {"times": TIMES, "positions": PATH})
 
 
@@ -129,7 +129,7 @@ def test_writing_to_an_unknown_ending_is_refused(tmp_path):
     ],
 )
 def test_a_dict_that_is_no_movement_is_not_written(tmp_path, movement, words):
-    with pytest.raises(kineme.TrajectoryError, match=words):
+    with pytest.raises(kineme.errors.TrajectoryError, match=words):
         kineme.write_movement(tmp_path / "a.csv", movement)
     assert not list(tmp_path.iterdir())
 

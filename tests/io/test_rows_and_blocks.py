@@ -66,7 +66,7 @@ def test_a_class_at_the_end_of_lines_is_no_coordinate():
     )
     np.testing.assert_array_equal(np.array(positions(found)), POINTS)
     assert found.labels.tolist() == ["0", "1", "2"] * 2
-    with pytest.raises(kineme.DataError, match=r"got fractions in both; say which with label=.*--label-column"):
+    with pytest.raises(kineme.errors.DataError, match=r"got fractions in both; say which with label=.*--label-column"):
         read("\n".join(f"{row},0.5" for row in lines(POINTS).split("\n")), rows=True, columns=("x", "y"))
 
 
@@ -79,11 +79,11 @@ def test_lines_may_differ_in_length_and_be_padded():
 
 
 def test_what_rows_leave_open_is_said():
-    with pytest.raises(kineme.DataError, match=r"say columns=.*in the shell --columns x,y"):
+    with pytest.raises(kineme.errors.DataError, match=r"say columns=.*in the shell --columns x,y"):
         read(lines(POINTS, [0] * 6), rows=True)
-    with pytest.raises(kineme.SpecificationError, match="expected rows without every"):
+    with pytest.raises(kineme.errors.SpecificationError, match="expected rows without every"):
         Layout(rows=True, every=5)
-    with pytest.raises(kineme.DataError, match="expected text, of which each line is a movement"):
+    with pytest.raises(kineme.errors.DataError, match="expected text, of which each line is a movement"):
         read(b"PK", "a.npz", rows=True)
     found = read(lines(POINTS, [0] * 6) + "\n0,oops,1,2,3,4,5,6,7\n", rows=True, columns=("x", "y"))
     assert [one.reason for one in found.problems] == ["line 7: expected numbers, got 'oops'"]
@@ -119,7 +119,7 @@ def test_values_to_predict_are_no_labels_and_other_ts_files_are_named():
     text = "@targetlabel true\n@timestamps false\n@data\n1,2,3,4:0.25\n1,2,3,9:0.5\n"
     assert read(text, "a.ts").labels.tolist() == [None, None]
     for other in ("export const x = 1;", "", "@data\n", "@classLabel true\n@data\n:wave\n"):
-        with pytest.raises(kineme.DataError, match=r"a\.ts: expected"):
+        with pytest.raises(kineme.errors.DataError, match=r"a\.ts: expected"):
             read(other, "a.ts")
 
 
@@ -146,7 +146,9 @@ def test_blocks_keep_the_labels_and_begin_where_labels_change():
         logged(48, lambda k: "ann" if k < 12 else "bob").replace("label", "who"), every=12, units=0.01, person="who"
     )
     assert people.people == ["ann", "bob", "bob", "bob"]
-    with pytest.raises(kineme.DataError, match="expected blocks of 12 samples, got 35 samples in movement 0: 2 blocks"):
+    with pytest.raises(
+        kineme.errors.DataError, match="expected blocks of 12 samples, got 35 samples in movement 0: 2 blocks"
+    ):
         read(logged(48, lambda k: "punch" if k < 35 else "flex"), every=12, units=0.01)
 
 
@@ -155,9 +157,11 @@ def test_blocks_of_any_format_and_a_rest_that_is_no_block_is_refused(tmp_path):
     found = kineme.read_recordings(tmp_path / "a.npz", every=10)
     assert found.demonstrations.lengths.tolist() == [10] * 4
     np.testing.assert_array_equal(found[3].times, np.arange(10) / 10)
-    with pytest.raises(kineme.DataError, match="expected blocks of 9 samples, got 40 samples: 4 blocks and 4 more"):
+    with pytest.raises(
+        kineme.errors.DataError, match="expected blocks of 9 samples, got 40 samples: 4 blocks and 4 more"
+    ):
         kineme.read_recordings(tmp_path / "a.npz", every=9)
-    with pytest.raises(kineme.SpecificationError, match="expected every to be"):
+    with pytest.raises(kineme.errors.SpecificationError, match="expected every to be"):
         Layout(every=3)
 
 
@@ -171,17 +175,19 @@ def test_a_log_without_heads_and_times_has_no_time_where_all_columns_are_chosen(
     found = read(log, every=12, units=0.01, columns=(0, 1, 2))
     assert (found.demonstrations.n_dims, found.detected[0][0].time) == (3, None)
     np.testing.assert_allclose(found.demonstrations.durations, 0.11)
-    with pytest.raises(kineme.DataError, match="expected a column of times"):
+    with pytest.raises(kineme.errors.DataError, match="expected a column of times"):
         read(log, every=12, columns=(0, 1, 2))
 
 
 def test_empty_lines_between_samples_without_times_part_movements():
     blocks = ["\n".join(f"{k},{k * k}" for k in range(n)) for n in (9, 9, 9, 7)]
     with pytest.raises(
-        kineme.DataError, match=r"got 3 blocks of 9 to 9 samples .* say every=9, in the shell --every 9"
+        kineme.errors.DataError, match=r"got 3 blocks of 9 to 9 samples .* say every=9, in the shell --every 9"
     ):
         read("x,y\n" + "\n\n".join(blocks[:3]), units=0.1)
     assert len(read("x,y\n" + "\n\n".join(blocks[:3]), units=0.1, every=9)) == 3
-    with pytest.raises(kineme.DataError, match=r"got 4 blocks of 7 to 9 samples .* save each in a file of its own"):
+    with pytest.raises(
+        kineme.errors.DataError, match=r"got 4 blocks of 7 to 9 samples .* save each in a file of its own"
+    ):
         read("x,y\n" + "\n \n".join(blocks), units=0.1)
     assert len(read("x,y\n\n" + blocks[0].replace("\n", "\n\n") + "\n\n", units=0.1)) == 1

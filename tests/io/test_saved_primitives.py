@@ -25,7 +25,7 @@ def learned(labels=("a", "b", "a"), **specification):
 def test_round_trip_is_exact(tmp_path, formulation, fit):
     steps = (kineme.TrimRest(0.02), kineme.Smooth(15.0), kineme.Resample(64))
     before = learned(formulation=formulation, fit=fit, n_basis=12, damping=17.5, ridge=1e-5, preprocessing=steps)
-    after = kineme.Primitives.load(before.save(tmp_path / "wave.kineme"))
+    after = kineme.dmp.Primitives.load(before.save(tmp_path / "wave.kineme"))
     assert after.dmp == before.dmp
     assert list(after.labels) == list(before.labels)
     assert after.names == before.names
@@ -36,12 +36,12 @@ def test_round_trip_is_exact(tmp_path, formulation, fit):
 
 @pytest.mark.parametrize("labels", [None, [1, 2, 1], [0.5, 1.5, 2.5]])
 def test_labels_keep_their_type(tmp_path, labels):
-    after = kineme.Primitives.load(learned(labels).save(tmp_path / "x"))
+    after = kineme.dmp.Primitives.load(learned(labels).save(tmp_path / "x"))
     assert (after.labels is None) if labels is None else (after.labels.tolist() == labels)
 
 
 def test_loaded_arrays_are_protected(tmp_path):
-    after = kineme.Primitives.load(learned().save(tmp_path / "x"))
+    after = kineme.dmp.Primitives.load(learned().save(tmp_path / "x"))
     with pytest.raises(ValueError, match="read-only"):
         after.starts[0] = 0
 
@@ -51,8 +51,10 @@ def test_a_truncated_file_is_refused(tmp_path, kept):
     path = learned().save(tmp_path / "x")
     data = path.read_bytes()
     path.write_bytes(data[: int(kept * len(data))])
-    with pytest.raises(kineme.DataError, match=r"x to be an archive of arrays, got something foreign, truncated"):
-        kineme.Primitives.load(path)
+    with pytest.raises(
+        kineme.errors.DataError, match=r"x to be an archive of arrays, got something foreign, truncated"
+    ):
+        kineme.dmp.Primitives.load(path)
 
 
 def test_a_flipped_bit_in_the_numbers_is_noticed(tmp_path):
@@ -60,20 +62,20 @@ def test_a_flipped_bit_in_the_numbers_is_noticed(tmp_path):
     data = bytearray(path.read_bytes())
     data[len(data) // 2] ^= 1
     path.write_bytes(data)
-    with pytest.raises(kineme.DataError, match="damaged"):
-        kineme.Primitives.load(path)
+    with pytest.raises(kineme.errors.DataError, match="damaged"):
+        kineme.dmp.Primitives.load(path)
 
 
 def test_another_programs_archive_is_refused(tmp_path):
     np.savez(tmp_path / "x.npz", header=np.frombuffer(b'{"a": 1}', dtype=np.uint8))
-    with pytest.raises(kineme.DataError, match="another program's archive"):
-        kineme.Primitives.load(tmp_path / "x.npz")
+    with pytest.raises(kineme.errors.DataError, match="another program's archive"):
+        kineme.dmp.Primitives.load(tmp_path / "x.npz")
 
 
 def test_text_is_refused(tmp_path):
     (tmp_path / "x").write_text("time,x,y\n0,0,0\n")
-    with pytest.raises(kineme.DataError, match="foreign"):
-        kineme.Primitives.load(tmp_path / "x")
+    with pytest.raises(kineme.errors.DataError, match="foreign"):
+        kineme.dmp.Primitives.load(tmp_path / "x")
 
 
 def test_pickled_objects_are_never_loaded(tmp_path):
@@ -84,8 +86,8 @@ def test_pickled_objects_are_never_loaded(tmp_path):
             return (os.mkdir, (str(marker),))
 
     np.savez(tmp_path / "x.npz", header=np.array([Attack()], dtype=object))
-    with pytest.raises(kineme.DataError):
-        kineme.Primitives.load(tmp_path / "x.npz")
+    with pytest.raises(kineme.errors.DataError):
+        kineme.dmp.Primitives.load(tmp_path / "x.npz")
     assert not marker.exists()
 
 
@@ -93,14 +95,14 @@ def test_a_later_version_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr("kineme.io.arrays.npz.VERSION", 7)
     path = learned().save(tmp_path / "x")
     monkeypatch.undo()
-    with pytest.raises(kineme.DataError, match="version 1 or earlier, got 7; upgrade kineme"):
-        kineme.Primitives.load(path)
+    with pytest.raises(kineme.errors.DataError, match="version 1 or earlier, got 7; upgrade kineme"):
+        kineme.dmp.Primitives.load(path)
 
 
 def test_another_kind_is_refused(tmp_path):
     path = write_container(tmp_path / "x", "recipes", {}, {})
-    with pytest.raises(kineme.DataError, match="to hold primitives, got 'recipes'"):
-        kineme.Primitives.load(path)
+    with pytest.raises(kineme.errors.DataError, match="to hold primitives, got 'recipes'"):
+        kineme.dmp.Primitives.load(path)
 
 
 @pytest.mark.parametrize(
@@ -120,17 +122,17 @@ def test_headers_that_do_not_fit_are_refused(tmp_path, change, words):
     header = json.loads(arrays.pop("header").tobytes())
     header["dmp"] |= change["dmp"]
     np.savez(path, header=np.frombuffer(json.dumps(header).encode(), dtype=np.uint8), **arrays)
-    with pytest.raises(kineme.DataError, match=words):
-        kineme.Primitives.load(path)
+    with pytest.raises(kineme.errors.DataError, match=words):
+        kineme.dmp.Primitives.load(path)
 
 
 def test_a_missing_file_is_file_not_found(tmp_path):
     with pytest.raises(FileNotFoundError, match=r"a file of primitives at '.*nothing', found nothing there; save"):
-        kineme.Primitives.load(tmp_path / "nothing")
-    with pytest.raises(kineme.DataError, match=r"expected a file of primitives at .*, found a folder there"):
-        kineme.Primitives.load(tmp_path)
+        kineme.dmp.Primitives.load(tmp_path / "nothing")
+    with pytest.raises(kineme.errors.DataError, match=r"expected a file of primitives at .*, found a folder there"):
+        kineme.dmp.Primitives.load(tmp_path)
     with pytest.raises(TypeError, match="expected the path of a file of primitives, got int"):
-        kineme.Primitives.load(5)
+        kineme.dmp.Primitives.load(5)
 
 
 def test_a_missing_folder_is_named(tmp_path):
@@ -153,7 +155,7 @@ def test_a_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
 
 
 def test_labels_that_are_objects_are_refused(tmp_path):
-    with pytest.raises(kineme.DataError, match="text or numbers"):
+    with pytest.raises(kineme.errors.DataError, match="text or numbers"):
         learned([object(), object(), object()]).save(tmp_path / "x")
 
 

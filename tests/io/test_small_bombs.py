@@ -83,7 +83,7 @@ def test_zeros_that_are_packed_are_not_expanded(tmp_path):
         file.create_dataset("x", data=np.zeros(2**23 + 1), **packed)
         file.create_dataset("y", data=np.zeros(2**23 + 1), **packed)
     assert (tmp_path / "a.h5").stat().st_size < MIB
-    with pytest.raises(kineme.KinemeError, match="nearly all of which are alike"):
+    with pytest.raises(kineme.errors.KinemeError, match="nearly all of which are alike"):
         kineme.read_recordings(tmp_path / "a.h5")
 
 

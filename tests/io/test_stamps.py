@@ -80,7 +80,7 @@ def test_columns_of_one_clock_are_one_time_in_the_unit_that_one_of_them_says(tmp
 def test_two_clocks_are_not_one(tmp_path, other):
     rows = [f"{1_700_000_000_000_000_000 + 10_000_000 * k},{other(k)},{k}" for k in range(200)]
     (tmp_path / "a.csv").write_text("\n".join(["time,seconds_elapsed,x", *rows]))
-    with pytest.raises(kineme.DataError, match=r"say which of \['time', 'seconds_elapsed'\] with time="):
+    with pytest.raises(kineme.errors.DataError, match=r"say which of \['time', 'seconds_elapsed'\] with time="):
         kineme.read_recordings(tmp_path / "a.csv")
 
 
@@ -88,7 +88,7 @@ def test_a_second_clock_is_left_aside_where_the_time_is_said(tmp_path):
     """As loggers of phones write it: time in nanoseconds since 1970, and the seconds that elapsed."""
     rows = [f"{1_700_000_000_000_000_000 + 10_000_000 * k},{k / 100},{k},{k * k},{k % 3}" for k in range(20)]
     (tmp_path / "a.csv").write_text("\n".join(["time,seconds_elapsed,x,y,t", *rows]))
-    with pytest.raises(kineme.DataError, match=r"say which of \['time', 'seconds_elapsed', 't'\] with time="):
+    with pytest.raises(kineme.errors.DataError, match=r"say which of \['time', 'seconds_elapsed', 't'\] with time="):
         kineme.read_recordings(tmp_path / "a.csv")
     for time in ("time", "seconds_elapsed"):
         read = kineme.read_recordings(tmp_path / "a.csv", time=time)
@@ -166,7 +166,7 @@ def test_midnight_passes_from_times_of_day_alone_and_missing_dates_are_none():
 def test_stamps_that_may_be_two_units_are_refused_until_one_is_said(tmp_path, unit, finer, step):
     stamps = PER_SECOND[unit] * (1_200_000_000 + step * np.arange(20))
     with pytest.raises(
-        kineme.DataError, match=rf"since 1970 or {finer} since another time; say units='{unit}' or '{finer}'"
+        kineme.errors.DataError, match=rf"since 1970 or {finer} since another time; say units='{unit}' or '{finer}'"
     ):
         unit_by_size(stamps, "time")
     assert unit_by_size(stamps, "unix time") == (unit, "since 1970")
@@ -235,7 +235,7 @@ def test_ticks_of_100_ns_are_known_by_their_year_or_by_the_head(tmp_path, head, 
 def test_ticks_of_unknown_length_are_refused_until_it_is_said(tmp_path):
     rows = [f"{k * 333_333},{k},{k * k}" for k in range(30)]
     (tmp_path / "a.csv").write_text("\n".join(["ticks,x,y", *rows]))
-    with pytest.raises(kineme.DataError, match=r"got 'ticks' in steps of 333333; .* units='100ns' .* --units"):
+    with pytest.raises(kineme.errors.DataError, match=r"got 'ticks' in steps of 333333; .* units='100ns' .* --units"):
         kineme.read_recordings(tmp_path / "a.csv", time="ticks")
     recordings = kineme.read_recordings(tmp_path / "a.csv", time="ticks", units="100ns")
     np.testing.assert_allclose(np.diff(recordings.demonstrations[0].times), 1 / 30, rtol=1e-5)

@@ -18,7 +18,7 @@ def outcome(data, layout=Layout()):  # noqa: B008 - frozen
     """Everything that reading gives: columns, faults, roles, or the error."""
     try:
         table, roles = read_text_table(data, layout)
-    except kineme.DataError as error:
+    except kineme.errors.DataError as error:
         return str(error)
     columns = [np.asarray(one).tolist() for one in table.columns]
     return repr(

@@ -65,7 +65,7 @@ def test_any_number_in_any_notation_is_read_to_the_last_bit(values, style, separ
 def test_any_text_is_a_table_or_an_error(text, skip):
     try:
         found = read(text.encode("utf-8", "replace"), skip=skip)
-    except kineme.DataError as error:
+    except kineme.errors.DataError as error:
         assert "a.csv" in str(error)  # noqa: PT017 - both ends are right
     else:
         assert np.isfinite(found.demonstrations.positions).all()
@@ -145,7 +145,7 @@ def test_units_that_are_given_win(units, divisor):
 
 
 def test_rows_without_stamps_are_a_given_step_apart():
-    with pytest.raises(kineme.DataError, match="or the step between samples with units= where there is none"):
+    with pytest.raises(kineme.errors.DataError, match="or the step between samples with units= where there is none"):
         read(lines(SIX, "a,b,c"))
     found = read(lines(SIX, "a,b,c"), units=0.02)
     np.testing.assert_allclose(found.demonstrations.times, np.arange(6) * 0.02)
@@ -200,14 +200,18 @@ def test_roles_that_are_given_win():
     ],
 )
 def test_a_column_that_is_not_there_is_refused_with_those_that_are(options, words):
-    with pytest.raises(kineme.DataError, match=words):
+    with pytest.raises(kineme.errors.DataError, match=words):
         read(lines(SIX), **options)
 
 
 def test_ambiguous_columns_are_refused():
-    with pytest.raises(kineme.DataError, match=r"expected one column of times, .*\['time', 'y', 'stamp'\]; say which"):
+    with pytest.raises(
+        kineme.errors.DataError, match=r"expected one column of times, .*\['time', 'y', 'stamp'\]; say which"
+    ):
         read(lines(SIX, "time,y,stamp"))
-    with pytest.raises(kineme.DataError, match=r"expected one column of labels, got \['label', 'class'\]; say which"):
+    with pytest.raises(
+        kineme.errors.DataError, match=r"expected one column of labels, got \['label', 'class'\]; say which"
+    ):
         read(lines([("a", "b", *row) for row in SIX], "label,class,time,x,y"))
 
 
@@ -302,10 +306,10 @@ def test_an_empty_cell_costs_its_movement_where_its_gap_is_too_long_to_be_filled
 )
 def test_time_must_go_on(times, reason, kept):
     text = lines([(t, k, -k) for k, t in enumerate(times)], "time,x,y")
-    with pytest.raises(kineme.DataError, match=rf"line [345]: .*{reason}"):
+    with pytest.raises(kineme.errors.DataError, match=rf"line [345]: .*{reason}"):
         read(text)
     if kept is None:
-        with pytest.raises(kineme.DataError, match="expected at least 4 samples, got 2"):
+        with pytest.raises(kineme.errors.DataError, match="expected at least 4 samples, got 2"):
             read(text, skip="sample")
     else:
         assert read(text, skip="sample").demonstrations.times.tolist() == kept
@@ -321,7 +325,7 @@ def test_a_separator_at_the_end_of_every_line_is_no_column(text):
 def test_many_faults_are_told_once_per_movement():
     rows = [(k, "" if k % 3 == 0 else k, k) for k in range(30)]
     rows[0], rows[3] = (0, 0, 0), (3, "oops", 3)
-    with pytest.raises(kineme.DataError, match=r"line 5: expected a number in 'x', got 'oops'"):
+    with pytest.raises(kineme.errors.DataError, match=r"line 5: expected a number in 'x', got 'oops'"):
         read(lines(rows))
     kept = read(lines(rows), skip="sample")
     assert kept.problems[1].reason.endswith("; 8 samples like this left out")
@@ -340,7 +344,7 @@ def test_many_faults_are_told_once_per_movement():
     ],
 )
 def test_no_table(text, words):
-    with pytest.raises(kineme.DataError, match=words):
+    with pytest.raises(kineme.errors.DataError, match=words):
         read(text)
 
 
@@ -374,7 +378,7 @@ def test_dates_are_time_stamps(style, between, head):
 def test_a_cell_that_is_no_date_is_found_by_its_line():
     rows = [(f"2024-05-06 07:{8 + k // 60:02}:{k % 60:02}", k) for k in range(40)]
     rows[30] = ("yesterday", 30)
-    with pytest.raises(kineme.DataError, match="line 32: expected a date in 'time', got 'yesterday'"):
+    with pytest.raises(kineme.errors.DataError, match="line 32: expected a date in 'time', got 'yesterday'"):
         read(lines(rows, "time,x"))
     assert read(lines(rows, "time,x"), skip="sample").demonstrations.lengths.tolist() == [39]
 
@@ -393,7 +397,9 @@ def test_marks_between_thousands_are_no_decimal_marks(mark):
     x = np.linspace(900, 1200, 40).round()
     grouped = [f"{one:,.0f}".replace(",", mark) for one in x]
     text = "t;x\n" + "\n".join(f"{k};{cell}" for k, cell in enumerate(grouped))
-    with pytest.raises(kineme.DataError, match=rf"'x' without marks between thousands, got '1\{mark}0.*' beside '900'"):
+    with pytest.raises(
+        kineme.errors.DataError, match=rf"'x' without marks between thousands, got '1\{mark}0.*' beside '900'"
+    ):
         read(text)
     shortest = [f"{one:g}".replace(".", mark) for one in (x / 1000).round(3)]  # 0.9, 1, 1.008: decimals
     text = "t;x\n" + "\n".join(f"{k};{cell}" for k, cell in enumerate(shortest))
@@ -423,10 +429,10 @@ def test_columns_of_thousands_alone_are_refused_and_never_left_aside(separator, 
         for k in range(20)
     ]
     text = "\n".join([separator.join(["t", "x", "y"]), *rows])
-    with pytest.raises(kineme.DataError, match=rf"'x'.* without marks between thousands, got {got}"):
+    with pytest.raises(kineme.errors.DataError, match=rf"'x'.* without marks between thousands, got {got}"):
         read(text)
     assert read(text, exclude="x").demonstrations.dimensions == ("y",)
-    with pytest.raises(kineme.DataError, match=rf"'x'.* without marks between thousands, got {got}"):
+    with pytest.raises(kineme.errors.DataError, match=rf"'x'.* without marks between thousands, got {got}"):
         read(text, exclude="y")
 
 
@@ -446,7 +452,7 @@ def test_several_lines_of_heads_are_one(tmp_path, names):
 def test_times_that_are_not_understood_are_shown():
     for stamp in ("01/05/2024 10:00:0{}", "5/1/2024 11:59:5{} PM", "10:00:01:00{}"):
         with pytest.raises(
-            kineme.DataError, match=r"times such as 2024-05-06T07:08:09.25 .* in 'timestamp', got '.*0.*'"
+            kineme.errors.DataError, match=r"times such as 2024-05-06T07:08:09.25 .* in 'timestamp', got '.*0.*'"
         ):
             read(lines([(stamp.format(k), k, k * k) for k in range(8)], "timestamp,x,y"))
 
@@ -460,7 +466,7 @@ def test_lines_above_the_heads_are_passed_over(mark):
         assert found.demonstrations.dimensions == ("x", "y"), above
         np.testing.assert_array_equal(found.demonstrations[0].positions[:, 0], np.arange(9.0) ** 2)
     for above in (mark.join("12"), mark.join(("time", "x"))):  # another table, or heads that lack one
-        with pytest.raises(kineme.DataError):
+        with pytest.raises(kineme.errors.DataError):
             read(f"{above}\n{rows}")
 
 
@@ -477,7 +483,9 @@ def test_columns_of_one_name_are_numbered_as_pandas_does_and_not_chosen_by_it():
     read = read_recordings_from_bytes(data, "a.csv", Layout())
     assert read.demonstrations.dimensions == ("x", "y", "x.1")
     np.testing.assert_array_equal(read.demonstrations.positions[:, 2], np.arange(5) - 1)
-    with pytest.raises(kineme.DataError, match=r"expected one column 'x', got the columns \[1, 3\] of that name; say"):
+    with pytest.raises(
+        kineme.errors.DataError, match=r"expected one column 'x', got the columns \[1, 3\] of that name; say"
+    ):
         read_recordings_from_bytes(data, "a.csv", Layout(columns=["x"]))
     chosen = read_recordings_from_bytes(data, "a.csv", Layout(columns=[3, 2]))
     assert chosen.demonstrations.dimensions == ("x", "y")
@@ -514,7 +522,7 @@ LONG = 2**53 + 1
 def test_integers_that_floats_would_round_are_refused(tmp_path, integer):
     rows = [(k, k, integer + k) for k in range(6)]
     with pytest.raises(
-        kineme.DataError, match=rf"expected a number in 'x' that a float can hold, got {integer}, which"
+        kineme.errors.DataError, match=rf"expected a number in 'x' that a float can hold, got {integer}, which"
     ):
         read(lines(rows, "time,y,x"))
     assert len(read(lines([(k, k, float(integer) + k * 1e20) for k in range(6)], "time,y,x"))) == 1
@@ -522,17 +530,17 @@ def test_integers_that_floats_would_round_are_refused(tmp_path, integer):
         return
     refused = rf"that floats can hold, got {integer}"
     frame = pd.DataFrame(rows, columns=["time", "y", "x"])
-    with pytest.raises(kineme.KinemeError, match=refused):
+    with pytest.raises(kineme.errors.KinemeError, match=refused):
         kineme.Demonstrations.of(frame)
-    with pytest.raises(kineme.KinemeError, match=refused):
+    with pytest.raises(kineme.errors.KinemeError, match=refused):
         kineme.Demonstrations.from_arrays(frame[["y", "x"]].to_numpy()[None])
-    with pytest.raises(kineme.KinemeError, match=refused):
+    with pytest.raises(kineme.errors.KinemeError, match=refused):
         kineme.Trajectory(np.arange(6.0), frame[["y", "x"]].to_numpy())
     np.savez(tmp_path / "a.npz", times=np.arange(6), positions=frame[["y", "x"]].to_numpy())
     frame.to_parquet(tmp_path / "a.parquet")
     (tmp_path / "a.json").write_text(json.dumps(frame.to_dict("list")))
     for ending in ("npz", "parquet", "json"):
-        with pytest.raises(kineme.KinemeError, match=refused):
+        with pytest.raises(kineme.errors.KinemeError, match=refused):
             kineme.read_recordings(tmp_path / f"a.{ending}")
 
 
@@ -551,5 +559,5 @@ def test_stamps_of_nanoseconds_may_be_rounded(tmp_path):
 @pytest.mark.parametrize("ending", [".xlsx", ".XLS", ".ods"])
 def test_spreadsheets_are_to_be_saved_as_text(tmp_path, ending):
     (tmp_path / f"a{ending}").write_bytes(b"PK")
-    with pytest.raises(kineme.DataError, match=rf"the spreadsheet a{ending}; save its sheet as \.csv"):
+    with pytest.raises(kineme.errors.DataError, match=rf"the spreadsheet a{ending}; save its sheet as \.csv"):
         read_recordings(tmp_path / f"a{ending}")

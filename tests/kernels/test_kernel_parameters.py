@@ -15,7 +15,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.svm import SVC
 
-from kineme import SpecificationError
+from kineme.errors import SpecificationError
 from kineme.kernels import KERNELS, MEANS, PAPER_WIDTHS, RBF, Averaged, Laplacian, TruncatedEuclidean, averaged
 
 widths = st.one_of(st.floats(1e-3, 1e3), st.integers(1, 9))

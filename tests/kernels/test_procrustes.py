@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from kineme import SpecificationError
+from kineme.errors import SpecificationError
 from kineme.kernels.procrustes import Procrustes
 from movement_samples import turn
 

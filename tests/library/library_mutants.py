@@ -16,7 +16,8 @@ from library_attacks import attack, make_victim
 from library_samples import contents
 
 import kineme
-from kineme import ActionLibrary, KinemeError
+from kineme import ActionLibrary
+from kineme.errors import KinemeError
 from kineme.library.storage.connection import FILE
 from kineme.library.storage.schema import COLUMNS
 

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from library_samples import contents, draw_movements
 
 import kineme
-from kineme import ActionLibrary, SpecificationError
+from kineme import ActionLibrary
+from kineme.errors import SpecificationError
 from kineme.library.storage import symbols
 
 N = 12
@@ -117,7 +118,7 @@ def test_a_library_says_what_a_simple_model_says_at_every_version(tmp_path_facto
                 seen.append(model.said())
             else:
                 assert model.said() == said
-                with pytest.raises(kineme.KinemeError):
+                with pytest.raises(kineme.errors.KinemeError):
                     _do(library, *step)
                 assert library.version == before
             assert _said(library) == model.said()

@@ -9,14 +9,16 @@ import threading
 import pytest
 from library_samples import draw_movements
 
-from kineme import ActionLibrary, DataError
+from kineme import ActionLibrary
+from kineme.errors import DataError
 
 CLOSED = r"expected an open library, got .*library\.sqlite, which has been closed; open it again"
 
 #: Threads that read one large library while the first one closes it; SQLite itself ends the process.
 CLOSE_BESIDE_READERS = """
 import sys, threading, time
-from kineme import ActionLibrary, DataError
+from kineme import ActionLibrary
+from kineme.errors import DataError
 
 def read(library):
     try:

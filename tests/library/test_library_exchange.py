@@ -10,7 +10,8 @@ import time
 import pytest
 from library_samples import contents, draw_movements, tables
 
-from kineme import ActionLibrary, DataError
+from kineme import ActionLibrary
+from kineme.errors import DataError
 from kineme.library.storage.connection import FILE
 
 

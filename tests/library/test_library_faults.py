@@ -20,7 +20,8 @@ import pytest
 from library_crashes import check_what_is_left, kill_while_learning
 from library_samples import contents, draw_movements
 
-from kineme import ActionLibrary, DataError
+from kineme import ActionLibrary
+from kineme.errors import DataError
 from kineme.library.storage import connection, store
 from kineme.library.storage.connection import FILE
 

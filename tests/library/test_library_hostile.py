@@ -15,7 +15,8 @@ import pytest
 from library_attacks import DEFINITIONS, ROWS, attack, copy_of, make_endless, make_victim
 from library_samples import contents
 
-from kineme import ActionLibrary, DataError, KinemeError
+from kineme import ActionLibrary
+from kineme.errors import DataError, KinemeError
 from kineme.library.storage import safety
 from kineme.library.storage.connection import FILE, connect
 from kineme.library.storage.schema import SCHEMA_VERSION

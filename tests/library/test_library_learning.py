@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from library_samples import draw_movements
 
 import kineme
-from kineme import ActionLibrary, Demonstrations, SpecificationError, Trajectory, TrajectoryError
+from kineme import ActionLibrary, Demonstrations, Trajectory
+from kineme.errors import SpecificationError, TrajectoryError
 from kineme.library import learn as learning
 from kineme.library.storage.source import Source
 from kineme.similarity.describe import feature_rows
@@ -239,7 +240,7 @@ def test_what_cannot_be_stored_is_refused_before_anything_is(library, movements,
 
 @pytest.mark.parametrize(("label", "shown"), [("", "''"), ("a\ud800", r"'a\ud800'")])
 def test_a_label_is_text(library, label, shown):
-    with pytest.raises(kineme.SpecificationError, match=rf"expected a name .* got {re.escape(shown)}"):
+    with pytest.raises(kineme.errors.SpecificationError, match=rf"expected a name .* got {re.escape(shown)}"):
         library.learn(draw_movements(2), labels=["fine", label])
     assert len(library) == 0
 
@@ -276,7 +277,9 @@ def test_an_empty_library_says_so(library):
     assert library.symbols() == library.history() == ()
     assert library.verify() == []
     for read in (library.movements, library.features, library.primitives):
-        with pytest.raises(kineme.SpecificationError, match=r"expected at least one movement, got none: the library"):
+        with pytest.raises(
+            kineme.errors.SpecificationError, match=r"expected at least one movement, got none: the library"
+        ):
             read()
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from library_mutants import MUTANTS, exported, read_mutant
 
-from kineme import KinemeError
+from kineme.errors import KinemeError
 
 
 @pytest.mark.parametrize("kind", MUTANTS)

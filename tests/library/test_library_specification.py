@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from kineme import DMP, ActionLibrary, Recognizer, SpecificationError
+from kineme import DMP, ActionLibrary, Recognizer
+from kineme.errors import SpecificationError
 from kineme.movements.preparation.resample import Resample
 
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from library_samples import draw_movements
 
-from kineme import ActionLibrary, Recognizer, SpecificationError, Trajectory
+from kineme import ActionLibrary, Recognizer, Trajectory
+from kineme.errors import SpecificationError
 from kineme.library.recognize import LibraryRecognizer
 
 

@@ -7,7 +7,8 @@ import tracemalloc
 import pytest
 from library_samples import draw_movements
 
-from kineme import ActionLibrary, SpecificationError
+from kineme import ActionLibrary
+from kineme.errors import SpecificationError
 from kineme.library.storage.schema import MAX_TEXT
 
 LONG = 1 << 20

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from library_samples import draw_movements
 
-from kineme import ActionLibrary, Demonstrations, SpecificationError, TrajectoryError
+from kineme import ActionLibrary, Demonstrations
+from kineme.errors import SpecificationError, TrajectoryError
 from kineme.library import learn as learning
 from kineme.library.storage.undo import can_undo
 

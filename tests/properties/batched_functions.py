@@ -26,8 +26,6 @@ from kineme import (
     ActionLibrary,
     Demonstrations,
     DMPFeatures,
-    ExtrapolationWarning,
-    Primitives,
     Recognizer,
     Resample,
     RhythmicDMP,
@@ -38,14 +36,16 @@ from kineme import (
     preprocess,
     styles,
 )
+from kineme.dmp import Primitives
 from kineme.dmp.discrete.formulations import FORMULATIONS
 from kineme.dmp.discrete.specification import FITS, GATINGS
 from kineme.dmp.join import laid_out, laid_out_poses
+from kineme.errors import ExtrapolationWarning
 from kineme.features.movement_features import FEATURES, PoseFeatures
-from kineme.features.random_binning import RandomBinning
 from kineme.kernels import KERNELS, MEANS, averaged
 from kineme.kernels.pair_distances import listed_distances, pair_bounds, pair_distances
 from kineme.kernels.procrustes import Procrustes
+from kineme.kernels.random_binning import RandomBinning
 from kineme.kernels.shapes import shapes_of
 from kineme.movements.channels.channel import Channel
 from kineme.movements.preparation.resample import resample_by_arc_length

@@ -11,7 +11,7 @@ from drawn_movements import any_movements, many_movements
 from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
 
-from kineme import DegenerateMovementWarning
+from kineme.errors import DegenerateMovementWarning
 from soaking import SOAK, examples
 
 #: Numbers of one tile of work, set so small that every batch is many tiles, none of which begins where the batch does.

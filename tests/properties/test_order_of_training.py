@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kineme import DMP, Recognizer, RhythmicFeatures, styles
-from kineme.features.random_binning import RandomBinning
 from kineme.kernels import KERNELS, averaged
+from kineme.kernels.random_binning import RandomBinning
 
 DRAWN = [(20 + 3 * i, i % 3 - 1, ("even", "jitter", "random")[i % 3], 0, i) for i in range(18)]
 orders = st.permutations(range(18))

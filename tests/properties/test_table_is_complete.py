@@ -176,7 +176,7 @@ def _called():
 @pytest.fixture(scope="module")
 def missing():
     with pytest.MonkeyPatch.context() as patch, warnings.catch_warnings():
-        warnings.simplefilter("ignore", kineme.DegenerateMovementWarning)
+        warnings.simplefilter("ignore", kineme.errors.DegenerateMovementWarning)
         patch.setenv("KINEME_COMPILED", "never")
         called = _called()
     return {name for name, code in _discovered().items() if code not in called}

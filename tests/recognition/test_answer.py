@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kineme import Demonstrations, Recognizer, Representation, Trajectory
+from kineme import Demonstrations, Recognizer, Trajectory
+from kineme.recognition import Representation
 from kineme.recognition.conformal import RULES
 from kineme.similarity.specification import LOG_MEANS
 from movement_samples import draw_shapes, turn

@@ -47,9 +47,9 @@ def test_a_picture_lays_the_nearest_example_over_the_movement():
 def test_a_picture_with_other_demonstrations_is_refused():
     answer = RECOGNIZER.recognize(DEMOS[0])
     for wrong in (DEMOS[2:], draw_shapes([2] * 3, 3, 0), DEMOS[:0:-1]):
-        with pytest.raises(kineme.SpecificationError, match="expected"):
+        with pytest.raises(kineme.errors.SpecificationError, match="expected"):
             answer.plot(DEMOS[0], wrong)
-    with pytest.raises(kineme.SpecificationError, match="got one of them"):
+    with pytest.raises(kineme.errors.SpecificationError, match="got one of them"):
         answer.plot(DEMOS[0])
-    with pytest.raises(kineme.SpecificationError, match="expected one movement"):
+    with pytest.raises(kineme.errors.SpecificationError, match="expected one movement"):
         answer.plot(DEMOS, DEMOS)

@@ -8,7 +8,8 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from kineme import Recognizer, RotationPrior
+from kineme import Recognizer
+from kineme.recognition import RotationPrior
 from kineme.similarity import widths
 from movement_samples import draw_shapes
 

@@ -11,7 +11,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.stats import chi
 
-from kineme import Recognizer, TrajectoryError
+from kineme import Recognizer
+from kineme.errors import TrajectoryError
 from kineme.kernels.procrustes import Prepared, Procrustes
 from kineme.recognition.conformal import EXPONENT, calibrate, class_probabilities, fit_exponent
 from kineme.recognition.left_out import ClassDistances, law

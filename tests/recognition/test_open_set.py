@@ -10,7 +10,8 @@ from scipy.stats import binom
 from sklearn.metrics import roc_auc_score
 
 import kineme
-from kineme import Recognizer, SpecificationError
+from kineme import Recognizer
+from kineme.errors import SpecificationError
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.recognition.conformal import calibrate
 from kineme.similarity.scores import nearest as nearest_of_each

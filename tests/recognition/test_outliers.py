@@ -84,7 +84,7 @@ def test_what_is_said_of_an_outlier():
 def test_few_movements_and_those_without_a_label_are_not_checked():
     demos = kineme.load_lasa(["CShape", "Snake", "Sine"])
     labels = [*demos.labels.tolist()[:19], None, None]
-    assert find_outliers(demos, labels) == kineme.Outliers((), 0, 0.05)
+    assert find_outliers(demos, labels) == kineme.recognition.Outliers((), 0, 0.05)
     few = [*demos.labels.tolist()[:18], "a", "a", "a"]
     assert find_outliers(demos, few).checked == 0
     assert outliers_as_words(find_outliers(demos, few), []) == ""
@@ -133,13 +133,13 @@ def test_progress_is_told():
 
 def test_copies_alone_are_refused_in_words():
     one = kineme.load_lasa(["CShape"])[0]
-    with pytest.raises(kineme.SpecificationError, match="expected training movements that differ"):
+    with pytest.raises(kineme.errors.SpecificationError, match="expected training movements that differ"):
         find_outliers([one] * 24, ["a"] * 12 + ["b"] * 12)
-    with pytest.raises(kineme.TrajectoryError, match="expected movements with labels"):
+    with pytest.raises(kineme.errors.TrajectoryError, match="expected movements with labels"):
         find_outliers([one.positions] * 24)
-    with pytest.raises(kineme.TrajectoryError, match="expected one label or None for each of 24"):
+    with pytest.raises(kineme.errors.TrajectoryError, match="expected one label or None for each of 24"):
         find_outliers([one] * 24, ["a"])
-    with pytest.raises(kineme.SpecificationError, match="error_rate"):
+    with pytest.raises(kineme.errors.SpecificationError, match="error_rate"):
         find_outliers([one] * 24, ["a"] * 24, error_rate=0.0)
 
 

@@ -14,8 +14,9 @@ from sklearn.neighbors import KNeighborsClassifier
 from sklearn.svm import SVC
 
 import kineme
-from kineme import Demonstrations, Recognizer, SpecificationError, Trajectory, TrajectoryError
+from kineme import Demonstrations, Recognizer, Trajectory
 from kineme.datasets.lasa import PAPER_LETTERS
+from kineme.errors import SpecificationError, TrajectoryError
 from kineme.kernels.soft_rotation import RotationPrior
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.movements.preparation.resample import arc_length_phase

@@ -11,7 +11,8 @@ from sklearn.exceptions import NotFittedError
 from sklearn.metrics import roc_auc_score
 from sklearn.model_selection import GridSearchCV, cross_val_predict, cross_val_score
 
-from kineme import Recognizer, SpecificationError
+from kineme import Recognizer
+from kineme.errors import SpecificationError
 from movement_samples import draw_shapes
 
 CLASSIFIERS = ["nearest", "prototype", "svm"]

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme import Demonstrations, Recognizer, SpecificationError, Trajectory, TrajectoryError
+from kineme import Demonstrations, Recognizer, Trajectory
+from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.segmentation.motion import observe
 from kineme.movements.segmentation.segment import pieces_of
 from kineme.recognition import compared_windows

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kineme import Recognizer, SpecificationError, TrajectoryError
+from kineme import Recognizer
+from kineme.errors import SpecificationError, TrajectoryError
 from kineme.similarity.representation import DEFAULT_REPRESENTATIONS, Representation
 from movement_samples import draw_shapes
 

@@ -138,14 +138,14 @@ def test_half_way_to_a_moved_copy_is_the_shape_half_turned(seed, d, angle):
 
 def test_what_cannot_be_aligned():
     primitives = kineme.DMP(n_basis=20).learn(draw_kinds([2, 2]))
-    with pytest.raises(kineme.TrajectoryError, match="expected one primitive at each end, got 2"):
+    with pytest.raises(kineme.errors.TrajectoryError, match="expected one primitive at each end, got 2"):
         morph(primitives[:2], primitives[0], 0.5)
-    with pytest.raises(kineme.SpecificationError, match=r"shares of the way from 0 to 1, got \[0.5, 1.5\]"):
+    with pytest.raises(kineme.errors.SpecificationError, match=r"shares of the way from 0 to 1, got \[0.5, 1.5\]"):
         morph(primitives[0], primitives[1], [0.5, 1.5])
     other = kineme.DMP(n_basis=21).learn(draw_kinds([1]))
-    with pytest.raises(kineme.SpecificationError, match="expected primitives of one specification"):
+    with pytest.raises(kineme.errors.SpecificationError, match="expected primitives of one specification"):
         morph(primitives[0], other, 0.5)
-    with pytest.raises(kineme.TrajectoryError, match="same dimensions, got 2 and 3"):
+    with pytest.raises(kineme.errors.TrajectoryError, match="same dimensions, got 2 and 3"):
         morph(primitives[0], kineme.DMP(n_basis=20).learn(draw_kinds([1], 3)), 0.5)
-    with pytest.raises(kineme.SpecificationError, match="expected medoid to be one of 4 members, got 4"):
+    with pytest.raises(kineme.errors.SpecificationError, match="expected medoid to be one of 4 members, got 4"):
         prototype(primitives, medoid=4)

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kineme import Recognizer, SpecificationError
+from kineme import Recognizer
+from kineme.errors import SpecificationError
 from kineme.similarity.specification import LOG_MEANS, SHARES
 from movement_samples import draw_shapes
 

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from sklearn.base import clone
 
-from kineme import Recognizer, Representation
+from kineme import Recognizer
 from kineme.errors import SpecificationError
 from kineme.kernels.procrustes import Prepared, Procrustes
+from kineme.recognition import Representation
 from kineme.similarity.describe import describe
 from kineme.similarity.described import Described
 from kineme.similarity.representation import DEFAULT_REPRESENTATIONS, ROW_REPRESENTATIONS

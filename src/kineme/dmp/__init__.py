@@ -1,1 +1,5 @@
 """Dynamical Movement Primitives: discrete, rhythmic, of poses; styles, generation, control."""
+
+from kineme._lazy import lazy_names as _lazy_names
+
+__getattr__, __dir__, __all__ = _lazy_names(__name__)

@@ -97,7 +97,7 @@ class Contextual(BaseEstimator):
     >>> u = np.linspace(0, 1, 100)
     >>> heights = np.array([0.1, 0.2, 0.3, 0.4])
     >>> demos = [np.column_stack((u, h * np.sin(np.pi * u))) for h in heights]
-    >>> model = kineme.Contextual().fit(demos, parameters=heights)
+    >>> model = kineme.dmp.Contextual().fit(demos, parameters=heights)
     >>> round(float(model.primitive(0.37).rollout().positions[0, :, 1].max()), 3)
     0.37
     """

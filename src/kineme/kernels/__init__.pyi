@@ -7,6 +7,7 @@ from kineme.kernels.table import Canberra as Canberra
 from kineme.kernels.distance import DistanceKernel as DistanceKernel
 from kineme.kernels.average import averaged as averaged
 from kineme.kernels.average import Averaged as Averaged
+from kineme.kernels.random_binning import RandomBinning as RandomBinning
 
 # Tables
 from kineme.kernels.table import KERNELS as KERNELS

@@ -1,1 +1,5 @@
 """Recognition of movements: classifiers, open set, early recognition, spotting."""
+
+from kineme._lazy import lazy_names as _lazy_names
+
+__getattr__, __dir__, __all__ = _lazy_names(__name__)

@@ -87,8 +87,8 @@ class ComparisonSpecification:
             check_number("max_angle", self.max_angle, least=0.0)
         if self.prior is not None and not isinstance(self.prior, RotationPrior):
             raise SpecificationError(
-                f"expected rotation_prior to be a kineme.RotationPrior or None, got {self.prior!r}; write "
-                "kineme.RotationPrior(concentration=0.03)"
+                f"expected rotation_prior to be a kineme.recognition.RotationPrior or None, got {self.prior!r}; write "
+                "kineme.recognition.RotationPrior(concentration=0.03)"
             )
         if self.max_angle is not None and self.prior not in (None, RotationPrior()):
             raise SpecificationError(

@@ -8,9 +8,11 @@ from sklearn.base import clone
 from sklearn.exceptions import NotFittedError
 
 import kineme
-from kineme import DMP, Contextual, SpecificationError, Trajectory, TrajectoryError
+from kineme import DMP, Trajectory
+from kineme.dmp import Contextual
 from kineme.dmp.contextual import Smoother, solve
 from kineme.dmp.discrete.formulations import FORMULATIONS
+from kineme.errors import SpecificationError, TrajectoryError
 
 U = np.linspace(0.0, 1.0, 120)
 
@@ -142,7 +144,7 @@ def test_what_cannot_be_is_refused():
             Contextual().fit(demos, parameters)
     with pytest.raises(TrajectoryError, match="none follows from the others"):
         Contextual().fit([lift(h) for h in (0.1, 0.2, 0.3, 0.4)], [[1, 2], [2, 4], [3, 6], [4, 8]])
-    with pytest.raises(TrajectoryError, match=r"expected kineme.Primitives, got RhythmicPrimitives"):
+    with pytest.raises(TrajectoryError, match=r"expected kineme.dmp.Primitives, got RhythmicPrimitives"):
         Contextual().fit(kineme.RhythmicDMP().learn([np.sin(np.linspace(0, 20, 200))]), [1.0])
     with pytest.raises(SpecificationError, match="expected regression to be one of"):
         Contextual(regression="cubic").fit(demos, heights)

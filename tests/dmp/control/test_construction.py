@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kineme import DegenerateMovementError, SpecificationError
 from kineme.dmp.control.options import ObstacleAvoidance
+from kineme.errors import DegenerateMovementError, SpecificationError
 
 WRONG = {
     "dt zero": ({"dt": 0.0}, r"expected dt to be a number above 0, got 0\.0"),

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme import SpecificationError
 from kineme.control import Controller, ObstacleAvoidance, Options, State, Status
 from kineme.dmp.control.plan import Plan
+from kineme.errors import SpecificationError
 from kineme.orientation import PoseDMP, angle_between, exp
 
 U = np.linspace(0.0, 1.0, 100)
@@ -58,13 +58,13 @@ def steered(request):
 
 
 def rollout_of(primitive, dt, n_steps):
-    if isinstance(primitive, kineme.RhythmicPrimitives):
+    if isinstance(primitive, kineme.dmp.RhythmicPrimitives):
         return primitive.rollout(n_steps * dt / primitive.periods[0], n_samples=n_steps + 1)
     return primitive.rollout(duration=n_steps * dt, n_samples=n_steps + 1)
 
 
 def controller_of(primitive, dt, n_steps, **options):
-    if not isinstance(primitive, kineme.RhythmicPrimitives):
+    if not isinstance(primitive, kineme.dmp.RhythmicPrimitives):
         options["duration"] = n_steps * dt
     return primitive.controller(dt, **options)
 
@@ -88,7 +88,7 @@ def test_it_is_one_controller_with_one_state(moving):
 def test_an_editor_knows_every_option_and_everything_a_step_can_be_told(moving):
     options = set(inspect.signature(moving.controller).parameters)
     expected = set(inspect.signature(Options).parameters) - (
-        {"settle"} if isinstance(moving, kineme.RhythmicPrimitives) else set()
+        {"settle"} if isinstance(moving, kineme.dmp.RhythmicPrimitives) else set()
     )
     assert expected <= options
     common = set(inspect.signature(Controller.step).parameters)
@@ -215,7 +215,7 @@ def test_a_new_goal_is_reached_and_a_filter_glides_there(moving):
     for _ in range(1500):
         state = glides.step(goal=goal)
     np.testing.assert_allclose(state.goal, goal, atol=1e-12)
-    if not isinstance(moving, kineme.RhythmicPrimitives):
+    if not isinstance(moving, kineme.dmp.RhythmicPrimitives):
         assert state.status == Status.SETTLED
         np.testing.assert_allclose(state.position, goal, atol=1e-8)
 

@@ -19,7 +19,7 @@ def reach():
 
 @pytest.fixture
 def primitive_of_2_s(reach):
-    from kineme import Primitives
+    from kineme.dmp import Primitives
 
     return Primitives.from_rollout(reach)[0]
 

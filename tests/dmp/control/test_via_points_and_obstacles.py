@@ -69,7 +69,9 @@ def test_a_via_point_on_the_obstacle_is_missed_and_said_with_point_distance_and_
     primitive = kineme.DMP().learn([curve()])
     middle = curve().positions[100]
     options = MovementOptions(via=((0.5, middle),), obstacles=middle[None], rate=100.0)
-    with pytest.warns(kineme.ExtrapolationWarning, match=r"the via point \[.*\] at 0\.5 .* missed by .*: .* move one"):
+    with pytest.warns(
+        kineme.errors.ExtrapolationWarning, match=r"the via point \[.*\] at 0\.5 .* missed by .*: .* move one"
+    ):
         generate(Learned(primitive), options)
 
 

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme import DMP, SpecificationError, TrajectoryError
+from kineme import DMP
 from kineme.dmp.discrete.choose import RIDGES, relative_paths, score
 from kineme.dmp.discrete.formulations import FORMULATIONS
 from kineme.dmp.discrete.operators import decoder, trajectory_columns
+from kineme.errors import SpecificationError, TrajectoryError
 
 
 def noisy(n=3, n_samples=40, noise=0.01, seed=0):

@@ -7,7 +7,8 @@ import warnings
 import numpy as np
 import pytest
 
-from kineme import DMP, DegenerateMovementError, DegenerateMovementWarning, Trajectory
+from kineme import DMP, Trajectory
+from kineme.errors import DegenerateMovementError, DegenerateMovementWarning
 
 U = np.linspace(0, 1, 100)
 CLOSED = np.column_stack((U, np.sin(2 * np.pi * U)))

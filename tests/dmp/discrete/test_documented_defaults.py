@@ -9,9 +9,10 @@ import pytest
 from click.testing import CliRunner
 
 import kineme
-from kineme import DMP, DegenerateMovementError, DegenerateMovementWarning, DMPFeatures, RhythmicDMP
+from kineme import DMP, DMPFeatures, RhythmicDMP
 from kineme.cli import main
 from kineme.dmp.persistence import specification_from_dict, specification_to_dict
+from kineme.errors import DegenerateMovementError, DegenerateMovementWarning
 from kineme.library.storage.specification import Specification
 from kineme.orientation import PoseDMP
 
@@ -29,7 +30,7 @@ def test_the_command_line_takes_the_same(tmp_path):
     files = {name: str(tmp_path / name) for name in ("x.csv", "x.kineme", "y.csv")}
     arguments = ["generate", files["x.csv"], "--save", files["x.kineme"], "-o", files["y.csv"]]
     assert CliRunner().invoke(main, arguments).exit_code == 0
-    assert kineme.Primitives.load(tmp_path / "x.kineme").dmp == DMP()
+    assert kineme.dmp.Primitives.load(tmp_path / "x.kineme").dmp == DMP()
 
 
 def test_what_is_saved_names_every_field():

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kineme import DMP, KinemeError, RhythmicDMP, SpecificationError, Trajectory
+from kineme import DMP, RhythmicDMP, Trajectory
 from kineme.control import Status
+from kineme.errors import KinemeError, SpecificationError
 
 
 @pytest.fixture(scope="module")

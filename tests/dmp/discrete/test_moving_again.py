@@ -127,7 +127,7 @@ class TestIssuesOfTheOriginalFormulation:
         x = strokes(seed=4)
         x[:, :, 0] += np.linspace(0, 1, 120) ** 2 * (0.001 - x[:, -1:, 0])
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", kineme.DegenerateMovementWarning)
+            warnings.simplefilter("ignore", kineme.errors.DegenerateMovementWarning)
             growth = {}
             for formulation in FORMULATIONS:
                 primitives = kineme.DMP(formulation).learn(x)
@@ -187,39 +187,43 @@ class TestWrongWishes:
     @pytest.mark.parametrize("duration", [0.0, -1.0, [1.0, 2.0, -3.0]])
     def test_durations_of_zero_or_less(self, duration):
         value = np.ravel(duration)[-1]
-        with pytest.raises(kineme.SpecificationError, match=f"duration above 0 seconds, got {value:g}"):
+        with pytest.raises(kineme.errors.SpecificationError, match=f"duration above 0 seconds, got {value:g}"):
             learn("bio-inspired").rollout(duration=duration)
 
     @pytest.mark.parametrize("name", ["start", "goal", "velocity"])
     def test_wrong_dimensions(self, name):
-        with pytest.raises(kineme.TrajectoryError, match=rf"{name} of shape \(2,\) or \(n, 2\), got shape \(3,\)"):
+        with pytest.raises(
+            kineme.errors.TrajectoryError, match=rf"{name} of shape \(2,\) or \(n, 2\), got shape \(3,\)"
+        ):
             learn("bio-inspired").rollout(**{name: [1.0, 2.0, 3.0]})
 
     def test_not_a_number(self):
-        with pytest.raises(kineme.TrajectoryError, match=r"finite numbers for goal, got \[nan, 1.0\]"):
+        with pytest.raises(kineme.errors.TrajectoryError, match=r"finite numbers for goal, got \[nan, 1.0\]"):
             learn("bio-inspired").rollout(goal=[float("nan"), 1.0])
 
     def test_which_of_many_wishes_is_bad(self):
         goals = np.zeros((1000, 2))
         goals[700, 1] = np.inf
         with pytest.raises(
-            kineme.TrajectoryError, match=r"finite numbers for goal, got \[0.0, inf\] for movement 700$"
+            kineme.errors.TrajectoryError, match=r"finite numbers for goal, got \[0.0, inf\] for movement 700$"
         ):
             learn("bio-inspired").rollout(goal=goals)
         goals[700, 1] = 1e200
-        with pytest.raises(kineme.TrajectoryError, match=r"got \[0.0, 1e\+200\] for movement 700; choose another unit"):
+        with pytest.raises(
+            kineme.errors.TrajectoryError, match=r"got \[0.0, 1e\+200\] for movement 700; choose another unit"
+        ):
             learn("bio-inspired").rollout(goal=goals.tolist())
 
     def test_numbers_of_movements_that_do_not_go_together(self):
-        with pytest.raises(kineme.TrajectoryError, match="got 3 primitives, 4 goal"):
+        with pytest.raises(kineme.errors.TrajectoryError, match="got 3 primitives, 4 goal"):
             learn("bio-inspired").rollout(goal=np.ones((4, 2)))
 
     def test_a_rate_too_low_for_the_dynamics(self):
-        with pytest.raises(kineme.SpecificationError, match=r"rate of at least 10 Hz .* got 5 Hz"):
+        with pytest.raises(kineme.errors.SpecificationError, match=r"rate of at least 10 Hz .* got 5 Hz"):
             learn("bio-inspired").rollout(duration=2.0, rate=5)
 
     def test_rate_and_samples_together(self):
-        with pytest.raises(kineme.SpecificationError, match="either rate or n_samples"):
+        with pytest.raises(kineme.errors.SpecificationError, match="either rate or n_samples"):
             learn("bio-inspired").rollout(rate=100, n_samples=10)
 
     def test_a_closed_movement_cannot_go_elsewhere_in_the_original_formulation(self):
@@ -227,13 +231,13 @@ class TestWrongWishes:
         x[1, -1] = x[1, 0]
         demos = kineme.Demonstrations.from_arrays(list(x), names=["a", "loop", "c"])
         with pytest.raises(
-            kineme.DegenerateMovementError, match=r"trajectory 1 \('loop'\).*dimension 0.*amplitude-scaled"
+            kineme.errors.DegenerateMovementError, match=r"trajectory 1 \('loop'\).*dimension 0.*amplitude-scaled"
         ):
             kineme.DMP("original").learn(demos).rollout(goal=[1.0, 1.0])
 
     def test_a_tolerance_that_is_never_met(self):
         primitives = kineme.DMP("bio-inspired", damping=0.01).learn(strokes())
-        with pytest.raises(kineme.SpecificationError, match=r"within 1e-06 of its goal in 10 durations"):
+        with pytest.raises(kineme.errors.SpecificationError, match=r"within 1e-06 of its goal in 10 durations"):
             primitives.rollout(settle=1e-6)
 
 

@@ -7,8 +7,9 @@ import re
 import numpy as np
 import pytest
 
-from kineme import DMP, SpecificationError, TrajectoryError
+from kineme import DMP
 from kineme.dmp.discrete.formulations import FORMULATIONS
+from kineme.errors import SpecificationError, TrajectoryError
 
 NAN = float("nan")
 OUT_OF_RANGE = [

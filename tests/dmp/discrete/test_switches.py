@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from kineme import DMP, Demonstrations, Smooth, SpecificationError, Trajectory, TrimRest
+from kineme import DMP, Demonstrations, Smooth, Trajectory, TrimRest
 from kineme.dmp.discrete import encode
+from kineme.errors import SpecificationError
 from kineme.runtime import compiled, parallel
 
 

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme import DMP, SpecificationError, improve
+from kineme import DMP, improve
 from kineme.dmp.discrete.operators import decoder
 from kineme.dmp.improve import METHODS, Search, exploration_factor
+from kineme.errors import SpecificationError
 
 U = np.linspace(0.0, 1.0, 100)
 MIDDLE = 0.5
@@ -163,9 +164,9 @@ def test_what_cannot_be_is_refused():
     wrong(r"expected exploration", far_from([0, 0]), exploration=0.0)
     with pytest.raises(SpecificationError, match=r"expected one primitive to improve, got 2"):
         improve(DMP().learn([U, U**2]), far_from([0]))
-    with pytest.raises(kineme.KinemeError, match=r"20 numbers, the cost of each movement"):
+    with pytest.raises(kineme.errors.KinemeError, match=r"20 numbers, the cost of each movement"):
         improve(primitive, lambda r: ["x"] * n)
-    with pytest.raises(kineme.TrajectoryError, match=r"expected kineme.Primitives, got ndarray"):
+    with pytest.raises(kineme.errors.TrajectoryError, match=r"expected kineme.dmp.Primitives, got ndarray"):
         improve(np.zeros(5), far_from([0]))
     with pytest.raises(SpecificationError, match=r"at least 4 basis functions"):
         improve(reach(DMP(n_basis=3)), far_from([0, 0]))

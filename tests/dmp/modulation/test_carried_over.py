@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kineme import DMP, Demonstrations, Primitives, TrajectoryError, blend, join
+from kineme import DMP, Demonstrations, blend, join
+from kineme.dmp import Primitives
+from kineme.errors import TrajectoryError
 from kineme.movements.channels.channel import Channel
 from kineme.movements.trajectories.movements import of_channels
 

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme import DMP, ExtrapolationWarning, SpecificationError, TrajectoryError, couple
+from kineme import DMP, couple
 from kineme.dmp.discrete.formulations import FORMULATIONS
+from kineme.errors import ExtrapolationWarning, SpecificationError, TrajectoryError
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +26,7 @@ def test_the_difference_is_kept_and_starts_and_goals_with_their_velocities(shape
     learned = DMP(formulation, gating=gating).learn(shapes)
     arms = learned[:7], learned[7:]
     pair = couple(*arms, during=(0.3, 0.7))
-    before, after = paths([kineme.Primitives.from_rollout(one.rollout()) for one in arms]), paths(pair)
+    before, after = paths([kineme.dmp.Primitives.from_rollout(one.rollout()) for one in arms]), paths(pair)
     extent = max(np.ptp(one, axis=1).max() for one in before)
     difference = (after[1] - after[0])[:, 120:281]
     assert np.ptp(difference, axis=1).max() < 2e-5 * extent

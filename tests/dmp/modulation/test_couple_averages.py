@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme import DMP, Primitives, TrajectoryError, couple, join
+from kineme import DMP, couple, join
+from kineme.dmp import Primitives
 from kineme.dmp.discrete.formulations import FORMULATIONS
+from kineme.errors import TrajectoryError
 from kineme.styles import average
 
 

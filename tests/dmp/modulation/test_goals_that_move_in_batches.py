@@ -8,8 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import kineme
-from kineme import DMP, Primitives, SpecificationError, TrajectoryError
+from kineme import DMP
+from kineme.dmp import Primitives
 from kineme.dmp.discrete.formulations import FORMULATIONS
+from kineme.errors import SpecificationError, TrajectoryError
 
 DEMOS = kineme.load_lasa(["GShape"])
 

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme import DMP, Primitives, SpecificationError, TrajectoryError, blend, join
+from kineme import DMP, blend, join
+from kineme.dmp import Primitives
 from kineme.dmp.discrete.formulations import FORMULATIONS
+from kineme.errors import SpecificationError, TrajectoryError
 
 
 @pytest.fixture(scope="module")

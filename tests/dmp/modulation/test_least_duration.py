@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme import DMP, SpecificationError
+from kineme import DMP
 from kineme.dmp import base_rollout
 from kineme.dmp.discrete.formulations import FORMULATIONS
+from kineme.errors import SpecificationError
 
 
 @pytest.fixture(scope="module")

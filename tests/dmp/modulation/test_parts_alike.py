@@ -8,7 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import kineme
-from kineme import DMP, Demonstrations, Primitives, TrajectoryError, blend, couple, join
+from kineme import DMP, Demonstrations, blend, couple, join
+from kineme.dmp import Primitives
+from kineme.errors import TrajectoryError
 from kineme.movements.channels.channel import Channel, check_alike
 from kineme.movements.trajectories.movements import of_channels
 from kineme.orientation import PoseDMP, PosePrimitives, exp

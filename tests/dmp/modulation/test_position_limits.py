@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme import DMP, SpecificationError
+from kineme import DMP
 from kineme.dmp.discrete.formulations import FORMULATIONS
 from kineme.dmp.discrete.specification import FITS, GATINGS
+from kineme.errors import SpecificationError
 
 
 @pytest.fixture(scope="module")

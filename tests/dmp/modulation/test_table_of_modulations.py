@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme import KinemeError
+from kineme.errors import KinemeError
 from kineme.orientation import PoseDMP, exp
 from kineme.styles import average
 
@@ -55,7 +55,7 @@ def through(one):
 
 def controlled(one):
     if isinstance(one, kineme.styles.AveragePrimitive):
-        return kineme.Primitives.from_rollout(one.rollout(via=through(one))).controller(0.01)
+        return kineme.dmp.Primitives.from_rollout(one.rollout(via=through(one))).controller(0.01)
     return one.controller(0.01, via=through(one))
 
 

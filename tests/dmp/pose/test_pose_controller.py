@@ -102,13 +102,13 @@ def test_nothing_raises_in_mid_motion(name, value):
 def test_one_primitive_at_a_time():
     both = PoseDMP().learn([tumble(0), tumble(1)])
     with pytest.raises(
-        kineme.SpecificationError,
+        kineme.errors.SpecificationError,
         match=r"expected one primitive to control, got 2; choose one: primitives\[0\].controller\(dt\)",
     ):
         both.controller(0.02)
-    with pytest.raises(kineme.SpecificationError, match="got 3"):
+    with pytest.raises(kineme.errors.SpecificationError, match="got 3"):
         both[0].controller(0.02, goal=random_quaternions(0, 3))
-    with pytest.raises(kineme.TrajectoryError, match=r"goal: .*expected a unit quaternion"):
+    with pytest.raises(kineme.errors.TrajectoryError, match=r"goal: .*expected a unit quaternion"):
         both[0].controller(0.02, goal=[2.0, 0, 0, 0])
 
 

@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kineme import DMP, Demonstrations, ExtrapolationWarning, SpecificationError, TrajectoryError
+from kineme import DMP, Demonstrations
 from kineme.dmp.discrete.formulations import FORMULATIONS
 from kineme.dmp.discrete.specification import GATINGS
+from kineme.errors import ExtrapolationWarning, SpecificationError, TrajectoryError
 from kineme.movements.channels.channel import Channel
 from kineme.movements.trajectories.movements import of_channels
 from kineme.orientation import PoseDMP, PosePrimitives, conjugate, exp, log, product

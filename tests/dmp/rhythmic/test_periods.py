@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kineme import RhythmicDMP, TrajectoryError
+from kineme import RhythmicDMP
 from kineme.dmp.rhythmic.encode import dissimilarity, find_cycles
 from kineme.dmp.rhythmic.operators import as_real, fit_harmonics, waves
+from kineme.errors import TrajectoryError
 
 SEEDS = st.integers(0, 10_000)
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kineme import RhythmicDMP, Smooth, SpecificationError, Trajectory, TrajectoryError
+from kineme import RhythmicDMP, Smooth, Trajectory
+from kineme.errors import SpecificationError, TrajectoryError
 
 T = np.linspace(0.0, 3.0, 100)
 WAVE = Trajectory(T, np.sin(2 * np.pi * T), name="wave")

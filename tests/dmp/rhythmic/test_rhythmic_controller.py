@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kineme import RhythmicDMP, SpecificationError, TrajectoryError
+from kineme import RhythmicDMP
 from kineme.control import RhythmicState, State, Status
+from kineme.errors import SpecificationError, TrajectoryError
 from soaking import SOAK
 
 

@@ -10,8 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import kineme
-from kineme import ExtrapolationWarning, RhythmicDMP, SpecificationError, TrajectoryError
+from kineme import RhythmicDMP
 from kineme.dmp.rhythmic.operators import limit_cycle
+from kineme.errors import ExtrapolationWarning, SpecificationError, TrajectoryError
 
 SPECIFICATIONS = [RhythmicDMP(fit=fit, n_basis=n) for fit in ("trajectory", "forcing") for n in (15, 30)]
 each = pytest.mark.parametrize("dmp", SPECIFICATIONS, ids=lambda dmp: f"{dmp.fit}-{dmp.n_basis}")

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kineme import DMP, TrajectoryError
+from kineme import DMP
+from kineme.errors import TrajectoryError
 from kineme.styles import average, average_by_label, learn_styles
 
 any_seed = given(seed=st.integers(0, 10**6))

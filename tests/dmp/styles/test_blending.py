@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kineme import DMP, SpecificationError
+from kineme import DMP
 from kineme.dmp.styles.parameters import map_rows, path_matrix
+from kineme.errors import SpecificationError
 from kineme.styles import average
 
 AT = 60

@@ -10,8 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kineme import DMP, Demonstrations, ExtrapolationWarning, SpecificationError, TrajectoryError
+from kineme import DMP, Demonstrations
 from kineme.dmp.styles.parameters import path_matrix, to_numbers
+from kineme.errors import ExtrapolationWarning, SpecificationError, TrajectoryError
 from kineme.styles import average
 
 any_seed = given(seed=st.integers(0, 10**6))
@@ -19,7 +20,7 @@ AT = 101  # samples: t = 0.25 is sample 25
 
 
 #: Where a point is outside what was demonstrated, it is not what is tested.
-pytestmark = pytest.mark.filterwarnings("ignore::kineme.ExtrapolationWarning")
+pytestmark = pytest.mark.filterwarnings("ignore::kineme.errors.ExtrapolationWarning")
 
 
 @pytest.fixture(scope="session")

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from kineme import DMP, SpecificationError, TrajectoryError
+from kineme import DMP
 from kineme.dmp.styles.parameters import map_rows, path_matrix
+from kineme.errors import SpecificationError, TrajectoryError
 from kineme.styles import average
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kineme import DMP, RhythmicDMP, SpecificationError, TrajectoryError
+from kineme import DMP, RhythmicDMP
+from kineme.errors import SpecificationError, TrajectoryError
 from kineme.styles import average, average_by_label, learn_styles
 
 

@@ -53,7 +53,7 @@ def test_what_is_no_recording_is_left_out_with_the_reason(folder, make_movement)
 
 def test_a_folder_that_is_not_there_is_refused():
     with pytest.raises(
-        kineme.DataError, match="expected lasa, lasa-letters, a folder or a file, found nothing at 'nowhere'"
+        kineme.errors.DataError, match="expected lasa, lasa-letters, a folder or a file, found nothing at 'nowhere'"
     ):
         load_data("nowhere")
 
@@ -61,15 +61,15 @@ def test_a_folder_that_is_not_there_is_refused():
 def test_one_class_is_not_enough(folder):
     for path in (folder / "wave").iterdir():
         path.unlink()
-    with pytest.raises(kineme.DataError, match=r"two folders of at least two recordings .* found {'point': 3}"):
+    with pytest.raises(kineme.errors.DataError, match=r"two folders of at least two recordings .* found {'point': 3}"):
         load_data(str(folder))
 
 
 def test_an_empty_folder_says_so_and_the_first_reason_is_shown(tmp_path):
-    with pytest.raises(kineme.DataError, match=r"expected recordings in .* found none"):
+    with pytest.raises(kineme.errors.DataError, match=r"expected recordings in .* found none"):
         load_data(str(tmp_path))
     (tmp_path / "a.csv").write_text("")
-    with pytest.raises(kineme.DataError, match=r"1 could not be read, the first a\.csv: expected samples"):
+    with pytest.raises(kineme.errors.DataError, match=r"1 could not be read, the first a\.csv: expected samples"):
         load_data(str(tmp_path))
 
 

@@ -54,7 +54,7 @@ def test_nothing_is_known_without_the_array_or_of_one_person(archive):
 
 
 def test_too_few_people_are_refused(archive):
-    with pytest.raises(kineme.DataError, match=r"expected a person for each movement in gestures\.npz, got 3"):
+    with pytest.raises(kineme.errors.DataError, match=r"expected a person for each movement in gestures\.npz, got 3"):
         load_data(str(archive(people=np.array(["a", "b", "c"]))))
 
 

@@ -114,7 +114,7 @@ def test_a_method_that_breaks_on_import_is_reported(tmp_path, monkeypatch):
 
 
 def test_the_group_to_install_is_named():
-    with pytest.raises(kineme.SpecificationError, match=r"'no_such_package', .* pip install 'kineme\[rivals\]'"):
+    with pytest.raises(kineme.errors.SpecificationError, match=r"'no_such_package', .* pip install 'kineme\[rivals\]'"):
         optional_module("no_such_package.part")
 
 

@@ -81,15 +81,15 @@ def test_a_movement_may_end_a_second_beside_the_messages(tmp_path):
 def test_a_bag_is_not_copied_over_itself_nor_as_another_kind(tmp_path):
     source = bag(tmp_path, "ros1")
     before = source.read_bytes()
-    with pytest.raises(kineme.DataError, match=r"expected another path for the copy than the recording"):
+    with pytest.raises(kineme.errors.DataError, match=r"expected another path for the copy than the recording"):
         write_annotations(source, [one(0, 1, "a")], [source])
-    with pytest.raises(kineme.DataError, match=r"ends in \.bag for a copy of run\.bag, got b\.mcap"):
+    with pytest.raises(kineme.errors.DataError, match=r"ends in \.bag for a copy of run\.bag, got b\.mcap"):
         write_annotations(tmp_path / "b.mcap", [one(0, 1, "a")], [source])
     assert source.read_bytes() == before
     folder = bag(tmp_path, "mcap")
-    with pytest.raises(kineme.DataError, match=r"expected the name of a folder"):
+    with pytest.raises(kineme.errors.DataError, match=r"expected the name of a folder"):
         write_annotations(tmp_path / "b.mcap", [one(0, 1, "a")], [folder])
-    with pytest.raises(kineme.DataError, match=r"or one inside"):
+    with pytest.raises(kineme.errors.DataError, match=r"or one inside"):
         write_annotations(folder / "b", [one(0, 1, "a")], [folder])
 
 
@@ -97,7 +97,7 @@ def test_nothing_is_left_of_a_copy_that_fails(tmp_path):
     source = bag(tmp_path, "mcap")
     write_annotations(tmp_path / "once", [one(1.7e9, 1.7e9 + 0.1, "a")], [source])
     before = sorted(tmp_path.iterdir())
-    with pytest.raises(kineme.DataError, match="got one that has it"):
+    with pytest.raises(kineme.errors.DataError, match="got one that has it"):
         write_annotations(tmp_path / "twice", [one(1.7e9, 1.7e9 + 0.1, "a")], [tmp_path / "once"])
     assert sorted(tmp_path.iterdir()) == before
 
@@ -106,7 +106,7 @@ def test_a_folder_with_files_is_never_written_over(tmp_path):
     source = bag(tmp_path, "mcap")
     (tmp_path / "named").mkdir()
     (tmp_path / "named" / "thesis.txt").write_text("mine")
-    with pytest.raises(kineme.DataError, match=r"expected a new folder .* is there; name another, or remove it"):
+    with pytest.raises(kineme.errors.DataError, match=r"expected a new folder .* is there; name another, or remove it"):
         write_annotations(tmp_path / "named", [one(0, 1, "a")], [source])
     assert [path.name for path in (tmp_path / "named").iterdir()] == ["thesis.txt"]
 
@@ -129,5 +129,5 @@ def test_a_lerobot_set_says_it_on_the_frames(tmp_path):
     frames = pandas.read_parquet(two / "data" / "chunk-000" / "episode_000000.parquet")
     (text,) = set(frames["annotation.motion"])
     assert [json.loads(row["content"])["symbol"] for row in json.loads(text)] == ["wave"]
-    with pytest.raises(kineme.DataError, match="expected annotations of episodes, got one of 'run 3'"):
+    with pytest.raises(kineme.errors.DataError, match="expected annotations of episodes, got one of 'run 3'"):
         write_annotations(tmp_path / "three", [one(0, 1, "a", "run 3")], [source])

@@ -112,7 +112,7 @@ def test_poses_are_learned_as_recorded():
 def test_channels_that_are_no_pose_are_refused_by_name():
     both, _ = poses()
     two = replace(both.movements, channels=(*XYZ[:2], Q, GRIPPER), positions=both.positions[:, 1:])
-    with pytest.raises(kineme.TrajectoryError, match=r"x \(position\), y \(position\), q \(orientation\)"):
+    with pytest.raises(kineme.errors.TrajectoryError, match=r"x \(position\), y \(position\), q \(orientation\)"):
         as_poses(Demonstrations.of_movements(two))
 
 
@@ -133,7 +133,7 @@ def test_beside_positions_a_radian_counts_as_the_way_of_a_tool(unit, lever):
 
 
 def test_discrete_channels_alone_are_refused():
-    with pytest.raises(kineme.SpecificationError, match="a channel that moves, got gripper, all discrete"):
+    with pytest.raises(kineme.errors.SpecificationError, match="a channel that moves, got gripper, all discrete"):
         learned(np.zeros((8, 1)), np.array([0, 8]), (GRIPPER,))
 
 

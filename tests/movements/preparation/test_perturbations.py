@@ -149,13 +149,13 @@ def test_noise_has_its_standard_deviation_and_is_white():
 @pytest.mark.parametrize("name", sorted(STRENGTHS))
 @pytest.mark.parametrize("value", [-0.1, math.nan, "much"])
 def test_a_strength_that_is_none_is_refused(name, value):
-    with pytest.raises(kineme.SpecificationError, match=f"{name} to be a number of at least 0, got {value!r}"):
+    with pytest.raises(kineme.errors.SpecificationError, match=f"{name} to be a number of at least 0, got {value!r}"):
         Perturbation(**{name: value})
 
 
 @pytest.mark.parametrize("d", [1, 4])
 def test_a_rotation_needs_a_plane_or_space(make_demos, d):
-    with pytest.raises(kineme.SpecificationError, match=f"rotation=0 for movements of {d} dimensions, got 0.3"):
+    with pytest.raises(kineme.errors.SpecificationError, match=f"rotation=0 for movements of {d} dimensions, got 0.3"):
         Perturbation(rotation=0.3).apply(make_demos(0, d), 0)
     assert Perturbation(rotation=0.3, noise=0.1).in_dimensions(d) == Perturbation(noise=0.1)
     Perturbation(**STRENGTHS).in_dimensions(d).apply(make_demos(0, d), 0)

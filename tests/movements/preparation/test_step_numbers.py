@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kineme import Resample, Smooth, Trajectory, TrimRest, preprocess
-from kineme.features.random_binning import RandomBinning
+from kineme.kernels.random_binning import RandomBinning
 from kineme.movements.preparation.resample import arc_length_phase
 
 

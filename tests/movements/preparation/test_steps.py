@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kineme import DMP, Demonstrations, Resample, Smooth, SpecificationError, TrimRest, preprocess
+from kineme import DMP, Demonstrations, Resample, Smooth, TrimRest, preprocess
+from kineme.errors import SpecificationError
 
 
 def _one(x, times=None):

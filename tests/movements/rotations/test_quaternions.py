@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation, Slerp
 
-from kineme import KinemeError, orientation
-from kineme.errors import TrajectoryError
+from kineme import orientation
+from kineme.errors import KinemeError, TrajectoryError
 from kineme.movements.rotations import matrices_of, nearest, quaternion_of, rotated
 from kineme.orientation import angle_between, conjugate, continuous, exp, log, normalized, product, slerp
 from rotation_samples import as_rotation, random_quaternions, seeds

@@ -8,7 +8,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from kineme import KinemeError, Recognizer, Trajectory, segment
+from kineme import Recognizer, Trajectory, segment
+from kineme.errors import KinemeError
 
 KINDS = {
     "constant": lambda rng, n, d: np.zeros((n, d)),

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme import SpecificationError, Trajectory, TrajectoryError
+from kineme import Trajectory
+from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.segmentation.table import Rest
 
 T = np.linspace(0, 2, 200)

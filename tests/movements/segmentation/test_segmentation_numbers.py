@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kineme import Trajectory, TrajectoryError, segment
+from kineme import Trajectory, segment
+from kineme.errors import TrajectoryError
 from kineme.movements.segmentation.motion import Motion, noise_variance, observe, onset_rows
 
 

@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kineme import DMP, Demonstrations, KinemeError, Trajectory, TrajectoryError, orientation, styles
-from kineme.features.random_binning import RandomBinning
+from kineme import DMP, Demonstrations, Trajectory, orientation, styles
+from kineme.errors import KinemeError, TrajectoryError
+from kineme.kernels.random_binning import RandomBinning
 
 T = np.linspace(0, 1, 8)
 X = np.column_stack((T, T**2))

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme import Demonstrations, TrajectoryError
+from kineme import Demonstrations
+from kineme.errors import TrajectoryError
 
 pd = pytest.importorskip("pandas")
 

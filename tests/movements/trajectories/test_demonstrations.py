@@ -7,7 +7,8 @@ from collections import deque
 import numpy as np
 import pytest
 
-from kineme import Demonstrations, Trajectory, TrajectoryError
+from kineme import Demonstrations, Trajectory
+from kineme.errors import TrajectoryError
 from kineme.movements.trajectories.demonstrations import require_labels
 
 

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme import Demonstrations, Recognizer, Trajectory, TrajectoryError
+from kineme import Demonstrations, Recognizer, Trajectory
+from kineme.errors import TrajectoryError
 from kineme.io.reading.recordings import read_recordings_from_bytes
 from kineme.movements.tables.layout import Layout
 from kineme.movements.trajectories.labels import label_array
@@ -78,8 +79,8 @@ def test_one_long_label_costs_its_own_length(tmp_path):
     demos = recordings.demonstrations
     kept = Demonstrations(list(demos))[np.arange(len(demos))]
     learned = kineme.DMP(n_basis=5).learn(kept)
-    kineme.Primitives.concatenate([learned, learned]).save(tmp_path / "learned")
-    assert kineme.Primitives.load(tmp_path / "learned").labels[7] == long
+    kineme.dmp.Primitives.concatenate([learned, learned]).save(tmp_path / "learned")
+    assert kineme.dmp.Primitives.load(tmp_path / "learned").labels[7] == long
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert kept.labels.dtype == object

@@ -50,7 +50,9 @@ def test_a_list_may_hold_arrays_beside_trajectories():
     demos = Demonstrations.of([Trajectory(T, X), X, Demonstrations.of([X]), np.stack((X, X))])
     assert len(demos) == 5
     _same(demos[1:2], Demonstrations.of([X]))
-    with pytest.raises(kineme.TrajectoryError, match="index 1 of the list: the movement: expected at least 4 samples"):
+    with pytest.raises(
+        kineme.errors.TrajectoryError, match="index 1 of the list: the movement: expected at least 4 samples"
+    ):
         Demonstrations.of([Trajectory(T, X), X[:2].repeat(40, 1)])
 
 
@@ -65,7 +67,9 @@ def test_a_stand_in_that_has_every_attribute_holds_no_movements():
     circle = SimpleNamespace()
     circle.demonstrations = SimpleNamespace(demonstrations=circle)
     for odd in (Endless(), circle):
-        with pytest.raises(kineme.TrajectoryError, match=rf"expected movements, got {type(odd).__name__}, whose demo"):
+        with pytest.raises(
+            kineme.errors.TrajectoryError, match=rf"expected movements, got {type(odd).__name__}, whose demo"
+        ):
             kineme.DMP().learn(odd)
 
 
@@ -212,5 +216,5 @@ NOT_MOVEMENTS = {
 @pytest.mark.parametrize("holder", NOT_MOVEMENTS.values(), ids=NOT_MOVEMENTS)
 def test_what_holds_something_else_than_movements_is_refused_alone_and_in_a_list(holder):
     for movements in (holder, [holder, X], [Trajectory(T, X), holder]):
-        with pytest.raises(kineme.TrajectoryError, match=r"expected movements as a list of \(T, d\) arrays"):
+        with pytest.raises(kineme.errors.TrajectoryError, match=r"expected movements as a list of \(T, d\) arrays"):
             Demonstrations.of(movements)

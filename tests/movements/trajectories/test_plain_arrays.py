@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from kineme import Demonstrations, TrajectoryError
+from kineme import Demonstrations
+from kineme.errors import TrajectoryError
 from kineme.movements.trajectories.collect import plain_block, plain_stamps
 
 

@@ -54,7 +54,9 @@ def test_pandas_has_the_columns_that_were_recorded_with_their_units():
 
 def test_pandas_is_asked_for_where_it_is_missing(monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(kineme.DataError, match="expected the package pandas for a data frame; pip install pandas"):
+    with pytest.raises(
+        kineme.errors.DataError, match="expected the package pandas for a data frame; pip install pandas"
+    ):
         RAGGED.to_pandas()
 
 

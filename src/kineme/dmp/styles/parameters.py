@@ -42,7 +42,7 @@ def check_primitives(primitives: Any) -> None:
     """Refuse movements that are not learned yet, and rhythms and poses, which are no such numbers."""
     if not isinstance(primitives, Primitives):
         raise TrajectoryError(
-            f"expected kineme.Primitives, got {type(primitives).__name__}; learn movements first, "
+            f"expected kineme.dmp.Primitives, got {type(primitives).__name__}; learn movements first, "
             "kineme.DMP().learn(movements), and take the tangent of pose primitives"
         )
 

@@ -232,7 +232,7 @@ export function encode({ header, arrays }, one) {
  */
 
 /**
- * The movement to a new start and goal; see `kineme.Primitives.rollout`.
+ * The movement to a new start and goal; see `kineme.dmp.Primitives.rollout`.
  * @param {import("./arrays.js").Snapshot} snapshot
  * @param {Primitive} one
  * @param {Wish} [asked]

@@ -10,7 +10,7 @@ from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.utils.validation import check_is_fitted
 
 from kineme.errors import SpecificationError
-from kineme.kernels import TruncatedEuclidean
+from kineme.kernels.table import TruncatedEuclidean
 from kineme.validation import Array, as_numbers, check_count, check_number, check_seed
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ class RandomBinning(TransformerMixin, BaseEstimator):
     Examples
     --------
     >>> import numpy as np
-    >>> from kineme.features.random_binning import RandomBinning
+    >>> from kineme.kernels.random_binning import RandomBinning
     >>> from kineme.kernels import TruncatedEuclidean
     >>> X = np.random.default_rng(0).normal(size=(5, 200))
     >>> Z = RandomBinning(m=1.0, n_shifts=500).fit_transform(X)

@@ -7,8 +7,8 @@ from sklearn.pipeline import make_pipeline
 from sklearn.svm import SVC, LinearSVC
 
 import kineme
-from kineme.features.random_binning import RandomBinning
 from kineme.kernels import TruncatedEuclidean
+from kineme.kernels.random_binning import RandomBinning
 
 
 def rows(seed=0, n=20, p=30):
@@ -87,5 +87,5 @@ def test_it_is_a_scikit_learn_transformer():
     ],
 )
 def test_what_cannot_be_used_is_refused(call, words):
-    with pytest.raises(kineme.SpecificationError, match=words):
+    with pytest.raises(kineme.errors.SpecificationError, match=words):
         call()

@@ -1,0 +1,11 @@
+# Recognition
+from kineme.similarity.representation import Representation as Representation
+from kineme.kernels.soft_rotation import RotationPrior as RotationPrior
+from kineme.recognition.answer import Answer as Answer
+from kineme.recognition.early.hypotheses import Early as Early
+from kineme.recognition.early.stream import Live as Live
+from kineme.recognition.early.live_state import LiveState as LiveState
+from kineme.recognition.outliers import Outlier as Outlier
+from kineme.recognition.outliers import Outliers as Outliers
+
+__all__: list[str]
