@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,8 +126,6 @@ def _stamps(rows: Sequence[Row], about: Sequence[tuple[Any, ...]], kind: Any) ->
     )
 
 
-Table = NDArray[np.int64]
-
 _SHOWN = 100  # messages per check
 _BATCH_BYTES = 1 << 24  # of rows whose contents are checked together
 _ROW_BYTES = 512  # memory of a row beside its bytes
@@ -176,11 +174,12 @@ def verify(store: Store, *, pages: bool = True) -> list[Problem]:
             *((_structure,) if pages else ()),
             *(_rows(table, store) for table in COLUMNS if has_table(connection, table)),
             _references,
+            _without(*_COMPLETE),
             _completeness,
-            _sizes(store),
+            _without(*_sizes(store)),
         ]
         problems = [problem for check in checks for problem in _all_of(check, connection)]
-        return problems or _all_of(lives, connection)  # relations between rows are checked only if each row is valid
+        return problems or _all_of(_without(*LIVES), connection)  # of rows that are valid one by one
 
 
 def blame(store: Store, error: BaseException) -> None:
@@ -290,10 +289,6 @@ def _references(connection: sqlite3.Connection) -> Iterator[Problem]:
 
 
 def _completeness(connection: sqlite3.Connection) -> Iterator[Problem]:
-    for table in BLOBS:
-        query = f"SELECT id FROM movement WHERE id NOT IN (SELECT movement FROM {table}) LIMIT {_SHOWN}"
-        for (key,) in connection.execute(query):
-            yield _problem(table, key, "not there")
     for table in ("version", "movement"):
         last, n = connection.execute(f"SELECT coalesce(max(id), 0), count(*) FROM {table}").fetchone()
         if last != n:
@@ -307,7 +302,34 @@ def _completeness(connection: sqlite3.Connection) -> Iterator[Problem]:
         yield Problem("meta", "n_dims", "row n_dims of table meta: not there")
 
 
-def _sizes(store: Store) -> Check:
+class Constraint(NamedTuple):
+    """Rows of a table that must not be there: a query of their keys, and what is wrong with them."""
+
+    table: str
+    query: str
+    words: str
+
+
+def _without(*constraints: Constraint) -> Check:
+    """Check that no row breaks one of these constraints."""
+
+    def check(connection: sqlite3.Connection) -> Iterator[Problem]:
+        for table, query, words in constraints:
+            if has_table(connection, table):
+                yield from (_problem(table, key, words) for (key,) in connection.execute(f"{query} LIMIT {_SHOWN}"))
+
+    return check
+
+
+#: Each movement has its samples, primitive and features.
+_COMPLETE = [
+    Constraint(table, f"SELECT id FROM movement WHERE id NOT IN (SELECT movement FROM {table})", "not there")
+    for table in BLOBS
+]
+
+
+def _sizes(store: Store) -> list[Constraint]:
+    """Return the constraints on the sizes of rows, which follow from the specification."""
     specification, d = store.specification, store.n_dims or 0
     n_features, n_weights = sum(specification.widths(d)), d * specification.dmp.n_basis
     expected = {
@@ -316,103 +338,63 @@ def _sizes(store: Store) -> Check:
         "primitive": f"length(boundary) = {32 * d} AND length(weights) = {4 * n_weights}",
         "feature": f"length(rows) = {4 * n_features}",
     }
-
     if channels := store.channels:
         expected["recorded"] = f"length(columns) = {4 * len(other_columns(channels))} * n_samples"
-
-    def check(connection: sqlite3.Connection) -> Iterator[Problem]:
-        for table, fits in expected.items():
-            if not has_table(connection, table):
-                continue
-            query = f"SELECT id FROM {table} JOIN movement ON id = movement WHERE NOT ({fits}) LIMIT {_SHOWN}"
-            for (key,) in connection.execute(query):
-                yield _problem(table, key, "of the wrong size")
-
-    return check
+    return [
+        Constraint(
+            table, f"SELECT id FROM {table} JOIN movement ON id = movement WHERE NOT ({fits})", "of the wrong size"
+        )
+        for table, fits in expected.items()
+    ]
 
 
-def lives(connection: sqlite3.Connection) -> Iterator[Problem]:
-    """Find contradictions between the lifetimes of rows. Expects a library whose rows are valid one by one."""
-    yield from _counted(connection)
-    movement = _columns(connection, "movement", "id")
-    state = _columns(connection, "symbol_state", "symbol")
-    member = _columns(connection, "member", "movement")
-    symbol = _columns(connection, "member", "symbol")
-    yield from _apart("member", member, "the movement shows two symbols at a time")
-    returned = [key for (key,) in connection.execute("SELECT id FROM version WHERE action IN (?, ?)", RETURNS)]
-    gaps = "is not there for a while"  # none but those of symbols that were deleted, until they were there again
-    yield from _apart("symbol_state", state, "the symbol has two states at a time", gaps, returned)
-    yield from _apart("symbol_state", _named(connection), "two symbols have its name at a time")
-    yield from _within("member", member, movement, "its movement")
-    yield from _within("member", symbol, _spans(state), "its symbol")
-    yield from _within("symbol_state", _columns(connection, "symbol_state", "prototype"), movement, "its prototype")
+_END = f"coalesce(removed, {LARGEST_ID})"
 
 
-def _counted(connection: sqlite3.Connection) -> Iterator[Problem]:
-    """Check the number of rows that are alive, which each version states."""
-    names = list(COUNTED.values())
-    said = _table(connection, f"SELECT id, {', '.join(names)} FROM version ORDER BY id", 1 + len(names))
-    n = len(said)
-    for table, name in COUNTED.items():
-        alive = np.zeros(n + 1, dtype=np.int64)
-        for column, sign in (("added", 1), ("removed", -1)):
-            query = f"SELECT {column}, count(*) FROM {table} WHERE {column} IS NOT NULL GROUP BY {column}"
-            at = _table(connection, query, 2)
-            alive[at[:, 0]] += sign * at[:, 1]
-        wrong = np.flatnonzero(np.cumsum(alive)[1:] != said[:, 1 + names.index(name)])
-        yield from (_problem("version", int(said[k, 0]), f"counts other {name} than there are") for k in wrong)
-
-
-def _table(connection: sqlite3.Connection, query: str, width: int) -> Table:
-    return np.array(connection.execute(query).fetchall(), dtype=np.int64).reshape(-1, width)
-
-
-def _columns(connection: sqlite3.Connection, table: str, whose: str) -> Table:
-    """Return rows (key, owner, added, removed), ordered by owner, then by time."""
-    query = f"SELECT id, {whose}, added, coalesce(removed, {LARGEST_ID}) FROM {table} WHERE {whose} IS NOT NULL"
-    rows = _table(connection, query, 4)
-    return rows[np.lexsort((rows[:, 3], rows[:, 2], rows[:, 1]))]
-
-
-def _named(connection: sqlite3.Connection) -> Table:
-    """Return `_columns` of the names of symbols, numbered."""
-    rows = connection.execute(f"SELECT id, name, added, coalesce(removed, {LARGEST_ID}) FROM symbol_state").fetchall()
-    numbers: dict[str, int] = {}
-    lives = [(key, numbers.setdefault(name, len(numbers)), *life) for key, name, *life in rows]
-    table = np.array(lives, dtype=np.int64).reshape(-1, 4)
-    return table[np.lexsort((table[:, 3], table[:, 2], table[:, 1]))]
-
-
-def _apart(table: str, rows: Table, words: str, gaps: str = "", returned: Sequence[int] = ()) -> Iterator[Problem]:
-    """Check that lifetimes of one owner do not overlap; and have no gaps, if `gaps` says what one would mean.
-
-    At the versions of `returned` a gap may end.
-    """
-    same = rows[1:, 1] == rows[:-1, 1]
-    yield from (_problem(table, int(key), words) for key in rows[1:][same & (rows[1:, 2] < rows[:-1, 3]), 0])
-    if gaps:
-        later = same & (rows[1:, 2] > rows[:-1, 3]) & ~np.isin(rows[1:, 2], returned)
-        yield from (_problem(table, int(key), f"the symbol {gaps}") for key in rows[1:][later, 0])
-
-
-def _spans(rows: Table) -> Table:
-    """Return one row per owner, from its first to its last version."""
-    owners, first = np.unique(rows[:, 1], return_index=True)
-    last = np.append(first[1:], len(rows)) - 1
-    return np.stack([owners, owners, rows[first, 2], rows[last, 3]], axis=1) if len(rows) else rows
-
-
-def _within(table: str, rows: Table, owners: Table, whose: str) -> Iterator[Problem]:
-    """Check that a row is alive only while the row that it refers to is."""
-    if not len(rows):
-        return
-    place = np.searchsorted(owners[:, 1], rows[:, 1])
-    there: Any = np.zeros(len(rows), dtype=bool)
-    referring = place < len(owners)
-    referred = owners[place[referring]]
-    part = rows[referring]
-    never = part[:, 2] == part[:, 3]
-    there[referring] = (referred[:, 1] == part[:, 1]) & (
-        never | ((referred[:, 2] <= part[:, 2]) & (part[:, 3] <= referred[:, 3]))
+def _counted(table: str, name: str) -> Constraint:
+    """Return the constraint that versions state how many rows of a table are alive."""
+    changes = (
+        f"SELECT added AS since, 1 AS n FROM {table} UNION ALL SELECT removed, -1 FROM {table} WHERE removed NOT NULL"
     )
-    yield from (_problem(table, int(key), f"is there when {whose} is not") for key in rows[~there, 0])
+    alive = (
+        f"SELECT id, {name} AS stated, sum(coalesce(n, 0)) OVER (ORDER BY id) AS alive FROM version "
+        f"LEFT JOIN (SELECT since, sum(n) AS n FROM ({changes}) GROUP BY since) ON since = id"
+    )
+    return Constraint(
+        "version", f"SELECT id FROM ({alive}) WHERE stated != alive", f"counts other {name} than there are"
+    )
+
+
+def _apart(table: str, owner: str, words: str, compared: str = "added < before") -> Constraint:
+    """Return the constraint on each lifetime of one owner and the one `before` it."""
+    before = f"lag({_END}) OVER (PARTITION BY {owner} ORDER BY added, {_END}, id) AS before"
+    return Constraint(table, f"SELECT id FROM (SELECT id, added, {before} FROM {table}) WHERE {compared}", words)
+
+
+def _within(table: str, column: str, owners: str, whose: str) -> Constraint:
+    """Return the constraint that a row is alive only while the row that it refers to is."""
+    alive = f"SELECT id AS key, {column} AS whose, added AS begin, {_END} AS end FROM {table} WHERE {column} NOT NULL"
+    owned = f"SELECT id AS owner, added AS first, {_END} AS last FROM {owners}"
+    is_there = "begin = end OR (first <= begin AND end <= last)"
+    query = f"SELECT key FROM ({alive}) LEFT JOIN ({owned}) ON owner = whose WHERE owner IS NULL OR NOT ({is_there})"
+    return Constraint(table, query, f"is there when {whose} is not")
+
+
+_SYMBOLS = f"(SELECT symbol AS id, min(added) AS added, max({_END}) AS removed FROM symbol_state GROUP BY symbol)"
+_RETURNED = f"SELECT id FROM version WHERE action IN ('{RETURNS[0]}', '{RETURNS[1]}')"
+
+#: Constraints on the lifetimes of rows that are valid one by one. A symbol is not there for a while only if it was
+#: deleted, and comes back by the version that takes this back.
+LIVES = (
+    *(_counted(table, name) for table, name in COUNTED.items()),
+    _apart("member", "movement", "the movement shows two symbols at a time"),
+    _apart("symbol_state", "symbol", "the symbol has two states at a time"),
+    _apart(
+        "symbol_state", "symbol", "the symbol is not there for a while",
+        f"added > before AND added NOT IN ({_RETURNED})",
+    ),
+    _apart("symbol_state", "name", "two symbols have its name at a time"),
+    _within("member", "movement", "movement", "its movement"),
+    _within("member", "symbol", _SYMBOLS, "its symbol"),
+    _within("symbol_state", "prototype", "movement", "its prototype"),
+)  # fmt: skip
