@@ -39,7 +39,6 @@ _FILES = {
     "view": (None, (".html", ".htm"), "An .html page in which the arm moves; opens in a browser, needs no network."),
 }
 
-
 #: Add an option for each file that is written.
 file_options = under(
     "Output",

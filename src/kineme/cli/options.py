@@ -13,7 +13,6 @@ from click.shell_completion import CompletionItem
 
 _PLAIN = re.compile(r"\w[\w@%+:./-]*")  # names that every shell reads as one word, and that are not options
 
-
 _MOST = 1_000_000  # largest count; more is a typing error
 _LARGEST_ID = 2**62 - 2  # of versions and movements, as in `library.storage.schema`, which --help should not load
 
@@ -25,7 +24,6 @@ def whole(least: int, most: int = _MOST) -> click.IntRange:
 
 #: Id of a movement, or number of a version.
 ID = whole(0, _LARGEST_ID)
-
 
 #: Heading of the options that say how recordings are read, the same in every command.
 READING = "Reading"

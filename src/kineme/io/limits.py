@@ -44,22 +44,19 @@ def most_in_passing() -> int:
     return max(max_file_bytes(), _IN_PASSING)
 
 
-def check_expanded(n_bytes: int, what: str = "a file") -> None:
-    """Refuse a size in memory above the limit."""
-    _check(n_bytes, max_file_bytes(), what)
-
-
-def check_in_passing(n_bytes: int, what: str) -> None:
-    """Refuse what is in memory on the way only, and above the limit on that."""
-    _check(n_bytes, most_in_passing(), what)
-
-
-def _check(n_bytes: int, most: int, what: str) -> None:
+def check_expanded(n_bytes: int, what: str = "a file", most: int | None = None) -> None:
+    """Refuse a size in memory above the limit, or above `most`; the message says how to raise it."""
+    most = max_file_bytes() if most is None else most
     if n_bytes > most:
         raise DataError(
             f"expected {what} that takes at most {most:,} bytes of memory, got one that takes {n_bytes:,}; "
             f"split it, or, if you trust it, set the environment variable {VARIABLE} to more"
         )
+
+
+def check_in_passing(n_bytes: int, what: str) -> None:
+    """Refuse what is in memory on the way only, and above the limit on that."""
+    check_expanded(n_bytes, what, most_in_passing())
 
 
 def read_limited(stream: BinaryIO) -> bytes:

@@ -26,7 +26,6 @@ from kineme.sampling import evenly_spaced
 
 _MOST = 3000  # movements that are compared at most, equally many of each symbol
 
-
 _SAME = 0.8  # share of members in a rejected proposal from which on a proposal counts as the same
 
 

@@ -14,7 +14,6 @@ from typing import Any
 #: Characters that are invisible or look like a blank, although `str.isprintable` is true of them.
 _INVISIBLE = frozenset("\u034f\u115f\u1160\u17b4\u17b5\u2800\u3164\uffa0")
 
-
 _FORMULA = re.compile(r"'*[=+\-@\t\r]")  # what makes a cell a formula, also behind quotes that `as_cell` wrote
 
 #: Longest text that is shown whole: anywhere, and in a column of a table.

@@ -44,9 +44,7 @@ from kineme.validation import Array
 #: Numbers of the stored paths, at most: 1.3 MB in base64, so that a page with all else stays below 2 MB.
 MOST_NUMBERS = 240_000
 
-
 _BOUNDARY = ("starts", "goals", "velocities", "durations", "extents")
-
 
 #: How the studio and its page recognize movements under way. People draw on a screen faster or slower than they showed:
 #: with 1.0 a factor of 7 either way is two standard deviations. Of 150 letters of 26 (letters2d, two of each in the

@@ -11,6 +11,7 @@ import math
 import struct
 import zlib
 from collections.abc import Container, Iterator, Mapping
+from itertools import cycle
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -59,48 +60,27 @@ def read_demos(data: bytes) -> Demos:
         variables = matrices(data, order, ("demos", "name"))
         if "demos" not in variables:
             raise ValueError("none of that name")
-        pairs = list(_pairs(variables["demos"], order))
-        if not pairs:
+        node = _node(variables["demos"], order, [0], wanted=_FIELDS)
+        demos = []
+        for cell in node if isinstance(node, list) else [node]:
+            demos += [_of_structure(record) for record in (cell if isinstance(cell, list) else [cell])]
+        if not demos:
             raise ValueError("none in it")
-        check_expanded(sum(8 * math.prod(matrix.dims) for pair in pairs for matrix in pair))
-        demos = [_arrays(numbers(t, order), numbers(x, order)) for t, x in pairs]
         name = text(variables["name"], order) if "name" in variables else None
     except (ValueError, struct.error, zlib.error) as error:
         raise DataError(f"expected a MATLAB file with 'demos', got {error}") from error
     return Demos([t for t, _ in demos], [x for _, x in demos], name or None)
 
 
-def _pairs(demos: Matrix, order: str) -> Iterator[tuple[Matrix, Matrix]]:
-    """Fields ``t`` and ``pos`` of every structure."""
-    if demos.kind == CELL:
-        children = elements(demos.content, order)
-        for _ in range(math.prod(demos.dims)):
-            yield from _of_structures(_next(children, order), order)
-    else:
-        yield from _of_structures(demos, order)
-
-
-def _of_structures(demos: Matrix, order: str) -> Iterator[tuple[Matrix, Matrix]]:
-    if demos.kind != STRUCT:
+def _of_structure(record: Any) -> tuple[Array, Array]:
+    """Times (T,) and positions (T, d) of a structure with ``t`` (T,) and ``pos`` (d, T)."""
+    if not isinstance(record, dict):
         raise ValueError("something else than structures in it")
-    parts = elements(demos.content, order)
-    next(parts, None), next(parts, None)  # the width of the names and the names
-    fields = field_names(demos, order)
-    if missing := [field for field in _FIELDS if field not in fields]:
-        raise ValueError(f"structures without {missing[0]!r}, but with {fields}")
-    for _ in range(math.prod(demos.dims)):
-        values = [_next(parts, order) for _ in fields]
-        yield values[fields.index("t")], values[fields.index("pos")]
-
-
-def _next(parts: Iterator[Element], order: str) -> Matrix:
-    part = next(parts, None)
-    if part is None:
-        raise ValueError("fewer elements than it says")
-    return as_matrix(part, order)
-
-
-def _arrays(t: Array, x: Array) -> tuple[Array, Array]:
+    if missing := [field for field in _FIELDS if field not in record]:
+        raise ValueError(f"structures without {missing[0]!r}, but with {list(record)}")
+    t, x = (record[field] for field in _FIELDS)
+    if not (isinstance(t, np.ndarray) and isinstance(x, np.ndarray)):
+        raise ValueError("something else than numbers")
     x = x[:, None] if x.ndim == 1 else x.T
     if t.ndim != 1 or x.ndim != 2 or len(t) != len(x):
         raise ValueError(f"t of shape {t.shape} and pos of shape {x.T.shape}")
@@ -113,7 +93,10 @@ def mat_movements(data: bytes, layout: Layout) -> Parsed:
     Structures with times hold one movement; cells and arrays of structures hold many. Matrices among the variables
     count only beside times or a rate, or where the caller gives the step between samples.
     """
-    variables = _variables(data)
+    try:
+        variables = matrices(data, byte_order(data))
+    except (ValueError, struct.error, zlib.error):
+        variables = {}  # no file of version 5 to 7.2, which `read_demos` says
     if "demos" in variables or not variables:
         demos = read_demos(data)
         named = Named([demos.name] * len(demos.times), "t")
@@ -133,42 +116,31 @@ def mat_movements(data: bytes, layout: Layout) -> Parsed:
     return tree_movements(tree, layout, "MATLAB")
 
 
-def _variables(data: bytes) -> dict[str, Matrix]:
-    """All variables; none of what is no file of version 5 to 7.2, which `read_demos` says."""
-    try:
-        return matrices(data, byte_order(data), _EVERYTHING)
-    except (ValueError, struct.error, zlib.error):
-        return {}
-
-
-class _Everything(Container[str]):
-    def __contains__(self, name: object) -> bool:
-        return True
-
-
-_EVERYTHING = _Everything()
-
-
 def as_tree(variables: Mapping[str, Matrix], order: str) -> dict[str, Any]:
     """Variables as a tree, in which every array has its samples along the first axis."""
     return _upright({name: _node(matrix, order, [0]) for name, matrix in variables.items()})
 
 
-def _node(matrix: Matrix, order: str, taken: list[int], depth: int = 0) -> Any:
+def _node(matrix: Matrix, order: str, taken: list[int], depth: int = 0, wanted: Container[str] | None = None) -> Any:
+    """A matrix as a branch of a tree; of structures only the wanted fields are read, which have to be real numbers."""
     if depth > _DEEPEST:
         return None
-    if matrix.kind in NUMBERS and not matrix.is_complex:
+    if matrix.kind in NUMBERS and not (matrix.is_complex and wanted is None):
         taken[0] += 8 * math.prod(matrix.dims)
         check_expanded(taken[0])
         return numbers(matrix, order)
     if matrix.kind == TEXT:
         return text(matrix, order)
     if matrix.kind == CELL:
-        return [_node(child, order, taken, depth + 1) for child in _children(matrix, order, math.prod(matrix.dims), 0)]
+        cells = _children(matrix, order, math.prod(matrix.dims), 0)
+        return [_node(cell, order, taken, depth + 1, wanted) for cell in cells]
     if matrix.kind == STRUCT:
         fields = field_names(matrix, order)
         values = _children(matrix, order, math.prod(matrix.dims) * len(fields), 2)
-        nodes = [_node(value, order, taken, depth + 1) for value in values]
+        nodes = [
+            _node(value, order, taken, depth + 1, wanted) if wanted is None or field in wanted else None
+            for field, value in zip(cycle(fields), values, strict=False)
+        ]
         rows = [dict(zip(fields, nodes[k : k + len(fields)], strict=True)) for k in range(0, len(nodes), len(fields))]
         return rows[0] if len(rows) == 1 else rows
     return None
@@ -253,8 +225,8 @@ def elements(data: memoryview, order: str) -> Iterator[Element]:
         yield Element(kind, data[start:end], at)
 
 
-def matrices(data: bytes, order: str, wanted: Container[str]) -> dict[str, Matrix]:
-    """The variables with these names; others are neither decompressed nor read."""
+def matrices(data: bytes, order: str, wanted: Container[str] | None = None) -> dict[str, Matrix]:
+    """The variables with these names, by default all; others are neither decompressed nor read."""
     variables, taken = {}, 0
     for element in elements(memoryview(data)[HEADER:], order):
         if element.type == _COMPRESSED:
@@ -263,14 +235,14 @@ def matrices(data: bytes, order: str, wanted: Container[str]) -> dict[str, Matri
             matrix = as_matrix(element, order)
         else:
             raise ValueError(f"an element of type {element.type} in place of a variable")
-        if matrix.name in wanted:
+        if wanted is None or matrix.name in wanted:
             taken += len(matrix.content)
             check_expanded(taken)
             variables[matrix.name] = matrix
     return variables
 
 
-def _expanded(packed: memoryview, order: str, wanted: Container[str]) -> Matrix:
+def _expanded(packed: memoryview, order: str, wanted: Container[str] | None) -> Matrix:
     """The matrix in a compressed element; only its header if its name is not wanted."""
     stream = zlib.decompressobj()
     head = stream.decompress(packed, _PEEK)
@@ -280,7 +252,7 @@ def _expanded(packed: memoryview, order: str, wanted: Container[str]) -> Matrix:
     if kind != _MATRIX:
         raise ValueError(f"a compressed element of type {kind} in place of a variable")
     matrix = _matrix(memoryview(head)[8 : 8 + size], order)
-    if matrix.name not in wanted:
+    if wanted is not None and matrix.name not in wanted:
         return matrix
     check_expanded(size)
     content = head + stream.decompress(stream.unconsumed_tail, max(1, 8 + size + 1 - len(head)))

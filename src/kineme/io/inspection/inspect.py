@@ -26,7 +26,6 @@ from kineme.validation import Array
 _SHOWN = 20  # lines of a list; the rest is counted
 _COLUMNS, _CHANNELS, _FILES = 24, 12, 3  # names in a line
 
-
 _MORE = 10.0  # times the extent of all others
 _LARGER = 30.0  # times the extent of the smallest movement of a label: a degree and a radian are 57 apart
 _LISTED = 6  # columns that the note on extents names

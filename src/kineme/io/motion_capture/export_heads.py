@@ -13,15 +13,11 @@ _SECTIONS = ("trajectories", "segments", "objects", "joints", "model outputs", "
 _OTHERS = ("events",)
 _QUATERNION = ("rx", "ry", "rz", "rw")
 
-
 _FIRST = "PathFileType"
-
 
 _POSES = ("x", "y", "z", "roll", "pitch", "yaw", "residual", *(f"rot[{k}]" for k in range(9)))
 
-
 _EXPECTED = ("rigid body marker", "bone marker", "trained markerset marker")  # computed from the pose, not measured
-
 
 _KEY = re.compile(
     r"(version|nrows|ncolumns|indegrees|datatype|datarate|opensimversion|num_\w+)\s*=|(datacolumns|datarows)\s+\d",

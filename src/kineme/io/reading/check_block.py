@@ -35,7 +35,6 @@ _EDGE = 0.25  # share of the samples that a column may lack at both ends, where 
 _SHOWN = 5  # columns in a message beside the first
 _ROUNDING = 1e-9  # of a gap, relative
 
-
 _VAST = np.append(10.0 ** np.arange(20, 39), np.finfo(np.float32).max)
 #: Numbers that programs write where they have no value: 999 to 9999999, 32768, 1e20 to 1e38, the largest of a float32,
 #: with either sign.

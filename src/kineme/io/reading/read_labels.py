@@ -33,7 +33,6 @@ from kineme.validation import MIN_SAMPLES, Array
 #: Share of a stretch that may lie outside its recording: somebody who labels to the end rounds it up.
 _OUTSIDE = 0.1
 
-
 _TIMES = "|".join(sorted(map(re.escape, TIME_UNITS), key=len, reverse=True))
 _UNIT = rf"(\b|_({_TIMES})$)"
 _START = re.compile(rf"(start|begin|onset|from){_UNIT}|(start|begin)[ _]?time")

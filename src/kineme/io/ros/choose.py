@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from difflib import get_close_matches
 from pathlib import Path
@@ -245,7 +245,7 @@ def connected_graph(bag: Bag, topics: Sequence[Topic], wanted: Sequence[Edge], m
             graph.parents.setdefault(edge[1], Counter())[edge[0]] += 1
             if edge not in edges:
                 edges.add(edge)
-                open_pairs = [pair for pair in open_pairs if _way(graph.edges, *pair) is None]
+                open_pairs = [pair for pair in open_pairs if pair[1] not in _ways(graph.edges, pair[0])]
                 if wanted and not open_pairs:
                     break
             if most is not None and n + 1 >= most:
@@ -265,48 +265,30 @@ def chain(graph: Graph, parent: str, child: str) -> list[Step]:
             alike = get_close_matches(frame, frames, 3)
             meant = f" (did you mean {' or '.join(alike)}?)" if alike else ""
             raise DataError(f"expected a frame {frame!r}{meant}, got the frames {listed(frames)}")
-    way = _way(edges, parent, child)
-    if way is None:
-        mine = sorted(_reached(edges, parent))
-        others = sorted(_reached(edges, child))
+    ways = _ways(edges, parent)
+    if child not in ways:
+        mine, others = sorted({*ways} - {parent}), sorted({*_ways(edges, child)} - {child})
         raise DataError(
             f"expected transforms that lead from {parent!r} to {child!r}, got none; {parent!r} is connected with "
-            f"{listed(frame for frame in mine if frame != parent)}, {child!r} with "
-            f"{listed(frame for frame in others if frame != child)}"
+            f"{listed(mine)}, {child!r} with {listed(others)}"
         )
-    return way
+    return ways[child]
 
 
-def _neighbors(edges: Iterable[Edge]) -> dict[str, list[tuple[str, Step]]]:
+def _ways(edges: Sequence[Edge], start: str) -> dict[str, list[Step]]:
+    """The shortest ways from a frame to all that are connected with it."""
     near: dict[str, list[tuple[str, Step]]] = {}
     for parent, child in edges:
         near.setdefault(parent, []).append((child, Step((parent, child), True)))
         near.setdefault(child, []).append((parent, Step((parent, child), False)))
-    return near
-
-
-def _way(edges: Sequence[Edge], start: str, end: str) -> list[Step] | None:
-    """The shortest way between two frames, or None."""
-    near, ways = _neighbors(edges), {start: list[Step]()}
-    waiting = deque([start])
-    while waiting and end not in ways:
+    ways, waiting = {start: list[Step]()}, deque([start])
+    while waiting:
         here = waiting.popleft()
         for there, step in near.get(here, ()):
             if there not in ways:
                 ways[there] = [*ways[here], step]
                 waiting.append(there)
-    return ways.get(end)
-
-
-def _reached(edges: Sequence[Edge], start: str) -> set[str]:
-    """The frames that are connected with one."""
-    near, reached, waiting = _neighbors(edges), {start}, [start]
-    while waiting:
-        for there, _ in near.get(waiting.pop(), ()):
-            if there not in reached:
-                reached.add(there)
-                waiting.append(there)
-    return reached
+    return ways
 
 
 def bag_contents(path: Path) -> list[Contents]:

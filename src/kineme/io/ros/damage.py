@@ -24,7 +24,6 @@ INFORMATION = "rosbag2_bagfile_information"
 _MOST_RATIO = 64  # of recordings; a file larger than the limit on files is expanded up to this ratio
 _AT_ONCE = 2**20
 
-
 #: File ending, or none for a folder -> what may help if the bag is damaged.
 REMEDIES = {
     ".bag": "if the recording was cut off, run rosbag reindex",

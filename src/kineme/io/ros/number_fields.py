@@ -128,7 +128,6 @@ TYPES: dict[str, MessageType] = {
     "std_msgs/msg/Float32MultiArray": MessageType(_numbers),
 }
 
-
 #: In ROS 1 both names of the type of /tf have one definition.
 _TF_1 = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 _TF_DEFINITION = "geometry_msgs/TransformStamped[] transforms\n"

@@ -27,7 +27,6 @@ _ROWS = 2**18  # rows that are decompressed at a time
 _WIDEST = 1000  # numbers in a list; images have more
 _STATE, _COMMANDS = "observation.state", frozenset({"action"})  # of LeRobot's episodes
 
-
 _LARGE, _EXPANDED = 2**26, 1000  # bytes from which on packing is looked at; times as many as repeated rows alone give
 
 

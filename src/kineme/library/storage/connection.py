@@ -69,7 +69,6 @@ _WORDS = {
 _WORDS[sqlite3.SQLITE_LOCKED] = _WORDS[sqlite3.SQLITE_BUSY]
 _WORDS[sqlite3.SQLITE_PERM] = _WORDS[sqlite3.SQLITE_READONLY]
 
-
 FILE = "library.sqlite"
 LOGS = ("-wal", "-journal")  # suffixes of the files beside a database from which SQLite may change it
 _COMPANIONS = (*LOGS, "-shm")

@@ -30,7 +30,6 @@ _NAMELESS = re.compile(
     r"(x|q|c|d|v|column|col|dim|dimension|coordinate|channel|feature|value|var|unnamed)?[ _:]*\d+", re.I
 )
 
-
 #: A rotation of a joint about an axis, one of three whose order says which is turned first: ``Hips.Zrotation``.
 _ROTATION = re.compile(r"(?P<joint>.+)\.(?P<axis>[xyz])rotation", re.I)
 

@@ -68,7 +68,6 @@ _UNIT_WORDS = {
     or (unit.quantity == "length" and (name in {"mm", "cm"} or (len(name) > 5 and name.endswith("s"))))
 }
 
-
 #: A coordinate in meters, ``hand_x_m``; an m elsewhere is too often something else.
 _IN_METERS = re.compile(r"(?:.*[\W_])?[xyz][_ ]m", re.IGNORECASE)
 _UNIT_WORD = re.compile(rf"[\W_]*(?<![a-z])({'|'.join(_UNIT_WORDS)})(?![a-z])", re.IGNORECASE)

@@ -22,7 +22,6 @@ _STILL = 1e-3  # of the same: speed at rest in a recording without noise
 _BLUR = 0.25  # time that smoothing moves a crossing outward, in cycles at the cutoff
 _REACH = 0.1  # longest extrapolation of an onset, as a share of the movement
 
-
 Rows = NDArray[np.intp]
 
 _ROUNDS = 6  # at most: peak speed and smoothing depend on each other, and are found by iteration

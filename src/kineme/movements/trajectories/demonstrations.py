@@ -25,7 +25,6 @@ from kineme.validation import Array, describe
 if TYPE_CHECKING:
     from kineme.movements.tables.layout import Column, Layout
 
-
 _SHOWN = 8  # names of dimensions
 _NESTED = 8  # records around movements; more are a mistake, such as a stand-in that has every attribute
 _ARRAYS = {np.ndarray, list, tuple, float, int}  # what lists of arrays hold

@@ -48,7 +48,6 @@ _VENDORED = {
     "vendor/viewer.js": ("robots", "view", "page", "viewer.js"),
 }
 
-
 ABOUT = """An action library: what movements are, what they are called, and how they go on.
 
 Times are in seconds, positions in the unit of the library. Numbers that are not finite are null. The websocket

@@ -38,7 +38,6 @@ from kineme.validation import Array
 
 recognition_router = APIRouter(prefix="/api", tags=["recognition"])
 
-
 _SAMPLES, _MOST_SAMPLES = 200, 20_000
 _STRONGER = (1.0, 2.0, 4.0, 8.0)  # steering that is tried until no obstacle is touched
 
