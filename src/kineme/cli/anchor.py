@@ -216,16 +216,7 @@ class Item(NamedTuple):
 
 
 class Session:
-    """Ask about each proposal and commit every answer at once.
-
-    Parameters
-    ----------
-    library : ActionLibrary
-        Opened for writing.
-    proposals : LibraryProposals
-    pictures : list of Path
-        One per proposal.
-    """
+    """Ask about each proposal and commit every answer at once; there is one picture for each."""
 
     def __init__(self, library: Any, proposals: Any, pictures: list[Path]) -> None:
         self.library = library

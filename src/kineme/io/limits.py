@@ -21,13 +21,7 @@ _IN_PASSING = 2**26
 
 
 def max_file_bytes() -> int:
-    """The limit [bytes].
-
-    Raises
-    ------
-    SpecificationError
-        The environment variable is no whole number above 0.
-    """
+    """The limit [bytes]."""
     given = os.environ.get(VARIABLE)
     if given is None:
         return _by_default()

@@ -34,18 +34,10 @@ _HEADS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
 
 
 class Npz(Mapping[str, NDArray[Any]]):
-    """The arrays in the bytes of an npz archive by name.
+    """The arrays in the bytes of an npz archive by name; `path` is for messages.
 
-    Parameters
-    ----------
-    path : Path
-        For messages.
-
-    Raises
-    ------
-    DataError
-        On construction: not an archive, or two entries of one name. On access to an array: it is damaged, takes more
-        memory than `kineme.io.limits` allows (all arrays together), or holds Python objects.
+    A `DataError` on construction: not an archive, or two entries of one name. On access to an array: it is damaged,
+    takes more memory than `kineme.io.limits` allows (all arrays together), or holds Python objects.
     """
 
     def __init__(self, data: bytes, path: Path) -> None:
@@ -136,16 +128,9 @@ def _decoded(content: bytes, name: str, path: Path, take: Callable[[int], None])
 
 
 def write_container(path: Path, kind: str, header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Path:
-    """Write a header and arrays to one file, atomically.
+    """Write a header, of what JSON can hold, and named arrays of numbers to one file, atomically.
 
-    Parameters
-    ----------
-    kind : str
-        Name of the content; `read_container` refuses a file of another one.
-    header : dict
-        Anything that JSON can hold.
-    arrays : dict
-        Name -> array of numbers.
+    `read_container` refuses a file of another `kind`.
     """
     full = {"format": FORMAT, "version": VERSION, "kind": kind, **header}
     encoded = np.frombuffer(json.dumps(full, allow_nan=False).encode(), dtype=np.uint8)
@@ -162,13 +147,8 @@ def kind_of(path: Path) -> str:
 def read_container(path: Path, kind: str) -> tuple[dict[str, Any], Mapping[str, NDArray[Any]]]:
     """Read a file of `write_container`; each array is read on first use.
 
-    Raises
-    ------
-    FileNotFoundError
-        There is no such file.
-    DataError
-        The file is foreign, truncated or damaged, of another kind, of a later version, or larger than
-        `kineme.io.limits` allows; the message says which.
+    A `DataError` says whether the file is foreign, truncated or damaged, of another kind, of a later version, or larger
+    than `kineme.io.limits` allows.
     """
     header, arrays = _read(path)
     if header.get("kind") != kind:

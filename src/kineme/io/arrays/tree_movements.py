@@ -35,11 +35,8 @@ _POINTS = frozenset({"position", "positions", "pos", "translation", "xyz", "poin
 def tree_movements(tree: Any, layout: Layout, kind: str, style: Style = NAMES, many: str = "refuse") -> Parsed:
     """The movements of a tree, see `kineme.io.arrays.trees`.
 
-    Parameters
-    ----------
-    many : {"refuse", "take"}
-        What is done with several arrays of more than one column in a movement if `layout` chooses none: they may mean
-        different things, such as states and commands, or be parts of one state.
+    Several arrays of more than one column, of which `layout` chooses none, are refused unless `many` is "take": they
+    may mean different things, such as states and commands, or be parts of one state.
     """
     movements = [movement for movement in movements_in(tree, style) if movement.entries]
     if not movements:

@@ -104,12 +104,8 @@ def movements_in(
 ) -> Iterator[Found]:
     """The movements in a tree, in its order, at the rate of the group around them where they say none.
 
-    Parameters
-    ----------
-    tree : Mapping, list, array or text
-        An array has ``shape`` and ``dtype``, and is converted to one of NumPy only when it is needed.
-    style : Style
-        `NAMES` where arrays are named, `GROUPS` where they lie in groups.
+    An array has ``shape`` and ``dtype``, and is converted to one of NumPy only when it is needed. The style is `NAMES`
+    where arrays are named, `GROUPS` where they lie in groups.
     """
     if place.count("/") > _DEEPEST:
         return

@@ -220,16 +220,8 @@ def language_leaves(kind: Any) -> list[str]:
 def with_language(old: Any, motions: Sequence[Sequence[Motion]], episode_of: NDArray[np.intp], kind: Any) -> Any:
     """The column of some rows: those of others that are there, behind them the texts of each row's episode.
 
-    Parameters
-    ----------
-    old : pyarrow array or None
-        The column so far.
-    motions : sequence of sequences of Motion
-        For each of some episodes.
-    episode_of : ndarray of shape (T,)
-        Which of them a row belongs to.
-    kind : pyarrow type
-        See `language_type`.
+    `old` is the column so far, an array of Arrow or None; `motions` are those of some episodes, `episode_of` (T,) says
+    which of these a row belongs to, and `kind` is a `language_type`.
     """
     import pyarrow as pa
 

@@ -255,14 +255,9 @@ class Frames(NamedTuple):
 
 
 def read_shard(folder: Path, shard: str, features: Mapping[str, int], taken: int) -> list[Frames]:
-    """The frames of a shard, in parts.
+    """The frames of a shard, in parts, with the features that are read, by their widths.
 
-    Parameters
-    ----------
-    features : mapping of str to int
-        Features that are read, with their widths.
-    taken : int
-        Bytes that earlier shards take, for the limit.
+    `taken` are the bytes of earlier shards, for the limit.
     """
     import pyarrow as pa
     from pyarrow import parquet

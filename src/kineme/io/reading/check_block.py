@@ -48,17 +48,10 @@ Flags = NDArray[np.bool_]
 def check_block(block: Block, file: str, layout: Layout, columns: Sequence[str]) -> tuple[Block, list[Problem]]:
     """The valid movements, gaps filled and ends cropped, and one problem for each invalid movement.
 
-    Parameters
-    ----------
-    file : str
-        Name of the file in the problems.
-    layout : Layout
-        `skip`: what is dropped for a sample that is missing, infinite, out of range, or not later than the one before:
-        its movement, or the sample alone. Movements of fewer than `MIN_SAMPLES` samples, or with an extent out of
-        range, are always dropped; the ranges are those of `kineme.validation`. `fill_gaps`: see
-        `kineme.io.reading.check_block.fill_gaps`.
-    columns : sequence of d str
-        Names of the columns.
+    `skip` of the layout says what is dropped for a sample that is missing, infinite, out of range, or not later than
+    the one before: its movement, or the sample alone. Movements of fewer than `MIN_SAMPLES` samples, or with an extent
+    out of range, are always dropped; the ranges are those of `kineme.validation`. `columns` are the d names of the
+    columns, and `file` is what problems name.
     """
     skip, problems = layout.skip, list[Problem]()
     odd = _unusable(block, skip)
@@ -234,17 +227,11 @@ def sentinels_as_missing(block: Block, columns: Sequence[str]) -> tuple[Block, t
 def fill_gaps(block: Block, columns: Sequence[str], layout: Layout) -> Block:
     """Crop movements to where all columns have values, and fill the short gaps between; other values stay missing.
 
-    Positions, and angles without their wraps, are interpolated in time by Akima's cubic polynomials (Akima, "A new
-    method of interpolation and smooth curve fitting based on local procedures", J. ACM 17, 1970), orientations by
-    turning at constant angular velocity; discrete channels keep the value before. A movement that would lose half of
-    its samples is cropped only to where those columns have values that lack fewer than a quarter at their ends.
-
-    Parameters
-    ----------
-    block : Block
-        NaN stands for a missing value; the stamps of each movement increase.
-    layout : Layout
-        `fill_gaps` is the longest gap that is filled [s], `kinds` what columns are.
+    NaN stands for a missing value, and `fill_gaps` of the layout is the longest gap that is filled [s]. Positions, and
+    angles without their wraps, are interpolated in time by Akima's cubic polynomials (Akima, "A new method of
+    interpolation and smooth curve fitting based on local procedures", J. ACM 17, 1970), orientations by turning at
+    constant angular velocity; discrete channels keep the value before. A movement that would lose half of its samples
+    is cropped only to where those columns have values that lack fewer than a quarter at their ends.
     """
     missing: Flags = np.isnan(block.positions)
     lacking = np.concatenate(([0], np.cumsum(missing.any(axis=1))))[block.offsets]

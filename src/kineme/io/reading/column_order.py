@@ -39,14 +39,9 @@ class ColumnSet(NamedTuple):
 
 
 def in_one_set(files: Sequence[FileRead], by_number: bool = False) -> ColumnSet:
-    """Files with the columns of most, in the order and in the units of these.
+    """Files, of equally many columns, with the columns of most, in the order and in the units of these.
 
-    Parameters
-    ----------
-    files : sequence of FileRead
-        Of equally many columns.
-    by_number : bool, default False
-        The caller chose the columns by their numbers: names do not matter.
+    Where the caller chose the columns `by_number`, names do not matter.
     """
     columns = [_columns(file) for file in files]
     keys = [(frozenset(own.names), sensors_of(file.path)) for file, own in zip(files, columns, strict=True)]

@@ -38,16 +38,9 @@ def join_files(files: Sequence[Placed], layout: Layout) -> list[Placed]:
 
     The samples are those of the file that has most in a second, while all of them last. Others are interpolated:
     linearly, angles without their wraps, orientations by turning evenly; a discrete channel keeps the value before.
-    Columns are named by their file, ``Gyroscope.x``; the label is the folder around that of the recording. A file that
-    covers less than half of the recording is a problem.
-
-    Parameters
-    ----------
-    files : sequence of (FileRead, Entry)
-        With all of their columns.
-    layout : Layout
-        The columns of the recordings, by the names that they have there, and their kinds. A file without any of the
-        columns that are chosen is passed over.
+    Columns are named by their file, ``Gyroscope.x``, also in the layout; the label is the folder around that of the
+    recording. A file that covers less than half of the recording is a problem; one without any of the columns that are
+    chosen is passed over. The files come with all of their columns.
     """
     result: list[Placed] = []
     for members in _folders(files).values():

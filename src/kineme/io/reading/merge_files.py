@@ -148,20 +148,11 @@ def merge_files(
     skip: str = "movement",
     by_number: bool = False,
 ) -> Recordings:
-    """One `Recordings` of all files that hold movements.
+    """One `Recordings` of all files that hold movements, and of the problems that came before.
 
-    Parameters
-    ----------
-    where : str
-        What is read, for the message.
-    problems : sequence of Problem
-        Those known before.
-    kinds : mapping, optional
-        Kinds of channels that are given, see `kineme.movements.channels.detect.find_channels`.
-    skip : {"movement", "sample"}
-        What a quaternion that is not of norm 1 costs.
-    by_number : bool, default False
-        Whether the columns of the files were chosen by their numbers, so that other names are no problem.
+    `where` is what is read, for the message where there is none. `kinds` are the channels that are given, see
+    `kineme.movements.channels.detect.find_channels`; `skip` says what a quaternion that is not of norm 1 costs. Where
+    columns were chosen `by_number`, other names are no problem.
     """
     reported = [*problems, *(problem for file in files for problem in file.problems)]
     full = [file for file in files if file.block is not None and len(file.block.labels)]
@@ -343,14 +334,8 @@ def each_person(path: Path, sources: Sequence[Source]) -> list[str | None]:
     """The person of each movement, or None where it is unknown.
 
     Where a column or a label pattern names the person, that one. In an npz archive, an array named as in `NAMES`, one
-    entry for each movement. Else the folder above that of the label: ``person/label/recording``.
-
-    Parameters
-    ----------
-    path : Path
-        The folder or file that was read.
-    sources : sequence of Source
-        Of the movements.
+    entry for each movement. Else the folder above that of the label: ``person/label/recording``. `path` is what was
+    read.
     """
     of_file = cache(lambda name: _people_in(path / name if path.is_dir() else path))
     return [source.person or _person(source, of_file(source.path)) for source in sources]

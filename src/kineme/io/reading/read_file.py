@@ -57,13 +57,8 @@ class FileRead(NamedTuple):
 def read_file(path: Path, relative: Path, layout: Layout, follow_links: bool = False) -> FileRead:
     """Read a file, or a folder that is one data set; it need not exist any more.
 
-    Parameters
-    ----------
-    relative : Path
-        Path in the result. Its innermost folder is the label of movements without one in the file, unless the format
-        takes the name of the file itself.
-    follow_links : bool, default False
-        Whether links in a data set that lead out of it are read.
+    `relative` is its path in the result. Its innermost folder is the label of movements without one in the file, unless
+    the format takes the name of the file itself.
     """
     name = as_text(relative)
     try:

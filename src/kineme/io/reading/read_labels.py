@@ -181,14 +181,11 @@ class LabelTable(NamedTuple):
 
 
 def read_labels(path: Path) -> LabelTable:
-    """Read the labels in a file.
+    """Read the labels in a file; a `DataError` names the file, and the line if there is one.
 
-    Parameters
-    ----------
-    path : Path
-        ``.eaf`` is a document of ELAN, ``.json`` a list of objects; anything else is a table whose cells are separated
-        by tabs, semicolons or commas. With heads, these name the columns; without, as Audacity and ELAN export tables,
-        the first two times are start and end, and the last column is the label.
+    ``.eaf`` is a document of ELAN, ``.json`` a list of objects; anything else is a table whose cells are separated by
+    tabs, semicolons or commas. With heads, these name the columns; without, as Audacity and ELAN export tables, the
+    first two times are start and end, and the last column is the label.
     """
     with path.open("rb") as file:
         data = read_limited(file)

@@ -27,14 +27,8 @@ Texts = Sequence[tuple[int, str]]  # time of recording [ns] and text of each mes
 def copy_with_topic(source: Path, target: Path, name: str, texts: Callable[[int, int], Texts]) -> None:
     """Copy a bag to a new file, or a folder to a new one, with a topic of texts.
 
-    Without texts it is a plain copy. Memory does not grow with the bag.
-
-    Parameters
-    ----------
-    name : str
-        The topic.
-    texts : callable
-        Of the times of the first and of the last message of the bag [ns].
+    `texts` takes the times of the first and of the last message of the bag [ns]. Without texts it is a plain copy.
+    Memory does not grow with the bag.
     """
     with open_bag(source) as bag:
         chosen = texts(int(bag.reader.start_time), int(bag.reader.end_time) - 1)

@@ -49,14 +49,9 @@ def refused(expected: str, remedy: str) -> Iterator[None]:
 
 
 def expand(compression: str, data: bytes, size: int, what: str = "a chunk") -> bytes:
-    """Expand all frames in some bytes.
+    """Expand all frames in some bytes, of "zstd", "lz4" or "bz2".
 
-    Parameters
-    ----------
-    size : int
-        How many bytes they should become; it is checked against the limit on files first.
-    what : str
-        They are, for messages.
+    `size` is how many bytes they should become, which is checked against the limit on files first.
     """
     check_in_passing(size, what)
     parts, n_bytes = [], 0

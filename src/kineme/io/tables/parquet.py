@@ -218,13 +218,7 @@ def width_of(kind: Any, file: Any, name: str) -> int:
 
 
 def rows_of_lists(column: Any, width: int, head: str) -> tuple[Array, dict[int, str]]:
-    """A list column as numbers (T, width), NaN where a row has none, and row -> what is wrong there.
-
-    Raises
-    ------
-    DataError
-        The bytes are damaged.
-    """
+    """A list column as numbers (T, width), NaN where a row has none, and row -> what is wrong there."""
     parts, n_rows = [np.empty((0, width))], 0
     faults: dict[int, str] = {}
     for chunk in getattr(column, "chunks", [column]):

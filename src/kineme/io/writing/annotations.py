@@ -262,16 +262,8 @@ def targets_of(
 ) -> dict[Path, list[Movement]]:
     """The files to write, and the movements whose annotations each of them holds.
 
-    Parameters
-    ----------
-    path : Path
-        A file; a folder where a format holds one movement in a file, and the format is named.
-    sources : sequence of Path
-        The recordings, as the user named them.
-    movements : sequence of Movement
-        All movements that are annotated.
-    name : str, optional
-        Key of `WRITERS`.
+    The path is a file, or a folder where a format, whose key of `WRITERS` is `name`, holds one movement in a file. The
+    sources are named as the user named them, and the movements are all that are annotated.
     """
     writer = writer_of(path, name, sources)
     if writer.check is not None:
@@ -298,12 +290,7 @@ def write_annotations(
     """Write annotations of recordings in the format that the name, the ending or the recording asks for.
 
     `path`, `sources`, `movements` and `name` are those of `targets_of`; by default the movements are those that have
-    annotations. A folder is created where there is a file for each movement.
-
-    Returns
-    -------
-    list of Path
-        What was written.
+    annotations. A folder is created where there is a file for each movement. What was written is returned.
     """
     groups: dict[Movement, list[Annotation]] = {key: [] for key in movements or ()}
     for annotation in annotations:

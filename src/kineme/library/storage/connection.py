@@ -242,10 +242,7 @@ def as_folder(folder: Any) -> Path:
 def new_database(path: Path) -> Iterator[Path]:
     """Context manager: a name beside `path` for a new database, which is renamed to `path`, if that does not exist.
 
-    Raises
-    ------
-    FileExistsError
-        A file of that name exists, or another process was faster; it is unchanged.
+    A FileExistsError if it does, or if another process was faster; it is unchanged.
     """
     if not path.exists():
         _remove_old_leftovers(path.parent)

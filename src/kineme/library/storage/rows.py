@@ -81,13 +81,7 @@ def strange(table: str, row: Row) -> DataError:
 
 
 def parsed(text: str) -> Any:
-    """Return JSON as plain data.
-
-    Raises
-    ------
-    ValueError
-        Invalid JSON, or nested too deeply.
-    """
+    """Return JSON as plain data; a ValueError if it is invalid, or nested too deeply."""
     try:
         return json.loads(text)
     except RecursionError as error:

@@ -101,17 +101,11 @@ def in_words(channels: Channels | None) -> str:
 
 
 def check_alike(several: Sequence[Channels | None], what: str = "part") -> None:
-    """Refuse channels whose columns do not mean the same, where that is known.
+    """Refuse channels whose columns do not mean the same, where that is known; `what` messages call each of `several`.
 
     Columns of equal names are the same, whatever their kinds were guessed to be. Those of other names may be the other
-    hand's: they need the same kinds, and not the same names in another order. Units that are known are equal.
-
-    Parameters
-    ----------
-    several : sequence of Channels or None
-        Of each part those that are learned, in the order of its columns; None where they are not known.
-    what : str, default "part"
-        What the message calls one of them.
+    hand's: they need the same kinds, and not the same names in another order. Units that are known are equal. Of each
+    part the channels are those that are learned, in the order of its columns; None where they are not known.
     """
     detected = [(i, channels) for i, channels in enumerate(several) if channels is not None]
     for i, channels in detected[1:]:

@@ -88,10 +88,7 @@ def _names_of(heads: tuple[str, ...]) -> tuple[str, ...]:
 def columns_like(positions: Array, ours: Columns, wanted: Columns, known_units: bool = True) -> Array:
     """Columns (total, m) by their names in the order and in the units of those that are `wanted`, of others no more.
 
-    Parameters
-    ----------
-    known_units : bool, default True
-        Refuse columns without a unit beside those with one; else they count as in that unit.
+    With `known_units`, columns without a unit beside those with one are refused; else they count as in that unit.
     """
     place = {name: k for k, name in enumerate(ours.names)}
     missing = [head for head, name in zip(wanted.heads, wanted.names, strict=True) if name not in place]

@@ -52,10 +52,7 @@ def off_norm(columns: Array, channels: Channels) -> Iterator[tuple[Channel, NDAr
 def canonical(columns: Array, offsets: NDArray[np.intp], channels: Channels) -> Array:
     """Recorded columns (total, m) with angles that do not jump, and quaternions of norm 1 whose signs do not either.
 
-    Parameters
-    ----------
-    columns : ndarray of shape (total, m)
-        All movements, one after the other; the norms of quaternions have been checked.
+    The norms of quaternions have been checked.
     """
     result = np.array(columns, dtype=np.float64, order="C")
     for channel, rows in zip(channels, columns_of(channels), strict=True):

@@ -67,18 +67,9 @@ class Roles(NamedTuple):
 
 
 def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, named: bool = True) -> Roles:
-    """Find the columns' roles.
+    """Find the roles of columns by their heads and what they hold, "number", "date" or "text"; choices take precedence.
 
-    Parameters
-    ----------
-    heads : sequence of str
-        One per column.
-    kinds : sequence of {"number", "date", "text"}
-        What the columns hold.
-    layout : Layout
-        The caller's choices; they take precedence.
-    named : bool, default True
-        Whether the file has heads. If not, the first column of numbers is time and the others are coordinates.
+    In a file without heads, not `named`, the first column of numbers is time and the others are coordinates.
     """
     if layout.excluded and (excluded := excluded_numbers(heads, layout.excluded)):
         heads = ["" if k in excluded else head for k, head in enumerate(heads)]

@@ -22,19 +22,11 @@ _ADVICE = "name the action, or leave the movement out"
 
 
 def label_array(labels: Any, n: int | None = None, names: Sequence[str | None] | None = None) -> NDArray[Any]:
-    """One label per movement as an array of shape (n,).
+    """One label per movement as an array of shape (n,); names of the movements are for messages.
 
     Texts, and anything else that is not a number, become an array of objects, texts as plain `str`. A NumPy array of
     fixed-width texts would make every label as large as the longest, and would merge labels that differ in trailing
     NULs. Numbers stay an array of numbers.
-
-    Parameters
-    ----------
-    labels : array_like of shape (n,)
-    n : int, optional
-        Expected number of labels; by default any.
-    names : sequence of n str or None, optional
-        Names of the movements, for messages.
     """
     if not isinstance(labels, np.ndarray):  # `np.asarray` of a list would convert numbers beside texts to texts
         labels = np.asarray(labels) if hasattr(labels, "__array__") else np.array(labels, dtype=object)
@@ -87,16 +79,8 @@ def _kind(label: Any) -> str:
 def as_indices(index: Any, n: int) -> NDArray[np.intp]:
     """Return a choice among n movements as indices from 0: of shape () for an integer, else (k,).
 
-    Parameters
-    ----------
-    index : int, slice, list of int, or mask of n bool
-        Negative integers count from the end.
-    n : int
-
-    Raises
-    ------
-    IndexError
-        Anything else, or an index out of range; the message says what was expected.
+    It is an integer, a slice, a list of integers or a mask; negative integers count from the end. An `IndexError` says
+    what was expected where it is anything else.
     """
     if isinstance(index, (bool, np.bool_)):  # as ("a", "b") == "a" is
         raise IndexError(f"expected {_WAYS}, got {index}; compare an array, numpy.array(labels) == label")

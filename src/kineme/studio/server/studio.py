@@ -47,12 +47,7 @@ class LibraryView(NamedTuple):
 class Studio:
     """An open library and what its clients share; any thread may use it.
 
-    Parameters
-    ----------
-    folder : Path
-        Of the library, which is made where there is none.
-    read_only : bool
-        Refuse every change.
+    The folder is that of the library, which is made where there is none; read only, every change is refused.
     """
 
     def __init__(self, folder: Path, read_only: bool = False) -> None:
