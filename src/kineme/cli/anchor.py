@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import click
 
-from kineme.cli.options import json_option, library_option, whole
-from kineme.cli.output import ask, confirm, say, write
+from kineme.cli.options import Parsed, json_option, library_option, whole
+from kineme.cli.output import ask, confirm, say, table, write
 from kineme.errors import KinemeError
 from kineme.reporting.text import counted, printable
 
@@ -27,19 +27,15 @@ HELP = """\
 _SHOWN = 5  # remaining movements that are listed
 
 
-class Choice(click.ParamType):  # type: ignore[type-arg]
+def _choice(text: str) -> list[int] | str:
     """Numbers of proposals separated by commas, or "all"."""
+    try:
+        return text if text == "all" else [int(part) for part in text.split(",")]
+    except ValueError:
+        raise ValueError(f"expected numbers of proposals separated by commas, or all, got {text!r}") from None
 
-    name = "1,2,...|all"
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> list[int] | str:
-        """Text as numbers."""
-        if value == "all":
-            return "all"
-        try:
-            return [int(part) for part in value.split(",")]
-        except ValueError:
-            self.fail(f"expected numbers of proposals separated by commas, or all, got {value!r}", param, ctx)
+_CHOICE = Parsed("1,2,...|all", _choice)
 
 
 @click.command(short_help="Turn unlabeled movements into symbols.")
@@ -53,8 +49,8 @@ class Choice(click.ParamType):  # type: ignore[type-arg]
 )
 @click.option("--join/--no-join", default=True, show_default=True,
               help="First add movements to the symbols that they are recognized as.")  # fmt: skip
-@click.option("--accept", type=Choice(), help="Accept these proposals without asking.")
-@click.option("--reject", type=Choice(), help="Reject these proposals, and do not propose their movements again.")
+@click.option("--accept", type=_CHOICE, help="Accept these proposals without asking.")
+@click.option("--reject", type=_CHOICE, help="Reject these proposals, and do not propose their movements again.")
 @click.option("--names", type=click.Path(exists=True, dir_okay=False, path_type=Path),
               help='A JSON file of names: {"1": "wave", "2": "nod"}.  [default: cluster 1, ...]')  # fmt: skip
 @click.option("--pictures", type=click.Path(file_okay=False, path_type=Path), default="proposals", show_default=True,
@@ -185,8 +181,6 @@ def _as_data(proposals: Any) -> dict[str, Any]:
 
 
 def _text(data: dict[str, Any], alone: str) -> str:
-    from kineme.reporting.table import Table, to_text
-
     lines = [f"{counted(n, 'movement')} joined {printable(name)}" for name, n in data["joined"].items()]
     lines += [f"{counted(n, 'movement')} would join {printable(name)}" for name, n in data["would_join"].items()]
     proposals = data["proposals"]
@@ -196,9 +190,7 @@ def _text(data: dict[str, Any], alone: str) -> str:
         for proposal in proposals
     ]  # fmt: skip
     title = f"{counted(len(proposals), 'proposal')}, {counted(len(data['left_over']), 'movement')} left over{alone}"
-    lines.append(
-        to_text(Table(title, ("number", "movements", "stability", "cohesion", "most like"), rows)) if rows else title
-    )
+    lines.append(table(("number", "movements", "stability", "cohesion", "most like"), rows, title) if rows else title)
     if data["pictures"]:
         lines.append(f"pictures: {printable(data['pictures'][0])}")
     lines += [f"{printable(name)}: {counted(n, 'movement')}" for name, n in data.get("accepted", {}).items()]

@@ -3,31 +3,24 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import click
 
-from kineme.cli.options import Finite, GroupedCommand, force_option, heading, json_option, library_option
-from kineme.cli.output import check_new, say, write
+from kineme.cli.options import Finite, GroupedCommand, Parsed, force_option, heading, json_option, library_option
+from kineme.cli.output import check_new, progress, say, table, write
 from kineme.cli.reading import differences, known_choices, layout_options, problem_lines, read, recordings_argument
 from kineme.reporting.text import counted, printable
 
 
-class Format(click.ParamType):  # type: ignore[type-arg]
+def _format(text: str) -> str:
     """A key of `kineme.io.writing.annotations.WRITERS`, which --help does not load."""
+    from kineme.io.writing.annotations import WRITERS
 
-    name = "NAME"
-
-    def convert(self, value: Any, param: Any, ctx: Any) -> str:
-        """The name, if there is such a format."""
-        from kineme.io.writing.annotations import WRITERS
-
-        if value not in WRITERS:
-            self.fail(f"expected one of {', '.join(WRITERS)}, got {value!r}", param, ctx)
-        return str(value)
+    if text not in WRITERS:
+        raise ValueError(f"expected one of {', '.join(WRITERS)}, got {text!r}")
+    return text
 
 
 @click.command(cls=GroupedCommand, short_help="Find the symbols of a library in long recordings.")
@@ -44,7 +37,9 @@ class Format(click.ParamType):  # type: ignore[type-arg]
     help="What to write: a .csv, .json, .eaf (ELAN) or .txt (Audacity) file, a folder, or a copy of a bag or of a "
     "LeRobot data set.  [default: show a table]",
 )  # fmt: skip
-@click.option("--format", "form", type=Format(), help="Format, where the ending does not say it: csv, elan, ...")
+@click.option(
+    "--format", "form", type=Parsed("NAME", _format), help="Format, where the ending does not say it: csv, elan, ..."
+)
 @json_option
 @click.option("--csv", "as_csv", is_flag=True, help="Answer in CSV.")
 @force_option
@@ -83,8 +78,10 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
                     raise click.UsageError(
                         f"expected a new folder to write, {printable(target)} is there; write over it with --force"
                     )
-        with _progress(parsed) as progress:
-            report = find(library.store, parsed, error_rate, progress)
+        total = float(parsed.demonstrations.durations.sum())
+        bar_format = "{l_bar}{bar}| {n:.0f} of {total:.0f} s [{elapsed}<{remaining}]"
+        with progress(total=total, desc="annotating", bar_format=bar_format) as bar:
+            report = find(library.store, parsed, error_rate, lambda done: bar.update(min(done, total) - bar.n))
         notes = known_choices(parsed, options, library.channels) + notes_on_gaps(parsed)
         notes += differences(library.channels, parsed.demonstrations.channels)
     written = [] if output is None else write_annotations(output, report.annotations, sources, form, movements)
@@ -94,7 +91,7 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
             as_row(each) | {"certainty": certainty(each.confidence, is_new=each.unknown, is_guess=is_guess)}
             for each in report.annotations
         ],
-        "seconds": float(parsed.demonstrations.durations.sum()),
+        "seconds": total,
         "calibrated": report.calibrated,
         "written": list(map(str, written)),
         "notes": notes,
@@ -109,24 +106,7 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
         say(as_json, data, lambda: _text(data, problems))
 
 
-@contextmanager
-def _progress(parsed: Any) -> Iterator[Callable[[float], None]]:
-    """A progress bar on a terminal, in seconds of recordings, with the time left."""
-    from tqdm import tqdm
-
-    total = float(parsed.demonstrations.durations.sum())
-    form = "{l_bar}{bar}| {n:.0f} of {total:.0f} s [{elapsed}<{remaining}]"
-    with tqdm(total=total, desc="annotating", bar_format=form, leave=False, disable=None) as bar:
-
-        def tell(done: float) -> None:
-            bar.update(min(done, total) - bar.n)
-
-        yield tell
-
-
 def _text(data: dict[str, Any], problems: list[str]) -> str:
-    from kineme.reporting.table import Table, to_text
-
     rows, written = data["annotations"], data["written"]
     symbols = [row["symbol"] for row in rows if not row["unknown"]]
     counts = f"{counted(len(symbols), 'movement')} of {counted(len(set(symbols)), 'symbol')}"
@@ -137,7 +117,7 @@ def _text(data: dict[str, Any], problems: list[str]) -> str:
         for name, row in zip(names, rows, strict=True):
             seconds[name] += row["end"] - row["start"]
         totals = [(name, f"{n:,}", f"{seconds[name]:,.1f}") for name, n in Counter(names).most_common()]
-        lines.append(to_text(Table("", ("symbol", "times", "seconds"), totals)))
+        lines.append(table(("symbol", "times", "seconds"), totals))
     elif rows:
         heads = ("recording", "start [s]", "end [s]", "symbol", "how sure")
         cells = [
@@ -150,7 +130,7 @@ def _text(data: dict[str, Any], problems: list[str]) -> str:
             )
             for name, row in zip(names, rows, strict=True)
         ]
-        lines.append(to_text(Table("", heads, cells)))
+        lines.append(table(heads, cells))
     return "\n".join([*lines, *_remarks(data, problems), *(f"written to {printable(path)}" for path in written)])
 
 

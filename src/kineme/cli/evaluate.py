@@ -10,7 +10,7 @@ import click
 from click.core import ParameterSource
 
 from kineme.cli.options import GroupedCommand, whole
-from kineme.cli.output import write
+from kineme.cli.output import progress, write
 from kineme.cli.reading import LAYOUT_OPTIONS, layout_options, read
 
 # The names of the tables in kineme_experiments.evaluation, written out so that --help loads nothing; a test compares
@@ -58,6 +58,7 @@ def evaluate(data: tuple[str, ...], protocols: tuple[str, ...], methods: tuple[s
     recognizer with the paper's configuration and with other methods, under the same splits and perturbations. Several
     data sets get a folder each. Rivals that are not installed are reported and left out: pip install 'kineme[rivals]'.
     """
+    from kineme.reporting.table import to_text
     from kineme.runtime.parallel import n_threads
     from kineme_experiments.evaluation.data import load_data
     from kineme_experiments.evaluation.methods import METHODS
@@ -76,7 +77,11 @@ def evaluate(data: tuple[str, ...], protocols: tuple[str, ...], methods: tuple[s
     sets = _numbered([load_data(data_set, reading) for data_set in data])
     for name, reason in ((name, reason) for data_set in sets for name, reason in data_set.left_out.items()):
         write(f"left out {name}: {reason}", err=True)
-    runner = Runner(options["jobs"] or n_threads(), _progress)
+
+    def watched(items: Any, total: int) -> Any:
+        return progress(items, total=total, desc="evaluating", unit="part")
+
+    runner = Runner(options["jobs"] or n_threads(), watched)
     evaluations = []
     for data_set in sets:
         chosen = protocols or tuple(name for name, each in PROTOCOLS.items() if each.runs_by_default(data_set))
@@ -84,7 +89,9 @@ def evaluate(data: tuple[str, ...], protocols: tuple[str, ...], methods: tuple[s
             run(data_set, (chosen, contenders), settings, out / data_set.name if len(sets) > 1 else out, runner)
         )
         _print(data_set.name if len(sets) > 1 else "", evaluations[-1])
-    _print_summary(summarize([data_set.name for data_set in sets], evaluations, out), evaluations[0].files[0])
+    ranks = summarize([data_set.name for data_set in sets], evaluations, out).ranks
+    write(ranks if isinstance(ranks, str) else to_text(ranks))
+    write(f"\nopen {evaluations[0].files[0]}")
 
 
 def _check_read(data: tuple[str, ...]) -> None:
@@ -119,19 +126,6 @@ def _print(name: str, evaluation: Any) -> None:
     write(f"\n{verdict(evaluation.results)}\n")
 
 
-def _print_summary(summary: Any, page: Path) -> None:
-    from kineme.reporting.table import to_text
-
-    write(summary.ranks if isinstance(summary.ranks, str) else to_text(summary.ranks))
-    write(f"\nopen {page}")
-
-
-def _progress(items: Any, total: int) -> Any:
-    from tqdm import tqdm
-
-    return tqdm(items, total=total, desc="evaluating", unit="part", leave=False, disable=None)
-
-
 @click.command(short_help="Reproduce the paper's tables and figures.")
 @click.option("--out", type=click.Path(file_okay=False, path_type=Path), default="out", show_default=True,
               help="Folder for report.html, results.json, tables.txt and the figures.")  # fmt: skip
@@ -145,14 +139,12 @@ def reproduce(out: Path, draws: int | None, seed: int, quick: bool) -> None:
     Prints Tables 1 to 4 beside the paper's numbers, what explains them, and the same on all 26 shapes; draws
     the counterparts of Figures 1 to 11.
     """
-    from tqdm import tqdm
-
     from kineme_experiments.paper.run import reproduce as run
 
-    def progress(items, total):  # type: ignore[no-untyped-def]
-        return tqdm(items, total=total, desc="reproducing", unit="part", leave=False, disable=None)
+    def watched(items: Any, total: int) -> Any:
+        return progress(items, total=total, desc="reproducing", unit="part")
 
-    result = run(out, draws or (3 if quick else 12), seed, quick, progress)
+    result = run(out, draws or (3 if quick else 12), seed, quick, watched)
     from kineme.reporting.table import to_text
 
     write("\n\n".join(map(to_text, result.tables)))

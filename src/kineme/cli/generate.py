@@ -8,9 +8,9 @@ from typing import Any
 import click
 
 from kineme.cli.options import (
+    NUMBERS,
     Finite,
     GroupedCommand,
-    Numbers,
     SymbolName,
     force_option,
     heading,
@@ -34,14 +34,14 @@ _MISSED = 0.01  # of the extent of a column
 @heading("Movement")
 @click.option(
     "--start",
-    type=Numbers(),
+    type=NUMBERS,
     help="Where it starts: a value for each column but discrete ones.  [default: as demonstrated]",
 )
-@click.option("--goal", type=Numbers(), help="Where it ends, likewise.  [default: as demonstrated]")
+@click.option("--goal", type=NUMBERS, help="Where it ends, likewise.  [default: as demonstrated]")
 @click.option("--duration", type=Finite(), help="Duration in seconds.  [default: as demonstrated]")
 @click.option("--rate", type=Finite(), default=100.0, show_default=True, help="Samples per second at least.")
 @click.option("--settle", type=Finite(), help="Continue past the duration until this close to the goal.")
-@click.option("--obstacle", "obstacles", type=Numbers(), multiple=True, help="Point to avoid; may be repeated.")
+@click.option("--obstacle", "obstacles", type=NUMBERS, multiple=True, help="Point to avoid; may be repeated.")
 @specification_options
 @layout_options
 @heading("Output")
@@ -101,7 +101,10 @@ def generate(**options: Any) -> None:
     if options["save"]:
         learned.primitive.save(options["save"])
     if options["plot"]:
-        _plot(options["plot"], learned, movement, movement_options.obstacles)
+        from kineme.dmp.generation.figure import draw_movement
+        from kineme.reporting.figures import save_figure
+
+        save_figure(draw_movement(learned, movement.columns, movement_options.obstacles), options["plot"])
     _write(options["output"], movement, ".json" if options["as_json"] else ".csv")
 
 
@@ -123,13 +126,6 @@ def _warn_of_missed_goal(learned: Any, movement: Any, goals: Any) -> None:
             f"there, say for instance --settle {_MISSED * extent:.1g}",
             err=True,
         )
-
-
-def _plot(path: Path, learned: Any, movement: Any, obstacles: Any) -> None:
-    from kineme.dmp.generation.figure import draw_movement
-    from kineme.reporting.figures import save_figure
-
-    save_figure(draw_movement(learned, movement.columns, obstacles), path)
 
 
 def _write(output: Path, movement: Any, ending: str) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from kineme.cli.options import Finite, GroupedCommand, heading, json_option
-from kineme.cli.output import say
+from kineme.cli.output import progress, say
 from kineme.cli.reading import layout_options, read, recordings_argument
 
 
@@ -64,7 +64,10 @@ def inspect(
             unlike, inspections, words = _outliers(recorded, error_rate)
             texts += [words] if words else []
         if plot is not None:
-            _draw(recorded, unlike, plot)
+            from kineme.io.inspection.figure import draw_recordings
+            from kineme.reporting.figures import save_figure
+
+            save_figure(draw_recordings(recorded, unlike), plot)
     data = as_data(summary) | inspections | ({"contents": contents_as_data(contents)} if contents else {})
     say(as_json, data, lambda: "\n\n".join([*contents_as_words(contents), *texts]))
     if recorded is None:
@@ -73,14 +76,12 @@ def inspect(
 
 def _outliers(recorded: Any, error_rate: float) -> tuple[tuple[int, ...], dict[str, Any], str]:
     """Indices of the outliers; what is said of them as data, and in words."""
-    from tqdm import tqdm
-
     from kineme.errors import KinemeError
     from kineme.recognition.outliers import find_outliers, outliers_as_data, outliers_as_words
 
     names = recorded.short_names
     try:
-        with tqdm(total=len(names), desc="comparing", unit="movement", leave=False, disable=None) as bar:
+        with progress(total=len(names), desc="comparing", unit="movement") as bar:
             outliers = find_outliers(recorded, recorded.labels, error_rate, lambda done: bar.update(done - bar.n))
     except KinemeError as error:
         return (), {}, f"outliers were not looked for: {error}"
@@ -89,10 +90,3 @@ def _outliers(recorded: Any, error_rate: float) -> tuple[tuple[int, ...], dict[s
         {"outliers": outliers_as_data(outliers, names)},
         outliers_as_words(outliers, names),
     )
-
-
-def _draw(recorded: Any, unlike: tuple[int, ...], path: Path) -> None:
-    from kineme.io.inspection.figure import draw_recordings
-    from kineme.reporting.figures import save_figure
-
-    save_figure(draw_recordings(recorded, unlike), path)

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import click
 
 from kineme.cli.options import GroupedCommand, json_option, library_option
-from kineme.cli.output import say
+from kineme.cli.output import progress, say
 from kineme.cli.reading import layout_options, problem_lines, read, recordings_argument
 from kineme.reporting.text import counted, printable
 
@@ -71,8 +69,10 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
     labels = [None if no_labels else each if label is None else label for each in parsed.labels]
     with ActionLibrary(folder, create=True) as library:
         before = library.version
-        with _progress(len(parsed)) as progress:
-            report = learn_recordings(library.store, parsed, options, labels, progress, root, people)
+        with progress(total=len(parsed), desc="learning", unit="movement") as bar:
+            report = learn_recordings(
+                library.store, parsed, options, labels, lambda done, _: bar.update(done - bar.n), root, people
+            )
         data = {
             "library": str(folder),
             "added": report.added,
@@ -142,15 +142,6 @@ def _named(library: Any, ids: Any, labels: list[Any]) -> dict[str, Any]:
         "without_symbol": sum(name is None for name in names),
         "kept": [{"symbol": symbol, "label": label, "movements": n} for (symbol, label), n in refused.items()],
     }
-
-
-@contextmanager
-def _progress(total: int) -> Iterator[Callable[[int, int], None]]:
-    """A progress bar on a terminal; it takes the number of movements done and the number of all."""
-    from tqdm import tqdm
-
-    with tqdm(total=total, desc="learning", unit="movement", leave=False, disable=None) as bar:
-        yield lambda done, _: bar.update(done - bar.n)
 
 
 def _text(data: dict[str, Any], problems: list[str]) -> str:

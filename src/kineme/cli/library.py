@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from kineme.cli.options import ID, SymbolName, json_option, library_option, whole
-from kineme.cli.output import confirm, in_words, say
+from kineme.cli.output import confirm, in_words, say, table
 from kineme.reporting.text import counted, printable
 
 
@@ -45,15 +45,13 @@ def list_symbols(folder: Path, version: int | None, as_json: bool) -> None:
         }
 
     def text() -> str:
-        from kineme.reporting.table import Table, to_text
-
         rows = [(printable(s.name), f"{len(s)}", s.id, printable(s.description)) for s in symbols]
         by = f", {sum(people.values()):,} by {counted(len(people), 'person', 'people')}" if people else ""
         title = (
             f"{counted(data['movements'], 'movement')}, {counted(len(symbols), 'symbol')}, "
             f"{unlabeled} without a symbol{by}; version {data['version']}"
         )
-        return to_text(Table(title, ("symbol", "movements", "id", "description"), rows)) if rows else title
+        return table(("symbol", "movements", "id", "description"), rows, title) if rows else title
 
     say(as_json, data, text)
 
@@ -146,13 +144,11 @@ def history(folder: Path, limit: int, as_json: bool) -> None:
     ]
 
     def text() -> str:
-        from kineme.reporting.table import Table, to_text
-
         rows = [
             (str(version.id), version.at[:19].replace("T", " "), version.action, printable(in_words(version.detail)))
             for version in versions[-limit:]
         ]
-        return to_text(Table(counted(len(versions), "version"), ("version", "at (UTC)", "action", "what"), rows))
+        return table(("version", "at (UTC)", "action", "what"), rows, counted(len(versions), "version"))
 
     say(as_json, data, text)
 
@@ -232,8 +228,6 @@ def brief(symbol: Any) -> dict[str, Any]:
 
 
 def _report_text(data: dict[str, Any]) -> str:
-    from kineme.reporting.table import Table, to_text
-
     with_people = any(member["person"] for member in data["members"])
     rows = [
         (str(member["id"]), printable(member["name"] or ""), printable(member["source"] or ""),
@@ -245,7 +239,7 @@ def _report_text(data: dict[str, Any]) -> str:
     if data["description"]:
         head += f"\n{printable(data['description'])}"
     person = ("person",) if with_people else ()
-    return to_text(Table(head, ("movement", "name", "file", *person, "duration [s]", "start", "goal"), rows))
+    return table(("movement", "name", "file", *person, "duration [s]", "start", "goal"), rows, head)
 
 
 def _point(point: list[float], member: dict[str, Any]) -> str:

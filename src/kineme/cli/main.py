@@ -83,18 +83,9 @@ def main() -> None:
     """Learn movements as Dynamical Movement Primitives, recognize them, move again."""
 
 
-main.add_command(anchor)
-main.add_command(annotate)
-main.add_command(evaluate)
-main.add_command(generate)
-main.add_command(move)
-main.add_command(inspect)
-main.add_command(learn)
-main.add_command(library)
 for command in COMMANDS:
     library.add_command(command)
-main.add_command(page)
-main.add_command(recognize)
-main.add_command(reproduce)
-main.add_command(segment)
-main.add_command(studio)
+for command in (
+    anchor, annotate, evaluate, generate, move, inspect, learn, library, page, recognize, reproduce, segment, studio
+):  # fmt: skip
+    main.add_command(command)

@@ -8,9 +8,9 @@ from typing import Any
 import click
 
 from kineme.cli.options import (
+    NUMBERS,
     Finite,
     GroupedCommand,
-    Numbers,
     SymbolName,
     heading,
     json_option,
@@ -120,14 +120,14 @@ _NEW_FOLDER = click.Path(path_type=Path, file_okay=False)
 @heading("Arm")
 @click.option("--robot", required=True, help="panda, ur5e, wam, so101, or a .urdf file.")
 @click.option("--tip", help="Link that follows the movement.  [default: the end of the arm]")
-@click.option("--from", "start", type=Numbers(), help="Where the joints stand now.  [default: the rest posture]")
-@click.option("--rest", type=Numbers(), help="Joints at rest.  [default: of the model, of a file near mid-range]")
-@click.option("--at", type=Numbers(), help="Start in the frame of the robot.  [default: where the arm does it best]")
+@click.option("--from", "start", type=NUMBERS, help="Where the joints stand now.  [default: the rest posture]")
+@click.option("--rest", type=NUMBERS, help="Joints at rest.  [default: of the model, of a file near mid-range]")
+@click.option("--at", type=NUMBERS, help="Start in the frame of the robot.  [default: where the arm does it best]")
 @click.option("--as-recorded", is_flag=True, help="Execute it where it was recorded: in the frame of the robot.")
 @click.option("--scale", type=Finite(), help="Meters for one unit of the recording.  [default: as its heads say]")
 @click.option("--plane", type=click.Choice(["xy", "xz", "yz"]), default="xy", show_default=True,
               help="Where the axes of a movement in the plane lie.")  # fmt: skip
-@click.option("--orientation", type=Numbers(), help="Of the tip: w,x,y,z.  [default: as demonstrated, else as at rest]")
+@click.option("--orientation", type=NUMBERS, help="Of the tip: w,x,y,z.  [default: as demonstrated, else as at rest]")
 @click.option("--follow", type=click.Choice(["full", "axis", "free"]), default="full", show_default=True,
               help="How much of the orientation: all, the direction of the z axis of the tip, nothing.")  # fmt: skip
 @click.option("--joints", is_flag=True, help="SOURCE moves the joints, not the tip.  [default: by its columns]")
@@ -137,7 +137,7 @@ _NEW_FOLDER = click.Path(path_type=Path, file_okay=False)
 @click.option("--max-velocity", type=Finite(), help="Of every joint, below what the model allows.")
 @click.option("--max-acceleration", type=Finite(), help="The same for accelerations.")
 @heading("Movement")
-@click.option("--goal", type=Numbers(), help="End in the frame of the robot.  [default: as demonstrated]")
+@click.option("--goal", type=NUMBERS, help="End in the frame of the robot.  [default: as demonstrated]")
 @click.option("--duration", type=Finite(), help="Duration in seconds.  [default: as demonstrated]")
 @click.option("--slow-down", is_flag=True, help="Slow the movement down as far as limits demand.")
 @click.option("--fastest", is_flag=True, help="Pass the path in the least time that the limits allow.")

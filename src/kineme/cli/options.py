@@ -95,20 +95,32 @@ class Finite(click.FloatRange):
         return number
 
 
-class Numbers(click.ParamType):  # type: ignore[type-arg]
-    """Numbers separated by commas: one per dimension."""
+class Parsed(click.ParamType):  # type: ignore[type-arg]
+    """A text that a function reads; its ValueError says what it expected."""
 
-    name = "x,y,..."
+    def __init__(self, name: str, parse: Callable[[str], Any]) -> None:
+        self.name, self.parse = name, parse
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> list[float]:
-        """Text as numbers."""
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        """The text as the function reads it; anything else as it is."""
         try:
-            numbers = [float(part) for part in value.split(",")]
-        except ValueError:
-            self.fail(f"expected numbers separated by commas, as 0.4,0.2, got {value!r}", param, ctx)
-        if not all(map(math.isfinite, numbers)):
-            self.fail(f"expected finite numbers, got {value!r}", param, ctx)
-        return numbers
+            return self.parse(value) if isinstance(value, str) else value
+        except ValueError as error:
+            self.fail(str(error), param, ctx)
+
+
+def _numbers(text: str) -> list[float]:
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        raise ValueError(f"expected numbers separated by commas, as 0.4,0.2, got {text!r}") from None
+    if not all(map(math.isfinite, numbers)):
+        raise ValueError(f"expected finite numbers, got {text!r}")
+    return numbers
+
+
+#: Numbers separated by commas: one per dimension.
+NUMBERS = Parsed("x,y,...", _numbers)
 
 
 class SymbolName(click.ParamType):  # type: ignore[type-arg]

@@ -43,6 +43,20 @@ def write_bytes(data: bytes) -> None:
     click.echo(data, nl=False)
 
 
+def progress(items: Any = None, **options: Any) -> Any:
+    """Show a bar of progress on a terminal; see `tqdm.tqdm`."""
+    from tqdm import tqdm
+
+    return tqdm(items, leave=False, disable=None, **options)  # None: on a terminal only
+
+
+def table(heads: tuple[str, ...], rows: Any, title: str = "") -> str:
+    """Lay out rows below their heads; loads only where there is a table."""
+    from kineme.reporting.table import Table, to_text
+
+    return to_text(Table(title, heads, rows))
+
+
 def ask(question: str) -> str:
     """Ask the user for a line; empty if none is entered."""
     return str(click.prompt(printable_lines(question), default="", show_default=False))

@@ -11,24 +11,12 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from kineme.cli.options import READING, SPECIFICATION, Finite, under
+from kineme.cli.options import READING, SPECIFICATION, Finite, Parsed, under
+from kineme.cli.output import progress
 from kineme.reporting.text import printable
 
 _NAMED = 6  # columns that a sentence names
 STANDARD_INPUT = "standard input.csv"
-
-
-class Unit(click.ParamType):  # type: ignore[type-arg]
-    """A unit of time by name, or its length in seconds."""
-
-    name = "s|ms|us|ns|SECONDS"
-
-    def convert(self, value: Any, param: Any, ctx: Any) -> str | float:
-        """A number if the text is one, else the name of a unit."""
-        try:
-            return float(value)
-        except ValueError:
-            return str(value)
 
 
 class Recording(click.Path):
@@ -44,45 +32,36 @@ class Recording(click.Path):
         return super().convert(value, param, ctx)
 
 
-class Level(click.ParamType):  # type: ignore[type-arg]
-    """Source of labels: task, folder, or a level of folders."""
-
-    name = "task|folder|LEVEL"
-
-    def convert(self, value: Any, param: Any, ctx: Any) -> str | int:
-        """A number if the text is one, else the word."""
-        if value in {"task", "folder"} or isinstance(value, int):
-            return value
-        if not value.isdecimal() or int(value) < 1:
-            self.fail(f"expected task, folder or a level from 1, the innermost, got {value!r}", param, ctx)
-        return int(value)
+def _unit(text: str) -> str | float:
+    """The name of a unit of time, or its length in seconds."""
+    try:
+        return float(text)
+    except ValueError:
+        return text
 
 
-class Heads(click.ParamType):  # type: ignore[type-arg]
+def _level(text: str) -> str | int:
+    if text in {"task", "folder"}:
+        return text
+    if not text.isdecimal() or int(text) < 1:
+        raise ValueError(f"expected task, folder or a level from 1, the innermost, got {text!r}")
+    return int(text)
+
+
+def _heads(text: str) -> tuple[str, ...]:
     """Columns separated by commas, as heads or as numbers counted from 0; a head with a comma stands in quotes."""
-
-    name = "a,b,..."
-
-    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[str, ...]:
-        """The columns."""
-        if isinstance(value, tuple):
-            return value
-        return tuple(part.strip() for row in csv.reader([value], skipinitialspace=True) for part in row or [""])
+    return tuple(part.strip() for row in csv.reader([text], skipinitialspace=True) for part in row or [""])
 
 
-class Kind(click.ParamType):  # type: ignore[type-arg]
+def _kind(text: str) -> tuple[str, str]:
     """Columns and their kind, as ``gripper=discrete`` or ``a,b,c,d=xyzw``."""
+    columns, mark, kind = text.rpartition("=")
+    if not mark or not columns:
+        raise ValueError(f"expected columns and their kind, as gripper=discrete, got {text!r}")
+    return columns.strip(), kind.strip()
 
-    name = "COLUMNS=KIND"
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[str, str]:
-        """The columns and the kind."""
-        if isinstance(value, tuple):
-            return value
-        columns, mark, kind = value.rpartition("=")
-        if not mark or not columns:
-            self.fail(f"expected columns and their kind, as gripper=discrete, got {value!r}", param, ctx)
-        return columns.strip(), kind.strip()
+_HEADS, _UNIT = Parsed("a,b,...", _heads), Parsed("s|ms|us|ns|SECONDS", _unit)
 
 
 def _or_none(ctx: Any, param: Any, value: tuple[Any, ...]) -> tuple[Any, ...] | None:
@@ -95,13 +74,13 @@ layout_options = under(
     READING,
     click.option("--time", metavar="COLUMN", help="Column of the time stamps."),
     click.option(
-        "--columns", type=Heads(), help="Columns of the coordinates; * and ? stand for any text and any character."
+        "--columns", type=_HEADS, help="Columns of the coordinates; * and ? stand for any text and any character.",
     ),
-    click.option("--exclude", type=Heads(), help="Columns that are left aside, named as for --columns."),
-    click.option("--movement", type=Heads(), help="Columns that distinguish the movements of a table."),
+    click.option("--exclude", type=_HEADS, help="Columns that are left aside, named as for --columns."),
+    click.option("--movement", type=_HEADS, help="Columns that distinguish the movements of a table."),
     click.option("--label-column", metavar="COLUMN", help="Column of the labels."),
     click.option("--person-column", metavar="COLUMN", help="Column of who showed the movements of a table."),
-    click.option("--units", type=Unit(), help="Unit of the time stamps, by name or in seconds."),
+    click.option("--units", type=_UNIT, help="Unit of the time stamps, by name or in seconds."),
     click.option(
         "--skip", type=click.Choice(["movement", "sample"]), default="movement", show_default=True,
         help="What is dropped for a repeated sample, or for missing values that are not filled.",
@@ -111,7 +90,7 @@ layout_options = under(
         help="Longest gap of a column that is filled, 0 for none.  [default: 0.2]",
     ),
     click.option(
-        "--kind", "kinds", type=Kind(), multiple=True, callback=_or_none,
+        "--kind", "kinds", type=Parsed("COLUMNS=KIND", _kind), multiple=True, callback=_or_none,
         help="What columns are: position, angle, discrete; of four, wxyz or xyzw, a quaternion. May be repeated.",
     ),
     click.option("--topic", multiple=True, callback=_or_none, help="Topic of a ROS bag; several are put side by side."),
@@ -124,7 +103,7 @@ layout_options = under(
         help="File names that say label and person, as {person}_{label}_{n}.csv; {n} is a number.",
     ),
     click.option(
-        "--label-by", type=Level(),
+        "--label-by", type=Parsed("task|folder|LEVEL", _level),
         help="Label by the task of LeRobot, by the innermost folder, or by the folder so many levels up.",
     ),
     click.option(
@@ -178,7 +157,14 @@ def read(paths: Path | Sequence[Path], options: dict[str, Any], library: Any = N
     several = [paths] if isinstance(paths, Path) else list(paths)
     files = [path for path in several if str(path) != "-"]
     given = None if len(files) == len(several) else (STANDARD_INPUT, read_limited(sys.stdin.buffer))
-    return read_paths(files, Layout(**layout_options), rule, **how, progress=_watched, standard_input=given)
+    return read_paths(
+        files,
+        Layout(**layout_options),
+        rule,
+        **how,
+        progress=lambda paths: progress(paths, desc="reading", unit="file"),
+        standard_input=given,
+    )
 
 
 def known_choices(parsed: Any, options: dict[str, Any], learned: Any) -> list[str]:
@@ -214,13 +200,6 @@ def _some(names: Sequence[str]) -> str:
 def problem_lines(problems: Any, lost: str = "not read: ") -> list[str]:
     """A line for each problem: what was lost, or that samples alone were."""
     return [f"{'read but for samples: ' if problem.samples else lost}{printable(problem)}" for problem in problems]
-
-
-def _watched(files: Any) -> Any:
-    """The files, with a progress bar on a terminal if they are several."""
-    from tqdm import tqdm
-
-    return tqdm(files, desc="reading", unit="file", leave=False, disable=None)  # None: on a terminal only
 
 
 def read_source(options: dict[str, Any]) -> Any:

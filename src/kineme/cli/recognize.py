@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from kineme.cli.options import Finite, GroupedCommand, json_option, library_option, whole
-from kineme.cli.output import say
+from kineme.cli.output import progress, say, table
 from kineme.cli.reading import differences, known_choices, layout_options, problem_lines, read, recordings_argument
 from kineme.reporting.text import printable
 
@@ -64,10 +64,8 @@ def recognize(
 
 def _recognized(library: Any, movements: Any, error_rate: float) -> list[Any]:
     """An answer for each movement, with a progress bar on a terminal."""
-    from tqdm import tqdm
-
     answers: list[Any] = []
-    with tqdm(total=len(movements), desc="recognizing", unit="movement", leave=False, disable=None) as bar:
+    with progress(total=len(movements), desc="recognizing", unit="movement") as bar:
         for start in range(0, len(movements), _AT_ONCE):
             answers += library.recognize(movements[start : start + _AT_ONCE], error_rate)
             bar.update(len(answers) - bar.n)
@@ -104,8 +102,6 @@ def _as_data(source: Any, answer: Any, ids: dict[str, str], top: int) -> dict[st
 
 
 def _text(data: dict[str, Any], error_rate: float, problems: list[str]) -> str:
-    from kineme.reporting.table import Table, to_text
-
     rows = []
     for movement in data["movements"]:
         name = f"{movement['recording']} {movement['place']}".strip()
@@ -116,7 +112,7 @@ def _text(data: dict[str, Any], error_rate: float, problems: list[str]) -> str:
              "" if movement["symbol"] is None else _relative(movement["transform"]))
         )  # fmt: skip
     heads = ("recording", "symbol", "how sure", "ranked", "most like", "relative to it")
-    lines = [to_text(Table("", heads, rows)), *map(printable, data["notes"])]
+    lines = [table(heads, rows), *map(printable, data["notes"])]
     if any(movement["rule"] == "guess" for movement in data["movements"]):
         needed = math.ceil(1 / error_rate - 1 - 1e-9)
         lines.append(

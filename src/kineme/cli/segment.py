@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from kineme.cli.options import Finite, GroupedCommand, force_option, heading, json_option, whole
-from kineme.cli.output import check_new, say
+from kineme.cli.output import check_new, say, table
 from kineme.cli.reading import layout_options, read, recordings_argument
 from kineme.reporting.text import counted, printable
 
@@ -149,8 +149,6 @@ def _as_data(cut: list[Any], movements: list[Any], files: list[Path]) -> list[di
 
 
 def _text(pieces: list[dict[str, Any]], problems: list[str], output: Path | None) -> str:
-    from kineme.reporting.table import Table, to_text
-
     heads = ("recording", "piece", "start [s]", "end [s]", "duration [s]")
     rows = [
         (
@@ -160,7 +158,7 @@ def _text(pieces: list[dict[str, Any]], problems: list[str], output: Path | None
         )
         for piece in pieces
     ]
-    lines = [to_text(Table("", heads, rows))] if rows else []
+    lines = [table(heads, rows)] if rows else []
     lines += [f"not cut: {printable(problem)}" for problem in problems]
     where = "" if output is None else f", written to {printable(output)}"
     return "\n".join([*lines, f"{counted(len(pieces), 'movement')}{where}"])
