@@ -189,7 +189,7 @@ def test_chunks_of_one_time_are_in_memory_together(tmp_path, child, at_once):
 def test_bytes_that_are_cut_off_are_refused():
     import lz4.frame
 
-    from kineme.io.ros.damage import expand
+    from kineme.io.ros.bags import expand
 
     for name, compress in {"bz2": bz2.compress, "lz4": lz4.frame.compress}.items():
         data = compress(bytes(range(200)) * 50)

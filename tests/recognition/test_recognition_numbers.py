@@ -11,7 +11,7 @@ import kineme
 from kineme import Demonstrations, Recognizer, Trajectory
 from kineme.kernels.procrustes import Prepared, Procrustes
 from kineme.movements.preparation.perturbations import Perturbation
-from kineme.movements.segmentation.motion import observe
+from kineme.movements.segmentation.table import observe
 from kineme.recognition import spotting
 from kineme.recognition.compared_windows import Surroundings, Templates, compare_windows
 from kineme.recognition.conformal import Calibration, calibrate

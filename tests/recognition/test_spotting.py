@@ -15,8 +15,8 @@ import pytest
 import kineme
 from kineme import Demonstrations, Recognizer, Trajectory
 from kineme.errors import SpecificationError, TrajectoryError
-from kineme.movements.segmentation.motion import observe
 from kineme.movements.segmentation.segment import pieces_of
+from kineme.movements.segmentation.table import observe
 from kineme.recognition import compared_windows
 from kineme.recognition.compared_windows import (
     Candidates,

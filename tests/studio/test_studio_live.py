@@ -16,8 +16,7 @@ from studio_samples import LIVE, asked, make_library, samples
 from kineme import ActionLibrary
 from kineme.errors import DataError, TrajectoryError
 from kineme.studio.page.write_page import library_page
-from kineme.studio.server.live_socket import _Client, _Received, parsed_samples
-from kineme.studio.server.live_sources import MOST, Follower, Sources
+from kineme.studio.server.live_socket import MOST, Follower, Sources, _Client, _Received, parsed_samples
 from kineme.studio.server.studio import Changes, Studio
 from kineme.studio.snapshot import DRAWN
 

@@ -56,8 +56,7 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
     from kineme.io.reading.entries import expanded
     from kineme.io.reading.recording_gaps import notes_on_gaps
     from kineme.io.reading.recordings import paths_of
-    from kineme.io.writing.annotation import as_row, to_csv
-    from kineme.io.writing.annotations import targets_of, write_annotations
+    from kineme.io.writing.annotations import as_row, targets_of, to_csv, write_annotations
     from kineme.library.annotate import annotate as find
     from kineme.library.library import ActionLibrary
     from kineme.recognition.answer import certainty

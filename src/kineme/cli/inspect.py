@@ -40,8 +40,14 @@ def inspect(
     Example: kineme inspect recordings/ --plot recordings.png
     """
     from kineme.errors import DataError
-    from kineme.io.inspection.contents import contents_as_data, contents_as_words, contents_of_all
-    from kineme.io.inspection.inspect import as_data, as_words, nothing_read
+    from kineme.io.inspection.inspect import (
+        as_data,
+        as_words,
+        contents_as_data,
+        contents_as_words,
+        contents_of_all,
+        nothing_read,
+    )
     from kineme.io.inspection.inspect import inspect as summarize
     from kineme.io.reading.entries import in_words
 

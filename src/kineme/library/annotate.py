@@ -8,7 +8,7 @@ from typing import NamedTuple
 from kineme.errors import KinemeError
 from kineme.io.reading.merge_files import Recordings, Source
 from kineme.io.records import Problem
-from kineme.io.writing.annotation import Annotation
+from kineme.io.writing.annotations import Annotation
 from kineme.library.recognize import some_of_each_symbol
 from kineme.library.storage.store import Store
 from kineme.movements.trajectories.trajectory import Trajectory

@@ -20,8 +20,17 @@ from numpy.typing import NDArray
 
 from kineme.errors import TrajectoryError
 from kineme.io.reading.merge_files import Recordings
-from kineme.library.commit import Batch, Committed, commit, find_stored, serialize_new
-from kineme.library.serialize import check, evenly_sampled, relative_times, stored_times
+from kineme.library.commit import (
+    Batch,
+    Committed,
+    check,
+    commit,
+    evenly_sampled,
+    find_stored,
+    relative_times,
+    serialize_new,
+    stored_times,
+)
 from kineme.library.storage.channels import other_columns
 from kineme.library.storage.read import count
 from kineme.library.storage.source import Source

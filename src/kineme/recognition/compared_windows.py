@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
-from kineme.movements.segmentation.motion import Motion, Rows, observe
 from kineme.movements.segmentation.segment import moving
-from kineme.movements.segmentation.table import Rest
+from kineme.movements.segmentation.table import Motion, Rest, Rows, observe
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import Movements
 from kineme.movements.trajectories.trajectory import Trajectory

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from kineme.errors import TrajectoryError
 from kineme.movements.preparation.resample import relative_rows
-from kineme.movements.segmentation.motion import Motion, Rows, observe
 from kineme.movements.segmentation.segment import as_recording, pieces_of
+from kineme.movements.segmentation.table import Motion, Rows, observe
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import Label
 from kineme.movements.trajectories.trajectory import MovementsLike, Trajectory

@@ -7,8 +7,7 @@ import pytest
 
 import kineme
 from bag_files import SECOND, START, Maker, pose_rows, stamps, store, write_bag
-from kineme.io.writing.annotation import Annotation
-from kineme.io.writing.annotations import write_annotations
+from kineme.io.writing.annotations import Annotation, write_annotations
 from lerobot_sets import write_v2, write_v3
 
 pytest.importorskip("rosbags")

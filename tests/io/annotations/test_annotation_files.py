@@ -10,8 +10,7 @@ import pandas
 import pytest
 
 from kineme.errors import DataError
-from kineme.io.writing.annotation import Annotation
-from kineme.io.writing.annotations import WRITERS, Writer, write_annotations, writer_of
+from kineme.io.writing.annotations import WRITERS, Annotation, Writer, write_annotations, writer_of
 
 LONG = Path("long.csv")
 WAVE = Annotation("long.csv", "", 1000.5, 1001.75, 'wave, "big"\nü', 0.4, 0.93, origin=1000.0)

@@ -15,8 +15,7 @@ from hypothesis import strategies as st
 from kineme.errors import DataError, KinemeError
 from kineme.io.reading.read_labels import labeled_pieces, read_labels, seconds_of
 from kineme.io.reading.recordings import read_recordings
-from kineme.io.writing.annotation import Annotation
-from kineme.io.writing.annotations import write_annotations
+from kineme.io.writing.annotations import Annotation, write_annotations
 
 SPANS = [(0.5, 1.75, "wave"), (2.0, 4.0, "nod")]
 #: As ELAN exports them: heads of a tier in a column of its own, heads with a tier for each row, and none.

@@ -5,8 +5,7 @@ from pathlib import Path
 import pytest
 
 from kineme.io.reading.read_labels import read_labels
-from kineme.io.writing.annotation import Annotation
-from kineme.io.writing.annotations import write_annotations
+from kineme.io.writing.annotations import Annotation, write_annotations
 
 elan = pytest.importorskip("pympi.Elan", reason="no package pympi-ling")
 

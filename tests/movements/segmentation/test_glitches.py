@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme.movements.segmentation.motion import without_glitches
+from kineme.movements.segmentation.table import without_glitches
 
 
 def _with_glitch(known, at, length, size):

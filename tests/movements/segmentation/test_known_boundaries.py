@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import kineme
-from kineme.movements.segmentation.motion import moving_bouts
+from kineme.movements.segmentation.table import moving_bouts
 
 seeds = st.integers(0, 10_000)
 

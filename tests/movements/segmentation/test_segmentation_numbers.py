@@ -7,7 +7,7 @@ import pytest
 
 from kineme import Trajectory, segment
 from kineme.errors import TrajectoryError
-from kineme.movements.segmentation.motion import Motion, noise_variance, observe, onset_rows
+from kineme.movements.segmentation.table import Motion, noise_variance, observe, onset_rows
 
 
 @pytest.mark.parametrize("noise", [0.002, 0.01])

@@ -19,7 +19,7 @@ from kineme.io.arrays.arrays import arrays_movements, has_known_names
 from kineme.io.arrays.tree_movements import tree_movements
 from kineme.io.limits import check_expanded
 from kineme.io.records import needs
-from kineme.io.ros.damage import REMEDIES, records_of_mcap, refused
+from kineme.io.ros.bags import REMEDIES, records_of_mcap, refused
 from kineme.io.tables.dialect import is_number
 from kineme.movements.tables.columns import counts_samples, is_time
 from kineme.movements.tables.layout import Layout, Parsed, listed

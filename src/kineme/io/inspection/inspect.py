@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kineme.errors import DataError
 from kineme.io.reading.column_order import notes_on_aside, notes_on_order
+from kineme.io.reading.entries import entries_of
+from kineme.io.reading.formats import FORMATS, data_set_of
 from kineme.io.reading.merge_files import Recordings
 from kineme.io.reading.recording_gaps import Sampling, notes_on_gaps, notes_on_sampling, sampling_of
-from kineme.io.records import Problem
+from kineme.io.records import Contents, Problem
 from kineme.movements.channels.channel import Channel, Channels
 from kineme.movements.channels.column_match import columns_recorded
 from kineme.movements.channels.coordinates import columns_of, lever_of
@@ -22,6 +26,9 @@ from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.reporting.table import Table, to_text
 from kineme.reporting.text import counted, first_names, printable
 from kineme.validation import Array
+
+_FILE = "file"  # head of the names of files
+_IDLE = ("nothing", "is fixed")  # how the last cell of a row begins that holds no movement
 
 _SHOWN = 20  # lines of a list; the rest is counted
 _COLUMNS, _CHANNELS, _FILES = 24, 12, 3  # names in a line
@@ -393,3 +400,92 @@ def _coordinates(how: Detected) -> str:
         return f"{first_names(how.columns, _COLUMNS)} in {units.pop()}"
     named = zip(how.columns, how.measured_in or [""] * len(how.columns), strict=True)
     return first_names([f"{name} [{unit}]" if unit else name for name, unit in named], _COLUMNS)
+
+
+def contents_of_all(paths: Sequence[Path], follow_links: bool = False) -> list[Contents]:
+    """The contents of all recordings at these paths; of several that have some, each row begins with its file."""
+    try:
+        entries, _ = entries_of(paths, follow_links) if paths else ([], [])
+    except (DataError, OSError):  # reading gives the reason
+        return []
+    listed = {entry.name: contents for entry in entries if (contents := contents_of(entry.path))}
+    if len(listed) < 2:
+        return next(iter(listed.values()), [])
+    merged: dict[tuple[str, tuple[str, ...]], Contents] = {}
+    for name, several in listed.items():
+        for content in several:
+            before = merged.get(
+                (content.name, content.heads), Contents(content.name, (_FILE, *content.heads), (), content.note)
+            )
+            rows = tuple((name, *row) for row in content.rows)
+            merged[content.name, content.heads] = before._replace(
+                rows=before.rows + rows, note=before.note or content.note
+            )
+    return list(merged.values())
+
+
+def contents_of(path: Path) -> list[Contents]:
+    """The contents of one recording.
+
+    There are none of a folder of files, of formats that hold movements alone, and of what cannot be opened: reading it
+    gives the reason.
+    """
+    data_set = data_set_of(path)
+    form = FORMATS.get(path.suffix.lower()) if data_set is None else data_set.format
+    if form is None or form.contents is None or (data_set is None and not path.is_file()):
+        return []
+    try:
+        return form.contents(path)
+    except (DataError, OSError):
+        return []
+
+
+def contents_as_data(contents: list[Contents]) -> dict[str, Any]:
+    """A list of dictionaries under each name."""
+    return {content.name: [dict(zip(content.heads, row, strict=True)) for row in content.rows] for content in contents}
+
+
+def contents_as_words(contents: list[Contents]) -> list[str]:
+    """A table of each: what several files have alike once, and of a long list only what holds movements."""
+    return [_in_words(_alike_once(content)) for content in contents]
+
+
+def _in_words(content: Contents) -> str:
+    title = f"{content.name}{f' {content.note}' if content.note else ''}"
+    rows = content.rows
+    if len(rows) > _SHOWN:
+        rows = tuple(row for row in rows if not any(str(cell).startswith(_IDLE) for cell in row[-2:]))
+    n_idle = len(content.rows) - len(rows)
+    more = f"\nand {n_idle} {content.name} that hold no movement; --json lists them" if n_idle else ""
+    return to_text(Table(title, content.heads, [_cells(row) for row in rows])) + more
+
+
+def _alike_once(content: Contents) -> Contents:
+    """Rows that several files have alike but for their counts, once: the range of these, and in how many files."""
+    if content.heads[0] != _FILE:
+        return content
+    n_files = len({file for file, *_ in content.rows})
+    groups: dict[tuple[str, ...], list[list[str | int]]] = {}
+    for _, *cells in content.rows:
+        groups.setdefault(tuple(cell for cell in cells if isinstance(cell, str)), []).append(cells)
+    rows = tuple(
+        (
+            *(_range_of_counts([row[k] for row in alike]) for k in range(len(content.heads) - 1)),
+            f"{len(alike)} of {n_files}",
+        )
+        for alike in groups.values()
+    )
+    return content._replace(heads=(*content.heads[1:], "files"), rows=rows)
+
+
+def _range_of_counts(cells: list[str | int]) -> str:
+    """A text that all rows have, or the least and the greatest of their numbers."""
+    numbers = [cell for cell in cells if isinstance(cell, int)]
+    if not numbers:
+        return str(cells[0])
+    least, greatest = min(numbers), max(numbers)
+    return f"{least:,}" if least == greatest else f"{least:,} to {greatest:,}"
+
+
+def _cells(row: tuple[str | int, ...]) -> tuple[str, ...]:
+    return tuple(f"{cell:,}" if isinstance(cell, int) else printable(cell) for cell in row)

@@ -16,9 +16,7 @@ from kineme.io.arrays.rows import row_movements, series_movements
 from kineme.io.arrays.tree_movements import nested, tree_movements
 from kineme.io.lerobot.info import MARKER
 from kineme.io.lerobot.read import lerobot_movements
-from kineme.io.motion_capture.bvh import read_bvh_table
-from kineme.io.motion_capture.c3d import read_c3d_table
-from kineme.io.motion_capture.mvnx import read_mvnx_table
+from kineme.io.motion_capture.readers import read_bvh_table, read_c3d_table, read_mvnx_table
 from kineme.io.records import Contents
 from kineme.io.ros.bags import check_records
 from kineme.io.ros.choose import bag_contents

@@ -15,8 +15,16 @@ from typing import Any, NamedTuple
 
 from kineme.errors import DataError
 from kineme.io.records import needs
-from kineme.io.ros.bags import Bag, open_bag, storages_of
-from kineme.io.ros.damage import INFORMATION, METADATA, compression_of_ros_1, records_of_mcap, refused
+from kineme.io.ros.bags import (
+    INFORMATION,
+    METADATA,
+    Bag,
+    compression_of_ros_1,
+    open_bag,
+    records_of_mcap,
+    refused,
+    storages_of,
+)
 from kineme.io.ros.number_fields import standard_types
 
 TEXT = "std_msgs/msg/String"  # every version of ROS knows it

@@ -15,8 +15,7 @@ from functools import cache, cached_property, lru_cache
 from typing import Any, NamedTuple
 
 from kineme.errors import DataError
-from kineme.io.ros.bags import Bag, Topic
-from kineme.io.ros.damage import refused
+from kineme.io.ros.bags import Bag, Topic, refused
 
 Heads = tuple[str, ...]
 Row = Sequence[float]

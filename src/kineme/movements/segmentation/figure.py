@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from kineme.movements.segmentation.motion import observe
 from kineme.movements.segmentation.segment import Segmentation
+from kineme.movements.segmentation.table import observe
 from kineme.movements.trajectories.movements import axis_names
 from kineme.reporting.figures import BLUE, GRAY, ORANGE, new_figure
 from kineme.reporting.text import drawable, shortened

@@ -10,8 +10,7 @@ import numpy as np
 
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.channels.channel import is_plain, learned_names
-from kineme.movements.segmentation.motion import Motion, Rows, consecutive, observe, onset_rows
-from kineme.movements.segmentation.table import SEGMENTERS, Segmenter
+from kineme.movements.segmentation.table import SEGMENTERS, Motion, Rows, Segmenter, consecutive, observe, onset_rows
 from kineme.movements.trajectories.demonstrations import Demonstrations, MovementSequence
 from kineme.movements.trajectories.trajectory import MovementsLike, Trajectory
 from kineme.validation import MIN_SAMPLES, Array, check_choice, check_switch

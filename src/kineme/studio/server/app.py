@@ -26,7 +26,7 @@ from kineme.studio.server import (
     rollout_routes,
 )
 from kineme.studio.server.access import Guard
-from kineme.studio.server.live_sources import Sources
+from kineme.studio.server.live_socket import Sources
 from kineme.studio.server.refusals import AnswersFailures, answer_errors, refuse
 from kineme.studio.server.studio import Changes, NotifyAfterChanges, Studio
 

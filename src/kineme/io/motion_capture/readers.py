@@ -1,0 +1,426 @@
+"""Files of motion capture systems as tables: C3D, BVH and MVNX.
+
+C3D holds points or rotations; its parameters are read by the package of that name. Source: Motion Lab Systems, "The C3D
+File Format User Guide"; of rotations C-Motion, "ROTATION_DATA_TYPE": for each frame and segment 16 numbers of a matrix,
+column by column, that turns and shifts it, and one that is negative where it is unknown.
+
+BVH is a hierarchy of joints with their channels, and one line of numbers for each frame. Source: Biovision's format as
+Meredith and Maddock, "Motion Capture File Formats Explained", 2001, describe it. Channels are named
+``Joint.Xposition`` and ``Joint.Zrotation``; rotations are in degrees, positions in a unit that no file says.
+
+MVNX is XML of Xsens MVN. Source: Xsens, "MVN User Manual", the section on MVNX. ``<subject frameRate="60">`` holds
+``<segments>`` and ``<joints>``, which name what the numbers of each ``<frame time="16" type="normal">`` are of:
+``<orientation>`` has w, x, y, z and ``<position>`` x, y, z [m] of each segment, ``<jointAngle>`` three angles [deg] of
+each joint. Times are in milliseconds.
+"""
+
+from __future__ import annotations
+
+import io
+import warnings
+from collections.abc import Sequence
+from itertools import islice
+from typing import Any, NamedTuple
+from xml.parsers import expat
+
+import numpy as np
+
+from kineme.errors import DataError
+from kineme.io.limits import check_expanded
+from kineme.io.motion_capture.export_heads import STAMP, positive, without_common_subject
+from kineme.io.records import needs
+from kineme.movements.channels.column_match import Columns
+from kineme.movements.tables.columns import Roles, choose_roles
+from kineme.movements.tables.layout import Layout, no_lines
+from kineme.movements.tables.table import Table
+
+_DEEPEST = 32
+_MOST = 10_000  # segments and joints
+
+
+class Quantity(NamedTuple):
+    """A kind of numbers in a frame: whose, what columns are called, and their unit."""
+
+    owners: str
+    ends: tuple[str, ...]
+    unit: str
+
+
+#: Element of a frame -> what it holds. Those of segments are learned unless columns are chosen.
+_QUANTITIES = {
+    "position": Quantity("segment", tuple(f"position.{axis}" for axis in "xyz"), "m"),
+    "orientation": Quantity("segment", tuple(f"orientation.{axis}" for axis in "wxyz"), ""),
+    "jointAngle": Quantity("joint", tuple(f"angle.{axis}" for axis in "xyz"), "deg"),
+}
+
+
+class _Content:
+    """The content that is gathered while the XML is parsed."""
+
+    def __init__(self) -> None:
+        self.rate = ""
+        self.names: dict[str, list[str]] = {"segment": [], "joint": []}
+        self.stamps: list[str] = []
+        self.texts: dict[str, list[str]] = {name: [] for name in _QUANTITIES}
+        self._path: list[str] = []
+        self._is_normal = False
+        self._text: list[str] | None = None
+
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        name = tag.rpartition(":")[2]
+        self._path.append(name)
+        if len(self._path) > _DEEPEST:
+            raise DataError(f"expected MVNX of at most {_DEEPEST} elements within each other, got more")
+        if name == "subject":
+            self.rate = attributes.get("frameRate", "")
+        elif name in self.names and self._path[-2:-1] == [f"{name}s"]:
+            self.names[name].append(attributes.get("label", f"{name} {len(self.names[name]) + 1}"))
+            if len(self.names[name]) > _MOST:
+                raise DataError(f"expected at most {_MOST:,} {name}s in MVNX, got more")
+        elif name == "frame":
+            self._is_normal = attributes.get("type", "normal") == "normal"
+            if self._is_normal:
+                self.stamps.append(attributes.get("time", ""))
+        elif self._is_normal and name in _QUANTITIES and self._path[-2:-1] == ["frame"]:
+            self._text = []
+
+    def end(self, tag: str) -> None:
+        name = self._path.pop()
+        if self._text is not None and name in _QUANTITIES:
+            texts = self.texts[name]
+            texts += [""] * (len(self.stamps) - 1 - len(texts))  # frames before that lack it
+            texts.append("".join(self._text))
+            self._text = None
+        elif name == "frame":
+            self._is_normal = False
+
+    def characters(self, text: str) -> None:
+        if self._text is not None:
+            self._text.append(text)
+
+
+def read_mvnx_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
+    """The columns of an MVNX file: ``Pelvis.position.x``, ``Pelvis.orientation.w``, ``jRightElbow.angle.x``, ...
+
+    Unless columns are chosen, angles of joints are learned only where there are no segments. What a frame lacks is NaN.
+    """
+    check_expanded(3 * len(data))
+    content = _parsed(data)
+    count = len(content.stamps)
+    if not count:
+        raise DataError("expected frames of type 'normal' in an MVNX file, got none")
+    heads, units, columns, faults = [STAMP], ["s"], [_times(content)], dict[int, str]()
+    for name, quantity in _QUANTITIES.items():
+        owners = content.names[quantity.owners]
+        if not any(content.texts[name]) or not owners:
+            continue
+        width = len(owners) * len(quantity.ends)
+        check_expanded(16 * count * width)
+        heads += [f"{owner}.{end}" for owner in owners for end in quantity.ends]
+        units += [quantity.unit] * width
+        columns += [*_numbers(content.texts[name], count, (name, width), faults).T]
+    if len(heads) == 1:
+        raise DataError(f"expected {', '.join(_QUANTITIES)} in the frames of an MVNX file, got none of them")
+    roles = choose_roles(heads, ("number",) * len(heads), layout)
+    segments = tuple(k for k in roles.positions if ".angle." not in heads[k])
+    if layout.coordinates is None and segments:
+        others = tuple(k for k in roles.positions if k not in {*segments})
+        roles = roles._replace(positions=segments, ignored=(*roles.ignored, *others))
+    return Table(tuple(heads), columns, count, no_lines, faults, measured_in=units, maker="Xsens"), roles
+
+
+def _parsed(data: bytes) -> _Content:
+    content, parser = _Content(), expat.ParserCreate()
+    parser.buffer_text = True
+    parser.StartElementHandler, parser.EndElementHandler = content.start, content.end
+    parser.CharacterDataHandler = content.characters
+    parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = _refuse
+    try:
+        parser.Parse(data, True)
+    except expat.ExpatError as error:
+        raise DataError(f"expected an MVNX file, got something foreign, truncated or damaged ({error})") from error
+    return content
+
+
+def _refuse(*_: Any) -> None:
+    raise DataError("expected MVNX without a document type, got one, which may hold entities that grow without bound")
+
+
+def _times(content: _Content) -> Any:
+    """Seconds, from the stamps of the frames [ms], or from the rate where these are missing or do not increase."""
+    try:
+        times = np.array([float(stamp) for stamp in content.stamps]) / 1e3
+    except ValueError:
+        times = np.zeros(len(content.stamps))
+    rate = positive(content.rate)
+    even = np.arange(len(times)) / (rate or 1.0)
+    if rate is not None and np.abs(times - times[0] - even).max() <= 1e-3:  # stamps are whole milliseconds
+        return even + times[0]
+    if (np.diff(times) > 0).all():
+        return times
+    if rate is None:
+        raise DataError(f"expected a frameRate in hertz or times of frames in an MVNX file, got {content.rate!r}")
+    return even
+
+
+def _numbers(texts: list[str], count: int, what: tuple[str, int], faults: dict[int, str]) -> Any:
+    """The numbers (count, width) of all frames, NaN where a frame has none; other counts are faults of their frames."""
+    name, width = what
+    values = np.full((count, width), np.nan)
+    for row, text in enumerate(texts):
+        words = text.split()
+        try:
+            numbers = [float(word) for word in words]
+        except ValueError:
+            faults[row] = f"expected numbers in {name!r}, got {text.strip()[:40]!r}"
+            continue
+        if len(numbers) == width:
+            values[row] = numbers
+        elif numbers:
+            faults[row] = f"expected {width} numbers in {name!r}, got {len(numbers)}"
+    return values
+
+
+_MOST_CHANNELS = 10_000
+
+_MOST_LABELS = 260  # parameters of labels, of 255 each
+_COMPUTED = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")  # parameters that list such points
+_OFF = 1e-2  # of a matrix that counts as a rotation, from orthonormal
+
+
+def read_c3d_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
+    """The positions of all points over time, of a file without points the poses of all segments; what is lost is NaN.
+
+    Poses of segments beside points, and what a model computed instead of places, as the angles of joints, are left
+    aside unless columns name them.
+    """
+    with needs("c3d", "read C3D files", "mocap"):
+        import c3d
+    if data[1:2] != b"\x50":
+        raise DataError("expected a C3D file, got something foreign")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of frames that are missing, which are counted below
+            reader = c3d.Reader(io.BytesIO(data))
+            names, values, units, rate = _content(reader, data)
+            is_point = [True] * len(names)
+            if int(reader.point_used) > 0:
+                computed = [unit for unit in _computed(reader, len(names) // 3) for _ in "xyz"]
+                is_point = [unit is None for unit in computed]
+                units = [own if unit is None else unit for own, unit in zip(units, computed, strict=True)]
+            if int(reader.point_used) > 0 and (segments := _beside(reader, data, rate, len(values), units[0])):
+                names, values = [*names, *segments[0]], np.hstack([values, segments[1]])
+                units = [*units, *segments[2]]
+                is_point += [False] * len(segments[0])
+    except DataError:
+        raise
+    except Exception as error:  # the package raises much on damaged files, even names that it did not assign
+        raise DataError(f"expected a C3D file, got a truncated or damaged one ({error})") from error
+    heads = (STAMP, *names)
+    is_read = is_point if layout.coordinates is None and any(is_point) else [True] * len(names)
+    kinds = ("number", *("number" if is_number else "text" for is_number in is_read))
+    roles = choose_roles(heads, kinds, layout)
+    columns = [np.arange(len(values)) / rate, *values.T]
+    return Table(heads, columns, len(values), no_lines, measured_in=("s", *units)), roles
+
+
+def _content(reader: Any, data: bytes) -> tuple[list[str], Any, list[str], float]:
+    """Names of the columns, their values (T, d), their units, and the rate [Hz]."""
+    count, rate = int(reader.point_used), float(reader.point_rate)
+    n_frames = int(reader.last_frame) - int(reader.first_frame) + 1
+    unit = reader.get("POINT:UNITS")
+    length = unit.string_value.strip() if unit is not None else ""
+    if count < 1 and n_frames > 0 and reader.get("ROTATION:USED") is not None:
+        return _rotations(reader, data, n_frames, length)
+    if count < 1 or n_frames < 1 or not 0 < rate < float("inf"):
+        raise DataError(
+            f"expected points over time in a C3D file, got {count} points and {n_frames} frames at {rate:g} Hz"
+        )
+    check_expanded(40 * count * n_frames)
+    # Points (T, n, 3), NaN where one was not found. A frame is four words for each point, then its analog samples.
+    # The package refuses files whose analog offsets are not whole numbers; so the frames are not read by it.
+    is_float = reader.point_scale < 0
+    dtype = np.dtype(reader._dtypes.float32 if is_float else reader._dtypes.int16)
+    if reader._dtypes.is_dec and is_float:
+        raise DataError(
+            "expected a C3D file of Intel or MIPS numbers, got one of DEC; save it anew with a newer program"
+        )
+    wide = 4 * count + int(reader.header.analog_count)
+    start, size = (int(reader.header.data_block) - 1) * 512, n_frames * wide * dtype.itemsize
+    if not 0 < start <= len(data) - size:
+        raise DataError(
+            f"expected {n_frames} frames of {count} points in a C3D file, got fewer bytes: a truncated file"
+        )
+    words = np.frombuffer(data, dtype, n_frames * wide, start).reshape(n_frames, wide)[:, : 4 * count]
+    values = words.reshape(n_frames, count, 4).astype(np.float64)
+    lost = (values[:, :, 3] < 0) | ~np.isfinite(values).all(axis=2) | (values[:, :, :3] == 0).all(axis=2)
+    points = np.where(lost[:, :, None], np.nan, values[:, :, :3] * (1.0 if is_float else abs(reader.point_scale)))
+    names = without_common_subject(_names(_labels(reader, "POINT"), count, "point"))
+    heads = [f"{name}.{axis}" for name in names for axis in "xyz"]
+    return heads, points.reshape(n_frames, -1), [length] * len(heads), rate
+
+
+def _beside(
+    reader: Any, data: bytes, rate: float, n_frames: int, length: str
+) -> tuple[list[str], Any, list[str]] | None:
+    """The poses of segments beside points, as `_content`; None where there are none of the same rate."""
+    used = reader.get("ROTATION:USED")
+    if used is None or used.int16_value < 1:
+        return None
+    names, values, units, same = _rotations(reader, data, n_frames, length)
+    return (names, values, units) if same == rate and len(values) == n_frames else None
+
+
+def _computed(reader: Any, count: int) -> list[str | None]:
+    """Return the unit of each point that holds an angle, a force, a moment or a power; None of places.
+
+    Source: Vicon's Plug-in Gait, which lists the points of each kind in parameters such as POINT:ANGLES.
+    """
+    unit_of: dict[str, str] = {}
+    for kind in _COMPUTED:
+        unit = reader.get(f"POINT:{kind.removesuffix('S')}_UNITS")
+        said = unit.string_value.strip() if unit is not None else ""
+        unit_of |= {label.strip(): said for label in _labels(reader, "POINT", kind)}
+    labels = [label.strip() for label in _labels(reader, "POINT")][:count]
+    return [*(unit_of.get(label) if label else None for label in labels), *[None] * (count - len(labels))]
+
+
+def _labels(reader: Any, group: str, kind: str = "LABELS") -> list[str]:
+    """All labels of points or rotations; of more than 255 the others are in LABELS2, LABELS3 and so on."""
+    labels: list[str] = []
+    for name in (kind, *(f"{kind}{k}" for k in range(2, _MOST_LABELS))):
+        if (parameter := reader.get(f"{group}:{name}")) is None:
+            break
+        labels += np.ravel(parameter.string_array).tolist()
+    return labels
+
+
+def _names(labels: Any, count: int, what: str) -> list[str]:
+    """A name for each of so many points or segments, numbered where the file has none."""
+    names = [label.strip() for label in labels][:count]
+    return [label or f"{what} {k}" for k, label in enumerate([*names, *[""] * (count - len(names))], 1)]
+
+
+def _rotations(reader: Any, data: bytes, n_frames: int, length: str) -> tuple[list[str], Any, list[str], float]:
+    """Positions and orientations of segments, as `_content`; NaN where a matrix is unknown or no rotation."""
+    said = {name: reader.get(f"ROTATION:{name}") for name in ("USED", "DATA_START", "RATIO", "RATE")}
+    count, block = (0 if said[name] is None else said[name].int16_value for name in ("USED", "DATA_START"))
+    ratio = 1 if said["RATIO"] is None else max(1, said["RATIO"].int16_value)
+    rate = float(reader.point_rate) * ratio
+    rate = rate if rate > 0 or said["RATE"] is None else said["RATE"].float_value
+    if count < 1 or not 0 < rate < float("inf"):
+        raise DataError(f"expected points or rotations over time in a C3D file, got {count} rotations at {rate:g} Hz")
+    n_samples, start = n_frames * ratio, (block - 1) * 512
+    check_expanded(3 * 8 * 17 * count * n_samples)
+    if not 0 < start <= len(data) - 4 * 17 * count * n_samples:
+        raise DataError(f"expected {n_samples} samples of {count} rotations in a C3D file, got fewer: a truncated file")
+    dtype = np.dtype(reader._dtypes.float32)
+    words = np.frombuffer(data, dtype, 17 * count * n_samples, start).reshape(n_samples * count, 17).astype(np.float64)
+    poses = words[:, :16].reshape(-1, 4, 4).transpose(0, 2, 1)
+    turns = poses[:, :3, :3]
+    with np.errstate(invalid="ignore", over="ignore"):
+        off = np.abs(turns @ turns.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2))
+        is_rotation = (words[:, 16] >= 0) & (off < _OFF) & (np.linalg.det(turns) > 0)
+    values = np.full((len(poses), 7), np.nan)
+    if is_rotation.any():
+        from scipy.spatial.transform import Rotation
+
+        values[is_rotation, :3] = poses[is_rotation, :3, 3]
+        values[is_rotation, 3:] = Rotation.from_matrix(turns[is_rotation]).as_quat(scalar_first=True)
+    names = [
+        name.removesuffix("_4X4")
+        for name in without_common_subject(_names(_labels(reader, "ROTATION"), count, "segment"))
+    ]
+    ends = [*(f"position.{axis}" for axis in "xyz"), *(f"orientation.{axis}" for axis in "wxyz")]
+    heads = [f"{name}.{end}" for name in names for end in ends]
+    return heads, values.reshape(n_samples, -1), [*[length] * 3, *[""] * 4] * count, rate
+
+
+def read_bvh_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
+    """The channels of a BVH file and its time stamps, from the time of a frame."""
+    check_expanded(3 * len(data))
+    lines = data.decode("utf-8", "replace").lstrip("\ufeff").splitlines()
+    if not lines or next((line.strip() for line in lines if line.strip()), "").upper() != "HIERARCHY":
+        raise DataError("expected a BVH file that begins with HIERARCHY, got something foreign")
+    at = next((k for k, line in enumerate(lines) if line.strip().upper() == "MOTION"), None)
+    if at is None:
+        raise DataError("expected MOTION below the hierarchy of a BVH file, got none: a truncated file")
+    channels = _channels(lines[:at])
+    step, first = _step(lines, at)
+    values, faults = _values(lines, first, len(channels))
+    heads = (STAMP, *channels)
+    units = ("s", *("deg" if name.lower().endswith("rotation") else "" for name in channels))
+    columns = [np.arange(len(values)) * step, *values.T]
+    numbered = [k for k in range(first, len(lines)) if lines[k].strip()]
+    table = Table(heads, columns, len(values), lambda row: numbered[row] + 1, faults, measured_in=units, maker="")
+    roles = choose_roles(heads, ("number",) * len(heads), layout)
+    # Refuse rotations of a joint in another order than that of the file, which says which axis turns first.
+    chosen, of_file = (
+        Columns(tuple(heads[k] for k in places), ()).rotations for places in (roles.positions, sorted(roles.positions))
+    )
+    for joint, axes in chosen.items():
+        if axes != of_file[joint]:
+            raise DataError(
+                f"expected the rotations of {joint!r} in the order {of_file[joint]}, as the file has them, got {axes}, "
+                "which are other angles of the same turns; export all files in one order"
+            )
+    return table, roles
+
+
+def _channels(lines: Sequence[str]) -> list[str]:
+    """The channels of all joints in their order."""
+    joint, names = "", []
+    for k, line in enumerate(lines, 1):
+        words = line.split()
+        key = words[0].upper() if words else ""
+        if key in ("ROOT", "JOINT"):
+            joint = " ".join(words[1:])
+        elif key == "CHANNELS":
+            count = words[1] if len(words) > 1 else ""
+            if not joint or not count.isdecimal() or int(count) != len(words) - 2:
+                raise DataError(
+                    f"expected a joint's number of channels and their names in line {k}, got {line.strip()!r}"
+                )
+            names += [f"{joint}.{channel}" for channel in words[2:]]
+    if not 0 < len(names) <= _MOST_CHANNELS:
+        raise DataError(f"expected joints with channels in the hierarchy of a BVH file, got {len(names)} channels")
+    return names
+
+
+def _step(lines: Sequence[str], at: int) -> tuple[float, int]:
+    """Seconds between frames, and the line of the first frame, counted from 0."""
+    for k, line in enumerate(islice(lines, at + 1, at + 6), at + 1):
+        key, colon, value = line.partition(":")
+        if colon and key.strip().lower() == "frame time":
+            if (step := positive(value.strip())) is None:
+                raise DataError(f"expected the time of a frame above 0 s in line {k + 1}, got {value.strip()!r}")
+            return step, k + 1
+    raise DataError("expected 'Frame Time: SECONDS' below MOTION, got none: a truncated or damaged file")
+
+
+def _values(
+    lines: Sequence[str], first: int, width: int
+) -> tuple[np.ndarray[tuple[int, int], np.dtype[np.float64]], dict[int, str]]:
+    """The numbers of all frames, NaN in a line that is not one number per channel, and what is wrong there."""
+    rows = [line for line in lines[first:] if line.strip()]
+    if not rows:
+        raise DataError("expected frames below the time of a frame, got none")
+    check_expanded(8 * width * len(rows))
+    try:
+        values = np.loadtxt(io.StringIO("\n".join(rows)), comments=None, ndmin=2)
+        if values.shape == (len(rows), width):
+            return values, {}
+    except ValueError:
+        pass
+    values, faults = np.full((len(rows), width), np.nan), {}
+    for row, line in enumerate(rows):
+        try:
+            numbers = [float(word) for word in line.split()]
+        except ValueError:
+            faults[row] = f"expected {width} numbers, got {line.strip()[:40]!r}"
+            continue
+        if len(numbers) == width:
+            values[row] = numbers
+        else:
+            faults[row] = f"expected {width} numbers, one for each channel, got {len(numbers)}"
+    return values, faults
