@@ -8,8 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
 import kineme
-from kineme.io.reading.name_rule import NameRule
-from kineme.io.reading.recordings import read_paths
+from kineme.io.reading.recordings import NameRule, read_paths
 from kineme.movements.tables.layout import Known, Layout
 
 BEGIN = 1_700_000_000.0  # s since 1970

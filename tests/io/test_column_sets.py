@@ -11,8 +11,7 @@ import scipy.io
 
 import kineme
 from kineme.io.inspection.inspect import inspect
-from kineme.io.reading.name_rule import NameRule
-from kineme.io.reading.recordings import read_paths
+from kineme.io.reading.recordings import NameRule, read_paths
 from kineme.library.storage.source import known_sources
 from kineme.movements.channels.detect import name_of
 from kineme.movements.tables.layout import Layout

@@ -9,8 +9,7 @@ import pytest
 import kineme
 from kineme.io.limits import VARIABLE
 from kineme.io.reading import formats
-from kineme.io.reading.entries import files_under, root_of
-from kineme.io.reading.formats import DataSet, Format, data_set_of
+from kineme.io.reading.formats import DataSet, Format, data_set_of, files_under, root_of
 from kineme.io.reading.recordings import read_recording, read_recordings
 from kineme.movements.tables.layout import Block, Detected, Parsed
 

@@ -8,7 +8,7 @@ import pytest
 
 import kineme
 from kineme.io.reading import recordings as recordings_module
-from kineme.io.reading.entries import as_text, files_under
+from kineme.io.reading.formats import as_text, files_under
 from kineme.io.reading.recordings import read_recordings
 
 TEXT = "time,x\n" + "".join(f"{k},{k * k}\n" for k in range(5))

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import kineme
 from kineme.errors import SpecificationError
-from kineme.io.reading.name_rule import NameRule, match
+from kineme.io.reading.recordings import NameRule, match
 
 PATTERN = "{person}_{label}_{n}.csv"
 TEXTS = st.text(st.sampled_from("abc-é.*("), min_size=1, max_size=8)
@@ -125,6 +125,6 @@ def test_no_name_takes_long():
 
 def test_levels_above_the_root_name_nothing():
     assert NameRule(label_by=400).label_by == 400
-    from kineme.io.reading.name_rule import _folder
+    from kineme.io.reading.recordings import _folder
 
     assert _folder(Path("/a/b.csv"), 2) is None

@@ -49,7 +49,7 @@ def inspect(
         nothing_read,
     )
     from kineme.io.inspection.inspect import inspect as summarize
-    from kineme.io.reading.entries import in_words
+    from kineme.io.reading.formats import in_words
 
     files = [recording for recording in recordings if str(recording) != "-"]
     contents = contents_of_all(files, options["follow_links"])

@@ -49,7 +49,7 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
 
     Example: kineme learn recordings/ --library actions/
     """
-    from kineme.io.reading.entries import root_of
+    from kineme.io.reading.formats import root_of
     from kineme.library.learn import learn_recordings
     from kineme.library.library import ActionLibrary
 

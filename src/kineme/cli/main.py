@@ -22,7 +22,6 @@ from kineme.cli.output import write
 from kineme.cli.recognize import recognize
 from kineme.cli.segment import segment
 from kineme.cli.studio import page, studio
-from kineme.cli.symbols import COMMANDS
 from kineme.errors import KinemeError
 from kineme.reporting.text import printable, printable_lines
 from kineme.runtime.compiled import tell_when_compiling
@@ -83,8 +82,6 @@ def main() -> None:
     """Learn movements as Dynamical Movement Primitives, recognize them, move again."""
 
 
-for command in COMMANDS:
-    library.add_command(command)
 for command in (
     anchor, annotate, evaluate, generate, move, inspect, learn, library, page, recognize, reproduce, segment, studio
 ):  # fmt: skip

@@ -138,8 +138,7 @@ def read(paths: Path | Sequence[Path], options: dict[str, Any], library: Any = N
     columns are asked for, a file that has the columns of `library` is read without others.
     """
     from kineme.io.limits import read_limited
-    from kineme.io.reading.name_rule import NameRule
-    from kineme.io.reading.recordings import read_paths
+    from kineme.io.reading.recordings import NameRule, read_paths
     from kineme.movements.tables.layout import Layout
 
     layout_options = {name.removesuffix("_column"): value for name, value in options.items()}

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from kineme.errors import DataError
 from kineme.io.reading.column_order import notes_on_aside, notes_on_order
-from kineme.io.reading.entries import entries_of
-from kineme.io.reading.formats import FORMATS, data_set_of
+from kineme.io.reading.formats import FORMATS, data_set_of, entries_of
 from kineme.io.reading.merge_files import Recordings
 from kineme.io.reading.recording_gaps import Sampling, notes_on_gaps, notes_on_sampling, sampling_of
 from kineme.io.records import Contents, Problem

@@ -11,7 +11,7 @@ import numpy as np
 
 from kineme.errors import DataError
 from kineme.io.reading.column_order import sensors_of
-from kineme.io.reading.entries import Entry, as_text, name_of
+from kineme.io.reading.formats import Entry, as_text, name_of
 from kineme.io.reading.read_file import FileRead, select_columns
 from kineme.io.records import Problem
 from kineme.io.ros.streams import interpolated

@@ -16,8 +16,7 @@ import numpy as np
 from kineme.errors import DataError, KinemeError
 from kineme.io.limits import check_expanded
 from kineme.io.reading.check_block import check_block, sentinels_as_missing
-from kineme.io.reading.entries import OUTSIDE, as_text, leads_out
-from kineme.io.reading.formats import FORMATS, Format, data_set_of
+from kineme.io.reading.formats import FORMATS, OUTSIDE, Format, as_text, data_set_of, leads_out
 from kineme.io.records import Problem
 from kineme.movements.channels.column_match import in_one_unit, numbers_by_name
 from kineme.movements.channels.detect import unit_of
