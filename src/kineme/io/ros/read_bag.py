@@ -7,10 +7,9 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kineme.errors import DataError
 from kineme.io.limits import check_expanded
@@ -83,24 +82,7 @@ def read_bag(path: Path, layout: Layout) -> Parsed:
                 f"topic {paths[0].name}: each of its messages is a movement of its own, expected it alone, got other "
                 "topics or frames beside it"
             )
-        return _whole(bag, read_paths(bag, paths[0], layout.skip), layout)
-
-
-def _whole(bag: Bag, paths: Paths, layout: Layout) -> Parsed:
-    numbers = np.repeat(np.arange(len(paths.lengths)), paths.lengths)
-    names = np.empty(len(numbers), dtype=object)
-    names[:] = [str(paths.places[k]) for k in numbers]
-    times: Any = np.zeros(len(numbers)) if paths.times is None else paths.times
-    heads = (paths.time, "message", *paths.heads)
-    table = Table(heads, [times, names, *paths.values.T], len(numbers), no_lines, dates_in="s")
-    chosen = _roles(heads, 0, layout)
-    roles = chosen._replace(movement=(1,))
-    about = (bag.kind, f"topic {paths.topic.name} of {paths.topic.type}, a movement a message", "stamps of its points")
-    parsed = _parsed(table, roles, layout, about, paths.left_out)
-    if paths.times is not None:
-        return parsed
-    detected = parsed.detected._replace(time=None, units_from="no times: one second each")
-    return parsed._replace(detected=detected, block=replace(parsed.block, times=None))
+        return _movements_of_messages(bag, paths[0], layout)
 
 
 def _roles(heads: tuple[str, ...], time: int, layout: Layout, of_joints: bool = True) -> Roles:
@@ -244,20 +226,6 @@ def _at(seconds: Array, start: int, stream: Stream, of_headers: bool) -> Array:
     return values_at(seconds, (stamps - start) / SECOND, stream, values)
 
 
-class Paths(NamedTuple):
-    """The movements of a topic, one after the other."""
-
-    topic: Topic
-    heads: Heads
-    values: Array  # shape (total, d)
-    times: Array | None  # shape (total,); in seconds; None if the points of a movement have no stamps of their own
-    time: str  # what the stamps are called
-    # lengths and places: number of points, and number of the message
-    lengths: list[int]
-    places: list[int]
-    left_out: list[str]
-
-
 class _Group(NamedTuple):
     values: array[float]
     stamps: array[int]
@@ -265,10 +233,10 @@ class _Group(NamedTuple):
     places: list[int]
 
 
-def read_paths(bag: Bag, topic: Topic, skip: str) -> Paths:
-    """The movements of a topic. Of those with different columns, the most frequent are read.
+def _movements_of_messages(bag: Bag, topic: Topic, layout: Layout) -> Parsed:
+    """The movements of a topic, one a message. Of those with different columns, the most frequent are read.
 
-    A message that cannot be read costs its own movement, whatever `skip` says.
+    A message that cannot be read costs its own movement, whatever the layout says to skip.
     """
     groups: dict[Heads, _Group] = {}
     left_out: list[str] = []
@@ -276,20 +244,33 @@ def read_paths(bag: Bag, topic: Topic, skip: str) -> Paths:
     if not groups:
         reason = f": {left_out[0]}" if left_out else ", got messages without points"
         raise DataError(f"topic {topic.name}: expected movements of {topic.type}{reason}")
-    heads, movements = max(groups.items(), key=lambda group: len(group[1].lengths))
+    heads, (numbers, ticks, lengths, places) = max(groups.items(), key=lambda group: len(group[1].lengths))
     for other, group in groups.items():
         if other != heads:
             n = counted(len(group.lengths), "message")
             left_out.append(f"topic {topic.name}: {n} with other columns {listed(other)}")
-    values = np.frombuffer(movements.values, np.float64).reshape(-1, len(heads))
-    stamps = np.frombuffer(movements.stamps, np.int64)
-    stream = with_rotations(Stream(topic.name, heads, values, stamps, None), f"topic {topic.name}: ", skip, left_out)
+    values = np.frombuffer(numbers, np.float64).reshape(-1, len(heads))
+    stamps = np.frombuffer(ticks, np.int64)
+    where = f"topic {topic.name}: "
+    stream = with_rotations(Stream(topic.name, heads, values, stamps, None), where, layout.skip, left_out)
     if len(stream.values) < len(values):
         raise DataError(left_out[-1])
     is_planned = topic.type.endswith("JointTrajectory")
-    times = stamps / _SECOND if is_planned or _increase(stamps, movements.lengths) else None
-    time = "time_from_start" if is_planned else "header.stamp"
-    return Paths(topic, stream.heads, stream.values, times, time, movements.lengths, movements.places, left_out)
+    inner = np.ones(max(len(stamps) - 1, 0), dtype=bool)  # steps within a movement
+    inner[np.cumsum(lengths)[:-1] - 1] = False
+    timed = is_planned or bool((np.diff(stamps)[inner] > 0).all())
+    names = np.empty(len(stamps), dtype=object)
+    names[:] = np.repeat([str(place) for place in places], lengths)
+    columns = ("time_from_start" if is_planned else "header.stamp", "message", *stream.heads)
+    times = stamps / _SECOND if timed else np.zeros(len(stamps))
+    table = Table(columns, [times, names, *stream.values.T], len(names), no_lines, dates_in="s")
+    roles = _roles(columns, 0, layout)._replace(movement=(1,))
+    about = (bag.kind, f"topic {topic.name} of {topic.type}, a movement a message", "stamps of its points")
+    parsed = _parsed(table, roles, layout, about, left_out)
+    if timed:
+        return parsed
+    detected = parsed.detected._replace(time=None, units_from="no times: one second each")
+    return parsed._replace(detected=detected, block=replace(parsed.block, times=None))
 
 
 def _collect_path(bag: Bag, topic: Topic, groups: dict[Heads, _Group], left_out: list[str]) -> None:
@@ -315,10 +296,3 @@ def _collect_path(bag: Bag, topic: Topic, groups: dict[Heads, _Group], left_out:
             check_expanded(_COPIES * n_bytes, "a topic")
     except DataError as error:
         left_out.append(f"topic {topic.name}: after {counted(n, 'message')}: {error}")
-
-
-def _increase(stamps: NDArray[np.int64], lengths: list[int]) -> bool:
-    """Tell whether the stamps increase within every movement."""
-    inner = np.ones(max(len(stamps) - 1, 0), dtype=bool)
-    inner[np.cumsum(lengths)[:-1] - 1] = False
-    return bool((np.diff(stamps)[inner] > 0).all())
