@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,10 +90,10 @@ def _without_missing(block: Block, file: str, skip: str, columns: Sequence[str])
         first = int(block.offsets[i] + np.argmax(lacking[block.offsets[i] :]))
         left_out = int(counts[i]) if readable[i] else 0
         effect = f"; {counted(left_out, 'sample')} like this left out" if left_out else ""
-        missing = missing_values(block, columns, i)
-        reason = movement_of(block, i) + in_words(missing, skip) + effect
+        names, words = lacking_values(block, columns, i, skip)
+        reason = movement_of(block, i) + words + effect
         line = block.line_of(block.row(first))
-        problems.append(Problem(file, line, reason, DataError, left_out, () if left_out else missing.names))
+        problems.append(Problem(file, line, reason, DataError, left_out, () if left_out else names))
     block = take_movements(block, readable)
     return _keep(block, ~np.asarray(np.isnan(block.positions).any(axis=1))), problems
 
@@ -182,23 +181,15 @@ def take_movements(block: Block, chosen: Flags) -> Block:
     return replace(taken, offsets=ends, labels=labels, places=places, people=people, repairs=repairs)
 
 
-class Spans(NamedTuple):
-    """Runs of missing values of one column: first rows, rows after the last ones, and the time that each takes [s].
+def spans_of(missing: Flags, times: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
+    """Find runs of missing values (T,) at times (T,) [s]: first rows, rows after the last ones, and their lengths [s].
 
-    The time is that from the value before to the value after; it is infinite at the ends of a movement.
+    The length is that from the value before to the value after; it is infinite at the ends of a movement.
     """
-
-    first: NDArray[np.intp]
-    stop: NDArray[np.intp]
-    seconds: Array
-
-
-def spans_of(missing: Flags, times: Array) -> Spans:
-    """Find the runs of missing values (T,) of one movement with time stamps (T,) [s]."""
     edges = np.diff(np.concatenate(([False], missing, [False])).astype(np.int8))
     first, stop = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
     before, after = np.concatenate(([-np.inf], times)), np.concatenate((times, [np.inf]))
-    return Spans(first, stop, after[stop] - before[first])
+    return first, stop, after[stop] - before[first]
 
 
 def sentinels_as_missing(block: Block, columns: Sequence[str]) -> tuple[Block, tuple[str, ...]]:
@@ -298,16 +289,16 @@ def _fill(values: Array, times: Array, most: float, channels: Sequence[tuple[Cha
     longest = np.zeros(len(values))
     for channel, columns in channels:
         missing: Flags = np.asarray(np.isnan(values[:, columns]).any(axis=1))
-        spans = spans_of(missing, times)
-        short = spans.seconds <= most * (1.0 + _ROUNDING)
+        first, stop, seconds = spans_of(missing, times)
+        short = seconds <= most * (1.0 + _ROUNDING)
         if not short.any():
             continue
-        lengths = (spans.stop - spans.first)[short]
-        begun = np.repeat(spans.first[short] - np.cumsum(lengths) + lengths, lengths)
+        lengths = (stop - first)[short]
+        begun = np.repeat(first[short] - np.cumsum(lengths) + lengths, lengths)
         chosen = begun + np.arange(len(begun))
         samples = times[~missing], values[~missing][:, columns]
         values[chosen[:, None], columns] = _between(channel, samples, times[chosen])
-        longest[chosen] = np.maximum(longest[chosen], np.repeat(spans.seconds[short], lengths))
+        longest[chosen] = np.maximum(longest[chosen], np.repeat(seconds[short], lengths))
     return longest
 
 
@@ -326,7 +317,10 @@ def _between(channel: Channel, samples: tuple[Array, Array], times: Array) -> Ar
         period = period_of_channel(channel, values[:, 0])
         unwrapped = without_wraps(values[:, 0], np.array([0, len(values)]), period)[:, None]
         between = _smooth(stamps, unwrapped, times)
-        return between if np.array_equal(unwrapped, values) else _wrapped(between, values, period)
+        if np.array_equal(unwrapped, values):
+            return between
+        low = 0.0 if values.min() >= 0.0 else -period / 2  # the turn that the recorded angles lie in
+        return np.asarray(low + (between - low) % period)
     return _smooth(stamps, values, times)
 
 
@@ -339,33 +333,18 @@ def _smooth(stamps: Array, values: Array, times: Array) -> Array:
     return np.asarray(Akima1DInterpolator(stamps, values)(times))
 
 
-def _wrapped(angles: Array, recorded: Array, period: float) -> Array:
-    """Angles in the turn that the recorded ones lie in, from 0 or from minus half a turn on: that tells an angle."""
-    low = 0.0 if recorded.min() >= 0.0 else -period / 2
-    return np.asarray(low + (angles - low) % period)
+def lacking_values(block: Block, columns: Sequence[str], i: int, skip: str) -> tuple[tuple[str, ...], str]:
+    """Return what movement i lacks, and say in which share of its samples, and the options that read it nevertheless.
 
-
-class Missing(NamedTuple):
-    """The values that one movement lacks: what has none, in which share of the samples, and for how long at most [s].
-
-    `names` are columns, or what several begin with before a dot that lack the same samples; the most frequently
-    missing comes first. `longest` is 0 where values are missing at the ends alone; `everywhere`: in all columns.
+    These are columns, or what several begin with before a dot that lack the same samples, the most frequently missing
+    first.
     """
-
-    names: tuple[str, ...]
-    shares: tuple[float, ...]
-    longest: float
-    everywhere: bool
-
-
-def missing_values(block: Block, columns: Sequence[str], i: int) -> Missing:
-    """Find what movement i lacks."""
     rows = slice(block.offsets[i], block.offsets[i + 1])
     missing = np.isnan(block.positions[rows])
-    shares = missing.mean(axis=0).tolist()
-    longest = 0.0
+    share_of = missing.mean(axis=0).tolist()
+    longest = 0.0  # where values are missing at the ends alone
     if block.times is not None:
-        spans = [spans_of(missing[:, k], block.times[rows]).seconds for k, share in enumerate(shares) if share]
+        spans = [spans_of(missing[:, k], block.times[rows])[2] for k, share in enumerate(share_of) if share]
         longest = max((float(seconds[np.isfinite(seconds)].max(initial=0.0)) for seconds in spans), default=0.0)
     groups: dict[str, list[int]] = {}
     for k, name in enumerate(columns):
@@ -373,27 +352,19 @@ def missing_values(block: Block, columns: Sequence[str], i: int) -> Missing:
     named: dict[str, float] = {}
     for group, members in groups.items():
         together = group and len(members) > 1 and (missing[:, members] == missing[:, members[:1]]).all()
-        named |= {group: shares[members[0]]} if together else {columns[k]: shares[k] for k in members}
-    ordered = sorted((name for name, share in named.items() if share > 0), key=lambda name: -named[name])
-    return Missing(tuple(ordered), tuple(named[name] for name in ordered), longest, len(ordered) == len(named))
-
-
-def in_words(missing: Missing, skip: str) -> str:
-    """Say what a movement lacks, and the options that read it nevertheless."""
-    first, *others = missing.names
-    shares = [f"{100 * share:.2g}" if share < 0.1 else f"{100 * share:.0f}" for share in missing.shares]
-    more = [f"{share} % of {name!r}" for name, share in zip(others, shares[1:], strict=True)]
+        named |= {group: share_of[members[0]]} if together else {columns[k]: share_of[k] for k in members}
+    first, *others = names = sorted((name for name, share in named.items() if share > 0), key=lambda name: -named[name])
+    shares = {name: f"{100 * named[name]:.{'2g' if named[name] < 0.1 else '0f'}}" for name in names}
+    more = [f"{shares[name]} % of {name!r}" for name in others]
     also = f", {', '.join(more[:_SHOWN])}" + (f" and of {len(more) - _SHOWN} more" if len(more) > _SHOWN else "")
-    lasting = f", for up to {missing.longest:.3g} s" if missing.longest else ""
-    options = {} if missing.everywhere else {"exclude=": f"--exclude {in_shell(missing.names)}"}
-    options |= {"fill_gaps=": f"--fill-gaps {_rounded_up(missing.longest):g}"} if missing.longest else {}
+    lasting = f", for up to {longest:.3g} s" if longest else ""
+    options = {} if len(names) == len(named) else {"exclude=": f"--exclude {in_shell(names)}"}
+    if longest:
+        unit = 10.0 ** (np.floor(np.log10(longest)) - 1)  # two digits, not fewer
+        options["fill_gaps="] = f"--fill-gaps {float(np.ceil(round(longest / unit, 6)) * unit):g}"
     options |= {"skip=": "--skip sample"} if skip == "movement" else {}
     said = f"; say {' or '.join(options.values())}, in Python {' or '.join(options)}" if options else ""
-    share = f"{shares[0]} % of the samples"
-    return f"expected a number in {first!r}, got nothing in {share}{also if others else ''}{lasting}{said}"
-
-
-def _rounded_up(seconds: float) -> float:
-    """Seconds in two digits, not fewer."""
-    unit = 10.0 ** (np.floor(np.log10(seconds)) - 1)
-    return float(np.ceil(round(seconds / unit, 6)) * unit)
+    share = f"{shares[first]} % of the samples"
+    return tuple(
+        names
+    ), f"expected a number in {first!r}, got nothing in {share}{also if others else ''}{lasting}{said}"

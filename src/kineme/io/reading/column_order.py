@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import PurePosixPath
-from typing import NamedTuple
 
 from kineme.errors import TrajectoryError
 from kineme.io.reading.read_file import FileRead
@@ -30,18 +29,13 @@ _SENSORS = frozenset(
 _NAMED = 6  # columns that a note names
 
 
-class ColumnSet(NamedTuple):
-    """The files with one set of columns, in one order and unit; those whose columns have no names; problems."""
-
-    same: list[FileRead]
-    nameless: list[FileRead]
-    problems: list[Problem]
-
-
-def in_one_set(files: Sequence[FileRead], by_number: bool = False) -> ColumnSet:
+def in_one_set(
+    files: Sequence[FileRead], by_number: bool = False
+) -> tuple[list[FileRead], list[FileRead], list[Problem]]:
     """Files, of equally many columns, with the columns of most, in the order and in the units of these.
 
-    Where the caller chose the columns `by_number`, names do not matter.
+    Behind them are those whose columns have no names, and problems. Where the caller chose the columns `by_number`,
+    names do not matter.
     """
     columns = [_columns(file) for file in files]
     keys = [(frozenset(own.names), sensors_of(file.path)) for file, own in zip(files, columns, strict=True)]
@@ -52,10 +46,10 @@ def in_one_set(files: Sequence[FileRead], by_number: bool = False) -> ColumnSet:
     usual = units.most_common(1)[0][0]
     alike = [own for own in exact if frozenset(zip(own.names, own.units, strict=True)) == usual]
     ours = max(alike, key=exact.__getitem__)  # of two orders that are equally frequent, the one met first
-    result = ColumnSet([], [], [])
+    same, nameless, problems = list[FileRead](), list[FileRead](), list[Problem]()
     for file, key, own in zip(files, keys, columns, strict=True):
         if key[0] != most[0] and (by_number or _is_nameless(file, own)):
-            result.nameless.append(file)
+            nameless.append(file)
         elif key != most and not by_number:
             here, there = (" ".join(sorted(sensors)) or "no sensor" for sensors in (key[1], most[1]))
             unlike = (
@@ -63,13 +57,13 @@ def in_one_set(files: Sequence[FileRead], by_number: bool = False) -> ColumnSet:
                 if key[0] != most[0]
                 else f"the file of another sensor by its name, {here} where most files are of {there}; read them apart"
             )
-            result.problems.append(Problem(file.path, None, unlike))
+            problems.append(Problem(file.path, None, unlike))
         else:
             try:
-                result.same.append(_as(file, own, ours))
+                same.append(_as(file, own, ours))
             except TrajectoryError as error:
-                result.problems.append(Problem(file.path, None, str(error)))
-    return result
+                problems.append(Problem(file.path, None, str(error)))
+    return same, nameless, problems
 
 
 def dimensions_unlike(files: Sequence[FileRead], most: Sequence[FileRead]) -> list[Problem]:

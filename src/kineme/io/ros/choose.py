@@ -149,7 +149,7 @@ def _transforms(bag: Bag, named: set[str]) -> tuple[Topic, ...]:
 
 
 def _only_frames(bag: Bag, transforms: Sequence[Topic]) -> Edge:
-    edges = connected_graph(bag, transforms, (), FRAMES_LOOKED_AT).edges
+    edges = connected_graph(bag, transforms, (), FRAMES_LOOKED_AT)
     if len(edges) == 1:
         return edges[0]
     pairs = first_names([f"{parent}:{child}" for parent, child in edges], _SHOWN)
@@ -200,17 +200,6 @@ class Step(NamedTuple):
     forward: bool
 
 
-class Graph(NamedTuple):
-    """The transforms between frames: for each child the number of transforms of each of its parents."""
-
-    parents: dict[str, Counter[str]]
-
-    @property
-    def edges(self) -> list[Edge]:
-        """Each child with the parent that it has most transforms of, in alphabetic order."""
-        return sorted((counts.most_common(1)[0][0], child) for child, counts in self.parents.items())
-
-
 def transform_topics(bag: Bag) -> list[Topic]:
     """The topics with transforms between frames."""
     return [topic for topic in bag.topics if topic.type in TRANSFORMS and topic.n_messages]
@@ -234,31 +223,37 @@ def edge_of(transform: Any) -> Edge:
     return transform.header.frame_id.removeprefix("/"), transform.child_frame_id.removeprefix("/")
 
 
-def connected_graph(bag: Bag, topics: Sequence[Topic], wanted: Sequence[Edge], most: int | None = None) -> Graph:
-    """The frames, read until all wanted pairs are connected, or `most` transforms, or to the end."""
-    graph = Graph({})
+def connected_graph(bag: Bag, topics: Sequence[Topic], wanted: Sequence[Edge], most: int | None = None) -> list[Edge]:
+    """The frames, read until all wanted pairs are connected, or `most` transforms, or to the end.
+
+    Each is a child with the parent that it has most transforms of, in alphabetic order.
+    """
+    parents: dict[str, Counter[str]] = {}
+
+    def ordered() -> list[Edge]:
+        return sorted((counts.most_common(1)[0][0], child) for child, counts in parents.items())
+
     open_pairs = list(wanted)
     edges: set[Edge] = set()
     try:
         for n, (_, _, transform) in enumerate(transforms_in(bag, topics, [])):
             edge = edge_of(transform)
-            graph.parents.setdefault(edge[1], Counter())[edge[0]] += 1
+            parents.setdefault(edge[1], Counter())[edge[0]] += 1
             if edge not in edges:
                 edges.add(edge)
-                open_pairs = [pair for pair in open_pairs if pair[1] not in _ways(graph.edges, pair[0])]
+                open_pairs = [pair for pair in open_pairs if pair[1] not in _ways(ordered(), pair[0])]
                 if wanted and not open_pairs:
                     break
             if most is not None and n + 1 >= most:
                 break
     except DataError:
-        if not graph.parents:
+        if not parents:
             raise
-    return graph
+    return ordered()
 
 
-def chain(graph: Graph, parent: str, child: str) -> list[Step]:
+def chain(edges: Sequence[Edge], parent: str, child: str) -> list[Step]:
     """The transforms from one frame to another."""
-    edges = graph.edges
     frames = sorted({frame for edge in edges for frame in edge})
     for frame in (parent, child):
         if frame not in frames:
