@@ -42,16 +42,8 @@ def annotate(
 ) -> Annotated:
     """Find the movements of a library's symbols in long recordings, and unknown motion between them.
 
-    Parameters
-    ----------
-    store : Store
-        The library, ``ActionLibrary.store``.
-    recordings : Recordings
-        Each movement is searched on its own.
-    error_rate : float, default 0.05
-        As in `Recognizer.spot`.
-    progress : callable, optional
-        Called now and then with the seconds of recordings that are done.
+    Each movement of the recordings is searched on its own, at an error rate as in `Recognizer.spot`. `progress` is
+    called now and then with the seconds of recordings that are done.
     """
     classes = some_of_each_symbol(store)
     classes.comparison.checked(recordings.demonstrations[:1], "recordings")  # all of them have the same columns

@@ -323,22 +323,11 @@ def learn_recordings(  # noqa: PLR0913, PLR0917 - those of `ActionLibrary.learn`
     root: str | PurePath = "",
     groups: Sequence[str | None] | None = None,
 ) -> LearnReport:
-    """Store the recordings of `kineme.io.reading.recordings.read_recordings`.
+    """Store the recordings of `kineme.io.reading.recordings.read_recordings` in the library of ``ActionLibrary.store``.
 
-    Parameters
-    ----------
-    store : Store
-        The library, ``ActionLibrary.store``.
-    options : mapping, optional
-        Options of the reader. The same file read with other options is another source.
-    labels : sequence of n str or None, optional
-        Names of symbols; by default each movement's own label.
-    progress : callable, optional
-        As for `ActionLibrary.learn`.
-    root : str or Path, optional
-        Folder that was read; stored before the names of the files.
-    groups : sequence of n str or None, optional
-        As for `ActionLibrary.learn`.
+    The options are those of the reader: the same file read with others is another source. `root` is the folder that was
+    read, stored before the names of the files. By default the labels are those of the movements; groups and progress
+    are as for `ActionLibrary.learn`.
     """
     now = datetime.now(UTC).isoformat(timespec="seconds")
     chosen = {name: value for name, value in (options or {}).items() if value is not None}

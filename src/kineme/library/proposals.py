@@ -76,15 +76,7 @@ def propose(
 ) -> LibraryProposals:
     """Propose symbols for movements; see `ActionLibrary.propose`.
 
-    Parameters
-    ----------
-    store : Store
-    ids : array_like of int, optional
-        By default the movements without a symbol that are not in `joining`.
-    method, n_clusters, min_members
-        As for `kineme.anchoring.propose`.
-    joining : Recognized, optional
-        Movements to leave out, and what is known of the symbols.
+    Movements that are `joining` a symbol are left out, and what is known of the symbols is taken from there.
     """
     joining = Recognized() if joining is None else joining
     chosen = (

@@ -31,15 +31,8 @@ def write_atomically(path: Path, data: bytes) -> Path:
 def whole_file(path: Path, *, replace: bool = True, companions: Sequence[str] = ()) -> Iterator[Path]:
     """Context manager: a hidden name beside `path` to write to; on success that file is flushed and named `path`.
 
-    Leftovers of killed processes are removed.
-
-    Parameters
-    ----------
-    path : Path
-    replace : bool, default True
-        Whether the new file takes the place of one that is there.
-    companions : sequence of str
-        Ends of the names of other files that may be made beside the new one, as "-wal" by SQLite; they are deleted.
+    Leftovers of killed processes are removed, and so are the `companions`: ends of the names of other files that may be
+    made beside the new one, as "-wal" by SQLite.
 
     Raises FileExistsError: `replace` is False and there is a file of that name, or another process was faster; it stays
     as it is; OSError: the folder is missing, read-only or full; what was at `path` is as it was.

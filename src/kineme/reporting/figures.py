@@ -99,10 +99,7 @@ def render(figure: Figure, dpi: int) -> dict[str, bytes]:
 
 
 def save_figure(figure: Figure, path: Path) -> Path:
-    """Write the figure in the format that the file's ending names, atomically.
-
-    Raises DataError: an ending that is not in `FORMATS`.
-    """
+    """Write the figure in the format that the file's ending names, atomically."""
     kind = path.suffix.lower().removeprefix(".")
     if kind not in FORMATS:
         raise DataError(f"expected a picture ending in one of {', '.join(FORMATS)}, got {path.suffix or 'none'!r}")

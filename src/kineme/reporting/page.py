@@ -36,17 +36,7 @@ def picture(svg: bytes, caption: str, head: str = "") -> str:
 
 
 def page(title: str, heading: str, body: str, facts: dict[str, Any]) -> str:
-    """A whole HTML document.
-
-    Parameters
-    ----------
-    title, heading : str
-        For the browser's tab, and above the text.
-    body : str
-        HTML.
-    facts : dict
-        Settings and versions, printed at the end.
-    """
+    """A whole HTML document: the title of the browser's tab, the heading above the body, and facts at its end."""
     listed = "; ".join(f"{in_markup(key)} {in_markup(value)}" for key, value in facts.items())
     return f"""<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">

@@ -137,10 +137,7 @@ def to_html(table: Table) -> str:
 
 
 def data_frame(columns: Mapping[str, Any]) -> Any:
-    """Columns as a data frame of pandas.
-
-    Raises DataError: the package pandas is not installed.
-    """
+    """Columns as a data frame of pandas."""
     try:
         import pandas as pd
     except ImportError as error:

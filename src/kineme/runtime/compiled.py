@@ -48,8 +48,6 @@ def use_compiled(n_operations: int, now: int | None = None) -> bool:
     Numba is imported for a job that is large enough to repay the import, and also once small jobs together have cost as
     much: many small calls then take at most twice the time that compiling at once would have taken. `now` is the part
     of the job that this call does. Where Numba cannot be imported, a warning says so once, and everything runs plain.
-
-    Raises SpecificationError: ``KINEME_COMPILED`` is none of `CHOICES`, or it is "always" and Numba cannot be imported.
     """
     global _spent  # noqa: PLW0603 - counted over the whole process
     choice = _choice()

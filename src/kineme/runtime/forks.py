@@ -30,15 +30,9 @@ def at_fork(
 ) -> None:
     """Prepare every later fork.
 
-    Parameters
-    ----------
-    hold : callable
-        Returns a context manager that is entered before a fork and left after it, in the parent and in the child: for
-        example a lock.
-    renew : callable
-        Called in the child before the context manager is left: creates again what another thread may have held.
-    first : bool
-        Enter it before the others. Needed where `hold` waits for work that may need the other locks.
+    `hold` returns a context manager that is entered before a fork and left after it, in the parent and in the child:
+    for example a lock. `renew` is called in the child before that is left: it creates again what another thread may
+    have held. `first` enters it before the others, where it waits for work that may need the other locks.
     """
     _guards.insert(0 if first else len(_guards), (hold, renew))
 

@@ -35,14 +35,9 @@ def n_threads() -> int:
 
 
 def for_tiles(work: Callable[[int, int], object], n_rows: int, tile_rows: int) -> None:
-    """Call ``work(start, stop)`` for consecutive row ranges that cover ``range(n_rows)``.
+    """Call ``work(start, stop)`` for consecutive ranges of at most `tile_rows` that cover ``range(n_rows)``.
 
-    Parameters
-    ----------
-    work : callable
-        Writes its own rows of a shared result; its return value is ignored.
-    n_rows, tile_rows : int
-        Number of rows in all, and at most this many in one call.
+    It writes its own rows of a shared result; its return value is ignored.
     """
     tiles = [(start, min(start + tile_rows, n_rows)) for start in range(0, n_rows, tile_rows)]
     threads = min(n_threads(), len(tiles))

@@ -65,15 +65,7 @@ _ALIGNMENT = 8  # bytes: arrays in JavaScript begin at multiples of the size of 
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """Header and arrays that the runtime in `kineme.studio.javascript` computes with.
-
-    Attributes
-    ----------
-    header : dict
-        JSON data: names, specification, widths, weights.
-    arrays : dict from str to ndarray
-        Of float64, float32 or int32.
-    """
+    """JSON data (names, specification, widths, weights) and arrays of float64, float32 or int32 for the runtime."""
 
     header: dict[str, Any]
     arrays: dict[str, NDArray[Any]]
@@ -96,10 +88,7 @@ class Snapshot:
 
 
 def recognition_parts(classes: KnownClasses) -> Snapshot:
-    """Header and arrays of what recognizes movements.
-
-    Raises SpecificationError: a classifier, or a limit of rotations in space, that the runtime does not have.
-    """
+    """Header and arrays of what recognizes movements."""
     demos = classes.references.all_movements()
     comparison, comparison_arrays = _comparison(classes.comparison, classes.references.described.pairs)
     calibration, calibration_arrays = _calibration(classes.calibration)
@@ -188,10 +177,7 @@ def _numbers(module: ModuleType, *names: str) -> dict[str, float]:
 
 
 def rotation_rule(procrustes: Procrustes) -> dict[str, Any]:
-    """Write how movements are rotated.
-
-    Raises SpecificationError: By at most an angle, in space.
-    """
+    """Write how movements are rotated."""
     d, prior = procrustes.n_dims, procrustes.prior
     if d == 3 and prior is None and procrustes.max_angle > 0:
         raise SpecificationError(
@@ -332,9 +318,6 @@ def snapshot_of_library(library: ActionLibrary, most: int | None = None, early: 
     many as fit into 2 MB, 603 in the plane and 402 in space. Widths and calibration are those of the movements taken,
     as if a library held these alone. ``header["n_all"]`` says of how many. `early` is how movements are recognized
     under way; by default as `kineme.Recognizer.stream` does.
-
-    Raises SpecificationError: no movement belongs to a symbol; more symbols than fit; what the runtime does not have,
-    see `recognition_parts`.
     """
     store = library.store
     members = members_of(store)

@@ -36,18 +36,10 @@ NOW = LARGEST_ID  # later than every version: the current state
 
 
 class Store:
-    """The open database of a library.
+    """The open database of a library, which is created by the specification if there is none.
 
-    Parameters
-    ----------
-    path : Path
-        Path of the database. Caches that can be built again may be beside it.
-    specification : Specification, optional
-        Specification of a library that is created if it does not exist.
-    as_of : int, optional
-        Show the library as it was at this version; implies `read_only`.
-    wait : float
-        Seconds to wait for another writer.
+    Caches that can be built again may be beside it. With `as_of`, it shows the library as it was at that version, for
+    reading. `wait` is the time for which it waits for another writer [s].
     """
 
     def __init__(

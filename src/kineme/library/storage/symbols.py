@@ -209,11 +209,8 @@ def add_members(change: Change, pairs: Sequence[tuple[int, int]], how: str) -> N
 def symbol_report(store: Store, who: str) -> dict[str, Any]:
     """Return a symbol as plain data.
 
-    Returns
-    -------
-    dict
-        ``id``, ``name``, ``description``, ``prototype``, ``parents``, and ``members``: per movement its id, name, file,
-        position in the file, person, n_samples, duration [s], start and goal.
+    It has ``id``, ``name``, ``description``, ``prototype``, ``parents``, and ``members``: per movement its id, name,
+    file, position in the file, person, n_samples, duration [s], start and goal.
     """
     shown = symbol(store, who)
     members = []

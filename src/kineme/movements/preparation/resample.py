@@ -91,17 +91,12 @@ def extents_of(demonstrations: Demonstrations, start: int, stop: int) -> Array:
 
 
 def arc_length_phase(paths: Array, share: float = 1.0) -> Array:
-    """Phase in [0, 1] of evenly sampled paths, as a blend of arc length and time.
+    """Phase in [0, 1] of evenly sampled paths (n, d, T), as a blend of arc length and time.
 
-    ``phase = a s / s_total + (1 - a) t / tau`` with s the length of the polygon through the samples and
-    ``a = 0.999 share``: the thousandth of time keeps the phase strictly increasing where the movement pauses.
-
-    Parameters
-    ----------
-    paths : ndarray of shape (n, d, T)
-        Smooth the paths first: noise adds length, and at 3 % of the extent it is longer than the movement itself.
-    share : float, default 1.0
-        Weight of the arc length: 1 is arc length, 0 is time.
+    ``phase = a s / s_total + (1 - a) t / tau`` with s the length of the polygon through the samples and ``a = 0.999
+    share``: the thousandth of time keeps the phase strictly increasing where the movement pauses. A share of 1 is arc
+    length, 0 is time. Smooth the paths first: noise adds length, and at 3 % of the extent it is longer than the
+    movement itself.
     """
     n, _, n_samples = paths.shape
     time = np.linspace(0.0, 1.0, n_samples)

@@ -200,23 +200,11 @@ def spline_matrix(n_in: int, n_out: int) -> Array:
 
 
 def spline_rows(parameter: Array, positions: Array, offsets: NDArray[np.intp], n_points: int) -> Array:
-    """Interpolate movements on `n_points` even values of their parameter, relative to their start.
+    """Interpolate movements on `n_points` even values of their parameter, relative to their start, (n, d, n_points).
 
-    Parameters
-    ----------
-    parameter : ndarray of shape (total,)
-        Strictly increasing within each movement: time, or arc length.
-    positions : ndarray of shape (total, d)
-        Samples of all movements.
-    offsets : ndarray of shape (n + 1,)
-        Where each movement begins in `parameter` and `positions`.
-    n_points : int
-        Points per movement.
-
-    Returns
-    -------
-    ndarray of shape (n, d, n_points)
-        Positions minus the first position: a large offset costs no digits.
+    The parameter (total,) is strictly increasing within each movement: time, or arc length. Movement i holds the
+    samples ``offsets[i]:offsets[i + 1]`` of it and of the positions (total, d). A large offset of these costs no
+    digits.
     """
     n, n_dims = len(offsets) - 1, positions.shape[1]
     rows = np.empty((n, n_dims, n_points))

@@ -354,13 +354,8 @@ def observe(recording: Trajectory, resolution: float) -> Motion:
     cutoff c [Hz] with a speed of variance ``(pi^3 / sqrt 2) sigma^2 c^3 / r`` per dimension: the integral of
     ``(2 pi nu)^2 (2 sigma^2 / r) / (1 + (nu / c)^4)^2``. The largest c that keeps this below the limit is taken, so a
     clean recording is hardly smoothed, and no cutoff in hertz assumes how fast people or robots move. Glitches are
-    taken out first, see `without_glitches`.
-
-    Parameters
-    ----------
-    recording : Trajectory
-    resolution : float
-        Speed that must be distinguished from rest, as a share of the peak speed.
+    taken out first, see `without_glitches`. The resolution is the speed that must be distinguished from rest, as a
+    share of the peak speed.
     """
     who = f"recording {recording.name!r}" if recording.name else "recording"
     if len(recording) < _MIN_SAMPLES:

@@ -26,10 +26,7 @@ _FROM_ABOVE = 0.8  # of the direction of the view: y is up where it is mostly al
 
 
 def library_page(library: ActionLibrary, title: str, most: int | None = None) -> tuple[str, Snapshot]:
-    """Make the text of the page, and the snapshot that it holds: `most` movements, see `snapshot_of_library`.
-
-    Raises SpecificationError: Movements that are neither in the plane nor in space; what `snapshot_of_library` refuses.
-    """
+    """Make the text of the page, and the snapshot that it holds: `most` movements, see `snapshot_of_library`."""
     if library.n_dims not in (2, 3) and len(library):
         raise SpecificationError(
             f"expected a library of movements in the plane or in space, got {library.n_dims} dimensions, which cannot "

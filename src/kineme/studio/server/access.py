@@ -29,15 +29,9 @@ _FRAMED = "/arm.html"  # the only page that the studio's page shows inside itsel
 class Guard:
     """Check every request and every websocket, and say with every answer what browsers may do with it.
 
-    Parameters
-    ----------
-    app : ASGI application
-    token : str
-    once : str
-        What opens the page one time in the place of the token: other users of the machine see the address that a
-        browser is started with. Empty for none.
-    hosts : sequence of str
-        Names beside those of the loopback under which the server may be asked, from `--host`; with one, any address.
+    What opens the page `once` is in the place of the token: other users of the machine see the address that a browser
+    is started with. The hosts are names beside those of the loopback under which the server may be asked, from
+    `--host`; with one, any address.
     """
 
     def __init__(self, app: ASGIApp, token: str, once: str = "", hosts: tuple[str, ...] = ()) -> None:

@@ -112,22 +112,11 @@ ROUTERS = (
 def create_app(
     folder: str | Path, token: str, *, once: str = "", read_only: bool = False, hosts: tuple[str, ...] = ()
 ) -> FastAPI:
-    """The studio of one library, for any ASGI server.
+    """The studio of one library, for any ASGI server; the library is made if there is none, unless read only.
 
-    Parameters
-    ----------
-    folder : str or Path
-        Of the library; it is made if there is none, unless read only.
-    token : str
-        What every request must know, as a cookie or as ``Authorization: Bearer``; ``/?token=...`` sets the cookie.
-    once : str, default ""
-        What sets it one time, as ``/?once=...``; empty for none.
-    read_only : bool, default False
-        Refuse every change.
-    hosts : tuple of str
-        Names beside those of the loopback under which it may be asked; with one, every address too.
-
-    Raises DataError: the library cannot be opened.
+    Every request must know the token, as a cookie or as ``Authorization: Bearer``; ``/?token=...`` sets the cookie, and
+    ``/?once=...`` sets it one time. The hosts are names beside those of the loopback under which it may be asked; with
+    one, every address too. Read only, it refuses every change.
     """
     studio = Studio(Path(folder), read_only)
     app = StudioApp(

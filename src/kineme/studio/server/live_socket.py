@@ -288,10 +288,7 @@ class LiveSession:
 
 
 def parsed_samples(given: Any) -> Array:
-    """Check samples of a message: rows of a time stamp and positions.
-
-    Raises TrajectoryError: anything else.
-    """
+    """Check samples of a message: rows of a time stamp and positions."""
     words = f"samples as [[t, x, y, ...], ...], at most {MOST_SAMPLES:,} rows of equally many finite numbers"
 
     def is_row(row: Any) -> bool:
@@ -437,10 +434,7 @@ class Follower:
 
 
 def parsed_name(given: Any) -> str:
-    """Check the name of a program, as its message holds it.
-
-    Raises TrajectoryError: anything but some characters; halves of them cannot be sent on.
-    """
+    """Check the name of a program, as its message holds it."""
     name = given.strip() if isinstance(given, str) else ""
     if not 0 < len(name) <= LONGEST or any("\ud800" <= mark <= "\udfff" for mark in name):
         raise TrajectoryError(f"expected a name of 1 to {LONGEST} characters, got something else; send one")

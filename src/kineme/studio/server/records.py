@@ -84,10 +84,7 @@ def numbers(values: ArrayLike) -> Any:
 
 
 def trajectory(times: list[float], positions: list[list[float]]) -> Trajectory:
-    """A movement that a client sent.
-
-    Raises TrajectoryError: rows of different lengths, and whatever `Trajectory` refuses.
-    """
+    """A movement that a client sent."""
     if len({len(row) for row in positions}) > 1:
         raise TrajectoryError("expected positions as rows of equally many numbers, got rows of different lengths")
     return Trajectory(np.array(times, dtype=np.float64), np.array(positions, dtype=np.float64))

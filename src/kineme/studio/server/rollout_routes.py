@@ -62,10 +62,7 @@ def styles_of(studio: Studio, symbol: str) -> StyleModel:
 
 
 def make(studio: Studio, body: RolloutRequest) -> Rollout:
-    """Generate the movement that is asked for.
-
-    Raises SpecificationError, TrajectoryError: See `kineme.dmp.generation.generate.generate`.
-    """
+    """Generate the movement that is asked for."""
     learned = learned_as(studio, body)
     duration = body.duration or float(learned.primitive.durations[0])
     rate = body.rate or _SAMPLES / duration

@@ -53,9 +53,6 @@ def serve(options: Options, ready: Callable[[str, str], object]) -> None:
     """Serve a library until interrupted; once it can be opened, `ready` is called with its address.
 
     The second argument of `ready` is an address for the browser of this machine, without the token: it opens once.
-
-    Raises DataError: the library cannot be opened, the address is taken, or the extra `studio` is not installed;
-    SpecificationError: a token in the environment that is too short.
     """
     try:
         import uvicorn

@@ -57,10 +57,7 @@ class Uploads:
         self._folder.close()
 
     async def receive(self, name: str, chunks: AsyncIterator[bytes]) -> str:
-        """Keep a file under the key that is returned; `name` is percent-encoded, its ending says the format.
-
-        Raises DataError: the disk is full.
-        """
+        """Keep a file under the key that is returned; `name` is percent-encoded, its ending says the format."""
         key = secrets.token_hex(8)
         path = self._folder.path / key / plain_name(name)
         try:
