@@ -15,16 +15,7 @@ from typing import Any, NamedTuple
 
 from kineme.errors import DataError
 from kineme.io.records import needs
-from kineme.io.ros.bags import (
-    INFORMATION,
-    METADATA,
-    Bag,
-    compression_of_ros_1,
-    open_bag,
-    records_of_mcap,
-    refused,
-    storages_of,
-)
+from kineme.io.ros import bags
 from kineme.io.ros.number_fields import standard_types
 
 TEXT = "std_msgs/msg/String"  # every version of ROS knows it
@@ -38,10 +29,10 @@ def copy_with_topic(source: Path, target: Path, name: str, texts: Callable[[int,
     `texts` takes the times of the first and of the last message of the bag [ns]. Without texts it is a plain copy.
     Memory does not grow with the bag.
     """
-    with open_bag(source) as bag:
+    with bags.open_bag(source) as bag:
         chosen = texts(int(bag.reader.start_time), int(bag.reader.end_time) - 1)
         added = added_topic(bag, name, chosen)
-        with refused("expected a bag that takes a topic more", bag.remedy):
+        with bags.refused("expected a bag that takes a topic more", bag.remedy):
             if source.is_dir():
                 _copy_folder(bag, source, target, added)
             elif not added.messages:
@@ -49,10 +40,10 @@ def copy_with_topic(source: Path, target: Path, name: str, texts: Callable[[int,
             elif bag.version == 1:
                 copy_bag(bag, target, added)
             else:
-                _copy_file(source, target, added, storages_of(bag)[0])
+                _copy_file(source, target, added, bags.storages_of(bag)[0])
 
 
-def _copy_folder(bag: Bag, source: Path, target: Path, added: AddedTopic) -> None:
+def _copy_folder(bag: bags.Bag, source: Path, target: Path, added: AddedTopic) -> None:
     """Each message goes into the file that was recorded at its time; the description of the folder counts them."""
     from ruamel.yaml import YAML
 
@@ -62,11 +53,11 @@ def _copy_folder(bag: Bag, source: Path, target: Path, added: AddedTopic) -> Non
         raise DataError("expected a bag whose files are not compressed as a whole, to add a topic to; ros2 bag convert")
     if bag.compression == "message":
         added = added._replace(messages=tuple((stamp, _compressed(raw)) for stamp, raw in added.messages))
-    with refused(f"expected {METADATA} of a bag of ROS 2", "run ros2 bag reindex"):
-        metadata = yaml.load((source / METADATA).read_text(encoding="utf-8"))
-        about = metadata[INFORMATION]
+    with bags.refused(f"expected {bags.METADATA} of a bag of ROS 2", "run ros2 bag reindex"):
+        metadata = yaml.load((source / bags.METADATA).read_text(encoding="utf-8"))
+        about = metadata[bags.INFORMATION]
         names = [PurePath(file).name for file in about["relative_file_paths"]]
-        parts = _divided(added, [storage.metadata.start_time for storage in storages_of(bag)])
+        parts = _divided(added, [storage.metadata.start_time for storage in bags.storages_of(bag)])
         changed = {names[k]: part for k, part in parts.items()}
         if added.messages:
             _count(about, added)
@@ -77,9 +68,9 @@ def _copy_folder(bag: Bag, source: Path, target: Path, added: AddedTopic) -> Non
         source, target, dirs_exist_ok=True, ignore=lambda folder, _: changed if Path(folder) == source else ()
     )
     for name, part in changed.items():
-        _copy_file(source / name, target / name, part, storages_of(bag)[names.index(name)])
+        _copy_file(source / name, target / name, part, bags.storages_of(bag)[names.index(name)])
     if changed:
-        with (target / METADATA).open("w", encoding="utf-8") as file:
+        with (target / bags.METADATA).open("w", encoding="utf-8") as file:
             yaml.dump(metadata, file)
 
 
@@ -141,7 +132,7 @@ class AddedTopic(NamedTuple):
     messages: tuple[tuple[int, bytes], ...]  # time of recording [ns] and bytes of each, in the order of time
 
 
-def added_topic(bag: Bag, name: str, texts: Sequence[tuple[int, str]]) -> AddedTopic:
+def added_topic(bag: bags.Bag, name: str, texts: Sequence[tuple[int, str]]) -> AddedTopic:
     """Texts with their times of recording [ns] as messages of that bag's version of ROS."""
     if any(topic.name == name for topic in bag.topics):
         raise DataError(f"expected a bag without the topic {name}, got one that has it; annotate the recording itself")
@@ -156,7 +147,7 @@ def added_topic(bag: Bag, name: str, texts: Sequence[tuple[int, str]]) -> AddedT
     return AddedTopic(name, str(definition), str(digest), messages)
 
 
-def copy_bag(bag: Bag, target: Path, added: AddedTopic) -> None:
+def copy_bag(bag: bags.Bag, target: Path, added: AddedTopic) -> None:
     """Write a copy of an open bag of ROS 1 with a topic more, in the order of time.
 
     It is written anew, by rosbags: roscpp, rospy and the mode "append" of rosbag order the fields of their records each
@@ -165,7 +156,7 @@ def copy_bag(bag: Bag, target: Path, added: AddedTopic) -> None:
     from rosbags.rosbag1 import Writer
 
     writer = Writer(target)
-    compression = compression_of_ros_1(bag.reader.bio, min(bag.reader.chunks))[0] if bag.reader.chunks else "none"
+    compression = bags.compression_of_ros_1(bag.reader.bio, min(bag.reader.chunks))[0] if bag.reader.chunks else "none"
     if compression != "none":
         writer.set_compression(Writer.CompressionFormat[compression.upper()])
     if compression == "lz4":  # rosbags writes frames that roslz4, with which ROS 1 reads, takes for damaged
@@ -205,7 +196,7 @@ def copy_mcap(source: Path, target: Path, added: AddedTopic, compression: str) -
         from mcap.writer import CompressionType, Writer
     schemas, channels, texts = {0: 0}, dict[int, int](), deque(added.messages)
     with source.open("rb") as old, target.open("wb") as new:
-        parts = records_of_mcap(old, validate_crcs=True)
+        parts = bags.records_of_mcap(old, validate_crcs=True)
         header = next(parts)
         writer: Any = Writer(new, compression=CompressionType[compression.upper() or "NONE"])
         writer.start(header.profile, header.library)

@@ -10,33 +10,25 @@ import numpy as np
 
 from kineme.errors import DataError
 from kineme.io.limits import check_expanded
-from kineme.io.motion_capture.export_heads import (
-    STAMP,
-    ExportHead,
-    opensim_head,
-    optitrack_head,
-    qualisys_head,
-    trc_head,
-    vicon_head,
-)
+from kineme.io.motion_capture import export_heads
 from kineme.io.tables.dialect import COMMA_NUMBER, Dialect, check_line, split
 from kineme.movements.tables.table import Table
 
 _HEAD_LINES = 400  # of an export with a head of its own, at most
 _FIRST = 3  # lines among which the first line of an export is
 _MAKERS = {
-    "OptiTrack": optitrack_head,
-    "Vicon": vicon_head,
-    "Qualisys": qualisys_head,
-    "TRC": trc_head,
-    "OpenSim": opensim_head,
+    "OptiTrack": export_heads.optitrack_head,
+    "Vicon": export_heads.vicon_head,
+    "Qualisys": export_heads.qualisys_head,
+    "TRC": export_heads.trc_head,
+    "OpenSim": export_heads.opensim_head,
 }
 _LINE = 100  # bytes of a line in Python, beside its characters
 _SAMPLES = 5  # in which decimal commas are looked for
 _ROUNDED = 1e-5  # s by which written times may differ from those of frames at the rate
 
 
-def export_head(lines: Iterable[str], n_bytes: int) -> tuple[ExportHead, Dialect] | None:
+def export_head(lines: Iterable[str], n_bytes: int) -> tuple[export_heads.ExportHead, Dialect] | None:
     """The head of an export of `_MAKERS` and how its samples are written; None for other tables."""
     lines = iter(lines)
     some = list(islice(lines, _FIRST))
@@ -50,7 +42,7 @@ def export_head(lines: Iterable[str], n_bytes: int) -> tuple[ExportHead, Dialect
     else:
         some += list(islice(lines, _HEAD_LINES))
     head = _head(some)
-    assert isinstance(head, ExportHead)
+    assert isinstance(head, export_heads.ExportHead)
     rows = [split(line, head.separator) for line in some[head.first : head.end][:_SAMPLES] if line.strip()]
     if not rows:
         raise DataError(f"expected samples below the heads of a {head.maker} export, got none")
@@ -77,23 +69,25 @@ def _head(lines: Sequence[str], probe: bool = False) -> Any:
     return None
 
 
-def with_times(head: ExportHead, dialect: Dialect) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
+def with_times(
+    head: export_heads.ExportHead, dialect: Dialect
+) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
     """Heads, kinds and units of the columns, and of one more for the times that follow from the rate."""
     more = head.rate is not None and not head.is_timed
     return (
-        (*dialect.heads, *[STAMP] * more),
+        (*dialect.heads, *[export_heads.STAMP] * more),
         (*dialect.kinds, *["number"] * more),
         (*dialect.measured_in, *["s"] * more),
     )
 
 
-def export_table(head: ExportHead, table: Table) -> Table:
+def export_table(head: export_heads.ExportHead, table: Table) -> Table:
     """A table with times, and NaN for markers that were not found."""
     columns = list(table.columns)
     if head.rate is not None and not head.is_timed:
         columns.append(_stamps(table, columns, head.rate))
     elif head.rate is not None and "frame" in head.heads:
-        k, frames = head.heads.index(STAMP), columns[head.heads.index("frame")]
+        k, frames = head.heads.index(export_heads.STAMP), columns[head.heads.index("frame")]
         even = columns[k][0] + (frames - frames[0]) / head.rate
         columns[k] = np.where(np.abs(columns[k] - even) <= _ROUNDED, even, columns[k])
     if head.zeros_are_gaps:

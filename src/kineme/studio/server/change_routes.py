@@ -13,25 +13,7 @@ from kineme.anchoring.proposals import Proposal
 from kineme.errors import SpecificationError
 from kineme.library import proposals as stored
 from kineme.library.storage import changes, read
-from kineme.studio.server.records import (
-    VERSION,
-    Change,
-    ChangedOut,
-    Description,
-    Ids,
-    LearnedOut,
-    Name,
-    Point,
-    Points,
-    ProposalKey,
-    RejectRequest,
-    SymbolKey,
-    Text,
-    Times,
-    numbers,
-    thumbnail,
-    trajectory,
-)
+from kineme.studio.server import records
 from kineme.studio.server.refusals import ConflictError
 from kineme.studio.server.studio import Reads, Studio, Writes
 
@@ -40,15 +22,15 @@ proposal_router = APIRouter(prefix="/api/proposals", tags=["proposals"])
 router = APIRouter(prefix="/api/library", tags=["changes"])
 
 
-@router.post("/movements", response_model=LearnedOut, summary="Store a movement, with or without a name")
+@router.post("/movements", response_model=records.LearnedOut, summary="Store a movement, with or without a name")
 def learn(studio: Writes, body: NewMovement) -> dict[str, Any]:
     """One drawing is enough for a new symbol; a movement that is stored already gets the symbol if it has none."""
-    recording = trajectory(body.times, body.positions)
+    recording = records.trajectory(body.times, body.positions)
     report = studio.library.learn([recording], [body.label], groups=[body.group])
     return {"ids": report.ids.tolist(), "version": report.version}
 
 
-@router.post("/movements/assign", response_model=ChangedOut, summary="Say which symbol movements belong to")
+@router.post("/movements/assign", response_model=records.ChangedOut, summary="Say which symbol movements belong to")
 def assign(studio: Writes, body: AssignRequest) -> dict[str, Any]:
     """They leave the one that they belonged to."""
     studio.check_movements(body.ids, body.version)
@@ -58,51 +40,51 @@ def assign(studio: Writes, body: AssignRequest) -> dict[str, Any]:
     return {"version": changes.assign(store, body.ids, body.symbol, "label")}
 
 
-@router.post("/movements/delete", response_model=ChangedOut, summary="Delete movements")
+@router.post("/movements/delete", response_model=records.ChangedOut, summary="Delete movements")
 def delete_movements(studio: Writes, body: DeleteRequest) -> dict[str, Any]:
     """Earlier versions still hold them."""
     studio.check_movements(body.ids, body.version)
     return {"version": changes.delete_movements(studio.library.store, body.ids)}
 
 
-@router.post("/symbols/merge", response_model=ChangedOut, summary="Merge symbols into one")
+@router.post("/symbols/merge", response_model=records.ChangedOut, summary="Merge symbols into one")
 def merge(studio: Writes, body: MergeRequest) -> dict[str, Any]:
     """`into` names one of them, another one, or a new one."""
     keys = [studio.symbol(key, body.version).id for key in body.ids]  # a name may be another symbol's meanwhile
     return {"version": changes.merge(studio.library.store, keys, body.into)}
 
 
-@router.post("/symbols/{key}/rename", response_model=ChangedOut, summary="Rename a symbol")
-def rename(studio: Writes, key: SymbolKey, body: RenameRequest) -> dict[str, Any]:
+@router.post("/symbols/{key}/rename", response_model=records.ChangedOut, summary="Rename a symbol")
+def rename(studio: Writes, key: records.SymbolKey, body: RenameRequest) -> dict[str, Any]:
     """Its id stays."""
     studio.symbol(key, body.version)
     return {"version": changes.rename(studio.library.store, key, body.name)}
 
 
-@router.post("/symbols/{key}/describe", response_model=ChangedOut, summary="Describe a symbol")
-def describe(studio: Writes, key: SymbolKey, body: DescribeRequest) -> dict[str, Any]:
+@router.post("/symbols/{key}/describe", response_model=records.ChangedOut, summary="Describe a symbol")
+def describe(studio: Writes, key: records.SymbolKey, body: DescribeRequest) -> dict[str, Any]:
     """In words of your own."""
     studio.symbol(key, body.version)
     return {"version": changes.annotate(studio.library.store, key, description=body.text)}
 
 
-@router.post("/symbols/{key}/split", response_model=ChangedOut, summary="Make a new symbol of some members")
-def split(studio: Writes, key: SymbolKey, body: SplitRequest) -> dict[str, Any]:
+@router.post("/symbols/{key}/split", response_model=records.ChangedOut, summary="Make a new symbol of some members")
+def split(studio: Writes, key: records.SymbolKey, body: SplitRequest) -> dict[str, Any]:
     """The others stay."""
     studio.check_movements(body.ids, body.version)
     studio.symbol(key, body.version)
     return {"version": changes.split(studio.library.store, key, body.ids, body.name)}
 
 
-@router.delete("/symbols/{key}", response_model=ChangedOut, summary="Delete a symbol; its movements stay")
+@router.delete("/symbols/{key}", response_model=records.ChangedOut, summary="Delete a symbol; its movements stay")
 def delete_symbol(
-    studio: Writes, key: SymbolKey, version: Annotated[int | None, Query(description=VERSION)] = None
+    studio: Writes, key: records.SymbolKey, version: Annotated[int | None, Query(description=records.VERSION)] = None
 ) -> dict[str, Any]:
     """They belong to none then."""
     return {"version": changes.delete_symbol(studio.library.store, studio.symbol(key, version).id)}
 
 
-@router.post("/undo", response_model=ChangedOut, summary="Take back the last change, or restore a version")
+@router.post("/undo", response_model=records.ChangedOut, summary="Take back the last change, or restore a version")
 def undo(studio: Writes, body: UndoRequest | None = None) -> dict[str, Any]:
     """Make a new version; again, the change before. 409 if another change came since the version that is named."""
     expected, to = (None, None) if body is None else (body.version, body.to)
@@ -114,65 +96,65 @@ def undo(studio: Writes, body: UndoRequest | None = None) -> dict[str, Any]:
         raise
 
 
-class NewMovement(Change):
+class NewMovement(records.Change):
     """A movement to be stored."""
 
-    times: Times
-    positions: list[Point]
-    label: Name | None = Field(None, description="Name of its symbol, which is made if needed.")
-    group: Name | None = Field(None, description="Who showed it.")
+    times: records.Times
+    positions: list[records.Point]
+    label: records.Name | None = Field(None, description="Name of its symbol, which is made if needed.")
+    group: records.Name | None = Field(None, description="Who showed it.")
 
 
-class UndoRequest(Change):
+class UndoRequest(records.Change):
     """The version whose state is wanted again; by default that before the last change."""
 
     to: int | None = Field(None, ge=0)
 
 
-class RenameRequest(Change):
+class RenameRequest(records.Change):
     """A new name of a symbol."""
 
-    name: Name
+    name: records.Name
 
 
-class DescribeRequest(Change):
+class DescribeRequest(records.Change):
     """A description of a symbol."""
 
-    text: Description
+    text: records.Description
 
 
-class SplitRequest(Change):
+class SplitRequest(records.Change):
     """Members of a symbol that become a new one."""
 
-    ids: Ids
-    name: Name
+    ids: records.Ids
+    name: records.Name
 
 
-class MergeRequest(Change):
+class MergeRequest(records.Change):
     """Symbols that become one."""
 
-    ids: list[Text] = Field(min_length=1, max_length=10_000)
-    into: Name
+    ids: list[records.Text] = Field(min_length=1, max_length=10_000)
+    into: records.Name
 
 
-class AssignRequest(Change):
+class AssignRequest(records.Change):
     """Movements, and the symbol that they belong to from now on; none if null."""
 
-    ids: Ids
-    symbol: Name | None
+    ids: records.Ids
+    symbol: records.Name | None
 
 
-class DeleteRequest(Change):
+class DeleteRequest(records.Change):
     """Movements."""
 
-    ids: Ids
+    ids: records.Ids
 
 
-class AcceptRequest(Change):
+class AcceptRequest(records.Change):
     """A name for a proposal."""
 
-    name: Name
-    description: Description | None = None
+    name: records.Name
+    description: records.Description | None = None
 
 
 class ProposalOut(BaseModel):
@@ -183,7 +165,7 @@ class ProposalOut(BaseModel):
     medoid: int
     cohesion: float
     stability: float | None
-    path: Points
+    path: records.Points
 
 
 class ProposalsOut(BaseModel):
@@ -199,14 +181,14 @@ async def proposals(studio: Reads) -> dict[str, Any]:
     return await studio.cached_in_background("listed proposals", lambda: _listed_proposals(studio))
 
 
-@proposal_router.post("/{key}/accept", response_model=ChangedOut, summary="Name a proposal")
-def accept(studio: Writes, key: ProposalKey, body: AcceptRequest) -> dict[str, Any]:
+@proposal_router.post("/{key}/accept", response_model=records.ChangedOut, summary="Name a proposal")
+def accept(studio: Writes, key: records.ProposalKey, body: AcceptRequest) -> dict[str, Any]:
     """Its movements belong to that symbol from now on, which is made if needed; its medoid is the prototype."""
     return {"version": stored.accept(studio.library.store, _proposal(studio, key), body.name, body.description)}
 
 
-@proposal_router.post("/{key}/reject", response_model=ChangedOut, summary="Propose it no more")
-def reject(studio: Writes, key: ProposalKey, body: RejectRequest | None = None) -> dict[str, Any]:
+@proposal_router.post("/{key}/reject", response_model=records.ChangedOut, summary="Propose it no more")
+def reject(studio: Writes, key: records.ProposalKey, body: records.RejectRequest | None = None) -> dict[str, Any]:
     """Its movements stay without a name."""
     return {"version": stored.reject(studio.library.store, _proposal(studio, key))}
 
@@ -221,8 +203,8 @@ def _listed_proposals(studio: Studio) -> dict[str, Any]:
                 "members": proposal.members.tolist(),
                 "medoid": proposal.medoid,
                 "cohesion": proposal.cohesion,
-                "stability": numbers(proposal.stability),
-                "path": thumbnail(read.movements(store, np.array([proposal.medoid]))[0].positions),
+                "stability": records.numbers(proposal.stability),
+                "path": records.thumbnail(read.movements(store, np.array([proposal.medoid]))[0].positions),
             }
             for key, proposal in by_key.items()
         ],

@@ -17,41 +17,31 @@ from kineme.library.learn import learn_recordings
 from kineme.movements.channels.channel import recorded_names
 from kineme.movements.trajectories.movements import axis_names
 from kineme.sampling import evenly_spaced
-from kineme.studio.server.records import (
-    Change,
-    ChannelOut,
-    LearnedOut,
-    Name,
-    Number,
-    RecordingKey,
-    RequestBody,
-    Text,
-    numbers,
-)
+from kineme.studio.server import records
 from kineme.studio.server.refusals import in_studio_words
 from kineme.studio.server.studio import Reads, Studio, Work, Writes, while_wanted
 from kineme.studio.server.uploads import go_on
 
 
-class ChannelChoice(Change):
+class ChannelChoice(records.Change):
     """A table of a recording, and some of its columns; by default the first, and those that are found."""
 
-    table: Text | None = None
-    channels: list[Text] | None = Field(None, max_length=1000)
+    table: records.Text | None = None
+    channels: list[records.Text] | None = Field(None, max_length=1000)
 
 
 class SpotRequest(ChannelChoice):
     """A search for movements of the library."""
 
-    error_rate: Number = Field(0.05, gt=0, lt=1)
+    error_rate: records.Number = Field(0.05, gt=0, lt=1)
 
 
-class Span(RequestBody):
+class Span(records.RequestBody):
     """A stretch of a recording, in seconds since its first sample, and what it shows."""
 
-    begin: Number
-    end: Number
-    label: Name | None = None
+    begin: records.Number
+    end: records.Number
+    label: records.Name | None = None
 
 
 class LearnRequest(ChannelChoice):
@@ -78,7 +68,7 @@ class TableOut(BaseModel):
     """One recording of a file."""
 
     name: str
-    channels: list[ChannelOut]
+    channels: list[records.ChannelOut]
     duration: float
     rate: float | None
     n_samples: int
@@ -155,7 +145,7 @@ async def send(
 
 
 @router.post("/{key}/spotted", response_model=SpottedOut, summary="What happens when in a recording")
-async def spotted(studio: Reads, request: Request, key: RecordingKey, body: SpotRequest) -> dict[str, Any]:
+async def spotted(studio: Reads, request: Request, key: records.RecordingKey, body: SpotRequest) -> dict[str, Any]:
     """Movements of the library's symbols, and motion that is like none; times are seconds since the first sample.
 
     A search ends where the client that asked for it goes, and where another one of the same recording begins.
@@ -174,7 +164,7 @@ async def spotted(studio: Reads, request: Request, key: RecordingKey, body: Spot
                 "begin": annotation.span[0],
                 "end": annotation.span[1],
                 "label": annotation.symbol,
-                "p": numbers(annotation.p_value),
+                "p": records.numbers(annotation.p_value),
             }
             for annotation in report.annotations
         ]
@@ -190,13 +180,13 @@ async def spotted(studio: Reads, request: Request, key: RecordingKey, body: Spot
 
 
 @router.get("/{key}/spotted", response_model=SearchedOut, summary="How much of a recording is searched")
-def searched(studio: Reads, key: RecordingKey) -> dict[str, Any]:
+def searched(studio: Reads, key: records.RecordingKey) -> dict[str, Any]:
     """The share that is done; null where nothing is searched."""
     return {"share": studio.works.share(key)}
 
 
-@router.post("/{key}/learn", response_model=LearnedOut, summary="Learn stretches of a recording")
-def learn(studio: Writes, key: RecordingKey, body: LearnRequest) -> dict[str, Any]:
+@router.post("/{key}/learn", response_model=records.LearnedOut, summary="Learn stretches of a recording")
+def learn(studio: Writes, key: records.RecordingKey, body: LearnRequest) -> dict[str, Any]:
     """Each stretch becomes a movement of the symbol that its label names; one without a label, an unnamed one.
 
     Without stretches each table of the file becomes a movement, of the symbol that the file names, if it does.
@@ -257,7 +247,7 @@ def _table(read: Recordings, k: int) -> dict[str, Any]:
             {"name": channel.name, "kind": channel.kind, "columns": list(channel.columns), "unit": channel.unit}
             for channel in demos.channels
         ]
-    rate = numbers((n - 1) / duration)
+    rate = records.numbers((n - 1) / duration)
     return {
         "name": _name(read, k),
         "channels": channels,
@@ -275,5 +265,5 @@ def _plot(read: Recordings, k: int) -> dict[str, Any]:
     values = (demos.positions if demos.channels is None else demos.recorded)[rows]
     times = demos.movements.stamps[rows]
     shown = evenly_spaced(len(times), _PLOTTED)
-    columns = [{"name": name, "values": numbers(values[shown, j])} for j, name in enumerate(_columns(read))]
-    return {"times": numbers(times[shown] - times[0]), "columns": columns}
+    columns = [{"name": name, "values": records.numbers(values[shown, j])} for j, name in enumerate(_columns(read))]
+    return {"times": records.numbers(times[shown] - times[0]), "columns": columns}

@@ -19,19 +19,7 @@ from kineme.errors import SpecificationError, heard_warnings
 from kineme.io.writing.write_movement import WRITERS, encode_movement
 from kineme.library.grounding import prototype_of
 from kineme.library.storage import read
-from kineme.studio.server.records import (
-    Number,
-    Point,
-    Points,
-    RequestBody,
-    SymbolKey,
-    Text,
-    Times,
-    numbers,
-    plain_answer,
-    thumbnail,
-    trajectory,
-)
+from kineme.studio.server import records
 from kineme.studio.server.studio import Reads, Studio
 from kineme.studio.snapshot import snapshot_of_primitive
 from kineme.validation import Array
@@ -133,17 +121,17 @@ def _around(learned: Learned, options: MovementOptions, balls: list[Obstacle]) -
     ]
 
 
-class Style(RequestBody):
+class Style(records.RequestBody):
     """A symbol with values of the directions in which its members differ."""
 
-    symbol: Text
-    values: list[Number] = Field(min_length=1, max_length=100)
+    symbol: records.Text
+    values: list[records.Number] = Field(min_length=1, max_length=100)
 
 
-class Subject(RequestBody):
+class Subject(records.RequestBody):
     """The prototype of a symbol, a stored movement, or a style of a symbol; one of the three."""
 
-    symbol: Text | None = None
+    symbol: records.Text | None = None
     movement: int | None = None
     style: Style | None = None
 
@@ -154,48 +142,50 @@ class Subject(RequestBody):
         return self
 
 
-class Obstacle(RequestBody):
+class Obstacle(records.RequestBody):
     """A ball to pass by."""
 
-    center: Point
-    radius: Number = Field(0.0, ge=0)
+    center: records.Point
+    radius: records.Number = Field(0.0, ge=0)
 
 
-class PrimitiveRequest(RequestBody):
+class PrimitiveRequest(records.RequestBody):
     """A primitive, in the formulation of the library or in another one."""
 
     what: Subject
-    formulation: Text | None = None
+    formulation: records.Text | None = None
 
 
 class RolloutRequest(PrimitiveRequest):
     """A new movement; what is left out is as demonstrated. Via points are pairs: share of the duration, point."""
 
-    start: Point | None = None
-    goal: Point | None = None
-    via: list[tuple[Number, Point]] = Field([], max_length=100)
+    start: records.Point | None = None
+    goal: records.Point | None = None
+    via: list[tuple[records.Number, records.Point]] = Field([], max_length=100)
     obstacles: list[Obstacle] = Field([], max_length=100)
-    duration: Number | None = Field(None, gt=0, description="[s]")
-    rate: Number | None = Field(None, gt=0, description="Samples per second; by default 200 in all.")
+    duration: records.Number | None = Field(None, gt=0, description="[s]")
+    rate: records.Number | None = Field(None, gt=0, description="Samples per second; by default 200 in all.")
 
 
 class ExportRequest(RolloutRequest):
     """The same as a file."""
 
-    format: Text = Field(description=f"One of {', '.join(WRITERS)}.")
+    format: records.Text = Field(description=f"One of {', '.join(WRITERS)}.")
 
 
 class RolloutOut(BaseModel):
     """A new movement, with warnings."""
 
     times: list[float]
-    positions: Points
-    velocities: Points
-    accelerations: Points
+    positions: records.Points
+    velocities: records.Points
+    accelerations: records.Points
     columns: list[str]
     start: list[float]
     goal: list[float]
-    recorded: Points | None = Field(description="At most 64 points of the recording that moves; null for a style.")
+    recorded: records.Points | None = Field(
+        description="At most 64 points of the recording that moves; null for a style."
+    )
     warnings: list[str]
 
 
@@ -231,12 +221,12 @@ def rollout(studio: Reads, body: RolloutRequest) -> dict[str, Any]:
     columns, recording = movement.columns, learned.demonstration
     positions = moving_positions(learned, movement)
     return {
-        **{name: numbers(columns[name]) for name in ("times", "velocities", "accelerations")},
-        "positions": numbers(positions),
+        **{name: records.numbers(columns[name]) for name in ("times", "velocities", "accelerations")},
+        "positions": records.numbers(positions),
         "columns": list(learned.moving_columns),
-        "start": numbers(positions[0]),
-        "goal": numbers(positions[-1] if body.goal is None else body.goal),
-        "recorded": None if recording is None else thumbnail(recording.positions),
+        "start": records.numbers(positions[0]),
+        "goal": records.numbers(positions[-1] if body.goal is None else body.goal),
+        "recorded": None if recording is None else records.thumbnail(recording.positions),
         "warnings": warnings,
     }
 
@@ -256,11 +246,11 @@ def primitive(studio: Reads, body: PrimitiveRequest) -> Response:
 @router.get(
     "/library/symbols/{key}/styles", response_model=StylesOut, summary="In which ways members of a symbol differ"
 )
-def styles(studio: Reads, key: SymbolKey) -> dict[str, Any]:
+def styles(studio: Reads, key: records.SymbolKey) -> dict[str, Any]:
     """The range of each direction; values of a rollout's style lie between."""
     model = styles_of(studio, key)
     ranges = {"lowest": model.lowest, "highest": model.highest, "explained": model.explained_variance}
-    shown = {name: numbers(values) for name, values in ranges.items()}
+    shown = {name: records.numbers(values) for name, values in ranges.items()}
     return {**shown, "formulation": studio.library.specification.dmp.formulation}
 
 
@@ -284,12 +274,12 @@ def export(studio: Reads, body: ExportRequest) -> Response:
     return Response(data, media_type="application/octet-stream", headers={"Content-Disposition": saved_as})
 
 
-class RecognizeRequest(RequestBody):
+class RecognizeRequest(records.RequestBody):
     """A movement to be recognized."""
 
-    times: Times
-    positions: list[Point]
-    error_rate: Number = Field(0.05, gt=0, lt=1)
+    times: records.Times
+    positions: list[records.Point]
+    error_rate: records.Number = Field(0.05, gt=0, lt=1)
 
 
 class RankedOut(BaseModel):
@@ -326,4 +316,6 @@ class AnswerOut(BaseModel):
 @recognition_router.post("/recognize", response_model=AnswerOut, summary="Recognize a whole movement")
 def recognize(studio: Reads, body: RecognizeRequest) -> dict[str, Any]:
     """Its symbol, or null for unknown; with p-values that are calibrated where there are enough demonstrations."""
-    return plain_answer(studio.library.recognize(trajectory(body.times, body.positions), body.error_rate))
+    return records.plain_answer(
+        studio.library.recognize(records.trajectory(body.times, body.positions), body.error_rate)
+    )
