@@ -6,9 +6,9 @@ import numpy as np
 
 import kineme
 from kineme.robots import load
-from kineme.robots.execution.along import along
 from kineme.robots.execution.joint_trajectory import JointTrajectory
-from kineme.robots.kinematics.inverse import InverseKinematics
+from kineme.robots.execution.preflight import along
+from kineme.robots.kinematics.descent import InverseKinematics
 
 _SETTINGS = 'fusestatic="false" balanceinertia="true" boundmass="1e-3" boundinertia="1e-6"'
 

@@ -30,12 +30,12 @@ from kineme import (
     kernels,
 )
 from kineme.dmp import Contextual
-from kineme.dmp.control.options import ObstacleAvoidance
+from kineme.dmp.control.plan import ObstacleAvoidance
 from kineme.errors import KinemeError
 from kineme.kernels.random_binning import RandomBinning
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.recognition.early.hypotheses import Early
-from kineme.similarity.representation import Representation
+from kineme.similarity.specification import Representation
 from kineme.styles import AveragePrimitive, average
 
 WRONG = (

@@ -19,7 +19,7 @@ from kineme.datasets.lasa import LASA_26
 from kineme.dmp import Rollout
 from kineme.errors import TrajectoryError
 from kineme.robots import JointTrajectory, Robot, load, move
-from kineme.robots.execution.timing import Torques
+from kineme.robots.execution.joint_trajectory import Torques
 
 ARMS = ("panda", "ur5e", "wam", "so101")
 SIZES = (0.05, 0.1, 0.2)  # of the longer side [m]

@@ -15,7 +15,7 @@ from bench.simulated_panda import tracking
 from kineme import DMP, Trajectory
 from kineme.orientation import PoseDMP, exp, product
 from kineme.robots import ArmController, InverseKinematics, Robot, load, move
-from kineme.robots.execution.along import along
+from kineme.robots.execution.preflight import along
 from kineme.validation import Array
 
 N_SAMPLES, SECONDS, SIZE, DT = 150, 3.0, 0.2, 0.005

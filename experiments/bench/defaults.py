@@ -15,12 +15,12 @@ import numpy as np
 import kineme
 from bench.by_person import FOLDER
 from bench.rows import Row
-from kineme.kernels.soft_rotation import RotationPrior
+from kineme.kernels.rotation import RotationPrior
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.recognition import classifiers
-from kineme.similarity import widths
-from kineme.similarity.representation import DEFAULT_REPRESENTATIONS as FIVE
-from kineme.similarity.representation import POSITIONS, Representation
+from kineme.similarity import similarity as widths
+from kineme.similarity.specification import DEFAULT_REPRESENTATIONS as FIVE
+from kineme.similarity.specification import POSITIONS, Representation
 from kineme_experiments.evaluation.conditions import TOGETHER
 from kineme_experiments.evaluation.data import load_data
 from kineme_experiments.evaluation.splits import few_shot

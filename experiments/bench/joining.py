@@ -13,8 +13,7 @@ from bench.rows import Row
 from kineme import DMP, couple, join, load_lasa
 from kineme.datasets.lasa import LASA_30
 from kineme.dmp import Primitives, Rollout
-from kineme.dmp.condition import condition
-from kineme.dmp.discrete.operators import decoder, smoothness_factor
+from kineme.dmp.discrete.operators import condition, decoder, smoothness_factor
 
 STEPS = 500  # of each part
 DURING, OFFSET = (0.3, 0.7), (10.0, 0.0)  # of two that carry one thing: shares of the duration, millimeters

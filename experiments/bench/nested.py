@@ -18,13 +18,11 @@ from numpy.typing import NDArray
 from bench.by_person import FOLDER
 from bench.nested_sets import Movements, movement_sets
 from bench.rows import Row
-from kineme.kernels.shapes import ElasticSpec
-from kineme.kernels.soft_rotation import CONCENTRATION, RotationPrior
-from kineme.similarity.describe import describe
-from kineme.similarity.described import Described, squared_distances
-from kineme.similarity.representation import DEFAULT_REPRESENTATIONS
-from kineme.similarity.specification import ComparisonSpecification
-from kineme.similarity.widths import SHARE
+from kineme.kernels.pair_distances import ElasticSpec
+from kineme.kernels.rotation import CONCENTRATION, RotationPrior
+from kineme.similarity.describe import Described, describe, squared_distances
+from kineme.similarity.similarity import SHARE
+from kineme.similarity.specification import DEFAULT_REPRESENTATIONS, ComparisonSpecification
 
 OWN = tuple(one.weight for one in DEFAULT_REPRESENTATIONS)
 WEIGHTS = (OWN, (1.0,) * 5, (1.0, 1.0, 2.0, 1.0, 2.0), (2.0, 1.0, 1.0, 1.0, 1.0))

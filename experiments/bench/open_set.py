@@ -24,12 +24,10 @@ from bench.by_person import FOLDER
 from bench.people import recorded
 from bench.rows import Row
 from kineme.movements.preparation.perturbations import Perturbation
-from kineme.recognition.conformal import EXPONENT, class_probabilities
-from kineme.recognition.known_classes import fit_known_classes
-from kineme.recognition.left_out import LEAST, distances
-from kineme.similarity.describe import feature_rows, prepare
-from kineme.similarity.described import Described
-from kineme.similarity.references import References
+from kineme.recognition.answer import fit_known_classes
+from kineme.recognition.conformal import EXPONENT, LEAST, class_probabilities, distances
+from kineme.similarity.comparison import References
+from kineme.similarity.describe import Described, feature_rows, prepare
 from kineme.similarity.scores import nearest, nearest_each, score
 from kineme.similarity.specification import ComparisonSpecification
 from kineme_experiments.evaluation.conditions import TOGETHER

@@ -10,8 +10,8 @@ import numpy as np
 from bench.rows import Row
 from kineme import Trajectory
 from kineme.robots import Robot, move
-from kineme.robots.execution.along import along
 from kineme.robots.execution.joint_trajectory import JointTrajectory
+from kineme.robots.execution.preflight import along
 from kineme.validation import Array
 
 MOST_OFF = 10.0  # mm

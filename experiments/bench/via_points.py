@@ -22,9 +22,8 @@ from bench.rows import Row
 from kineme import DMP, load_lasa
 from kineme.datasets.lasa import LASA_30
 from kineme.dmp import Primitives, Rollout
-from kineme.dmp.condition import condition
 from kineme.dmp.discrete.modulate import SLACK, changes
-from kineme.dmp.discrete.operators import decoder, decoder_at, smoothness_factor, trajectory_columns
+from kineme.dmp.discrete.operators import condition, decoder, decoder_at, smoothness_factor, trajectory_columns
 from kineme.errors import ExtrapolationWarning
 
 DEMONSTRATIONS = 7  # of each set

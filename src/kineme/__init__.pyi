@@ -24,7 +24,7 @@ from kineme import control as control
 from kineme.dmp.rhythmic.rhythmic_dmp import RhythmicDMP as RhythmicDMP
 from kineme import orientation as orientation
 from kineme import styles as styles
-from kineme.dmp.couple import couple as couple
+from kineme.dmp.join import couple as couple
 from kineme.dmp.join import join as join
 from kineme.dmp.join import blend as blend
 from kineme.dmp.improve import improve as improve

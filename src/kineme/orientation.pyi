@@ -17,6 +17,6 @@ from kineme.movements.rotations import angle_between as angle_between
 from kineme.movements.rotations import exp as exp
 from kineme.movements.rotations import log as log
 from kineme.movements.rotations import slerp as slerp
-from kineme.dmp.pose.rates import angular_velocity as angular_velocity
-from kineme.dmp.pose.rates import angular_acceleration as angular_acceleration
-from kineme.dmp.pose.rates import rotation_vector_rate as rotation_vector_rate
+from kineme.dmp.pose.tangent import angular_velocity as angular_velocity
+from kineme.dmp.pose.tangent import angular_acceleration as angular_acceleration
+from kineme.dmp.pose.tangent import rotation_vector_rate as rotation_vector_rate

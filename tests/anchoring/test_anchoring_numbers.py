@@ -9,13 +9,12 @@ import pytest
 from sklearn.utils import Bunch
 
 from kineme import DMP, Demonstrations, Recognizer
-from kineme.anchoring import clustering, merge_split
-from kineme.anchoring.assignment import agreement
+from kineme.anchoring import assignment as merge_split
+from kineme.anchoring import clustering
+from kineme.anchoring.assignment import Split, agreement, suggest_merges, suggest_splits
 from kineme.anchoring.clustering import count_clusters
-from kineme.anchoring.merge_split import Split, suggest_merges, suggest_splits
-from kineme.anchoring.morphing import morph
 from kineme.anchoring.proposals import largest_clustered, radii, subsample
-from kineme.anchoring.space import ConceptualSpace, conceptual_space
+from kineme.anchoring.space import ConceptualSpace, conceptual_space, morph
 from kineme.similarity.describe import describe
 from unlabeled_samples import draw_kinds
 

@@ -10,8 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import kineme
-from kineme.anchoring.assignment import assign
-from kineme.anchoring.merge_split import suggest_merges, suggest_splits
+from kineme.anchoring.assignment import assign, suggest_merges, suggest_splits
 from kineme.recognition.recognizer import Recognizer
 from unlabeled_samples import ALL_TOGETHER, draw_kinds
 
@@ -127,7 +126,7 @@ def test_one_symbol_or_one_member():
 
 
 def test_many_members_speak_through_some(monkeypatch):
-    monkeypatch.setattr("kineme.anchoring.merge_split._LARGEST", 2000)  # 400 of one symbol
+    monkeypatch.setattr("kineme.anchoring.assignment._LARGEST", 2000)  # 400 of one symbol
     demos = draw_kinds([1300, 900], 2, 0, spread=0.03)
     labels = np.where(np.arange(2200) % 2, "a", "b")
     (merge,) = suggest_merges(demos[:1300], labels[:1300])

@@ -10,12 +10,10 @@ from sklearn.metrics import adjusted_rand_score
 
 from kineme import Demonstrations
 from kineme.anchoring.clustering import NEIGHBORS, components, count_by_eigengap, fuse, set_apart, spectral
-from kineme.anchoring.unlabeled import by_shape, link_people, propose
+from kineme.anchoring.proposals import by_shape, link_people, propose
 from kineme.errors import TrajectoryError
-from kineme.similarity.describe import describe
-from kineme.similarity.described import squared_distances
-from kineme.similarity.representation import ROW_REPRESENTATIONS
-from kineme.similarity.specification import ComparisonSpecification
+from kineme.similarity.describe import describe, squared_distances
+from kineme.similarity.specification import ROW_REPRESENTATIONS, ComparisonSpecification
 from soaking import SOAK
 from unlabeled_samples import draw_kinds, recovered
 

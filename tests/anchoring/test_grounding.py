@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import kineme
 from kineme.anchoring.grounding import SymbolName, ground, grounding_schema, medoid_of, primitive_from
-from kineme.dmp.discrete.formulations import FORMULATIONS
+from kineme.dmp.discrete.specification import FORMULATIONS
 from unlabeled_samples import draw_kinds
 
 quick = settings(max_examples=8, deadline=None, derandomize=True)

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from sklearn.cluster import AgglomerativeClustering
 
 import kineme
-from kineme.anchoring.proposals import describe_clusters, extend
-from kineme.anchoring.unlabeled import propose
+from kineme.anchoring.proposals import describe_clusters, extend, propose
 from kineme.errors import SpecificationError
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.recognition.recognizer import Recognizer

@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 from sklearn.utils import Bunch
 
-from kineme.anchoring.assignment import agreement
-from kineme.anchoring.merge_split import suggest_merges
+from kineme.anchoring.assignment import agreement, suggest_merges
 from kineme.kernels.procrustes import Procrustes
-from kineme.similarity.described import Described
-from kineme.similarity.references import References
-from kineme.similarity.similarity import AveragedSimilarity
-from kineme.similarity.widths import SHARE, gap_widths
+from kineme.similarity.comparison import References
+from kineme.similarity.describe import Described
+from kineme.similarity.similarity import SHARE, AveragedSimilarity, gap_widths
 
 
 def on_a_line(points):

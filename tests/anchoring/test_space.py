@@ -10,8 +10,7 @@ from scipy.spatial.distance import pdist, squareform
 
 import kineme
 from kineme.anchoring.figures import apart, classical_scaling
-from kineme.anchoring.morphing import morph
-from kineme.anchoring.space import ConceptualSpace, conceptual_space
+from kineme.anchoring.space import ConceptualSpace, conceptual_space, morph
 from kineme.recognition.recognizer import Recognizer
 from kineme.similarity.specification import ComparisonSpecification
 from unlabeled_samples import draw_kinds

@@ -7,8 +7,7 @@ import pytest
 import kineme
 from kineme.dmp.discrete.dmp import DMP
 from kineme.dmp.generation.figure import draw_movement, path_columns
-from kineme.dmp.generation.generate import MovementOptions, generate
-from kineme.dmp.generation.learned import largest_deviation, learn_one
+from kineme.dmp.generation.generate import MovementOptions, generate, largest_deviation, learn_one
 from kineme.io.writing.write_movement import write_movement
 from kineme.orientation import exp, log, product
 from soaking import combined

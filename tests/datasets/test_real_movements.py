@@ -7,7 +7,7 @@ import pytest
 
 from kineme import DMP, DMPFeatures, load_lasa
 from kineme.datasets import PAPER_LETTERS
-from kineme.dmp.discrete.formulations import FORMULATIONS
+from kineme.dmp.discrete.specification import FORMULATIONS
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kineme.dmp.condition import condition
+from kineme.dmp.discrete.operators import condition
 from kineme.errors import SpecificationError
 
 

@@ -13,7 +13,7 @@ from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 
 import kineme
-from kineme.dmp.base_rollout import BaseRollout
+from kineme.dmp.discrete.rollout import BaseRollout
 from kineme.orientation import PoseDMP, exp
 
 

@@ -10,7 +10,8 @@ from kernel_samples import CAUCHY, KINDS, NAMED, rows
 from scipy import stats
 
 from kineme.errors import SpecificationError
-from kineme.kernels import KERNELS, MEANS, RBF, DistanceKernel, Laplacian, TruncatedEuclidean, average, averaged
+from kineme.kernels import KERNELS, MEANS, RBF, DistanceKernel, Laplacian, TruncatedEuclidean, averaged
+from kineme.kernels import table as average
 
 SCIPY = {
     "arithmetic": lambda k: np.mean(k, axis=0),

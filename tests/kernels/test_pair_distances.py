@@ -11,8 +11,14 @@ from hypothesis import strategies as st
 from scipy.stats import special_ortho_group
 
 from kineme.errors import SpecificationError
-from kineme.kernels.pair_distances import listed_distances, pair_bounds, pair_distances
-from kineme.kernels.shapes import CloudSpec, ElasticSpec, shapes_of
+from kineme.kernels.pair_distances import (
+    CloudSpec,
+    ElasticSpec,
+    listed_distances,
+    pair_bounds,
+    pair_distances,
+    shapes_of,
+)
 from soaking import combined, examples
 
 CHOICES = ("never", "always")

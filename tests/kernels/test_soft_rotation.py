@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from kineme.errors import SpecificationError
 from kineme.kernels import procrustes as module
 from kineme.kernels.procrustes import Procrustes
-from kineme.kernels.soft_rotation import RotationPrior, limited, soft_products, soft_rotations
+from kineme.kernels.rotation import RotationPrior, limited, soft_products, soft_rotations
 
 seeds = given(seed=st.integers(0, 10_000))
 

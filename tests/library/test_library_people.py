@@ -13,7 +13,7 @@ from library_samples import draw_movements
 
 import kineme
 from kineme import ActionLibrary, Recognizer
-from kineme.anchoring.unlabeled import propose as propose_clusters
+from kineme.anchoring.proposals import propose as propose_clusters
 from kineme.errors import TrajectoryError
 from kineme.io.reading.merge_files import each_person
 from kineme.library import proposals

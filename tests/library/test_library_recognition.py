@@ -13,9 +13,9 @@ from kineme.errors import SpecificationError, TrajectoryError
 from kineme.library import calibration_cache
 from kineme.library import reduced_features_cache as features_cache
 from kineme.library.recognize import LibraryRecognizer
-from kineme.recognition import sampled_calibration
-from kineme.recognition.left_out import distances
-from kineme.similarity.references import StoredReferences
+from kineme.recognition import two_stage_search as sampled_calibration
+from kineme.recognition.conformal import distances
+from kineme.similarity.comparison import StoredReferences
 
 
 def _kinds(counts, d=2, seed=0, spread=0.05):

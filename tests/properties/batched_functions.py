@@ -37,16 +37,14 @@ from kineme import (
     styles,
 )
 from kineme.dmp import Primitives
-from kineme.dmp.discrete.formulations import FORMULATIONS
-from kineme.dmp.discrete.specification import FITS, GATINGS
+from kineme.dmp.discrete.specification import FITS, FORMULATIONS, GATINGS
 from kineme.dmp.join import laid_out, laid_out_poses
 from kineme.errors import ExtrapolationWarning
 from kineme.features.movement_features import FEATURES, PoseFeatures
 from kineme.kernels import KERNELS, MEANS, averaged
-from kineme.kernels.pair_distances import listed_distances, pair_bounds, pair_distances
+from kineme.kernels.pair_distances import listed_distances, pair_bounds, pair_distances, shapes_of
 from kineme.kernels.procrustes import Procrustes
 from kineme.kernels.random_binning import RandomBinning
-from kineme.kernels.shapes import shapes_of
 from kineme.movements.channels.channel import Channel
 from kineme.movements.preparation.resample import resample_by_arc_length
 from kineme.movements.rotations import matrices_of, rotated
@@ -55,13 +53,11 @@ from kineme.movements.trajectories.movements import of_channels
 from kineme.orientation import PoseDMP, continuous, from_tangent, normalized, to_tangent
 from kineme.recognition.answer import Answer
 from kineme.recognition.early.evidence import cut
-from kineme.similarity.alignment import maps_onto, paths_of
-from kineme.similarity.alignment import moved as laid_onto
 from kineme.similarity.bounds import fit_bases, reduce_features
-from kineme.similarity.describe import describe_rows, feature_rows
-from kineme.similarity.representation import ROW_REPRESENTATIONS, SCALES, Normalization
+from kineme.similarity.describe import describe_rows, feature_rows, maps_onto, paths_of
+from kineme.similarity.describe import moved as laid_onto
 from kineme.similarity.similarity import compare
-from kineme.similarity.specification import ComparisonSpecification
+from kineme.similarity.specification import ROW_REPRESENTATIONS, SCALES, ComparisonSpecification, Normalization
 
 
 @dataclass(frozen=True)

@@ -14,25 +14,23 @@ from kineme.recognition.conformal import (
     GUESSES,
     RULES,
     Calibration,
+    ClassDistances,
     between_classes,
+    broad_law,
     calibrate,
     class_probabilities,
-    fit_exponent,
-    least_scale,
-)
-from kineme.recognition.left_out import (
-    ClassDistances,
-    broad_law,
     comparable_groups,
     distances,
+    fit_exponent,
     law,
+    least_scale,
     reaching,
     score_classes,
     typical_distance,
     typical_scale,
 )
-from kineme.similarity.described import Described
-from kineme.similarity.references import References
+from kineme.similarity.comparison import References
+from kineme.similarity.describe import Described
 from kineme.similarity.similarity import AveragedSimilarity
 from movement_samples import draw_shapes
 

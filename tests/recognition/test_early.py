@@ -10,7 +10,7 @@ import pytest
 import kineme
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.kernels.procrustes import Procrustes
-from kineme.kernels.soft_rotation import RotationPrior
+from kineme.kernels.rotation import RotationPrior
 from kineme.movements.preparation.smooth import Smooth
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.recognition.early import evidence

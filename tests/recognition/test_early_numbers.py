@@ -12,7 +12,7 @@ import kineme
 from kineme.recognition.early import evidence
 from kineme.recognition.early.evidence import cut, partial_shares
 from kineme.recognition.early.hypotheses import Early, Ending, Hypotheses, hypotheses, smooth_paths
-from kineme.similarity.widths import SHARE
+from kineme.similarity.similarity import SHARE
 from kineme_experiments.evaluation.splits import one_person_out
 
 

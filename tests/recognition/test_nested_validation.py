@@ -10,7 +10,7 @@ import pytest
 
 from kineme import Recognizer
 from kineme.recognition import RotationPrior
-from kineme.similarity import widths
+from kineme.similarity import similarity as widths
 from movement_samples import draw_shapes
 
 ROOT = str(Path(__file__).parents[2])

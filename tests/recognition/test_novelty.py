@@ -14,10 +14,9 @@ from scipy.stats import chi
 from kineme import Recognizer
 from kineme.errors import TrajectoryError
 from kineme.kernels.procrustes import Prepared, Procrustes
-from kineme.recognition.conformal import EXPONENT, calibrate, class_probabilities, fit_exponent
-from kineme.recognition.left_out import ClassDistances, law
-from kineme.similarity.described import Described
-from kineme.similarity.references import References
+from kineme.recognition.conformal import EXPONENT, ClassDistances, calibrate, class_probabilities, fit_exponent, law
+from kineme.similarity.comparison import References
+from kineme.similarity.describe import Described
 from kineme.similarity.similarity import AveragedSimilarity
 from movement_samples import draw_shapes
 from soaking import combined

@@ -14,15 +14,14 @@ from kineme.movements.preparation.perturbations import Perturbation
 from kineme.movements.segmentation.table import observe
 from kineme.recognition import spotting
 from kineme.recognition.compared_windows import Surroundings, Templates, compare_windows
-from kineme.recognition.conformal import Calibration, calibrate
+from kineme.recognition.conformal import Calibration, calibrate, typical_scale
 from kineme.recognition.early.evidence import _log_priors, describe_begun
 from kineme.recognition.early.hypotheses import Early, hypotheses, smooth_paths
 from kineme.recognition.early.stream import Decision
-from kineme.recognition.left_out import typical_scale
 from kineme.recognition.spotting import Manner, expected, score_windows
-from kineme.similarity.described import Described
-from kineme.similarity.representation import DEFAULT_REPRESENTATIONS, ROW_REPRESENTATIONS
-from kineme.similarity.weights import aligned_weights
+from kineme.similarity.describe import Described
+from kineme.similarity.similarity import aligned_weights
+from kineme.similarity.specification import DEFAULT_REPRESENTATIONS, ROW_REPRESENTATIONS
 from movement_samples import draw_shapes
 
 

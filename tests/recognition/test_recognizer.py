@@ -17,7 +17,7 @@ import kineme
 from kineme import Demonstrations, Recognizer, Trajectory
 from kineme.datasets.lasa import PAPER_LETTERS
 from kineme.errors import SpecificationError, TrajectoryError
-from kineme.kernels.soft_rotation import RotationPrior
+from kineme.kernels.rotation import RotationPrior
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.movements.preparation.resample import arc_length_phase
 from kineme.similarity import scores as module

@@ -13,11 +13,11 @@ from kineme import Demonstrations, Recognizer
 from kineme.errors import SpecificationError
 from kineme.recognition import two_stage_search
 from kineme.recognition.two_stage_search import TwoStageSearch
-from kineme.similarity import references
+from kineme.similarity import comparison as references
 from kineme.similarity.bounds import fit_bases, reduce_features
+from kineme.similarity.comparison import StoredReferences
 from kineme.similarity.describe import feature_rows
-from kineme.similarity.references import StoredReferences
-from kineme.similarity.representation import ROW_REPRESENTATIONS
+from kineme.similarity.specification import ROW_REPRESENTATIONS
 from movement_samples import draw_shapes
 from soaking import examples
 

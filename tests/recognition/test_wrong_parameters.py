@@ -7,7 +7,7 @@ import pytest
 
 from kineme import Recognizer
 from kineme.errors import SpecificationError, TrajectoryError
-from kineme.similarity.representation import DEFAULT_REPRESENTATIONS, Representation
+from kineme.similarity.specification import DEFAULT_REPRESENTATIONS, Representation
 from movement_samples import draw_shapes
 
 DEMOS = draw_shapes([2, 2])

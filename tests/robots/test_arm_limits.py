@@ -14,10 +14,9 @@ import kineme
 from arm_samples import simulated, stroke, tip_in
 from kineme.errors import TrajectoryError
 from kineme.robots import load, move
-from kineme.robots.execution.timing import fastest, sampled
-from kineme.robots.kinematics.descent import postures
-from kineme.robots.kinematics.inverse import InverseKinematics
-from kineme.robots.models.load import MODELS
+from kineme.robots.execution.joint_trajectory import fastest, sampled
+from kineme.robots.kinematics.descent import InverseKinematics, postures
+from kineme.robots.models.robot import MODELS
 from soaking import examples
 
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")

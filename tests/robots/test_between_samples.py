@@ -14,10 +14,18 @@ import kineme
 from arm_samples import simple_arm, stroke
 from kineme.errors import TrajectoryError
 from kineme.robots import InfeasibleError, JointTrajectory, load, move, preflight
-from kineme.robots.execution.along import along
-from kineme.robots.execution.joint_trajectory import _bernstein, between, dense_times, extreme
-from kineme.robots.execution.timing import Torques, as_generated, fastest, sampled
-from kineme.robots.execution.timing import _by_length as by_length
+from kineme.robots.execution.joint_trajectory import (
+    Torques,
+    _bernstein,
+    as_generated,
+    between,
+    dense_times,
+    extreme,
+    fastest,
+    sampled,
+)
+from kineme.robots.execution.joint_trajectory import _by_length as by_length
+from kineme.robots.execution.preflight import along
 from soaking import SOAK, examples
 
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")

@@ -8,9 +8,9 @@ from scipy.spatial.transform import Rotation
 
 from arm_samples import simple_arm
 from kineme.robots import InfeasibleError, JointTrajectory, load, move, preflight
-from kineme.robots.execution.along import along
-from kineme.robots.execution.timing import approach
-from kineme.robots.kinematics.task_path import TaskPath
+from kineme.robots.execution.joint_trajectory import approach
+from kineme.robots.execution.preflight import along
+from kineme.robots.kinematics.descent import TaskPath
 
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")
 

@@ -6,8 +6,8 @@ import pytest
 from view_samples import write_stl
 
 from kineme.robots import load
-from kineme.robots.view import shapes as module
-from kineme.robots.view.shapes import shapes_of
+from kineme.robots.view import write_view as module
+from kineme.robots.view.write_view import shapes_of
 
 _VISUAL = (
     '<visual><geometry><mesh filename="package://panda_description/meshes/{}.stl"/></geometry>'

@@ -11,9 +11,8 @@ from scipy.interpolate import CubicSpline
 import kineme
 from arm_samples import stroke
 from kineme.robots import load, move
-from kineme.robots.execution.along import along
-from kineme.robots.execution.joint_trajectory import between
-from kineme.robots.execution.timing import as_generated, fastest
+from kineme.robots.execution.joint_trajectory import as_generated, between, fastest
+from kineme.robots.execution.preflight import along
 from kineme.robots.planning import robot_movement
 
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")

@@ -11,7 +11,7 @@ from kineme.control import ObstacleAvoidance, Status
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.orientation import PoseDMP
 from kineme.robots import ArmController, load, move
-from kineme.robots.execution.along import along
+from kineme.robots.execution.preflight import along
 
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")
 

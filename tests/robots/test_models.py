@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from arm_samples import simulated, standing, tip_in
 from kineme.errors import DataError, SpecificationError
 from kineme.robots import load
-from kineme.robots.models.load import MODELS
+from kineme.robots.models.robot import MODELS
 
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")
 

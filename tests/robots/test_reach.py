@@ -14,9 +14,8 @@ from scipy.spatial.transform import Rotation
 import kineme
 from kineme.errors import TrajectoryError
 from kineme.robots import load, move
-from kineme.robots.kinematics.descent import kinematics
-from kineme.robots.kinematics.inverse import ORIENTATIONS
-from kineme.robots.models.load import MODELS
+from kineme.robots.kinematics.descent import ORIENTATIONS, kinematics
+from kineme.robots.models.robot import MODELS
 from soaking import combined
 
 pinocchio = pytest.importorskip("pinocchio", reason="the extra robot is not installed")

@@ -8,13 +8,13 @@ from scipy.spatial.transform import Rotation
 
 import kineme
 from arm_samples import stroke
-from kineme.dmp.generation.learned import learn_one
+from kineme.dmp.generation.generate import learn_one
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.orientation import PoseDMP
 from kineme.robots import InfeasibleError, load, move
-from kineme.robots.execution.along import along
-from kineme.robots.kinematics.inverse import InverseKinematics
-from kineme.robots.models.load import MODELS
+from kineme.robots.execution.preflight import along
+from kineme.robots.kinematics.descent import InverseKinematics
+from kineme.robots.models.robot import MODELS
 from kineme.robots.planning.generate_at import generate_at
 from kineme.robots.planning.move import request_of
 

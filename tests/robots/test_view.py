@@ -21,12 +21,11 @@ pytest.importorskip("pinocchio", reason="the extra robot is not installed")
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.reporting import figures
 from kineme.robots import load, move, write_view
-from kineme.robots.execution.along import along
-from kineme.robots.kinematics.inverse import InverseKinematics
-from kineme.robots.models.load import MODELS
-from kineme.robots.view import shapes as module
-from kineme.robots.view.shapes import shapes_of
-from kineme.robots.view.write_view import MOST_SAMPLES, as_script_data, view_page
+from kineme.robots.execution.preflight import along
+from kineme.robots.kinematics.descent import InverseKinematics
+from kineme.robots.models.robot import MODELS
+from kineme.robots.view import write_view as module
+from kineme.robots.view.write_view import MOST_SAMPLES, as_script_data, shapes_of, view_page
 
 FOLDER = Path(view.__file__).parent
 VENDORED = json.loads((FOLDER / "vendor" / "vendored.json").read_text())

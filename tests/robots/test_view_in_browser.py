@@ -15,7 +15,7 @@ from browsing import Pages, wait_until
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")
 
 from kineme.robots import load, write_view
-from kineme.robots.execution.along import along
+from kineme.robots.execution.preflight import along
 from soaking import combined
 
 WIDTHS = (390, 820, 1440)
@@ -61,7 +61,7 @@ def shown(page):
 def panda():
     from kineme.movements.trajectories.trajectory import Trajectory
     from kineme.robots import move
-    from kineme.robots.kinematics.inverse import InverseKinematics
+    from kineme.robots.kinematics.descent import InverseKinematics
 
     robot = load("panda")
     u = np.linspace(0, 1, 150)

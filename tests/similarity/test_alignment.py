@@ -12,10 +12,9 @@ from scipy.spatial.transform import Rotation
 
 import kineme
 from kineme.anchoring.grounding import medoid_of, prototype
-from kineme.anchoring.morphing import morph
+from kineme.anchoring.space import morph
 from kineme.recognition.recognizer import Recognizer
-from kineme.similarity.alignment import maps_onto, moved, paths_of
-from kineme.similarity.describe import N_POINTS
+from kineme.similarity.describe import N_POINTS, maps_onto, moved, paths_of
 from kineme.similarity.similarity import similarities
 from unlabeled_samples import draw_kinds
 

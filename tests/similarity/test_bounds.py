@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 from kineme.kernels.procrustes import Procrustes
-from kineme.kernels.soft_rotation import RotationPrior
+from kineme.kernels.rotation import RotationPrior
 from kineme.similarity.bounds import fit_bases, log_bounds, reduce_features
 from kineme.similarity.describe import feature_rows, prepare
-from kineme.similarity.representation import ROW_REPRESENTATIONS
 from kineme.similarity.similarity import AveragedSimilarity
-from kineme.similarity.specification import LOG_MEANS, ComparisonSpecification
+from kineme.similarity.specification import LOG_MEANS, ROW_REPRESENTATIONS, ComparisonSpecification
 from movement_samples import draw_shapes
 from soaking import combined
 

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme.anchoring.unlabeled import by_shape
+from kineme.anchoring.proposals import by_shape
 from kineme.kernels.procrustes import Procrustes
-from kineme.similarity.describe import describe
-from kineme.similarity.described import squared_distances
+from kineme.similarity.describe import describe, squared_distances
 
 
 @pytest.fixture(scope="module")

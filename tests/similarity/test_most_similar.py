@@ -8,12 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import kineme
-from kineme.similarity import most_similar as module
+from kineme.similarity import scores as module
 from kineme.similarity.describe import describe
-from kineme.similarity.most_similar import most_similar, nearest_above
-from kineme.similarity.representation import DEFAULT_REPRESENTATIONS
+from kineme.similarity.scores import most_similar, nearest_above
 from kineme.similarity.similarity import AveragedSimilarity
-from kineme.similarity.specification import ComparisonSpecification
+from kineme.similarity.specification import DEFAULT_REPRESENTATIONS, ComparisonSpecification
 from movement_samples import draw_shapes
 
 N = len(DEFAULT_REPRESENTATIONS)

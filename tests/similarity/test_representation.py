@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from kineme import Demonstrations, Recognizer
-from kineme.similarity.describe import describe
-from kineme.similarity.described import squared_distances
-from kineme.similarity.representation import (
+from kineme.similarity.describe import describe, squared_distances
+from kineme.similarity.specification import (
     DEFAULT_REPRESENTATIONS,
     ROW_REPRESENTATIONS,
     Normalization,

@@ -12,12 +12,9 @@ from kineme import Recognizer
 from kineme.errors import SpecificationError
 from kineme.kernels.procrustes import Prepared, Procrustes
 from kineme.recognition import Representation
-from kineme.similarity.describe import describe
-from kineme.similarity.described import Described
-from kineme.similarity.representation import DEFAULT_REPRESENTATIONS, ROW_REPRESENTATIONS
-from kineme.similarity.similarity import AveragedSimilarity
-from kineme.similarity.weights import aligned_weights, fitted_weights
-from kineme.similarity.widths import impostor_widths
+from kineme.similarity.describe import Described, describe
+from kineme.similarity.similarity import AveragedSimilarity, aligned_weights, fitted_weights, impostor_widths
+from kineme.similarity.specification import DEFAULT_REPRESENTATIONS, ROW_REPRESENTATIONS
 from movement_samples import draw_shapes
 
 

@@ -5,15 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kineme.kernels.shapes import CloudSpec, ElasticSpec
-from kineme.similarity import described as described_module
-from kineme.similarity.describe import describe
-from kineme.similarity.described import squared_distances
-from kineme.similarity.representation import DEFAULT_REPRESENTATIONS, Representation
-from kineme.similarity.similarity import averaged
-from kineme.similarity.specification import ComparisonSpecification
-from kineme.similarity.weights import given_weights
-from kineme.similarity.widths import SHARE, gap_widths, impostor_widths
+from kineme.kernels.pair_distances import CloudSpec, ElasticSpec
+from kineme.similarity import describe as described_module
+from kineme.similarity.describe import describe, squared_distances
+from kineme.similarity.similarity import SHARE, averaged, gap_widths, given_weights, impostor_widths
+from kineme.similarity.specification import DEFAULT_REPRESENTATIONS, ComparisonSpecification, Representation
 from movement_samples import draw_shapes
 
 

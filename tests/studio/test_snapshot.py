@@ -14,7 +14,7 @@ from node_runtime import NODE, REASON, ask, question
 import kineme
 from kineme.errors import SpecificationError
 from kineme.movements.preparation import pauses
-from kineme.recognition import left_out
+from kineme.recognition import conformal
 from kineme.recognition.early import evidence, hypotheses
 from kineme.studio.snapshot import MOST_NUMBERS, snapshot_of_library, snapshot_of_recognizer
 from movement_samples import draw_shapes
@@ -44,7 +44,7 @@ def test_numbers_that_are_tuned_come_from_python_alone():
     header = snapshot_of_recognizer(kineme.Recognizer().fit(draw_shapes([2, 3]))).header
     groups = {
         "pauses.js": (header["comparison"]["pauses"], [pauses]),
-        "recognition.js": (header["calibration"], [left_out]),
+        "recognition.js": (header["calibration"], [conformal]),
         "evidence.js hypotheses.js": (header["early"]["numbers"], [evidence, hypotheses]),
     }
     for files, (numbers, modules) in groups.items():

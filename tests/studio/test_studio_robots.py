@@ -8,8 +8,8 @@ from studio_samples import drawing
 
 from kineme import ActionLibrary, Trajectory
 from kineme.errors import DataError
-from kineme.robots.kinematics import reach
-from kineme.robots.planning import refusal
+from kineme.robots.kinematics import descent as reach
+from kineme.robots.planning import robot_movement as refusal
 from kineme.studio.server import robot_routes
 from kineme.studio.server.refusals import in_studio_words
 

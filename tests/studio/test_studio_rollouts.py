@@ -14,7 +14,7 @@ from node_runtime import NODE, REASON, ask
 from studio_samples import drawing, make_library
 
 from kineme import ActionLibrary, Demonstrations, Trajectory
-from kineme.dmp.discrete.formulations import FORMULATIONS
+from kineme.dmp.discrete.specification import FORMULATIONS
 from kineme.dmp.styles.model import learn_styles
 from kineme.movements.channels.channel import Channel
 from kineme.movements.trajectories.movements import of_channels

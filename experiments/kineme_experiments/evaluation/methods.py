@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
-from kineme.anchoring.unlabeled import propose
-from kineme.kernels.shapes import matched_sums
+from kineme.anchoring.proposals import propose
+from kineme.kernels.pair_distances import matched_sums
 from kineme.movements.trajectories.demonstrations import Demonstrations, require_labels
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.recognition.early.evidence import cut

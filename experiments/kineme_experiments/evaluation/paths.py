@@ -5,7 +5,7 @@ from __future__ import annotations
 from kineme.movements.preparation.resample import relative_rows, resample_by_arc_length
 from kineme.movements.preparation.smooth import Smooth
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.similarity.representation import Normalization
+from kineme.similarity.specification import Normalization
 from kineme.validation import Array
 
 _N_SAMPLES = 200  # even in time, before arc length is taken

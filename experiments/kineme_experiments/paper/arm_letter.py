@@ -11,9 +11,8 @@ from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.reporting.figures import BLUE, GRAY, GREEN, LINES, ORANGE, PURPLE, new_figure
 from kineme.reporting.table import Table
-from kineme.robots.kinematics.inverse import InverseKinematics
-from kineme.robots.kinematics.task_path import PLANES
-from kineme.robots.models.load import load
+from kineme.robots.kinematics.descent import PLANES, InverseKinematics
+from kineme.robots.models.robot import load
 from kineme.robots.planning.move import move
 from kineme.robots.planning.robot_movement import RobotMovement
 from kineme.validation import Array

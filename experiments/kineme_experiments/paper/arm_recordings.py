@@ -7,10 +7,8 @@ import numpy as np
 from kineme.errors import DataError
 from kineme.movements.preparation.resample import Resample
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.robots.kinematics.inverse import InverseKinematics
-from kineme.robots.kinematics.task_path import PLANES
-from kineme.robots.models.load import load
-from kineme.robots.models.robot import Robot
+from kineme.robots.kinematics.descent import PLANES, InverseKinematics
+from kineme.robots.models.robot import Robot, load
 from kineme.validation import Array
 from kineme_experiments.paper.paper import N_POINTS
 

@@ -4,22 +4,22 @@ from kineme.similarity.describe import describe_rows as describe_rows
 from kineme.similarity.similarity import similarities as similarities
 
 # New symbols, and changed ones
-from kineme.anchoring.unlabeled import propose as propose
+from kineme.anchoring.proposals import propose as propose
 from kineme.anchoring.proposals import Proposal as Proposal
 from kineme.anchoring.proposals import Proposals as Proposals
 from kineme.anchoring.assignment import assign as assign
 from kineme.anchoring.assignment import Assignment as Assignment
-from kineme.anchoring.merge_split import suggest_merges as suggest_merges
-from kineme.anchoring.merge_split import suggest_splits as suggest_splits
-from kineme.anchoring.merge_split import Merge as Merge
-from kineme.anchoring.merge_split import Split as Split
+from kineme.anchoring.assignment import suggest_merges as suggest_merges
+from kineme.anchoring.assignment import suggest_splits as suggest_splits
+from kineme.anchoring.assignment import Merge as Merge
+from kineme.anchoring.assignment import Split as Split
 
 # What symbols mean
 from kineme.anchoring.grounding import prototype as prototype
 from kineme.anchoring.grounding import Prototype as Prototype
 from kineme.anchoring.space import conceptual_space as conceptual_space
 from kineme.anchoring.space import ConceptualSpace as ConceptualSpace
-from kineme.anchoring.morphing import morph as morph
+from kineme.anchoring.space import morph as morph
 from kineme.anchoring.grounding import ground as ground
 from kineme.anchoring.grounding import SymbolName as SymbolName
 from kineme.anchoring.grounding import grounding_schema as grounding_schema

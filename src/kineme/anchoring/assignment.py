@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from kineme.anchoring.clustering import Clusters, average_linkage, cut_at, stabilities, without_small
-from kineme.anchoring.proposals import Proposals, describe_clusters, extend, largest_clustered, subsample
-from kineme.anchoring.unlabeled import own_order
+from kineme.anchoring.clustering import Clusters, average_linkage, cut_at, cuts, stabilities, without_small
+from kineme.anchoring.proposals import Proposals, describe_clusters, extend, largest_clustered, own_order, subsample
+from kineme.errors import SpecificationError
+from kineme.movements.trajectories.labels import label_array
 from kineme.movements.trajectories.trajectory import MovementsLike
-from kineme.recognition.known_classes import FittedRecognizer, KnownClasses, known_classes, open_set_labels
-from kineme.recognition.left_out import distances as in_widths
+from kineme.recognition.answer import FittedRecognizer, KnownClasses, known_classes, open_set_labels
+from kineme.recognition.conformal import distances as in_widths
 from kineme.sampling import evenly_spaced
-from kineme.similarity.comparison import Comparison
-from kineme.similarity.describe import describe
-from kineme.similarity.described import Described
-from kineme.similarity.references import References
-from kineme.similarity.similarity import compare
-from kineme.validation import Array, check_count
+from kineme.similarity.comparison import Comparison, References
+from kineme.similarity.describe import Described, describe
+from kineme.similarity.similarity import averaged, compare, similarities
+from kineme.similarity.specification import Compares
+from kineme.validation import Array, check_count, check_number
+
+_LARGEST = 5000  # movements compared at once
+_STABLE = 0.75  # a valid cluster to Hennig (2007)
 
 _REPEATS = 20
 _REACH = 0.6  # share of the typical distance to another symbol, where no two movements show one symbol
@@ -171,3 +175,164 @@ def _at(indices: NDArray[np.intp], proposals: Proposals, n: int) -> Proposals:
         for proposal in proposals.proposals
     )
     return Proposals(tuple(moved), clusters, proposals.widths)
+
+
+class Merge(NamedTuple):
+    """Two symbols whose members are hard to tell apart."""
+
+    first: Any
+    second: Any
+    overlap: float
+
+
+class Split(NamedTuple):
+    """A symbol whose members form two clusters, given by the indices of the movements."""
+
+    symbol: Any
+    parts: tuple[NDArray[np.intp], NDArray[np.intp]]
+    overlap: float
+    stability: float  # of the less stable part
+
+
+def suggest_merges(
+    movements: MovementsLike | Described,
+    labels: ArrayLike,
+    *,
+    least: float = 0.5,
+    like: Compares | None = None,
+    widths: ArrayLike | None = None,
+) -> tuple[Merge, ...]:
+    """Pairs of symbols that overlap, those that do most first.
+
+    The overlap of a and b is ``mean K(a, b) / sqrt(mean K(a, a') mean K(b, b'))`` over different members: the cosine
+    of their mean elements in the kernel's space (Gretton et al., "A kernel two-sample test", JMLR 13, 2012, section
+    2.2), free of bias. It is about 1 where both are drawn from one class and 0 where no member is near the other's; on
+    handwriting, halves of one shape have 0.7 to 1.4, and the two most similar shapes 0.25.
+
+    Parameters
+    ----------
+    movements : Described, or movements as `Demonstrations.of` accepts them
+    labels : array_like of shape (n,)
+        The symbol of each.
+    least : float, default 0.5
+        Overlap from which on a pair is named.
+    like : Recognizer, Comparison or ComparisonSpecification, optional
+        Whose representations and invariances to take.
+    widths : array_like of shape (R,), optional
+        Of the kernels, by default `gap_widths` of these movements.
+
+    Notes
+    -----
+    A symbol with one member is as cohesive as the others typically are. Of a large symbol, evenly spaced
+    members are compared.
+    """
+    check_number("least", least, above=0.0)
+    described, member, names = _labeled(movements, labels, like)
+    if len(names) < 2:
+        return ()
+    chosen = _some_of_each(member, max(3, _LARGEST // len(names)))
+    K, own = similarities(described.take(chosen), widths=widths), member[chosen]
+    counts = np.bincount(own)
+    H = (own[:, None] == np.arange(len(names))).astype(float)
+    means = (H.T @ K @ H - np.diag(counts)) / np.maximum(np.outer(counts, counts) - np.diag(counts), 1)
+    several = counts > 1
+    typical = float(np.median(np.diag(means)[several])) if several.any() else 1.0
+    within = np.maximum(np.where(several, np.diag(means), typical), np.finfo(float).tiny)
+    overlap = means / np.sqrt(np.outer(within, within))
+    pairs = np.argwhere(np.triu(overlap >= least, 1))
+    merges = [Merge(names[i], names[j], float(overlap[i, j])) for i, j in pairs]
+    return tuple(sorted(merges, key=lambda merge: -merge.overlap))
+
+
+def suggest_splits(
+    movements: MovementsLike | Described,
+    labels: ArrayLike,
+    *,
+    most: float = 0.25,
+    min_members: int = 2,
+    like: Compares | None = None,
+    widths: ArrayLike | None = None,
+) -> tuple[Split, ...]:
+    """Symbols whose members form two stable clusters, the most clearly apart first.
+
+    Average linkage in two; both parts must have a stability of 0.75 (Hennig 2007) and `min_members` members, and
+    their overlap (see `suggest_merges`) must be at most `most`. On handwriting, two shapes under one name have less
+    than 0.02, and the two most different ways of drawing one shape 0.4. Parts can be split again.
+
+    Parameters
+    ----------
+    movements, labels, like, widths
+        As for `suggest_merges`. Without `widths` there must be another symbol that shows how far apart symbols are;
+        the only symbol is never split.
+    most : float, default 0.25
+        Overlap up to which a symbol is named.
+    min_members : int, default 2
+        Of each part.
+    """
+    check_number("most", most, least=0.0)
+    check_count("min_members", min_members, 2)
+    described, member, names = _labeled(movements, labels, like)
+    if len(names) < 2 and widths is None:
+        return ()
+    sigma = averaged(described, widths).widths
+    splits = []
+    for k, name in enumerate(names):
+        indices = np.flatnonzero(member == k)
+        if len(indices) >= 2 * min_members and len(indices) > 3:
+            splits.append(_in_two(name, described.take(indices), indices, sigma))
+    clear = (
+        s for s in splits if s.overlap <= most and s.stability >= _STABLE and min(map(len, s.parts)) >= min_members
+    )
+    return tuple(sorted(clear, key=lambda split: split.overlap))
+
+
+def _in_two(name: Any, described: Described, indices: NDArray[np.intp], widths: Array) -> Split:
+    some = evenly_spaced(len(described), _LARGEST // 5)
+    K = similarities(described.take(some), widths=widths)
+    order = own_order(K)
+    K = K[np.ix_(order, order)]
+
+    def halve(distances: Array) -> Clusters:
+        return cuts(average_linkage(distances), [2])[0]
+
+    halves = halve(1.0 - K)
+    stability = float(stabilities(1.0 - K, halves, halve, _REPEATS).min())
+    a, b = K[halves == 0], K[halves == 1]
+    between = float(a[:, halves == 1].mean())
+    within = _mean_within(a[:, halves == 0]) * _mean_within(b[:, halves == 1])
+    parts = np.empty(len(some), dtype=np.intp)
+    parts[order] = halves
+    nearest = compare(averaged(described, widths), described, described.take(some)).argmax(axis=1)
+    parent = parts[nearest]
+    parent[some] = parts
+    overlap = between / float(np.sqrt(max(within, np.finfo(float).tiny)))
+    return Split(name, (indices[parent == 0], indices[parent == 1]), overlap, stability)
+
+
+def _mean_within(K: Array) -> float:
+    """Mean of different pairs; 1 for a movement alone."""
+    m = len(K)
+    return float((K.sum() - m) / (m * (m - 1))) if m > 1 else 1.0
+
+
+def _labeled(
+    movements: MovementsLike | Described, labels: ArrayLike, like: Compares | None
+) -> tuple[Described, NDArray[np.intp], list[Any]]:
+    described, label_values = describe(movements, like), label_array(labels)
+    if len(label_values) != len(described):
+        raise SpecificationError(
+            f"expected one label for each of the {len(described)} movements, got shape {label_values.shape}"
+        )
+    names, member = np.unique(label_values, return_inverse=True)
+    return described, np.asarray(member, dtype=np.intp), names.tolist()
+
+
+def _some_of_each(member: NDArray[np.intp], most: int) -> NDArray[np.intp]:
+    """At most so many evenly spaced movements of each symbol."""
+    order = np.argsort(member, kind="stable")
+    counts = np.bincount(member)
+    rank = np.arange(len(member)) - np.repeat(np.cumsum(counts) - counts, counts)
+    total = np.repeat(counts, counts)
+    # The k-th of m is kept where floor(k most / m) steps up: exactly `most` of them, evenly spaced.
+    chosen = (total <= most) | (((rank + 1) * most) // total > (rank * most) // total)
+    return np.sort(order[chosen])

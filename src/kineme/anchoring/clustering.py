@@ -174,7 +174,9 @@ def spectral(similar: Array, n_clusters: int, min_members: int = 1) -> Clusters:
     left over, and of the others the loosest is divided until there are enough.
     """
     wanted = max(1, min(n_clusters, len(similar) // min_members))
-    rows = _directions(similar, wanted)
+    n = len(similar)
+    vectors = eigh(_normalized(similar), subset_by_index=(n - wanted, n - 1))[1]
+    rows = vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), np.finfo(float).tiny)
     distances = np.maximum(1.0 - rows @ rows.T, 0.0)
     distances = 0.5 * (distances + distances.T)
     np.fill_diagonal(distances, 0.0)
@@ -209,13 +211,6 @@ def _half(distances: Array, min_members: int) -> NDArray[np.bool_]:
     nearer = np.zeros(n, dtype=bool)
     nearer[np.argsort(distances[:, j] - distances[:, i], kind="stable")[: n // 2]] = True
     return nearer
-
-
-def _directions(similar: Array, k: int) -> Array:
-    """Rows (n, k) of norm 1."""
-    n = len(similar)
-    vectors = eigh(_normalized(similar), subset_by_index=(n - k, n - 1))[1]
-    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), np.finfo(float).tiny))
 
 
 def _normalized(similar: Array) -> Array:

@@ -15,20 +15,17 @@ from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.reporting.figures import BLUE, GRAY, ORANGE, new_figure
 from kineme.reporting.text import drawable
-from kineme.similarity.alignment import maps_onto, paths_of
+from kineme.similarity.describe import maps_onto, paths_of
 from kineme.similarity.specification import Compares
 from kineme.validation import Array
 
 _INCHES = 6.9  # width of a map
 _HEIGHTS = (3.0, 8.0)  # of a map, at least and at most, in inches
 
-
 _CELL = 1.35  # inches
 _LEFT_OVER = 24  # of those left over, drawn at most
 
-
 _SHOWN = 60  # members drawn at most, evenly spread; more would hide each other
-
 
 _ABOUT = {1: "position over the share of the duration", 2: ""}
 
@@ -237,9 +234,10 @@ def draw_map(space: ConceptualSpace, prototypes: Primitives | MovementsLike) -> 
     if len(demos) != len(space.symbols):
         raise SpecificationError(f"expected {len(space.symbols)} prototypes, one per symbol, got {len(demos)}")
     positions, share = classical_scaling(space.distances)
-    half = _half_size(len(positions))
+    half = min(0.08, 0.21 / np.sqrt(len(positions)))  # of the largest size of a drawing, in widths of the map
     positions = apart(positions / (float(np.ptp(positions, axis=0).max()) or 1.0), 3.0 * half)
-    figure = new_figure(_INCHES, _height(positions, half))
+    width, height = np.ptp(positions, axis=0) + 2.5 * half
+    figure = new_figure(_INCHES, float(np.clip(_INCHES * height / width + 0.4, *_HEIGHTS)))
     axes = figure.subplots()
     for name, position, path in zip(space.symbols, positions, paths_of(demos), strict=True):
         drawn = _fitted(flat(path[None], path)[0], half) + position[:, None]
@@ -252,17 +250,6 @@ def draw_map(space: ConceptualSpace, prototypes: Primitives | MovementsLike) -> 
     bare(axes, 2)
     axes.set_title(f"{len(positions)} symbols; the plane holds {100 * share:.0f} % of their squared distances")
     return figure
-
-
-def _half_size(n: int) -> float:
-    """Half the largest size of a drawing, in widths of the map: what n drawings have room for."""
-    return min(0.08, 0.21 / np.sqrt(n))
-
-
-def _height(positions: Array, half: float) -> float:
-    """Inches, so that the map is as high as its symbols need."""
-    width, height = np.ptp(positions, axis=0) + 2.5 * half
-    return float(np.clip(_INCHES * height / width + 0.4, *_HEIGHTS))
 
 
 def _fitted(drawn: Array, half: float) -> Array:

@@ -11,20 +11,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from kineme.dmp.batch import check_array, specification_from_dict, specification_to_dict
 from kineme.dmp.discrete.dmp import DMP, Primitives
-from kineme.dmp.persistence import check_array, specification_from_dict, specification_to_dict
 from kineme.dmp.styles.average import AveragePrimitive, average
 from kineme.dmp.styles.model import StyleModel, compared, learn_styles
 from kineme.dmp.styles.parameters import check_primitives
 from kineme.errors import DataError, SpecificationError, TrajectoryError
 from kineme.movements.trajectories.trajectory import MovementsLike
-from kineme.similarity.alignment import Maps, maps_onto, moved, paths_of
-from kineme.similarity.describe import describe
-from kineme.similarity.described import Described
-from kineme.similarity.similarity import similarities
+from kineme.similarity.describe import Described, Maps, describe, maps_onto, moved, paths_of
+from kineme.similarity.similarity import median_distances, similarities
 from kineme.similarity.specification import Compares
-from kineme.similarity.widths import median_distances
-from kineme.validation import Array, check_choice
+from kineme.validation import check_choice
 
 FORMAT = "kineme-grounding"
 VERSION = 1
@@ -92,6 +89,10 @@ def ground(
     check_choice("by", by, ["medoid", "mean"])
     if not len(primitives):
         raise TrajectoryError(f"expected at least one demonstration of {symbol.name!r}, got none")
+    d = primitives.n_dims
+    named = None if units is None else [units] * d if isinstance(units, str) else list(units)
+    if named is not None and len(named) != d:
+        raise TrajectoryError(f"expected a unit for each of {d} dimensions, got {len(named)}: {named}")
     typical = prototype(primitives, medoid, like)
     primitive = primitives[typical.medoid] if by == "medoid" else typical.primitive
     return {
@@ -103,24 +104,21 @@ def ground(
             "description": symbol.description,
             "parents": list(symbol.parents),
         },
-        "n_dims": primitives.n_dims,
-        "units": {"position": _units(units, primitives.n_dims), "time": "s"},
+        "n_dims": d,
+        "units": {"position": named, "time": "s"},
         "n_demonstrations": len(primitives),
         "prototype": {"by": by, "medoid": typical.medoid},
         "dmp": specification_to_dict(primitive.dmp),
         "primitive": _numbers(primitive),
-        "demonstrated": _ranges(primitives),
+        "demonstrated": {
+            "start": _range(primitives.starts),
+            "goal": _range(primitives.goals),
+            "displacement": _range(primitives.goals - primitives.starts),
+            "extent": _range(primitives.extents),
+            "duration": _range(primitives.durations),
+        },
         "styles": _styles(primitives, typical),
     }
-
-
-def _units(units: Sequence[str] | str | None, n_dims: int) -> list[str] | None:
-    if units is None:
-        return None
-    named = [units] * n_dims if isinstance(units, str) else list(units)
-    if len(named) != n_dims:
-        raise TrajectoryError(f"expected a unit for each of {n_dims} dimensions, got {len(named)}: {named}")
-    return named
 
 
 def _numbers(primitive: Primitives) -> dict[str, Any]:
@@ -135,16 +133,6 @@ def _numbers(primitive: Primitives) -> dict[str, Any]:
     }
 
 
-def _ranges(primitives: Primitives) -> dict[str, Any]:
-    return {
-        "start": _range(primitives.starts),
-        "goal": _range(primitives.goals),
-        "displacement": _range(primitives.goals - primitives.starts),
-        "extent": _range(primitives.extents),
-        "duration": _range(primitives.durations),
-    }
-
-
 def _range(values: NDArray[np.float64]) -> dict[str, Any]:
     return {
         "min": values.min(axis=0).tolist(),
@@ -156,7 +144,7 @@ def _range(values: NDArray[np.float64]) -> dict[str, Any]:
 def _styles(primitives: Primitives, typical: Prototype) -> dict[str, Any] | None:
     """The style model of the members laid onto the medoid, or None where they are too few or do not differ."""
     laid = moved(primitives, typical.maps)
-    if len(laid) < _STYLED or not _differ(typical.average.deviation(), laid.extents):
+    if len(laid) < _STYLED or typical.average.deviation().max() <= _FLAT * laid.extents.max():
         return None
     model = learn_styles(laid)
     return {
@@ -171,10 +159,6 @@ def _styles(primitives: Primitives, typical: Prototype) -> dict[str, Any] | None
         "tempo_basis": model.tempo_basis.tolist(),
         "singular_values": model.singular_values.tolist(),
     }
-
-
-def _differ(deviation: Array, extents: Array) -> bool:
-    return bool(deviation.max() > _FLAT * extents.max())
 
 
 def style_model(styles: dict[str, Any], dmp: Any) -> StyleModel:
@@ -288,7 +272,13 @@ def primitive_from(grounding: Mapping[str, Any], style: ArrayLike | None = None)
     SpecificationError
         A style of a symbol without styles, or outside its range.
     """
-    _check_format(grounding)
+    form = grounding.get("format") if isinstance(grounding, Mapping) else type(grounding).__name__
+    if not isinstance(grounding, Mapping) or form != FORMAT:
+        raise DataError(f"expected a grounding, a mapping with format {FORMAT!r}, got {form!r}")
+    if not isinstance(grounding.get("version"), int) or grounding["version"] > VERSION:
+        raise DataError(
+            f"expected a grounding of version {VERSION} or earlier, got {grounding.get('version')!r}; upgrade kineme"
+        )
     try:
         dmp = specification_from_dict(DMP, grounding["dmp"])
         label = np.array([grounding["symbol"]["name"]])
@@ -307,16 +297,6 @@ def primitive_from(grounding: Mapping[str, Any], style: ArrayLike | None = None)
             f"got {style!r}"
         )
     return model.primitive(style)
-
-
-def _check_format(grounding: Any) -> None:
-    if not isinstance(grounding, Mapping) or grounding.get("format") != FORMAT:
-        got = grounding.get("format") if isinstance(grounding, Mapping) else type(grounding).__name__
-        raise DataError(f"expected a grounding, a mapping with format {FORMAT!r}, got {got!r}")
-    if not isinstance(grounding.get("version"), int) or grounding["version"] > VERSION:
-        raise DataError(
-            f"expected a grounding of version {VERSION} or earlier, got {grounding.get('version')!r}; upgrade kineme"
-        )
 
 
 def _primitive(dmp: DMP, numbers: Mapping[str, Any], d: int, label: Any) -> Primitives:

@@ -6,12 +6,36 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from kineme.anchoring.clustering import (
+    METHODS,
+    Clusters,
+    components,
+    count_by_eigengap,
+    count_clusters,
+    fuse,
+    local_similarities,
+    set_apart,
+    spectral,
+    stabilities,
+)
 from kineme.errors import SpecificationError
-from kineme.similarity.described import Described
-from kineme.similarity.similarity import AveragedSimilarity, averaged, compare
-from kineme.validation import Array
+from kineme.movements.trajectories.trajectory import MovementsLike
+from kineme.recognition.conformal import check_groups, comparable_groups
+from kineme.similarity.describe import Described, describe, squared_distances
+from kineme.similarity.similarity import AveragedSimilarity, averaged, compare, similarities
+from kineme.similarity.specification import Compares
+from kineme.validation import Array, check_choice, check_count
+
+_SHARE = 0.5  # sum of all links by that of the similarities; with 1, classes that few people made are merged
+_NEAREST = 5  # movements of a person, of which each counts less than the one before it
+
+_SPECTRAL = "spectral"
+#: Of `propose` and of whatever clusters by it.
+DEFAULT_METHOD = _SPECTRAL
+_LARGEST = 2000  # movements whose similarities are fused at once
+_REPEATS = 20  # subsets that clusters must come again in
 
 _WITHIN = 0.95  # of the sampled members of all clusters are within the common radius of their nearest neighbor
 _TILE = 20_000  # movements at a time
@@ -206,3 +230,180 @@ def radii(K: Array, proposals: Proposals) -> Array:
         return np.empty(0)
     common = float(np.quantile(away[member], _WITHIN))
     return np.array([max(common, float(away[proposal.members].max())) for proposal in proposals.proposals])
+
+
+def propose(  # noqa: PLR0913 - what is asked, and how it is compared
+    movements: MovementsLike | Described,
+    method: str = DEFAULT_METHOD,
+    n_clusters: int | None = None,
+    *,
+    groups: ArrayLike | None = None,
+    min_members: int = 3,
+    like: Compares | None = None,
+    max_clustered: int | None = None,
+) -> Proposals:
+    """Cluster movements without labels.
+
+    By default (``method="spectral"``) movements are similar whose neighbors are similar, in several representations
+    together and at the scale of each neighborhood: see `kineme.anchoring.clustering.fuse`. So movements of
+    several people connect, of whom each repeats the own way more closely than that of others. Name who made each
+    movement by `groups` where that is known: it is the better the more similar classes are. The other methods take
+    distances ``1 - K`` of the averaged kernel at `gap_widths`: bounded, so that what is far is just far.
+
+    Parameters
+    ----------
+    movements : Described, or movements as `Demonstrations.of` accepts them
+        At least three.
+    method : {"spectral", "agglomerative", "hdbscan"}, default "spectral"
+        Spectral clustering, in `n_clusters`; average linkage, cut into `n_clusters`; or clusters of density (HDBSCAN),
+        which find their number themselves.
+    n_clusters : int, optional
+        Number of proposals, exactly, if there are `min_members` movements for each; with "agglomerative" the number of
+        clusters of the tree, those too small to be proposed included. By default it is found, by the largest gap
+        between eigenvalues or by `count_clusters`, and is at least two: whether all movements are one cluster cannot be
+        told from their own distances.
+    groups : array_like of shape (n,), optional
+        Who made each movement; the other methods ignore it. Movements of two people are linked if they are among each
+        other's nearest: classes that each draws in an own way are found together, and classes that are alike apart. See
+        `kineme.anchoring.proposals.link_people`.
+    min_members : int, default 3
+        Movements of a proposal, at least; smaller clusters are left over.
+    like : Recognizer, Comparison or ComparisonSpecification, optional
+        Whose representations, invariances and mean to take; it need not be fitted.
+    max_clustered : int, optional
+        More movements than this are clustered by a subsample of so many; each of the others is added to the cluster of
+        its nearest neighbor in the subsample if it is within the radius of that cluster, else it is left over. By
+        default 2000; with the other methods 5000, in space 800.
+
+    Returns
+    -------
+    Proposals
+
+    Raises
+    ------
+    SpecificationError
+        Parameters out of range, fewer than three movements, or copies of one movement.
+    TrajectoryError
+        Not one group for each movement.
+    """
+    check_choice("method", method, [_SPECTRAL, *METHODS])
+    check_count("min_members", min_members, 2)
+    described = describe(movements, like)
+    if n_clusters is not None:
+        check_count("n_clusters", n_clusters, 1)
+        if method == "hdbscan":
+            raise SpecificationError(
+                f"expected no n_clusters with method={method!r}, got {n_clusters!r}; it finds its own"
+            )
+        if n_clusters > len(described):
+            raise SpecificationError(
+                f"expected n_clusters of at most {len(described)}, the number of movements, got {n_clusters!r}"
+            )
+    people = None if groups is None else comparable_groups(check_groups(groups, len(described)))
+    by_default = _LARGEST if method == _SPECTRAL else largest_clustered(described.n_dims)
+    limit = by_default if max_clustered is None else max_clustered
+    check_count("max_clustered", limit, 3)
+    if len(described) <= limit:
+        return _propose(described, averaged(described), method, n_clusters, min_members, people)[1]
+    sample, similarity = subsample(described, limit)
+    people = None if people is None else people[sample]
+    K, clusters = _propose(described.take(sample), similarity, method, n_clusters, min_members, people)
+    return extend(described, sample, K, clusters, similarity)
+
+
+def _propose(
+    described: Described,
+    similarity: AveragedSimilarity,
+    method: str,
+    n_clusters: int | None,
+    min_members: int,
+    people: NDArray[np.intp] | None,
+) -> tuple[Array, Proposals]:
+    """Similarities K (n, n) at the widths given, and proposals."""
+    K = similarities(described, widths=similarity.widths)
+    order = own_order(K)
+    clusters = np.empty(len(K), dtype=np.intp)
+    if method == _SPECTRAL:
+        ordered = None if people is None else people[order]
+        in_order, stable = _by_neighbors(described.take(order), n_clusters, min_members, ordered)
+    else:
+        in_order, stable = _by_distances(1.0 - K[np.ix_(order, order)], method, n_clusters, min_members)
+    clusters[order] = in_order
+    return K, describe_clusters(K, clusters, stable, similarity.widths)
+
+
+def _by_neighbors(
+    described: Described, n_clusters: int | None, min_members: int, people: NDArray[np.intp] | None
+) -> tuple[Clusters, Array]:
+    """Clusters of movements that are not alone, and how stable each is."""
+    described = by_shape(described)
+    squares = squared_distances(described, described)
+    squares = 0.5 * (squares + squares.transpose(0, 2, 1))
+    component = components(squares)
+    large = np.flatnonzero(np.bincount(component)[component] >= min_members)
+    clusters = np.full(len(described), -1, dtype=np.intp)
+    if len(large) < 3:
+        return clusters, np.empty(0)
+    squares, weights = squares[:, large[:, None], large], described.own_weights
+    similar = fuse(squares, weights)
+    if people is not None:
+        similar = link_people(similar, local_similarities(squares, weights), people[large])
+    similar = set_apart(similar, component[large])
+    wanted = count_by_eigengap(similar) if n_clusters is None else n_clusters
+    clusters[large] = spectral(similar, wanted, min_members)
+    stable = stabilities(similar, clusters[large], lambda some: spectral(some, wanted), _REPEATS)
+    return clusters, stable
+
+
+def by_shape(described: Described) -> Described:
+    """Without the forcing term, if movements are also compared pair by pair: across people it tells little."""
+    if described.pairs is None:
+        return described
+    n = len(described.blocks)
+    positions = [r for r, block in enumerate(described.blocks) if block is described.pairs.positions]
+    return described.select([*positions, *range(n, described.n_representations)])
+
+
+def _by_distances(distances: Array, method: str, n_clusters: int | None, min_members: int) -> tuple[Clusters, Array]:
+    """Clusters of all movements, and how stable each is."""
+    share = n_clusters or 0
+    if method == "agglomerative" and n_clusters is None:
+        share = count_clusters(distances, _REPEATS)
+
+    def again(some: Array) -> Clusters:
+        return METHODS[method](some, share, 1 if method == "agglomerative" else min_members)
+
+    clusters = METHODS[method](distances, share, min_members)
+    return clusters, stabilities(distances, clusters, again, _REPEATS)
+
+
+def own_order(K: Array) -> NDArray[np.intp]:
+    """An order of the movements by their similarities, so that the result does not depend on that of the input."""
+    return np.argsort(K.sum(axis=1), kind="stable")
+
+
+def link_people(similar: Array, near: Array, people: NDArray[np.intp]) -> Array:
+    """Similarities W (n, n) with links added between people, half as strong in total.
+
+    Among the movements of j's person, j is the p-th nearest to i, and among those of i's person i the q-th nearest to
+    j. If both are among the five nearest and the people differ, the link of i and j is ``1 / (p q)``, up to a factor:
+    one link suffices where each class was made once, and several connect repetitions. If one of the two people never
+    made the class of i, its nearest movement by that person is, as a rule, nearer to others, and there is no link.
+
+    Source: L. Haghverdi et al., "Batch effects in single-cell RNA-sequencing data are corrected by matching mutual
+    nearest neighbors", Nature Biotechnology 36, 2018. A person's repetitions are each other's nearest neighbors; among
+    the nearest of all movements there may be none by another person, so neighbors are taken from each person in turn.
+
+    - `similar` (n, n): W, as `kineme.anchoring.clustering.fuse` gives it.
+    - `near` (n, n): by which the nearest are found; greater is nearer.
+    - `people` (n,): who made each movement, as numbers.
+    """
+    n = len(similar)
+    share = np.zeros((n, n))  # 1 / p
+    for person in np.unique(people):
+        own = np.flatnonzero(people == person)
+        nearest = own[np.argsort(-near[:, own], axis=1, kind="stable")[:, :_NEAREST]]
+        share[np.arange(n)[:, None], nearest] = 1.0 / np.arange(1, nearest.shape[1] + 1)
+    links = np.where(people[:, None] != people, share * share.T, 0.0)
+    total = float(links.sum())
+    return np.asarray(similar + (_SHARE * float(similar.sum()) / total if total > 0 else 0.0) * links)

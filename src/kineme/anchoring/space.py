@@ -12,15 +12,15 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from kineme.errors import SpecificationError
+from kineme.dmp.discrete.dmp import Primitives
+from kineme.dmp.styles.parameters import check_primitives, from_numbers, to_numbers
+from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.trajectories.trajectory import MovementsLike
-from kineme.similarity.describe import describe
-from kineme.similarity.described import Described
-from kineme.similarity.similarity import averaged
+from kineme.similarity.describe import Described, describe, maps_onto, paths_of
+from kineme.similarity.similarity import averaged, median_distances
 from kineme.similarity.specification import Compares
-from kineme.similarity.widths import median_distances
 from kineme.validation import Array, check_count, check_number
 
 
@@ -136,7 +136,10 @@ def conceptual_space(
             f"{len(names)} symbols, {len(set(names))} of them different"
         )
     n_rows = len(described.blocks)
-    sigma = _typical(described) if widths is None else np.asarray(widths, dtype=np.float64)
+    if widths is None:
+        widths = median_distances(described)
+        widths = np.where(widths > 0, widths, 1.0)  # where the prototypes do not differ
+    sigma = np.asarray(widths, dtype=np.float64)
     averaged(described, sigma)  # refuses widths of another number
     described = described.select(range(n_rows))
     similarity = averaged(described, sigma[:n_rows])
@@ -146,7 +149,75 @@ def conceptual_space(
     return ConceptualSpace(names, d)
 
 
-def _typical(described: Described) -> NDArray[np.float64]:
-    """Median distance of two movements in each representation; 1 where they do not differ."""
-    medians = median_distances(described)
-    return np.where(medians > 0, medians, 1.0)
+def morph(a: Primitives, b: Primitives, shares: ArrayLike, like: Compares | None = None) -> Primitives:
+    """Movements on the way from `a` to `b`, one for each share of the way: 0 is a, 1 is b.
+
+    b is laid onto a, and ``theta = (1 - s) theta_a + s theta_b`` is the mean of their paths at equal phase (see
+    `kineme.dmp.styles.parameters`); then position, size (geometrically) and direction (about one axis) go the
+    same share of the way back to b's own. So no movement shrinks half way because the two face different ways, as a
+    plain mean of paths does.
+
+    Parameters
+    ----------
+    a, b : Primitives
+        Batches of one with the same specification: two prototypes, say.
+    shares : array_like of shape (m,)
+        From 0 to 1.
+    like : Recognizer, Comparison or ComparisonSpecification, optional
+        Whose invariances to take.
+
+    Raises
+    ------
+    TrajectoryError
+        Not one primitive each, or of different dimensions.
+    SpecificationError
+        Different specifications, or shares that are not between 0 and 1.
+    """
+    _check_pair(a, b)
+    s = np.atleast_1d(np.asarray(shares, dtype=np.float64))
+    if s.ndim != 1 or not ((s >= 0) & (s <= 1)).all():
+        raise SpecificationError(f"expected shares of the way from 0 to 1, got {shares!r}")
+    paths = np.concatenate((paths_of(a), paths_of(b)))
+    back = maps_onto(paths[:1], paths[1], like)  # from a's frame to b's
+    theta_a, theta_b = to_numbers(a)[0], to_numbers(b)[0]
+    inverse = np.linalg.inv(back.matrices[0])
+    laid = inverse @ theta_b
+    laid[:, -3:-1] -= (inverse @ back.shifts[0])[:, None]
+    theta = theta_a + s[:, None, None] * (laid - theta_a)
+    # The share of the way back, about a center that moves evenly to where the map takes it. With sizes per dimension
+    # the matrix goes evenly, since it is no rotation and one size.
+    center, matrix = paths[0].mean(axis=1), back.matrices[0]
+    if np.ptp(back.scales[0]) == 0:
+        matrices = (back.scales[0] ** s[:, None])[:, :, None] * _part_rotation(back.rotations[0], s)
+    else:
+        matrices = np.eye(len(matrix)) + s[:, None, None] * (matrix - np.eye(len(matrix)))
+    shifts = center + s[:, None] * (matrix @ center + back.shifts[0] - center) - matrices @ center
+    theta = matrices @ theta
+    theta[:, :, -3:-1] += shifts[:, :, None]
+    durations = a.durations * (b.durations / a.durations) ** s
+    return from_numbers(a.dmp, theta, durations)
+
+
+def _check_pair(a: Primitives, b: Primitives) -> None:
+    for symbol in (a, b):
+        check_primitives(symbol)
+        if len(symbol) != 1:
+            raise TrajectoryError(f"expected one primitive at each end, got {len(symbol)}; choose one, primitives[0]")
+    if a.n_dims != b.n_dims:
+        raise TrajectoryError(f"expected primitives of the same dimensions, got {a.n_dims} and {b.n_dims}")
+    if a.dmp != b.dmp:
+        raise SpecificationError(f"expected primitives of one specification, got {a.dmp} and {b.dmp}; learn them again")
+
+
+def _part_rotation(R: Array, s: Array) -> Array:
+    """Rotations by the share s (m,) of the angle of R, about the same axis."""
+    d = len(R)
+    if d == 2:
+        angle = s * np.arctan2(R[1, 0], R[0, 0])
+        c, sn = np.cos(angle), np.sin(angle)
+        return np.stack((np.stack((c, -sn), -1), np.stack((sn, c), -1)), -2)
+    if d == 3:
+        from scipy.spatial.transform import Rotation
+
+        return np.asarray(Rotation.from_rotvec(s[:, None] * Rotation.from_matrix(np.array(R)).as_rotvec()).as_matrix())
+    return np.broadcast_to(np.eye(d), (len(s), d, d)).copy()

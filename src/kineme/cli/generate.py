@@ -67,9 +67,8 @@ def generate(**options: Any) -> None:
     """  # noqa: D301 - a backspace tells click to keep the lines
     import numpy as np
 
-    from kineme.dmp.generation.generate import MovementOptions, checked_point
+    from kineme.dmp.generation.generate import MovementOptions, checked_point, largest_deviation
     from kineme.dmp.generation.generate import generate as make
-    from kineme.dmp.generation.learned import largest_deviation
 
     for name in ("output", "save", "plot"):
         check_new(options[name], options["force"], options["source"])

@@ -168,7 +168,7 @@ def move(**options: Any) -> None:
     from kineme.errors import heard_warnings
     from kineme.reporting.table import to_text
     from kineme.robots.execution.preflight import preflight_table
-    from kineme.robots.models.load import load
+    from kineme.robots.models.robot import load
 
     if options["slow_down"] and options["fastest"]:
         raise click.UsageError("expected one of --slow-down and --fastest")
@@ -200,7 +200,7 @@ def move(**options: Any) -> None:
 def _moved(robot: Any, options: dict[str, Any]) -> Any:
     from kineme.robots.planning.generate_at import generate_at
     from kineme.robots.planning.move import move as move_robot
-    from kineme.robots.planning.refusal import InfeasibleError
+    from kineme.robots.planning.robot_movement import InfeasibleError
     from kineme.robots.planning.roles import space_of
 
     learned = read_source(options)

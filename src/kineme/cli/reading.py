@@ -212,7 +212,7 @@ def read_source(options: dict[str, Any]) -> Any:
         with ActionLibrary(options["folder"], read_only=True) as library:
             return learned_of(library.store, source)
     from kineme.dmp.discrete.dmp import DMP
-    from kineme.dmp.generation.learned import SAVED, Learned, learn_one, load_saved
+    from kineme.dmp.generation.generate import SAVED, Learned, learn_one, load_saved
 
     if source != "-" and not Path(source).exists():
         raise FileNotFoundError(

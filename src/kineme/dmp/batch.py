@@ -2,22 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import fields
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import asdict, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.dmp.recorded_as import RecordedAs, merged
-from kineme.errors import SpecificationError, TrajectoryError
-from kineme.movements.channels.channel import Channels, check_alike
+from kineme.dmp.recorded_as import DiscreteSteps, RecordedAs, merged
+from kineme.errors import DataError, KinemeError, SpecificationError, TrajectoryError
+from kineme.movements.channels.channel import Channels, channels_from_data, channels_to_data, check_alike
+from kineme.movements.preparation.resample import Resample
+from kineme.movements.preparation.smooth import Smooth
+from kineme.movements.preparation.trim import TrimRest
 from kineme.movements.trajectories.labels import as_indices, label_array
 from kineme.movements.trajectories.movements import Names
+from kineme.validation import as_path
 
-if TYPE_CHECKING:
-    from kineme.dmp.persistence import Arrays
+#: The preprocessing steps in files, by names of this table; files never contain names of classes.
+STEPS = {"trim-rest": TrimRest, "smooth": Smooth, "resample": Resample}
+
+#: Name of an array in files -> field of `DiscreteSteps`.
+_STEPS_OF = {"step_values": "values", "step_shares": "shares", "step_offsets": "offsets"}
+
+_LABEL_TYPES = (str, int, float, bool)
+
+Arrays = Mapping[str, NDArray[Any]]
+T = TypeVar("T")
 
 
 class Batch:
@@ -161,11 +173,13 @@ class Batch:
         OSError
             The file cannot be written; what was there before stays.
         """
-        rows = {name: self.row(name) for name in self.ROWS}
-        from kineme.dmp.persistence import header_of, save_as, step_arrays  # files load when they are used
+        from kineme.io.arrays.npz import write_container  # files load when they are used
 
+        arrays = {name: self.row(name) for name in self.ROWS}
+        if self.recorded_as is not None and self.recorded_as.steps is not None:
+            arrays |= {name: getattr(self.recorded_as.steps, field) for name, field in _STEPS_OF.items()}
         header = header_of(self.dmp, self.labels, self.names, self.channels)
-        return save_as(self.KIND, path, header, rows | step_arrays(self.recorded_as))
+        return write_container(Path(path), self.KIND, header, arrays)
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
@@ -178,9 +192,29 @@ class Batch:
         FileNotFoundError
             There is no such file.
         """
-        from kineme.dmp.persistence import load_as
+        from kineme.io.arrays.npz import read_container
 
-        return load_as(cls.KIND, path, cls._from_file)
+        path = as_path(path, f"the path of a file of {cls.KIND}")
+        if path.is_dir() or not path.exists():
+            there = "a folder" if path.is_dir() else "nothing"
+            missing = DataError if path.is_dir() else FileNotFoundError
+            raise missing(f"expected a file of {cls.KIND} at {str(path)!r}, found {there} there; save(path) writes one")
+        header, arrays = read_container(path, cls.KIND)
+        try:
+            return cls._from_file(header, arrays)
+        except (
+            LookupError,
+            TypeError,
+            ValueError,
+            AttributeError,
+            ArithmeticError,
+            RecursionError,
+            MemoryError,
+        ) as error:
+            reason = error if isinstance(error, KinemeError) else f"{type(error).__name__}: {error}"
+            raise DataError(
+                f"expected {path} to hold complete {cls.KIND}, got a header that does not fit ({reason})"
+            ) from error
 
     def row(self, name: str) -> NDArray[Any]:
         """Return the array of that name in `ROWS`."""
@@ -200,9 +234,96 @@ class Batch:
 
     @classmethod
     def _from_file(cls, header: dict[str, Any], arrays: Arrays) -> Self:
-        from kineme.dmp.persistence import checked_rows, labels_and_names, recorded_as_from, specification_from_dict
-
         dmp: Any = specification_from_dict(cls.SPECIFICATION, header["dmp"])
         rows = checked_rows(cls.ROWS, arrays, dmp.n_basis)
         n, d = next(iter(rows.values())).shape[:2]
-        return cls._of_rows(dmp, rows, *labels_and_names(header, n), recorded_as_from(header, arrays, n, d))
+        labels, names = (_one_each(n, header, name) for name in ("labels", "names"))
+        about = recorded_as_from(header, arrays, n, d)
+        return cls._of_rows(
+            dmp,
+            rows,
+            None if labels is None else label_array(labels, n),
+            None if names is None else tuple(names),
+            about,
+        )
+
+
+def header_of(dmp: Any, labels: NDArray[Any] | None, names: Names, channels: Channels | None) -> dict[str, Any]:
+    """Specification, labels, names and channels of a batch as plain data."""
+    plain = None if labels is None else np.asarray(labels).tolist()
+    if plain is not None and not all(isinstance(label, _LABEL_TYPES) for label in plain):
+        raise DataError(f"expected labels that are text or numbers, to save them, got {type(plain[0]).__name__}")
+    return {
+        "dmp": specification_to_dict(dmp),
+        "labels": plain,
+        "names": None if names is None else list(names),
+        "channels": None if channels is None else channels_to_data(channels),
+    }
+
+
+def recorded_as_from(header: dict[str, Any], arrays: Arrays, n: int, n_dims: int) -> RecordedAs | None:
+    """Read what n movements were recorded as, checked; files of earlier versions do not say it."""
+    if header.get("channels") is None:
+        return None
+    channels = channels_from_data(header["channels"], n_dims)
+    n_discrete = sum(channel.kind == "discrete" for channel in channels)
+    if not n_discrete or not set(_STEPS_OF) <= set(arrays):
+        return RecordedAs(channels)
+    steps = DiscreteSteps(**{field: arrays[name] for name, field in _STEPS_OF.items()})
+    check_array("step_values", steps.values, (len(steps.shares), n_discrete))
+    check_array("step_shares", steps.shares, (len(steps.shares),))
+    check_array("step_offsets", steps.offsets, (n + 1,))
+    lengths = np.diff(steps.offsets)
+    if steps.offsets[0] != 0 or steps.offsets[-1] != len(steps.shares) or (lengths < 1).any():
+        raise ValueError("step_offsets should say where the steps of each movement begin")
+    later = np.diff(steps.shares) > 0
+    later[steps.offsets[1:-1] - 1] = True
+    if (steps.shares[steps.offsets[:-1]] != 0).any() or not later.all() or steps.shares.max() > 1:
+        raise ValueError("step_shares should rise from 0 to at most 1 in each movement")
+    return RecordedAs(channels, steps)
+
+
+def checked_rows(rows: Mapping[str, str], arrays: Arrays, n_basis: int) -> dict[str, NDArray[Any]]:
+    """The arrays of a batch, refused unless they have the shapes of `rows`, in the letters n, d and N; q is any."""
+    sizes = {"N": n_basis} | dict(zip("nd", arrays[next(iter(rows))].shape, strict=False))
+    for name, letters in rows.items():
+        own_sizes = dict(zip(letters, arrays[name].shape, strict=False))
+        shape = tuple(own_sizes.get("q", 0) if letter == "q" else sizes[letter] for letter in letters)
+        check_array(name, arrays[name], shape)
+    return {name: arrays[name] for name in rows}
+
+
+def _one_each(n: int, header: dict[str, Any], name: str) -> list[Any] | None:
+    """Labels or names of a header, one per movement."""
+    given = header[name]
+    allowed = (str, type(None)) if name == "names" else _LABEL_TYPES
+    if given is not None and (
+        not isinstance(given, list) or len(given) != n or not all(isinstance(entry, allowed) for entry in given)
+    ):
+        raise ValueError(f"{name} should be a list of {n} {'texts' if name == 'names' else 'texts or numbers'}")
+    return given
+
+
+def check_array(name: str, array: NDArray[Any], shape: tuple[int, ...]) -> None:
+    """Refuse an array of another shape, of anything but float64 or whole numbers, or with NaN."""
+    if array.shape != shape or array.dtype not in (np.float64, np.intp) or not np.isfinite(array).all():
+        raise ValueError(f"{name} should be finite float64 of shape {shape}, is {array.dtype} of shape {array.shape}")
+
+
+def specification_to_dict(dmp: Any) -> dict[str, Any]:
+    """A specification as plain data."""
+    by_type = {step: name for name, step in STEPS.items()}
+    unknown = [step for step in dmp.preprocessing if type(step) not in by_type]
+    if unknown:
+        raise DataError(f"expected preprocessing steps out of {list(STEPS)}, to save them, got {unknown[0]!r}")
+    steps = [{"step": by_type[type(step)], **asdict(step)} for step in dmp.preprocessing]
+    return {field.name: getattr(dmp, field.name) for field in fields(dmp)} | {"preprocessing": steps}
+
+
+def specification_from_dict(specification: type[T], data: dict[str, Any]) -> T:
+    """Plain data as a specification; every parameter is checked like user input."""
+    steps = []
+    for record in data["preprocessing"]:
+        parameters = dict(record)
+        steps.append(STEPS[parameters.pop("step")](**parameters))
+    return specification(**{**data, "preprocessing": tuple(steps)})

@@ -40,7 +40,6 @@ from kineme.validation import LARGEST, Array, as_numbers, check_choice, check_nu
 _SLACK = 1e-9  # of the range: a demonstrated parameter is inside, whatever the rounding
 _ALONE = 1e-9  # of the leverage: a demonstration that differs from all others alone
 
-
 LENGTH_SCALES = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
 NOISES = (1e-8, 1e-6, 1e-4, 1e-2, 1e-1)
 
@@ -177,7 +176,12 @@ class Contextual(BaseEstimator):
             Parameters of another number than the demonstrated ones, or not finite.
         """
         check_is_fitted(self, "primitives_")
-        C = task_parameters(parameters, self.parameters_.shape[1])
+        k = self.parameters_.shape[1]
+        C = as_numbers(parameters, "parameters")
+        C = C.reshape(-1, 1) if k == 1 and C.ndim < 2 else np.atleast_2d(C)
+        if C.ndim != 2 or C.shape[1] != k or not len(C):
+            raise TrajectoryError(f"expected parameters of shape ({k},) or (m, {k}), got shape {np.shape(parameters)}")
+        C = _finite(C)
         if not extrapolate:
             check_range(C, self.parameters_)
         w = self._solved.weights(_standardized(C, self.center_, self.scale_))
@@ -321,18 +325,6 @@ def demonstrated_parameters(parameters: ArrayLike, n: int) -> Array:
             f"out, got demonstration {np.argmax(leverage)} alone with its own; demonstrate another one like it"
         )
     return C.copy()
-
-
-def task_parameters(parameters: ArrayLike, k: int) -> Array:
-    """Parameters (m, k) of m tasks to generate for.
-
-    Raises `TrajectoryError`: another number than the k demonstrated ones, or not finite.
-    """
-    C = as_numbers(parameters, "parameters")
-    C = C.reshape(-1, 1) if k == 1 and C.ndim < 2 else np.atleast_2d(C)
-    if C.ndim != 2 or C.shape[1] != k or not len(C):
-        raise TrajectoryError(f"expected parameters of shape ({k},) or (m, {k}), got shape {np.shape(parameters)}")
-    return _finite(C)
 
 
 def check_range(C: Array, shown: Array) -> None:

@@ -17,9 +17,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kineme.dmp.condition import condition
 from kineme.dmp.discrete.dmp import Primitives
-from kineme.dmp.discrete.operators import decoder
+from kineme.dmp.discrete.operators import condition, decoder
 from kineme.dmp.discrete.rollout import Rollout
 from kineme.dmp.discrete.specification import Specification
 from kineme.dmp.styles.parameters import check_primitives
@@ -107,7 +106,6 @@ def covariance_adaptation(search: Search, variants: Array, costs: Array) -> Sear
 METHODS: dict[str, Callable[[Search, Array, Array], Search]] = {"cma-es": covariance_adaptation, "pi-bb": path_integral}
 
 _NEGLIGIBLE = 1e-2  # of the largest: directions that change the path less are not explored
-
 
 _FEWEST_BASIS = 4
 _MOST = 100_000  # rollouts, and updates

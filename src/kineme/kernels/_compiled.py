@@ -1,4 +1,4 @@
-"""Compiled sums over coordinates, twins of those in ``_sums.py``. Importing this module imports Numba."""
+"""Compiled sums over coordinates, twins of those in ``table.py``. Importing this module imports Numba."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from numba.core.errors import NumbaError  # noqa: F401 - what a call of `user_sums` may raise
 from numba.extending import register_jitable
 
-from kineme.kernels._rows import Rows
+from kineme.kernels.base import Rows
 from kineme.runtime.compiled import jit
 
 # Bytes of each feature of those rows of B that are packed together, and rows of A that go over them at once. The strips
@@ -181,7 +181,7 @@ def fill_soft_in_plane(parts: Rows, a: Any, b: Any, best: Any, rotations: Any) -
     """Best products (n, m) under a prior, and cosines and sines (n, m, 2) if there is room for them.
 
     `parts` is what `procrustes._split` splits, in single precision, whose squares do not overflow; a and b are norms
-    times the root of tr F. The twin is `soft_rotation.soft_products_in_plane`.
+    times the root of tr F. The twin is `rotation.soft_products_in_plane`.
     """
     n, m = best.shape
     below, beside = (n, 0) if len(parts) > n else (0, m)

@@ -1,4 +1,4 @@
-"""Compiled twin of `shapes.shapes_of`: each movement's arrays are filled while it is in the cache.
+"""Compiled twin of `pair_distances.shapes_of`: each movement's arrays are filled while it is in the cache.
 
 Importing this imports Numba.
 """

@@ -1,4 +1,4 @@
-"""Compiled best rotations in space under a prior: the twin of ``soft_rotation``, several pairs at once.
+"""Compiled best rotations in space under a prior: twins of those in ``rotation.py``, several pairs at once.
 
 Each pair has its own vector lane and goes through the same steps whatever its company: a lane that has converged keeps
 its number while others go on.
@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from kineme.kernels.soft_rotation import CLOSE, ROUNDING, STEPS, TIE, TIE_BREAK
+from kineme.kernels.rotation import CONVERGED, NEWTON_STEPS, ROUNDING, TIE, TIE_BREAK
 from kineme.runtime.compiled import jit
 
 _LANES = 32  # pairs at once: with fewer the processor waits for roots and divisions
@@ -115,14 +115,14 @@ def _solve(lanes):  # type: ignore[no-untyped-def]
             M[0, 0, lane] * A[0, 0, lane] + M[0, 1, lane] * A[0, 1, lane] + M[0, 2, lane] * A[0, 2, lane]
         )
         top[lane] = math.sqrt(square[lane] + math.sqrt(3.0 * last[lane]))
-    for _ in range(STEPS):
+    for _ in range(NEWTON_STEPS):
         moving = 0.0
         for lane in range(_LANES):
             x = top[lane]
             over = x * x - square[lane]
             slope = 4.0 * x * over - 8.0 * determinant[lane]
             value = over * over - 8.0 * x * determinant[lane] - last[lane]
-            goes_on = slope > 0.0 and value > CLOSE * x * slope and value > ROUNDING * square[lane] * square[lane]
+            goes_on = slope > 0.0 and value > CONVERGED * x * slope and value > ROUNDING * square[lane] * square[lane]
             step = value / slope if goes_on else 0.0
             top[lane] = x - step
             moving += step

@@ -1,13 +1,45 @@
 """Elastic, turning and point-cloud distances of many pairs of movements, each after the rotation of its pair.
 
-`kineme.kernels.shapes` and `kineme.kernels.shapes` define them. Movements are described once, by
-`kineme.kernels.shapes.shapes_of`. A pair's distances do not depend on the pairs beside it.
+`kineme.kernels.pair_distances` and `kineme.kernels.pair_distances` define them. Movements are described once, by
+`kineme.kernels.pair_distances.shapes_of`. A pair's distances do not depend on the pairs beside it.
+
+Shapes of movements, compared pair by pair: segments and points of paths, and the plain definitions of distances.
+
+A *path* (d, S) holds positions at even steps along arc length, centered at their mean, with a root mean square distance
+of 1 from it. Its *segments* are the pieces between ``n_segments + 1`` even values along it; its *points* are
+``n_points`` even values. Values between two positions are interpolated linearly.
+
+For movements a and b and a rotation R that brings b onto a, two segments p, q cost
+
+    c(p, q) = |t_p - R t_q|^2 + w_x |x_p - R x_q|^2 + w_theta (theta_p - theta_q)^2
+
+with tangents t, midpoints x and turning angles theta (divided by pi). The squared elastic distance is the least sum of
+costs over warping paths from (0, 0) to (K - 1, K - 1) with steps (1, 0), (0, 1), (1, 1) and ``|p - q| <= band``
+(H. Sakoe and S. Chiba, "Dynamic programming algorithm optimization for spoken word recognition", IEEE TASSP 26(1),
+1978), divided by the number K of segments. The squared turning distance is the same with the last term alone, so it
+needs no rotation and is never larger. A warping path visits every segment of b, so that the costs of some of them, each
+with whichever segment of a within the band costs least, bound both from below. Both are symmetric, with the transposed
+rotation, non-negative, and zero for equal movements; neither satisfies the triangle inequality.
+
+$P+ (R.-D. Vatavu, "Improving gesture recognition accuracy on touch screens for users with low vision", CHI 2017)
+compares points by position and turning angle, whatever their order. Here they have also the line of their tangent,
+without its direction, and the second movement is rotated first:
+
+    D(p, q)^2 = |x_p - R x_q|^2 + w_theta (theta_p - theta_q)^2 + w_l ((|t_p|^2 + |t_q|^2) / 2 - (t_p . R t_q)^2)
+
+The last term is the squared sine of the angle between two tangents; a point without a tangent, t = 0, differs from one
+with a tangent by a half and not at all from another without. Each point of one movement is matched with the nearest of
+the other, the first of equally near ones, and then each point of the other that nobody matched with its nearest. The
+distance is the sum of D over these pairs divided by the number of points, in the direction in which it is smaller. It
+is symmetric, with the transposed rotation, non-negative, and zero for equal movements; it does not satisfy the
+triangle inequality.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass, fields
 from functools import lru_cache
 from typing import Any
 
@@ -15,10 +47,274 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
-from kineme.kernels.shapes import CloudSpec, ElasticSpec, Floats, Shapes, cloud_squares, elastic_bounds, elastic_squares
 from kineme.runtime.compiled import compiled_module, use_compiled
 from kineme.runtime.parallel import for_tiles
 from kineme.validation import Array
+
+Indices = NDArray[np.intp]
+
+Floats = NDArray[np.float32]
+
+_PATH_OPERATIONS, _CALL_OPERATIONS = 800, 12_000  # elementary operations of the plain definition per path and call
+MOST_POINTS = 32  # of a cloud: the matched ones are bits of an integer
+
+_NO_LENGTH = 1e-6  # of a movement of size 1: a shorter vector is the rounding error of positions in single precision
+
+
+@dataclass(frozen=True)
+class ElasticSpec:
+    """Options of comparing segments by dynamic time warping; see `kineme.kernels.pair_distances`.
+
+    `position_weight`, `turning_weight`: weights of the squared differences of midpoints and of turning angles / pi;
+    that of tangents is 1.
+    """
+
+    n_segments: int = 33  # segments of a path, at least 3
+    band: int = 6  # a segment is matched with segments at most so many numbers away (Sakoe & Chiba 1978)
+    position_weight: float = 0.5
+    turning_weight: float = 8.0
+
+    def __post_init__(self) -> None:
+        _at_least("n_segments", self.n_segments, 3)
+        _at_least("band", self.band, 0)
+        _at_least("position_weight", self.position_weight, 0)
+        _at_least("turning_weight", self.turning_weight, 0)
+
+
+@dataclass(frozen=True)
+class CloudSpec:
+    """Options of comparing points as a cloud; see `kineme.kernels.pair_distances`.
+
+    `turning_weight`, `line_weight`: weights of the squared difference of turning angles / pi and of the squared sine
+    between the tangents' lines; that of positions is 1.
+    """
+
+    n_points: int = 20  # points of a path, 3 to 32
+    turning_weight: float = 16.0
+    line_weight: float = 0.75
+
+    def __post_init__(self) -> None:
+        _at_least("n_points", self.n_points, 3)
+        if self.n_points > MOST_POINTS:
+            raise SpecificationError(f"expected n_points of at most {MOST_POINTS}, got {self.n_points}; take fewer")
+        _at_least("turning_weight", self.turning_weight, 0)
+        _at_least("line_weight", self.line_weight, 0)
+
+
+def _at_least(name: str, value: float, least: int) -> None:
+    if not least <= value < np.inf:
+        raise SpecificationError(f"expected {name} of at least {least}, got {value!r}")
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """n movements in d dimensions as segments and points: C-contiguous arrays of float32, made by `shapes_of`.
+
+    - `tangents`, `midpoints` (n, n_segments, d): unit vectors along the segments, zero for a segment of length zero,
+      and their midpoints.
+    - `turning` (n, n_segments): angle between the tangents before and after a segment, divided by pi; 0 at both ends,
+      and wherever one of the three has no direction.
+    - `points`, `point_tangents` (n, n_points, d): points, and unit vectors along the central differences there
+      (one-sided at the ends), zero for a difference of zero.
+    - `point_turning` (n, n_points): angle between the steps to and from a point, divided by pi; 0 at both ends, and
+      where one has length zero.
+    """
+
+    tangents: Floats
+    midpoints: Floats
+    turning: Floats
+    points: Floats
+    point_tangents: Floats
+    point_turning: Floats
+    elastic: ElasticSpec
+    cloud: CloudSpec
+
+    def __len__(self) -> int:
+        return len(self.turning)
+
+    @property
+    def n_dims(self) -> int:
+        """Dimensions d of the movements."""
+        return int(self.tangents.shape[2])
+
+    def take(self, chosen: NDArray[np.integer] | NDArray[np.bool_] | slice) -> Shapes:
+        """The movements that an index array, a mask or a slice chooses, in its order."""
+        return Shapes(
+            **{name: np.ascontiguousarray(array[chosen]) for name, array in self.arrays().items()},
+            elastic=self.elastic,
+            cloud=self.cloud,
+        )
+
+    def empty(self, n: int) -> Shapes:
+        """Uninitialized arrays for n movements with the same dimensions and specifications, to be filled."""
+        return Shapes(
+            **{name: np.empty((n, *array.shape[1:]), np.float32) for name, array in self.arrays().items()},
+            elastic=self.elastic,
+            cloud=self.cloud,
+        )
+
+    def put(self, start: int, others: Shapes) -> None:
+        """Write other movements over those from `start` on."""
+        theirs = others.arrays()
+        for name, array in self.arrays().items():
+            array[start : start + len(others)] = theirs[name]
+
+    def arrays(self) -> dict[str, Floats]:
+        """The arrays by name."""
+        return {
+            field.name: getattr(self, field.name) for field in fields(self) if field.name not in ("elastic", "cloud")
+        }
+
+
+def shapes_of(paths: NDArray[Any], elastic: ElasticSpec | None = None, cloud: CloudSpec | None = None) -> Shapes:
+    """Segments and points of paths (n, d, S), computed in double precision.
+
+    `paths` (n, d, S): positions at even steps along arc length, centered, with a root mean square distance of 1 from
+    the mean; zeros for a movement without extent. At least two positions.
+    """
+    n, d, n_positions = paths.shape
+    shapes = _room(n, d, elastic or ElasticSpec(), cloud or CloudSpec())
+    if use_compiled(_CALL_OPERATIONS + n * _PATH_OPERATIONS):
+        ends, even = _between(n_positions, shapes.elastic.n_segments + 1), _between(n_positions, shapes.cloud.n_points)
+        segments = (shapes.tangents, shapes.midpoints, shapes.turning)
+        points = (shapes.points, shapes.point_tangents, shapes.point_turning)
+        fill = compiled_module("kineme.kernels._shapes").fill_shapes
+        fill(np.ascontiguousarray(paths), _NO_LENGTH, (ends, even), segments, points)
+    else:
+        _fill_shapes(paths, shapes)
+    return shapes
+
+
+def _room(n: int, d: int, elastic: ElasticSpec, cloud: CloudSpec) -> Shapes:
+    segments, points = (n, elastic.n_segments), (n, cloud.n_points)
+    return Shapes(
+        tangents=np.empty((*segments, d), np.float32),
+        midpoints=np.empty((*segments, d), np.float32),
+        turning=np.empty(segments, np.float32),
+        points=np.empty((*points, d), np.float32),
+        point_tangents=np.empty((*points, d), np.float32),
+        point_turning=np.empty(points, np.float32),
+        elastic=elastic,
+        cloud=cloud,
+    )
+
+
+def _fill_shapes(paths: Array, shapes: Shapes) -> None:
+    """The plain definition."""
+    ends, points = _even(paths, shapes.elastic.n_segments + 1), _even(paths, shapes.cloud.n_points)
+    tangents, steps = _unit(np.diff(ends, axis=1)), _unit(np.diff(points, axis=1))
+    shapes.tangents[:] = tangents
+    shapes.midpoints[:] = 0.5 * (ends[:, 1:] + ends[:, :-1])
+    shapes.turning[:, [0, -1]] = 0
+    shapes.turning[:, 1:-1] = _angles(tangents[:, :-2], tangents[:, 2:]) * (tangents[:, 1:-1] != 0).any(axis=2)
+    shapes.points[:] = points
+    shapes.point_tangents[:] = _unit(np.gradient(points, axis=1))
+    shapes.point_turning[:, [0, -1]] = 0
+    shapes.point_turning[:, 1:-1] = _angles(steps[:, :-1], steps[:, 1:])
+
+
+def _even(paths: Array, n: int) -> Array:
+    """Positions (N, n, d) at n even values along paths (N, d, S), interpolated linearly."""
+    before, share = _between(paths.shape[2], n)
+    x = paths.transpose(0, 2, 1)
+    return np.asarray(x[:, before] * (1 - share)[:, None] + x[:, before + 1] * share[:, None])
+
+
+def _between(n_positions: int, n: int) -> tuple[NDArray[np.intp], Array]:
+    """The positions before n even values along a path, and the shares of the next positions in them."""
+    last = n_positions - 1
+    at = np.arange(n) * last / (n - 1)
+    before = np.minimum(at.astype(np.intp), last - 1)
+    return before, at - before
+
+
+def _unit(vectors: Array) -> Array:
+    """Vectors (..., d) divided by their lengths; zero where they have none."""
+    lengths = np.sqrt((vectors * vectors).sum(axis=-1, keepdims=True))
+    return np.where(lengths > _NO_LENGTH, vectors / np.where(lengths > _NO_LENGTH, lengths, 1.0), 0.0)
+
+
+def _angles(a: Array, b: Array) -> Array:
+    """Angles between unit vectors (..., d), divided by pi; 0 where one of them is zero."""
+    both = (a != 0).any(axis=-1) & (b != 0).any(axis=-1)
+    return np.where(both, np.arccos(np.clip((a * b).sum(axis=-1), -1.0, 1.0)) / np.pi, 0.0)
+
+
+def elastic_squares(A: Shapes, B: Shapes, first: Indices, second: Indices, rotations: Array | None) -> Array:
+    """Squared elastic and turning distances (2, k) of k pairs: A's movement ``first[i]`` and B's ``second[i]``.
+
+    `first`, `second` (k,); `rotations` (k, d, d).
+    """
+    sums = [_warped(costs, A.elastic.band) for costs in _costs(A, B, first, second, rotations)]
+    return np.stack(sums) / A.elastic.n_segments
+
+
+def elastic_bounds(A: Shapes, B: Shapes, first: Indices, second: Indices, rotations: Array | None, every: int) -> Array:
+    """Lower bounds (2, k) of the same: the costs of each `every`-th segment of b with the one of a that costs least."""
+    n = A.elastic.n_segments
+    far = np.abs(np.subtract.outer(np.arange(n), np.arange(n))) > A.elastic.band
+    some = slice(every // 2, None, every)
+    costs = (np.where(far, np.inf, each)[:, :, some] for each in _costs(A, B, first, second, rotations))
+    return np.stack([each.min(axis=1).sum(axis=1) for each in costs]) / n
+
+
+def _costs(A: Shapes, B: Shapes, first: Indices, second: Indices, rotations: Array | None) -> tuple[Array, Array]:
+    """Costs (k, n, n) of segments with segments: all of c, and its last term."""
+    angles = A.turning[first, :, None].astype(np.float64) - B.turning[second, None, :]
+    turning: Array = A.elastic.turning_weight * angles**2
+    costs = turning.copy()
+    for weight, name in ((1.0, "tangents"), (A.elastic.position_weight, "midpoints")):
+        a, b = getattr(A, name)[first].astype(float), rotated(getattr(B, name)[second], rotations)
+        for k in range(A.n_dims):
+            costs += weight * (a[:, :, None, k] - b[:, None, :, k]) ** 2
+    return costs, turning
+
+
+def rotated(vectors: Floats, rotations: Array | None) -> Array:
+    """Vectors (k, n, d), each pair's by its own rotation (k, d, d)."""
+    double = vectors.astype(np.float64)
+    return double if rotations is None else np.asarray(double @ rotations.transpose(0, 2, 1))
+
+
+def _warped(costs: Array, band: int) -> Array:
+    """Least sums (k,) over warping paths through costs (k, n, n)."""
+    n = costs.shape[1]
+    table = np.full((n + 1, n + 1, len(costs)), np.inf)
+    table[0, 0] = 0
+    for p in range(n):
+        for q in range(max(0, p - band), min(n, p + band + 1)):
+            before = np.minimum(np.minimum(table[p, q + 1], table[p + 1, q]), table[p, q])
+            table[p + 1, q + 1] = costs[:, p, q] + before
+    return table[n, n]
+
+
+def cloud_squares(A: Shapes, B: Shapes, first: Indices, second: Indices, rotations: Array | None) -> Array:
+    """Squared distances (k,) of k pairs: A's movement ``first[i]`` and B's ``second[i]``.
+
+    `first`, `second` (k,); `rotations` (k, d, d).
+    """
+    x, y = A.points[first].astype(float), rotated(B.points[second], rotations)
+    t, u = A.point_tangents[first].astype(float), rotated(B.point_tangents[second], rotations)
+    angles = A.point_turning[first, :, None].astype(float) - B.point_turning[second, None, :]
+    halves = 0.5 * ((t * t).sum(axis=2)[:, :, None] + (u * u).sum(axis=2)[:, None, :])
+    squares = A.cloud.turning_weight * angles**2
+    squares += A.cloud.line_weight * (halves - (t @ u.transpose(0, 2, 1)) ** 2)
+    for k in range(A.n_dims):
+        squares += (x[:, :, None, k] - y[:, None, :, k]) ** 2
+    return np.asarray((matched_sums(np.sqrt(np.maximum(squares, 0))) / A.cloud.n_points) ** 2)
+
+
+def matched_sums(D: Array) -> Array:
+    """Sums (k,) of the distances of matched points, of distances (k, n, n): those of the better direction."""
+    return np.minimum(_directed(D), _directed(D.transpose(0, 2, 1)))
+
+
+def _directed(D: Array) -> Array:
+    """Sums (k,) of distances (k, n, n) to the nearest, by rows, and by columns where no row's nearest is."""
+    matched = np.zeros(D.shape[::2], dtype=bool)
+    np.put_along_axis(matched, D.argmin(axis=2), True, axis=1)
+    return np.asarray(D.min(axis=2).sum(axis=1) + np.where(matched, 0, D.min(axis=1)).sum(axis=1))
+
 
 Tile = tuple[slice, slice]  # movements of A and of B
 Pairs = tuple[NDArray[np.intp], NDArray[np.intp]]  # indices into A and into B
@@ -52,8 +348,7 @@ def pair_distances(A: Shapes, B: Shapes, rotations: NDArray[Any] | None = None) 
 def pair_bounds(A: Shapes, B: Shapes, rotations: NDArray[Any] | None = None) -> Floats:
     """Lower bounds (3, n, m) of what `pair_distances` gives, up to rounding.
 
-    For 16 movements of A or more they take a seventh of its time. See `kineme.kernels.shapes.elastic_bounds`; that of
-    the point cloud is 0.
+    For 16 movements of A or more they take a seventh of its time. See `elastic_bounds`; that of the point cloud is 0.
     """
     return _grid(A, B, rotations, (_bound_compiled, _bound_plain), _TILE_BOUNDS)
 

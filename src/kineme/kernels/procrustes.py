@@ -11,9 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
-from kineme.kernels.rotation import best_products, best_rotations, half_angle
-from kineme.kernels.soft_rotation import (
+from kineme.kernels.rotation import (
     RotationPrior,
+    best_products,
+    best_rotations,
+    half_angle,
     limited,
     soft_products,
     soft_products_in_plane,

@@ -2,16 +2,327 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from kineme.kernels._rows import Rows
-from kineme.kernels._sums import ABSOLUTE, CANBERRA, SQUARED, TRUNCATED, fill_gram, median_difference, median_of_sums
-from kineme.kernels.average import MEANS
-from kineme.kernels.base import Kernel
+from kineme.errors import SpecificationError
+from kineme.kernels.base import Kernel, Rows, contiguous
+from kineme.runtime.compiled import compiled_module, use_compiled
 from kineme.runtime.parallel import for_tiles
+from kineme.sampling import evenly_spaced
+
+
+@dataclass(frozen=True)
+class Mean:
+    """One A-average."""
+
+    average: Callable[[Rows], Rows]  # similarities (d, ...) to their average (...)
+    formula: str
+    psd: str  # for which positive semi-definite kernels the average is proved positive semi-definite
+    reason: str  # the proof, or why there is none
+    nonnegative: bool = False  # whether it is defined for non-negative similarities only
+
+
+def _geometric(similarities: Rows) -> Rows:
+    with np.errstate(divide="ignore"):  # log 0 = -inf, and exp(-inf) = 0 is right
+        logarithms = np.log(similarities)
+    mean = logarithms.mean(axis=0)
+    return np.exp(mean, out=mean)
+
+
+def _harmonic(similarities: Rows) -> Rows:
+    with np.errstate(divide="ignore", over="ignore"):  # 1 / 0 = inf, and 1 / inf = 0 is right
+        mean = np.reciprocal(similarities).mean(axis=0)
+        return np.reciprocal(mean, out=mean)
+
+
+#: Name of a mean -> how it averages similarities, and what is proved of it.
+MEANS: dict[str, Mean] = {
+    "arithmetic": Mean(
+        lambda k: k.mean(axis=0),
+        "1/d Σ k_j",
+        "always",
+        "Sums of positive semi-definite kernels, with positive factors, are positive semi-definite.",
+    ),
+    "geometric": Mean(
+        _geometric,
+        "(Π k_j)^(1/d)",
+        "infinitely divisible",
+        "Where every power k_j^(1/d) is positive semi-definite (an infinitely divisible kernel), so is "
+        "their product (Schur). Other kernels: not claimed.",
+        nonnegative=True,
+    ),
+    "harmonic": Mean(
+        _harmonic,
+        "d / Σ (1 / k_j)",
+        "not claimed",
+        "Reciprocals of positive semi-definite kernels are not positive semi-definite.",
+        nonnegative=True,
+    ),
+    "quadratic": Mean(
+        lambda k: np.sqrt(np.square(k).mean(axis=0)),
+        "√(1/d Σ k_j²)",
+        "not claimed",
+        "The sum of squares is positive semi-definite (Schur), its square root need not be.",
+    ),
+    "min": Mean(
+        lambda k: k.min(axis=0),
+        "min k_j",
+        "not claimed",
+        "The smaller of two positive semi-definite kernels need not be positive semi-definite.",
+    ),
+}
+
+# Bytes of per-dimension similarities that exist at a time.
+_SCRATCH = 2**24
+_MOST_DIMS = 10_000
+
+
+@dataclass(frozen=True)
+class Averaged(Kernel):
+    """An A-average of per-dimension similarities; made by `averaged`.
+
+    Parameters
+    ----------
+    kernel : Kernel or tuple of n_dims kernels
+        One for all dimensions, or one for each. A width of None is chosen per dimension.
+    n_dims : int
+        The columns are that many equal blocks, Eq. (9): x_1..x_S, y_1..y_S.
+    mean : str
+        A key of `MEANS`, which says what is proved about positive semi-definiteness.
+    """
+
+    kernel: Kernel | tuple[Kernel, ...]
+    n_dims: int
+    mean: str = "arithmetic"
+
+    def __post_init__(self) -> None:
+        if (
+            isinstance(self.n_dims, bool)
+            or not isinstance(self.n_dims, int | np.integer)
+            or not 1 <= self.n_dims <= _MOST_DIMS
+        ):
+            raise SpecificationError(
+                f"expected n_dims to be a whole number from 1, got {self.n_dims!r}; at most {_MOST_DIMS:,}"
+            )
+        object.__setattr__(self, "n_dims", int(self.n_dims))
+        if not isinstance(self.mean, str) or self.mean not in MEANS:
+            raise SpecificationError(f"expected mean to be one of {tuple(MEANS)}, got {self.mean!r}")
+        for kernel in self._kernels():
+            if not isinstance(kernel, Kernel):
+                raise SpecificationError(f"expected a kernel, such as RBF(), got {kernel!r}; pass an instance")
+        if len(self._kernels()) != self.n_dims:
+            raise SpecificationError(
+                f"expected one kernel, or one for each of n_dims={self.n_dims} dimensions, got {len(self._kernels())}"
+            )
+
+    def _kernels(self) -> tuple[Kernel, ...]:
+        return self.kernel if isinstance(self.kernel, tuple) else (self.kernel,) * self.n_dims
+
+    def _with_widths(self, X: Rows) -> Self:
+        kernels, blocks = self._kernels(), self._blocks(X)
+        fitted = tuple(_fitted(kernels[j], blocks[j], j) for j in range(len(kernels)))
+        return self if fitted == kernels else replace(self, kernel=fitted)
+
+    def _check_dtype(self, dtype: np.dtype[np.floating]) -> None:
+        for kernel in self._kernels():
+            kernel._check_dtype(dtype)
+
+    def _blocks(self, X: Rows) -> list[Rows]:
+        if X.shape[1] % self.n_dims:
+            raise SpecificationError(
+                f"expected columns in n_dims={self.n_dims} blocks of equal size, got {X.shape[1]} columns; "
+                "n_dims is the number of dimensions of the movements"
+            )
+        return [np.ascontiguousarray(block) for block in np.split(X, self.n_dims, axis=1)]
+
+    def _fill(self, A: Rows, B: Rows | None, gram: Rows) -> None:
+        a = self._blocks(A)
+        b = a if B is None else self._blocks(B)
+        step = max(1, _SCRATCH // (self.n_dims * len(b[0]) * A.itemsize))
+        for start in range(0, len(A), step):
+            band = slice(start, min(start + step, len(A)))
+            rows = [block[band] for block in a]
+            if B is not None:
+                self._average(rows, b, gram[band])
+                continue
+            self._average(rows, None, gram[band, band])
+            if band.start:  # below the diagonal, and its mirror image
+                before = slice(0, band.start)
+                self._average(rows, [block[before] for block in b], gram[band, before])
+                gram[before, band] = gram[band, before].T
+
+    def _average(self, a: list[Rows], b: list[Rows] | None, gram: Rows) -> None:
+        """Write the average over dimensions of the similarities of `a` and `b` to `gram`."""
+        mean = MEANS[self.mean]
+        similarities = np.empty((len(a), *gram.shape), gram.dtype)
+        for j, kernel in enumerate(self._kernels()):
+            kernel._fill(a[j], None if b is None else b[j], similarities[j])
+            if mean.nonnegative and similarities[j].min() < 0:
+                raise SpecificationError(
+                    f"expected similarities >= 0 for the {self.mean} mean, got {similarities[j].min():.3g} from "
+                    f"{kernel} in dimension {j}; use mean='arithmetic'"
+                )
+
+        def work(start: int, stop: int) -> None:
+            gram[start:stop] = mean.average(similarities[:, start:stop])
+
+        for_tiles(work, len(gram), 64)
+
+
+def averaged(kernel: Kernel | tuple[Kernel, ...], n_dims: int, mean: str = "arithmetic") -> Averaged:
+    """Compare dimension by dimension with `kernel`, then average the similarities (Section 3.2).
+
+    Parameters
+    ----------
+    kernel : Kernel or tuple of n_dims kernels
+    n_dims : int
+        Dimensions of the movements: the columns are that many equal blocks, Eq. (9).
+    mean : {"arithmetic", "geometric", "harmonic", "quadratic", "min"}
+        Arithmetic keeps positive semi-definiteness always, geometric that of infinitely divisible
+        kernels (`RBF`, `Laplacian`); of the others nothing is claimed. See `MEANS`.
+
+    Raises
+    ------
+    SpecificationError
+        An unknown mean, n_dims below 1, something that is not a kernel; when called, a number of columns
+        that n_dims does not divide.
+
+    Examples
+    --------
+    >>> from kineme.kernels import RBF, averaged
+    >>> averaged(RBF(sigma=1.0), n_dims=2)([[0.0, 0.0]], [[0.0, 100.0]])
+    array([[0.5]])
+    """
+    return Averaged(kernel, n_dims, mean)
+
+
+def _fitted(kernel: Kernel, block: Rows, dimension: int) -> Kernel:
+    try:
+        return kernel._with_widths(block)
+    except SpecificationError as error:
+        n = block.shape[1]
+        where = f"dimension {dimension} (columns {dimension * n} to {dimension * n + n - 1})"
+        raise SpecificationError(f"in {where}: {error}") from None
+
+
+# One call of a Python function costs about as much as this many elementary operations of NumPy.
+_PYTHON_CALL = 100
+
+_MAX_ROWS = 1000
+_MAX_DIFFERENCES = 2**21
+
+# Pairs of 256 x 256 rows: large enough to repay packing the columns, small enough for the cache.
+_TILE = 256
+# Elements of a temporary array in the twin.
+_TWIN_CHUNK = 2**17
+
+TileSums = Callable[[Rows, Rows, Any, Rows], None]
+
+
+@dataclass(frozen=True)
+class Term:
+    """The term that one coordinate adds to the sum: g(d(x, y)), with one constant c.
+
+    `load_compiled`: returns the compiled loop; called only if it is used, because it imports Numba.
+    """
+
+    twin: Callable[[Rows, Rows, Any], Any]  # the definition, ``twin(x, y, c)`` over arrays
+    load_compiled: Callable[[], TileSums]
+    cost: int = 4  # elementary operations of NumPy per evaluation of the twin
+    symmetric: bool = True  # whether term(x, y) always equals term(y, x)
+
+
+def _builtin(name: str) -> Callable[[], TileSums]:
+    def load() -> TileSums:
+        loop: TileSums = getattr(compiled_module("kineme.kernels._compiled"), name)
+        return loop
+
+    return load
+
+
+def _canberra(x: Rows, y: Rows, _c: Any) -> Rows:
+    size = np.abs(x) + np.abs(y)
+    return np.abs(x - y) / np.where(size > 0, size, 1)
+
+
+ABSOLUTE = Term(lambda x, y, c: np.abs(x - y), _builtin("absolute_sums"))
+SQUARED = Term(lambda x, y, c: (x - y) ** 2, _builtin("squared_sums"))
+TRUNCATED = Term(lambda x, y, c: np.minimum(np.abs(x - y), c), _builtin("truncated_sums"))
+CANBERRA = Term(_canberra, _builtin("canberra_sums"), cost=8)
+
+
+def fill_gram(term: Term, c: float, finish: Callable[[Rows], object], A: Rows, B: Rows | None, gram: Rows) -> None:
+    """Write h(sums of `term` over coordinates) to `gram`, tile by tile, in threads.
+
+    - `c`: the constant of the term.
+    - `finish`: h of Eq. (5): changes a tile of sums in place.
+    - `A`, `B` (n_A, p), (n_B, p).
+    - `gram` (n_A, n_B).
+    """
+    mirrored = B is None and term.symmetric
+    A = contiguous(A, A.dtype)
+    columns = A if B is None else contiguous(B, A.dtype)
+    n_pairs = gram.size // (2 if mirrored else 1)
+    tile_sums = tile_sums_of(term, n_pairs * A.shape[1])
+    constant = A.dtype.type(c)
+    tiles = [(i, j) for i in range(0, len(A), _TILE) for j in range(0, i + 1 if mirrored else len(columns), _TILE)]
+
+    def work(first: int, last: int) -> None:
+        for i, j in tiles[first:last]:
+            a, b = A[i : i + _TILE], columns[j : j + _TILE]
+            tile = np.empty((len(a), len(b)), A.dtype)
+            tile_sums(a, b, constant, tile)
+            finish(tile)
+            gram[i : i + _TILE, j : j + _TILE] = tile
+            if mirrored and i != j:
+                gram[j : j + _TILE, i : i + _TILE] = tile.T
+
+    for_tiles(work, len(tiles), 1)
+
+
+def tile_sums_of(term: Term, n_terms: int) -> TileSums:
+    """The loop to use for `n_terms` evaluations of the term: compiled if that repays its overhead, else plain."""
+    if use_compiled(n_terms * term.cost):
+        return term.load_compiled()
+
+    def twin_sums(A: Rows, B: Rows, c: Any, sums: Rows) -> None:
+        step = max(1, _TWIN_CHUNK // A.shape[1])
+        for i, x in enumerate(A):
+            for j in range(0, len(B), step):
+                sums[i, j : j + step] = term.twin(x, B[j : j + step], c).sum(axis=1)
+
+    return twin_sums
+
+
+def median_of_sums(term: Term, finish: Callable[[Rows], object], X: Rows) -> float:
+    """Median over pairs of different rows of finish(sum of `term` over coordinates), in place.
+
+    Of large X, 1000 evenly spaced rows are used, so the result is deterministic. Pairs of equal rows are
+    left out: copies of a row say nothing about the distances between different rows.
+    """
+    rows = _some_rows(X, _MAX_ROWS)
+    sums = np.empty((len(rows), len(rows)))
+    fill_gram(term, 0.0, finish, rows, None, sums)
+    return _median_of_positive(sums[np.triu_indices(len(rows), 1)], len(X))
+
+
+def _some_rows(X: Rows, most: int) -> Rows:
+    """At most `most` evenly spaced rows, in double precision."""
+    return np.ascontiguousarray(X[evenly_spaced(len(X), most)] if len(X) > most else X, np.float64)
+
+
+def _median_of_positive(values: Rows, n_rows: int) -> float:
+    positive = values[values > 0]
+    if not positive.size:
+        raise SpecificationError(
+            f"expected training rows that differ, got {n_rows} row(s), all equal, which say nothing about "
+            "the widths; pass the widths as numbers, or more rows"
+        )
+    return float(np.median(positive))
 
 
 @dataclass(frozen=True)
@@ -39,7 +350,10 @@ class TruncatedEuclidean(Kernel):
     sigma: float = field(default=1.0, metadata={"width": True})
 
     def _median_width(self, name: str, X: Rows) -> float:
-        return median_difference(X)
+        # Of large X, as many evenly spaced rows are used as give about two million differences.
+        rows = _some_rows(X, max(10, min(_MAX_ROWS, int((2 * _MAX_DIFFERENCES / X.shape[1]) ** 0.5))))
+        first, second = np.triu_indices(len(rows), 1)
+        return _median_of_positive(np.abs(rows[first] - rows[second]), len(X))
 
     def _fill(self, A: Rows, B: Rows | None, gram: Rows) -> None:
         # max(0, m - min(m, t) / σ) = m - min(m min(1, σ), t) / σ: one comparison, not two.
@@ -232,3 +546,77 @@ PAPER_WIDTHS: dict[tuple[str, str], PaperKernels] = {
 }
 for _kernels in PAPER_WIDTHS.values():
     hash(_kernels)  # they are constants: a kernel that was hashed refuses set_params
+
+
+@dataclass(frozen=True, repr=False)
+class DistanceKernel(Kernel):
+    r"""``k(x, y) = h(Σ_j g(d(x_j, y_j)))``, Eq. (5), for functions of your own.
+
+    Nothing is claimed about positive semi-definiteness: it depends on the functions. With
+    ``h(z) = exp(-z)`` it holds if ``g(d(x, y))`` is conditionally negative definite (Schoenberg), as for
+    ``|x - y|^p`` with ``0 < p <= 2``.
+
+    Parameters
+    ----------
+    d, g : callables
+        d(x, y) and g(z) of single numbers: Python functions that Numba can compile (arithmetic, if,
+        min, max, abs, the functions of ``math``), or already compiled ones. Small jobs run them as
+        Python. They are compiled once per process.
+    h : callable
+        h(sums) for an array, elementwise, giving an array of that shape.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from kineme.kernels import DistanceKernel
+    >>> cauchy = DistanceKernel(d=lambda x, y: abs(x - y), g=lambda z: z * z, h=lambda s: 1 / (1 + s))
+    >>> cauchy([[0.0, 0.0]], [[1.0, 2.0]]).round(3)
+    array([[0.167]])
+    """
+
+    d: Callable[[Any, Any], Any]
+    g: Callable[[Any], Any]
+    h: Callable[[Any], Any]
+
+    def __post_init__(self) -> None:
+        for name in ("d", "g", "h"):
+            if not callable(getattr(self, name)):
+                raise SpecificationError(f"expected a function {name}, got {getattr(self, name)!r}")
+
+    def __repr__(self) -> str:
+        names = (f"{name}={getattr(f, '__name__', repr(f))}" for name, f in self.get_params().items())
+        return f"DistanceKernel({', '.join(names)})"
+
+    def _fill(self, A: Rows, B: Rows | None, gram: Rows) -> None:
+        def similarity(tile: Rows) -> None:
+            similarities = np.asarray(self.h(tile))
+            if similarities.shape != tile.shape:
+                raise SpecificationError(
+                    f"expected h to map an array of shape {tile.shape} to that shape, got {similarities.shape}; "
+                    "write h with array operations, such as np.exp(-s)"
+                )
+            tile[...] = similarities
+
+        # The caller's d may be asymmetric, so no triangle of the Gram matrix is mirrored.
+        term = Term(self._in_python, self._compiled, cost=_PYTHON_CALL, symmetric=False)
+        fill_gram(term, 0.0, similarity, A, B, gram)
+
+    def _in_python(self, x: Rows, y: Rows, _c: Any) -> Rows:
+        # Numba-compiled functions carry the Python function they were made from; either can be called.
+        terms = np.frompyfunc(lambda a, b: self.g(self.d(a, b)), 2, 1)(x, y)
+        return np.asarray(terms, dtype=x.dtype)
+
+    def _compiled(self) -> TileSums:
+        compiled = compiled_module("kineme.kernels._compiled")
+        loop = compiled.user_sums(self.d, self.g)
+
+        def sums(A: Rows, B: Rows, c: Any, sums_of_tile: Rows) -> None:
+            try:
+                loop(A, B, c, sums_of_tile)
+            except compiled.NumbaError as error:
+                raise SpecificationError(
+                    f"expected functions d and g that Numba can compile, got {self}; use arithmetic and math on "
+                    f"numbers, or set KINEME_COMPILED=never to run them as Python. Numba says: {error}"
+                ) from error
+
+        return sums

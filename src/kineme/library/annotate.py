@@ -12,8 +12,8 @@ from kineme.io.writing.annotations import Annotation
 from kineme.library.recognize import some_of_each_symbol
 from kineme.library.storage.store import Store
 from kineme.movements.trajectories.trajectory import Trajectory
+from kineme.recognition.answer import KnownClasses
 from kineme.recognition.compared_windows import Templates
-from kineme.recognition.known_classes import KnownClasses
 from kineme.recognition.spotting import Spotted, spot
 
 _MAX_PIECES = 8  # most stretches between rests that a movement may consist of, as in `Recognizer.spot`

@@ -18,11 +18,10 @@ from kineme.library.members import Members, described_references
 from kineme.library.storage.rows import among, listed
 from kineme.library.storage.store import Store
 from kineme.recognition.conformal import Calibration, calibrate
-from kineme.recognition.sampled_calibration import calibrate_sample
+from kineme.recognition.two_stage_search import calibrate_sample
 from kineme.reporting.atomic import write_atomically
 from kineme.sampling import evenly_spaced
-from kineme.similarity.comparison import Comparison, fit_to_references
-from kineme.similarity.references import References, StoredReferences
+from kineme.similarity.comparison import Comparison, References, StoredReferences, fit_to_references
 from kineme.similarity.similarity import AveragedSimilarity
 from kineme.validation import Array
 

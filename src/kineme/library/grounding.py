@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.anchoring.grounding import SymbolName, ground, medoid_of
-from kineme.anchoring.morphing import morph
-from kineme.anchoring.space import ConceptualSpace, conceptual_space
+from kineme.anchoring.space import ConceptualSpace, conceptual_space, morph
 from kineme.dmp.discrete.dmp import Primitives
-from kineme.dmp.generation.learned import Learned, has_orientation, learn_one
+from kineme.dmp.generation.generate import Learned, has_orientation, learn_one
 from kineme.dmp.recorded_as import recorded_as
 from kineme.errors import SpecificationError
 from kineme.library.members import described

@@ -17,10 +17,8 @@ from kineme.library.storage.rows import ALIVE, among, damage, damaged, listed
 from kineme.library.storage.store import Store
 from kineme.movements.trajectories.labels import label_array
 from kineme.sampling import evenly_spaced
-from kineme.similarity.comparison import Comparison
-from kineme.similarity.describe import describe_rows
-from kineme.similarity.described import Described
-from kineme.similarity.references import OnDemand, References
+from kineme.similarity.comparison import Comparison, OnDemand, References
+from kineme.similarity.describe import Described, describe_rows
 
 
 @dataclass(frozen=True, eq=False)

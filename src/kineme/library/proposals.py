@@ -9,11 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kineme.anchoring.assignment import assign_described
-from kineme.anchoring.merge_split import Merge, Split, suggest_merges, suggest_splits
-from kineme.anchoring.proposals import Proposal, Proposals
-from kineme.anchoring.unlabeled import DEFAULT_METHOD
-from kineme.anchoring.unlabeled import propose as propose_clusters
+from kineme.anchoring.assignment import Merge, Split, assign_described, suggest_merges, suggest_splits
+from kineme.anchoring.proposals import DEFAULT_METHOD, Proposal, Proposals
+from kineme.anchoring.proposals import propose as propose_clusters
 from kineme.errors import SpecificationError
 from kineme.library.members import described, described_references, groups_of
 from kineme.library.storage import changes, read
@@ -21,7 +19,7 @@ from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store, history
 from kineme.library.storage.symbols import symbols
 from kineme.movements.trajectories.labels import label_array
-from kineme.recognition.known_classes import KnownClasses, fit_known_classes, open_set_labels
+from kineme.recognition.answer import KnownClasses, fit_known_classes, open_set_labels
 from kineme.sampling import evenly_spaced
 
 _MOST = 3000  # movements that are compared at most, equally many of each symbol

@@ -18,13 +18,12 @@ from kineme.library.storage import read
 from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store
 from kineme.movements.trajectories.trajectory import MovementsLike, Trajectory
-from kineme.recognition.answer import Answer, Neighbor, is_one
+from kineme.recognition.answer import Answer, Calibrates, KnownClasses, Neighbor, fit_known_classes, is_one
 from kineme.recognition.conformal import calibrate
 from kineme.recognition.early.hypotheses import Early, Hypotheses, as_early, hypotheses
 from kineme.recognition.early.stream import Decision, Live
-from kineme.recognition.known_classes import Calibrates, KnownClasses, fit_known_classes
 from kineme.recognition.two_stage_search import TwoStageSearch
-from kineme.similarity.references import StoredReferences
+from kineme.similarity.comparison import StoredReferences
 
 #: Movements up to which every one is compared: the answer is then the recognizer's own. Processor time of 2000
 #: movements of 26 classes in space: 2.2 s until the first answer and 1.4 ms for each (two stages: 1.0 s, 3.4 ms).

@@ -1,6 +1,6 @@
 # Recognition
-from kineme.similarity.representation import Representation as Representation
-from kineme.kernels.soft_rotation import RotationPrior as RotationPrior
+from kineme.similarity.specification import Representation as Representation
+from kineme.kernels.rotation import RotationPrior as RotationPrior
 from kineme.recognition.answer import Answer as Answer
 from kineme.recognition.early.hypotheses import Early as Early
 from kineme.recognition.early.stream import Live as Live

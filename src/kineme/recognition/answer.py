@@ -2,30 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.channels.channel import Channels
+from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
 from kineme.movements.trajectories.labels import Label
 from kineme.movements.trajectories.trajectory import MovementLike, MovementsLike, Trajectory
-from kineme.recognition.classifiers import Classifier, NearestEach
-from kineme.recognition.conformal import GUESSES, RULES, Calibration, class_probabilities
-from kineme.recognition.transform import Transform, map_onto
+from kineme.recognition.classifiers import Classifier, NearestEach, fit_classifier
+from kineme.recognition.conformal import GUESSES, RULES, Calibration, calibrate, check_error_rate, class_probabilities
 from kineme.reporting.table import Table, data_frame, to_html
-from kineme.similarity.comparison import Comparison
-from kineme.similarity.describe import Tile, recorded_paths
-from kineme.similarity.references import IndexedMovements, References
-from kineme.similarity.scores import Compared, for_compared
+from kineme.runtime.parallel import single_threaded_blas
+from kineme.similarity.comparison import Comparison, IndexedMovements, References, fit_comparison, fit_to_references
+from kineme.similarity.describe import Described, Tile, even_paths, fit_maps, recorded_paths
+from kineme.similarity.scores import Compared, for_compared, nearest, score
+from kineme.similarity.similarity import AveragedSimilarity
+from kineme.similarity.specification import POSITIONS, ComparisonSpecification
 from kineme.validation import Array
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+#: What calibrates references, as `calibrate` does.
+Calibrates = Callable[[AveragedSimilarity, References, NDArray[np.intp] | None], Calibration]
 
 Certainty = Literal["sure", "probably", "looks like", "new"]
 
@@ -226,23 +231,11 @@ def answers(
     def answer(tile: Tile, compared: Compared) -> None:
         some = demos if len(compared) == len(demos) else demos[tile.start : tile.stop]
         paths = recorded_paths(some, tile.paths)
-        parts[tile.start] = answers_to(compared, classifier, calibration, some, paths, error_rate)
+        verdicts = verdicts_of(compared, classifier, calibration, error_rate)
+        parts[tile.start] = with_transforms(verdicts, comparison, references.demonstrations, some, paths)
 
     for_compared(comparison, references, demos, answer)
     return [each for start in sorted(parts) for each in parts[start]]
-
-
-def answers_to(
-    compared: Compared,
-    classifier: Classifier,
-    calibration: Calibration,
-    demos: Demonstrations,
-    paths: Array,
-    error_rate: float,
-) -> list[Answer]:
-    """Return an answer for each movement of a compared tile; `paths` (n, d, T) are where they were recorded."""
-    verdicts = verdicts_of(compared, classifier, calibration, error_rate)
-    return with_transforms(verdicts, compared.comparison, compared.references.demonstrations, demos, paths)
 
 
 class Verdict(NamedTuple):
@@ -354,3 +347,164 @@ def certainty(confidence: float, *, is_new: bool, is_guess: bool, is_over: bool 
 def in_words(word: Certainty, name: str, most_like: str) -> str:
     """Return the word with the name that it is about: of what is new, that which it is most like."""
     return f"new, most like {most_like}" if word == "new" else f"{word} {name}"
+
+
+class FittedRecognizer(Protocol):
+    """A fitted `kineme.Recognizer`, as far as it is asked here."""
+
+    comparison_: Comparison
+    references_: References
+    classifier_: Classifier
+
+    def calibration(self) -> Calibration:
+        """Return the calibration of the p-values."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class KnownClasses:
+    """Everything that recognizes movements as one of C classes, or as unknown.
+
+    Attributes
+    ----------
+    comparison : Comparison
+    references : References
+        The labeled movements.
+    classifier : Classifier
+    calibration : Calibration
+        Of the p-values.
+    """
+
+    comparison: Comparison
+    references: References
+    classifier: Classifier
+    calibration: Calibration
+
+    def recognize(self, movements: MovementsLike, error_rate: float = 0.05) -> list[Answer]:
+        """Return an answer for each movement, see `kineme.Recognizer.recognize`."""
+        check_error_rate(error_rate)
+        demos = self.comparison.checked(movements)
+        return answers(self.comparison, self.references, self.classifier, self.calibration, demos, error_rate)
+
+
+def known_classes(symbols: FittedRecognizer | MovementsLike) -> KnownClasses:
+    """Return the records of a fitted recognizer, or those fitted to labeled movements with the default parameters.
+
+    Raises `sklearn.exceptions.NotFittedError` (a recognizer that is not fitted) and `TrajectoryError` (movements
+    without labels).
+    """
+    if hasattr(symbols, "calibration"):
+        fitted = cast(FittedRecognizer, symbols)
+        calibration = fitted.calibration()  # first: it refuses a recognizer that is not fitted
+        return KnownClasses(fitted.comparison_, fitted.references_, fitted.classifier_, calibration)
+    demos = Demonstrations.of(symbols)
+    labels = check_labels(demos, None)
+    return _known(*fit_comparison(ComparisonSpecification(), demos, labels), "auto")
+
+
+def fit_known_classes(  # noqa: PLR0913, PLR0917 - what a recognizer is made of
+    specification: ComparisonSpecification,
+    references: References,
+    weights: str | Sequence[float] = "auto",
+    classifier: str = "auto",
+    groups: NDArray[np.intp] | None = None,
+    channels: Channels | None = None,
+    calibrated: Calibrates = calibrate,
+) -> KnownClasses:
+    """Fit to references that are described already, see `kineme.similarity.comparison.fit_to_references`.
+
+    With `groups`, such as people, each a number, the calibration compares no reference with another of its group.
+    `channels` are what was recorded of the movements, where that is known. `calibrated` may keep calibrations.
+    """
+    return _known(*fit_to_references(specification, references, weights, channels), classifier, groups, calibrated)
+
+
+def _known(
+    comparison: Comparison,
+    references: References,
+    classifier: str,
+    groups: NDArray[np.intp] | None = None,
+    calibrated: Calibrates = calibrate,
+) -> KnownClasses:
+    with single_threaded_blas():  # products of few rows: a second thread waits for most of the time, and in the way
+        fitted = fit_classifier(classifier, comparison, references)
+        calibration = calibrated(comparison.similarity, references, groups)
+    return KnownClasses(comparison, references, fitted, calibration)
+
+
+def open_set_labels(
+    classes: KnownClasses, described: Described, error_rate: float = 0.05
+) -> tuple[NDArray[np.object_], Array]:
+    """Return the class of each described movement by those who showed some, and its p-values.
+
+    Returns `labels`: the best class with a p-value above `error_rate`; None, unknown, as in
+    `Calibration.known_p_values`; `p_values` (n, C).
+    """
+    check_error_rate(error_rate)
+    similarities, scores = score(classes.comparison, classes.references, described, nearest, classes.classifier.scores)
+    p_values = classes.calibration.p_values(similarities, error_rate)
+    calibration = classes.calibration.of_those_shown()
+    labels = known_labels(classes.references.classes, scores, similarities, calibration, error_rate)
+    return labels, p_values
+
+
+@dataclass(frozen=True, eq=False)
+class Transform:
+    """``x = matrix @ x_demonstration + shift``, and a time that runs `duration_ratio` as long.
+
+    With sizes of both per dimension, ``matrix = diag(size) R diag(1 / size_demonstration)``; with one size for all
+    dimensions, ``matrix = scale R``. What the recognizer does not take out stays 0, or 1, here.
+    """
+
+    matrix: Array  # (d, d)
+    shift: Array  # (d,)
+    scale: Array  # (d,), equal numbers unless sizes are per dimension
+    rotation: Array  # (d, d), R
+    duration_ratio: float
+
+    @property
+    def angle(self) -> float:
+        """Angle of the rotation [rad]; with a sign in the plane, counterclockwise positive."""
+        if len(self.rotation) == 2:
+            return math.atan2(self.rotation[1, 0], self.rotation[0, 0])
+        if len(self.rotation) != 3:
+            return 0.0
+        skew = self.rotation - self.rotation.T
+        return math.atan2(float(np.linalg.norm(skew)) / math.sqrt(2.0), float(np.trace(self.rotation)) - 1.0)
+
+    def apply(self, positions: Array) -> Array:
+        """Return positions (T, d) of the demonstration, mapped."""
+        return np.asarray(positions) @ self.matrix.T + self.shift
+
+
+def map_onto(
+    comparison: Comparison,
+    references: IndexedMovements,
+    example: NDArray[np.intp],
+    demos: Demonstrations,
+    paths: Array,
+    share: Array,
+) -> list[Transform]:
+    """Return transforms from the references `example` (n,) onto as many movements.
+
+    Fitted to positions over the phase of the representation with the largest share (R, n), one batch for each phase.
+
+    `demos`: the movements; `paths` (n, d, T): of the movements, where they were recorded.
+    """
+    # Of two representations that are equally alike, the one with the larger weight has the larger share.
+    weights = comparison.similarity.weights
+    alike = share if weights is None else share / np.maximum(weights, np.finfo(float).tiny)[:, None]
+    phases = np.array([representation.arc_share for representation in comparison.representations])[alike.argmax(axis=0)]
+    used, which = np.unique(example, return_inverse=True)  # one example may be that of many
+    stored = references[used]
+    examples = recorded_paths(stored, even_paths(stored, 0, len(stored), comparison.cutoff))[which]
+    ratios = (demos.durations / stored.durations[which]).tolist()
+    transforms: dict[int, Transform] = {}
+    for phase in np.unique(phases):
+        chosen = np.flatnonzero(phases == phase)
+        positions = replace(POSITIONS, arc_share=float(phase))
+        ours, theirs = positions.along(examples[chosen]), positions.along(paths[chosen])
+        maps = fit_maps(ours, theirs, comparison.normalization, comparison.procrustes)
+        for i, matrix, shift, rotation, scale in zip(chosen.tolist(), *maps, strict=True):
+            transforms[i] = Transform(matrix, shift, scale, rotation, ratios[i])
+    return [transforms[i] for i in range(len(demos))]

@@ -14,7 +14,6 @@ from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.figure import Paths, draw_movements_beside
 from kineme.movements.trajectories.labels import Label
 from kineme.movements.trajectories.trajectory import MovementLike, MovementsLike
-from kineme.recognition.transform import Transform
 from kineme.reporting.figures import BLUE, GRAY, figure_to_show
 from kineme.reporting.text import drawable, shortened
 
@@ -36,7 +35,7 @@ class Example(NamedTuple):
 
     number: int
     label: Label
-    transform: Transform
+    transform: Any  # a `Transform`
 
 
 def draw_answer(

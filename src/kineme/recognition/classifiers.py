@@ -10,11 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
-from kineme.similarity.comparison import Comparison
-from kineme.similarity.described import Described
-from kineme.similarity.most_similar import most_similar
-from kineme.similarity.references import References
-from kineme.similarity.scores import Compared
+from kineme.similarity.comparison import Comparison, References
+from kineme.similarity.describe import Described
+from kineme.similarity.scores import Compared, most_similar
 from kineme.similarity.similarity import AveragedSimilarity
 from kineme.similarity.specification import LOG_MEANS
 from kineme.validation import Array
@@ -116,16 +114,6 @@ class SupportVectors:
         return self.scores(compared).argmax(axis=1)
 
 
-def fit_nearest(comparison: Comparison, references: References) -> Nearest:
-    """Fit nothing: there is nothing to fit."""
-    return Nearest()
-
-
-def fit_nearest_each(comparison: Comparison, references: References) -> NearestEach:
-    """Fit nothing: there is nothing to fit."""
-    return NearestEach()
-
-
 def fit_prototype(comparison: Comparison, references: References) -> Prototype:
     """Choose the medoid of each class: the largest mean log similarity to the others, of equal ones the first."""
     medoids = []
@@ -161,12 +149,11 @@ def fit_support_vectors(comparison: Comparison, references: References) -> Suppo
 
 #: Name -> what fits the classifier.
 CLASSIFIERS: dict[str, Callable[[Comparison, References], Classifier]] = {
-    "nearest": fit_nearest,
-    "nearest-each": fit_nearest_each,
+    "nearest": lambda comparison, references: Nearest(),
+    "nearest-each": lambda comparison, references: NearestEach(),
     "prototype": fit_prototype,
     "svm": fit_support_vectors,
 }
-
 
 #: What "auto" stands for. Of gestures in space by other people, two to eight demonstrations of each class, and of bent
 #: handwriting, twelve of each, it is ahead of the nearest by up to 0.01, and of the SVM

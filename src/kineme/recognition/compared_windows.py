@@ -21,15 +21,12 @@ from kineme.movements.segmentation.table import Motion, Rest, Rows, observe
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import Movements
 from kineme.movements.trajectories.trajectory import Trajectory
-from kineme.recognition.conformal import Calibration
-from kineme.recognition.left_out import LEAST
+from kineme.recognition.conformal import LEAST, Calibration
 from kineme.runtime.compiled import compiled_module, use_compiled
 from kineme.runtime.parallel import for_tiles
 from kineme.sampling import evenly_spaced
-from kineme.similarity.comparison import Comparison
-from kineme.similarity.most_similar import nearest_above
-from kineme.similarity.references import References
-from kineme.similarity.scores import Compared, Score, nearest, score
+from kineme.similarity.comparison import Comparison, References
+from kineme.similarity.scores import Compared, Score, nearest, nearest_above, score
 from kineme.validation import Array
 
 MIN_SAMPLES = 8  # of a window

@@ -14,15 +14,12 @@ from kineme.errors import TrajectoryError
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import Label
 from kineme.movements.trajectories.trajectory import MovementsLike
-from kineme.recognition.conformal import check_error_rate
-from kineme.recognition.left_out import LEAST, distances
+from kineme.recognition.conformal import LEAST, check_error_rate, distances
 from kineme.reporting.table import Table, to_text
 from kineme.reporting.text import counted, printable
 from kineme.sampling import evenly_spaced
-from kineme.similarity.comparison import Comparison, fit_comparison
-from kineme.similarity.describe import Tile, feature_rows, for_described
-from kineme.similarity.described import Described
-from kineme.similarity.references import References
+from kineme.similarity.comparison import Comparison, References, fit_comparison
+from kineme.similarity.describe import Described, Tile, feature_rows, for_described
 from kineme.similarity.specification import ComparisonSpecification
 from kineme.validation import Array
 

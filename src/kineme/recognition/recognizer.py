@@ -11,22 +11,23 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, ClassifierMixin
 from sklearn.utils.validation import check_is_fitted
 
-from kineme.kernels.soft_rotation import RotationPrior
+from kineme.kernels.rotation import RotationPrior
 from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
 from kineme.movements.trajectories.trajectory import HasDemonstrations, MovementLike, MovementsLike, Trajectory
 from kineme.recognition.answer import Answer, answers, is_one, known_labels
 from kineme.recognition.classifiers import CLASSIFIERS, SupportVectors, fit_classifier
-from kineme.recognition.conformal import Calibration, calibrate, check_error_rate, class_probabilities
-from kineme.recognition.left_out import check_groups
+from kineme.recognition.conformal import Calibration, calibrate, check_error_rate, check_groups, class_probabilities
 from kineme.runtime.compiled import load_compiled
-from kineme.similarity.comparison import Comparison, fit_comparison
-from kineme.similarity.describe import describe
-from kineme.similarity.described import Described
-from kineme.similarity.references import References
-from kineme.similarity.representation import Normalization, Representation, default_representations
+from kineme.similarity.comparison import Comparison, References, fit_comparison
+from kineme.similarity.describe import Described, describe
 from kineme.similarity.scores import Compared, Score, best_classes, nearest, score
-from kineme.similarity.specification import ComparisonSpecification
+from kineme.similarity.specification import (
+    ComparisonSpecification,
+    Normalization,
+    Representation,
+    default_representations,
+)
 from kineme.validation import Array, check_choice
 
 if TYPE_CHECKING:
@@ -34,10 +35,8 @@ if TYPE_CHECKING:
     from kineme.recognition.early.stream import Live
     from kineme.recognition.spotting import Spotted
 
-
 _NUMBERS = (4, 30, 200)  # of movements: little work and much are compiled apart
 _SAMPLES = 1000
-
 
 _PRIOR = RotationPrior()
 
@@ -64,7 +63,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         The A-average over representations.
     weights : {"auto", "equal", "fitted"} or sequence of R numbers, default "auto"
         Of the representations in the arithmetic mean. "auto": their own; "fitted": half their own, half fitted to the
-        training movements, see `kineme.similarity.weights.fitted_weights`.
+        training movements, see `kineme.similarity.similarity.fitted_weights`.
     classifier : {"auto", "nearest", "nearest-each", "prototype", "svm"}, default "auto"
         "nearest" stored movement, "nearest-each", where each representation has its own nearest stored movement of a
         class, nearest class "prototype" (its medoid), or an "svm" on the averaged kernel. "auto" is "nearest-each".

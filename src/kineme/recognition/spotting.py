@@ -34,10 +34,9 @@ from kineme.recognition.compared_windows import (
     size_and_slowness,
     surroundings,
 )
-from kineme.recognition.conformal import Calibration, check_error_rate, class_probabilities
-from kineme.recognition.left_out import distances
+from kineme.recognition.conformal import Calibration, check_error_rate, class_probabilities, distances
 from kineme.sampling import evenly_spaced
-from kineme.similarity.references import References
+from kineme.similarity.comparison import References
 from kineme.similarity.scores import nearest, nearest_each, score
 from kineme.validation import Array, check_count
 
@@ -49,7 +48,6 @@ _REST_INSIDE = 1.2  # cost of a share of rest beyond the demonstrated one
 _PER_MOVEMENT = 0.165  # cost of one more movement, in typical durations
 _ALIKE = 0.9  # intersection over union from which two windows are about one movement
 _MANNER = 0.25  # share of the costs of duration and size that counts when the class is chosen
-
 
 #: Shares of the duration that are cut off at the start and at the end: windows end at samples some hundredths apart.
 _CUTS = ((0.03, 0.0), (0.0, 0.03), (0.03, 0.03))

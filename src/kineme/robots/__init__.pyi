@@ -1,16 +1,16 @@
 # Arms
-from kineme.robots.models.load import load as load
+from kineme.robots.models.robot import load as load
 from kineme.robots.models.robot import Robot as Robot
 
 # From a movement to an arm
 from kineme.robots.planning.move import move as move
 from kineme.robots.planning.robot_movement import RobotMovement as RobotMovement
-from kineme.robots.planning.refusal import InfeasibleError as InfeasibleError
+from kineme.robots.planning.robot_movement import InfeasibleError as InfeasibleError
 from kineme.robots.execution.joint_trajectory import JointTrajectory as JointTrajectory
 from kineme.robots.execution.preflight import preflight as preflight
 from kineme.robots.execution.preflight import Preflight as Preflight
 from kineme.robots.execution.preflight import Check as Check
-from kineme.robots.kinematics.inverse import InverseKinematics as InverseKinematics
+from kineme.robots.kinematics.descent import InverseKinematics as InverseKinematics
 
 # Files for robots and for people
 from kineme.robots.export_files import write_joints as write_joints

@@ -10,14 +10,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.dmp.control.controller import Controller
-from kineme.dmp.control.state import State
+from kineme.dmp.control.plan import State
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.rotations import matrices_of, matrix_one
+from kineme.robots.execution.joint_trajectory import Torques
 from kineme.robots.execution.preflight import TRACKED, TURNED
-from kineme.robots.execution.timing import Torques
-from kineme.robots.kinematics.descent import POSTURE_COST
-from kineme.robots.kinematics.inverse import InverseKinematics, is_partial
-from kineme.robots.kinematics.reach import point_in_words, reaching_postures
+from kineme.robots.kinematics.descent import (
+    POSTURE_COST,
+    InverseKinematics,
+    is_partial,
+    point_in_words,
+    reaching_postures,
+)
 from kineme.robots.models.robot import Robot, check_robot
 from kineme.validation import Array, as_numbers
 
@@ -136,7 +140,7 @@ class ArmController:
     def __init__(
         self,
         robot: Robot,
-        controller: Controller,
+        controller: Controller[Any],
         *,
         start: ArrayLike | None = None,
         orientation: ArrayLike | None = None,

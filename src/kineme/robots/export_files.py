@@ -24,9 +24,7 @@ from kineme.validation import Array, check_choice, check_number
 
 _FASTEST = 10_000.0  # frames per second
 
-
 _WITHOUT_POINT = re.compile(r"(?<=[ \[-])(\d+)(e[-+]\d+)")
-
 
 TOPIC = "/joint_trajectory_controller/joint_trajectory"  # that of ros2_control
 STATES = "/joint_states"

@@ -1,4 +1,12 @@
-"""Described movements compared with the references: similarities and scores, computed once and only if needed."""
+"""Described movements compared with the references: similarities and scores, computed once and only if needed.
+
+The most similar of many movements, without the distances of pairs that cannot change which one it is.
+
+The arithmetic mean ``K = sum_r w_r exp(-d_r^2 / 2 sigma_r^2)`` is largest for one movement. The distances of rows are
+known for all. For the movement that is most similar by them the others are computed too, and its K is a bar that the
+answer reaches. A lower bound of the elastic and turning distances bounds K from above; only pairs whose bound reaches
+the bar are compared completely. Where only similarities above a given bar count, no more than that is needed either.
+"""
 
 from __future__ import annotations
 
@@ -9,14 +17,21 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from kineme.kernels.pair_distances import listed_distances, pair_bounds
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.runtime.parallel import for_tiles
-from kineme.similarity.comparison import Comparison
-from kineme.similarity.describe import Tile, for_described
-from kineme.similarity.described import Described
-from kineme.similarity.references import References
-from kineme.similarity.specification import LOG_MEANS, SHARES
+from kineme.similarity.comparison import Comparison, References
+from kineme.similarity.describe import Described, Pairs, Tile, fill_by_rows, for_described
+from kineme.similarity.similarity import AveragedSimilarity
+from kineme.similarity.specification import LOG_MEANS, PAIR_QUANTITIES, SHARES
 from kineme.validation import Array
+
+Single = NDArray[np.float32]
+Indices = NDArray[np.intp]
+
+_LEAST_ASKED, _LEAST_PAIRS = 16, 1000  # with fewer it is faster to compare all
+_ROUNDING, _SMALLEST = 1e-3, 1e-30  # of a bar: bounds are computed in single precision
+_MANY, _MOST = 0.15, 0.8  # shares of pairs in doubt from which it is faster to bound them, and to compare all
 
 _TILE_PAIRS = 1_000_000  # similarities at a time: memory stays linear in the stored movements
 
@@ -136,3 +151,120 @@ def for_compared(
 def tile_rows(references: References) -> int:
     """Return movements to compare at a time."""
     return max(1, _TILE_PAIRS // len(references))
+
+
+def most_similar(similarity: AveragedSimilarity, A: Described, B: Described) -> Indices:
+    """Return the index (n,) of the movement of B that each of A is most similar to; of several the first."""
+    if not _can_skip(similarity, A, B):
+        return np.asarray(similarity.log_average(A, B).argmax(axis=1))
+    search, kernels = _by_rows(similarity, A, B)
+    each, first = np.arange(len(A)), kernels.argmax(axis=1)
+    logs = np.full(kernels.shape, -np.inf)
+    logs[each, first] = search.log_averages(each, first)
+    bars = _rounded(np.exp(logs[each, first]))
+    bounds = kernels + search.upper_bounds()
+    bounds[each, first] = -1.0  # compared already
+    i, j = np.divmod(np.flatnonzero(bounds >= bars[:, None]), len(B))
+    logs[i, j] = search.log_averages(i, j)
+    return np.asarray(logs.argmax(axis=1))
+
+
+def nearest_above(similarity: AveragedSimilarity, A: Described, B: Described, first: Indices, bars: Array) -> Array:
+    """Return log similarity (n, C) of movements A to the nearest of each class, where it reaches the bar of the class.
+
+    Elsewhere it is an upper bound, which does not reach the bar either.
+
+    `A`: n movements; `B`: m movements of C classes, ordered by class; `first` (C,): index of the first movement of each
+    class; `bars` (C,): averaged kernels K, from 0 to 1.
+    """
+    if not _can_skip(similarity, A, B):
+        return _nearest(similarity, A, B, first)
+    assert B.pairs is not None
+    clouds = np.array(B.pairs.measures) == PAIR_QUANTITIES.index("cloud")  # there is no bound of their kernel:
+    if (bars <= float(_shares(similarity)[len(B.blocks) :][clouds].sum())).all():  # no K below it can be ruled out
+        return _nearest(similarity, A, B, first)
+    search, kernels = _by_rows(similarity, A, B)
+    classes = np.repeat(np.arange(len(first)), np.diff(first, append=len(B)))
+    least = _rounded(bars).astype(np.float32)[classes]
+    bounds = kernels + search.others
+    doubtful = bounds >= least
+    if doubtful.mean() > _MANY:
+        bounds = kernels + search.upper_bounds()
+        doubtful = bounds >= least
+    if doubtful.mean() > _MOST:
+        return _nearest(similarity, A, B, first)
+    i, j = np.divmod(np.flatnonzero(doubtful), len(B))
+    bounds[i, j] = 0.0
+    bounds = np.maximum.reduceat(bounds, first, axis=1)
+    logs: Array = np.log(np.maximum(bounds, _SMALLEST), dtype=np.float64)
+    if len(i):
+        np.maximum.at(logs, (i, classes[j]), search.log_averages(i, j))
+    return logs
+
+
+def _nearest(similarity: AveragedSimilarity, A: Described, B: Described, first: Indices) -> Array:
+    """Compare all."""
+    return np.asarray(np.maximum.reduceat(similarity.log_average(A, B), first, axis=1))
+
+
+def _shares(similarity: AveragedSimilarity) -> Single:
+    """Return weights (R,) of the kernels, which add up to 1."""
+    return (np.exp(similarity.log_weights()) / len(similarity.widths)).astype(np.float32)
+
+
+def _rounded(bars: Array) -> Array:
+    """Return bars that bounds reach in spite of rounding, 0 for those that are too small for single precision."""
+    return np.where(bars > _SMALLEST, (1 - _ROUNDING) * bars, 0.0)
+
+
+def _by_rows(similarity: AveragedSimilarity, A: Described, B: Described) -> tuple[_Search, Single]:
+    """Compare rows of all pairs; return the search, and the weighted sum (n, m) of their kernels."""
+    assert A.pairs is not None
+    assert B.pairs is not None
+    squares = np.empty((len(A.blocks), len(A), len(B)))
+    search = _Search(similarity, A.pairs, B.pairs, squares, fill_by_rows(A, B, squares))
+    return search, search.kernels(squares, 0)
+
+
+def _can_skip(similarity: AveragedSimilarity, A: Described, B: Described) -> bool:
+    """Tell whether there are bounds, and enough pairs that they pay."""
+    elastic = A.pairs is not None and PAIR_QUANTITIES.index("elastic") in A.pairs.measures
+    enough = len(A) >= _LEAST_ASKED and len(A) * len(B) >= _LEAST_PAIRS
+    return elastic and similarity.mean == "arithmetic" and enough
+
+
+class _Search:
+    """Search among all pairs (n, m) by squared distances of rows (R', n, m) and rotations."""
+
+    def __init__(
+        self, similarity: AveragedSimilarity, a: Pairs, b: Pairs, squares: Array, rotations: Single | None
+    ) -> None:
+        self._similarity, self._a, self._b = similarity, a, b
+        self._squares, self._rotations = squares, rotations
+        self._shares = _shares(similarity)
+
+    def kernels(self, squares: NDArray[np.floating], first: int) -> Single:
+        """Return the weighted sum (n, m) of the kernels of some representations, from number `first` on."""
+        total = np.zeros(squares.shape[1:], np.float32)
+        for r, block in enumerate(squares, first):
+            width = self._similarity.widths[r]
+            kernel = np.asarray(block * np.float32(-0.5 / width**2), dtype=np.float32)
+            total += self._shares[r] * np.exp(kernel, out=kernel)
+        return total
+
+    @property
+    def others(self) -> np.float32:
+        """Weighted sum of the kernels of the other representations at distance 0."""
+        return np.float32(self._shares[len(self._squares) :].sum())
+
+    def upper_bounds(self) -> Single:
+        """Return upper bounds (n, m) of the weighted sum of the others."""
+        bounds = pair_bounds(self._a.shapes, self._b.shapes, self._rotations)
+        return self.kernels(bounds[list(self._a.measures)], len(self._squares))
+
+    def log_averages(self, i: Indices, j: Indices) -> Array:
+        """Return the logarithms (k,) of the averaged kernels of some pairs."""
+        rotations = None if self._rotations is None else self._rotations[i, j]
+        measured = listed_distances(self._a.shapes, self._b.shapes, i, j, rotations)[list(self._a.measures)]
+        squares: Array = np.concatenate((self._squares[:, i, j], measured))
+        return np.asarray(LOG_MEANS["arithmetic"](self._similarity.logs_at(squares[:, None]))[0])

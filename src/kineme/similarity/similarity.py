@@ -2,19 +2,138 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import SpecificationError
 from kineme.kernels.procrustes import Procrustes
 from kineme.movements.trajectories.trajectory import MovementsLike
-from kineme.similarity.describe import describe
-from kineme.similarity.described import Described, squared_distances
-from kineme.similarity.specification import LOG_MEANS, Compares
-from kineme.similarity.widths import gap_widths
+from kineme.sampling import evenly_spaced
+from kineme.similarity.describe import Described, describe, squared_distances
+from kineme.similarity.specification import LOG_MEANS, Compares, Representation
 from kineme.validation import Array
+
+_LEAST_WEIGHT = 0.02  # smaller weights become 0, to save the time of their representation
+_OWN = 0.5  # of the fitted weight always belongs to the representations' own weights
+
+Representations = tuple[Representation, ...]
+
+
+def own_weights(
+    similarity: AveragedSimilarity, described: Described, labels: NDArray[Any], representations: Representations
+) -> Array:
+    """Return the weights of the representations themselves, in the arithmetic mean; equal ones in the others."""
+    own = (
+        np.array([representation.weight for representation in representations])
+        if similarity.mean == "arithmetic"
+        else None
+    )
+    return equal_weights(similarity, described, labels, representations) if own is None else own / own.sum()
+
+
+def equal_weights(
+    similarity: AveragedSimilarity, described: Described, labels: NDArray[Any], representations: Representations
+) -> Array:
+    """Return the same weight for each."""
+    return np.full(len(representations), 1.0 / len(representations))
+
+
+def fitted_weights(
+    similarity: AveragedSimilarity, described: Described, labels: NDArray[Any], representations: Representations
+) -> Array:
+    """Return half of the weight as `aligned_weights` fits it, half as the representations' own weights.
+
+    The fitted weights are those of representations that separate the training movements. A representation that does
+    not help on them may still be needed for perturbations that they do not contain, so each keeps half of its own.
+
+    Raises `SpecificationError`: another mean than the arithmetic one, which weights are fitted for.
+    """
+    if similarity.mean != "arithmetic":
+        raise SpecificationError(
+            f"expected weights='fitted' with mean='arithmetic', got it with mean={similarity.mean!r}"
+        )
+    own = own_weights(similarity, described, labels, representations)
+    return np.asarray((1.0 - _OWN) * aligned_weights(similarity, described, labels) + _OWN * own)
+
+
+def aligned_weights(similarity: AveragedSimilarity, described: Described, labels: NDArray[Any]) -> Array:
+    """Return weights w >= 0 with which the average of the kernels is most like the kernel of the labels.
+
+    Minimizes ``|sum_r w_r K_r - Y|`` over all pairs of different movements, K_r and Y (1 for a pair of one class, else
+    0) centered, which up to its length is the w of largest alignment (Cortes, Mohri, Rostamizadeh, "Algorithms for
+    learning kernels based on centered alignment", Journal of Machine Learning Research 13, 2012, Proposition 9). The
+    diagonal is left out: a movement is like itself in every representation, which distinguishes none.
+
+    - `similarity`: of equal weights.
+    - `described`: in R representations.
+    - `labels` (n,): in the order of the rows; at most 500 evenly spaced movements are compared.
+
+    Returns (R,): summing to 1; weights below 0.02 are 0.
+    """
+    from scipy.optimize import nnls
+
+    chosen = evenly_spaced(len(labels), _ROWS)
+    some = described.take(chosen)
+    same = (labels[chosen, None] == labels[None, chosen]).astype(float)
+    kernels = np.stack([_centered(kernel) for kernel in np.exp(similarity.logs(some, some))], axis=1)
+    weights, _ = nnls(kernels, _centered(same))
+    weights = np.where(weights >= _LEAST_WEIGHT * weights.sum(), weights, 0.0)
+    if not weights.any():  # no kernel is aligned with that of the labels
+        return np.full(described.n_representations, 1.0 / described.n_representations)
+    return np.asarray(weights / weights.sum())
+
+
+def given_weights(weights: ArrayLike, n: int) -> Array:
+    """Return a user's weights, scaled to a sum of 1.
+
+    Raises `SpecificationError`: not one finite number from 0 for each of the n representations, or all 0.
+    """
+    try:
+        array = np.asarray(weights, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        array = np.empty(0)
+    if array.shape != (n,) or not np.isfinite(array).all() or (array < 0).any() or not array.any():
+        raise SpecificationError(
+            f"expected weights to be 'auto', 'equal', 'fitted' or {n} numbers from 0, not all 0, one for each "
+            f"representation, got {weights!r}"
+        )
+    array = array / array.max()  # so that the sum does not overflow
+    return np.asarray(array / array.sum())
+
+
+#: Name -> what computes the weights (R,), summing to 1.
+WEIGHTS: dict[str, Callable[[AveragedSimilarity, Described, NDArray[Any], Representations], Array]] = {
+    "auto": own_weights,
+    "equal": equal_weights,
+    "fitted": fitted_weights,
+}
+
+
+def _centered(gram: Array) -> Array:
+    """Return the pairs of different movements, after rows and columns are centered."""
+    gram, n = gram.copy(), len(gram)
+    # So that the diagonal does not change the means.
+    np.fill_diagonal(gram, (gram.sum(axis=1) - gram.diagonal()) / (n - 1))
+    gram -= gram.mean(axis=0)
+    gram -= gram.mean(axis=1, keepdims=True)
+    return gram[~np.eye(n, dtype=bool)]
+
+
+#: Width as a share of the typical distance to the nearest movement of another class, an impostor.
+SHARE = 0.4
+#: Quantity of a representation -> width as a share of the typical size, where there is one movement alone: about the
+#: median over eight sets of handwriting, gestures in space, signs, words and exercises.
+ALONE = {"positions": 0.2, "forcing": 0.3, "elastic": 0.16, "turning": 0.045, "cloud": 0.15}
+_LEAST = 0.01  # share of the typical size; smallest distance that is used
+_SAME = 1e-3  # share of the size; smaller distances are rounding errors of single precision
+_COPIES = 1e-4  # share of the size; unlabeled movements at smaller distances are copies
+_ROWS = 500  # movements that widths are estimated from, at most
+_BEGUN_MOVEMENTS = 60  # the same, where each has many beginnings
+_NO_IMPOSTOR = 0.1  # width where no two beginnings differ
 
 _TILE_PAIRS = 500_000  # at a time: each representation's kernel is held beside the average
 
@@ -121,3 +240,122 @@ def compare(similarity: AveragedSimilarity, A: Described, B: Described) -> Array
         rows = slice(start, start + step)
         K[rows] = np.exp(similarity.log_average(A.take(rows), B))
     return K
+
+
+def impostor_widths(described: Described, labels: NDArray[np.generic]) -> Array:
+    """Estimate the width sigma_r of each representation: a share of the typical distance to the nearest other class.
+
+    At 0.4 of it, a movement at the distance of an impostor has a similarity of exp(-3), under 0.05: movements closer
+    than the nearest impostor have nearly all influence. With one class, any other movement is the impostor. If classes
+    coincide, as N and Z do under any rotation, the width is a hundredth of the movements' size. Estimated from at most
+    500 evenly spaced movements, which bounds the cost.
+
+    Returns (R,). Raises `SpecificationError`: all movements are the same, or there is only one.
+    """
+    chosen = evenly_spaced(len(labels), _ROWS)
+    some, owners = described.take(chosen), labels[chosen]
+    sizes = some.sizes()
+    nearest = zip(_nearest_of_others(some, owners, chosen), sizes, strict=True)
+    widths = [_share_of_median(distances, _SAME * size, SHARE) for distances, size in nearest]
+    if all(width is None for width in widths):
+        raise SpecificationError(
+            "expected training movements that differ, got one movement or all the same; add demonstrations"
+        )
+    # Movements that do not differ in one representation have a similarity of 1 there.
+    return np.maximum([np.inf if width is None else width for width in widths], _LEAST * sizes)
+
+
+def lone_widths(described: Described, quantities: Sequence[str]) -> Array:
+    """Return the width sigma_r of each representation, (R,), of one movement alone: a share of its size, see `ALONE`.
+
+    Raises `SpecificationError`: the movement does not move.
+    """
+    sizes = described.sizes()
+    if not sizes[: len(described.blocks)].all():
+        raise SpecificationError("expected a training movement that moves, got one at rest; add demonstrations")
+    return np.array([ALONE[quantity] for quantity in quantities]) * sizes
+
+
+def beginning_widths(beginnings: Described, labels: NDArray[np.generic]) -> Array:
+    """Return widths (R,) for m movements with G beginnings each, which follow each other: rows (m * G).
+
+    The same share of the typical distance from a beginning to the nearest one of another class, at any progress. 0.1
+    where no two beginnings differ.
+    """
+    n_progress = len(beginnings) // len(labels)
+    chosen = evenly_spaced(len(labels), _BEGUN_MOVEMENTS)
+    rows = (chosen[:, None] * n_progress + np.arange(n_progress)).ravel()
+    owners, movements = np.repeat(labels[chosen], n_progress), np.repeat(chosen, n_progress)
+    widths = [
+        _share_of_median(distances, 0.0, SHARE)
+        for distances in _nearest_of_others(beginnings.take(rows), owners, movements)
+    ]
+    return np.array([_NO_IMPOSTOR if width is None else width for width in widths])
+
+
+def gap_widths(described: Described) -> Array:
+    """Return the width sigma_r of each representation: 0.4 of the typical distance to the first movement beyond a gap.
+
+    `impostor_widths` takes that share of the distance to the nearest movement of another class. Without labels the
+    class is told by its edge: sorted by distance, ``d_1 <= d_2 <= ...``, the neighbors of a movement are first those of
+    its own class, then the others, and where classes are apart the largest ratio ``d_{k+1} / d_k`` lies between them.
+    ``d_{k+1}`` replaces the distance to the nearest impostor; the median over movements is robust to some whose largest
+    ratio is elsewhere. k runs from 1 to n / 2, so neither the number of classes nor their sizes are assumed. A fixed k
+    would be within the class for some sizes and beyond it for others.
+
+    This is the gap by which agglomerative clusterings are cut (the largest step of merge heights), looked for around
+    each movement by itself, where the scale is local.
+
+    Returns (R,). Raises `SpecificationError`: fewer than three movements, or all the same.
+    """
+    n = len(described)
+    if n < 3:
+        raise SpecificationError(
+            f"expected at least 3 movements to tell classes apart without labels, got {n}; add some"
+        )
+    chosen = evenly_spaced(n, _ROWS)
+    widths = []
+    for squares, same in zip(
+        squared_distances(described.take(chosen), described), _COPIES * described.sizes(), strict=True
+    ):
+        squares[np.arange(len(chosen)), chosen] = -1.0  # itself first
+        ordered = np.sqrt(np.maximum(np.sort(squares, axis=1)[:, 1:], 0.0))
+        widths.append(_share_of_median(_beyond_the_gap(ordered, same), same, SHARE))
+    if all(width is None for width in widths):
+        raise SpecificationError("expected movements that differ, got copies of one movement; add other movements")
+    return np.array([np.inf if width is None else width for width in widths])
+
+
+def median_distances(described: Described) -> Array:
+    """Return the median distance of two different movements in each representation, (R,); NaN for one movement."""
+    pairs = ~np.eye(len(described), dtype=bool)
+    if not pairs.any():
+        return np.full(described.n_representations, np.nan)
+    return np.array([np.sqrt(np.median(squares[pairs])) for squares in squared_distances(described, described)])
+
+
+def _nearest_of_others(described: Described, owners: NDArray[np.generic], each: NDArray[np.generic]) -> list[Array]:
+    """Per representation, distances (n,) to the nearest row of another owner; of another `each` if all have one."""
+    own = owners[:, None] == owners
+    if own.all():
+        own = each[:, None] == each
+    nearest = []
+    for squares in squared_distances(described, described):
+        squares[own] = np.inf
+        nearest.append(np.sqrt(squares.min(axis=1, initial=np.inf)))
+    return nearest
+
+
+def _share_of_median(distances: Array, same: float, share: float) -> float | None:
+    """Return the `share` of the median of those distances that are finite and above `same`; None if none is."""
+    apart = distances[np.isfinite(distances) & (distances > same)]
+    return share * float(np.median(apart)) if len(apart) else None
+
+
+def _beyond_the_gap(ordered: Array, same: float) -> Array:
+    """Return first distance (k,) beyond the largest ratio, of distances (k, n - 1) in rising order."""
+    ordered = np.maximum(ordered, same)
+    last = max(2, (ordered.shape[1] + 1) // 2)
+    logs = np.log(np.maximum(ordered[:, :last], np.finfo(np.float64).tiny))  # all are 0 where nothing moves
+    ratios = np.diff(logs, axis=1)
+    return np.asarray(np.take_along_axis(ordered, ratios.argmax(axis=1)[:, None] + 1, axis=1)[:, 0])

@@ -1,7 +1,11 @@
 """The specification of a comparison: its parameters, without estimates from movements.
 
-Kernels are averaged by their logarithms here; `kineme.kernels.average` has the same averages of the kernels themselves,
+Kernels are averaged by their logarithms here; `kineme.kernels.table` has the same averages of the kernels themselves,
 with what is proved of each.
+
+Representations of movements: a quantity along a phase, compared sample by sample or pair by pair.
+
+Before movements are compared, the normalization removes their translation and size.
 """
 
 from __future__ import annotations
@@ -9,21 +13,258 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol
+from functools import lru_cache
+from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import DTypeLike, NDArray
 
-from kineme.errors import SpecificationError
+from kineme.dmp.discrete.dmp import DMP
+from kineme.dmp.discrete.operators import encoder, forcing_matrix
+from kineme.dmp.discrete.specification import MOST_BASIS, MOST_POINTS
+from kineme.errors import SpecificationError, TrajectoryError
 from kineme.kernels.procrustes import Procrustes
-from kineme.kernels.soft_rotation import RotationPrior
-from kineme.movements.preparation.smooth import Smooth
-from kineme.similarity.representation import (
-    DEFAULT_REPRESENTATIONS,
-    Normalization,
-    Representation,
-    check_representations,
+from kineme.kernels.rotation import RotationPrior
+from kineme.movements.preparation.resample import resample_by_arc_length
+from kineme.movements.preparation.smooth import Smooth, spline_matrix
+from kineme.runtime.compiled import compiled_module, use_compiled
+from kineme.validation import Array, check_choice, check_count, check_number, check_switch
+
+SCALES = ("path", "per-dimension", "none")
+SMALLEST, LARGEST = 1e-15, 1e15  # range of sizes of movements that keep their size
+_OPERATIONS_PER_SAMPLE = 5
+_FLAT = 1e-6  # share of the whole extent; flatter dimensions are not scaled up
+
+#: Compared sample by sample: a movement is a row of numbers.
+ROW_QUANTITIES = ("positions", "forcing")
+#: Compared pair by pair, see `kineme.kernels.pair_distances`.
+PAIR_QUANTITIES = ("elastic", "turning", "cloud")
+QUANTITIES = ROW_QUANTITIES + PAIR_QUANTITIES
+
+#: Quantity -> name of the representation.
+PAIR_NAMES = {"elastic": "elastic path", "turning": "turning angles", "cloud": "point cloud"}
+
+
+@dataclass(frozen=True)
+class Representation:
+    """One way to describe an evenly sampled, smooth path: by a row of numbers, or by what pairs are compared by.
+
+    A recognizer compares movements in several representations and averages the similarities: what misleads one of them,
+    such as uneven timing or a deformed path, leaves another one unimpaired.
+
+    Parameters
+    ----------
+    quantity : {"positions", "forcing", "elastic", "turning", "cloud"}
+        Sample by sample: "positions", the path itself, or "forcing", the forcing term f of a bio-inspired DMP learned
+        from it, which turns with the movement. The DMP is fitted to the path with a curvature penalty
+        (``fit="trajectory"``), so that no noise is differentiated. Pair by pair: "elastic", dynamic time warping of
+        tangents, positions and turning angles, "turning", of turning angles alone, or "cloud", points in any order, see
+        `kineme.kernels.pair_distances`. They need positions over arc length beside them.
+    arc_share : float, default 1.0
+        The phase: 0 is time, 1 arc length, between them a blend; see `arc_length_phase`. Arc length is independent of
+        timing; time distinguishes movements that differ in timing only. What is compared pair by pair takes arc length.
+    n_points : int, default 100
+        Samples along the phase.
+    n_basis, stiffness, ridge
+        Of the DMP; for "forcing" alone.
+    weight : float, default 1.0
+        Share in the average where no weights are given or fitted, relative to those of the others.
+
+    Raises
+    ------
+    SpecificationError
+        A parameter out of its range, or another phase than arc length for what is compared pair by pair.
+    """
+
+    quantity: str
+    arc_share: float = 1.0
+    n_points: int = 100
+    n_basis: int = 40
+    stiffness: float = 100.0
+    ridge: float = 1e-3
+    weight: float = 1.0
+
+    def __post_init__(self) -> None:
+        check_choice("quantity", self.quantity, QUANTITIES)
+        check_number("arc_share", self.arc_share, least=0.0)
+        if self.arc_share > 1:  # above 1 the phase could decrease
+            raise SpecificationError(f"expected arc_share to be a share of at most 1, got {self.arc_share!r}")
+        check_count("n_points", self.n_points, 2, most=MOST_POINTS)
+        check_count("n_basis", self.n_basis, 3, most=MOST_BASIS)
+        check_number("stiffness", self.stiffness, above=0.0)
+        check_number("ridge", self.ridge, least=0.0)
+        check_number("weight", self.weight, above=0.0)
+        if self.in_pairs and self.arc_share != 1:
+            raise SpecificationError(f"expected arc_share=1 with quantity={self.quantity!r}, got {self.arc_share!r}")
+
+    @property
+    def in_pairs(self) -> bool:
+        """True if movements are compared pair by pair, and not sample by sample."""
+        return self.quantity in PAIR_QUANTITIES
+
+    @property
+    def name(self) -> str:
+        """Name such as "forcing over arc length", or "elastic path"."""
+        if self.in_pairs:
+            return PAIR_NAMES[self.quantity]
+        phase = {0.0: "time", 1.0: "arc length"}.get(self.arc_share, f"{self.arc_share:g} arc length")
+        return f"{self.quantity} over {phase}"
+
+    def along(self, paths: Array) -> Array:
+        """Return paths (n, d, T) at even values of the phase, (n, d, n_points)."""
+        if self.arc_share == 0:
+            every, remainder = divmod(paths.shape[2] - 1, self.n_points - 1)
+            return paths[:, :, ::every] if remainder == 0 else paths @ spline_matrix(paths.shape[2], self.n_points).T
+        return resample_by_arc_length(paths, self.n_points, self.arc_share)
+
+    def describe(self, paths: NDArray[Any], translation: bool = True) -> NDArray[Any]:
+        """Return rows (n, d * n_points), dimension-major, of normalized paths (n, d, n_points) along the phase.
+
+        For what is compared sample by sample; in the precision of the paths. Without `translation` the paths still have
+        their position, and it is added to the forcing term: f itself does not depend on it, so that movements at other
+        positions would be similar in that representation.
+        """
+        described = paths
+        if self.quantity == "forcing":
+            described = (paths.reshape(-1, self.n_points) @ forcing_operator(self, paths.dtype)).reshape(paths.shape)
+            if not translation:
+                described += paths.mean(axis=2, keepdims=True)
+        return described.reshape(len(paths), -1)
+
+
+#: What gives the rotation of a pair, and the points of which elastic paths and point clouds consist.
+POSITIONS = Representation("positions", arc_share=1.0, weight=2.0)
+#: Representations that fail on different movements; in an average of kernels one that succeeds suffices. Those of the
+#: whole shape count twice. `python -m bench --only default_representations` tells what each is worth.
+DEFAULT_REPRESENTATIONS = (
+    POSITIONS,
+    Representation("forcing", arc_share=0.0),
+    Representation("elastic", weight=2.0),
+    Representation("turning"),
+    Representation("cloud", weight=2.0),
 )
-from kineme.validation import Array, check_choice, check_number
+#: Where position or size distinguishes movements: none of these takes it out by itself.
+ROW_REPRESENTATIONS = (
+    Representation("positions", arc_share=1.0),
+    Representation("forcing", arc_share=1.0),
+    Representation("forcing", arc_share=0.0),
+)
+
+
+def default_representations(normalization: Normalization) -> tuple[Representation, ...]:
+    """Return those of a recognizer: of the whole shape, unless position or size distinguishes movements."""
+    shape_alone = normalization.translation and normalization.scale != "none"
+    return DEFAULT_REPRESENTATIONS if shape_alone else ROW_REPRESENTATIONS
+
+
+def check_representations(representations: Any) -> tuple[Representation, ...]:
+    """Refuse anything but one or several representations."""
+    try:
+        given = tuple(representations)
+    except TypeError:
+        given = ()
+    if not given or not all(isinstance(item, Representation) for item in given):
+        raise SpecificationError(
+            "expected representations to be a tuple of kineme.similarity.specification.Representation, one or more, "
+            f"or None for the default ones, got {representations!r}"
+        )
+    gives_rotation = any(item.quantity == "positions" and item.arc_share == 1 for item in given)
+    if any(item.in_pairs for item in given) and not gives_rotation:
+        raise SpecificationError(
+            "expected Representation('positions', arc_share=1.0) beside those that are compared pair by pair, whose "
+            "rotation it gives; add it"
+        )
+    return tuple(sorted(given, key=lambda item: item.in_pairs))  # the order within each sort stays
+
+
+def rotating(representations: tuple[Representation, ...]) -> int:
+    """Find the one that gives the rotation to those compared pair by pair: the first of positions over arc length."""
+    return next(r for r, item in enumerate(representations) if item.quantity == "positions" and item.arc_share == 1)
+
+
+@lru_cache(maxsize=32)
+def forcing_operator(representation: Representation, dtype: np.dtype[Any]) -> NDArray[Any]:
+    """Return the matrix (T, T) from positions to f at as many points: subtract the start, encode, apply Eq. (2)."""
+    dmp = DMP(
+        "bio-inspired",
+        n_basis=representation.n_basis,
+        stiffness=representation.stiffness,
+        fit="trajectory",
+        ridge=representation.ridge,
+        n_points=representation.n_points,
+    )
+    operator = encoder(dmp, representation.n_points).weights @ forcing_matrix(dmp, representation.n_points).T / dmp.K
+    operator[0] -= operator.sum(axis=0)  # (x - x0) E = x E - x0 (sum of the rows of E)
+    operator = operator.astype(dtype, copy=False)
+    operator.setflags(write=False)
+    return operator
+
+
+@dataclass(frozen=True)
+class Normalization:
+    """Translation and scale; rotation belongs to the comparison, see `kernels.procrustes.Procrustes`.
+
+    - `translation`: remove the position. Movements that differ only in their position become equal.
+    - `scale` ({"path", "per-dimension", "none"}, default "path"): "path" divides by the root mean square distance from
+      the center, one number for all dimensions: a dot and a circle become equal. "per-dimension" divides each dimension
+      by its own: a circle and an ellipse become equal too. "none" keeps the size, which must be 1e-15 to 1e15 in the
+      unit of the data: movements are compared in single precision, where squares of other sizes overflow or underflow.
+    """
+
+    translation: bool = True
+    scale: str = "path"
+
+    def __post_init__(self) -> None:
+        check_switch("translation", self.translation)
+        check_choice("scale", self.scale, SCALES)
+
+    def apply(self, paths: Array, dtype: DTypeLike = np.float64) -> NDArray[Any]:
+        """Return paths (n, d, T) minus their center, divided by their size, as `dtype`."""
+        if self.translation and self.scale != "none" and use_compiled(_OPERATIONS_PER_SAMPLE * paths.size):
+            least = _FLAT if self.scale == "per-dimension" else math.inf
+            normalized = np.empty(paths.shape, dtype)
+            compiled_module("kineme.similarity._compiled").fill_normalized(paths, least, normalized)
+            return normalized
+        return self._apply(paths).astype(dtype, copy=False)
+
+    def _apply(self, paths: Array) -> Array:
+        centered = paths - self.center(paths)
+        if self.scale == "none":
+            _check_size(centered)
+            return np.asarray(centered)
+        squares = np.einsum("ijk,ijk->ij", centered, centered)[:, :, None] / paths.shape[2]
+        centered /= self._size(squares if self.translation else paths.var(axis=2, keepdims=True))
+        return np.asarray(centered)
+
+    def center(self, paths: Array) -> Array:
+        """Return the center of each path (n, d, T), shape (n, d, 1): its mean position along the phase."""
+        return paths.mean(axis=2, keepdims=True) if self.translation else np.zeros((*paths.shape[:2], 1))
+
+    def size(self, paths: Array) -> Array:
+        """Return the size of each path (n, d, T), shape (n, 1, 1) or (n, d, 1); 1 for a path that does not move."""
+        if self.scale == "none":
+            return np.ones((len(paths), 1, 1))
+        return self._size(paths.var(axis=2, keepdims=True))
+
+    def _size(self, squares: Array) -> Array:
+        """Return the size from the variance in each dimension, (n, d, 1)."""
+        total = np.sqrt(squares.sum(axis=1, keepdims=True))
+        total[total == 0] = 1.0
+        if self.scale == "path":
+            return np.asarray(total)
+        own = np.sqrt(squares)
+        return np.where(own > _FLAT * total, own, total)
+
+
+def _check_size(paths: Array) -> None:
+    """Refuse paths (n, d, T) that keep a size of which single precision makes zero or infinity."""
+    sizes = np.abs(paths).max(axis=(1, 2), initial=0.0)
+    wrong = (sizes > LARGEST) | ((sizes > 0) & (sizes < SMALLEST))
+    if wrong.any():
+        raise TrajectoryError(
+            f'expected movements of {SMALLEST:g} to {LARGEST:g} in their unit with scale="none", got '
+            f"{sizes[wrong][0]:.3g}; choose another unit, or another scale"
+        )
 
 
 def _log_mean_exp(logs: Array) -> Array:

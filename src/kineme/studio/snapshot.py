@@ -16,8 +16,8 @@ from kineme.dmp.discrete.dmp import DMP, Primitives
 from kineme.dmp.discrete.operators import decoder, smoothness_factor, trajectory_regression
 from kineme.dmp.pose.pose_dmp import PosePrimitives
 from kineme.errors import SpecificationError
+from kineme.kernels.pair_distances import Shapes
 from kineme.kernels.procrustes import Procrustes
-from kineme.kernels.shapes import Shapes
 from kineme.library.grounding import prototype_of
 from kineme.library.library import ActionLibrary
 from kineme.library.members import Members, members_of
@@ -27,18 +27,17 @@ from kineme.library.storage.symbols import symbol
 from kineme.movements.preparation import pauses
 from kineme.movements.preparation.smooth import spline_matrix
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.recognition import left_out
-from kineme.recognition.answer import LEAST_CONFIDENCE
+from kineme.recognition import conformal
+from kineme.recognition.answer import LEAST_CONFIDENCE, FittedRecognizer, KnownClasses, known_classes
 from kineme.recognition.classifiers import Classifier, Nearest, NearestEach, Prototype, fit_prototype
 from kineme.recognition.conformal import GUESSES, Calibration
 from kineme.recognition.early import evidence
 from kineme.recognition.early import hypotheses as beginnings
 from kineme.recognition.early.hypotheses import Early, hypotheses
-from kineme.recognition.known_classes import FittedRecognizer, KnownClasses, known_classes
 from kineme.sampling import evenly_spaced
 from kineme.similarity.comparison import Comparison
 from kineme.similarity.describe import N_POINTS, even_paths
-from kineme.similarity.representation import PAIR_QUANTITIES, Representation, forcing_operator, rotating
+from kineme.similarity.specification import PAIR_QUANTITIES, Representation, forcing_operator, rotating
 from kineme.validation import Array
 
 #: Numbers of the stored paths, at most: 1.3 MB in base64, so that a page with all else stays below 2 MB.
@@ -233,7 +232,7 @@ def _calibration(calibration: Calibration) -> tuple[dict[str, Any], dict[str, ND
         "between": calibration.between,
         "exponent": calibration.exponent,
         "guesses": list(GUESSES),
-        **_numbers(left_out, "LEAST", "ROUNDING", "DIMENSIONS", "MEAN_LENGTH", "REACH_OF_STRANGERS", "REACH_TO_NEXT"),
+        **_numbers(conformal, "LEAST", "ROUNDING", "DIMENSIONS", "MEAN_LENGTH", "REACH_OF_STRANGERS", "REACH_TO_NEXT"),
     }
     return {"pooled": [numbers[pair] for pair in shared], **header}, arrays
 

@@ -11,7 +11,7 @@ import kineme
 from kineme import DMP, Trajectory
 from kineme.dmp import Contextual
 from kineme.dmp.contextual import Smoother, solve
-from kineme.dmp.discrete.formulations import FORMULATIONS
+from kineme.dmp.discrete.specification import FORMULATIONS
 from kineme.errors import SpecificationError, TrajectoryError
 
 U = np.linspace(0.0, 1.0, 120)

@@ -7,8 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from kineme import DMP
-from kineme.dmp.discrete.formulations import FORMULATIONS
-from kineme.dmp.discrete.specification import GATINGS
+from kineme.dmp.discrete.specification import FORMULATIONS, GATINGS
 
 TWINS = ("always", "never")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kineme.dmp.control.options import ObstacleAvoidance
+from kineme.dmp.control.plan import ObstacleAvoidance
 from kineme.errors import DegenerateMovementError, SpecificationError
 
 WRONG = {

@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kineme.dmp.control.options import ObstacleAvoidance, steering
-from kineme.dmp.control.plan import MovingGoal
-from kineme.dmp.control.state import Status
+from kineme.dmp.control.plan import MovingGoal, ObstacleAvoidance, Status, steering
 from kineme.dmp.discrete.plan import plan_of
 
 

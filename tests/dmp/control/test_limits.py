@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kineme.dmp.control.state import Status
+from kineme.dmp.control.plan import Status
 
 
 @pytest.mark.parametrize("per_dimension", [False, True])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from kineme.dmp.control.options import ObstacleAvoidance, steering
+from kineme.dmp.control.plan import ObstacleAvoidance, steering
 
 GENTLE = ObstacleAvoidance(gamma=60.0, beta=3.0)
 

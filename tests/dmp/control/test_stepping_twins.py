@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kineme.dmp.control.options import ObstacleAvoidance
-from kineme.dmp.discrete.formulations import FORMULATIONS
+from kineme.dmp.control.plan import ObstacleAvoidance
+from kineme.dmp.discrete.specification import FORMULATIONS
 
 
 def script(primitive, n):

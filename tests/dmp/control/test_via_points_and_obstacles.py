@@ -12,11 +12,9 @@ from scipy.interpolate import CubicSpline
 
 import kineme
 from kineme.dmp.control import controller as controlling
-from kineme.dmp.control.plan import passed
-from kineme.dmp.control.state import Status
-from kineme.dmp.discrete.formulations import FORMULATIONS
-from kineme.dmp.generation.generate import MovementOptions, generate
-from kineme.dmp.generation.learned import Learned
+from kineme.dmp.control.plan import Status, passed
+from kineme.dmp.discrete.specification import FORMULATIONS
+from kineme.dmp.generation.generate import Learned, MovementOptions, generate
 from kineme.errors import heard_warnings
 from kineme.orientation import PoseDMP
 

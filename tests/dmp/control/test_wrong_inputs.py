@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kineme.dmp.control.state import MESSAGES, State, Status
+from kineme.dmp.control.plan import MESSAGES, State, Status
 
 NAN, INF = np.nan, np.inf
 

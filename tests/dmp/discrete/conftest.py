@@ -7,8 +7,7 @@ from itertools import product
 import pytest
 
 from kineme import DMP
-from kineme.dmp.discrete.formulations import FORMULATIONS
-from kineme.dmp.discrete.specification import GATINGS
+from kineme.dmp.discrete.specification import FORMULATIONS, GATINGS
 
 FITS = (("forcing", "local"), ("forcing", "ridge"), ("trajectory", "local"))
 DMPS = [

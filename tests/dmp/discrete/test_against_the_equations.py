@@ -7,8 +7,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from kineme import DMP, Trajectory
-from kineme.dmp.discrete.formulations import FORMULATIONS
 from kineme.dmp.discrete.operators import forcing_target, spring_damper_response
+from kineme.dmp.discrete.specification import FORMULATIONS
 
 SPRINGS = {"critical": (100.0, None), "underdamped": (100.0, 3.0), "overdamped": (50.0, 40.0)}
 

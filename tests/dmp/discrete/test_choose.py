@@ -9,9 +9,9 @@ import pytest
 
 import kineme
 from kineme import DMP
-from kineme.dmp.discrete.choose import RIDGES, relative_paths, score
-from kineme.dmp.discrete.formulations import FORMULATIONS
+from kineme.dmp.discrete.encode import RIDGES, relative_paths, score
 from kineme.dmp.discrete.operators import decoder, trajectory_columns
+from kineme.dmp.discrete.specification import FORMULATIONS
 from kineme.errors import SpecificationError, TrajectoryError
 
 

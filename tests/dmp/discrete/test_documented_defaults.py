@@ -11,7 +11,7 @@ from click.testing import CliRunner
 import kineme
 from kineme import DMP, DMPFeatures, RhythmicDMP
 from kineme.cli import main
-from kineme.dmp.persistence import specification_from_dict, specification_to_dict
+from kineme.dmp.batch import specification_from_dict, specification_to_dict
 from kineme.errors import DegenerateMovementError, DegenerateMovementWarning
 from kineme.library.storage.specification import Specification
 from kineme.orientation import PoseDMP

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import kineme
-from kineme.dmp.discrete.formulations import FORMULATIONS
+from kineme.dmp.discrete.specification import FORMULATIONS
 
 FORMULATION = pytest.mark.parametrize("formulation", sorted(FORMULATIONS))
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kineme import DMP, Trajectory
-from kineme.dmp.discrete.formulations import FORMULATIONS
+from kineme.dmp.discrete.specification import FORMULATIONS
 from kineme.errors import DegenerateMovementError
 
 # Largest rms distance, as a share of the largest side, of 20 smooth movements of 400 samples: N -> error.

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from kineme import DMP
-from kineme.dmp.discrete.formulations import FORMULATIONS
+from kineme.dmp.discrete.specification import FORMULATIONS
 from kineme.errors import SpecificationError, TrajectoryError
 
 NAN = float("nan")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from kineme import DMP
-from kineme.dmp.discrete.formulations import FORMULATIONS
+from kineme.dmp.discrete.specification import FORMULATIONS
 
 
 def pytest_generate_tests(metafunc):

@@ -7,7 +7,7 @@ import pytest
 
 import kineme
 from kineme import DMP, couple
-from kineme.dmp.discrete.formulations import FORMULATIONS
+from kineme.dmp.discrete.specification import FORMULATIONS
 from kineme.errors import ExtrapolationWarning, SpecificationError, TrajectoryError
 
 

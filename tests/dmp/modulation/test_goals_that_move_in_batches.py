@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import kineme
 from kineme import DMP
 from kineme.dmp import Primitives
-from kineme.dmp.discrete.formulations import FORMULATIONS
+from kineme.dmp.discrete.specification import FORMULATIONS
 from kineme.errors import SpecificationError, TrajectoryError
 
 DEMOS = kineme.load_lasa(["GShape"])

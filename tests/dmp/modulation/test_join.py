@@ -8,7 +8,7 @@ import pytest
 import kineme
 from kineme import DMP, blend, join
 from kineme.dmp import Primitives
-from kineme.dmp.discrete.formulations import FORMULATIONS
+from kineme.dmp.discrete.specification import FORMULATIONS
 from kineme.errors import SpecificationError, TrajectoryError
 
 

@@ -8,8 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kineme import DMP, Demonstrations, blend, couple, join
-from kineme.dmp.discrete.formulations import FORMULATIONS
-from kineme.dmp.discrete.specification import GATINGS
+from kineme.dmp.discrete.specification import FORMULATIONS, GATINGS
 from kineme.errors import TrajectoryError
 from kineme.movements.channels.channel import Channel
 from kineme.movements.trajectories.movements import of_channels

@@ -7,8 +7,8 @@ import pytest
 
 import kineme
 from kineme import DMP
-from kineme.dmp import base_rollout
-from kineme.dmp.discrete.formulations import FORMULATIONS
+from kineme.dmp.discrete import rollout as base_rollout
+from kineme.dmp.discrete.specification import FORMULATIONS
 from kineme.errors import SpecificationError
 
 
@@ -56,7 +56,7 @@ def test_a_limit_is_kept_between_samples_too():
 def test_each_movement_of_many_has_its_own(learned, monkeypatch):
     rollout = learned.rollout()
     together = rollout.least_duration(velocity=30.0, acceleration=200.0)
-    monkeypatch.setattr(base_rollout, "_TILE_SAMPLES", 1)  # one movement at a time
+    monkeypatch.setattr(base_rollout, "_LIMITED_SAMPLES", 1)  # one movement at a time
     np.testing.assert_allclose(rollout.least_duration(velocity=30.0, acceleration=200.0), together, rtol=1e-9)
     assert np.ptp(together) > 0.01
 

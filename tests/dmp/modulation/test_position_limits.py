@@ -9,8 +9,7 @@ import pytest
 
 import kineme
 from kineme import DMP
-from kineme.dmp.discrete.formulations import FORMULATIONS
-from kineme.dmp.discrete.specification import FITS, GATINGS
+from kineme.dmp.discrete.specification import FITS, FORMULATIONS, GATINGS
 from kineme.errors import SpecificationError
 
 

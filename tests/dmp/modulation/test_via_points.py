@@ -14,9 +14,8 @@ from hypothesis import strategies as st
 import kineme
 from kineme import DMP
 from kineme.dmp import Primitives
-from kineme.dmp.discrete.formulations import FORMULATIONS
 from kineme.dmp.discrete.operators import decoder, decoder_at, smoothness_factor
-from kineme.dmp.discrete.specification import GATINGS
+from kineme.dmp.discrete.specification import FORMULATIONS, GATINGS
 from kineme.errors import ExtrapolationWarning, SpecificationError, TrajectoryError
 
 FITS = (("forcing", "local"), ("forcing", "ridge"), ("trajectory", "local"))

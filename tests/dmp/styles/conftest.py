@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kineme import DMP, Demonstrations
-from kineme.dmp.discrete.formulations import FORMULATIONS
+from kineme.dmp.discrete.specification import FORMULATIONS
 
 
 def pytest_generate_tests(metafunc):

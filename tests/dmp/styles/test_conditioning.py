@@ -144,7 +144,7 @@ def test_velocities_far_from_those_that_were_shown_are_met_too(dmp, model, seed)
 
 
 def test_a_duration_that_was_not_found_is_said(dmp, model, monkeypatch):
-    monkeypatch.setattr("kineme.dmp.styles.conditioning._STEPS", 2)
+    monkeypatch.setattr("kineme.dmp.styles.parameters._STEPS", 2)
     known = model(dmp)
     v = 2.0 * known.primitive.rollout(n_samples=AT).velocities[0, 50]
     with pytest.warns(ExtrapolationWarning, match=r"after 2 steps .* still changes by [\d.e-]+ % a step.*velocity_std"):

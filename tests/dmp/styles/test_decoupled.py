@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from kineme import DMP
-from kineme.dmp.discrete.formulations import FORMULATIONS, HANDOVER, late_shape_weight
 from kineme.dmp.discrete.operators import decoder
+from kineme.dmp.discrete.specification import FORMULATIONS, HANDOVER, late_shape_weight
 
 
 def test_the_shape_weight_is_a_logistic_curve_in_time_from_1_to_0():

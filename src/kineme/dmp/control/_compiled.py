@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from kineme.dmp.control.options import AHEAD
+from kineme.dmp.control.plan import AHEAD
 from kineme.dmp.spring_damper import NODE_WEIGHTS, NODES, transition
 from kineme.runtime.compiled import jit
 
@@ -103,7 +103,7 @@ def _look_up(table, u, shape):  # type: ignore[no-untyped-def]
 
 @jit
 def _steer(avoidance, state, obstacles, velocities, passed, push):  # type: ignore[no-untyped-def]
-    """Add the terms of all obstacles to `push`; twin of `obstacles.steering`, with the obstacles `passed` later."""
+    """Add the terms of all obstacles to `push`; twin of `plan.steering`, with the obstacles `passed` later."""
     gamma, beta, fading, rounding = avoidance
     d = obstacles.shape[1]  # the leading dimensions
     r, heading = np.empty(d), np.empty(d)
@@ -137,7 +137,7 @@ def _steer(avoidance, state, obstacles, velocities, passed, push):  # type: igno
 
 @jit
 def _write_side(heading, across):  # type: ignore[no-untyped-def]
-    """The opposite of `obstacles._side`, where the obstacle is taken to lie."""
+    """The opposite of `plan._side`, where the obstacle is taken to lie."""
     if len(heading) == 2:
         across[0], across[1] = heading[1], -heading[0]
         return

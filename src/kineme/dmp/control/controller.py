@@ -6,17 +6,29 @@ Limits of velocity and acceleration are reported where they are exceeded, never 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kineme.dmp.control.options import ObstacleAvoidance, Options, numbers
-from kineme.dmp.control.plan import SHORTEST, Influences, MovingGoal, Plan, check_controlled, passed
-from kineme.dmp.control.state import State, Status
+from kineme.dmp.control.plan import (
+    SHORTEST,
+    Influences,
+    MovingGoal,
+    ObstacleAvoidance,
+    Options,
+    Plan,
+    State,
+    Status,
+    check_controlled,
+    numbers,
+    passed,
+)
 from kineme.dmp.control.stepping import stepper
 from kineme.errors import SpecificationError
 from kineme.validation import Array
+
+S = TypeVar("S", bound=State)
 
 _LARGEST = 1e150
 
@@ -24,7 +36,7 @@ _NOTHING = Status(0)
 _STANDSTILL = 1e-30  # durations; a step as short as this is none
 
 
-class Controller:
+class Controller(Generic[S]):
     """Moves one primitive step by step, and bends to what happens meanwhile.
 
     Made by ``controller`` of `Primitives`, `RhythmicPrimitives` and `PosePrimitives`. A step carries the equation of
@@ -57,21 +69,24 @@ class Controller:
     belongs to one thread.
     """
 
-    state: State
+    state: S
 
     def __init__(self, plan: Plan, dt: float, options: Options) -> None:
         check_controlled(plan, dt)
         self.dt, self.options = float(dt), options
         self._plan, self._n_dims, self._origin = plan, plan.n_dims, plan.origin
         self._set_tau(plan.duration)
-        self._limits = limits_from(options, self._n_dims)
+        self._limits = Limits(
+            _limit("velocity_limit", options.velocity_limit, self._n_dims),
+            _limit("acceleration_limit", options.acceleration_limit, self._n_dims),
+        )
         self._limited = self._limits.exist
         self._settle = float(options.settle or plan.settle)
         self._advance = stepper(plan, options.avoidance or ObstacleAvoidance())
         self._zeros, self._nowhere = np.zeros(self._n_dims), np.zeros((0, plan.n_positions))
         self.reset()
 
-    def reset(self) -> State:
+    def reset(self) -> S:
         """Back to the start, with the first goal; returns the state there."""
         plan = self._plan
         self._goal = MovingGoal(plan, plan.goal, self.options.goal_filter)
@@ -97,7 +112,7 @@ class Controller:
         goal_velocity: ArrayLike | None = None,
         obstacle_velocities: ArrayLike | None = None,
         dt: float | None = None,
-    ) -> State:
+    ) -> S:
         """Move on by dt. Never raises: what cannot be used is left out, and the status says so.
 
         Parameters
@@ -244,7 +259,7 @@ class Controller:
         """Velocity and acceleration in time, as the state reports them."""
         return self._motion[1] * self._rate, self._motion[2] * (self._rate * self._rate)
 
-    def _report(self, velocity: Array, acceleration: Array) -> State:
+    def _report(self, velocity: Array, acceleration: Array) -> Any:
         x, clock = self._motion[0], self._clock
         status = Status.MOVING
         if self._rate == 0.0:
@@ -344,14 +359,6 @@ class Limits(NamedTuple):
             if (largest > self.acceleration).any():
                 events |= Status.ACCELERATION_LIMIT
         return events
-
-
-def limits_from(options: Options, n_dims: int) -> Limits:
-    """The limits of the options for d components."""
-    return Limits(
-        _limit("velocity_limit", options.velocity_limit, n_dims),
-        _limit("acceleration_limit", options.acceleration_limit, n_dims),
-    )
 
 
 def _limit(name: str, value: ArrayLike | None, n_dims: int) -> Array | None:

@@ -10,8 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from kineme.dmp.control.options import ObstacleAvoidance, steering
-from kineme.dmp.control.plan import Influences, Plan
+from kineme.dmp.control.plan import Influences, ObstacleAvoidance, Plan, steering
 from kineme.dmp.spring_damper import NODE_WEIGHTS, NODES, transition
 from kineme.runtime.compiled import compiled_module, use_compiled
 from kineme.validation import Array

@@ -10,17 +10,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kineme.dmp.batch import Batch
-from kineme.dmp.discrete.formulations import safe_amplitudes
 from kineme.dmp.discrete.operators import forcing_matrix
-from kineme.dmp.discrete.specification import Specification
+from kineme.dmp.discrete.specification import Specification, safe_amplitudes
 from kineme.dmp.recorded_as import RecordedAs
 from kineme.errors import SpecificationError
 from kineme.validation import Array, check_count, check_samples
 
 if TYPE_CHECKING:
     from kineme.dmp.control.controller import Controller
-    from kineme.dmp.control.options import ObstacleAvoidance
-    from kineme.dmp.discrete.choose import BasisSelection
+    from kineme.dmp.control.plan import ObstacleAvoidance, State
+    from kineme.dmp.discrete.encode import BasisSelection
     from kineme.dmp.discrete.rollout import Rollout
     from kineme.dmp.discrete.via_points import ViaLike
     from kineme.movements.trajectories.trajectory import MovementsLike
@@ -40,7 +39,7 @@ class DMP(Specification):
     Parameters
     ----------
     formulation : {"original", "bio-inspired", "amplitude-scaled", "decoupled"}, default "bio-inspired"
-        The transformation system; see `kineme.dmp.discrete.formulations.FORMULATIONS`.
+        The transformation system; see `kineme.dmp.discrete.specification.FORMULATIONS`.
     n_basis : int, default 40
         Number N of basis functions, at most 2,000.
     stiffness : float, default 100.0
@@ -149,7 +148,7 @@ class DMP(Specification):
         >>> selection = kineme.DMP().choose(demos)
         >>> primitives = selection.dmp.learn(demos)
         """
-        from kineme.dmp.discrete.choose import choose  # only who chooses needs it
+        from kineme.dmp.discrete.encode import choose  # only who chooses needs it
 
         return choose(self, movements, n_basis, ridge, tolerance, negligible)
 
@@ -372,7 +371,7 @@ class Primitives(Batch):
         acceleration_limit: ArrayLike | None = None,
         avoidance: ObstacleAvoidance | None = None,
         settle: float | None = None,
-    ) -> Controller:
+    ) -> Controller[State]:
         """One primitive under live control, in steps of `dt` [s].
 
         Parameters
@@ -405,7 +404,7 @@ class Primitives(Batch):
         0.002
         """
         from kineme.dmp.control.controller import Controller  # these load where a robot moves, not to learn
-        from kineme.dmp.control.options import Options
+        from kineme.dmp.control.plan import Options
         from kineme.dmp.discrete.plan import plan_of
 
         options = Options(feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance, settle)

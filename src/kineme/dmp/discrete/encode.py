@@ -1,21 +1,47 @@
-"""Learn a batch of movements: resample, subtract the start, multiply by the encode matrix."""
+"""Learn a batch of movements: resample, subtract the start, multiply by the encode matrix.
+
+Number of basis functions and ridge by generalized cross-validation.
+
+Source: G. H. Golub, M. Heath and G. Wahba, "Generalized cross-validation as a method for choosing a good ridge
+parameter", Technometrics 21(2), 1979, Eq. (1.4). With H the matrix from the T samples of a path to the fitted ones,
+
+    GCV = mean (y - H y)^2 / (1 - trace(H) / T)^2,
+
+which is the mean squared error of predicting each sample from all others, with every diagonal element of H replaced
+by their mean.
+
+For one N, H of every ridge comes from one singular value decomposition: with A the columns that the path is fitted
+with and B the second differences of the weights, ``[A; B] = [Q1; Q2] R`` and ``Q1 = U C Z'``, so that
+``H = U C^2 (C^2 + ridge S^2)^-1 U'``, where S^2 are the squared lengths of the columns of ``Q2 Z``.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from kineme.dmp.discrete.operators import encoder
+from kineme.dmp.discrete.operators import decoder, encoder, trajectory_columns
 from kineme.dmp.discrete.specification import Specification
 from kineme.dmp.recorded_as import recorded_as
-from kineme.errors import TrajectoryError
+from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.preparation.resample import even_rows, extents_of, relative_rows
 from kineme.movements.preparation.trim import preprocess
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.runtime.parallel import for_tiles
-from kineme.validation import Array, describe
+from kineme.sampling import evenly_spaced
+from kineme.validation import Array, check_count, check_number, describe
+
+S = TypeVar("S", bound=Specification)
+
+N_BASIS = (6, 8, 10, 12, 15, 20, 25, 30, 40, 50, 60, 80, 100)
+RIDGES = tuple(float(10.0**k) for k in range(-12, 3))
+_FEWEST_POINTS = 20
+_FREE = 0.05  # least share of the samples that a fit may leave undetermined; with fewer the score is 0 / 0
+_MOST_MOVEMENTS = 2_000  # from which the choice is made
 
 _TILE_SAMPLES = 200_000  # in one tile: larger ones do not fit the cache, with smaller ones threads wait for each other
 
@@ -63,3 +89,129 @@ def check_movement(demos: Demonstrations, starts: Array, extents: Array) -> None
             f"{describe(i, demos.names)}: expected a movement, got {demos.lengths[i]} samples "
             f"at the same place ({still.sum()} of {len(demos)} movements do not move); leave them out"
         )
+
+
+@dataclass(frozen=True, eq=False)
+class BasisSelection(Generic[S]):
+    """Result of `DMP.choose`.
+
+    Attributes
+    ----------
+    dmp : DMP
+        The specification with the number of basis functions and the ridge that were chosen.
+    n_basis : ndarray of shape (a,)
+        The numbers of basis functions that were tried.
+    ridge : ndarray of shape (b,)
+        The ridges that were tried.
+    errors : ndarray of shape (a, b)
+        Square root of the generalized cross-validation score: the error that is to be expected at samples that were
+        not fitted, their own noise included, as a share of a movement's largest extent.
+    degrees_of_freedom : ndarray of shape (a, b)
+        trace(H): how many numbers each dimension of a movement is fitted with.
+    """
+
+    dmp: S
+    n_basis: Array
+    ridge: Array
+    errors: Array
+    degrees_of_freedom: Array
+
+    @property
+    def error(self) -> float:
+        """The error of what was chosen."""
+        a = int(np.argmax(self.n_basis == self.dmp.n_basis))
+        return float(self.errors[a, int(np.argmax(self.ridge == self.dmp.ridge))])
+
+    @property
+    def curve(self) -> dict[int, float]:
+        """Number of basis functions -> its error with the best ridge."""
+        return {int(n): float(error) for n, error in zip(self.n_basis, self.errors.min(axis=1), strict=True)}
+
+
+class Scores(NamedTuple):
+    """Of one number of basis functions, for every ridge."""
+
+    errors: Array  # (b,), root of the score
+    degrees_of_freedom: Array  # (b,)
+
+
+def choose(
+    dmp: S,
+    movements: MovementsLike,
+    n_basis: Sequence[int] | None,
+    ridge: Sequence[float] | None,
+    tolerance: float,
+    negligible: float,
+) -> BasisSelection[S]:
+    """Score every number of basis functions with every ridge; see `DMP.choose`."""
+    if dmp.fit != "trajectory":
+        raise SpecificationError(
+            f'expected fit="trajectory", whose fit and error are of the path, got fit={dmp.fit!r}; '
+            'the noise of its target, a second derivative, is not independent: choose with fit="trajectory"'
+        )
+    check_number("tolerance", tolerance, least=0.0)
+    check_number("negligible", negligible, least=0.0)
+    rows = relative_paths(dmp, movements)
+    counts = _counts(n_basis, rows.shape[1])
+    strengths = RIDGES if ridge is None else _listed("ridge", ridge)
+    for strength in strengths:
+        check_number("ridge", strength, above=0.0)
+    ridges = np.array(strengths, dtype=np.float64)
+    if not len(counts) or not len(ridges):
+        raise SpecificationError(f"expected at least one n_basis and one ridge, got {len(counts)} and {len(ridges)}")
+    scores = [score(replace(dmp, n_basis=count), rows, ridges) for count in counts]
+    errors = np.array([scored.errors for scored in scores])
+    best = errors.min(axis=1)
+    a = int(np.argmax(best <= max((1.0 + tolerance) * best.min(), negligible)))  # the fewest that are good enough
+    chosen = replace(dmp, n_basis=counts[a], ridge=float(ridges[errors[a].argmin()]))
+    return BasisSelection(
+        chosen, np.array(counts), ridges, errors, np.array([scored.degrees_of_freedom for scored in scores])
+    )
+
+
+def relative_paths(dmp: Specification, movements: MovementsLike) -> Array:
+    """Paths from the start in units of their largest extent at T even times, shape (n d, T).
+
+    T is the specification's `n_points`, or the median number of recorded samples if that is smaller: samples between
+    recorded ones say nothing new, and the score would take them for agreement.
+    """
+    demos = preprocess(Demonstrations.of(movements), dmp.preprocessing)
+    demos = demos[evenly_spaced(len(demos), _MOST_MOVEMENTS)]
+    extents = extents_of(demos, 0, len(demos))
+    check_movement(demos, demos.positions[demos.offsets[:-1]], extents)
+    n_points = int(np.clip(np.median(demos.lengths), _FEWEST_POINTS, max(_FEWEST_POINTS, dmp.n_points)))
+    rows = relative_rows(demos, 0, len(demos), n_points) / extents.max(axis=1)[:, None, None]
+    return np.asarray(rows.reshape(-1, n_points))
+
+
+def score(dmp: Specification, rows: Array, ridges: Array) -> Scores:
+    """Generalized cross-validation of relative paths (m, T), for one number of basis functions."""
+    n_points = rows.shape[1]
+    response = decoder(dmp, n_points)
+    columns, curvature = trajectory_columns(response, dmp.K)
+    Q, _ = np.linalg.qr(np.vstack((columns, curvature)))
+    U, C, Z = np.linalg.svd(Q[:n_points], full_matrices=False)
+    S2 = np.sum((Q[n_points:] @ Z.T) ** 2, axis=0)
+    y = rows - rows[:, -1:] * response.goal[0]
+    parts = np.sum((y @ U) ** 2, axis=0)
+    outside = max(0.0, float(np.sum(y**2) - parts.sum()))  # of what the columns span
+    shares = C**2 / (C**2 + ridges[:, None] * S2)
+    mean_square = (outside + (1.0 - shares) ** 2 @ parts) / rows.size
+    degrees = shares.sum(axis=1)
+    free = 1.0 - degrees / n_points
+    errors = np.full(len(ridges), np.inf)  # where as many numbers as samples leave nothing to predict
+    np.divide(np.sqrt(mean_square), free, out=errors, where=free > _FREE)
+    return Scores(errors, degrees)
+
+
+def _counts(n_basis: Sequence[int] | None, n_points: int) -> list[int]:
+    if n_basis is None:
+        return [count for count in N_BASIS if count <= n_points]
+    return sorted({check_count("n_basis", count, 3, most=n_points) for count in _listed("n_basis", n_basis)})
+
+
+def _listed(name: str, values: Any) -> list[Any]:
+    try:
+        return list(values)
+    except TypeError:
+        raise SpecificationError(f"expected {name} to be a sequence of what to try, got {values!r}") from None

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.dmp.batch import Batch
-from kineme.dmp.control.options import check_one, one_vector
-from kineme.dmp.control.plan import MISSED, Plan, ViaPlaces
+from kineme.dmp.control.plan import MISSED, Plan, ViaPlaces, check_one, one_vector
 from kineme.dmp.discrete.modulate import modulated
 from kineme.dmp.discrete.rollout import Rollout, rollout
 from kineme.dmp.discrete.via_points import ViaLike, ViaPoints, via_points

@@ -1,18 +1,174 @@
-"""Parameters of a discrete DMP, checked: the canonical system, basis functions over its phase, spring and fit."""
+"""Parameters of a discrete DMP, checked: the canonical system, basis functions over its phase, spring and fit.
+
+The formulations: the factor of the forcing term, and how the goal enters besides the spring.
+
+In normalized time u = t / tau every formulation is one linear spring-damper,
+
+    x'' = K (g - x) - D x' + scale f(s) + coupling(s) (g - x0),        ' = d/du,
+
+and only scale and coupling differ. Encoding, decoding and features are written once for all of them.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from kineme.dmp.discrete.formulations import FORMULATIONS, Formulation
 from kineme.dmp.spring_damper import SpringDamper
-from kineme.errors import SpecificationError
+from kineme.errors import DegenerateMovementError, DegenerateMovementWarning, SpecificationError, warn
 from kineme.movements.preparation.trim import check_steps
-from kineme.validation import Array, check_choice, check_count, check_number
+from kineme.validation import Array, check_choice, check_count, check_number, describe
+
+#: Share of its largest extent within which the goal of a movement counts as equal to its start.
+ZERO = 1e-9
+
+_NEAR = 1e-2  # of its largest extent; the original formulation magnifies noise a hundredfold there
+
+
+@dataclass(frozen=True)
+class Formulation:
+    """One row of `FORMULATIONS`.
+
+    Attributes
+    ----------
+    equation : str
+        The transformation system as the paper prints it.
+    divides_by_amplitude : bool
+        Whether scale is ``g - x0`` (then weights and f do not exist where it is 0) or the stiffness K.
+    coupling : callable
+        ``coupling(K, s)``: the factor of ``g - x0`` in the equation and, the same function, of
+        ``x - x0`` in the shape-attractor term.
+    ratio : callable
+        ``ratio(new, learned, extents)``: what scale f is multiplied by when a movement learned with one
+        ``g - x0`` is generated with another; all of shape (n, d).
+    """
+
+    name: str
+    equation: str
+    divides_by_amplitude: bool
+    coupling: Callable[[float, Array], Array]
+    ratio: Callable[[Array, Array, Array], Array]
+
+    def scale(self, stiffness: float, amplitude: Array) -> Array:
+        """The factor of f in the equation, for learned amplitudes g - x0 of any shape."""
+        return amplitude if self.divides_by_amplitude else np.full_like(amplitude, stiffness)
+
+
+def _per_dimension(new: Array, learned: Array, extents: Array) -> Array:
+    # A g - x0 that is rounding error would mirror and magnify the shape.
+    nothing = ZERO * extents.max(axis=-1, keepdims=True)
+    closed = np.abs(learned) <= nothing
+    ratio = np.where(np.abs(new) <= nothing, 1.0, np.inf)
+    return np.divide(new, learned, out=ratio, where=~closed)
+
+
+def _unchanged(new: Array, learned: Array, extents: Array) -> Array:
+    return np.ones_like(new)
+
+
+def _isotropic(new: Array, learned: Array, extents: Array) -> Array:
+    distance = np.linalg.norm(learned, axis=-1, keepdims=True)
+    closed = distance <= CLOSED * extents.max(axis=-1, keepdims=True)
+    ratio = np.linalg.norm(new, axis=-1, keepdims=True) / np.where(closed, 1.0, distance)
+    return np.broadcast_to(np.where(closed, 1.0, ratio), new.shape)
+
+
+#: Share of its extent within which a movement that ends there counts as closed for the amplitude-scaled formulation.
+CLOSED = 0.05
+
+#: Phase at which shape and goal have equal weight in the decoupled formulation; 35 % of the time for s(tau) = 0.01.
+HANDOVER = 0.2
+
+
+def late_shape_weight(s: Array) -> Array:
+    """Weight of the shape-attractor in the decoupled formulation: 1 at the start, 0 in the end.
+
+    ``w_s(s) = (1 + c^3) s^3 / (s^3 + c^3)`` with c = `HANDOVER`. As s decays exponentially this is a logistic curve in
+    time, ``1 / (1 + exp(3 alpha (u - u_c)))`` with ``s(u_c) = c``, up to the factor that makes it 1 at the start.
+
+    With K = 100 a change of the goal has gone through to 7 % at 30 % of the time, against 39 % in Eq. (4), to 20 % at
+    40 % of the time, against 56 %, and to 98 % at the end, against 97 %, with a smaller largest acceleration. Later or
+    slower curves arrive late.
+    """
+    return (1.0 + HANDOVER**3) * s**3 / (s**3 + HANDOVER**3)
+
+
+FORMULATIONS = {
+    row.name: row
+    for row in (
+        Formulation(
+            name="original",
+            equation="tau v' = K (g - x) + (g - x0) f(s) - D v  (Eq. 1)",
+            divides_by_amplitude=True,
+            coupling=lambda K, s: np.zeros_like(s),
+            ratio=_per_dimension,
+        ),
+        # Eq. (4) multiplied out: s K (f/s + x0 - x) + (1 - s) K (g - x) = K (g - x) + K f - K s (g - x0).
+        Formulation(
+            name="bio-inspired",
+            equation="tau v' = s K (f(s)/s + x0 - x) + (1 - s) K (g - x) - D v  (Eq. 4)",
+            divides_by_amplitude=False,
+            coupling=lambda K, s: -K * s,
+            ratio=_unchanged,
+        ),
+        # Eq. (4) with f multiplied by the ratio of the distances from start to goal, new over learned: one factor
+        # for all dimensions, never negative, so a nearer goal shrinks the shape and nothing is mirrored. Closed
+        # movements keep their size.
+        Formulation(
+            name="amplitude-scaled",
+            equation="tau v' = s K (r f(s)/s + x0 - x) + (1 - s) K (g - x) - D v,  r = |g - x0| / |g - x0| learned",
+            divides_by_amplitude=False,
+            coupling=lambda K, s: -K * s,
+            ratio=_isotropic,
+        ),
+        # Prada and Remazeilles (2012), the paper's [9], decouple the weights of the two attractors, s and 1 - s in
+        # Eq. (4). Taken from there: each attractor has a weight of its own, so that the goal can act later than with s.
+        # Chosen here: a logistic curve in time, and weights whose sum is 1, which keeps the spring constant.
+        # Multiplied out, K f + w_s K (x0 - x) + (1 - w_s) K (g - x) = K (g - x) + K f - K w_s (g - x0): nothing is
+        # divided by w_s, and w_s vanishes with s, so the goal is reached.
+        Formulation(
+            name="decoupled",
+            equation="tau v' = w_s K (f(s)/w_s + x0 - x) + w_g K (g - x) - D v,  w_g = 1 - w_s, w_s logistic in time",
+            divides_by_amplitude=False,
+            coupling=lambda K, s: -K * late_shape_weight(s),
+            ratio=_unchanged,
+        ),
+    )
+}
+
+
+def safe_amplitudes(amplitudes: Array, extents: Array, names: Sequence[str | None] | None, feature: str) -> Array:
+    """Return `amplitudes` g - x0 (n, d) if none is zero.
+
+    Raises `DegenerateMovementError`: where g = x0 in a dimension: a closed or a flat movement. Warns
+    `DegenerateMovementWarning`: once, with a count, for movements whose g is closer to x0 than 1 % of the movement's
+    largest extent.
+    """
+    relative = np.abs(amplitudes) / extents.max(axis=1, keepdims=True)
+    zero = relative <= ZERO
+    if zero.any():
+        i, k = (int(index) for index in np.argwhere(zero)[0])
+        raise DegenerateMovementError(
+            f"{describe(i, names)}: expected g != x0 in every dimension, got equal start and goal in "
+            f"dimension {k} ({zero.any(axis=1).sum()} of {len(zero)} movements are closed or flat); the original "
+            f'formulation divides by g - x0 to get {feature}: use feature "shape-attractor", which does not, or the '
+            '"bio-inspired" formulation'
+        )
+    near = (relative < _NEAR).any(axis=1)
+    if near.any():
+        warn(
+            f"{near.sum()} of {len(near)} movements end within 1 % of their extent from where they start, in some "
+            f"dimension (first: {describe(int(np.argmax(near)), names)}); "
+            f'their {feature} are large and fragile: prefer "shape-attractor" or the "bio-inspired" formulation',
+            DegenerateMovementWarning,
+            stacklevel=4,
+        )
+    return amplitudes
+
 
 FITS = ("forcing", "trajectory")
 REGRESSIONS = ("local", "ridge")

@@ -10,8 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure, SubFigure
 from numpy.typing import NDArray
 
-from kineme.dmp.generation.generate import MovementOptions, generate
-from kineme.dmp.generation.learned import Learned, largest_deviation
+from kineme.dmp.generation.generate import Learned, MovementOptions, generate, largest_deviation
 from kineme.io.writing.write_movement import Columns
 from kineme.movements.trajectories.figure import set_equal_scales
 from kineme.reporting.figures import BLUE, GRAY, GREEN, ORANGE, new_figure

@@ -6,13 +6,10 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kineme.dmp.control.controller import Controller, is_usable, read_vector
-from kineme.dmp.control.options import Options
-from kineme.dmp.control.plan import Plan
-from kineme.dmp.control.state import State, Status
-from kineme.dmp.pose.rates import Components, acceleration_components, rate_components, velocity_components
+from kineme.dmp.control.plan import Options, Plan, State, Status
+from kineme.dmp.pose.tangent import Components, acceleration_components, rate_components, velocity_components
 from kineme.movements.rotations import conjugate, exp_one, log_one, product_components
 from kineme.validation import Array
 
@@ -41,12 +38,18 @@ class PoseState(State):
         return self.position[-4 * (len(self.position) - len(self.velocity)) :]
 
 
-class PoseController(Controller):
+class PoseController(Controller[PoseState]):
     """Moves one pose primitive step by step; see `PosePrimitives.controller` and `Controller`.
 
     It steps through position and rotation vector, in the chart around the goal that it is made with: undisturbed it is
     the rollout. A goal that turns in flight moves in that chart. Where a step would turn further than a
     million radians, the orientation stays and is at rest, and the status says so.
+
+    `step` takes what `Controller.step` does, in the columns of `PoseState`: positions and goals of shape (4,) or (7,),
+    quaternions of either sign; velocities of shape (3,) or (6,), angular in the world frame [rad/s], for poses after
+    the linear ones, and external accelerations (`coupling`) likewise. With a `goal_velocity` the orientation of the
+    goal goes on as a rotation vector does. Obstacles are points (m, 3) that the position steers around; orientations
+    without a position have none.
 
     Attributes
     ----------
@@ -54,59 +57,12 @@ class PoseController(Controller):
         After the last step; at first the start.
     """
 
-    state: PoseState
-
     def __init__(self, plan: Plan, dt: float, options: Options, reference: Array) -> None:
         references = reference.reshape(-1, 4)
         self._references = references.tolist()
         self._backwards = conjugate(references).tolist()
         self._linear = plan.n_positions  # columns before the orientations
         super().__init__(plan, dt, options)
-
-    def reset(self) -> PoseState:
-        """Back to the start, with the first goal; returns the state there."""
-        super().reset()
-        return self.state
-
-    def step(  # noqa: PLR0913 - what can happen, a parameter each
-        self,
-        position: ArrayLike | None = None,
-        velocity: ArrayLike | None = None,
-        goal: ArrayLike | None = None,
-        tempo: float = 1.0,
-        coupling: ArrayLike | None = None,
-        obstacles: ArrayLike | None = None,
-        *,
-        goal_velocity: ArrayLike | None = None,
-        obstacle_velocities: ArrayLike | None = None,
-        dt: float | None = None,
-    ) -> PoseState:
-        """Move on by dt. Never raises: what cannot be used is left out, and the status says so.
-
-        Parameters
-        ----------
-        position, goal : array_like of shape (4,) or (7,), optional
-            Measured now, and where to go, in the columns of `PoseState`; quaternions of either sign.
-        velocity : array_like of shape (3,) or (6,), optional
-            Measured now: angular velocity in the world frame [rad/s], for poses after the linear velocity.
-        coupling : array_like of shape (3,) or (6,), optional
-            External angular acceleration during this step, for poses after the linear one.
-        goal_velocity : array_like of shape (3,) or (6,), optional
-            Velocity of the goal, in the columns of `velocity`; its orientation goes on as a rotation vector does.
-        obstacles, obstacle_velocities : array_like of shape (m, 3), optional
-            Points that the position steers around; orientations without a position have none.
-        tempo, dt : float, optional
-            See `Controller.step`.
-
-        Returns
-        -------
-        PoseState
-        """
-        super().step(
-            position, velocity, goal, tempo, coupling, obstacles,
-            goal_velocity=goal_velocity, obstacle_velocities=obstacle_velocities, dt=dt,
-        )  # fmt: skip
-        return self.state
 
     def _read_place(self, value: Any, near: Array) -> Array | None:
         """Return position and the rotation vector closest to that of `near`; None for what is no pose."""

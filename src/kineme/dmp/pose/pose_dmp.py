@@ -8,17 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kineme.dmp.batch import Batch
-from kineme.dmp.control.options import ObstacleAvoidance, Options, check_one
+from kineme.dmp.batch import Arrays, Batch, check_array
+from kineme.dmp.control.plan import ObstacleAvoidance, Options, check_one
 from kineme.dmp.discrete.dmp import DMP, Primitives
 from kineme.dmp.discrete.modulate import modulated
 from kineme.dmp.discrete.plan import plan_along
 from kineme.dmp.discrete.rollout import Rollout, rollout, sampled
 from kineme.dmp.discrete.via_points import ViaLike, broadcast_length
-from kineme.dmp.persistence import Arrays, check_array
-from kineme.dmp.pose.in_tangent import changes_in_tangent, checked_poses, rates_in_tangent
 from kineme.dmp.pose.pose_controller import PoseController
-from kineme.dmp.pose.pose_rollout import PoseRollout
+from kineme.dmp.pose.pose_rollout import PoseRollout, changes_in_tangent, checked_poses, rates_in_tangent
 from kineme.dmp.pose.tangent import to_tangent
 from kineme.dmp.recorded_as import RecordedAs, recorded_as
 from kineme.errors import SpecificationError
@@ -249,8 +247,7 @@ class PosePrimitives(Batch):
             Orientations (d = 4) or poses (d = 7), as demonstrated; quaternions of either sign. The way from a new
             start to a new goal is the one nearest to the demonstrated way, the long way round if that was shown.
             Of other recordings the positions and angles, and after them the orientations, each as (w, x, y, z).
-        duration, rate, n_samples : optional
-            See `Primitives.rollout`.
+        duration, rate, n_samples : as in `Primitives.rollout`
         velocity : array_like of shape (d - 1,) or (n, d - 1), optional
             Initial angular velocity in the world frame [rad/s], for poses after the linear velocity. By default
             the demonstrated rates of the position and the rotation vector, in proportion to the tempo.
@@ -273,14 +270,9 @@ class PosePrimitives(Batch):
             A start, goal, velocity or via point of the wrong shape, a quaternion not of norm 1, numbers that do not go
             together.
         SpecificationError
-            As of `Primitives.rollout`; limits of orientations alone.
+            As of `Primitives.rollout`, with its warnings, in positions or in radians; limits of orientations alone.
         DegenerateMovementError
             The original formulation asked to turn about an axis that the demonstration does not turn about.
-
-        Warns
-        -----
-        ExtrapolationWarning
-            As `Primitives.rollout`, in positions or in radians.
 
         Notes
         -----
@@ -326,23 +318,12 @@ class PosePrimitives(Batch):
         avoidance: ObstacleAvoidance | None = None,
         settle: float | None = None,
     ) -> PoseController:
-        """One primitive under live control, in steps of `dt` [s].
+        """One primitive under live control, in steps of `dt` [s]; options as of `Primitives.controller`.
 
-        Parameters
-        ----------
-        dt : float
-            Time of a step [s], at most the duration.
-        start, goal, duration, velocity, via, end_velocity, position_limits : optional
-            As in `rollout`, for one movement. Past the duration the goal attracts again, at rest.
-        feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance, settle : optional
-            What to do with measurements, new goals, limits and obstacles; see `kineme.control.Options`. Limits hold for
-            linear and angular velocities and accelerations, as the state reports them; obstacles are points (m, 3) that
-            the position steers around; `settle` holds for positions and the components of the rotation vector [rad].
-
-        Returns
-        -------
-        PoseController
-            At the start, with ``step``, ``reset`` and ``state``.
+        Start, goal, velocity, via points, end velocity and limits are as in `rollout`, for one movement. Limits of
+        `Options` hold for linear and angular velocities and accelerations, as the state reports them; obstacles are
+        points (m, 3) that the position steers around; `settle` holds for positions and the components of the rotation
+        vector [rad].
 
         Raises
         ------

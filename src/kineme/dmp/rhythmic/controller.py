@@ -6,9 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.dmp.control.controller import Controller, is_usable, read_number
-from kineme.dmp.control.options import Options
-from kineme.dmp.control.plan import FilteredValue, Plan
-from kineme.dmp.control.state import State, Status
+from kineme.dmp.control.plan import FilteredValue, Options, Plan, State, Status
 from kineme.validation import LARGEST_STAMP, SHORTEST_STEP, Array
 
 
@@ -30,7 +28,7 @@ class RhythmicState(State):
     period: float
 
 
-class RhythmicController(Controller):
+class RhythmicController(Controller[RhythmicState]):
     """Moves one limit cycle step by step; see `RhythmicPrimitives.controller` and `Controller`.
 
     The goal is the baseline. After a push, and after a change of baseline, amplitude or period, position and velocity
@@ -43,8 +41,6 @@ class RhythmicController(Controller):
         After the last step; at first the start.
     """
 
-    state: RhythmicState
-
     def __init__(self, plan: Plan, dt: float, options: Options, learned_amplitude: float, gain: float) -> None:
         self._learned_amplitude, self._first_gain = learned_amplitude, np.array([gain])
         super().__init__(plan, dt, options)
@@ -52,8 +48,7 @@ class RhythmicController(Controller):
     def reset(self) -> RhythmicState:
         """Back to the start, with the first baseline, amplitude and period; returns the state there."""
         self._gain = FilteredValue(self._first_gain, self.options.goal_filter)
-        super().reset()
-        return self.state
+        return super().reset()
 
     def step(  # noqa: PLR0913 - what can happen, a parameter each
         self,
@@ -102,11 +97,10 @@ class RhythmicController(Controller):
                 self._set_tau(new_period)
             else:
                 self._events |= Status.PERIOD_REJECTED
-        super().step(
+        return super().step(
             position, velocity, goal, tempo, coupling, obstacles,
             goal_velocity=goal_velocity, obstacle_velocities=obstacle_velocities, dt=dt,
         )  # fmt: skip
-        return self.state
 
     @property
     def amplitude(self) -> float:

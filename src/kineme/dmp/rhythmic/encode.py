@@ -15,8 +15,15 @@ from numpy.typing import NDArray
 
 from kineme.dmp.discrete.encode import check_movement
 from kineme.dmp.recorded_as import RecordedAs
-from kineme.dmp.rhythmic.operators import Complex, as_real, encoder, even_phases, fit_harmonics, waves
-from kineme.dmp.rhythmic.specification import RhythmicSpecification
+from kineme.dmp.rhythmic.operators import (
+    Complex,
+    RhythmicSpecification,
+    as_real,
+    encoder,
+    even_phases,
+    fit_harmonics,
+    waves,
+)
 from kineme.errors import TrajectoryError
 from kineme.movements.preparation.resample import relative_rows
 from kineme.movements.preparation.trim import preprocess

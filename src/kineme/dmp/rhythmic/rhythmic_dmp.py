@@ -10,22 +10,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kineme.dmp.batch import Batch
-from kineme.dmp.control.options import check_one, one_vector
-from kineme.dmp.control.plan import MISSED, Plan, ViaPlaces
+from kineme.dmp.control.plan import MISSED, Plan, ViaPlaces, check_one, one_vector
 from kineme.dmp.discrete.via_points import ViaLike, via_points
 from kineme.dmp.recorded_as import RecordedAs
 from kineme.dmp.rhythmic.encode import encode
-from kineme.dmp.rhythmic.operators import forcing_matrix
+from kineme.dmp.rhythmic.operators import RhythmicSpecification, forcing_matrix
 from kineme.dmp.rhythmic.rollout import PHASES, RhythmicRollout, modulated, rollout
-from kineme.dmp.rhythmic.specification import RhythmicSpecification
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.validation import Array, check_count, check_samples
 
 if TYPE_CHECKING:
-    from kineme.dmp.control.options import ObstacleAvoidance
+    from kineme.dmp.control.plan import ObstacleAvoidance
     from kineme.dmp.rhythmic.controller import RhythmicController
-
 
 _INSTEAD = {
     "goal": "a rhythm goes around its baseline: give baseline=",
@@ -35,7 +32,6 @@ _INSTEAD = {
     "position_limits": "a rhythm is not kept within limits: a smaller amplitude=, another baseline= or via= points are",
     "settle": "a rhythm never settles: give n_periods=",
 }
-
 
 _LONGEST_STEP = 1000.0  # periods in one step: the forcing is followed all the way
 
@@ -300,7 +296,7 @@ class RhythmicPrimitives(Batch):
             More than one primitive; both `baseline` and `goal`; an option out of its range, or one that a rhythm does
             not have.
         """
-        from kineme.dmp.control.options import Options  # these load where a robot moves, not to learn
+        from kineme.dmp.control.plan import Options  # these load where a robot moves, not to learn
         from kineme.dmp.rhythmic.controller import RhythmicController
 
         refuse_others("controller", others)

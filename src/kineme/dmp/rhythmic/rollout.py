@@ -14,10 +14,9 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kineme.dmp.base_rollout import BaseRollout, least_durations
 from kineme.dmp.batch import Batch
 from kineme.dmp.discrete.modulate import Changed, loose_changes, warn_changed, warn_far
-from kineme.dmp.discrete.rollout import Change
+from kineme.dmp.discrete.rollout import BaseRollout, Change, least_durations
 from kineme.dmp.discrete.via_points import (
     Span,
     ViaLike,
@@ -28,8 +27,7 @@ from kineme.dmp.discrete.via_points import (
     via_points,
 )
 from kineme.dmp.rhythmic.encode import SAMPLES_PER_PERIOD
-from kineme.dmp.rhythmic.operators import as_real, even_phases, limit_cycle, waves
-from kineme.dmp.rhythmic.specification import RhythmicSpecification
+from kineme.dmp.rhythmic.operators import RhythmicSpecification, as_real, even_phases, limit_cycle, waves
 from kineme.dmp.spring_damper import transitions
 from kineme.errors import SpecificationError
 from kineme.validation import Array, check_count, check_number, check_samples
@@ -94,17 +92,7 @@ class RhythmicRollout(BaseRollout):
     def least_period(self, velocity: ArrayLike | None = None, acceleration: ArrayLike | None = None) -> Array:
         """The least period of each movement (n,) [s] in which the same path stays within limits.
 
-        ``rollout(period=...)`` moves so; see `Rollout.least_duration`.
-
-        Parameters
-        ----------
-        velocity, acceleration : float or array_like of shape (d,), optional
-            Largest absolute value, per second and per second squared: of all dimensions, or one each.
-
-        Raises
-        ------
-        SpecificationError
-            No limit, or one that is not above 0; a rollout that was given an initial velocity other than 0.
+        ``rollout(period=...)`` moves so. Limits and errors are those of `Rollout.least_duration`.
         """
         fixed = self.velocity is not None and bool(self.velocity.any())
         finely = self.n_periods * self.primitives.dmp.n_basis, lambda movements, n: replace(movements, n_samples=n)

@@ -27,8 +27,9 @@ from kineme.dmp.discrete.rollout import Rollout, rollout, sampled
 from kineme.dmp.discrete.specification import Specification
 from kineme.dmp.discrete.via_points import ViaLike
 from kineme.dmp.recorded_as import merged
-from kineme.dmp.styles.conditioning import as_observation_times, as_observations, updated
 from kineme.dmp.styles.parameters import (
+    as_observation_times,
+    as_observations,
     as_primitives,
     from_numbers,
     map_rows,
@@ -36,6 +37,7 @@ from kineme.dmp.styles.parameters import (
     shared_label,
     shared_recording,
     to_numbers,
+    updated,
 )
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.channels.channel import check_alike
@@ -249,7 +251,13 @@ class AveragePrimitive:
         SpecificationError
             Another specification or dimension, or an activation outside 0 to 1.
         """
-        a = as_activation(activation, self.primitive.dmp.n_points)
+        a = np.atleast_1d(as_numbers(activation, "activation"))
+        if a.ndim != 1 or not len(a) or not ((a >= 0.0) & (a <= 1.0)).all():
+            raise SpecificationError(
+                f"expected activation to be numbers from 0 to 1, of shape (S,), got {activation!r}"
+            )
+        even = np.linspace(0.0, 1.0, self.primitive.dmp.n_points)
+        a = np.interp(even, np.linspace(0.0, 1.0, len(a)), a)
         if not isinstance(other, AveragePrimitive):
             raise SpecificationError(f"expected an AveragePrimitive to blend with, got {type(other).__name__}")
         own, its = self.primitive, self._of_this_kind(other.primitive)
@@ -365,14 +373,6 @@ class Blended(NamedTuple):
 
     theta: Array  # (1, d, N + 3)
     factor: Array  # (r1 + r2, d, N + 3)
-
-
-def as_activation(activation: ArrayLike, n_points: int) -> Array:
-    """A number or numbers at even times as (T,) numbers from 0 to 1."""
-    a = np.atleast_1d(as_numbers(activation, "activation"))
-    if a.ndim != 1 or not len(a) or not ((a >= 0.0) & (a <= 1.0)).all():
-        raise SpecificationError(f"expected activation to be numbers from 0 to 1, of shape (S,), got {activation!r}")
-    return np.interp(np.linspace(0.0, 1.0, n_points), np.linspace(0.0, 1.0, len(a)), a)
 
 
 def blended(

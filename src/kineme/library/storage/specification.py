@@ -8,14 +8,19 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
+from kineme.dmp.batch import specification_from_dict, specification_to_dict
 from kineme.dmp.discrete.dmp import DMP
-from kineme.dmp.persistence import specification_from_dict, specification_to_dict
 from kineme.errors import DataError, KinemeError, SpecificationError
-from kineme.kernels.soft_rotation import RotationPrior
+from kineme.kernels.rotation import RotationPrior
 from kineme.library.storage.rows import parsed
-from kineme.similarity.representation import ROW_REPRESENTATIONS, Normalization, Representation
-from kineme.similarity.specification import Compares, ComparisonSpecification
-from kineme.similarity.weights import WEIGHTS
+from kineme.similarity.similarity import WEIGHTS
+from kineme.similarity.specification import (
+    ROW_REPRESENTATIONS,
+    Compares,
+    ComparisonSpecification,
+    Normalization,
+    Representation,
+)
 from kineme.validation import check_choice, check_number
 
 if TYPE_CHECKING:

@@ -24,8 +24,7 @@ from kineme.recognition.early.hypotheses import (
     positive,
 )
 from kineme.similarity.comparison import Comparison
-from kineme.similarity.describe import describe_paths, even_paths
-from kineme.similarity.described import Described
+from kineme.similarity.describe import Described, describe_paths, even_paths
 from kineme.similarity.specification import LOG_MEANS
 from kineme.validation import MIN_SAMPLES, Array
 

@@ -14,18 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
+from kineme.kernels.pair_distances import ElasticSpec, shapes_of
 from kineme.kernels.procrustes import Procrustes
-from kineme.kernels.shapes import ElasticSpec, shapes_of
 from kineme.movements.preparation.pauses import without_pauses
 from kineme.movements.preparation.resample import arc_length_phase
 from kineme.movements.preparation.smooth import Smooth
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.similarity.comparison import Comparison
-from kineme.similarity.describe import N_POINTS, even_paths
-from kineme.similarity.described import Described, Pairs
-from kineme.similarity.references import References
-from kineme.similarity.representation import PAIR_QUANTITIES
-from kineme.similarity.widths import SHARE, beginning_widths
+from kineme.similarity.comparison import Comparison, References
+from kineme.similarity.describe import N_POINTS, Described, Pairs, even_paths
+from kineme.similarity.similarity import SHARE, beginning_widths
+from kineme.similarity.specification import PAIR_QUANTITIES
 from kineme.validation import Array, check_count, check_number
 
 N_PREFIX = ElasticSpec().n_segments + 1  # samples along the arc length of a beginning: the ends of segments

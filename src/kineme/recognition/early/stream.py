@@ -22,9 +22,8 @@ from kineme.recognition.early.hypotheses import Hypotheses, Prefixes, smoother
 from kineme.recognition.early.live_state import Guess, LiveState, LiveStatus
 from kineme.runtime.compiled import load_compiled
 from kineme.runtime.parallel import single_threaded_blas
-from kineme.similarity.comparison import Comparison
+from kineme.similarity.comparison import Comparison, References
 from kineme.similarity.describe import N_POINTS
-from kineme.similarity.references import References
 from kineme.validation import MIN_SAMPLES, Array, check_number
 
 N_REMAINING = 20  # samples of the predicted path

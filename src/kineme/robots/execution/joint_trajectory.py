@@ -2,14 +2,37 @@
 
 from __future__ import annotations
 
+import logging
+import math
 from dataclasses import dataclass
 from math import comb
 from typing import NamedTuple
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
+from kineme.errors import DataError, SpecificationError, TrajectoryError
 from kineme.robots.models.robot import Robot
 from kineme.validation import Array
+
+_KNOTS_APART = (
+    1e-3  # between two knots of the path, in lengths that the joints pass in a second at their limits of velocity
+)
+_KNOTS = 500, 5000  # of the path at least, and at most
+_PER_GAP = 3  # intervals between two knots at whose ends the limits hold: corners are sharp between knots
+_FINE = 20_000  # points at which the length is measured
+_USABLE = 0.998  # of the limits of velocity and acceleration: they hold at the grid, and hardly more between
+_UNLIMITED = 1e9  # [Nm, N]
+
+_PEAK_VELOCITY, _PEAK_ACCELERATION = 15 / 8, 10 / np.sqrt(3)  # of the polynomial, per distance and duration
+_SHORTEST = 0.5  # [s]
+
+STANDS = 1e-8  # of the limit of velocity: what counts as standing, also for controllers of ROS
+_GENTLE = 0.02, 0.1  # from such a share of the limit of velocity on a ramp takes so long at least [s]
+_SHARE = 0.5  # of the limit of acceleration that a ramp may take
+_PEAK = 1.5  # of the slope of the ramp, over its mean
+LONGEST = 1_000_000  # samples of one trajectory, at most
+_LEAST = 4  # samples
 
 _APART = 0.05  # between two postures that are looked at no joint moves farther [rad, m]
 _HALVINGS = 40  # of an interval between samples, which leave 1e-12 of it
@@ -185,3 +208,222 @@ def dense_times(robot: Robot, trajectory: JointTrajectory) -> Array:
     first = np.repeat(np.arange(len(parts)), parts)
     share = (np.arange(len(first)) - np.repeat(np.cumsum(parts) - parts, parts)) / parts[first]
     return np.append(times[first] + share * gaps[first, 0], times[-1])
+
+
+class Timed(NamedTuple):
+    """A path of joints, followed in time."""
+
+    trajectory: JointTrajectory
+    generated: Array  # (T,), the time of the movement as it was generated, at each sample [s]
+
+
+def n_samples(duration: float, rate: float, most: int = LONGEST) -> int:
+    """Number of even samples from 0 to `duration` [s], about `rate` for each second.
+
+    Raises SpecificationError: more than `most`.
+    """
+    if not duration * rate <= most:
+        raise SpecificationError(
+            f"expected at most {most:,} samples of one trajectory, got {duration * rate:,.0f}; choose a lower "
+            "rate, a shorter movement or higher limits of velocity and acceleration"
+        )
+    return max(_LEAST, round(duration * rate) + 1)
+
+
+def as_generated(robot: Robot, path: CubicSpline, rate: float, factor: float = 1.0) -> Timed:
+    """The timing of the movement itself, t = s; where it begins or ends in motion, with a ramp from or to a stand.
+
+    In a ramp of r seconds, with x = t / r, ``ds/dt = 3 x^2 - 2 x^3`` and so ``s = r (x^3 - x^4 / 2)``: it takes r / 2
+    seconds more than without. r is such that the arm takes half of its acceleration for it. All of it takes `factor`
+    times as long, ``s(t / factor)``. By the chain rule ``dq/dt = q'(s) ds/dt`` and ``d2q/dt2 = q''(s) (ds/dt)^2 +
+    q'(s) d2s/dt2``.
+    """
+    duration = float(path.x[-1])
+    at_ends = np.abs(path(np.array([0.0, duration]), 1)) / factor  # (2, n)
+    first, last = (min(duration, _ramp(robot, joints) / factor) for joints in at_ends)
+    total = duration + (first + last) / 2
+    times = np.linspace(0.0, total, n_samples(factor * total, rate))
+    s, velocity, acceleration = times - first / 2, np.ones_like(times), np.zeros_like(times)
+    for ramp, at, sign in ((first, times, 1.0), (last, total - times, -1.0)):
+        if ramp == 0:
+            continue
+        x = np.clip(at / ramp, 0.0, 1.0)
+        within = x < 1
+        covered = ramp * (x**3 - x**4 / 2)
+        s[within] = (covered if sign > 0 else duration - covered)[within]
+        velocity[within] = (3 * x**2 - 2 * x**3)[within]
+        acceleration[within] = (sign * 6 * (x - x**2) / ramp)[within]
+    s = np.clip(s, 0.0, duration)
+    slope, bend = path(s, 1), path(s, 2)
+    velocity, acceleration = velocity[:, None] / factor, acceleration[:, None] / factor**2
+    trajectory = JointTrajectory(
+        robot.joints, factor * times, path(s), slope * velocity, bend * velocity**2 + slope * acceleration, {}
+    )
+    return Timed(trajectory, s)
+
+
+def _ramp(robot: Robot, velocity: Array) -> float:
+    """Seconds of a ramp to velocities (n,); next to none where the movement is almost at a stand."""
+    share = float(np.max(velocity / robot.velocity))
+    if share <= STANDS:
+        return 0.0
+    moving, shortest = _GENTLE
+    return max(shortest * min(1.0, share / moving), float(np.max(_PEAK * velocity / (_SHARE * robot.acceleration))))
+
+
+def approach(robot: Robot, start: Array, end: Array, rate: float, factor: float = 1.0) -> JointTrajectory:
+    """All joints together from `start` to `end` (n,), standing at both, at half the velocity and acceleration allowed.
+
+    The polynomial of least jerk, ``q(u) = start + (end - start) (10 u^3 - 15 u^4 + 6 u^5)``, u from 0 to 1; Flash and
+    Hogan 1985. Sampled at `rate` [1/s]; `factor` times as long as those limits allow.
+    """
+    distance = np.abs(end - start)
+    by_velocity = _PEAK_VELOCITY * distance / (_SHARE * robot.velocity)
+    by_acceleration = np.sqrt(_PEAK_ACCELERATION * distance / (_SHARE * robot.acceleration))
+    duration = factor * max(_SHORTEST, float(by_velocity.max()), float(by_acceleration.max()))
+    u = np.linspace(0.0, 1.0, n_samples(duration, rate))[:, None]
+    shape = u**3 * (10 - 15 * u + 6 * u**2)
+    velocity = 30 * u**2 * (1 - u) ** 2 / duration
+    acceleration = 60 * u * (1 - u) * (1 - 2 * u) / duration**2
+    change = (end - start)[None]
+    return JointTrajectory(
+        robot.joints, duration * u[:, 0], start + change * shape, change * velocity, change * acceleration, {}
+    )
+
+
+def knows_masses(robot: Robot) -> bool:
+    """Tell whether the model says what its links weigh."""
+    return float(sum(inertia.mass for inertia in robot.model.inertias)) > 0
+
+
+class Torques:
+    """Torques of one arm, posture by posture: inverse dynamics by the recursive Newton-Euler algorithm of Pinocchio.
+
+    Without friction, and without a load that the model does not have.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        import pinocchio
+
+        self._inverse_dynamics = pinocchio.rnea
+        self._model, self._data = robot.model, robot.model.createData()
+        self._known = knows_masses(robot)
+        self._most = np.where(np.isnan(robot.effort), np.inf, robot.effort)
+
+    def of(self, q: Array, velocities: Array, accelerations: Array) -> Array:
+        """Torques (n,) [Nm, N] at joint positions, velocities and accelerations (n,); nan without masses."""
+        if not self._known:
+            return np.full(len(q), np.nan)
+        return np.array(self._inverse_dynamics(self._model, self._data, q, velocities, accelerations))
+
+    def exceeded(self, torques: Array) -> bool:
+        """Tell whether a joint would need more than it has; False where that is not known."""
+        return bool((np.abs(torques) > self._most).any())
+
+
+class Parameterization(NamedTuple):
+    """A path q(s) with the velocity along it, whose square is linear in s between the points of a grid."""
+
+    curve: CubicSpline  # q(s), s the length of the path
+    grid: Array  # (m,), of s
+    velocities: Array  # (m,), ds/dt
+    ends: Array  # (m,), t [s]
+    generated: Array  # (k,), times of the movement as it was generated [s]
+    lengths: Array  # (k,), s at these times
+
+
+def fastest(robot: Robot, path: CubicSpline) -> Parameterization | None:
+    """The least time along the path q(s) within velocities, accelerations and torques, standing at both ends.
+
+    Time-optimal path parameterization by reachability analysis, Pham and Pham 2018, as in the package toppra. The
+    acceleration along the path is constant between two points of its grid, and the limits hold at both. The path is
+    one of its length: each joint is counted in its limit of velocity, so where the movement stands nothing is passed.
+    None of a path for which toppra finds no timing, as of one that the arm cannot hold.
+
+    Raises DataError: the extra ``robot`` is not installed; TrajectoryError: a path on which no joint moves.
+    """
+    try:
+        import toppra
+    except ImportError as error:
+        raise DataError("expected the package toppra to time movements; pip install 'kineme[robot]'") from error
+    logging.getLogger("toppra").setLevel(logging.ERROR)
+    constraint, both_ends = toppra.constraint, toppra.constraint.DiscretizationType.Interpolation
+    velocity, acceleration = _USABLE * robot.velocity, _USABLE * robot.acceleration
+    limits = [
+        constraint.JointVelocityConstraint(np.column_stack((-velocity, velocity))),
+        constraint.JointAccelerationConstraint(np.column_stack((-acceleration, acceleration)), both_ends),
+    ]
+    if knows_masses(robot) and not np.isnan(robot.effort).all():
+        effort = _USABLE * np.where(np.isnan(robot.effort), _UNLIMITED, robot.effort)
+        frictionless, within = np.zeros(robot.n_joints), np.column_stack((-effort, effort))
+        limits.append(constraint.JointTorqueConstraint(Torques(robot).of, within, frictionless, both_ends))
+    curve, generated, lengths = _by_length(robot, path)
+    parts = np.arange(_PER_GAP) / _PER_GAP
+    grid = np.append((curve.x[:-1, None] + np.diff(curve.x)[:, None] * parts).ravel(), curve.x[-1])
+    spline = toppra.SplineInterpolator(curve.x, curve(curve.x))
+    algorithm = toppra.algorithm.TOPPRA(limits, spline, gridpoints=grid, solver_wrapper="seidel")
+    _, velocities, _ = algorithm.compute_parameterization(0.0, 0.0)  # at standstill at both ends
+    if velocities is None or not np.isfinite(velocities).all() or not (velocities[1:] + velocities[:-1] > 0).all():
+        return None
+    ends = np.concatenate(([0.0], np.cumsum(2 * np.diff(grid) / (velocities[1:] + velocities[:-1]))))
+    return Parameterization(curve, grid, velocities, ends, generated, lengths)
+
+
+def sampled(robot: Robot, fast: Parameterization, rate: float, factor: float = 1.0) -> Timed:
+    """The joints at even times along the fastest timing, or `factor` times as slowly.
+
+    They are the cubic B-spline whose control points are the joints c_k at times h apart,
+
+        q_k = (c_(k-1) + 4 c_k + c_(k+1)) / 6,
+        v_k = (c_(k+1) - c_(k-1)) / (2 h),
+        a_k = (c_(k-1) - 2 c_k + c_(k+1)) / h^2,
+
+    with the first and the last repeated, so that it begins and ends at a stand. Its velocity and acceleration are
+    means of those of the timing, so they keep its limits, also where that steps from one limit to the opposite one; and
+    its acceleration is linear between samples, where the polynomials of the fifth order of a controller are therefore
+    this spline itself. It leaves the path by ``h^2 a / 6``.
+    """
+    total = factor * float(fast.ends[-1])
+    n = n_samples(total, rate)
+    h = total / (n - 1)
+    s = _along(fast, np.linspace(0.0, fast.ends[-1], n))
+    s = np.concatenate((s[[0, 0]], s, s[[-1, -1]]))
+    controls = fast.curve(s)
+    trajectory = JointTrajectory(
+        robot.joints,
+        h * np.arange(n + 2.0),
+        _smooth(controls),
+        (controls[2:] - controls[:-2]) / (2 * h),
+        (controls[:-2] - 2 * controls[1:-1] + controls[2:]) / h**2,
+        {},
+    )
+    return Timed(trajectory, np.interp(_smooth(s), fast.lengths, fast.generated))
+
+
+def _smooth(controls: Array) -> Array:
+    return np.asarray((controls[:-2] + 4 * controls[1:-1] + controls[2:]) / 6)
+
+
+def _along(fast: Parameterization, times: Array) -> Array:
+    """Lengths s(t) at times (T,)."""
+    k = np.clip(np.searchsorted(fast.ends, times, "right") - 1, 0, len(fast.grid) - 2)
+    since, v = times - fast.ends[k], fast.velocities
+    acceleration = (v[k + 1] ** 2 - v[k] ** 2) / (2 * (fast.grid[k + 1] - fast.grid[k]))
+    return np.asarray(np.clip(fast.grid[k] + v[k] * since + acceleration * since**2 / 2, 0.0, fast.grid[-1]))
+
+
+def _by_length(robot: Robot, path: CubicSpline) -> tuple[CubicSpline, Array, Array]:
+    """The path by its length, each joint counted in its limit of velocity; times of the movement, and lengths there.
+
+    Where the movement stands, its time would have to pass infinitely fast; the length does not.
+    """
+    generated = np.linspace(0.0, float(path.x[-1]), _FINE)
+    joints = path(generated)
+    lengths = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(joints, axis=0) / robot.velocity, axis=1))))
+    if not lengths[-1] > 0:
+        raise TrajectoryError(f"{robot.name}: expected a movement, the joints stand still")
+    least, most = _KNOTS
+    knots = min(max(math.ceil(lengths[-1] / _KNOTS_APART), least), most)
+    begins_knot = np.concatenate(([True], np.diff(np.floor(lengths / lengths[-1] * knots)) > 0))
+    begins_knot[-1] = True
+    return CubicSpline(lengths[begins_knot], joints[begins_knot]), generated, lengths

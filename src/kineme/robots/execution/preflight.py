@@ -5,25 +5,32 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import TrajectoryError
 from kineme.reporting.table import Table
-from kineme.robots.execution.along import Along, along
-from kineme.robots.execution.joint_trajectory import JointTrajectory, between, dense_times, extreme
-from kineme.robots.execution.timing import STANDS, knows_masses
-from kineme.robots.kinematics.descent import kinematics
-from kineme.robots.kinematics.inverse import is_partial
-from kineme.robots.kinematics.task_path import TaskPath
+from kineme.robots.execution.joint_trajectory import (
+    STANDS,
+    JointTrajectory,
+    between,
+    dense_times,
+    extreme,
+    knows_masses,
+)
+from kineme.robots.kinematics.descent import TaskPath, is_partial, kinematics
 from kineme.robots.models.robot import Robot
 from kineme.validation import Array
 
+_MARGIN = 0.005  # links closer than this count as touching [m]
+_RANDOM_POSTURES = 100
+_ALWAYS = 0.9  # of random postures in which a pair of shapes touches: it touches by design
+
 TRACKED = 1e-3  # the tip may be this far from the path [m]
 TURNED = 1.0  # and turned by so many degrees from it, where the orientation is followed
-
 
 _STANDING = 0.02  # of the fastest instant as generated, or of the limits of velocity
 
@@ -296,7 +303,7 @@ def preflight_table(preflight: Preflight) -> Table:
             _limit(check),
             check.unit,
             f"{check.time:.2f}",
-            _verdict(check),
+            "" if math.isnan(check.limit) else "ok" if check.passed else "FAILED",
         )
         for check in preflight.checks
     ]
@@ -306,12 +313,6 @@ def preflight_table(preflight: Preflight) -> Table:
 
 def _limit(check: Check) -> str:
     return "" if math.isnan(check.limit) else f"{check.limit:.4g}"
-
-
-def _verdict(check: Check) -> str:
-    if math.isnan(check.limit):
-        return ""
-    return "ok" if check.passed else "FAILED"
 
 
 def tracking(
@@ -350,3 +351,111 @@ def _angles(rotations: Array, wanted: Array, follow: str) -> Array:
     else:
         cosines = (np.einsum("tji,tji->t", rotations, wanted) - 1) / 2
     return np.asarray(np.arccos(np.clip(cosines, -1, 1)))
+
+
+class Along(NamedTuple):
+    """Kinematics, torques and contacts of an arm at the T samples of a trajectory."""
+
+    tip_positions: Array  # (T, 3) [m]
+    tip_rotations: Array  # (T, 3, 3)
+    heights: Array  # (T, n + 1), of the joints and the tip above the base [m]
+    smallest_singular_values: Array  # (T,), of the Jacobian of the tip, its translation counted in meters
+    holding_torques: Array  # (T, n), at rest in that posture [Nm]
+    moving_torques: Array  # (T, n), what the movement adds
+    contacts: tuple[Contact, ...]  # the first of each pair of links that touch
+
+
+def along(robot: Robot, trajectory: JointTrajectory) -> Along:
+    """Follow the trajectory through the model."""
+    import pinocchio
+
+    model, data = robot.model, robot.model.createData()
+    tip = model.getFrameId(robot.tip)
+    n_samples, n = trajectory.positions.shape
+    positions, rotations, heights = (np.empty((n_samples, *shape)) for shape in ((3,), (3, 3), (n + 1,)))
+    jacobians, holding, total = np.empty((n_samples, 6, n)), np.empty((n_samples, n)), np.empty((n_samples, n))
+    samples = zip(trajectory.positions, trajectory.velocities, trajectory.accelerations, strict=True)
+    for t, (q, v, a) in enumerate(samples):
+        pinocchio.computeJointJacobians(model, data, q)
+        pinocchio.updateFramePlacement(model, data, tip)
+        jacobian = pinocchio.getFrameJacobian(model, data, tip, pinocchio.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+        jacobians[t] = jacobian.reshape(6, n)  # of a single joint it has one axis
+        positions[t], rotations[t] = data.oMf[tip].translation, data.oMf[tip].rotation
+        heights[t] = [*(data.oMi[j].translation[2] for j in range(1, model.njoints)), positions[t, 2]]
+        holding[t] = pinocchio.computeGeneralizedGravity(model, data, q)
+        total[t] = pinocchio.rnea(model, data, q, v, a)
+    singular = np.asarray(np.linalg.svd(jacobians, compute_uv=False)[:, min(6, n) - 1], dtype=np.float64)
+    contacts = contacts_of(robot, trajectory.positions)
+    return Along(positions, rotations, heights, singular, holding, total - holding, contacts)
+
+
+class Contact(NamedTuple):
+    """Two links that touch."""
+
+    sample: int
+    first: str
+    second: str
+
+
+def contacts_of(robot: Robot, positions: Array) -> tuple[Contact, ...]:
+    """The first contact of each pair of shapes that touch, over joint positions (T, n)."""
+    import pinocchio
+
+    geometry, margins = _pair_geometry(robot)
+    if len(geometry.collisionPairs) == 0:
+        return ()
+    data, shapes = robot.model.createData(), geometry.createData()
+    for request, margin in zip(shapes.collisionRequests, margins, strict=True):
+        request.security_margin = margin
+    first_samples: dict[int, int] = {}
+    for t, q in enumerate(positions):
+        if pinocchio.computeCollisions(robot.model, data, geometry, shapes, q, False):
+            for k, result in enumerate(shapes.collisionResults):
+                if result.isCollision():
+                    first_samples.setdefault(k, t)
+    pairs = geometry.collisionPairs
+
+    def link(shape: int) -> str:
+        return str(robot.model.frames[geometry.geometryObjects[shape].parentFrame].name)
+
+    return tuple(Contact(t, link(pairs[k].first), link(pairs[k].second)) for k, t in first_samples.items())
+
+
+@lru_cache(maxsize=8)
+def _pair_geometry(robot: Robot) -> tuple[Any, tuple[float, ...]]:
+    """The arm's shapes with the pairs that can touch, and the margin of each pair [m].
+
+    None of neighboring links, and none that touch in nearly all postures: those overlap by design, as two links on one
+    axis do. Links that are within the margin of one another where the arm rests, without touching, have none.
+    """
+    import pinocchio
+
+    geometry = robot.geometry.copy()
+    geometry.removeAllCollisionPairs()
+    objects = geometry.geometryObjects
+    parents = list(robot.model.parents)
+    for i, first in enumerate(objects):
+        for j in range(i + 1, len(objects)):
+            a, b = first.parentJoint, objects[j].parentJoint
+            if a != b and parents[a] != b and parents[b] != a:
+                geometry.addCollisionPair(pinocchio.CollisionPair(i, j))
+    postures = np.random.default_rng(0).uniform(robot.lower, robot.upper, (_RANDOM_POSTURES, robot.n_joints))
+    shares = _touching(robot, geometry, postures, _MARGIN).mean(axis=0)
+    for k in np.flatnonzero(shares > _ALWAYS)[::-1]:
+        geometry.removeCollisionPair(geometry.collisionPairs[int(k)])
+    near, touching = (_touching(robot, geometry, robot.rest[None], margin)[0] for margin in (_MARGIN, 0.0))
+    return geometry, tuple(np.where(near & ~touching, 0.0, _MARGIN).tolist())
+
+
+def _touching(robot: Robot, geometry: Any, postures: Array, margin: float) -> Array:
+    """Tell of each pair of shapes whether it is closer than the margin [m], in each posture: (T, pairs)."""
+    import pinocchio
+
+    data, shapes = robot.model.createData(), geometry.createData()
+    for request in shapes.collisionRequests:
+        request.security_margin = margin
+    touching = np.zeros((len(postures), len(geometry.collisionPairs)), dtype=bool)
+    for t, q in enumerate(postures):
+        pinocchio.computeCollisions(robot.model, data, geometry, shapes, q, False)
+        touching[t] = [result.isCollision() for result in shapes.collisionResults]
+    return touching

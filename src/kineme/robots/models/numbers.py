@@ -14,7 +14,6 @@ from kineme.errors import DataError
 _MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 SIZES = {"box": ("size", 3), "cylinder": ("radius length", 1), "sphere": ("radius", 1)}  # and how many numbers each has
 
-
 _ORIGIN = {"xyz": 3, "rpy": 3, "quat_xyzw": 4}  # attributes of an <origin>, and how many numbers each has
 _ELEMENTS = ("origin", "axis", "limit", "mimic")  # of a joint: one that is misspelt would be left out
 _TURNS = 4 * math.pi  # angles beyond are rather degrees [rad]

@@ -7,13 +7,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kineme.dmp.generation.generate import MovementOptions, generate
-from kineme.dmp.generation.learned import Learned
+from kineme.dmp.generation.generate import Learned, MovementOptions, generate
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.channels.coordinates import as_wxyz
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.robots.execution.preflight import TRACKED
-from kineme.robots.kinematics.task_path import PLANES
+from kineme.robots.kinematics.descent import PLANES
 from kineme.robots.models.robot import Robot
 from kineme.robots.planning.roles import Roles, Scales, roles_of, scales_of
 from kineme.validation import Array, as_numbers
@@ -33,9 +32,6 @@ class _Frame(NamedTuple):
     start: Array  # (n,), as recorded
     units: Array  # (n,), meters or radians for one of each
     origin: Array  # (n,) [m] or [rad]
-
-    def to_robot(self, recorded: Array) -> Array:
-        return (recorded - self.start) * self.units + self.origin
 
     def to_recording(self, point: Array) -> Array:
         return self.start + (point - self.origin) / self.units
@@ -98,7 +94,7 @@ def generate_at(  # noqa: PLR0913 - one parameter per option
     options = MovementOptions(goal=target, duration=duration, rate=rate, meet_goal=target is not None)
     generated = generate(learned, options).columns
     recorded = generated["positions"]
-    moved = frame.to_robot(recorded[:, roles.positions])
+    moved = (recorded[:, roles.positions] - frame.start) * frame.units + frame.origin
     through = end if begin is None else begin
     if through is not None and len(through) > n:
         flat, moved = moved, np.tile(through, (len(moved), 1))  # in the plane through that point

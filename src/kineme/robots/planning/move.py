@@ -17,20 +17,27 @@ from kineme.movements.channels.coordinates import as_wxyz
 from kineme.movements.rotations import quaternion_of
 from kineme.movements.segmentation.segment import as_recording
 from kineme.robots.execution.preflight import TRACKED
-from kineme.robots.kinematics.choose import choose_place, choose_posture
-from kineme.robots.kinematics.descent import kinematics
-from kineme.robots.kinematics.inverse import ORIENTATIONS, InverseKinematics
-from kineme.robots.kinematics.pursuit import pursue
-from kineme.robots.kinematics.reach import OutOfReachError, check_reached
-from kineme.robots.kinematics.task_path import PLANES, TaskPath, task_path
+from kineme.robots.kinematics.descent import (
+    ORIENTATIONS,
+    PLANES,
+    InverseKinematics,
+    OutOfReachError,
+    TaskPath,
+    check_reached,
+    kinematics,
+    task_path,
+)
+from kineme.robots.kinematics.pursuit import choose_place, choose_posture, pursue
 from kineme.robots.models.robot import Robot, check_robot, check_start
-from kineme.robots.planning.refusal import loses_its_path, refuse_failed, refuse_outside
 from kineme.robots.planning.robot_movement import (
     FASTEST_RATE,
     SLOWEST_RATE,
     TIMINGS,
     PlannedPath,
     RobotMovement,
+    loses_its_path,
+    refuse_failed,
+    refuse_outside,
     with_timing,
 )
 from kineme.robots.planning.roles import JOINT_UNITS, SPACES, check_plausible, roles_of, scales_of, space_of
@@ -148,7 +155,11 @@ def move(  # noqa: PLR0913 - one parameter per option
             refuse_failed(result, planned, timing)
         return result
     ik = InverseKinematics(robot, follow)
-    return _along(ik, path_of_the_tip(ik, request, orientation, plane), place, planned, timing, force)
+    # A missing orientation or third coordinate is that of the tip at rest.
+    turned = request.orientations if orientation is None else orientation
+    turned = quaternion_of(ik.tip_rotation) if turned is None else turned
+    path = task_path(request.times, request.positions, turned, plane, ik.tip_position)
+    return _along(ik, path, place, planned, timing, force)
 
 
 def _along(
@@ -210,15 +221,6 @@ def _posture(start: ArrayLike, robot: Robot) -> Array:
         raise TrajectoryError(f"expected start as the positions of {robot.n_joints} joints, got shape {q.shape}")
     check_start(robot, q)
     return q
-
-
-def path_of_the_tip(
-    ik: InverseKinematics, request: Request, orientation: ArrayLike | None = None, plane: str = "xy"
-) -> TaskPath:
-    """Return the poses that are asked for; a missing orientation or third coordinate is that of the tip at rest."""
-    turned = request.orientations if orientation is None else orientation
-    at_rest = quaternion_of(ik.tip_rotation)
-    return task_path(request.times, request.positions, at_rest if turned is None else turned, plane, ik.tip_position)
 
 
 class Way(NamedTuple):

@@ -3,23 +3,42 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from base64 import b64encode
+from collections.abc import Iterator
 from hashlib import sha256
+from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
+from xml.etree import ElementTree
 
 import numpy as np
 
+from kineme.errors import DataError
 from kineme.reporting.atomic import write_atomically
 from kineme.reporting.figures import BLUE, GRAY, GREEN, ORANGE
 from kineme.reporting.text import counted, in_markup, printable
 from kineme.robots.execution.preflight import preflight_table
 from kineme.robots.kinematics.descent import kinematics
+from kineme.robots.models.numbers import SIZES, finite_numbers
+from kineme.robots.models.robot import FOLDER, MODELS, Robot
+from kineme.robots.models.urdf import find_mesh, read_root
 from kineme.robots.planning.robot_movement import RobotMovement, duration_in_words
-from kineme.robots.view.shapes import Shapes, shapes_of
 from kineme.sampling import evenly_spaced
 from kineme.validation import Array
+
+Element = ElementTree.Element
+
+_PACKAGE = "example-robot-data"
+_ROBOTS = "cmeel.prefix/share/example-robot-data/robots"  # within what its wheel installs
+
+_LARGEST = 16_000_000  # bytes of all meshes of one page
+_MESHES = {".stl": "stl", ".dae": "collada"}
+
+_GRAYS = ((0.80, 0.82, 0.85, 1.0), (0.58, 0.61, 0.66, 1.0))  # of links one after the other that have no color
+_THICKNESS = 0.12  # of the cylinder between two joints: its radius for each meter of its length
+_THIN, _THICK = 0.01, 0.05  # bounds of that radius [m]
 
 MOST_SAMPLES = 3000  # of a page; between two of them the page interpolates
 
@@ -188,3 +207,211 @@ def _rounded(values: Array) -> Any:
 def as_script_data(data: dict[str, Any]) -> str:
     """JSON that can stand in a script element: no ``<`` is left in it that could end the element."""
     return json.dumps(data, separators=(",", ":")).replace("<", r"\u003c")
+
+
+class Shapes(NamedTuple):
+    """Shapes of an arm. Links are called l0, l1, ... and joints j0, j1, ...: no name of the file is in the text."""
+
+    urdf: str
+    meshes: tuple[Mesh, ...]  # a file name in `urdf` is an index into them
+    joints: tuple[str, ...]  # those of the robot, in its order
+    tip: str
+    stand_ins: tuple[str, ...]  # links of the file that are drawn as cylinders
+
+
+def shapes_of(robot: Robot) -> Shapes:
+    """The visual shapes of an arm, by name those that are installed; where a link has none, its collision shapes.
+
+    A link whose meshes are not there, of another format than STL and COLLADA, or larger than 16 MB with those before
+    them, is drawn as cylinders to the joints that it bears; so is every link of a file without any shape.
+    """
+    root = root_with_shapes(robot)
+    links = {str(link.get("name")): f"l{i}" for i, link in enumerate(root.findall("link"))}
+    joints = {str(joint.get("name")): f"j{i}" for i, joint in enumerate(root.findall("joint"))}
+    drawer = LinkShapes(root, robot.source)
+    drawn = {name: drawer.of(link) for name, link in zip(links, root.findall("link"), strict=True)}
+    nothing = not any(drawn.values())
+    bare = [name for name in links if not drawn[name] and (nothing or name in drawer.without)]
+    arm = ElementTree.Element("robot", name="arm")
+    for i, (name, link) in enumerate(links.items()):
+        to = ElementTree.SubElement(arm, "link", name=link)
+        shapes = drawn[name] if name not in bare else list(_cylinders(root, name))
+        for shape in shapes:
+            set_color(shape, _GRAYS[i % 2])
+        to.extend(shapes)
+    moving = {str(joint.get("name")): joint for joint in root.findall("joint") if joint.get("name") in robot.joints}
+    for joint in root.findall("joint"):
+        arm.append(_joint(joint, joints[str(joint.get("name"))], links, str(joint.get("name")) in moving))
+    return Shapes(
+        ElementTree.tostring(arm, "unicode"),
+        tuple(drawer.meshes),
+        tuple(joints[name] for name in robot.joints),
+        links[robot.tip],
+        tuple(name for name in bare if name in drawer.without),
+    )
+
+
+def _joint(given: Element, name: str, links: dict[str, str], moves: bool) -> Element:
+    """The joint; one that the arm does not move is fixed where the model has it, at 0."""
+    kind = ("prismatic" if given.get("type") == "prismatic" else "revolute") if moves else "fixed"
+    joint = ElementTree.Element("joint", name=name, type=kind)
+    joint.append(origin_of(given))
+    for end in ("parent", "child"):
+        link = given.find(end)
+        ElementTree.SubElement(joint, end, link=links["" if link is None else str(link.get("link"))])
+    axis = given.find("axis")
+    values = [] if axis is None else finite_numbers(axis.get("xyz"), 3)
+    ElementTree.SubElement(joint, "axis", xyz=as_text(values if any(values) else [1.0, 0.0, 0.0]))
+    return joint
+
+
+def _cylinders(root: Element, link: str) -> Iterator[Element]:
+    """One from the frame of a link to each joint that it bears."""
+    for joint in root.findall("joint"):
+        parent = joint.find("parent")
+        if parent is None or parent.get("link") != link:
+            continue
+        x, y, z = finite_numbers(origin_of(joint).get("xyz"), 3)
+        length = math.hypot(x, y, z)
+        if length < 1e-3:
+            continue
+        visual = ElementTree.Element("visual")
+        turned = [0.0, math.acos(z / length), math.atan2(y, x)]
+        ElementTree.SubElement(visual, "origin", xyz=as_text([x / 2, y / 2, z / 2]), rpy=as_text(turned))
+        radius = min(max(_THICKNESS * length, _THIN), _THICK)
+        shape = ElementTree.Element("cylinder", radius=as_text([radius]), length=as_text([length]))
+        ElementTree.SubElement(visual, "geometry").append(shape)
+        yield visual
+
+
+class Mesh(NamedTuple):
+    """A mesh as the page holds it."""
+
+    kind: str  # "stl" or "collada"
+    content: bytes
+
+
+class LinkShapes:
+    """The shapes of one link after the other, and the meshes that they need."""
+
+    def __init__(self, root: Element, path: Path) -> None:
+        self.colors = {
+            material.get("name"): color
+            for material in root.findall("material")
+            if (color := material.find("color")) is not None
+        }
+        self.path = path
+        self.meshes: list[Mesh] = []
+        self.without: list[str] = []  # links with shapes, none of which can be drawn
+        self._numbers: dict[Path, int] = {}
+        self._bytes = 0
+
+    def of(self, link: Element) -> list[Element]:
+        """The visual shapes of a link, or else its collision shapes; none where they cannot be drawn."""
+        for tag in ("visual", "collision"):
+            shapes = [shape for given in link.findall(tag) if (shape := self._shape(given)) is not None]
+            if shapes:
+                return shapes
+        if link.find("visual") is not None or link.find("collision") is not None:
+            self.without.append(str(link.get("name")))
+        return []
+
+    def _shape(self, given: Element) -> Element | None:
+        geometry = given.find("geometry")
+        shape = None if geometry is None or len(geometry) == 0 else self._geometry(geometry[0])
+        if shape is None:
+            return None
+        visual = ElementTree.Element("visual")
+        visual.append(origin_of(given))
+        ElementTree.SubElement(visual, "geometry").append(shape)
+        color = given.find("material/color")
+        if color is None and (material := given.find("material")) is not None:
+            color = self.colors.get(material.get("name"))
+        values = [] if color is None else finite_numbers(color.get("rgba"), 4)
+        if values:
+            set_color(visual, tuple(min(max(value, 0.0), 1.0) for value in values))
+        return visual
+
+    def _geometry(self, given: Element) -> Element | None:
+        if given.tag == "mesh":
+            number = self._mesh(given.get("filename", ""))
+            if number is None:
+                return None
+            scale = finite_numbers(given.get("scale"), 3) or [1.0, 1.0, 1.0]
+            return ElementTree.Element("mesh", filename=str(number), scale=as_text(scale))
+        if given.tag not in SIZES:
+            return None
+        names, length = SIZES[given.tag]
+        sizes = {name: finite_numbers(given.get(name), length) for name in names.split()}
+        if not all(values and min(values) > 0 for values in sizes.values()):
+            return None
+        return ElementTree.Element(given.tag, {name: as_text(values) for name, values in sizes.items()})
+
+    def _mesh(self, name: str) -> int | None:
+        path = find_mesh(name, self.path)
+        if path is None or path.suffix.lower() not in _MESHES:
+            return None
+        if path not in self._numbers:
+            self._bytes += path.stat().st_size
+            if self._bytes > _LARGEST:
+                return None
+            self._numbers[path] = len(self.meshes)
+            self.meshes.append(Mesh(_MESHES[path.suffix.lower()], path.read_bytes()))
+        return self._numbers[path]
+
+
+def root_with_shapes(robot: Robot) -> Element:
+    """The URDF of an arm; of an arm by name, with the shapes of its links in the package instead of ours.
+
+    Its frames of links are those of the models here.
+    """
+    root = read_root(robot.source)
+    model = MODELS.get(robot.name) if robot.source.parent == FOLDER else None
+    folder = robots_folder() if model is not None and model.meshes else None
+    if model is None or folder is None:
+        return root
+    path = folder / model.meshes
+    try:
+        shown = read_root(path)
+    except DataError:  # of another release, without this arm
+        return root
+    links = {link.get("name"): link for link in shown.findall("link")}
+    for mesh in shown.iterfind("link/visual/geometry/mesh"):
+        file = find_mesh(mesh.get("filename", ""), path)
+        mesh.set("filename", "" if file is None else str(file))
+    for link in root.findall("link"):
+        like = links.get(link.get("name"))
+        if like is not None and like.find("visual") is not None:
+            for visual in link.findall("visual"):
+                link.remove(visual)
+            link.extend(like.findall("visual"))
+    root.extend(shown.findall("material"))
+    return root
+
+
+def robots_folder() -> Path | None:
+    """Find the folder of the robots of the package; None where it is not installed."""
+    try:
+        folder = Path(str(distribution(_PACKAGE).locate_file(_ROBOTS)))
+    except PackageNotFoundError:
+        return None
+    return folder if folder.is_dir() else None
+
+
+def origin_of(given: Element) -> Element:
+    """A copy of the origin of an element; at 0 what it does not say."""
+    origin = given.find("origin")
+    values = {name: [] if origin is None else finite_numbers(origin.get(name), 3) for name in ("xyz", "rpy")}
+    return ElementTree.Element("origin", {name: as_text(value or [0.0, 0.0, 0.0]) for name, value in values.items()})
+
+
+def set_color(shape: Element, rgba: tuple[float, ...]) -> None:
+    """Give a shape a color, unless it has one."""
+    if shape.find("material") is None:
+        material = ElementTree.SubElement(shape, "material", name="")
+        ElementTree.SubElement(material, "color", rgba=as_text(list(rgba)))
+
+
+def as_text(values: list[float]) -> str:
+    """Numbers as an attribute."""
+    return " ".join(f"{value:.9g}" for value in values)

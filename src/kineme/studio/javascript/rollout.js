@@ -290,7 +290,7 @@ function passThrough(how, smooth, formulation, via, goal, numbers, map, faster) 
     for (const [j, row] of gain.entries()) for (const [i, value] of row.entries()) own[i] += missing[j][k] * value;
 }
 
-/** Rows by which what is missing changes the weights: F' Q R'^-1 with F A' = Q R, see kineme.dmp.condition. */
+/** Rows by which what is missing changes the weights: F' Q R'^-1 with F A' = Q R, see kineme.dmp.discrete.operators. */
 function gains(smooth, states, N) {
   const Q = states.map((state) => Float64Array.from({ length: N }, (_, i) => product(smooth, i * N, state, 0, N)));
   const found = [];

@@ -13,7 +13,7 @@ from pydantic import BaseModel
 
 from kineme.anchoring.figures import classical_scaling
 from kineme.anchoring.space import conceptual_space
-from kineme.dmp.discrete.formulations import FORMULATIONS
+from kineme.dmp.discrete.specification import FORMULATIONS
 from kineme.io.writing.write_movement import WRITERS
 from kineme.library.members import described
 from kineme.library.storage import read

@@ -10,14 +10,12 @@ from pydantic import BaseModel, Field
 
 from kineme.errors import KinemeError, SpecificationError
 from kineme.robots.execution.preflight import Preflight
-from kineme.robots.models.load import MODELS, load
-from kineme.robots.models.robot import Robot
+from kineme.robots.models.robot import MODELS, Robot, load
 from kineme.robots.planning.generate_at import generate_at
 from kineme.robots.planning.move import move as move_arm
-from kineme.robots.planning.refusal import InfeasibleError
+from kineme.robots.planning.robot_movement import InfeasibleError
 from kineme.robots.planning.roles import space_of
-from kineme.robots.view.shapes import shapes_of
-from kineme.robots.view.write_view import scene_data
+from kineme.robots.view.write_view import scene_data, shapes_of
 from kineme.studio.server.records import Number, Point, Text, numbers
 from kineme.studio.server.refusals import in_studio_words
 from kineme.studio.server.rollout_routes import PrimitiveRequest, learned_as

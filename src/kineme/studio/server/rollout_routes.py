@@ -11,9 +11,8 @@ from fastapi import APIRouter
 from fastapi.responses import Response
 from pydantic import BaseModel, Field, model_validator
 
-from kineme.dmp.control.options import ObstacleAvoidance
-from kineme.dmp.generation.generate import Generated, MovementOptions, generate
-from kineme.dmp.generation.learned import Learned, learn_one
+from kineme.dmp.control.plan import ObstacleAvoidance
+from kineme.dmp.generation.generate import Generated, Learned, MovementOptions, generate, learn_one
 from kineme.dmp.styles.model import StyleModel, learn_styles
 from kineme.errors import SpecificationError, heard_warnings
 from kineme.io.writing.write_movement import WRITERS, encode_movement
