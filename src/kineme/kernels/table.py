@@ -298,7 +298,7 @@ def tile_sums_of(term: Term, n_terms: int) -> TileSums:
     return twin_sums
 
 
-def median_of_sums(term: Term, finish: Callable[[Rows], object], X: Rows) -> float:
+def _median_of_sums(term: Term, finish: Callable[[Rows], object], X: Rows) -> float:
     """Median over pairs of different rows of finish(sum of `term` over coordinates), in place.
 
     Of large X, 1000 evenly spaced rows are used, so the result is deterministic. Pairs of equal rows are
@@ -393,7 +393,7 @@ class RBF(Kernel):
     sigma: float | None = field(default=None, metadata={"width": True})
 
     def _median_width(self, name: str, X: Rows) -> float:
-        return median_of_sums(SQUARED, lambda tile: np.sqrt(tile, out=tile), X)
+        return _median_of_sums(SQUARED, lambda tile: np.sqrt(tile, out=tile), X)
 
     def _fill(self, A: Rows, B: Rows | None, gram: Rows) -> None:
         # ‖a - b‖² = ‖a‖² + ‖b‖² - 2 a·b is one matrix product, but loses the digits that the norms
@@ -453,7 +453,7 @@ class Laplacian(Kernel):
     sigma: float | None = field(default=None, metadata={"width": True})
 
     def _median_width(self, name: str, X: Rows) -> float:
-        return median_of_sums(ABSOLUTE, lambda tile: tile, X)
+        return _median_of_sums(ABSOLUTE, lambda tile: tile, X)
 
     def _fill(self, A: Rows, B: Rows | None, gram: Rows) -> None:
         assert self.sigma is not None
