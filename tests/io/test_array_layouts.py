@@ -9,8 +9,9 @@ from scipy.io import savemat
 
 import kineme
 from kineme.io.arrays.arrays import arrays_movements
-from kineme.io.reading.recordings import read_recordings, read_recordings_from_bytes
+from kineme.io.reading.recordings import read_recordings
 from kineme.movements.tables.layout import Layout
+from recordings_in_bytes import read_recordings_from_bytes
 
 T = np.arange(5) / 10
 X = np.column_stack((T, T**2, 1 - T))

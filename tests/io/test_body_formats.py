@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from kineme.errors import DataError
-from kineme.io.reading.recordings import read_recordings_from_bytes
 from kineme.movements.tables.layout import Layout
+from recordings_in_bytes import read_recordings_from_bytes
 
 N = 24
 T = np.arange(N) / 60

@@ -14,9 +14,10 @@ import pytest
 import kineme
 from kineme.io import limits
 from kineme.io.limits import VARIABLE, max_file_bytes
-from kineme.io.reading.recordings import read_recordings, read_recordings_from_bytes
+from kineme.io.reading.recordings import read_recordings
 from kineme.movements.tables.layout import Layout
 from limited_child import MIB, LimitedChild
+from recordings_in_bytes import read_recordings_from_bytes
 
 T = np.arange(6) / 100
 X = np.column_stack((T, T**2))
@@ -128,7 +129,7 @@ def test_more_bytes_than_an_entry_admits_are_not_expanded():
     small = whole.replace(struct.pack("<I", 120 * MIB), struct.pack("<I", 176))
     assert small != whole
     with LimitedChild(("kineme.io.reading.recordings",), memory=60 * MIB) as child:
-        outcome = child.call("kineme.io.reading.recordings:read_recordings_from_bytes", small, "a.npz", Layout())
+        outcome = child.call("recordings_in_bytes:read_recordings_from_bytes", small, "a.npz", Layout())
     assert outcome.how == "refused", outcome
     assert "CRC" in outcome.what  # not that the memory was too small
 

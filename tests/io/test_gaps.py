@@ -7,8 +7,9 @@ from click.testing import CliRunner
 from kineme.cli import main
 from kineme.errors import DataError, SpecificationError
 from kineme.io.reading.recording_gaps import notes_on_gaps
-from kineme.io.reading.recordings import read_recording, read_recordings, read_recordings_from_bytes
+from kineme.io.reading.recordings import read_recording, read_recordings
 from kineme.movements.tables.layout import Layout
+from recordings_in_bytes import read_recordings_from_bytes
 
 RATE = 100
 MARKERS = ("LASI", "RASI", "LFIN")

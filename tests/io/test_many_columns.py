@@ -7,9 +7,9 @@ import time
 import pytest
 
 import kineme
-from kineme.io.reading.recordings import read_recordings_from_bytes
 from kineme.movements.tables.columns import choose_roles
 from kineme.movements.tables.layout import Layout
+from recordings_in_bytes import read_recordings_from_bytes
 
 HEADS = ["t", *(f"v_{k}" for k in range(8000))]
 

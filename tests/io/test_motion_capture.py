@@ -5,9 +5,10 @@ import pytest
 
 from kineme.errors import DataError
 from kineme.io.inspection.inspect import as_words, inspect
-from kineme.io.reading.recordings import read_recordings, read_recordings_from_bytes
+from kineme.io.reading.recordings import read_recordings
 from kineme.movements.channels.channel import recorded_names
 from kineme.movements.tables.layout import Layout
+from recordings_in_bytes import read_recordings_from_bytes
 
 N = 12
 

@@ -9,9 +9,9 @@ import pytest
 from pyarrow import parquet
 
 import kineme
-from kineme.io.reading.recordings import read_recordings_from_bytes
 from kineme.io.tables.parquet import _texts
 from kineme.movements.tables.layout import Layout
+from recordings_in_bytes import read_recordings_from_bytes
 
 T = np.arange(6) / 100
 X = T**2

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme.io.reading.recordings import read_recordings_from_bytes
 from kineme.movements.tables.layout import Layout
+from recordings_in_bytes import read_recordings_from_bytes
 
 RANDOM = np.random.default_rng(3)
 POINTS = RANDOM.normal(size=(6, 16, 2)).round(6)

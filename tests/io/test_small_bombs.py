@@ -28,16 +28,14 @@ def child():
 
 @pytest.mark.parametrize("name", TABLES)
 def test_tables_of_nothing_are_refused_at_once(child, name):
-    outcome = child.call("kineme.io.reading.recordings:read_recordings_from_bytes", TABLES[name], "a.csv", Layout())
+    outcome = child.call("recordings_in_bytes:read_recordings_from_bytes", TABLES[name], "a.csv", Layout())
     assert outcome.how == "refused", outcome
     assert len(str(outcome.what)) < 600
 
 
 def test_many_lines_with_an_empty_cell_are_read_in_seconds_and_an_empty_column_is_left_aside(child):
     rows = b"".join(b"%d,,%d\n" % (k, k * k) for k in range(60_000))
-    outcome = child.call(
-        "kineme.io.reading.recordings:read_recordings_from_bytes", b"time,x,y\n" + rows, "a.csv", Layout()
-    )
+    outcome = child.call("recordings_in_bytes:read_recordings_from_bytes", b"time,x,y\n" + rows, "a.csv", Layout())
     assert outcome.how == "done", outcome
     assert outcome.what.demonstrations.lengths.tolist() == [60_000]
     assert outcome.what.detected[0][0].ignored == ("x",)

@@ -8,10 +8,10 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import kineme
-from kineme.io.reading.recordings import read_recordings_from_bytes
 from kineme.io.tables import text_table
 from kineme.io.tables.text_table import read_text_table
 from kineme.movements.tables.layout import Layout
+from recordings_in_bytes import read_recordings_from_bytes
 
 
 def outcome(data, layout=Layout()):  # noqa: B008 - frozen

@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 
 import kineme
 from kineme.io.reading.check_block import SENTINELS
-from kineme.io.reading.recordings import read_recordings, read_recordings_from_bytes
+from kineme.io.reading.recordings import read_recordings
 from kineme.movements.tables.columns import choose_roles, is_time
 from kineme.movements.tables.layout import Layout, distinct
+from recordings_in_bytes import read_recordings_from_bytes
 
 SIX = [(k, 10.0 + k, 20.0 - k * k) for k in range(6)]
 

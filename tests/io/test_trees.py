@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from kineme.errors import DataError
-from kineme.io.reading.recordings import read_recordings, read_recordings_from_bytes
+from kineme.io.reading.recordings import read_recordings
 from kineme.movements.tables.layout import Layout
+from recordings_in_bytes import read_recordings_from_bytes
 
 T = np.arange(10) / 10
 X = np.column_stack((np.sin(T), T**2))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from kineme.datasets.lasa import LASA_26, PAPER_LETTERS, load_lasa
 from kineme.errors import DataError
-from kineme.io.reading.merge_files import Recordings, people_of
+from kineme.io.reading.merge_files import Recordings, each_person
 from kineme.io.reading.recordings import read_recordings
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import label_array
@@ -76,7 +76,11 @@ def load_data(data: str, read_path: Callable[[Path], Recordings] = read_recordin
         )
     labels = label_array([label for label, keep in zip(read.labels, kept, strict=True) if keep])
     chosen = read.demonstrations[np.flatnonzero(kept)].movements
-    people = people_of(path, [source for source, keep in zip(read.sources, kept, strict=True) if keep])
+    shown_by = each_person(path, [source for source, keep in zip(read.sources, kept, strict=True) if keep])
+    people: NDArray[Any] | None = None  # where any is unknown, or all are the same person
+    if None not in shown_by and len(set(shown_by)) > 1:
+        people = np.empty(len(shown_by), dtype=object)
+        people[:] = shown_by
     name = path.resolve().name if path.is_dir() else path.stem
     return DataSet(name, Demonstrations.of_movements(replace(chosen, labels=labels)), left_out, people)
 

@@ -8,11 +8,12 @@ import pytest
 from kineme.io.inspection.figure import draw_recordings
 from kineme.io.inspection.inspect import as_data, as_words, duplicates_among, inspect
 from kineme.io.reading.recording_gaps import GAP, sampling_of
-from kineme.io.reading.recordings import read_recordings, read_recordings_from_bytes
+from kineme.io.reading.recordings import read_recordings
 from kineme.io.writing.write_movement import write_movement
 from kineme.movements.tables.layout import Layout
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.reporting.figures import encode_figure
+from recordings_in_bytes import read_recordings_from_bytes
 
 
 def ragged(seed, n=12):

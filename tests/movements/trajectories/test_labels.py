@@ -11,9 +11,9 @@ import pytest
 import kineme
 from kineme import Demonstrations, Recognizer, Trajectory
 from kineme.errors import TrajectoryError
-from kineme.io.reading.recordings import read_recordings_from_bytes
 from kineme.movements.tables.layout import Layout
 from kineme.movements.trajectories.labels import label_array
+from recordings_in_bytes import read_recordings_from_bytes
 
 X = np.arange(20.0)[:, None] ** [1, 2]
 T = np.arange(20.0)

@@ -320,16 +320,6 @@ def _check_orientations(file: FileRead, channels: Channels, skip: str) -> tuple[
     return file._replace(block=take_movements(block, good)), problems
 
 
-def people_of(path: Path, sources: Sequence[Source]) -> NDArray[Any] | None:
-    """Return `each_person`, shape (n,); None where any is unknown, or all are the same person."""
-    people = each_person(path, sources)
-    if None in people or len(set(people)) < 2:
-        return None
-    named = np.empty(len(people), dtype=object)
-    named[:] = people
-    return named
-
-
 def each_person(path: Path, sources: Sequence[Source]) -> list[str | None]:
     """The person of each movement, or None where it is unknown.
 

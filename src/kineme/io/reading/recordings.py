@@ -206,11 +206,6 @@ def read_paths(  # noqa: PLR0913 - those of `read_recordings`, in records
     return trimmed(recordings) if trim else recordings
 
 
-def read_recordings_from_bytes(data: bytes, name: str, layout: Layout) -> Recordings:
-    """Read what a file of that name would hold, for data that come from elsewhere."""
-    return read_paths([], layout, NameRule(), standard_input=(name, data))
-
-
 def trimmed(recordings: Recordings) -> Recordings:
     """Recordings without the rests at both ends of each movement, see `TrimRest`."""
     moving = TrimRest().apply(recordings.demonstrations)
