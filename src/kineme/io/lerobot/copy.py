@@ -35,18 +35,10 @@ TEXT_FEATURE = {"dtype": "string", "shape": [1], "names": None}
 
 
 class Motion(NamedTuple):
-    """A text about a movement of an episode.
+    """A text about a movement of an episode."""
 
-    Attributes
-    ----------
-    start : float
-        Seconds since the beginning of the episode; the stored stamp of the nearest frame is written.
-    content : str
-        JSON that begins with `OWN`, so that a later copy can replace it.
-    """
-
-    start: float
-    content: str
+    start: float  # seconds since the beginning of the episode; the stored stamp of the nearest frame is written
+    content: str  # JSON that begins with `OWN`, so that a later copy can replace it
 
 
 class Column(NamedTuple):

@@ -257,20 +257,14 @@ class Part(NamedTuple):
 
 @dataclass(frozen=True)
 class NameRule:
-    """The origin of labels, if not the recording or its innermost folder.
+    """The origin of labels, if not the recording or its innermost folder."""
 
-    Attributes
-    ----------
-    label_pattern : str, optional
-        A file name with fields in braces, as ``"{person}_{label}_{n}.csv"``. ``{label}`` is the label, ``{person}`` who
-        showed the movements; other fields are passed over, and ``{n}`` is a number. Each takes as little as it can,
-        and all other text is taken literally. With slashes it is compared with as many folders too.
-    label_by : {"task", "folder"} or int, optional
-        ``"task"``: the label in the recording alone, as the tasks of LeRobot; ``"folder"``: the innermost folder, also
-        of a file that is given alone; a number: the folder so many levels up, 1 for the innermost.
-    """
-
+    # A file name with fields in braces, as ``"{person}_{label}_{n}.csv"``. ``{label}`` is the label, ``{person}`` who
+    # showed the movements; other fields are passed over, and ``{n}`` is a number. Each takes as little as it can, and
+    # all other text is taken literally. With slashes it is compared with as many folders too.
     label_pattern: str | None = None
+    # ``"task"``: the label in the recording alone, as the tasks of LeRobot; ``"folder"``: the innermost folder, also of
+    # a file that is given alone; a number: the folder so many levels up, 1 for the innermost.
     label_by: str | int | None = None
 
     def __post_init__(self) -> None:

@@ -321,30 +321,16 @@ SEGMENTERS: dict[str, type[Any]] = {"rest": Rest, "speed": SpeedMinima, "change-
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A recording, smoothed as much as its noise requires.
+    """A recording, smoothed as much as its noise requires."""
 
-    Attributes
-    ----------
-    times : ndarray of shape (T,)
-    positions : ndarray of shape (T, d)
-        Smoothed.
-    speed : ndarray of shape (T,)
-        Norm of the derivative of the smoothed positions [unit/s].
-    peak : float
-        Robust peak speed: nine tenths of the path are covered at lower speed. Weighted by path, not by time, so that
-        long rests do not lower it.
-    noise : float
-        Root mean square speed of the noise that remains after smoothing [unit/s].
-    cutoff : float
-        Cutoff frequency of the smoothing [Hz].
-    """
-
-    times: Array
-    positions: Array
-    speed: Array
+    times: Array  # shape (T,)
+    positions: Array  # shape (T, d); smoothed
+    speed: Array  # shape (T,); norm of the derivative of the smoothed positions [unit/s]
+    # Robust peak speed: nine tenths of the path are covered at lower speed. Weighted by path, not by time, so that
+    # long rests do not lower it.
     peak: float
-    noise: float
-    cutoff: float
+    noise: float  # root mean square speed of the noise that remains after smoothing [unit/s]
+    cutoff: float  # cutoff frequency of the smoothing [Hz]
 
 
 def observe(recording: Trajectory, resolution: float) -> Motion:
