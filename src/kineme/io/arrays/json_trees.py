@@ -150,10 +150,15 @@ def as_tree(value: Any) -> Any:
                 "expected movements, got the people of one frame, as OpenPose writes it: which of them moves nothing "
                 "says; write a table with a line for each frame, its number or time and the points of one person"
             )
-        if any(
-            name.lower() == "name" for name in value
-        ):  # strokes of what has one name are one, as of the $N recognizer
-            value = {name: _drawn(entry) if name.lower() == "strokes" else entry for name, entry in value.items()}
+        if any(name.lower() == "name" for name in value):
+            # The points of several strokes of what has one name are one after the other, as of the $N recognizer.
+            drawn = {name for name in value if name.lower() == "strokes" and isinstance(value[name], list)}
+            value = {
+                name: [point for stroke in entry for point in stroke]
+                if name in drawn and all(map(_are_objects, entry))
+                else entry
+                for name, entry in value.items()
+            }
         stamped = {len(entry) for name, entry in value.items() if is_time(name) and isinstance(entry, list)}
         tree = {name: as_tree(entry) for name, entry in value.items()}
         return {
@@ -175,13 +180,6 @@ def as_tree(value: Any) -> Any:
     ):
         return [as_tree(element) for element in value]
     return _array(value)
-
-
-def _drawn(strokes: Any) -> Any:
-    """The points of several strokes, one after the other; of anything else that."""
-    if not isinstance(strokes, list) or not all(map(_are_objects, strokes)):
-        return strokes
-    return [point for stroke in strokes for point in stroke]
 
 
 def _stacked(rows: list[Any]) -> Any:

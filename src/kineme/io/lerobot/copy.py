@@ -294,15 +294,15 @@ def with_texts(old: Any, motions: Sequence[Sequence[Motion]], episode_of: NDArra
     """The column of some rows, see `with_language`."""
     import pyarrow as pa
 
+    plain = {"role": ROLE, "style": STYLE, "camera": None, "tool_calls": None}
+    added = [[{**plain, "content": motion.content, "timestamp": motion.start} for motion in some] for some in motions]
     contents, text_of = [""], np.zeros(len(episode_of), dtype=np.intp)
     if old is not None:
         coded = old.dictionary_encode()
         contents = [text or "" for text in coded.dictionary.to_pylist()] + [""]
         text_of = coded.indices.fill_null(len(contents) - 1).to_numpy(zero_copy_only=False).astype(np.intp)
     both, which = np.unique(np.column_stack((text_of, episode_of)), axis=0, return_inverse=True)
-    texts = [
-        json.dumps(_texts_of_others(contents[t]) + _text_rows(motions[e]), ensure_ascii=False) for t, e in both.tolist()
-    ]
+    texts = [json.dumps(_texts_of_others(contents[t]) + added[e], ensure_ascii=False) for t, e in both.tolist()]
     return pa.array(texts, kind).take(pa.array(which.ravel()))
 
 
@@ -317,11 +317,6 @@ def _texts_of_others(text: str) -> list[Any]:
     if not isinstance(rows, list):
         raise DataError(f"expected lists in JSON in {MOTION_TEXTS}, got {text[:40]!r}")
     return [row for row in rows if not (isinstance(row, dict) and str(row.get("content")).startswith(OWN))]
-
-
-def _text_rows(motions: Sequence[Motion]) -> list[dict[str, Any]]:
-    plain = {"role": ROLE, "style": STYLE, "camera": None, "tool_calls": None}
-    return [{**plain, "content": motion.content, "timestamp": motion.start} for motion in motions]
 
 
 #: Version -> its column.

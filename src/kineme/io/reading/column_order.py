@@ -59,8 +59,14 @@ def in_one_set(
             )
             problems.append(Problem(file.path, None, unlike))
         else:
+            if own == ours or file.detected is None or file.block is None:
+                same.append(file)
+                continue
+            measured_in = tuple(unit or "" for unit in ours.units)
+            detected = file.detected._replace(columns=ours.heads, measured_in=measured_in)
             try:
-                same.append(_as(file, own, ours))
+                positions = columns_like(file.block.positions, own, ours)
+                same.append(file._replace(detected=detected, block=replace(file.block, positions=positions)))
             except TrajectoryError as error:
                 problems.append(Problem(file.path, None, str(error)))
     return same, nameless, problems
@@ -106,15 +112,6 @@ def notes_on_aside(detected: Iterable[Detected]) -> list[str]:
     ]
 
 
-def _as(file: FileRead, own: Columns, ours: Columns) -> FileRead:
-    """A file with the heads, the order and the units of others."""
-    if own == ours or file.detected is None or file.block is None:
-        return file
-    positions = columns_like(file.block.positions, own, ours)
-    detected = file.detected._replace(columns=ours.heads, measured_in=tuple(unit or "" for unit in ours.units))
-    return file._replace(detected=detected, block=replace(file.block, positions=positions))
-
-
 def _differences(own: Columns, ours: Columns) -> str:
     """The columns of a file that most have not, and the other way round; and the options that read all files."""
     here, there = (
@@ -132,17 +129,16 @@ def _differences(own: Columns, ours: Columns) -> str:
             "in the shell --columns"
         )
     shared = [head for head, name in zip(ours.heads, ours.names, strict=True) if name in own.names]
-    aside = dict.fromkeys(_stem(head, shared) for head in [*there, *here])
+    # The beginning of a head before a dot, where no other one begins so: M30 of M30.x.
+    stems = {head: head.rpartition(".")[0] for head in [*there, *here]}
+    aside = dict.fromkeys(
+        head if not stem or any(other.startswith(f"{stem}.") for other in shared) else stem
+        for head, stem in stems.items()
+    )
     return (
         f"{said}; say --exclude {in_shell([*aside])} to read all without, or --columns to choose others, in Python "
         "exclude= or columns="
     )
-
-
-def _stem(head: str, others: Sequence[str]) -> str:
-    """Return the beginning of a head before a dot, where no other one begins so: M30 of M30.x."""
-    stem, dot, _ = head.rpartition(".")
-    return head if not dot or any(other.startswith(f"{stem}.") for other in others) else stem
 
 
 def _width(file: FileRead) -> int:

@@ -180,7 +180,7 @@ def merge_files(
         for place, label, person, repair in zip(
             _block(file).places,
             _block(file).labels,
-            _people(file),
+            _block(file).people or [None] * len(_block(file).labels),
             _block(file).repairs or [Repair()] * len(_block(file).labels),
             strict=True,
         )
@@ -202,11 +202,6 @@ def merge_files(
         tuple(reported),
         tuple(detected.most_common()),
     )
-
-
-def _people(file: FileRead) -> Sequence[str | None]:
-    """Return the person who showed each movement, as the file says it."""
-    return _block(file).people or [None] * len(_block(file).labels)
 
 
 def _block(file: FileRead) -> Block:
@@ -249,7 +244,7 @@ def with_channels(
         Problem(file.path, None, f"no names of columns where most files have {heads}; name them as these are")
         for file in nameless
     ]
-    checked = [_check_orientations(_in_order(file, channels), channels, skip) for file in same]
+    checked = [_check_orientations(file, channels, skip) for file in same]
     return (
         [file for file, _ in checked],
         channels,
@@ -292,15 +287,11 @@ def _without_wraps(files: Sequence[FileRead], given: Given) -> list[FileRead]:
     return result
 
 
-def _in_order(file: FileRead, channels: Channels) -> FileRead:
-    """A file with the columns of each of its channels side by side."""
-    block, heads = _block(file), file.detected.columns if file.detected else ()
-    return file._replace(block=replace(block, positions=in_order(block.positions, heads, channels)))
-
-
 def _check_orientations(file: FileRead, channels: Channels, skip: str) -> tuple[FileRead, list[Problem]]:
-    """A file without the movements, or the samples alone, in which a quaternion is not of norm 1."""
-    block, problems, faults = _block(file), [], dict[int, str]()
+    """A file with the columns of channels side by side, without movements or samples whose quaternions are none."""
+    heads = file.detected.columns if file.detected else ()
+    block = replace(_block(file), positions=in_order(_block(file).positions, heads, channels))
+    problems, faults = list[Problem](), dict[int, str]()
     good = np.ones(len(block.labels), dtype=bool)
     for channel, odd, norms in off_norm(block.positions, channels):
         owners = np.searchsorted(block.offsets, odd, side="right") - 1

@@ -132,7 +132,12 @@ def row_of(cells: Sequence[str], heads: Heads, line: int) -> LabelRow:
     """A row as a record."""
     if len(cells) <= max(heads.start, heads.end, heads.label):
         raise DataError(f"line {line}: expected start, end and label, got {list(cells)}")
-    start, end = (_time_in(cells[k], unit) for k, unit in zip((heads.start, heads.end), heads.units, strict=True))
+    times = []
+    for k, unit in zip((heads.start, heads.end), heads.units, strict=True):
+        time = seconds_of(cells[k])  # of mm:ss.sss whatever the unit is
+        is_clock = time is None or ":" in cells[k]
+        times.append(math.nan if time is None else time if is_clock else converted(time, UNITS[unit], UNITS["s"]))
+    start, end = map(float, times)
     if not end > start:
         raise DataError(
             f"line {line}: expected a start and an end after it, got {cells[heads.start]!r} and {cells[heads.end]!r}"
@@ -142,14 +147,6 @@ def row_of(cells: Sequence[str], heads: Heads, line: int) -> LabelRow:
     )
     label = text_in(cells[heads.label].strip())
     return LabelRow(start, end, None if label.lower() in _NOTHING else label, recording, place, line)
-
-
-def _time_in(cell: str, unit: str) -> float:
-    """Seconds of a cell in a unit of time; of mm:ss.sss whatever the unit is; NaN of what is none."""
-    time = seconds_of(cell)
-    if time is None:
-        return math.nan
-    return time if ":" in cell else float(converted(time, UNITS[unit], UNITS["s"]))
 
 
 def seconds_of(cell: str) -> float | None:
@@ -242,12 +239,11 @@ def _elan(data: bytes) -> tuple[list[LabelRow], bool]:
         raise DataError(
             f"expected one tier with annotations, or one named symbol, got {list(aligned)}; delete the others"
         )
-    return [row_of(_cells(annotation, slots), _MILLISECONDS, k) for k, annotation in enumerate(aligned[name], 1)], True
-
-
-def _cells(annotation: Any, slots: dict[str | None, str]) -> Sequence[str]:
-    times = [slots.get(annotation.get(f"TIME_SLOT_REF{i}"), "") for i in (1, 2)]
-    return [*times, annotation.findtext("ANNOTATION_VALUE") or ""]
+    rows = []
+    for k, annotation in enumerate(aligned[name], 1):
+        times = [slots.get(annotation.get(f"TIME_SLOT_REF{i}"), "") for i in (1, 2)]
+        rows.append(row_of([*times, annotation.findtext("ANNOTATION_VALUE") or ""], _MILLISECONDS, k))
+    return rows, True
 
 
 def labeled_pieces(recordings: Recordings, table: LabelTable) -> Recordings:

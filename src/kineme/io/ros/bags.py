@@ -366,6 +366,7 @@ def expanded_folder(path: Path) -> Iterator[Folder]:
         yield Folder(path, files if is_whole else (), mode)
         return
     from rosbags.rosbag2.storage_mcap import zstd
+    from ruamel.yaml import YAML
 
     with TemporaryDirectory() as name:
         folder = Path(name)
@@ -381,7 +382,8 @@ def expanded_folder(path: Path) -> Iterator[Folder]:
                     _check(n_bytes, most, file)
                     new.write(some)
         plain = {**about, "compression_mode": "", "relative_file_paths": [file.stem for file in files]}
-        _write(folder / METADATA, {INFORMATION: plain})
+        with (folder / METADATA).open("w", encoding="utf-8") as description:
+            YAML(typ="safe").dump({INFORMATION: plain}, description)
         yield Folder(folder, tuple(folder / file.stem for file in files), mode)
 
 
@@ -394,13 +396,6 @@ def _information(path: Path) -> dict[str, Any]:
         return dict(metadata[INFORMATION])
     except Exception:
         return {}
-
-
-def _write(path: Path, content: Any) -> None:
-    from ruamel.yaml import YAML
-
-    with path.open("w", encoding="utf-8") as file:
-        YAML(typ="safe").dump(content, file)
 
 
 def _check(n_bytes: int, most: int, source: Path) -> None:
