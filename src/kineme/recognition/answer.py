@@ -363,22 +363,12 @@ class FittedRecognizer(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class KnownClasses:
-    """Everything that recognizes movements as one of C classes, or as unknown.
-
-    Attributes
-    ----------
-    comparison : Comparison
-    references : References
-        The labeled movements.
-    classifier : Classifier
-    calibration : Calibration
-        Of the p-values.
-    """
+    """Everything that recognizes movements as one of C classes, or as unknown."""
 
     comparison: Comparison
-    references: References
+    references: References  # the labeled movements
     classifier: Classifier
-    calibration: Calibration
+    calibration: Calibration  # of the p-values
 
     def recognize(self, movements: MovementsLike, error_rate: float = 0.05) -> list[Answer]:
         """Return an answer for each movement, see `kineme.Recognizer.recognize`."""

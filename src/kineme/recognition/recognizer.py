@@ -20,8 +20,8 @@ from kineme.recognition.classifiers import CLASSIFIERS, SupportVectors, fit_clas
 from kineme.recognition.conformal import Calibration, calibrate, check_error_rate, check_groups, class_probabilities
 from kineme.runtime.compiled import load_compiled
 from kineme.similarity.comparison import Comparison, References, fit_comparison
-from kineme.similarity.describe import Described, describe
-from kineme.similarity.scores import Compared, Score, best_classes, nearest, score
+from kineme.similarity.describe import Described, Tile, describe
+from kineme.similarity.scores import Compared, Score, for_compared, nearest, score
 from kineme.similarity.specification import (
     ComparisonSpecification,
     Normalization,
@@ -229,7 +229,13 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     def predict(self, X: MovementsLike) -> NDArray[Any]:
         """Return the class with the largest score of each movement, shape (n,)."""
         comparison, references = self._fitted
-        best = best_classes(comparison, references, comparison.checked(X), self.classifier_.best)
+        demos = comparison.checked(X)
+        best = np.empty(len(demos), np.intp)
+
+        def fill(tile: Tile, compared: Compared) -> None:
+            best[tile.start : tile.stop] = self.classifier_.best(compared)
+
+        for_compared(comparison, references, demos, fill)
         return np.asarray(references.classes[best])
 
     def predict_proba(self, X: MovementsLike) -> Array:

@@ -23,11 +23,11 @@ from kineme.runtime.parallel import single_threaded_blas
 from kineme.similarity.bounds import ReducedFeatures, Single, log_bounds
 from kineme.similarity.describe import Described, feature_rows, prepare
 from kineme.similarity.similarity import (
+    ALONE,
     WEIGHTS,
     AveragedSimilarity,
     given_weights,
     impostor_widths,
-    lone_widths,
     own_weights,
 )
 from kineme.similarity.specification import ComparisonSpecification, Normalization, Representation, rotating
@@ -140,7 +140,13 @@ def fit_to_references(
     with single_threaded_blas():
         alone = len(references) == 1
         quantities = [representation.quantity for representation in representations]
-        widths = lone_widths(described, quantities) if alone else impostor_widths(described, labels)
+        if alone:
+            sizes = described.sizes()
+            if not sizes[: len(described.blocks)].all():
+                raise SpecificationError("expected a training movement that moves, got one at rest; add demonstrations")
+            widths = np.array([ALONE[quantity] for quantity in quantities]) * sizes
+        else:
+            widths = impostor_widths(described, labels)
         similarity = AveragedSimilarity(described.procrustes, widths, specification.mean)
         if isinstance(weights, str):
             check_choice("weights", weights, list(WEIGHTS))

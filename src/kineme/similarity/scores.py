@@ -119,22 +119,6 @@ def score(
     return arrays
 
 
-def best_classes(
-    comparison: Comparison,
-    references: References,
-    movements: Demonstrations,
-    best: Callable[[Compared], NDArray[np.intp]],
-) -> NDArray[np.intp]:
-    """Return the index (n,) of the class of each movement, as the function finds them tile by tile."""
-    classes = np.empty(len(movements), np.intp)
-
-    def fill(tile: Tile, compared: Compared) -> None:
-        classes[tile.start : tile.stop] = best(compared)
-
-    for_compared(comparison, references, movements, fill)
-    return classes
-
-
 def for_compared(
     comparison: Comparison, references: References, demos: Demonstrations, work: Callable[[Tile, Compared], None]
 ) -> None:

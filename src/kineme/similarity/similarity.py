@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -263,17 +263,6 @@ def impostor_widths(described: Described, labels: NDArray[np.generic]) -> Array:
         )
     # Movements that do not differ in one representation have a similarity of 1 there.
     return np.maximum([np.inf if width is None else width for width in widths], _LEAST * sizes)
-
-
-def lone_widths(described: Described, quantities: Sequence[str]) -> Array:
-    """Return the width sigma_r of each representation, (R,), of one movement alone: a share of its size, see `ALONE`.
-
-    Raises `SpecificationError`: the movement does not move.
-    """
-    sizes = described.sizes()
-    if not sizes[: len(described.blocks)].all():
-        raise SpecificationError("expected a training movement that moves, got one at rest; add demonstrations")
-    return np.array([ALONE[quantity] for quantity in quantities]) * sizes
 
 
 def beginning_widths(beginnings: Described, labels: NDArray[np.generic]) -> Array:

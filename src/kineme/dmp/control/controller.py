@@ -20,13 +20,12 @@ from kineme.dmp.control.plan import (
     Plan,
     State,
     Status,
-    check_controlled,
     numbers,
     passed,
 )
 from kineme.dmp.control.stepping import stepper
 from kineme.errors import SpecificationError
-from kineme.validation import Array
+from kineme.validation import Array, check_number
 
 S = TypeVar("S", bound=State)
 
@@ -72,7 +71,14 @@ class Controller(Generic[S]):
     state: S
 
     def __init__(self, plan: Plan, dt: float, options: Options) -> None:
-        check_controlled(plan, dt)
+        if not isinstance(plan, Plan):
+            raise SpecificationError(
+                f"expected the plan of one movement, got {type(plan).__name__}; write primitives[0].controller(dt)"
+            )
+        check_number("dt", dt, above=0.0)
+        if not SHORTEST * plan.duration <= dt <= plan.longest_step * plan.duration:
+            most = "the duration," if plan.longest_step == 1.0 else f"{plan.longest_step:g} periods of"
+            raise SpecificationError(f"expected dt of at most {most} {plan.duration:g} s, got {dt!r} s")
         self.dt, self.options = float(dt), options
         self._plan, self._n_dims, self._origin = plan, plan.n_dims, plan.origin
         self._set_tau(plan.duration)

@@ -214,18 +214,6 @@ def passed(via: ViaPlaces, begin: float, end: float, du: float, periodic: bool) 
         yield time - begin if time > begin else time - begin + 1.0, point
 
 
-def check_controlled(plan: Any, dt: Any) -> None:
-    """Refuse what is no plan, and steps that are too long or too short for it."""
-    if not isinstance(plan, Plan):
-        raise SpecificationError(
-            f"expected the plan of one movement, got {type(plan).__name__}; write primitives[0].controller(dt)"
-        )
-    check_number("dt", dt, above=0.0)
-    if not SHORTEST * plan.duration <= dt <= plan.longest_step * plan.duration:
-        most = "the duration," if plan.longest_step == 1.0 else f"{plan.longest_step:g} periods of"
-        raise SpecificationError(f"expected dt of at most {most} {plan.duration:g} s, got {dt!r} s")
-
-
 class FilteredValue:
     """Numbers that approach a target with a time constant, ``filter dx/dt = target - x``, or jump without one.
 

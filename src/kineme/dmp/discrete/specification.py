@@ -33,22 +33,16 @@ _NEAR = 1e-2  # of its largest extent; the original formulation magnifies noise 
 class Formulation:
     """One row of `FORMULATIONS`.
 
-    Attributes
-    ----------
-    equation : str
-        The transformation system as the paper prints it.
-    divides_by_amplitude : bool
-        Whether scale is ``g - x0`` (then weights and f do not exist where it is 0) or the stiffness K.
-    coupling : callable
-        ``coupling(K, s)``: the factor of ``g - x0`` in the equation and, the same function, of
-        ``x - x0`` in the shape-attractor term.
-    ratio : callable
-        ``ratio(new, learned, extents)``: what scale f is multiplied by when a movement learned with one
-        ``g - x0`` is generated with another; all of shape (n, d).
+    - `divides_by_amplitude`: whether scale is ``g - x0`` (then weights and f do not exist where it is 0) or the
+      stiffness K.
+    - `coupling`: ``coupling(K, s)``: the factor of ``g - x0`` in the equation and, the same function, of ``x - x0`` in
+      the shape-attractor term.
+    - `ratio`: ``ratio(new, learned, extents)``: what scale f is multiplied by when a movement learned with one ``g -
+      x0`` is generated with another; all of shape (n, d).
     """
 
     name: str
-    equation: str
+    equation: str  # the transformation system as the paper prints it
     divides_by_amplitude: bool
     coupling: Callable[[float, Array], Array]
     ratio: Callable[[Array, Array, Array], Array]
@@ -250,24 +244,16 @@ class ExponentialPhase:
 class GaussianBasis:
     """Basis functions ``psi_i(s) = exp(-h_i (s - c_i)^2)``, Eq. (3), with centers equally spaced in time.
 
-    Parameters
-    ----------
-    n_basis : int
-        Number N of basis functions.
-    overlap : float
-        Value of each function at the next center, between 0 and 1. It sets the widths:
-        ``h_i = -ln(overlap) / (c_{i+1} - c_i)^2``.
-    gating : {"none", "phase"}
-        Whether f carries the factor s: ``f = sum psi w / sum psi`` (Eq. 2) or that times s. Papers mix
-        the two and call both f.
-    phase : ExponentialPhase
-        Maps time to s.
+    - `overlap`: value of each function at the next center, between 0 and 1. It sets the widths: ``h_i = -ln(overlap) /
+      (c_{i+1} - c_i)^2``.
+    - `gating` ({"none", "phase"}): whether f carries the factor s: ``f = sum psi w / sum psi`` (Eq. 2) or that times s.
+      Papers mix the two and call both f.
     """
 
-    n_basis: int
+    n_basis: int  # number N of basis functions
     overlap: float
     gating: str
-    phase: ExponentialPhase
+    phase: ExponentialPhase  # maps time to s
 
     def __post_init__(self) -> None:
         check_count("n_basis", self.n_basis, 2, most=MOST_BASIS)

@@ -306,19 +306,12 @@ def load_saved(path: Path) -> Primitives | PosePrimitives:
 class Deviation(NamedTuple):
     """The largest distance from a recording.
 
-    Attributes
-    ----------
-    largest : float
-        In the unit of the recording; of an orientation the angle [rad].
-    share : float
-        Of the extent: the diagonal of the bounding box, or the largest angle from the start.
-    of : str
-        What deviates so far: "positions", "angles", or the name of an orientation; empty if the recording is of one
-        kind.
+    `of`: what deviates so far: "positions", "angles", or the name of an orientation; empty if the recording is of one
+    kind.
     """
 
-    largest: float
-    share: float
+    largest: float  # in the unit of the recording; of an orientation the angle [rad]
+    share: float  # of the extent: the diagonal of the bounding box, or the largest angle from the start
     of: str
 
 

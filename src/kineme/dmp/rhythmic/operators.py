@@ -199,21 +199,15 @@ class RhythmicSpecification(SpringDamper):
 class VonMisesBasis:
     """Basis functions ``psi_i(phi) = exp(h (cos(phi - c_i) - 1))`` with N centers equally spaced on the circle.
 
-    Parameters
-    ----------
-    n_basis : int
-        Number N of basis functions, at least 3.
-    overlap : float
-        Value of each function at the next center, between 0 and 1. It sets the width of all of them:
-        ``h = -ln(overlap) / (1 - cos(2 pi / N))``.
+    `overlap`: value of each function at the next center, between 0 and 1. It sets the width of all of them:
+    ``h = -ln(overlap) / (1 - cos(2 pi / N))``.
 
-    References
-    ----------
-    A. J. Ijspeert, J. Nakanishi, H. Hoffmann, P. Pastor, S. Schaal, "Dynamical Movement Primitives: Learning Attractor
-    Models for Motor Behaviors", Neural Computation 25(2), 2013: Table 1 and the rhythmic forcing term, Eq. (2.6).
+    Source: A. J. Ijspeert, J. Nakanishi, H. Hoffmann, P. Pastor, S. Schaal, "Dynamical Movement Primitives: Learning
+    Attractor Models for Motor Behaviors", Neural Computation 25(2), 2013: Table 1 and the rhythmic forcing term, Eq.
+    (2.6).
     """
 
-    n_basis: int
+    n_basis: int  # number N of basis functions, at least 3
     overlap: float
 
     def __post_init__(self) -> None:

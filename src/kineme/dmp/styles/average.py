@@ -28,7 +28,6 @@ from kineme.dmp.discrete.specification import Specification
 from kineme.dmp.discrete.via_points import ViaLike
 from kineme.dmp.recorded_as import merged
 from kineme.dmp.styles.parameters import (
-    as_observation_times,
     as_observations,
     as_primitives,
     from_numbers,
@@ -193,7 +192,9 @@ class AveragePrimitive:
         """
         if position is None and velocity is None:
             raise SpecificationError("expected a position or a velocity to condition on, got neither")
-        times, d = as_observation_times(t), self.primitive.n_dims
+        times, d = np.atleast_1d(as_numbers(t, "t")), self.primitive.n_dims
+        if times.ndim != 1 or not len(times) or not ((times >= 0.0) & (times <= 1.0)).all():
+            raise SpecificationError(f"expected t between 0 and 1, as shares of the duration, got {t!r}")
         observed = (
             None if position is None else as_observations("position", times, position, std, d),
             None if velocity is None else as_observations("velocity", times, velocity, velocity_std, d),

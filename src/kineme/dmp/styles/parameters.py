@@ -297,14 +297,6 @@ class Observations(NamedTuple):
     deviations: Array  # (m, d)
 
 
-def as_observation_times(t: ArrayLike) -> Array:
-    """Times (m,) between 0 and 1."""
-    times = np.atleast_1d(as_numbers(t, "t"))
-    if times.ndim != 1 or not len(times) or not ((times >= 0.0) & (times <= 1.0)).all():
-        raise SpecificationError(f"expected t between 0 and 1, as shares of the duration, got {t!r}")
-    return times
-
-
 def as_observations(name: str, times: Array, values: ArrayLike, std: ArrayLike, n_dims: int) -> Observations:
     """Check values (m, d), with NaN for dimensions that are free, and their standard deviations."""
     m = len(times)

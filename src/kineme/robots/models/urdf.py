@@ -288,18 +288,9 @@ class Candidate(NamedTuple):
 class Ends:
     """The tree of a URDF as bodies, which are links that fixed joints hold together, and the joints between them.
 
-    Parameters
-    ----------
-    links : list of str
-    parents : dict of str to Element
-        The joint above each link that has one.
-
-    Attributes
-    ----------
-    gripper : set of str
-        Names of the joints of grippers and hands: by their names (finger, thumb, jaw, gripper ...), joints that mimic
-        others at the end of a chain, and two or more branches of equally many joints that leave the end of a chain at
-        least twice as long. If nothing else moves, there are none.
+    `parents`: the joint above each link that has one. `gripper`: names of the joints of grippers and hands: by their
+    names (finger, thumb, jaw, gripper ...), joints that mimic others at the end of a chain, and two or more branches of
+    equally many joints that leave the end of a chain at least twice as long. If nothing else moves, there are none.
     """
 
     def __init__(self, links: list[str], parents: dict[str, ElementTree.Element]) -> None:
