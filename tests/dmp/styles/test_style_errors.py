@@ -97,5 +97,7 @@ def test_a_new_demonstration_of_another_kind(model, learned, make_movement):
 @pytest.mark.parametrize("function", [average, average_by_label, learn_styles])
 def test_rhythms_are_no_demonstrations_of_one_movement(demonstrate, function):
     rhythms = RhythmicDMP(aperiodic="accept").learn(demonstrate(5, 30))
-    with pytest.raises(TrajectoryError, match=r"expected kineme\.Primitives, got RhythmicPrimitives; learn movements"):
+    with pytest.raises(
+        TrajectoryError, match=r"expected kineme\.dmp\.Primitives, got RhythmicPrimitives; learn movements"
+    ):
         function(rhythms)
