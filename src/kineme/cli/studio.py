@@ -39,26 +39,20 @@ def studio(folder: Path, port: int | None, no_open: bool, read_only: bool, host:
     from kineme.studio.server.serve import Options, is_loopback, serve
 
     def ready(address: str, once: str) -> None:
-        _say(folder, address, read_only)
+        only = ", for reading only" if read_only else ""
+        # Both lines are written as one: it may be stopped at once.
+        write(f"{printable(folder)} is open{only} at {address}\nstop it with Ctrl-C")
+        sys.stdout.flush()
         if not is_loopback(host):
             write("others on the network reach it with this address, unencrypted: give it to those you trust", err=True)
-        if not no_open and _has_display():
+        # Only a browser with windows is opened: one of the terminal would take the terminal.
+        if not no_open and (
+            sys.platform in {"darwin", "win32"}
+            or any(os.environ.get(variable) for variable in ("DISPLAY", "WAYLAND_DISPLAY"))
+        ):
             webbrowser.open(once)  # without the token, which others on this machine would see
 
     serve(Options(folder, host, port, read_only), ready)
-
-
-def _say(folder: Path, address: str, read_only: bool) -> None:
-    only = ", for reading only" if read_only else ""
-    write(f"{printable(folder)} is open{only} at {address}\nstop it with Ctrl-C")  # in one: it may be stopped at once
-    sys.stdout.flush()
-
-
-def _has_display() -> bool:
-    """Tell whether a browser with windows can be opened: one of the terminal would take the terminal."""
-    return sys.platform in {"darwin", "win32"} or any(
-        os.environ.get(variable) for variable in ("DISPLAY", "WAYLAND_DISPLAY")
-    )
 
 
 @click.command(short_help="A library as one HTML page: draw, recognize, drag.")

@@ -44,10 +44,14 @@ def to_text(table: Table, width: int | None = None) -> str:
     """
     lines = [(*(_cell(cell) for cell in row[:-1]), printable(row[-1])) for row in (table.columns, *table.rows)]
     natural = [max(width_of(row[k]) for row in lines) for k in range(len(table.columns))]
-    columns = _terminal_width() if width is None else width
+    columns = (get_terminal_size().columns if sys.stdout.isatty() else None) if width is None else width
     title = printable_lines(table.title)
     if columns is None:
-        widths: list[int] | None = _with_last(natural, _PIPED)
+        # The last column is as wide as what is left.
+        widths: list[int] | None = [
+            *natural[:-1],
+            max(24, min(natural[-1], _PIPED - sum(natural[:-1]) - 2 * len(natural))),
+        ]
         reading = fill(printable_lines(table.reading), 110)
     else:
         title = "\n".join("\n".join(wrapped(line, columns)) for line in title.split("\n"))
@@ -61,19 +65,9 @@ def to_text(table: Table, width: int | None = None) -> str:
     return "\n".join(filter(None, [title, rule, *rendered[0], rule, *body, reading]))
 
 
-def _terminal_width() -> int | None:
-    """Columns of the terminal that the output goes to; None where it goes elsewhere."""
-    return get_terminal_size().columns if sys.stdout.isatty() else None
-
-
 def _cell(text: str) -> str:
     """A cell, shortened: a column is as wide as its widest cell, and one long name would hide the other columns."""
     return shortened(printable(text), LONGEST_CELL)
-
-
-def _with_last(natural: list[int], width: int) -> list[int]:
-    """The widths, the last one as much as is left."""
-    return [*natural[:-1], max(24, min(natural[-1], width - sum(natural[:-1]) - 2 * len(natural)))]
 
 
 def _narrowed(lines: Sequence[tuple[str, ...]], natural: list[int], width: int) -> list[int] | None:
@@ -84,16 +78,16 @@ def _narrowed(lines: Sequence[tuple[str, ...]], natural: list[int], width: int) 
     words = [max(widest_word(row[k]) for row in lines) for k in range(len(natural))]
     for least in (words, [min(word, _NARROW) for word in words]):
         if sum(least) <= width:
-            limit = next(n for n in range(max(natural), 0, -1) if _total(natural, least, n) <= width)
+            limit = next(
+                n
+                for n in range(max(natural), 0, -1)
+                if sum(max(low, min(column, n)) for column, low in zip(natural, least, strict=True)) <= width
+            )
             widths = [max(low, min(column, limit)) for column, low in zip(natural, least, strict=True)]
             for k in range(len(widths)):  # what is left over by whole columns
                 widths[k] += max(0, min(natural[k] - widths[k], width - sum(widths)))
             return widths
     return None
-
-
-def _total(natural: list[int], least: list[int], limit: int) -> int:
-    return sum(max(low, min(column, limit)) for column, low in zip(natural, least, strict=True))
 
 
 def _aligned(row: tuple[str, ...], widths: list[int]) -> list[str]:

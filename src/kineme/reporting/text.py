@@ -46,7 +46,10 @@ def shortened(text: str, longest: int) -> str:
 def _escape(text: str) -> str:
     if text.isprintable() and _INVISIBLE.isdisjoint(text):
         return text
-    return "".join(mark if mark.isprintable() and mark not in _INVISIBLE else _escape_character(mark) for mark in text)
+    return "".join(
+        mark if mark.isprintable() and mark not in _INVISIBLE else mark.encode("unicode_escape").decode("ascii")
+        for mark in text
+    )
 
 
 def printable_lines(text: Any) -> str:
@@ -72,7 +75,3 @@ def counted(number: int, noun: str, plural: str | None = None) -> str:
 def first_names(names: Sequence[Any], most: int) -> str:
     """The first names of many, and how many more there are: ``a, b and 3 more``."""
     return ", ".join(map(str, names[:most])) + (f" and {len(names) - most} more" if len(names) > most else "")
-
-
-def _escape_character(mark: str) -> str:
-    return mark.encode("unicode_escape").decode("ascii")

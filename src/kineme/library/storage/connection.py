@@ -83,7 +83,13 @@ _DEFINITIONS = "SELECT type, name, tbl_name, sql FROM sqlite_master ORDER BY typ
 def connect(path: Path, mode: str, wait: float) -> Connection:
     """Return a connection in ``mode`` "ro", "rw" or "rwc"; transactions are begun explicitly."""
     address = f"file:{quote(os.fsencode(path))}?mode={mode}"
-    if mode == "ro" and _cannot_keep_a_log(path):
+    # Where the folder is read-only for this user and has no log, SQLite cannot lock, and reads without. It then assumes
+    # that the file does not change: if another user writes to it meanwhile, rows are refused as damaged until the
+    # library is opened again.
+    if mode == "ro" and (
+        not os.access(path.parent, os.W_OK, effective_ids=os.access in os.supports_effective_ids)
+        and not path.with_name(path.name + "-wal").exists()
+    ):
         address += "&immutable=1"
     connection = open_connection(address, uri=True, timeout=wait, isolation_level=None, check_same_thread=False)
     try:
@@ -98,18 +104,6 @@ def connect(path: Path, mode: str, wait: float) -> Connection:
         connection.close()
         raise
     return connection
-
-
-def _cannot_keep_a_log(path: Path) -> bool:
-    """Tell whether the folder is read-only for this user and has no log: SQLite cannot lock then, and reads without.
-
-    SQLite then assumes that the file does not change. If another user writes to it meanwhile, rows are refused as
-    damaged until the library is opened again.
-    """
-    return (
-        not os.access(path.parent, os.W_OK, effective_ids=os.access in os.supports_effective_ids)
-        and not path.with_name(path.name + "-wal").exists()
-    )
 
 
 def create(path: Path, meta: dict[str, str]) -> None:

@@ -73,7 +73,12 @@ def import_(path: str | Path, folder: str | Path, wait: float = 10.0) -> Path:
     Path(folder).mkdir(parents=True, exist_ok=True)
     check_alone(target)
     with _new(target) as beside:
-        _check_room(source, target)
+        # Refuse a file that would fill the disk; a sparse file may be larger than its disk.
+        size, free = source.stat().st_size, shutil.disk_usage(target.parent).free
+        if size > free:
+            raise DataError(
+                f"expected room for the {size:,} bytes of {source} in {target.parent}, got {free:,}; free some"
+            )
         shutil.copyfile(source, beside)
         with _named(beside, source), in_plain_words(source, wait):
             _check_structure(beside, source, wait)
@@ -96,13 +101,6 @@ def _check_file(source: Path) -> None:
                 f"expected an exported library, got {source} with changes beside it in {log.name}; export it, and "
                 "import that file"
             )
-
-
-def _check_room(source: Path, target: Path) -> None:
-    """Refuse a file that would fill the disk; a sparse file may be larger than its disk."""
-    size, free = source.stat().st_size, shutil.disk_usage(target.parent).free
-    if size > free:
-        raise DataError(f"expected room for the {size:,} bytes of {source} in {target.parent}, got {free:,}; free some")
 
 
 def _check_structure(beside: Path, source: Path, wait: float) -> None:

@@ -71,7 +71,10 @@ class Store:
                 meta = checked_meta(self._reader, self.path)
                 self.id = meta["id"]
                 self.specification = Specification.from_json(meta, self.path)
-                self.as_of = self._checked_version(as_of)
+                last = int(self._reader.execute("SELECT coalesce(max(id), 0) FROM version").fetchone()[0])
+                if as_of is not None and not (isinstance(as_of, Integral) and 0 <= as_of <= last):
+                    raise SpecificationError(f"expected a version from 0 to {last}, got {as_of!r}; see history()")
+                self.as_of = NOW if as_of is None else int(as_of)
             except BaseException:
                 self._reader.close()
                 raise
@@ -123,12 +126,6 @@ class Store:
                 "open it once without read_only to bring it up to date"
             )
         migrate(self._reader, self.path)
-
-    def _checked_version(self, as_of: int | None) -> int:
-        last = int(self._reader.execute("SELECT coalesce(max(id), 0) FROM version").fetchone()[0])
-        if as_of is not None and not (isinstance(as_of, Integral) and 0 <= as_of <= last):
-            raise SpecificationError(f"expected a version from 0 to {last}, got {as_of!r}; see history()")
-        return NOW if as_of is None else int(as_of)
 
     @property
     def folder(self) -> Path:
