@@ -6,6 +6,7 @@ import importlib
 import pkgutil
 import re
 import shlex
+from pathlib import Path
 
 import click
 import pytest
@@ -91,7 +92,9 @@ def test_commands_and_options_in_sentences_exist(page):
         assert {word for word in words if word.startswith("--")} <= known, line
 
 
-@pytest.mark.parametrize("name", MODULES)
-def test_examples_in_docstrings(name):
-    failed, _ = doctest.testmod(importlib.import_module(name))
-    assert failed == 0
+def test_examples_in_docstrings():
+    """Of all modules, each of which can be imported; those without an example are not searched for any."""
+    modules = [importlib.import_module(name) for name in MODULES]
+    shown = [module for module in modules if ">>> " in Path(module.__file__).read_text(encoding="utf-8")]
+    assert len(shown) >= 10
+    assert [module.__name__ for module in shown if doctest.testmod(module).failed] == []

@@ -12,6 +12,7 @@ from scipy import stats
 from kineme.errors import SpecificationError
 from kineme.kernels import KERNELS, MEANS, RBF, DistanceKernel, Laplacian, TruncatedEuclidean, averaged
 from kineme.kernels import table as average
+from soaking import combined
 
 SCIPY = {
     "arithmetic": lambda k: np.mean(k, axis=0),
@@ -22,9 +23,10 @@ SCIPY = {
 }
 
 
-@pytest.mark.parametrize("mean", MEANS)
-@pytest.mark.parametrize("n_dims", [1, 2, 3])
-@pytest.mark.parametrize("kernel", [RBF(2.0), TruncatedEuclidean(1.5), Laplacian(3.0), CAUCHY], ids=repr)
+@pytest.mark.parametrize(
+    ("kernel", "n_dims", "mean"),
+    combined([RBF(2.0), TruncatedEuclidean(1.5), Laplacian(3.0), CAUCHY], [1, 2, 3], MEANS),
+)
 def test_means_are_those_of_scipy(mean, n_dims, kernel):
     A, B = rows("normal", 1, 14, 6), rows("normal", 2, 8, 6)
     blocks = [slice(j * 6 // n_dims, (j + 1) * 6 // n_dims) for j in range(n_dims)]

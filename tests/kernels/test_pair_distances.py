@@ -136,9 +136,11 @@ def test_distances_are_those_of_the_textbooks(d, specs, choice):
             np.testing.assert_allclose(found[:, i, j], expected, atol=1e-5)
 
 
-@pytest.mark.parametrize("d", [1, 2, 3, 6])
-@pytest.mark.parametrize(("n", "m"), [(1, 1), (1, 40), (40, 1), (40, 3), (35, 70), (3, 17)])
-def test_compiled_equals_plain(d, n, m, monkeypatch):
+@pytest.mark.parametrize(
+    ("d", "sizes"), combined([1, 2, 3, 6], [(1, 1), (1, 40), (40, 1), (40, 3), (35, 70), (3, 17)], together=1)
+)
+def test_compiled_equals_plain(d, sizes, monkeypatch):
+    n, m = sizes
     A, B, R = shapes_of(paths(n, d)), shapes_of(paths(m, d, seed=1)), rotations(n, m, d)
     found = {}
     for choice in CHOICES:

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from kineme.kernels.procrustes import Procrustes
 from kineme.kernels.rotation import best_products, best_rotations
+from soaking import combined
 
 LIMITS = [0.01, 0.3, math.pi / 3, 2.0, 3.1, math.pi]
 LONG = math.prod((3, 20))
@@ -114,9 +115,10 @@ def test_near_a_line_nothing_breaks(seed, off, max_angle):
     np.testing.assert_allclose(best_products(C, max_angle), line, atol=10 * 10.0**off + 1e-13)
 
 
-@pytest.mark.parametrize("max_angle", [0.0, 1e-300, 0.3, math.pi / 3, math.pi])
-@pytest.mark.parametrize("dtype", [np.float64, np.float32])
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    ("kind", "dtype", "max_angle"),
+    combined(KINDS, [np.float64, np.float32], [0.0, 1e-300, 0.3, math.pi / 3, math.pi], together=1),
+)
 def test_compiled_plain_batch_and_one_by_one_are_the_same(kind, dtype, max_angle, monkeypatch):
     """Sizes over twelve powers of ten side by side; compared on the size of each pair."""
     rng, sizes = np.random.default_rng(3), 10.0 ** np.arange(-6, 7)

@@ -36,24 +36,29 @@ def recognizer(lasa):
     return kineme.Recognizer().fit(lasa[[i for i in range(len(lasa)) if i % 7 < 3]])
 
 
-@pytest.fixture(params=range(0, len(SHAPES), 1 if SOAK else 2), ids=lambda k: SHAPES[k])
+@pytest.fixture(scope="module", params=range(0, len(SHAPES), 1 if SOAK else 2), ids=lambda k: SHAPES[k])
 def movement(lasa, request):
     """A movement that the recognizer has not seen, at 200 of its samples."""
-    one = lasa[7 * request.param + 5]
-    return kineme.Trajectory(one.times[::5], one.positions[::5], one.label)
+    recorded = lasa[7 * request.param + 5]
+    return kineme.Trajectory(recorded.times[::5], recorded.positions[::5], recorded.label)
 
 
 def _states(live, movement):
     return [live.update(t, x) for t, x in zip(movement.times, movement.positions, strict=True)]
 
 
-def test_a_stream_fed_whole_ends_with_the_batch_answer(recognizer, movement):
+@pytest.fixture(scope="module")
+def followed(recognizer, movement):
+    """The states of a stream after each sample, and its answer at the end."""
     live = recognizer.stream()
-    _states(live, movement)
+    return _states(live, movement), live.finish()
+
+
+def test_a_stream_fed_whole_ends_with_the_batch_answer(recognizer, movement, followed):
     again = recognizer.stream()
     again.update(movement.times, movement.positions)
     batch = recognizer.recognize(movement)
-    for answer in (live.finish(), again.finish()):
+    for answer in (followed[1], again.finish()):
         assert (answer.label, answer.confidence) == (batch.label, batch.confidence)
 
 
@@ -65,8 +70,8 @@ def test_a_stream_ends_with_the_fit_that_it_began_with(recognizer, movement):
     assert live.finish().label == recognizer.recognize(movement).label
 
 
-def test_it_decides_before_the_end_and_never_flickers(recognizer, movement):
-    states = _states(recognizer.stream(), movement)
+def test_it_decides_before_the_end_and_never_flickers(followed, movement):
+    states = followed[0]
     labels = [state.label for state in states]
     if movement.label == "CShape":  # which is how a G begins: nobody can know before it stops
         assert set(labels) == {None}
@@ -78,8 +83,8 @@ def test_it_decides_before_the_end_and_never_flickers(recognizer, movement):
     assert decided < 0.9 * len(labels)
 
 
-def test_progress_grows_and_the_goal_is_found(recognizer, movement):
-    states = _states(recognizer.stream(), movement)
+def test_progress_grows_and_the_goal_is_found(followed, movement):
+    states = followed[0]
     leaders = [state.ranked[0].label if state.ranked else None for state in states]
     progress = np.array([state.progress for state in states])
     since = len(leaders) - next((k for k, label in enumerate(leaders[::-1]) if label != movement.label), len(leaders))
@@ -93,8 +98,8 @@ def test_progress_grows_and_the_goal_is_found(recognizer, movement):
     np.testing.assert_allclose(late.path[0], movement.positions[int(0.9 * len(states))])
 
 
-def test_shares_sum_to_one_and_are_ranked(recognizer, movement):
-    for state in _states(recognizer.stream(), movement)[10::40]:
+def test_shares_sum_to_one_and_are_ranked(recognizer, followed):
+    for state in followed[0][10::40]:
         shares = [guess.confidence for guess in state.ranked]
         assert sum(shares) + state.unknown == pytest.approx(1.0)
         assert shares == sorted(shares, reverse=True)

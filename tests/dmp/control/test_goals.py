@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from soaking import combined
+
 SHARES = {"closer": 0.3, "farther": 2.5, "across the start": -1.0}
 
 
@@ -19,9 +21,7 @@ def test_a_goal_in_the_first_step_is_the_rollouts_goal(primitive, steps, agree, 
     agree(positions, primitive.rollout(goal=goal, n_samples=101).positions[0], 1e-10)
 
 
-@pytest.mark.parametrize("share", SHARES.values(), ids=SHARES.keys())
-@pytest.mark.parametrize("when", [4, 18, 28])
-@pytest.mark.parametrize("goal_filter", [None, 0.3])
+@pytest.mark.parametrize(("share", "when", "goal_filter"), combined(SHARES.values(), [4, 18, 28], [None, 0.3]))
 def test_a_goal_changed_in_flight_is_reached(primitive, steps, share, when, goal_filter):
     controller, goal = primitive.controller(0.1, goal_filter=goal_filter), shifted(primitive, share)
     steps(controller, when)

@@ -41,11 +41,14 @@ def test_a_goal_at_a_tenth_of_a_meter_per_second_is_trailed_by_4_cm_or_not_at_al
 def test_it_moves_on_by_itself(primitive, twin):
     told, once = primitive.controller(0.02), primitive.controller(0.02)
     velocity, start = np.array([0.3, -0.2, 0.1]), primitive.goals[0] - [0.6, -0.4, 0.2]
+    states, others = [], []
     for k in range(500):
-        state = told.step(goal=start + 0.02 * k * velocity, goal_velocity=velocity)
-        other = once.step(**({"goal": start, "goal_velocity": velocity} if k == 0 else {}))
-        np.testing.assert_allclose(other.position, state.position, rtol=0, atol=1e-9)
-        np.testing.assert_allclose(other.goal, start + 0.02 * (k + 1) * velocity, rtol=0, atol=1e-12)
+        states.append(told.step(goal=start + 0.02 * k * velocity, goal_velocity=velocity))
+        others.append(once.step(**({"goal": start, "goal_velocity": velocity} if k == 0 else {})))
+    positions, goals = ([getattr(state, name) for state in others] for name in ("position", "goal"))
+    np.testing.assert_allclose(positions, [state.position for state in states], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(goals, start + 0.02 * np.arange(1, 501)[:, None] * velocity, rtol=0, atol=1e-12)
+    state = states[-1]
     np.testing.assert_allclose(state.position, state.goal, atol=1e-4)
     np.testing.assert_allclose(state.velocity, velocity, atol=1e-3)
     assert Status.SETTLED not in state.status

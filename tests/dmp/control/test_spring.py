@@ -8,6 +8,7 @@ from scipy.linalg import expm
 
 from kineme.dmp.control import _compiled
 from kineme.dmp.spring_damper import transition, transitions
+from soaking import combined
 
 
 def many_at_once(stiffness, damping, h):
@@ -17,9 +18,10 @@ def many_at_once(stiffness, damping, h):
 @pytest.mark.parametrize(
     "function", [transition, _compiled._transition, many_at_once], ids=["plain", "compiled", "many"]
 )
-@pytest.mark.parametrize("stiffness", [1e-2, 100.0, 1e4])
-@pytest.mark.parametrize("damping", [1e-3, 0.5, 1 - 1e-12, 1.0, 1 + 1e-12, 1 + 1e-6, 3.0, 50.0])
-@pytest.mark.parametrize("h", [0.0, 1e-6, 0.01, 1.0])
+@pytest.mark.parametrize(
+    ("stiffness", "damping", "h"),
+    combined([1e-2, 100.0, 1e4], [1e-3, 0.5, 1 - 1e-12, 1.0, 1 + 1e-12, 1 + 1e-6, 3.0, 50.0], [0.0, 1e-6, 0.01, 1.0]),
+)
 def test_transition_is_the_matrix_exponential(function, stiffness, damping, h):
     D = 2 * np.sqrt(stiffness) * damping
     expected = expm(np.array([[0.0, 1.0], [-stiffness, -D]]) * h)

@@ -1,18 +1,17 @@
-"""Properties of DMPs are stated once and run over formulation x fit x regression x gating."""
+"""Properties of DMPs are stated once and run over formulation x fit x regression x gating, in pairs."""
 
 from __future__ import annotations
-
-from itertools import product
 
 import pytest
 
 from kineme import DMP
 from kineme.dmp.discrete.specification import FORMULATIONS, GATINGS
+from soaking import combined
 
 FITS = (("forcing", "local"), ("forcing", "ridge"), ("trajectory", "local"))
 DMPS = [
     DMP(formulation, n_basis=15, n_points=60, fit=fit, regression=regression, gating=gating)
-    for formulation, (fit, regression), gating in product(FORMULATIONS, FITS, GATINGS)
+    for formulation, (fit, regression), gating in combined(FORMULATIONS, FITS, GATINGS)
 ]
 
 

@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 from kineme import DMP, Trajectory
 from kineme.dmp.discrete.operators import forcing_target, spring_damper_response
 from kineme.dmp.discrete.specification import FORMULATIONS
+from soaking import combined
 
 SPRINGS = {"critical": (100.0, None), "underdamped": (100.0, 3.0), "overdamped": (50.0, 40.0)}
 
@@ -59,9 +60,7 @@ def integrate(dmp, w, x0, g, v0, tau, times):
     return state[:d].T, state[d:-1].T / tau, derivatives[:, d:-1] / tau
 
 
-@pytest.mark.parametrize("gating", ["none", "phase"])
-@pytest.mark.parametrize("spring", SPRINGS)
-@pytest.mark.parametrize("formulation", PRINTED)
+@pytest.mark.parametrize(("formulation", "spring", "gating"), combined(PRINTED, SPRINGS, ["none", "phase"]))
 def test_the_decode_matrix_solves_the_printed_equations(make_movement, agree, formulation, spring, gating):
     stiffness, damping = SPRINGS[spring]
     dmp = DMP(formulation, 8, stiffness, damping, gating, fit="trajectory", n_points=80)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import warnings
-from itertools import product
 
 import numpy as np
 import pytest
@@ -17,11 +16,12 @@ from kineme.dmp import Primitives
 from kineme.dmp.discrete.operators import decoder, decoder_at, smoothness_factor
 from kineme.dmp.discrete.specification import FORMULATIONS, GATINGS
 from kineme.errors import ExtrapolationWarning, SpecificationError, TrajectoryError
+from soaking import combined
 
 FITS = (("forcing", "local"), ("forcing", "ridge"), ("trajectory", "local"))
 EVERY = [
     DMP(name, n_basis=n, n_points=80, fit=fit, regression=regression, gating=gating)
-    for name, (fit, regression), gating, n in product(FORMULATIONS, FITS, GATINGS, (12, 40))
+    for name, (fit, regression), gating, n in combined(FORMULATIONS, FITS, GATINGS, (12, 40))
 ]
 NAMES = [f"{one.formulation}-{one.fit}-{one.regression}-{one.gating}-{one.n_basis}" for one in EVERY]
 

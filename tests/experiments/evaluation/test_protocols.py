@@ -18,6 +18,7 @@ from kineme_experiments.evaluation.protocols import PROTOCOLS, usable_shots
 from kineme_experiments.evaluation.score_split import does, score_split
 from kineme_experiments.evaluation.spotting import Stretch, concatenate_all
 from kineme_experiments.evaluation.trials import TASKS, Settings
+from soaking import SOAK
 
 SETTINGS = Settings(splits=2, seed=3, shots=(1, 2))
 AVAILABLE = [name for name, one in METHODS.items() if not one.unavailable()]
@@ -138,8 +139,16 @@ def test_movements_of_unknown_classes_must_not_be_found(of_people, monkeypatch):
     assert scores.values == {"precision": known.mean(), "recall": 1.0}
 
 
-@pytest.mark.parametrize("method", AVAILABLE)
-@pytest.mark.parametrize("protocol", PROTOCOLS)
+#: Each protocol by kineme, each method in one protocol, and what a method does not do; `make soak` tries all.
+THROUGH = [
+    (protocol, method)
+    for protocol in PROTOCOLS
+    for method in AVAILABLE
+    if SOAK or method == "kineme" or protocol == "few-shot" or (protocol, method) == ("earliness", "paper")
+]
+
+
+@pytest.mark.parametrize(("protocol", "method"), THROUGH)
 def test_every_method_goes_through_every_protocol_and_recognizes_what_is_easy(of_people, protocol, method):
     scores = score_split(of_people, protocol, method, 0, SETTINGS)
     if not does(method, PROTOCOLS[protocol].task):
