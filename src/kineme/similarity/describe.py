@@ -169,12 +169,12 @@ def _precision(how: ComparisonSpecification) -> DTypeLike:
     return np.float32 if how.normalization.translation else np.float64
 
 
-def even_paths(demos: Demonstrations, start: int, stop: int, cutoff: float | None) -> Array:
+def even_paths(demos: Demonstrations, start: int, stop: int, cutoff: float | None, allowance: float = 1.0) -> Array:
     """Return movements start:stop, smoothed, at even times, minus their first recorded position, (stop - start, d, T).
 
     Pauses are cut short first, see `cut_pauses`.
     """
-    if (shorter := without_pauses(demos, start, stop)) is not None:
+    if (shorter := without_pauses(demos, start, stop, allowance)) is not None:
         demos, start, stop = shorter, 0, stop - start
     if cutoff is None:
         return relative_rows(demos, start, stop, N_POINTS)

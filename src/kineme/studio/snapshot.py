@@ -26,7 +26,6 @@ from kineme.library.storage import read
 from kineme.library.storage.symbols import symbol
 from kineme.movements.preparation import pauses
 from kineme.movements.preparation.smooth import spline_matrix
-from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.recognition import conformal
 from kineme.recognition.answer import LEAST_CONFIDENCE, FittedRecognizer, KnownClasses, known_classes
 from kineme.recognition.classifiers import Classifier, Nearest, NearestEach, Prototype, fit_prototype
@@ -38,9 +37,9 @@ from kineme.sampling import evenly_spaced
 from kineme.similarity.comparison import Comparison
 from kineme.similarity.describe import N_POINTS, even_paths
 from kineme.similarity.specification import PAIR_QUANTITIES, Representation, forcing_operator, rotating
-from kineme.validation import Array
 
-#: Numbers of the stored paths, at most: 1.3 MB in base64, so that a page with all else stays below 2 MB.
+#: Numbers of the stored paths, those of early recognition included, at most: 1.3 MB in base64, so that a page with all
+#: else stays below 2 MB.
 MOST_NUMBERS = 240_000
 
 _BOUNDARY = ("starts", "goals", "velocities", "durations", "extents")
@@ -57,7 +56,7 @@ _AGAIN = (
     "then other.learn(library.movements(symbol.name)) for every symbol in library.symbols()"
 )
 
-FORMAT, VERSION = "kineme-snapshot", 2
+FORMAT, VERSION = "kineme-snapshot", 3
 _KINDS = ("float64", "float32", "int32")
 _ALIGNMENT = 8  # bytes: arrays in JavaScript begin at multiples of the size of their numbers
 
@@ -103,16 +102,11 @@ def recognition_parts(classes: KnownClasses) -> Snapshot:
     paths = even_paths(demos, 0, len(demos), classes.comparison.cutoff)
     arrays: dict[str, NDArray[Any]] = {
         "paths": paths.astype(np.float32),
-        "starts": _starts(demos),
-        "durations": np.asarray((pauses.without_pauses(demos, 0, len(demos)) or demos).durations, dtype=np.float64),
+        "starts": np.asarray(demos.positions[demos.offsets[:-1]], dtype=np.float64),
         **comparison_arrays,
         **calibration_arrays,
     }
     return Snapshot(header, arrays)
-
-
-def _starts(demos: Demonstrations) -> Array:
-    return np.asarray(demos.positions[demos.offsets[:-1]], dtype=np.float64)
 
 
 def _comparison(how: Comparison, pairs: Any) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
@@ -164,10 +158,12 @@ def _row_representation(representation: Representation, r: int) -> tuple[dict[st
     return row, arrays
 
 
-def pause_rule() -> dict[str, float]:
-    """Return how pauses within movements are cut short."""
-    names = "RADIUS GAP PAUSE REST LAST_REST SHORTEST WINDOWS FEWEST EQUAL WHOLE ROUNDS"
-    return _numbers(pauses, *names.split())
+def pause_rule(allowance: float = 1.0) -> dict[str, float]:
+    """Return how pauses within movements are cut short; they count `allowance` times as long."""
+    shares = _numbers(pauses, "PAUSE", "REST", "LAST_REST")
+    return {name: allowance * share for name, share in shares.items()} | _numbers(
+        pauses, "RADIUS", "GAP", "SHORTEST", "WINDOWS", "FEWEST", "EQUAL", "WHOLE", "ROUNDS"
+    )
 
 
 def _numbers(module: ModuleType, *names: str) -> dict[str, float]:
@@ -237,15 +233,20 @@ def _calibration(calibration: Calibration) -> tuple[dict[str, Any], dict[str, ND
     return {"pooled": [numbers[pair] for pair in shared], **header}, arrays
 
 
-def early_part(classes: KnownClasses, early: Early | None = None) -> dict[str, Any]:
-    """Header of early recognition: spreads, rotations, widths, and how fast movements are at their end."""
+def early_parts(classes: KnownClasses, early: Early | None = None) -> Snapshot:
+    """Header and arrays of early recognition.
+
+    Spreads, rotations, widths, how fast movements are at their end, and the stored movements that have another path
+    where pauses count more.
+    """
     described = hypotheses(classes.comparison, classes.references, early or Early())
     spreads = {name: getattr(described.early, name) for name in ("size_spread", "duration_spread", "timing_spread")}
     assert described.described.pairs is not None
-    return {
+    header = {
         "n_progress": described.early.n_progress,
         **{name: None if math.isinf(value) else value for name, value in spreads.items()},
         "own_rotations": described.early.max_angle is not None,
+        "pauses": pause_rule(beginnings.ALLOWANCE),
         "rule": rotation_rule(described.procrustes),
         "shapes": pair_rule(described.described.pairs.shapes),
         "widths": described.widths.tolist(),
@@ -257,6 +258,15 @@ def early_part(classes: KnownClasses, early: Early | None = None) -> dict[str, A
             **_numbers(beginnings, "LAST", "LEAST_SPEED"),
         },
     }
+    demos, cutoff = classes.references.all_movements(), classes.comparison.cutoff
+    paths = even_paths(demos, 0, len(demos), cutoff, beginnings.ALLOWANCE).astype(np.float32)
+    own = np.flatnonzero((paths != even_paths(demos, 0, len(demos), cutoff).astype(np.float32)).any(axis=(1, 2)))
+    arrays: dict[str, NDArray[Any]] = {
+        "early movements": own.astype(np.int32),
+        "early paths": paths[own],
+        "durations": described.durations,
+    }
+    return Snapshot(header, arrays)
 
 
 def movement_parts(primitives: Primitives, *, learns: bool = True) -> Snapshot:
@@ -314,18 +324,20 @@ def snapshot_of_library(library: ActionLibrary, most: int | None = None, early: 
     """The symbols of a library with their movements.
 
     Of symbols with many movements some are taken, evenly spaced, as many of each as add up to `most`; by default as
-    many as fit into 2 MB, 603 in the plane and 402 in space. Widths and calibration are those of the movements taken,
-    as if a library held these alone. ``header["n_all"]`` says of how many. `early` is how movements are recognized
-    under way; by default as `kineme.Recognizer.stream` does.
+    many as fit into 2 MB, 603 in the plane and 402 in space, or half of that if all of them pause. Widths and
+    calibration are those of the movements taken, as if a library held these alone. ``header["n_all"]`` says of how
+    many. `early` is how movements are recognized under way; by default as `kineme.Recognizer.stream` does.
     """
     store = library.store
     members = members_of(store)
     fitting = MOST_NUMBERS // (N_POINTS * (store.n_dims or 1))
     taken = some_members(members, fitting if most is None else most)
-    classes = known_members(store, taken)
     prototypes = [prototype_of(store, symbol(store, str(name))) for name in members.names]
     primitives = read.primitives(store, np.array(prototypes, dtype=np.int64))
-    snapshot = _snapshot(classes, primitives, early)
+    snapshot = _snapshot(known_members(store, taken), primitives, early)
+    stored = sum(snapshot.arrays[name].size for name in ("paths", "early paths"))
+    if most is None and stored > MOST_NUMBERS:
+        return snapshot_of_library(library, max(fitting * MOST_NUMBERS // stored, len(members.names)), early)
     snapshot.header["n_all"] = len(members.ids)
     snapshot.header["ids"] = taken.ids.tolist()
     snapshot.header["channels"] = None if store.channels is None else [channel.name for channel in store.channels]
@@ -360,6 +372,6 @@ def some_members(members: Members, most: int) -> Members:
 
 
 def _snapshot(classes: KnownClasses, primitives: Primitives, early: Early | None = None) -> Snapshot:
-    recognition, movements = recognition_parts(classes), movement_parts(primitives)
-    header: dict[str, Any] = {**recognition.header, **movements.header, "early": early_part(classes, early)}
-    return Snapshot(header, recognition.arrays | movements.arrays)
+    recognition, movements, begun = recognition_parts(classes), movement_parts(primitives), early_parts(classes, early)
+    header: dict[str, Any] = {**recognition.header, **movements.header, "early": begun.header}
+    return Snapshot(header, recognition.arrays | movements.arrays | begun.arrays)

@@ -22,7 +22,7 @@ from kineme.runtime.compiled import jit
 
 
 @jit
-def fill_cut(samples, offsets, cut, ends):  # type: ignore[no-untyped-def]
+def fill_cut(samples, offsets, allowance, cut, ends):  # type: ignore[no-untyped-def]
     """Movements with their pauses cut short, one after the other from 0 on; whether any had one, see `cut_pauses`."""
     times, positions = samples
     cut_times, cut_positions = cut
@@ -36,7 +36,7 @@ def fill_cut(samples, offsets, cut, ends):  # type: ignore[no-untyped-def]
             for k in range(positions.shape[1]):
                 own[j, k] = positions[offsets[i] + j, k]
         for _ in range(ROUNDS):
-            if not _fill_shortened(own_times[:n], own[:n], steps[:n], moving[:n]):
+            if not _fill_shortened(own_times[:n], own[:n], allowance, steps[:n], moving[:n]):
                 break
             changes, elapsed, left = True, 0.0, 0
             for j in range(n):
@@ -52,7 +52,7 @@ def fill_cut(samples, offsets, cut, ends):  # type: ignore[no-untyped-def]
 
 
 @jit
-def _fill_shortened(times, positions, steps, moving):  # type: ignore[no-untyped-def]
+def _fill_shortened(times, positions, allowance, steps, moving):  # type: ignore[no-untyped-def]
     """Steps of one movement, as far as they count, and which samples are left; whether anything changes."""
     last = len(times) - 1
     usual = _fill_steps(times, steps)
@@ -61,7 +61,8 @@ def _fill_shortened(times, positions, steps, moving):  # type: ignore[no-untyped
     for j in range(last):
         if moving[j]:
             motion += min(steps[j], usual)
-    gaps = _may_have_gaps(steps, usual, motion)
+    scale = allowance * motion  # pauses count by shares of it
+    gaps = _may_have_gaps(steps, usual, scale)
     if not gaps and not rests:
         return False
     if gaps or between:  # a path takes long to measure, and rests at the ends do not depend on it
@@ -70,18 +71,18 @@ def _fill_shortened(times, positions, steps, moving):  # type: ignore[no-untyped
                 path += np.sqrt(_squared_distance(positions, j, j + 1))
     pace = motion / path if path > 0 else 0.0  # seconds for a unit of length
     if not gaps:
-        return _shorten_rests(steps, moving, motion, REST * reach * pace)
+        return _shorten_rests(steps, moving, scale, allowance * REST * reach * pace)
     changes = False
     before = 0.0
     for j in range(last):
         step = steps[j]
         if step > usual:
             length = np.sqrt(_squared_distance(positions, j, j + 1))
-            most = min(GAP * max(before, steps[j + 1], length * pace), PAUSE * motion)
+            most = min(GAP * max(before, steps[j + 1], length * pace), PAUSE * scale)
             changes |= step > EQUAL * max(usual, most)
             steps[j] = min(step, max(usual, most))
         before = step
-    return _shorten_rests(steps, moving, motion, REST * reach * pace) or changes
+    return _shorten_rests(steps, moving, scale, allowance * REST * reach * pace) or changes
 
 
 @jit

@@ -33,11 +33,11 @@ _OPERATIONS, _PER_NUMBER = 60_000, 100  # of NumPy, of which many calls are need
 Parts = tuple[Array, Array, NDArray[np.intp]]
 
 
-def without_pauses(demos: Demonstrations, start: int, stop: int) -> Demonstrations | None:
+def without_pauses(demos: Demonstrations, start: int, stop: int, allowance: float = 1.0) -> Demonstrations | None:
     """Movements start:stop with their pauses cut short, see `cut_pauses`; None if they have none, the usual case."""
     offsets = demos.offsets[start : stop + 1]
     rows = slice(int(offsets[0]), int(offsets[-1]))
-    cut = cut_pauses(demos.movements.spread[rows], demos.positions[rows], offsets - offsets[0])
+    cut = cut_pauses(demos.movements.spread[rows], demos.positions[rows], offsets - offsets[0], allowance)
     if cut is None:
         return None
     times, positions, ends = cut
@@ -45,7 +45,7 @@ def without_pauses(demos: Demonstrations, start: int, stop: int) -> Demonstratio
     return Demonstrations.of_movements(Movements(positions, ends, durations, times))
 
 
-def cut_pauses(times: Array, positions: Array, offsets: NDArray[np.intp]) -> Parts | None:
+def cut_pauses(times: Array, positions: Array, offsets: NDArray[np.intp], allowance: float = 1.0) -> Parts | None:
     """Cut short the time in which a movement does not move, or in which nothing was recorded of it.
 
     So that a drawing during which somebody stopped to think is the drawing that it would have been: smoothing by cycles
@@ -65,6 +65,8 @@ def cut_pauses(times: Array, positions: Array, offsets: NDArray[np.intp]) -> Par
         Samples of all movements.
     offsets : ndarray of shape (n + 1,)
         Where each movement begins.
+    allowance : float
+        So many times the shares below of the time in motion, and of the reach, are left of pauses.
 
     Returns
     -------
@@ -74,13 +76,13 @@ def cut_pauses(times: Array, positions: Array, offsets: NDArray[np.intp]) -> Par
     if use_compiled(_OPERATIONS + _PER_NUMBER * positions.size):
         cut_times, cut_positions, ends = np.empty(len(times)), np.empty(positions.shape), np.empty_like(offsets)
         fill = compiled_module("kineme.movements.preparation._pauses").fill_cut
-        if not fill((times, positions), offsets, (cut_times, cut_positions), ends):
+        if not fill((times, positions), offsets, allowance, (cut_times, cut_positions), ends):
             return None
         return cut_times[: ends[-1]], cut_positions[: ends[-1]], ends
     cut: Parts | None = None
     for _ in range(ROUNDS):
         steps, moving = np.empty(len(times)), np.ones(len(times), dtype=np.bool_)
-        if not _fill_shortened(times, positions, offsets, steps, moving):
+        if not _fill_shortened(times, positions, offsets, allowance, steps, moving):
             break
         elapsed = np.append(0.0, np.cumsum(steps)[:-1])
         elapsed -= np.repeat(elapsed[offsets[:-1]], np.diff(offsets))
@@ -90,7 +92,12 @@ def cut_pauses(times: Array, positions: Array, offsets: NDArray[np.intp]) -> Par
 
 
 def _fill_shortened(
-    times: Array, positions: Array, offsets: NDArray[np.intp], steps: Array, moving: NDArray[np.bool_]
+    times: Array,
+    positions: Array,
+    offsets: NDArray[np.intp],
+    allowance: float,
+    steps: Array,
+    moving: NDArray[np.bool_],
 ) -> bool:
     """Write the time that each step counts, 0 after last samples, and which samples are kept; whether any changes."""
     first, last, lengths = offsets[:-1], offsets[1:] - 1, np.diff(offsets)
@@ -107,6 +114,7 @@ def _fill_shortened(
     motion = np.add.reduceat(np.where(resting, 0.0, np.minimum(steps, usual[owner])), first)
     path = np.add.reduceat(np.where(resting, 0.0, apart), first)
     pace = np.divide(motion, path, out=np.zeros(len(path)), where=path > 0)  # seconds for a unit of length
+    motion *= allowance  # pauses count by shares of it
     neighbors = np.maximum(np.append(0.0, steps[:-1]), np.append(steps[1:], 0.0))  # 0 beyond an end
     most = np.minimum(GAP * np.maximum(neighbors, apart * pace[owner]), PAUSE * motion[owner])
     longest = np.maximum(usual[owner], most)
@@ -118,7 +126,7 @@ def _fill_shortened(
         return changes
     total = np.add.reduceat(np.where(resting, steps, 0.0), begins)  # until the next rest begins
     own = owner[begins]
-    most, within = PAUSE * motion[own], REST * reach[own] * pace[own]
+    most, within = PAUSE * motion[own], allowance * REST * reach[own] * pace[own]
     limit = np.where(begins == first[own], most, np.minimum(most, within))
     limit = np.where(begins + n_steps == last[own], LAST_REST * motion[own], limit)
     long = (total > EQUAL * limit) & (limit > 0)

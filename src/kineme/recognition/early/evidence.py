@@ -16,6 +16,7 @@ from kineme.movements.preparation.resample import arc_length_phase, relative_row
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.recognition.early.hypotheses import (
+    ALLOWANCE,
     EXPLAINING,
     Hypotheses,
     Prefixes,
@@ -51,10 +52,16 @@ class Begun(NamedTuple):
     durations: Array
 
 
-def describe_begun(stored: Hypotheses, paths: Array, starts: Array, durations: Array) -> Begun:
-    """Describe the smooth, evenly timed paths (n, d, T), relative to their first recorded positions (n, d)."""
+def describe_begun(
+    stored: Hypotheses, paths: Array, starts: Array, durations: Array, wholes: Array | None = None
+) -> Begun:
+    """Describe the smooth, evenly timed paths (n, d, T), relative to their first recorded positions (n, d).
+
+    `wholes` are the same paths with their pauses cut as those of whole movements are, if there are any.
+    """
+    wholes = paths if wholes is None else wholes
     prefixes = beginnings(paths, _WHOLE)
-    where = paths if stored.comparison.normalization.translation else paths + starts[:, :, None]
+    where = wholes if stored.comparison.normalization.translation else wholes + starts[:, :, None]
     return Begun(prefixes, describe_prefixes(prefixes, stored.procrustes), where, durations)
 
 
@@ -159,10 +166,11 @@ def partial_shares(comparison: Comparison, stored: Hypotheses, X: MovementsLike)
 
 
 def _shares(comparison: Comparison, stored: Hypotheses, demos: Demonstrations) -> Array:
-    demos = without_pauses(demos, 0, len(demos)) or demos
-    paths = even_paths(demos, 0, len(demos), comparison.cutoff)
+    wholes = even_paths(demos, 0, len(demos), comparison.cutoff)
+    demos = without_pauses(demos, 0, len(demos), ALLOWANCE) or demos
+    paths = even_paths(demos, 0, len(demos), comparison.cutoff, ALLOWANCE)
     starts = demos.positions[demos.offsets[:-1]]
-    return stored.shares(log_evidence(stored, describe_begun(stored, paths, starts, demos.durations)))
+    return stored.shares(log_evidence(stored, describe_begun(stored, paths, starts, demos.durations, wholes)))
 
 
 def cut(movements: MovementsLike, fraction: float) -> Demonstrations:

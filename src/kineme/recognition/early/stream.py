@@ -18,7 +18,7 @@ from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.recognition.answer import Answer
 from kineme.recognition.early.evidence import describe_begun, log_evidence
-from kineme.recognition.early.hypotheses import Hypotheses, Prefixes, smoother
+from kineme.recognition.early.hypotheses import ALLOWANCE, Hypotheses, Prefixes, smoother
 from kineme.recognition.early.live_state import Guess, LiveState, LiveStatus
 from kineme.runtime.compiled import load_compiled
 from kineme.runtime.parallel import single_threaded_blas
@@ -125,9 +125,9 @@ class Live:
 
     def _estimate(self, samples: Array, status: LiveStatus) -> LiveState:
         elapsed = float(samples[-1, 0] - samples[0, 0])
-        times, positions = _without_pauses(samples)
-        even = self._smooth(times, positions)
-        so_far = describe_begun(self._hypotheses, even, samples[:1, 1:], times[-1:] - times[0])
+        times, positions = _without_pauses(samples, ALLOWANCE)
+        even, whole = self._smooth(times, positions), self._smooth(*_without_pauses(samples))
+        so_far = describe_begun(self._hypotheses, even, samples[:1, 1:], times[-1:] - times[0], whole)
         evidence = log_evidence(self._hypotheses, so_far)
         shares = self._hypotheses.shares(evidence)[0]
         order = np.argsort(-shares[:-1], kind="stable")
@@ -158,10 +158,10 @@ class Live:
         return np.asarray(even if cutoff is None else even @ smoother(float(cutoff)).T)[None]
 
 
-def _without_pauses(samples: Array) -> tuple[Array, Array]:
+def _without_pauses(samples: Array, allowance: float = 1.0) -> tuple[Array, Array]:
     """Return times and positions of samples (k, 1 + d), as those of stored movements are described."""
     times, positions = np.ascontiguousarray(samples[:, 0]), np.ascontiguousarray(samples[:, 1:])
-    cut = cut_pauses(times, positions, np.array([0, len(samples)]))
+    cut = cut_pauses(times, positions, np.array([0, len(samples)]), allowance)
     return (times, positions) if cut is None else cut[:2]
 
 

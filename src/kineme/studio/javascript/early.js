@@ -14,14 +14,13 @@ const WHOLE = [1];
 
 /** Progress and time left on average over a class's hypotheses, the remaining path from its best one. */
 function forecast(stored, evidence, label, begun, duration) {
-  const { header, arrays } = stored.known;
   const {
     early,
     first,
     n_movements: m,
     comparison: { n_dims: d },
-  } = header;
-  const [G, { prefixes, S }] = [early.n_progress, stored];
+  } = stored.known.header;
+  const [G, { paths, prefixes, S }] = [early.n_progress, stored];
   const from = first[label] * G;
   const own = evidence.subarray(from, (first[label + 1] ?? m) * G);
   const weights = softmax(own);
@@ -32,7 +31,7 @@ function forecast(stored, evidence, label, begun, duration) {
     left += (weight * (1 - elapsed)) / elapsed;
   });
   const best = from + argmax(own);
-  const path = arrays.paths.subarray(Math.floor(best / G) * d * N_POINTS);
+  const path = paths.subarray(Math.floor(best / G) * d * N_POINTS);
   const even = linspace(0, 1, N_POINTS);
   const times = linspace(prefixes.elapsed[best], 1, N_REMAINING);
   const rows = Array.from({ length: d }, (_, k) =>
@@ -87,14 +86,11 @@ export function follow(stored, { confidence = 0.9, patience = 0.05 } = {}) {
   return (times, positions) => {
     const n = times.length;
     if (n < 4 || positions.every((x) => x.every((value, k) => value === positions[0][k]))) return null;
-    const active = withoutPauses(movement(times, positions, d), pauses);
+    const soFar = movement(times, positions, d);
+    const active = withoutPauses(soFar, early.pauses);
     const duration = active.times[active.times.length - 1] - active.times[0];
-    const even = linspace(active.times[0], active.times[0] + duration, N_POINTS);
-    const column = (k) => Float64Array.from(active.times, (_, j) => active.positions[j * d + k] - positions[0][k]);
-    const rows = Array.from({ length: d }, (_, k) => interpolate(even, active.times, column(k)));
-    const samples = Float64Array.from({ length: d * N_POINTS }, (_, j) => rows[j % d][Math.floor(j / d)]);
-    const path = smooth(movement(linspace(0, 1, N_POINTS), samples, d), cutoff, rows);
-    const begun = beginnings(path, d, WHOLE, early);
+    const begun = beginnings(smooth(active, cutoff), d, WHOLE, early);
+    const path = smooth(withoutPauses(soFar, pauses), cutoff);
     const elapsed = times[n - 1] - times[0];
     const evidence = logEvidence(stored, begun, path, positions[0], duration);
     const share = shares(stored, evidence);
@@ -119,7 +115,12 @@ export function follow(stored, { confidence = 0.9, patience = 0.05 } = {}) {
   };
 }
 
-/** A path at even times as the stored ones are smoothed; its start stays where the spline has it. */
-function smooth(one, cutoff, rows) {
-  return cutoff === null ? Float64Array.from(rows.flatMap((row) => [...row])) : evenPath(one, cutoff, N_POINTS);
+/** A movement at even times, as the stored ones are smoothed; its start stays where the spline has it. */
+function smooth({ times, positions, d }, cutoff) {
+  const even = linspace(times[0], times[times.length - 1], N_POINTS);
+  const column = (k) => Float64Array.from(times, (_, j) => positions[j * d + k] - positions[k]);
+  const rows = Array.from({ length: d }, (_, k) => interpolate(even, times, column(k)));
+  if (cutoff === null) return Float64Array.from(rows.flatMap((row) => [...row]));
+  const samples = Float64Array.from({ length: d * N_POINTS }, (_, j) => rows[j % d][Math.floor(j / d)]);
+  return evenPath(movement(linspace(0, 1, N_POINTS), samples, d), cutoff, N_POINTS);
 }

@@ -82,11 +82,17 @@ export function hypotheses(known) {
   const { early, comparison, n_movements: m } = header;
   const G = early.n_progress;
   const progress = Float64Array.from({ length: G }, (_, g) => (g + 1) / G);
-  const prefixes = beginnings(arrays.paths, comparison.n_dims, progress, early);
+  const size = comparison.n_dims * N_POINTS;
+  const paths = arrays.paths.slice();
+  arrays["early movements"].forEach((i, k) => {
+    paths.set(arrays["early paths"].subarray(k * size, (k + 1) * size), i * size);
+  });
+  const prefixes = beginnings(paths, comparison.n_dims, progress, early);
   const S = early.shapes.n_segments + 1;
   const each = (value) => Float64Array.from({ length: m * G }, (_, h) => value(h));
   return {
     known,
+    paths,
     progress,
     prefixes,
     S,
