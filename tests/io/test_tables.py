@@ -138,6 +138,14 @@ def test_stamps_since_1970_tell_their_unit_whatever_the_rate(scale, units):
     np.testing.assert_allclose(found.demonstrations.times, times, rtol=1e-15)
 
 
+@pytest.mark.parametrize(("head", "step"), [("RelativeTime", 333_333), ("relative_time", 100_000), ("time", 250_000)])
+def test_stamps_that_may_be_ticks_of_a_camera_are_refused_until_it_is_said(head, step):
+    text = lines([(k * step, 1, k) for k in range(8)], f"{head},x,y")
+    with pytest.raises(kineme.errors.DataError, match="say how long one is, as units='us', '100ns'"):
+        read(text)
+    assert read(text, units="100ns").demonstrations.times[1] == pytest.approx(step * 1e-7)
+
+
 @pytest.mark.parametrize(("units", "divisor"), [("ms", 1000), ("us", 10**6), (0.5, 2), ("milliseconds", 1000)])
 def test_units_that_are_given_win(units, divisor):
     found = read(lines(SIX, "time [s],x,y"), units=units)
@@ -173,6 +181,8 @@ def test_heads_that_are_not(head):
         ("id label t x", (2, (3,), (0,), 1, ())),
         ("subject trial gesture stamp q1 q2", (3, (4, 5), (0, 1), 2, ())),
         ("frame time x y v_x v_y a_x a_y", (1, (2, 3), (), None, (0, 4, 5, 6, 7))),
+        ("time num_bodies x y", (0, (2, 3), (), None, (1,))),
+        ("time observation.state.q1 action", (0, (1, 2), (), None, ())),
         ("Unnamed:_0 time x y vx vy", (1, (2, 3), (), None, (0, 4, 5))),
         ("time v_x v_y", (0, (1, 2), (), None, ())),
         ("class_name movement_id time_ms x", (2, (3,), (1,), 0, ())),

@@ -74,7 +74,7 @@ def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, nam
     if layout.excluded and (excluded := excluded_numbers(heads, layout.excluded)):
         heads = ["" if k in excluded else head for k, head in enumerate(heads)]
         kinds = ["text" if k in excluded else kind for k, kind in enumerate(kinds)]
-    label = _label(heads, layout, named)
+    label = _label(heads, kinds, layout, named)
     movement = _movement(heads, layout, named, label)
     taken = {*movement, label}
     person = None if layout.person is None else _number(heads, layout.person)
@@ -283,10 +283,12 @@ def _named_as(head: str, kind: frozenset[str]) -> bool:
     return words <= kind | _BESIDE_NAMES and bool(words & kind)
 
 
-def _label(heads: Sequence[str], layout: Layout, named: bool) -> int | None:
+def _label(heads: Sequence[str], kinds: Sequence[str], layout: Layout, named: bool) -> int | None:
     if layout.label is not None:
         return _number(heads, layout.label)
     of_labels = [k for k, head in enumerate(heads) if named and _named_as(head, LABEL_WORDS)]
+    if any(head.lower().startswith("observation") for head in heads):  # of a robot, whose actions are numbers
+        of_labels = [k for k in of_labels if kinds[k] == "text" or heads[k].lower() != "action"]
     if len(of_labels) > 1:
         raise DataError(
             f"expected one column of labels, got {[heads[k] for k in of_labels]}; say which with label=, "
@@ -351,9 +353,11 @@ def _is_number_of_thing(head: str) -> bool:
 
 
 def counts_samples(head: str) -> bool:
-    """Tell whether a head names a counter of samples: ``frame``, ``Sample No.``."""
-    words = {word for word in words_of(head) if not word.isdecimal()}
-    return bool(words & _COUNTERS) and words <= _COUNTERS | _BESIDE_COUNTERS
+    """Tell whether a head names a counter of samples, or how many things there are: ``frame``, ``num_bodies``."""
+    words = [word for word in words_of(head) if not word.isdecimal()]
+    if len(words) > 1 and words[0] == "num":
+        return True
+    return bool({*words} & _COUNTERS) and {*words} <= _COUNTERS | _BESIDE_COUNTERS
 
 
 def _says_nothing_new(head: str, plain: set[str]) -> bool:

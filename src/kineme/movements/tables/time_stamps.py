@@ -33,6 +33,7 @@ _LONGEST = 5.0  # s between samples
 _TICKS_SINCE = {"since 1601": 145_731, "since the year 1": 730_119}
 _CENTURY, _TICKS_A_DAY, _TICKS_A_SECOND = 36_525, 864e9, 1e7
 _TICK_WORDS = frozenset({"tick", "ticks"})
+_SLOW_IN_US = 2e5  # five samples a second, or fifty if they are ticks of 100 ns, as a camera with depth writes them
 _DATE_WORDS = frozenset({"unix", "epoch", "utc"})
 _DRIFT = 1e-4  # of the time that passed, between two clocks of one device
 
@@ -83,7 +84,8 @@ def unit_by_size(stamps: Array, head: str = "") -> tuple[str, str]:
     ------
     DataError
         Such stamps with a step of 1 to 5 s, which may as well be 1 to 5 thousandths of it; a head with a word as unix
-        decides. Ticks that count from elsewhere: of what, nothing says.
+        decides. Ticks that count from elsewhere: of what, nothing says. Steps of 200,000 to a million, or relative
+        times in thousands: microseconds of a slow clock, or 100 ns of a fast one.
     """
     finite = stamps[np.isfinite(stamps)]
     if len(finite) == 0:
@@ -105,12 +107,14 @@ def unit_by_size(stamps: Array, head: str = "") -> tuple[str, str]:
     for since, days in _TICKS_SINCE.items():
         if days <= finite[0] / _TICKS_A_DAY <= days + _CENTURY and step / _TICKS_A_SECOND < _LONGEST:
             return "100ns", since
-    if {*words_of(head)} & _TICK_WORDS:
+    by_step = next((unit for unit, least in _STEPS if step >= least), None)
+    may_be_ticks = by_step == "us" and ("relative" in words_of(head) or step >= _SLOW_IN_US)
+    if {*words_of(head)} & _TICK_WORDS or may_be_ticks:
+        us = "'us', " if may_be_ticks else ""
         raise DataError(
             f"expected times whose unit can be told, got {head!r} in steps of {step:.6g}; say how long one is, as "
-            "units='100ns' or a number of seconds, in the shell --units"
+            f"units={us}'100ns' or a number of seconds, in the shell --units"
         )
-    by_step = next((unit for unit, least in _STEPS if step >= least), None)
     return (by_step, "by its steps") if by_step else ("s", "assumed")
 
 
