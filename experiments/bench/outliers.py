@@ -79,7 +79,7 @@ def _single(demos: kineme.Demonstrations, repeats: int) -> list[Row]:
 
 def _counts(demos: kineme.Demonstrations, labels: list[str], planted: NDArray[np.intp]) -> tuple[int, int, int, int]:
     """Planted, found of these, found of the others, movements."""
-    found = {one.index for one in kineme.find_outliers(demos, labels).found}
+    found = {one.index for one in kineme.find_outliers(demos, labels).outliers}
     right = len(found & set(planted.tolist()))
     return len(planted), right, len(found) - right, len(demos)
 

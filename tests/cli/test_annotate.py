@@ -159,7 +159,7 @@ def test_a_table_of_labels_cuts_a_long_recording_into_symbols(recording, truth, 
     learned = answer("learn", recording, "--labels", tmp_path / "labels.csv", "-l", tmp_path / "actions")
     assert (learned["added"], sorted(learned["symbols"])) == (6, sorted(set(ORDER)))
     again = answer("learn", recording, "--labels", tmp_path / "labels.csv", "-l", tmp_path / "actions")
-    assert (again["added"], again["known"]) == (0, 6)
+    assert (again["added"], again["duplicates"]) == (0, 6)
     said = answer("annotate", recording, "-l", tmp_path / "actions")
     middles = [0.5 * (start + end) for start, end, _ in truth]
     found = [one["symbol"] for middle in middles for one in said["annotations"] if one["start"] < middle < one["end"]]

@@ -88,7 +88,7 @@ def test_topics_and_frames_are_learned(bag, tmp_path):
     library = tmp_path / "library"
     one = answer("learn", bag, "--topic", "/joint_states", "--label", "wave", "--library", library)
     assert (one["added"], one["symbols"], one["problems"]) == (1, ["wave"], [])
-    assert answer("learn", bag, "--topic", "/joint_states", "--label", "wave", "--library", library)["known"] == 1
+    assert answer("learn", bag, "--topic", "/joint_states", "--label", "wave", "--library", library)["duplicates"] == 1
     with closing(sqlite3.connect(library / "library.sqlite")) as opened:
         (path, sha256, options), *others = opened.execute("SELECT path, sha256, options FROM source").fetchall()
     assert path == str(bag)

@@ -134,7 +134,7 @@ def test_a_movement_unlike_the_others_of_its_label_is_listed(misplaced, tmp_path
     assert (tmp_path / "out.png").read_bytes().startswith(PNG)
     data = json.loads(run(misplaced, "--json").stdout)["outliers"]
     assert (data["checked"], data["error_rate"]) == (21, 0.05)
-    (one,) = data["found"]
+    (one,) = data["outliers"]
     assert (one["movement"], one["label"], one["label_of_most_like"]) == ("Snake/2.csv", "Snake", "CShape")
 
 

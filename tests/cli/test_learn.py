@@ -26,7 +26,7 @@ def recordings(demos, tmp_path):
 
 def test_a_folder_of_folders_becomes_symbols(recordings, demos, tmp_path):
     learned = answer("learn", recordings, "-l", tmp_path / "actions")
-    assert (learned["added"], learned["known"], learned["problems"]) == (14, 0, [])
+    assert (learned["added"], learned["duplicates"], learned["problems"]) == (14, 0, [])
     assert sorted(learned["symbols"]) == ["CShape", "GShape"]
     with kineme.ActionLibrary(tmp_path / "actions", read_only=True) as library:
         stored = library.movements("GShape")
@@ -52,9 +52,9 @@ def test_every_movement_of_a_long_table_is_learned(demos, tmp_path, columns, key
     (tmp_path / "long.csv").write_text("\n".join([f"{columns},t,x,y", *rows]))
     options = ["--movement", columns] if "label" not in columns else []
     learned = answer("learn", tmp_path / "long.csv", "-l", tmp_path / "actions", *options)
-    assert (learned["added"], learned["known"]) == (4, 0)
+    assert (learned["added"], learned["duplicates"]) == (4, 0)
     again = answer("learn", tmp_path / "long.csv", "-l", tmp_path / "actions", *options)
-    assert (again["added"], again["known"]) == (0, 4)
+    assert (again["added"], again["duplicates"]) == (0, 4)
 
 
 def test_a_movement_tells_the_file_that_it_comes_from(recordings, tmp_path):
@@ -68,10 +68,14 @@ def test_a_movement_tells_the_file_that_it_comes_from(recordings, tmp_path):
 def test_learning_again_adds_nothing_also_from_another_place(recordings, tmp_path):
     library = tmp_path / "actions"
     answer("learn", recordings, "-l", library)
-    assert answer("learn", recordings, "-l", library)["known"] == 14
+    assert answer("learn", recordings, "-l", library)["duplicates"] == 14
     moved = recordings.rename(tmp_path / "elsewhere")
     again = answer("learn", moved, moved / "CShape" / "0.csv", "-l", library)
-    assert (again["added"], again["known"], again["movements"]) == (0, 14, 14)  # a file that is named twice counts once
+    assert (again["added"], again["duplicates"], again["movements"]) == (
+        0,
+        14,
+        14,
+    )  # a file that is named twice counts once
 
 
 def test_what_cannot_be_read_is_listed_and_the_rest_is_learned(recordings, tmp_path):
@@ -102,7 +106,7 @@ def test_labels_can_be_given_or_left_out(recordings, tmp_path):
     assert [(one["name"], one["movements"]) for one in listed["symbols"]] == [("gee/../", 7)]
     labeled_later = answer("learn", recordings, "-l", library)
     assert (labeled_later["added"], labeled_later["symbols"]) == (0, ["CShape"])
-    assert (labeled_later["known"], labeled_later["joined"]) == (14, 7)  # those that had a symbol keep it
+    assert (labeled_later["duplicates"], labeled_later["joined"]) == (14, 7)  # those that had a symbol keep it
     assert answer("learn", recordings, "-l", library)["joined"] == 0
     both = run("learn", recordings, "--label", "x", "--no-labels", "-l", library)
     assert both.returncode == 2

@@ -67,4 +67,4 @@ def test_every_format_gives_the_same_library(folder, name, tmp_path):
 
 def test_what_comes_in_another_format_is_known(folder, tmp_path):
     learned = answer("learn", *(folder / name for name in WRITERS), "-l", tmp_path / "actions")
-    assert (learned["added"], learned["known"], learned["movements"]) == (14, 28, 14)
+    assert (learned["added"], learned["duplicates"], learned["movements"]) == (14, 28, 14)

@@ -52,7 +52,7 @@ def check_what_is_left(folder, acknowledged):
         for k in {0, acknowledged, n - 1}:
             batch = draw_batch(k)
             report = library.learn(batch)
-            assert (report.added, report.known) == (0, BATCH)
+            assert (report.added, report.duplicates) == (0, BATCH)
             assert report.ids.tolist() == list(range(k * BATCH + 1, (k + 1) * BATCH + 1))
             np.testing.assert_allclose(library.movements(ids=report.ids).positions, batch.positions, atol=1e-5)
         return n

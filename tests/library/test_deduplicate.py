@@ -33,14 +33,14 @@ def test_samples_say_more_than_the_place_in_a_file(library):
     demos = draw_movements(3)
     first = library.learn(demos, source=_source(), places=["0", "1", "2"])
     again = library.learn(demos, source=_source(), places=["2", "0", "1"])
-    assert again.known == 3
+    assert again.duplicates == 3
     np.testing.assert_array_equal(again.ids, first.ids)
 
 
 def test_one_place_is_one_movement_also_within_one_call(library):
     demos = draw_movements(1)
     report = library.learn([demos[0].positions, *_rounded(demos)], source=[_source(), _source()], places=["0", "0"])
-    assert (report.added, report.known, report.ids.tolist()) == (1, 1, [1, 1])
+    assert (report.added, report.duplicates, report.ids.tolist()) == (1, 1, [1, 1])
 
 
 def test_the_same_file_read_with_other_options_is_another_source(library):
@@ -55,7 +55,7 @@ def test_what_was_deleted_is_learned_anew(library, by):
     first = library.learn(demos, source=_source(), places=["0", "1"])
     library.delete(first.ids[:1])
     again = library.learn(demos if by == "samples" else _rounded(demos), source=_source(), places=["0", "1"])
-    assert (again.added, again.known) == (1, 1)
+    assert (again.added, again.duplicates) == (1, 1)
     assert again.ids[0] not in first.ids
     assert again.ids[1] == first.ids[1]
 

@@ -55,7 +55,7 @@ def test_an_imported_library_is_a_library_like_any_other(eventful, tmp_path):
     with ActionLibrary(eventful) as library:
         library.export(tmp_path / "one")
     with ActionLibrary.import_(tmp_path / "one", tmp_path / "copy", wait=0.5) as copy:
-        assert copy.learn(draw_movements(12, ragged=True)).known == 10  # two were deleted
+        assert copy.learn(draw_movements(12, ragged=True)).duplicates == 10  # two were deleted
         copy.rename("tilt", "lean")
     with ActionLibrary(eventful) as library:
         assert "tilt" in library

@@ -96,7 +96,7 @@ def test_learning_again_does_not_duplicate(library, ragged):
     demos = draw_movements(9, ragged=ragged)
     first = library.learn(demos)
     again = library.learn(demos[::-1])
-    assert (again.added, again.known, len(library)) == (0, 9, 9)
+    assert (again.added, again.duplicates, len(library)) == (0, 9, 9)
     assert again.ids.tolist() == first.ids[::-1].tolist()
     assert library.version == first.version == again.version  # nothing happened
 
@@ -104,7 +104,7 @@ def test_learning_again_does_not_duplicate(library, ragged):
 def test_the_same_movement_twice_in_one_call_is_one_movement(library):
     demos = draw_movements(3)
     report = library.learn([demos[0], demos[1], demos[0]])
-    assert (report.added, report.known, report.ids.tolist()) == (2, 1, [1, 2, 1])
+    assert (report.added, report.duplicates, report.ids.tolist()) == (2, 1, [1, 2, 1])
 
 
 def test_place_and_time_tell_movements_apart_but_not_their_origin_in_time(library):
@@ -116,7 +116,7 @@ def test_place_and_time_tell_movements_apart_but_not_their_origin_in_time(librar
     x = draw_movements(1)[0].positions
     early, late = (Demonstrations.from_arrays([x], times=[t0 + np.arange(40) / 32]) for t0 in (0.0, 64.0))
     assert library.learn(early).added == 1
-    assert library.learn(late).known == 1
+    assert library.learn(late).duplicates == 1
 
 
 def test_a_movement_is_known_by_its_place_in_a_file_read_in_the_same_way(library, tmp_path):
@@ -128,7 +128,7 @@ def test_a_movement_is_known_by_its_place_in_a_file_read_in_the_same_way(library
     library.learn(demos, source=source, places=places)
     moved = Source.of_file(path.rename(tmp_path / "other.csv"), options={"unit": "m"})
     rounded = [one.positions.astype(np.float32) for one in demos]
-    assert library.learn(rounded, source=moved, places=places).known == 4
+    assert library.learn(rounded, source=moved, places=places).duplicates == 4
     other = Source.of_file(moved.path, options={"unit": "mm"})
     assert library.learn(rounded, source=other, places=places).added == 4
     again = library.learn([demos[1].positions.astype(np.float16)], source=[moved], places=["1"])
@@ -139,7 +139,7 @@ def test_a_file_that_comes_in_two_calls_without_places_is_learned_whole(library)
     source, demos = Source("wave.csv", "0" * 64, 1), draw_movements(4)
     assert library.learn(demos[:2], source=source).added == 2
     assert library.learn(demos[2:], source=source).added == 2
-    assert library.learn(demos, source=source).known == 4
+    assert library.learn(demos, source=source).duplicates == 4
 
 
 def test_a_library_keeps_the_specification_that_it_was_made_with(library, tmp_path):
@@ -198,7 +198,7 @@ def test_learning_that_was_interrupted_goes_on_where_it_ended(library, monkeypat
     there = len(library)
     assert there in (10, 20)
     report = library.learn(demos)
-    assert (report.added, report.known, len(library)) == (30 - there, there, 30)
+    assert (report.added, report.duplicates, len(library)) == (30 - there, there, 30)
 
 
 def test_disk_is_little_more_than_the_arrays_in_single_precision(tmp_path):

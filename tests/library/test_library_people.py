@@ -110,7 +110,7 @@ def test_a_calibration_of_other_people_is_not_taken_from_the_cache(tmp_path):
     with _library(tmp_path / "actions", paths, labels, None) as library:
         before = LibraryRecognizer(library.store, exhaustive=0).model().calibration
         report = library.learn(paths, groups=groups)  # said later: nothing is added but who showed what
-        assert (report.added, report.known) == (0, len(paths))
+        assert (report.added, report.duplicates) == (0, len(paths))
         after = LibraryRecognizer(library.store, exhaustive=0).model().calibration
         again = LibraryRecognizer(library.store, exhaustive=0).model().calibration
     assert (after.scales > 1.4 * before.scales).all()

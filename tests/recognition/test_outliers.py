@@ -26,8 +26,8 @@ def wrongly_labeled(labels, share, rng):
 
 def counts(demos, labels, planted):
     """Planted outliers that are found, and how many others are."""
-    found = {one.index for one in find_outliers(demos, labels).found}
-    return len(found & set(planted.tolist())), len(found - set(planted.tolist()))
+    indices = {outlier.index for outlier in find_outliers(demos, labels).outliers}
+    return len(indices & set(planted.tolist())), len(indices - set(planted.tolist()))
 
 
 @pytest.mark.parametrize(("share", "least"), [(0.02, 0.85), (0.1, 0.75)])
@@ -36,14 +36,14 @@ def test_wrong_labels_of_digits_are_found_and_few_others(digits, share, least):
     demos, _ = digits
     rng = np.random.default_rng(4)
     runs = [(*counts(demos, *wrongly_labeled(demos.labels, share, rng)), round(share * len(demos))) for _ in range(4)]
-    found, others, planted = np.sum(runs, axis=0)
-    assert found >= least * planted
-    assert others <= 0.05 * (found + others)
+    n_detected, n_others, n_planted = np.sum(runs, axis=0)
+    assert n_detected >= least * n_planted
+    assert n_others <= 0.05 * (n_detected + n_others)
 
 
 def test_real_recordings_as_they_are_have_almost_none(gestures, digits):
     for demos, _ in (gestures, digits):
-        assert len(find_outliers(demos).found) <= 0.005 * len(demos)
+        assert len(find_outliers(demos).outliers) <= 0.005 * len(demos)
 
 
 def test_movements_of_an_action_that_has_no_label_are_found(gestures):
@@ -53,28 +53,28 @@ def test_movements_of_an_action_that_has_no_label_are_found(gestures):
     chosen = np.concatenate((np.flatnonzero(~foreign), np.flatnonzero(foreign)[:20]))
     given = labels[chosen].copy()
     given[-20:] = np.unique(given[:-20])[np.arange(20) % 10]
-    found, others = counts(demos[chosen], given.tolist(), np.arange(len(chosen) - 20, len(chosen)))
-    assert found >= 15
-    assert others <= 3
+    n_detected, n_others = counts(demos[chosen], given.tolist(), np.arange(len(chosen) - 20, len(chosen)))
+    assert n_detected >= 15
+    assert n_others <= 3
 
 
 def test_what_is_said_of_an_outlier():
     demos = kineme.load_lasa(["CShape", "Snake", "Sine"])
     labels = demos.labels.tolist()
     labels[2] = "Snake"
-    found = find_outliers(demos, labels)
-    assert found.checked == 21
-    (one,) = found.found
-    assert (one.index, one.label, one.label_of_most_like) == (2, "Snake", "CShape")
-    assert one.ratio > 2
-    assert one.p_value < 0.05 / 21
-    assert labels[one.most_like] == "CShape"
+    result = find_outliers(demos, labels)
+    assert result.checked == 21
+    (outlier,) = result.outliers
+    assert (outlier.index, outlier.label, outlier.label_of_most_like) == (2, "Snake", "CShape")
+    assert outlier.ratio > 2
+    assert outlier.p_value < 0.05 / 21
+    assert labels[outlier.most_like] == "CShape"
     names = [f"m{i}" for i in range(21)]
-    words = outliers_as_words(found, names)
+    words = outliers_as_words(result, names)
     assert "outliers: 1 of 21 movements unlike the others of their label (about 5 % of those" in words
-    assert f"m{one.most_like} (CShape)" in words
-    data = outliers_as_data(found, names)
-    assert (data["found"][0]["movement"], data["checked"], data["error_rate"]) == ("m2", 21, 0.05)
+    assert f"m{outlier.most_like} (CShape)" in words
+    data = outliers_as_data(result, names)
+    assert (data["outliers"][0]["movement"], data["checked"], data["error_rate"]) == ("m2", 21, 0.05)
     labels[2] = "CShape"
     assert outliers_as_words(find_outliers(demos, labels), names) == (
         "no outliers: none of 21 movements is unlike the others of its label"
@@ -95,8 +95,8 @@ def test_the_answer_depends_on_no_order():
     labels = demos.labels.tolist()
     labels[2] = "Snake"
     order = np.random.default_rng(0).permutation(21)
-    found = find_outliers(demos[order], [labels[i] for i in order]).found
-    assert [order[one.index] for one in found] == [2]
+    outliers = find_outliers(demos[order], [labels[i] for i in order]).outliers
+    assert [order[outlier.index] for outlier in outliers] == [2]
 
 
 def test_p_values_are_those_of_an_exponential_law():
@@ -146,5 +146,5 @@ def test_copies_alone_are_refused_in_words():
 def test_many_copies_hide_no_outlier_and_make_none():
     demos = kineme.load_lasa(["CShape", "Snake"])
     movements = [*([demos[0]] * 20), demos[1], demos[2], demos[8]]
-    found = find_outliers(movements, ["a"] * 23).found
-    assert found[0].index == 22
+    outliers = find_outliers(movements, ["a"] * 23).outliers
+    assert outliers[0].index == 22

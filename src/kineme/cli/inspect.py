@@ -92,7 +92,7 @@ def _outliers(recorded: Any, error_rate: float) -> tuple[tuple[int, ...], dict[s
     except KinemeError as error:
         return (), {}, f"outliers were not looked for: {error}"
     return (
-        tuple(outlier.index for outlier in outliers.found),
+        tuple(outlier.index for outlier in outliers.outliers),
         {"outliers": outliers_as_data(outliers, names)},
         outliers_as_words(outliers, names),
     )

@@ -76,8 +76,8 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
         data = {
             "library": str(folder),
             "added": report.added,
-            "known": report.known,
-            "joined": _joined(library, before) if report.known else 0,
+            "duplicates": report.duplicates,
+            "joined": _joined(library, before) if report.duplicates else 0,
             **_named(library, report.ids, labels),
             "symbols": list(report.symbols),
             "movements": len(library),
@@ -147,7 +147,7 @@ def _named(library: Any, ids: Any, labels: list[Any]) -> dict[str, Any]:
 def _text(data: dict[str, Any], problems: list[str]) -> str:
     new = f", {counted(len(data['symbols']), 'new symbol')}" if data["symbols"] else ""
     joined = f" ({data['joined']:,} joined the symbol of its label)" if data["joined"] else ""
-    stored = f", {data['known']:,} stored already{joined}" if data["known"] else ""
+    stored = f", {data['duplicates']:,} stored already{joined}" if data["duplicates"] else ""
     held = f"{printable(data['library'])} holds {counted(data['movements'], 'movement')}"
     people = data["people"]
     by = f", by {counted(len(people), 'person', 'people')}" if people else ""

@@ -67,7 +67,7 @@ class LearnReport:
 
     Attributes
     ----------
-    added, known : int
+    added, duplicates : int
         Number of movements that were stored, and of those that were stored before.
     symbols : tuple of str
         Names of new symbols.
@@ -78,13 +78,14 @@ class LearnReport:
     """
 
     added: int
-    known: int
+    duplicates: int
     symbols: tuple[str, ...]
     ids: NDArray[np.int64]
     version: int
 
     def __repr__(self) -> str:
-        return f"LearnReport(added={self.added}, known={self.known}, symbols={self.symbols!r}, version={self.version})"
+        counts = f"added={self.added}, duplicates={self.duplicates}"
+        return f"LearnReport({counts}, symbols={self.symbols!r}, version={self.version})"
 
 
 def learn(  # noqa: PLR0913, PLR0917 - those of `ActionLibrary.learn`

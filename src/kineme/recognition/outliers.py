@@ -67,16 +67,16 @@ class Outliers:
 
     Attributes
     ----------
-    found : tuple of Outlier
+    outliers : tuple of Outlier
         The most unlike first.
     checked : int
         Movements that were compared with others of their label: those of labels with at least 5, if these are 20 or
         more, else 0.
     error_rate : float
-        Expected share of `found` that are like the others after all.
+        Expected share of `outliers` that are like the others after all.
     """
 
-    found: tuple[Outlier, ...]
+    outliers: tuple[Outlier, ...]
     checked: int
     error_rate: float
 
@@ -252,20 +252,20 @@ def outliers_as_data(outliers: Outliers, names: Sequence[str]) -> dict[str, Any]
             "ratio": outlier.ratio, "p_value": outlier.p_value,
             "most_like": names[outlier.most_like], "label_of_most_like": outlier.label_of_most_like,
         }
-        for outlier in outliers.found
+        for outlier in outliers.outliers
     ]  # fmt: skip
-    return {"checked": outliers.checked, "error_rate": outliers.error_rate, "found": rows}
+    return {"checked": outliers.checked, "error_rate": outliers.error_rate, "outliers": rows}
 
 
 def outliers_as_words(outliers: Outliers, names: Sequence[str]) -> str:
     """Return a table, the most unlike first; empty if no movement was checked."""
     if not outliers.checked:
         return ""
-    if not outliers.found:
+    if not outliers.outliers:
         return f"no outliers: none of {counted(outliers.checked, 'movement')} is unlike the others of its label"
     title = (
-        f"outliers: {len(outliers.found):,} of {counted(outliers.checked, 'movement')} unlike the others of their label"
-        f" (about {100 * outliers.error_rate:.2g} % of those listed are false alarms)"
+        f"outliers: {len(outliers.outliers):,} of {counted(outliers.checked, 'movement')} unlike the others of their "
+        f"label (about {100 * outliers.error_rate:.2g} % of those listed are false alarms)"
     )
     rows = [
         (
@@ -275,8 +275,8 @@ def outliers_as_words(outliers: Outliers, names: Sequence[str]) -> str:
             f"{outlier.p_value:.1g}",
             printable(f"{names[outlier.most_like]} ({outlier.label_of_most_like})"),
         )
-        for outlier in outliers.found[:_SHOWN]
+        for outlier in outliers.outliers[:_SHOWN]
     ]
-    more = len(outliers.found) - _SHOWN
+    more = len(outliers.outliers) - _SHOWN
     table = to_text(Table(title, ("movement", "label", "farther than usual", "p-value", "most like"), rows))
     return f"{table}\nand {more:,} more" if more > 0 else table
