@@ -9,7 +9,7 @@ import pytest
 import kineme
 from kineme.io.inspection.inspect import inspect
 from kineme.io.reading.column_order import notes_on_aside
-from kineme.io.reading.recording_gaps import notes_on_gaps
+from kineme.io.reading.merge_files import notes_on_gaps
 from kineme.movements.tables.layout import Layout
 from recordings_in_bytes import read_recordings_from_bytes
 

@@ -6,7 +6,7 @@ from click.testing import CliRunner
 
 from kineme.cli import main
 from kineme.errors import DataError, SpecificationError
-from kineme.io.reading.recording_gaps import notes_on_gaps
+from kineme.io.reading.merge_files import notes_on_gaps
 from kineme.io.reading.recordings import read_recording, read_recordings
 from kineme.movements.tables.layout import Layout
 from recordings_in_bytes import read_recordings_from_bytes

@@ -54,7 +54,7 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
     Example: kineme annotate long.csv --library actions/ -o long-labels.csv
     """
     from kineme.io.reading.formats import expanded
-    from kineme.io.reading.recording_gaps import notes_on_gaps
+    from kineme.io.reading.merge_files import notes_on_gaps
     from kineme.io.reading.recordings import paths_of
     from kineme.io.writing.annotations import as_row, targets_of, to_csv, write_annotations
     from kineme.library.annotate import annotate as find

@@ -93,7 +93,7 @@ def _notes(recordings: Any) -> list[str]:
     """List what a person should know of how recordings were read, before they rely on what is learned."""
     from kineme.io.inspection.inspect import notes_on_extents, notes_on_sizes
     from kineme.io.reading.column_order import notes_on_aside, notes_on_order
-    from kineme.io.reading.recording_gaps import notes_on_gaps, notes_on_sampling
+    from kineme.io.reading.merge_files import notes_on_gaps, notes_on_sampling
     from kineme.movements.channels.column_match import columns_recorded
 
     demos = recordings.demonstrations

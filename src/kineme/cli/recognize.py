@@ -43,7 +43,7 @@ def recognize(
 
     Example: kineme recognize *.csv --library actions/
     """
-    from kineme.io.reading.recording_gaps import notes_on_gaps
+    from kineme.io.reading.merge_files import notes_on_gaps
     from kineme.library.library import ActionLibrary
 
     with ActionLibrary(folder, read_only=True) as library:

@@ -7,7 +7,7 @@ import pytest
 
 from kineme.io.inspection.figure import draw_recordings
 from kineme.io.inspection.inspect import as_data, as_words, duplicates_among, inspect
-from kineme.io.reading.recording_gaps import GAP, sampling_of
+from kineme.io.reading.merge_files import GAP, sampling_of
 from kineme.io.reading.recordings import read_recordings
 from kineme.io.writing.write_movement import write_movement
 from kineme.movements.tables.layout import Layout

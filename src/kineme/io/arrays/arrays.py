@@ -45,7 +45,9 @@ def arrays_movements(arrays: Mapping[str, Any], layout: Layout, kind: str) -> Pa
     Where there are no times, a rate (``fps``, ``dt``, ...) gives them; else movements of ``positions`` (n, T, d) and
     ``positions_0`` are evenly sampled over one second.
     """
-    arrays = _axes_stacked(arrays)
+    axes = [name for name in "xyz" if name in arrays]
+    if axes[:2] == ["x", "y"] and len({np.shape(arrays[name]) for name in axes}) == 1 and np.ndim(arrays["x"]) == 1:
+        arrays = _Joined(arrays, axes, np.column_stack([numbers_of(arrays[name]) for name in axes]))
     key = first_named(arrays, POSITIONS)
     if key is not None:
         xs, ts, how = _of_one(arrays, numbers_of(arrays[key]), layout)
@@ -55,8 +57,11 @@ def arrays_movements(arrays: Mapping[str, Any], layout: Layout, kind: str) -> Pa
         check_first_axis([x.shape for x in xs])
         ts, layout = [rate.stamps(len(x)) for x in xs], replace(layout, units="s")
     shape: tuple[int, ...] = () if key is None else np.shape(arrays[key])
-    points = point_names(*shape[1:]) if len(shape) == 3 and len(xs) < shape[0] else None
-    named = Named(_labels(arrays, len(xs)), first_named(arrays, TIMES) or STAMP, None, _column_names(arrays) or points)
+    columns = point_names(*shape[1:]) if len(shape) == 3 and len(xs) < shape[0] else None
+    names = np.asarray(arrays[COLUMNS]) if COLUMNS in arrays else None
+    if names is not None and names.ndim == 1 and names.dtype.kind == "U":
+        columns = [str(name) for name in names.tolist()] or columns
+    named = Named(_labels(arrays, len(xs)), first_named(arrays, TIMES) or STAMP, None, columns)
     return parsed_arrays(xs, ts, named, layout, (kind, how))
 
 
@@ -149,14 +154,6 @@ def point_names(n_points: int, width: int) -> list[str]:
     return [f"{k}.{end}" for k in range(n_points) for end in ends]
 
 
-def _column_names(arrays: Mapping[str, Any]) -> list[str] | None:
-    """The names of the coordinates, if there are such."""
-    names = np.asarray(arrays[COLUMNS]) if COLUMNS in arrays else None
-    if names is None or names.ndim != 1 or names.dtype.kind != "U":
-        return None
-    return [str(name) for name in names.tolist()]
-
-
 def has_known_names(names: Collection[str]) -> bool:
     """Tell whether arrays have the names of `arrays_movements`, or none that could be other movements.
 
@@ -171,14 +168,6 @@ def has_known_names(names: Collection[str]) -> bool:
         return False
     others = set(names) - {*TIMES, *LABELS, "offsets"}
     return has_positions or all(seconds_named(name) is not None for name in others)
-
-
-def _axes_stacked(arrays: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Coordinates ``x`` (T,), ``y`` (T,), ``z`` (T,) as positions (T, d)."""
-    axes = [name for name in "xyz" if name in arrays]
-    if axes[:2] != ["x", "y"] or len({np.shape(arrays[name]) for name in axes}) > 1 or np.ndim(arrays["x"]) != 1:
-        return arrays
-    return _Joined(arrays, axes, np.column_stack([numbers_of(arrays[name]) for name in axes]))
 
 
 class _Joined(Mapping[str, Any]):

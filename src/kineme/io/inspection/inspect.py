@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from kineme.errors import DataError
 from kineme.io.reading.column_order import notes_on_aside, notes_on_order
 from kineme.io.reading.formats import FORMATS, data_set_of, entries_of
-from kineme.io.reading.merge_files import Recordings
-from kineme.io.reading.recording_gaps import Sampling, notes_on_gaps, notes_on_sampling, sampling_of
+from kineme.io.reading.merge_files import Recordings, Sampling, notes_on_gaps, notes_on_sampling, sampling_of
 from kineme.io.records import Contents, Problem
 from kineme.movements.channels.channel import Channel, Channels
 from kineme.movements.channels.column_match import columns_recorded
@@ -164,29 +163,20 @@ def _notes(recordings: Recordings, labels: tuple[LabelSummary, ...]) -> list[str
 
 def _notes_on_channels(demos: Demonstrations) -> list[str]:
     """Columns whose values do not fit their kind, and those that never change."""
-    notes = _notes_on_still_columns(demos)
-    for channel, columns in zip(demos.channels or (), columns_of(demos.channels or ()), strict=True):
-        values = demos.recorded[:, columns.start]
+    channels, x, starts, notes = demos.channels or (), demos.recorded, demos.offsets[:-1], list[str]()
+    columns_of_channels = columns_of(channels)
+    if len(columns_recorded(channels).heads) >= _MANY:
+        # Columns that have one value throughout every movement tell nothing of what moves.
+        still = (np.maximum.reduceat(x, starts, axis=0) == np.minimum.reduceat(x, starts, axis=0)).all(axis=0)
+        named = zip(channels, columns_of_channels, strict=True)
+        if quiet := [channel.name for channel, columns in named if still[columns].all()]:
+            names = first_names(quiet, _NAMED)
+            notes.append(f"{len(quiet)} of {len(channels)} channels never move: {names}; --exclude leaves them out")
+    for channel, columns in zip(channels, columns_of_channels, strict=True):
+        values = x[:, columns.start]
         if channel.kind == "position" and values.min() < values.max() and ((values == 0) | (values == 1)).all():
             notes.append(f"{channel.name} is 0 or 1 throughout; if it is a switch, say --kind {channel.name}=discrete")
     return notes
-
-
-def _notes_on_still_columns(demos: Demonstrations) -> list[str]:
-    """Columns of many that have one value throughout every movement: they tell nothing of what moves."""
-    names, x, starts = columns_recorded(demos.channels or ()).heads, demos.recorded, demos.offsets[:-1]
-    if len(names) < _MANY:
-        return []
-    still = (np.maximum.reduceat(x, starts, axis=0) == np.minimum.reduceat(x, starts, axis=0)).all(axis=0)
-    quiet = [
-        channel.name
-        for channel, columns in zip(demos.channels or (), columns_of(demos.channels or ()), strict=True)
-        if still[columns].all()
-    ]
-    if not quiet:
-        return []
-    named = first_names(quiet, _NAMED)
-    return [f"{len(quiet)} of {len(demos.channels or ())} channels never move: {named}; --exclude leaves them out"]
 
 
 def duplicates_among(demonstrations: Demonstrations) -> list[list[int]]:
@@ -211,18 +201,16 @@ def duplicates_among(demonstrations: Demonstrations) -> list[list[int]]:
 def _equal(demonstrations: Demonstrations, alike: list[int]) -> list[list[int]]:
     groups: list[list[int]] = []
     for i in alike:
-        same = next((group for group in groups if _are_equal(demonstrations, group[0], i)), None)
-        if same is None:
-            groups.append([i])
+        movement = demonstrations[i]
+        for group in groups:
+            other = demonstrations[group[0]]
+            apart = np.abs((other.times - other.times[0]) - (movement.times - movement.times[0])).max()
+            if np.array_equal(other.recorded, movement.recorded) and apart <= _STAMP * other.duration:
+                group.append(i)
+                break
         else:
-            same.append(i)
+            groups.append([i])
     return [group for group in groups if len(group) > 1]
-
-
-def _are_equal(demonstrations: Demonstrations, i: int, k: int) -> bool:
-    movement, other = demonstrations[i], demonstrations[k]
-    since = np.abs((movement.times - movement.times[0]) - (other.times - other.times[0])).max()
-    return np.array_equal(movement.recorded, other.recorded) and bool(since <= _STAMP * movement.duration)
 
 
 def extents_of(demos: Demonstrations) -> Array:
@@ -456,7 +444,8 @@ def _in_words(content: Contents) -> str:
         rows = tuple(row for row in rows if not any(str(cell).startswith(_IDLE) for cell in row[-2:]))
     n_idle = len(content.rows) - len(rows)
     more = f"\nand {n_idle} {content.name} that hold no movement; --json lists them" if n_idle else ""
-    return to_text(Table(title, content.heads, [_cells(row) for row in rows])) + more
+    cells = [tuple(f"{cell:,}" if isinstance(cell, int) else printable(cell) for cell in row) for row in rows]
+    return to_text(Table(title, content.heads, cells)) + more
 
 
 def _alike_once(content: Contents) -> Contents:
@@ -484,7 +473,3 @@ def _range_of_counts(cells: list[str | int]) -> str:
         return str(cells[0])
     least, greatest = min(numbers), max(numbers)
     return f"{least:,}" if least == greatest else f"{least:,} to {greatest:,}"
-
-
-def _cells(row: tuple[str | int, ...]) -> tuple[str, ...]:
-    return tuple(f"{cell:,}" if isinstance(cell, int) else printable(cell) for cell in row)

@@ -80,7 +80,12 @@ def copy_with_motions(source: Path, target: Path, motions: Mapping[int, Sequence
     )
     for shard in shards:
         write_shard(source / shard, target / shard, motions, column)
-    _declare(source / MARKER, target / MARKER, column)
+    declaration = read_json(source / MARKER, MARKER)
+    if column.name in declaration["features"]:
+        shutil.copy2(source / MARKER, target / MARKER)
+        return
+    declaration["features"][column.name] = column.feature
+    (target / MARKER).write_text(json.dumps(declaration, indent=4, ensure_ascii=False), encoding="utf-8")
 
 
 def _take(source: Path, old: Path, new: Path, changed: set[Path]) -> None:
@@ -95,15 +100,6 @@ def _take(source: Path, old: Path, new: Path, changed: set[Path]) -> None:
         else:
             return
     shutil.copy2(old, new)
-
-
-def _declare(source: Path, target: Path, column: Column) -> None:
-    info = read_json(source, MARKER)
-    if column.name in info["features"]:
-        shutil.copy2(source, target)
-        return
-    info["features"][column.name] = column.feature
-    target.write_text(json.dumps(info, indent=4, ensure_ascii=False), encoding="utf-8")
 
 
 def write_shard(source: Path, target: Path, motions: Mapping[int, Sequence[Motion]], column: Column) -> None:

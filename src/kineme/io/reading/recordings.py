@@ -14,9 +14,8 @@ from kineme.errors import DataError, SpecificationError, warn
 from kineme.io.limits import max_file_bytes
 from kineme.io.reading.formats import as_text, data_set_of, entries_of, in_words, name_of, root_of
 from kineme.io.reading.join_files import Placed, join_files, notes_on_clocks
-from kineme.io.reading.merge_files import Recordings, merge_files
+from kineme.io.reading.merge_files import Recordings, merge_files, notes_on_gaps
 from kineme.io.reading.read_file import FileRead, format_of, read_bytes, read_file
-from kineme.io.reading.recording_gaps import notes_on_gaps
 from kineme.io.records import Problem
 from kineme.movements.preparation.trim import TrimRest
 from kineme.movements.tables.columns import excluded_numbers

@@ -7,6 +7,7 @@ import sqlite3
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
+from functools import partial
 from heapq import merge
 from math import inf
 from pathlib import Path, PurePath
@@ -52,7 +53,9 @@ def _copy_folder(bag: bags.Bag, source: Path, target: Path, added: AddedTopic) -
     if bag.compression == "file":
         raise DataError("expected a bag whose files are not compressed as a whole, to add a topic to; ros2 bag convert")
     if bag.compression == "message":
-        added = added._replace(messages=tuple((stamp, _compressed(raw)) for stamp, raw in added.messages))
+        from rosbags.rosbag2.storage_mcap import zstd
+
+        added = added._replace(messages=tuple((stamp, bytes(zstd.compress(raw))) for stamp, raw in added.messages))
     with bags.refused(f"expected {bags.METADATA} of a bag of ROS 2", "run ros2 bag reindex"):
         metadata = yaml.load((source / bags.METADATA).read_text(encoding="utf-8"))
         about = metadata[bags.INFORMATION]
@@ -116,12 +119,6 @@ def _extend(about: Any, added: AddedTopic) -> None:
     about["message_count"] += len(stamps)
 
 
-def _compressed(raw: bytes) -> bytes:
-    from rosbags.rosbag2.storage_mcap import zstd
-
-    return bytes(zstd.compress(raw))
-
-
 class AddedTopic(NamedTuple):
     """Messages of the type std_msgs/String."""
 
@@ -160,7 +157,9 @@ def copy_bag(bag: bags.Bag, target: Path, added: AddedTopic) -> None:
     if compression != "none":
         writer.set_compression(Writer.CompressionFormat[compression.upper()])
     if compression == "lz4":  # rosbags writes frames that roslz4, with which ROS 1 reads, takes for damaged
-        writer.compressor = _compressed_by_lz4
+        from lz4.frame import compress
+
+        writer.compressor = partial(compress, store_size=False, block_linked=False, content_checksum=True)
     copies: dict[tuple[Any, ...], Any] = {}  # a node that began anew has connections that are equal
     with writer:
         for existing in bag.reader.connections:
@@ -181,12 +180,6 @@ def copy_bag(bag: bags.Bag, target: Path, added: AddedTopic) -> None:
         texts = ((stamp, (), raw) for stamp, raw in added.messages)
         for stamp, connection, raw in merge(recorded, texts, key=lambda message: message[0]):
             writer.write(copies[connection], stamp, raw)
-
-
-def _compressed_by_lz4(data: bytes) -> bytes:
-    from lz4.frame import compress
-
-    return bytes(compress(data, store_size=False, block_linked=False, content_checksum=True))
 
 
 def copy_mcap(source: Path, target: Path, added: AddedTopic, compression: str) -> None:

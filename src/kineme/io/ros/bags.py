@@ -11,7 +11,7 @@ import os
 import struct
 from bz2 import BZ2Decompressor
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from functools import cache, partial
 from itertools import groupby
@@ -358,7 +358,11 @@ def expanded_folder(path: Path) -> Iterator[Folder]:
 
     A folder that is none of ROS 2, or whose files are missing, is left to rosbags to refuse.
     """
-    about = _information(path)
+    from ruamel.yaml import YAML
+
+    about: dict[str, Any] = {}
+    with suppress(Exception):  # rosbags reads it too, and says why it cannot
+        about = dict(YAML(typ="safe").load((path / METADATA).read_text(encoding="utf-8"))[INFORMATION])
     mode = str(about.get("compression_mode", "")).lower().replace("none", "")
     files = tuple(path / PurePath(str(file)).name for file in about.get("relative_file_paths") or ())
     is_whole = all(file.is_file() for file in files)
@@ -366,7 +370,6 @@ def expanded_folder(path: Path) -> Iterator[Folder]:
         yield Folder(path, files if is_whole else (), mode)
         return
     from rosbags.rosbag2.storage_mcap import zstd
-    from ruamel.yaml import YAML
 
     with TemporaryDirectory() as name:
         folder = Path(name)
@@ -385,17 +388,6 @@ def expanded_folder(path: Path) -> Iterator[Folder]:
         with (folder / METADATA).open("w", encoding="utf-8") as description:
             YAML(typ="safe").dump({INFORMATION: plain}, description)
         yield Folder(folder, tuple(folder / file.stem for file in files), mode)
-
-
-def _information(path: Path) -> dict[str, Any]:
-    """Read the description of the folder, or nothing: rosbags reads it too, and says why it cannot."""
-    from ruamel.yaml import YAML
-
-    try:
-        metadata = YAML(typ="safe").load((path / METADATA).read_text(encoding="utf-8"))
-        return dict(metadata[INFORMATION])
-    except Exception:
-        return {}
 
 
 def _check(n_bytes: int, most: int, source: Path) -> None:

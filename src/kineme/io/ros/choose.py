@@ -47,7 +47,13 @@ def choose(bag: Bag, layout: Layout) -> Choice:
     frames = tuple(pair_of(frame) for frame in layout.frames)
     named = [_named(bag, name) for name in layout.topics]
     topics = tuple(topic for topic in named if topic.type not in TRANSFORMS)
-    transforms = _transforms(bag, {topic.name for topic in named if topic.type in TRANSFORMS})
+    # The topics of transforms: all, or those that are named, each with that of its transforms that never change.
+    named_transforms = {topic.name for topic in named if topic.type in TRANSFORMS}
+    transforms = tuple(
+        topic
+        for topic in transform_topics(bag)
+        if not named_transforms or {topic.name, topic.name.removesuffix("_static")} & named_transforms
+    )
     if not frames and len(topics) < len(named):
         frames = (_only_frames(bag, transforms),)
     if topics or frames:
@@ -138,14 +144,6 @@ def _named(bag: Bag, name: str) -> Topic:
     if not (full := [topic for topic in candidates if topic.n_messages]):
         raise DataError(f"topic {same[0].name}: expected samples of {candidates[0].type}, got no messages")
     return max(full, key=lambda topic: topic.n_messages)
-
-
-def _transforms(bag: Bag, named: set[str]) -> tuple[Topic, ...]:
-    """The topics of transforms: all, or those that are named, each with that of its transforms that never change."""
-    topics = transform_topics(bag)
-    return tuple(
-        topic for topic in topics if not named or topic.name in named or topic.name.removesuffix("_static") in named
-    )
 
 
 def _only_frames(bag: Bag, transforms: Sequence[Topic]) -> Edge:

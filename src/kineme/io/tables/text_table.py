@@ -1,4 +1,7 @@
-"""CSV and similar text tables, read by NumPy's C parser; irregular lines are read one by one."""
+"""CSV and similar text tables, read by NumPy's C parser; irregular lines are read one by one.
+
+Text exports of motion capture systems have heads of their own, and zeros for markers that were not found.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +17,10 @@ import numpy as np
 
 from kineme.errors import DataError
 from kineme.io.limits import check_expanded
+from kineme.io.motion_capture import export_heads
 from kineme.io.motion_capture.export_heads import ExportHead
 from kineme.io.tables.dialect import (
+    COMMA_NUMBER,
     COMMENTS,
     LONGEST,
     Dialect,
@@ -25,7 +30,6 @@ from kineme.io.tables.dialect import (
     marks_within,
     split,
 )
-from kineme.io.tables.exports import export_head, export_table, with_times
 from kineme.movements.tables.columns import Roles, choose_roles
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.table import Table
@@ -43,6 +47,19 @@ _EMPTY_LINE = re.compile(rb"\n[ \t\r]*\n")
 _SMOOTH = 0.3  # of the range: a step from 999 to 1.002 is less if these are thousands, and more if they are decimals
 _GROUPED = re.compile(r"[-+]?[1-9]\d{0,2}[.,]\d{3}")  # a number that may be thousands
 _NUMBER, _TEXT, _COLUMN = 8, 64, 1000  # bytes of a number, a text and a column
+
+_HEAD_LINES = 400  # of an export with a head of its own, at most
+_FIRST = 3  # lines among which the first line of an export is
+_MAKERS = {
+    "OptiTrack": export_heads.optitrack_head,
+    "Vicon": export_heads.vicon_head,
+    "Qualisys": export_heads.qualisys_head,
+    "TRC": export_heads.trc_head,
+    "OpenSim": export_heads.opensim_head,
+}
+_LINE = 100  # bytes of a line in Python, beside its characters
+_SAMPLES = 5  # in which decimal commas are looked for
+_ROUNDED = 1e-5  # s by which written times may differ from those of frames at the rate
 
 
 def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:  # noqa: PLR0912 - one check after the other
@@ -188,19 +205,88 @@ def _rounded(samples: Iterator[tuple[int, str]], dialect: Dialect, columns: Sequ
     return faults
 
 
+def export_head(lines: Iterable[str], n_bytes: int) -> tuple[ExportHead, Dialect] | None:
+    """The head of an export of `_MAKERS` and how its samples are written; None for other tables."""
+    lines = iter(lines)
+    some = list(islice(lines, _FIRST))
+    for line in some:
+        check_line(line)
+    if (maker := _head(some, probe=True)) is None:
+        return None
+    if maker == "Vicon":  # the section that is read may stand anywhere
+        check_expanded(2 * n_bytes + _LINE)
+        some += list(lines)
+    else:
+        some += list(islice(lines, _HEAD_LINES))
+    head = _head(some)
+    assert isinstance(head, ExportHead)
+    rows = [split(line, head.separator) for line in some[head.first : head.end][:_SAMPLES] if line.strip()]
+    if not rows:
+        raise DataError(f"expected samples below the heads of a {head.maker} export, got none")
+    wide = max(0, len(rows[0]) - len(head.heads))
+    heads, units = ((*given, *[""] * wide) for given in (head.heads, head.measured_in))
+    comma = (
+        not head.packed and head.separator != "," and any(COMMA_NUMBER.fullmatch(cell) for row in rows for cell in row)
+    )
+    kinds = ("number",) * len(heads)
+    return head, Dialect(head.separator, comma, heads, True, head.first, kinds, units, head.end)
+
+
+def _head(lines: Sequence[str], probe: bool = False) -> Any:
+    """The head of an export, or None; with `probe` the name of its maker from the first lines alone."""
+    for maker, find in _MAKERS.items():
+        try:
+            head = find(lines, split)
+        except DataError:
+            if not probe:
+                raise
+            return maker  # the head is longer than the first lines
+        if head is not None:
+            return maker if probe else head
+    return None
+
+
 def _read_export(data: bytes, encoding: str, export: tuple[ExportHead, Dialect], layout: Layout) -> tuple[Table, Roles]:
     """Read the text export of a motion capture system; the rate in its head becomes time stamps."""
     head, dialect = export
     data = data.replace(b",", b"\t") if head.packed else data
     _check_memory(data, dialect)
-    heads, kinds, measured_in = with_times(head, dialect)
-    roles = choose_roles(heads, kinds, layout)
+    more = head.rate is not None and not head.is_timed  # a column of the times that follow from the rate
+    heads = (*dialect.heads, *[export_heads.STAMP] * more)
+    measured_in = (*dialect.measured_in, *["s"] * more)
+    roles = choose_roles(heads, (*dialect.kinds, *["number"] * more), layout)
     rows, faults = _rows(data, encoding, dialect, {k for k in (*roles.movement, roles.label) if k is not None})
     faults = {row: text for row, text in faults.items() if "columns" in text}  # other cells are taken for gaps
-    columns = [rows[name] for name in rows.dtype.names or ()]
+    columns = _with_times_and_gaps(head, dialect.heads, [rows[name] for name in rows.dtype.names or ()])
     line_of = _line_numbers(data, encoding, dialect)
-    table = Table(heads, columns, len(rows), line_of, faults, None, measured_in)
-    return export_table(head, table), roles
+    return Table(heads, columns, len(rows), line_of, faults, None, measured_in, None, head.maker), roles
+
+
+def _with_times_and_gaps(head: ExportHead, names: Sequence[str], columns: list[Any]) -> list[Any]:
+    """Return columns with the times of frames at the rate, and NaN for markers that were not found."""
+    if head.rate is not None and not head.is_timed:
+        counted = {name: columns[k] for k, name in enumerate(names) if name in ("frame", "sub frame")}
+        frames, parts = counted.get("frame"), counted.get("sub frame")
+        if frames is None or (parts is not None and parts.any()):  # frames are divided or not counted
+            frames = np.arange(len(columns[0]))
+        columns = [*columns, (frames - frames[0]) / head.rate]
+    elif head.rate is not None and "frame" in head.heads:
+        k, frames = head.heads.index(export_heads.STAMP), columns[head.heads.index("frame")]
+        even = columns[k][0] + (frames - frames[0]) / head.rate
+        columns[k] = np.where(np.abs(columns[k] - even) <= _ROUNDED, even, columns[k])
+    if head.zeros_are_gaps:
+        # NaN in place of the zeros that stand for a marker or a body that was not found.
+        groups: dict[str, list[int]] = {}
+        for k, name in enumerate(names):
+            if name[-2:] in (".x", ".y", ".z"):
+                groups.setdefault(name[:-2].removesuffix(".position"), []).append(k)
+        for owner, members in groups.items():
+            lost = np.all([columns[k] == 0 for k in members], axis=0)
+            if lost.any():
+                angles = [k for k, name in enumerate(names) if name.startswith(f"{owner}.")]
+                for k in chain(members, angles):
+                    columns[k] = np.where(lost, np.nan, columns[k])
+    return columns
 
 
 def _rows(data: bytes, encoding: str, dialect: Dialect, texts: set[int]) -> tuple[Any, dict[int, str]]:
