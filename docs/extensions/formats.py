@@ -68,14 +68,33 @@ def _formats() -> Iterator[str]:
     yield f"\n## Figures\n\n{_code(' '.join(f'.{kind}' for kind in FIGURES))}, byte for byte the same at every run."
 
 
+_HEAD = ("key", "kind", "what it is")
+
+
 def _schemas() -> Iterator[str]:
-    text = files("kineme.anchoring").joinpath("grounding.schema.json").read_text(encoding="utf-8")
-    schema = json.loads(text)
-    yield "# JSON schemas\n\n## Grounding of a symbol\n"
-    yield f"{schema['description']}\n\nWritten by `kineme library ground`; the schema itself by"
-    yield f"`kineme library schema`. Its name is `{schema['$id']}`.\n"
-    yield from table(("key", "kind", "what it is"), list(_keys(schema, "")))
-    yield f"\n```{{dropdown}} The schema\n~~~json\n{json.dumps(schema, indent=1)}\n~~~\n```"
+    answer, grounding = (
+        json.loads(files(package).joinpath(name).read_text(encoding="utf-8"))
+        for package, name in (
+            ("kineme.recognition", "answer.schema.json"),
+            ("kineme.anchoring", "grounding.schema.json"),
+        )
+    )
+    yield "# JSON schemas\n\n## Answer to a movement\n"
+    yield f"{answer['description']} [Answers](../answers.md) has an example. In the package the schema is"
+    yield f"`kineme/recognition/answer.schema.json`. Its name is `{answer['$id']}`.\n"
+    yield from table(_HEAD, list(_keys(answer, "")))
+    yield f"\n### State of a movement under way\n\n{answer['$defs']['state']['description']}\n"
+    yield from table(_HEAD, list(_keys(answer["$defs"]["state"], "")))
+    yield _dropdown(answer)
+    yield "\n## Grounding of a symbol\n"
+    yield f"{grounding['description']}\n\nWritten by `kineme library ground`; the schema itself by"
+    yield f"`kineme library schema`. Its name is `{grounding['$id']}`.\n"
+    yield from table(_HEAD, list(_keys(grounding, "")))
+    yield _dropdown(grounding)
+
+
+def _dropdown(schema: dict[str, Any]) -> str:
+    return f"\n```{{dropdown}} The schema\n~~~json\n{json.dumps(schema, indent=1)}\n~~~\n```"
 
 
 def _keys(schema: dict[str, Any], path: str) -> Iterator[tuple[str, str, str]]:

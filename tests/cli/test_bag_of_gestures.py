@@ -105,5 +105,5 @@ def test_recognize_takes_the_topic_of_the_library_too(library, tmp_path):
     rows, ((start, end, name),) = session(["pour"], 9)
     bag = bag_of(tmp_path, "mcap", rows[round(start * RATE) : round(end * RATE)], "one")
     said = answer("recognize", bag, "-l", library)
-    assert [one["ranked"][0]["symbol"] for one in said["movements"]] == [name]
+    assert [movement["answer"]["ranked"][0]["label"] for movement in said["movements"]] == [name]
     assert said["notes"][0].startswith("Read topic /tool of ")

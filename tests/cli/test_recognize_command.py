@@ -41,13 +41,13 @@ def asked(tmp_path_factory):
 def test_known_and_unknown_in_one_folder(folder, asked):
     data = answer("recognize", asked, "-l", folder)
     known, strange = data["movements"]
-    assert (known["recording"], known["symbol"]) == ("c.csv", "CShape")
-    assert known["like"][0]["name"] == "CShape 4"
-    change = known["transform"]
+    assert (known["recording"], known["answer"]["label"]) == ("c.csv", "CShape")
+    assert known["answer"]["nearest"][0]["name"] == "CShape 4"
+    change = known["answer"]["transform"]
     assert change["scale"][0] == pytest.approx(0.5, rel=1e-3)
     assert change["angle"] == pytest.approx(0.4, abs=1e-3)
     assert change["duration_ratio"] == pytest.approx(0.8, rel=1e-6)
-    assert (strange["recording"], strange["symbol"], strange["id"]) == ("strange.csv", None, None)
+    assert (strange["recording"], strange["answer"]["label"], strange["id"]) == ("strange.csv", None, None)
     assert len(data["problems"]) == 1
     assert data["problems"][0].startswith("bad.csv, line 2")
     text = run("recognize", asked, "-l", folder).stdout
@@ -99,18 +99,15 @@ def test_progress_goes_on_to_the_end_and_does_not_change_the_answers(folder, ask
 
 
 def test_the_answer_is_that_of_python(folder, asked):
-    data = answer("recognize", asked / "c.csv", "-l", folder, "--top", 5)["movements"][0]
+    data = answer("recognize", asked / "c.csv", "-l", folder, "--top", 5)["movements"][0]["answer"]
     with kineme.ActionLibrary(folder, read_only=True) as library:
         expected = library.recognize(read_recording(asked / "c.csv"))
-    assert (data["confidence"], data["certainty"]) == (expected.confidence, expected.certainty)
-    assert (data["p_known"], data["rule"], data["promise"]) == (expected.p_known, expected.rule, expected.promise)
-    assert {one["symbol"]: one["p_value"] for one in data["ranked"]} == dict(expected.p_values)
-    assert {one["symbol"]: one["probability"] for one in data["ranked"]} == dict(expected.probabilities)
+    assert data == expected.to_dict()
 
 
 def test_a_recording_may_come_through_a_pipe(folder, asked):
     data = answer("recognize", "-", "-l", folder, input=(asked / "c.csv").read_text(), by=start)
-    assert data["movements"][0]["symbol"] == "CShape"
+    assert data["movements"][0]["answer"]["label"] == "CShape"
 
 
 def test_a_library_without_symbols_cannot_say(tmp_path, asked):
@@ -209,7 +206,7 @@ def test_an_answer_that_is_a_guess_says_so(tmp_path, asked, shown, guess):
     demos = kineme.load_lasa(["CShape", "GShape", "NShape", "Angle", "Sine"])
     with kineme.ActionLibrary(tmp_path / "a", create=True) as library:
         library.learn(demos[np.arange(len(demos)) % 7 < shown])
-    said = answer("recognize", asked / "c.csv", "-l", tmp_path / "a")["movements"][0]
+    said = answer("recognize", asked / "c.csv", "-l", tmp_path / "a")["movements"][0]["answer"]
     assert said["calibrated"] is not guess
     assert (said["rule"] == "guess", "any share" in said["promise"]) == (guess, guess)
     text = run("recognize", asked / "c.csv", "-l", tmp_path / "a").stdout
@@ -227,9 +224,9 @@ def test_numbers_are_data_and_the_table_says_the_word(tmp_path):
     with kineme.ActionLibrary(tmp_path / "actions", create=True) as library:
         library.learn(demos, [name for name in shapes for _ in range(3)])
     path = write_movement(tmp_path / "a.csv", {"times": u, "positions": shapes["wave"]})
-    (one,) = answer("recognize", path, "-l", tmp_path / "actions")["movements"]
-    assert one["ranked"][1]["p_value"] < 1e-3
-    assert (one["rule"], one["confidence"]) == ("guess", pytest.approx(1.0))
+    (movement,) = answer("recognize", path, "-l", tmp_path / "actions")["movements"]
+    assert movement["answer"]["ranked"][1]["p_value"] < 1e-3
+    assert (movement["answer"]["rule"], movement["answer"]["confidence"]) == ("guess", pytest.approx(1.0))
     text = run("recognize", path, "-l", tmp_path / "actions").stdout
     assert "looks like" in text
     assert not any(word in text for word in ("1.00", "p-value", "<0.001"))
@@ -241,5 +238,6 @@ def test_a_library_of_one_movement_answers_and_says_that_it_guesses(tmp_path):
         write_movement(tmp_path / f"{name}.csv", {"times": one.times, "positions": one.positions})
     run("learn", tmp_path / "one.csv", "--label", "a", "-l", tmp_path / "l")
     asked = (tmp_path / "other.csv", tmp_path / "strange.csv")
-    assert [one["symbol"] for one in answer("recognize", *asked, "-l", tmp_path / "l")["movements"]] == ["a", None]
+    movements = answer("recognize", *asked, "-l", tmp_path / "l")["movements"]
+    assert [movement["answer"]["label"] for movement in movements] == ["a", None]
     assert "is a guess" in run("recognize", *asked, "-l", tmp_path / "l").stdout

@@ -604,8 +604,8 @@ def test_every_view_fits_its_window(opened, served_letters):
 #: What the panel says of a movement of which this much is done, with the evidence that it is unknown.
 SAYS = """([progress, unknown]) => import("/draw/answer_panel.js").then(({ AnswerPanel }) => {
   const certainty = unknown > 0.5 ? "new" : "looks like";
-  const ranked = [{ name: "A", probability: 1 }];
-  new AnswerPanel().drawing({ ranked, unknown, certainty, decided: null, progress, arrival: null }, 0);
+  const ranked = [{ label: "A", probability: 1 }];
+  new AnswerPanel().drawing({ ranked, unknown, certainty, label: null, progress, arrival: null }, 0);
   return document.getElementById("verdict").textContent;
 })"""
 

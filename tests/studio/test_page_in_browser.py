@@ -85,7 +85,7 @@ def test_a_letter_is_drawn_recognized_and_dragged(opened, width):
     page.mouse.up()
     page.get_by_role("button", name="Clear").click()
     draw(page)
-    assert page.evaluate("kineme.state.answer.ranked[0]") == "GShape"
+    assert page.evaluate("kineme.state.answer.ranked[0].label") == "GShape"
     word = page.evaluate("kineme.state.answer.certainty")
     assert page.locator("#certainty").inner_text() == word.capitalize()
     shares = page.locator("#bars li .value").all_inner_texts()
@@ -185,7 +185,7 @@ def plane_of(positions):
 def test_movements_in_space_are_turned_and_drawn_in_the_plane_of_the_view(opened):
     page = opened("space")
     draw(page, "CShape")
-    assert page.evaluate("kineme.state.answer.ranked[0]") == "CShape"
+    assert page.evaluate("kineme.state.answer.ranked[0].label") == "CShape"
     first = plane_of(page.evaluate("kineme.state.moving.positions"))
     view = np.reshape(page.evaluate("kineme.runtime.header.view"), (3, 3))
     np.testing.assert_allclose(view @ view.T, np.eye(3), atol=1e-9)
@@ -196,4 +196,4 @@ def test_movements_in_space_are_turned_and_drawn_in_the_plane_of_the_view(opened
     draw(page, "CShape")
     second = plane_of(page.evaluate("kineme.state.moving.positions"))
     assert abs(first @ second) == pytest.approx(0.5, abs=1e-6)
-    assert page.evaluate("kineme.state.answer.ranked[0]") == "CShape"
+    assert page.evaluate("kineme.state.answer.ranked[0].label") == "CShape"

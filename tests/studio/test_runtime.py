@@ -99,14 +99,20 @@ def compare_answers(case, runtime=RUNTIME):
     """Worst difference of any number in the answers; infinite where a class, a verdict or an order differs."""
     worst = 0.0
     for got, said in zip(ask(case.snapshot, case.asked, runtime), case.said, strict=True):
-        same = (got["label"], tuple(got["ranked"]), got["rule"], got["calibrated"], got["certainty"])
+        same = (
+            got["label"],
+            tuple(each["label"] for each in got["ranked"]),
+            got["rule"],
+            got["calibrated"],
+            got["certainty"],
+        )
         if same != (said.label, said.ranked, said.rule, said.calibrated, said.certainty):
             return np.inf
         if [one["index"] for one in got["nearest"]] != [one.index for one in said.nearest]:
             return np.inf
-        numbers = [got["pKnown"] - said.p_known, got["confidence"] - said.confidence]
-        numbers += [got["pValues"][label] - p for label, p in said.p_values.items()]
-        numbers += [got["probabilities"][label] - share for label, share in said.probabilities.items()]
+        numbers = [got["p_known"] - said.p_known, got["confidence"] - said.confidence]
+        numbers += [each["p_value"] - said.p_values[each["label"]] for each in got["ranked"]]
+        numbers += [each["probability"] - said.probabilities[each["label"]] for each in got["ranked"]]
         numbers += [a["similarity"] - b.similarity for a, b in zip(got["nearest"], said.nearest, strict=True)]
         numbers += [got["responsibilities"][name] - share for name, share in said.responsibilities.items()]
         worst = max(worst, np.abs(numbers).max())
@@ -259,11 +265,11 @@ def compare_states(case, runtime=RUNTIME):
                 continue
             n_states += 1
             shares = {guess.label: guess.confidence for guess in said.ranked}
-            same = (got["decided"], got["ranked"][0]["name"], got["certainty"])
+            same = (got["label"], got["ranked"][0]["label"], got["certainty"])
             if same != (said.label, said.ranked[0].label, said.certainty):
                 return np.inf
-            numbers = [guess["share"] - shares[guess["name"]] for guess in got["ranked"]]
-            numbers += [got["probabilities"][label] - share for label, share in said.probabilities.items()]
+            numbers = [guess["confidence"] - shares[guess["label"]] for guess in got["ranked"]]
+            numbers += [guess["probability"] - said.probabilities[guess["label"]] for guess in got["ranked"]]
             numbers += [got["unknown"] - said.unknown, got["progress"] - said.progress]
             numbers += [(got["arrival"] - said.arrival) / said.arrival]
             worst = max(worst, np.abs(numbers).max(), np.abs(np.array(got["path"]) - said.path).max() / size)

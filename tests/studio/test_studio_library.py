@@ -342,12 +342,12 @@ def test_the_answer_is_that_of_the_library(client, folder):
         ours = library.recognize(_array(given))
     assert (answer["label"], answer["calibrated"]) == (ours.label, ours.calibrated)
     assert answer["certainty"] == ours.certainty
-    assert {one["name"]: one["probability"] for one in answer["ranked"]} == pytest.approx(dict(ours.probabilities))
-    assert answer["p_values"] == pytest.approx(dict(ours.p_values))
-    assert [one["name"] for one in answer["ranked"]] == list(ours.ranked)
-    assert [one["p_value"] for one in answer["ranked"]] == pytest.approx([ours.p_values[name] for name in ours.ranked])
+    ranked = answer["ranked"]
+    assert [symbol["label"] for symbol in ranked] == list(ours.ranked)
+    assert [symbol["probability"] for symbol in ranked] == pytest.approx([ours.probabilities[k] for k in ours.ranked])
+    assert [symbol["p_value"] for symbol in ranked] == pytest.approx([ours.p_values[k] for k in ours.ranked])
     assert (answer["confidence"], answer["p_known"]) == pytest.approx((ours.confidence, ours.p_known))
-    assert [one["id"] for one in answer["nearest"]] == [one.index for one in ours.nearest]
+    assert [neighbor["index"] for neighbor in answer["nearest"]] == [one.index for one in ours.nearest]
     json.dumps(answer, allow_nan=False)
 
 

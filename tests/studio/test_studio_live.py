@@ -39,7 +39,7 @@ def _draw(socket, k, seed=99, step=6):
 def test_a_drawing_is_named_while_it_is_drawn_and_at_its_end(client, folder):
     with client.websocket_connect(LIVE) as socket:
         state = _draw(socket, 2)
-        assert state["ranked"][0]["name"] == state["decided"] == "kind 2"
+        assert state["ranked"][0]["label"] == state["label"] == "kind 2"
         assert state["progress"] > 0.8
         assert 0 <= state["unknown"] < 0.5
         assert state["arrival"] == pytest.approx(1.5, abs=0.3)
@@ -47,10 +47,10 @@ def test_a_drawing_is_named_while_it_is_drawn_and_at_its_end(client, folder):
         socket.send_json({"finish": True})
         answer = _said(socket, "answer")
         assert answer["label"] == "kind 2"
-        assert answer["nearest"][0]["id"] in {7, 8, 9}
-        assert _draw(socket, 1)["decided"] == "kind 1"  # after the end another one begins
+        assert answer["nearest"][0]["index"] in {7, 8, 9}
+        assert _draw(socket, 1)["label"] == "kind 1"  # after the end another one begins
         socket.send_json({"reset": True})
-        assert _draw(socket, 3)["decided"] == "kind 3"
+        assert _draw(socket, 3)["label"] == "kind 3"
 
 
 def test_states_are_those_of_a_stream_of_the_library_that_expects_another_tempo(client, folder):
@@ -64,8 +64,8 @@ def test_states_are_those_of_a_stream_of_the_library_that_expects_another_tempo(
     with client.websocket_connect(LIVE) as socket:
         socket.send_json({"samples": rows[:30].tolist()})
         state = _said(socket, "state")
-    assert [one["name"] for one in state["ranked"]] == [one.label for one in ours.ranked]
-    assert state["ranked"][0]["share"] == pytest.approx(ours.ranked[0].confidence)
+    assert [one["label"] for one in state["ranked"]] == [one.label for one in ours.ranked]
+    assert state["ranked"][0]["confidence"] == pytest.approx(ours.ranked[0].confidence)
     assert state["ranked"][0]["probability"] == pytest.approx(ours.ranked[0].confidence / (1 - ours.unknown))
     assert state["certainty"] == ours.certainty
     assert state["progress"] == pytest.approx(ours.progress)
@@ -137,7 +137,7 @@ def test_samples_of_other_widths_behind_each_other_are_taken_in_one_by_one(clien
             socket.send_json({"samples": rows[k : k + 6]})
             socket.send_json({"samples": [[*row, 0.0] for row in rows[k : k + 6]]})
         socket.send_json({"finish": True})
-        assert _said(socket, "answer")["ranked"][0]["name"] == "kind 0"
+        assert _said(socket, "answer")["ranked"][0]["label"] == "kind 0"
 
 
 def test_too_little_to_answer_is_said(client):
@@ -154,12 +154,12 @@ def test_too_little_to_answer_is_said(client):
 def test_what_was_named_is_known_to_the_next_drawing(client):
     with client.websocket_connect(LIVE) as socket:
         before = _draw(socket, 9)
-        assert "new" not in {one["name"] for one in before["ranked"]}
+        assert "new" not in {one["label"] for one in before["ranked"]}
         client.post("/api/library/movements", json=asked(9, label="new"))
         assert _said(socket, "changed") == 2
         socket.send_json({"reset": True})
         _until_warm(client, 2)
-        assert _draw(socket, 9, seed=5)["ranked"][0]["name"] == "new"
+        assert _draw(socket, 9, seed=5)["ranked"][0]["label"] == "new"
 
 
 def _until_warm(client, version):
@@ -185,12 +185,12 @@ def test_after_a_change_what_knew_the_library_before_answers_until_the_new_one_i
         rows = samples(9, 5)
         for start in range(0, 36, 6):
             socket.send_json({"samples": rows[start : start + 6]})
-            assert {one["name"] for one in _said(socket, "state")["ranked"]} <= {f"kind {k}" for k in range(4)}
+            assert {one["label"] for one in _said(socket, "state")["ranked"]} <= {f"kind {k}" for k in range(4)}
         may_make.set()
         _until_warm(client, version)
         socket.send_json({"samples": rows[36:42]})
         state = _said(socket, "state")
-        assert state["ranked"][0]["name"] == "new"  # of all samples so far
+        assert state["ranked"][0]["label"] == "new"  # of all samples so far
         with ActionLibrary(studio.library.folder, read_only=True) as library:
             ours = library.stream(early=DRAWN)
             for start in range(0, 42, 6):
@@ -201,10 +201,10 @@ def test_after_a_change_what_knew_the_library_before_answers_until_the_new_one_i
         client.post("/api/library/movements", json=asked(8, label="another"))
         socket.send_json({"reset": True})
         socket.send_json({"samples": samples(8, 5)})
-        assert "another" not in {one["name"] for one in _said(socket, "state")["ranked"]}
+        assert "another" not in {one["label"] for one in _said(socket, "state")["ranked"]}
         socket.send_json({"finish": True})
         may_make.set()
-        assert _said(socket, "answer")["ranked"][0]["name"] == "another"
+        assert _said(socket, "answer")["ranked"][0]["label"] == "another"
 
 
 def test_what_is_deleted_while_a_movement_is_under_way_is_no_answer_to_it(client):
@@ -218,7 +218,7 @@ def test_what_is_deleted_while_a_movement_is_under_way_is_no_answer_to_it(client
             socket.send_json({"samples": rows[40:]})
             socket.send_json({"finish": True})
             answer = _said(socket, "answer")
-            assert answer is None or name not in {one["name"] for one in answer["ranked"]}
+            assert answer is None or name not in {one["label"] for one in answer["ranked"]}
         assert answer is None
 
 
@@ -236,14 +236,14 @@ def test_a_disk_that_cannot_be_read_is_said_and_read_again(client, monkeypatch):
             broken.setattr(ActionLibrary, "stream", fail)
             socket.send_json({"samples": samples(1)[:6]})
             assert _said(socket, "error") == "expected a disk"
-        assert _draw(socket, 1)["ranked"][0]["name"] == "kind 1"
+        assert _draw(socket, 1)["ranked"][0]["label"] == "kind 1"
 
 
 def test_in_an_empty_library_drawings_are_taken_and_nothing_is_said(tmp_path, open_studio):
     client = open_studio(tmp_path / "new")
     with client.websocket_connect(LIVE) as socket:
         state = _draw(socket, 1)
-        assert (state["ranked"], state["decided"], state["unknown"]) == ([], None, None)
+        assert (state["ranked"], state["label"], state["unknown"]) == ([], None, None)
         socket.send_json({"finish": True})
         assert _said(socket, "answer") is None
 
@@ -285,7 +285,7 @@ def test_each_client_has_its_own_stream(client):
             two.send_json({"samples": b[start : start + 10]})
         for socket in (one, two):
             socket.send_json({"finish": True})
-        best = [_said(socket, "answer")["ranked"][0]["name"] for socket in (one, two)]
+        best = [_said(socket, "answer")["ranked"][0]["label"] for socket in (one, two)]
         assert best == ["kind 0", "kind 3"]
 
 

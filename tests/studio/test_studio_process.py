@@ -74,7 +74,7 @@ def test_a_real_websocket_is_guarded(studio):
         _live(studio, Authorization="Bearer x")
     with _live(studio) as client:
         client.send(json.dumps({"samples": samples(2)}))
-        assert json.loads(client.recv())["state"]["ranked"][0]["name"] == "kind 2"
+        assert json.loads(client.recv())["state"]["ranked"][0]["label"] == "kind 2"
 
 
 NODE = ["node", "--experimental-websocket"]  # node 20 has it under this option
@@ -194,7 +194,7 @@ def test_fifty_clients_draw_at_once(studio):
                 while "state" not in (message := json.loads(client.recv(timeout=300))):
                     assert "changed" in message, message
             client.send(json.dumps({"finish": True}))
-            answers[who] = json.loads(client.recv(timeout=300))["answer"]["ranked"][0]["name"]
+            answers[who] = json.loads(client.recv(timeout=300))["answer"]["ranked"][0]["label"]
 
     threads = [threading.Thread(target=draw, args=(who,)) for who in range(50)]
     for one in threads:

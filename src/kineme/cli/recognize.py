@@ -36,10 +36,11 @@ def recognize(
     An answer is sure or probably a symbol, or looks like one; what is unknown is new. It never more than looks like a
     symbol where too few recordings, as one of each symbol, tell what is unknown: that then is a guess.
 
-    --json adds the numbers. The confidence is the probability that the symbol is right if the movement is one of the
-    library's; for an unknown movement it is the share of known movements that are less novel. The rule says which
-    recordings decide what is unknown: those of the symbol (class), those of all symbols (pooled), or too few (guess);
-    the promise says what follows. P-values are then a guess too.
+    --json adds the numbers: each movement has an answer in the form of Answer.to_dict. The confidence is the
+    probability that the symbol is right if the movement is one of the library's; for an unknown movement it is the
+    share of known movements that are less novel. The rule says which recordings decide what is unknown: those of the
+    symbol (class), those of all symbols (pooled), or too few (guess); the promise says what follows. P-values are then
+    a guess too.
 
     Example: kineme recognize *.csv --library actions/
     """
@@ -51,10 +52,16 @@ def recognize(
         answers = _recognized(library, parsed.demonstrations, error_rate)
         notes = known_choices(parsed, options, library.channels) + notes_on_gaps(parsed)
         notes += differences(library.channels, parsed.demonstrations.channels)
-        stored = {symbol.name: symbol.id for symbol in library.symbols()}
+        ids = {symbol.name: symbol.id for symbol in library.symbols()}
     data = {
         "movements": [
-            _as_data(source, answer, stored, top) for source, answer in zip(parsed.sources, answers, strict=True)
+            {
+                "recording": source.path,
+                "place": source.place,
+                "id": None if answer.label is None else ids[answer.label],
+                "answer": answer.to_dict(top),
+            }
+            for source, answer in zip(parsed.sources, answers, strict=True)
         ],
         "notes": notes,
         "problems": [str(problem) for problem in parsed.problems],
@@ -72,48 +79,20 @@ def _recognized(library: Any, movements: Any, error_rate: float) -> list[Any]:
     return answers
 
 
-def _as_data(source: Any, answer: Any, ids: dict[str, str], top: int) -> dict[str, Any]:
-    transform = answer.transform
-    return {
-        "recording": source.path,
-        "place": source.place,
-        "symbol": answer.label,
-        "id": None if answer.label is None else ids[answer.label],
-        "certainty": answer.certainty,
-        "confidence": answer.confidence,
-        "p_known": answer.p_known,
-        "rule": answer.rule,
-        "promise": answer.promise,
-        "calibrated": answer.calibrated,
-        "ranked": [_ranked(answer, name) for name in answer.ranked[:top]],
-        "like": [
-            {"movement": neighbor.index, "name": neighbor.name, "similarity": neighbor.similarity}
-            for neighbor in answer.nearest
-        ],
-        "transform": {
-            "matrix": transform.matrix.tolist(),
-            "shift": transform.shift.tolist(),
-            "scale": transform.scale.tolist(),
-            "angle": transform.angle,
-            "duration_ratio": transform.duration_ratio,
-        },
-        "representations": dict(answer.responsibilities),
-    }
-
-
 def _text(data: dict[str, Any], error_rate: float, problems: list[str]) -> str:
     rows = []
     for movement in data["movements"]:
-        name = f"{movement['recording']} {movement['place']}".strip()
-        others = ", ".join(printable(each["symbol"]) for each in movement["ranked"])
+        answer, name = movement["answer"], f"{movement['recording']} {movement['place']}".strip()
+        label, nearest = answer["label"], answer["nearest"][0]
+        others = ", ".join(printable(candidate["label"]) for candidate in answer["ranked"])
         rows.append(
-            (printable(name), "unknown" if movement["symbol"] is None else printable(movement["symbol"]),
-             movement["certainty"], others, printable(movement["like"][0]["name"] or movement["like"][0]["movement"]),
-             "" if movement["symbol"] is None else _relative(movement["transform"]))
+            (printable(name), "unknown" if label is None else printable(label), answer["certainty"], others,
+             printable(nearest["name"] or nearest["index"]),
+             "" if label is None else _relative(answer["transform"]))
         )  # fmt: skip
     heads = ("recording", "symbol", "how sure", "ranked", "most like", "relative to it")
     lines = [table(heads, rows), *map(printable, data["notes"])]
-    if any(movement["rule"] == "guess" for movement in data["movements"]):
+    if any(movement["answer"]["rule"] == "guess" for movement in data["movements"]):
         needed = math.ceil(1 / error_rate - 1 - 1e-9)
         lines.append(
             "Which movements are unknown is a guess: too few demonstrations tell how much movements of one symbol "
@@ -127,9 +106,3 @@ def _relative(transform: dict[str, Any]) -> str:
     """Size, direction and duration relative to the most similar stored movement."""
     degrees = round(math.degrees(transform["angle"])) + 0
     return f"×{transform['scale'][0]:.2g}, {degrees:+d}°, {transform['duration_ratio']:.2g} × as long"
-
-
-def _ranked(answer: Any, name: Any) -> dict[str, Any]:
-    """A symbol with its numbers; in a large library the least like have none."""
-    values = {"probability": answer.probabilities.get(name), "p_value": answer.p_values.get(name)}
-    return {"symbol": str(name), **values}

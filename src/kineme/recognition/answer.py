@@ -129,6 +129,56 @@ class Answer:
         """Certainty and label, such as "sure GShape"; or what the movement is most like if it is new."""
         return in_words(self.certainty, str(self.label), str(self.ranked[0]))
 
+    def to_dict(self, top: int | None = None) -> dict[str, Any]:
+        """Return the answer as plain data that JSON can hold; shell, studio and page have this form, too.
+
+        ``recognition/answer.schema.json`` of the package is its JSON Schema (draft 2020-12).
+
+        Parameters
+        ----------
+        top : int, optional
+            How many classes `ranked` lists, best first; by default all.
+
+        Returns
+        -------
+        dict
+            ``label`` (None if unknown), ``certainty``, ``confidence``, ``p_known``, ``rule``, ``promise``,
+            ``calibrated``, ``ranked`` (``label``, ``probability`` and ``p_value`` of each class; in a large library
+            the numbers of the least like are None), ``nearest`` (``index``, ``name``, ``similarity``), ``transform``
+            (``matrix``, ``shift``, ``scale``, ``angle``, ``duration_ratio``) and ``responsibilities``.
+            Labels are texts.
+        """
+        transform = self.transform
+        return {
+            "label": None if self.label is None else str(self.label),
+            "certainty": self.certainty,
+            "confidence": self.confidence,
+            "p_known": self.p_known,
+            "rule": self.rule,
+            "promise": self.promise,
+            "calibrated": self.calibrated,
+            "ranked": [
+                {
+                    "label": str(label),
+                    "probability": self.probabilities.get(label),
+                    "p_value": self.p_values.get(label),
+                }
+                for label in self.ranked[:top]
+            ],
+            "nearest": [
+                {"index": neighbor.index, "name": neighbor.name, "similarity": neighbor.similarity}
+                for neighbor in self.nearest
+            ],
+            "transform": {
+                "matrix": transform.matrix.tolist(),
+                "shift": transform.shift.tolist(),
+                "scale": transform.scale.tolist(),
+                "angle": transform.angle,
+                "duration_ratio": transform.duration_ratio,
+            },
+            "responsibilities": dict(self.responsibilities),
+        }
+
     def to_pandas(self) -> Any:
         """Return the answer as a table of one row: ``pandas.concat(one.to_pandas() for one in answers)`` joins many.
 

@@ -29,7 +29,7 @@ from kineme.movements.preparation.smooth import spline_matrix
 from kineme.recognition import conformal
 from kineme.recognition.answer import LEAST_CONFIDENCE, FittedRecognizer, KnownClasses, known_classes
 from kineme.recognition.classifiers import Classifier, Nearest, NearestEach, Prototype, fit_prototype
-from kineme.recognition.conformal import GUESSES, Calibration
+from kineme.recognition.conformal import GUESSES, RULES, Calibration
 from kineme.recognition.early import evidence
 from kineme.recognition.early import hypotheses as beginnings
 from kineme.recognition.early.hypotheses import Early, hypotheses
@@ -56,7 +56,7 @@ _AGAIN = (
     "then other.learn(library.movements(symbol.name)) for every symbol in library.symbols()"
 )
 
-FORMAT, VERSION = "kineme-snapshot", 3
+FORMAT, VERSION = "kineme-snapshot", 4
 _KINDS = ("float64", "float32", "int32")
 _ALIGNMENT = 8  # bytes: arrays in JavaScript begin at multiples of the size of their numbers
 
@@ -228,6 +228,7 @@ def _calibration(calibration: Calibration) -> tuple[dict[str, Any], dict[str, ND
         "between": calibration.between,
         "exponent": calibration.exponent,
         "guesses": list(GUESSES),
+        "promises": dict(RULES),
         **_numbers(conformal, "LEAST", "ROUNDING", "DIMENSIONS", "MEAN_LENGTH", "REACH_OF_STRANGERS", "REACH_TO_NEXT"),
     }
     return {"pooled": [numbers[pair] for pair in shared], **header}, arrays

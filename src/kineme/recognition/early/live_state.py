@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from enum import Flag, auto
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -98,8 +99,48 @@ class LiveState(NamedTuple):
     @property
     def probabilities(self) -> dict[Label, float]:
         """Probability of each class if the movement is of a known one, most likely first: as that of an `Answer`."""
-        share = max(1.0 - self.unknown, np.finfo(float).tiny)
-        return {guess.label: guess.confidence / share for guess in self.ranked}
+        return {guess.label: self._probability(guess) for guess in self.ranked}
+
+    def _probability(self, guess: Guess) -> float:
+        return guess.confidence / max(1.0 - self.unknown, np.finfo(float).tiny)
+
+    def to_dict(self, top: int | None = None) -> dict[str, Any]:
+        """Return the state as plain data that JSON can hold; what it shares with `Answer.to_dict` has the same keys.
+
+        Parameters
+        ----------
+        top : int, optional
+            How many classes `ranked` lists, the most likely first; by default all.
+
+        Returns
+        -------
+        dict
+            ``label`` (None while undecided), ``certainty``, ``ranked`` (``label``, ``confidence`` and ``probability``
+            of each class), ``unknown``, ``progress``, ``arrival``, ``path``, ``goal``, ``skipped`` and ``status`` (its
+            messages). What is not known yet is None, or an empty list.
+        """
+        unknown, progress, arrival = (
+            value if math.isfinite(value) else None for value in (self.unknown, self.progress, self.arrival)
+        )
+        return {
+            "label": None if self.label is None else str(self.label),
+            "certainty": self.certainty,
+            "ranked": [
+                {
+                    "label": str(guess.label),
+                    "confidence": guess.confidence,
+                    "probability": self._probability(guess),
+                }
+                for guess in self.ranked[:top]
+            ],
+            "unknown": unknown,
+            "progress": progress,
+            "arrival": arrival,
+            "path": [] if self.path is None else self.path.tolist(),
+            "goal": None if self.goal is None else self.goal.tolist(),
+            "skipped": self.skipped,
+            "status": list(self.status.messages),
+        }
 
     @property
     def in_words(self) -> str:

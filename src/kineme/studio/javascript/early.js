@@ -79,7 +79,8 @@ export function follow(stored, { confidence = 0.9, patience = 0.05 } = {}) {
   const decide = decision(confidence, patience);
   let [leader, furthest] = [-1, 0];
   /**
-   * The state after all samples so far; null while there are too few, or nothing moves.
+   * The state after all samples so far, in the form of `kineme.recognition.LiveState.to_dict`; null while there are too
+   * few, or nothing moves.
    * @param {number[]} times
    * @param {number[][]} positions
    */
@@ -100,17 +101,21 @@ export function follow(stored, { confidence = 0.9, patience = 0.05 } = {}) {
     const ahead = forecast(stored, evidence, shown, begun, duration);
     furthest = Math.max(ahead.progress, shown === leader ? furthest : 0);
     leader = shown;
+    const unknown = share[classes.length];
+    const remaining = ahead.remaining.map((x) => x.map((value, k) => value + positions[n - 1][k]));
     return {
-      ranked: order.map((c) => ({ name: classes[c], share: share[c] })),
-      probabilities: Object.fromEntries(
-        order.map((c) => [classes[c], share[c] / Math.max(1 - share[classes.length], Number.MIN_VALUE)]),
-      ),
-      unknown: share[classes.length],
-      certainty: certainty(least, share[order[0]], { isNew: share[classes.length] > share[order[0]], isOver: false }),
-      decided: decided === null ? null : classes[decided],
+      label: decided === null ? null : classes[decided],
+      certainty: certainty(least, share[order[0]], { isNew: unknown > share[order[0]], isOver: false }),
+      ranked: order.map((c) => ({
+        label: classes[c],
+        confidence: share[c],
+        probability: share[c] / Math.max(1 - unknown, Number.MIN_VALUE),
+      })),
+      unknown,
       progress: Math.min(furthest, 1),
       arrival: times[n - 1] + ahead.seconds,
-      path: ahead.remaining.map((x) => x.map((value, k) => value + positions[n - 1][k])),
+      path: remaining,
+      goal: remaining.at(-1),
     };
   };
 }

@@ -40,18 +40,19 @@ const SHARES = {
  * @property {number} dimensions in which members of a class vary, about; even
  * @property {number} mean_length of normal vectors in these
  * @property {string[]} guesses rules that promise nothing
+ * @property {Object<string, string>} promises of each rule, in a sentence
  *
- * @typedef {Object} Answer
+ * @typedef {Object} Answer in the form of `kineme.recognition.Answer.to_dict`
  * @property {string|null} label null: unknown
- * @property {number} confidence
- * @property {number} pKnown
- * @property {Object<string, number>} pValues
- * @property {Object<string, number>} probabilities of each class if it is one of them
- * @property {string} rule class, pooled, strangers or guess
- * @property {boolean} calibrated
  * @property {"sure"|"probably"|"looks like"|"new"} certainty
- * @property {string[]} ranked
- * @property {{index: number, similarity: number}[]} nearest
+ * @property {number} confidence
+ * @property {number} p_known
+ * @property {string} rule class, pooled, strangers or guess
+ * @property {string} promise
+ * @property {boolean} calibrated
+ * @property {{label: string, probability: number|null, p_value: number|null}[]} ranked best first
+ * @property {{index: number, name: string|null, similarity: number}[]} nearest by their ids where they have some
+ * @property {Object|null} transform null: the runtime computes none
  * @property {Object<string, number>} responsibilities
  */
 
@@ -244,25 +245,25 @@ export function recognize(known, one, errorRate = 0.05) {
   const own = compared.average.subarray(first[shown], first[shown + 1] ?? known.stored.m);
   const nearest = descending(own)
     .slice(0, SHOWN)
-    .map((j) => ({ index: first[shown] + j, similarity: Math.exp(own[j]) }));
+    .map((j) => ({ row: first[shown] + j, similarity: Math.exp(own[j]) }));
   const m = known.stored.m;
-  const shares = SHARES[how.mean](Float64Array.from(how.widths, (_, r) => compared.logs[r * m + nearest[0].index]));
+  const shares = SHARES[how.mean](Float64Array.from(how.widths, (_, r) => compared.logs[r * m + nearest[0].row]));
   const responsibilities = {};
   for (const [r, name] of how.names.entries()) responsibilities[name] = (responsibilities[name] ?? 0) + shares[r];
   return {
     label: isKnown ? classes[chosen] : null,
-    confidence: isKnown ? odds[shown] : 1 - p.known,
-    pKnown: p.known,
-    pValues: Object.fromEntries(classes.map((name, c) => [name, p.each[c]])),
-    probabilities: Object.fromEntries(classes.map((name, c) => [name, odds[c]])),
-    rule: p.rule,
     certainty: certainty(known.header.certainty, odds[shown], {
       isNew: !isKnown,
       isGuess: calibration.guesses.includes(p.rule),
     }),
+    confidence: isKnown ? odds[shown] : 1 - p.known,
+    p_known: p.known,
+    rule: p.rule,
+    promise: calibration.promises[p.rule],
     calibrated: p.calibrated,
-    ranked: ranked.map((c) => classes[c]),
-    nearest,
+    ranked: ranked.map((c) => ({ label: classes[c], probability: odds[c], p_value: p.each[c] })),
+    nearest: nearest.map(({ row, similarity }) => ({ index: known.header.ids?.[row] ?? row, name: null, similarity })),
+    transform: null,
     responsibilities,
   };
 }

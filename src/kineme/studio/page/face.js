@@ -93,11 +93,11 @@ function showLive() {
   why([]);
   if (!live) return say("…", "Go on drawing.");
   const done = `${percent(live.progress)} done`;
-  if (live.decided === null && live.progress < BEGUN) say("…", done);
+  if (live.label === null && live.progress < BEGUN) say("…", done);
   else if (live.certainty === "new")
-    say("Unknown", `${done}, most like ${live.ranked[0].name}`, "unknown", "new, so far");
-  else say(live.decided ?? live.ranked[0].name, done, "", `${live.certainty}, so far`);
-  bars(live.probabilities);
+    say("Unknown", `${done}, most like ${live.ranked[0].label}`, "unknown", "new, so far");
+  else say(live.label ?? live.ranked[0].label, done, "", `${live.certainty}, so far`);
+  bars(live.ranked);
 }
 
 function showAnswer() {
@@ -111,7 +111,8 @@ function showAnswer() {
         : "Draw a movement: with a mouse, a pen or a finger. Or choose a known one.",
     );
   const more = answer.rule === "guess" ? "More drawings of each would say how sure. " : "";
-  if (answer.label === null) say("Unknown", `Most like ${answer.ranked[0]}. ${more}`, "unknown", answer.certainty);
+  if (answer.label === null)
+    say("Unknown", `Most like ${answer.ranked[0].label}. ${more}`, "unknown", answer.certainty);
   else
     say(
       answer.label,
@@ -120,14 +121,14 @@ function showAnswer() {
       answer.certainty,
     );
   why([
-    `${percent(answer.pKnown)} of known movements differ as much.`,
+    `${percent(answer.p_known)} of known movements differ as much.`,
     `p-values: ${answer.ranked
       .slice(0, ROWS)
-      .map((name) => `${name} ${answer.pValues[name].toPrecision(2)}`)
+      .map(({ label, p_value }) => `${label} ${p_value.toPrecision(2)}`)
       .join(", ")}`,
     `Similarity to the nearest: ${answer.nearest[0].similarity.toFixed(2)}`,
   ]);
-  bars(answer.probabilities);
+  bars(answer.ranked);
 }
 
 /** The numbers, for who asks. */
@@ -137,16 +138,14 @@ function why(reasons) {
 }
 
 /** The most likely ones, if it is a known one; always as many rows; names are text. */
-function bars(probabilities) {
-  const shown = Object.entries(probabilities)
-    .sort((a, b) => b[1] - a[1])
-    .slice(0, ROWS);
+function bars(ranked) {
+  const likely = [...ranked].sort((a, b) => b.probability - a.probability);
   [...byId("bars").children].forEach((row, i) => {
     const [name, track, value] = row.children;
-    const [label, share] = shown[i] ?? ["", 0];
+    const { label, probability } = likely[i] ?? { label: "", probability: 0 };
     name.textContent = label;
-    value.textContent = label && percent(share);
-    /** @type {HTMLElement} */ (track.firstElementChild).style.width = `${100 * share}%`;
+    value.textContent = label && percent(probability);
+    /** @type {HTMLElement} */ (track.firstElementChild).style.width = `${100 * probability}%`;
   });
 }
 
@@ -162,7 +161,7 @@ function clear() {
     held: null,
   });
   known.select(null);
-  bars({});
+  bars([]);
   showAnswer();
   later();
 }
@@ -201,7 +200,7 @@ function finish() {
     known.select(state.answer.label);
   } catch {
     state.note = "That was too short: draw a longer movement.";
-    bars({});
+    bars([]);
   }
   showAnswer();
   later();

@@ -18,7 +18,6 @@ from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 
 from kineme.errors import KinemeError, SpecificationError, TrajectoryError
 from kineme.recognition.early.stream import Live
-from kineme.studio.server.records import plain_answer, plain_state
 from kineme.studio.server.studio import Changes, Studio
 from kineme.validation import LARGEST, Array
 
@@ -29,15 +28,17 @@ UNNAMED = "a program"
 Tell = Callable[[], object]  # must not wait
 
 MOST_SAMPLES = 10_000  # in one message
+_SHOWN = 8  # classes of a movement under way
 _MOST_WAITING = 200  # messages that are taken in again when the library has changed: a few seconds
 _EMPTY: dict[str, Any] = {
+    "label": None,
     "certainty": None,
     "ranked": [],
     "unknown": None,
-    "decided": None,
     "progress": None,
     "arrival": None,
     "path": [],
+    "goal": None,
     "skipped": 0,
     "status": [],
 }
@@ -253,7 +254,7 @@ class LiveSession:
                 self._renew()
                 return self._state
         if self._stream is not None:
-            self._state = plain_state(self._stream.update(samples[:, 0], samples[:, 1:]))
+            self._state = self._stream.update(samples[:, 0], samples[:, 1:]).to_dict(_SHOWN)
         return self._state
 
     def finish(self) -> dict[str, Any] | None:
@@ -266,8 +267,8 @@ class LiveSession:
             return None
         try:
             if self._version == self.studio.library.version:
-                return plain_answer(stream.finish())
-            return plain_answer(self.studio.library.recognize(stream.movement()))  # changed since the movement began
+                return stream.finish().to_dict()
+            return self.studio.library.recognize(stream.movement()).to_dict()  # changed since the movement began
         except SpecificationError:  # no symbols any more
             return None
         finally:
@@ -283,7 +284,7 @@ class LiveSession:
         self._version, self._is_old, self._state = version, False, _EMPTY
         for samples in self._waiting:
             if self._stream is not None:
-                self._state = plain_state(self._stream.update(samples[:, 0], samples[:, 1:]))
+                self._state = self._stream.update(samples[:, 0], samples[:, 1:]).to_dict(_SHOWN)
         self._waiting.clear()
 
 

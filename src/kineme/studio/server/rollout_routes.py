@@ -284,37 +284,46 @@ class RecognizeRequest(records.RequestBody):
 class RankedOut(BaseModel):
     """A class, its probability if the movement is of a known one, and its p-value."""
 
-    name: str
+    label: str
     probability: float | None
     p_value: float | None
 
 
 class NearestOut(BaseModel):
-    """A stored movement that is like the one asked for."""
+    """A stored movement that is like the one asked for; its index is its id."""
 
-    id: int
+    index: int
     name: str | None
-    similarity: float | None
+    similarity: float
+
+
+class TransformOut(BaseModel):
+    """The map from the nearest movement onto the one asked for."""
+
+    matrix: list[list[float]]
+    shift: list[float]
+    scale: list[float]
+    angle: float
+    duration_ratio: float
 
 
 class AnswerOut(BaseModel):
-    """The answer to a movement; label null is unknown."""
+    """The answer to a movement, as `kineme.recognition.Answer.to_dict` gives it; label null is unknown."""
 
     label: str | None
     certainty: str
-    confidence: float | None
-    p_known: float | None
-    p_values: dict[str, float | None]
-    ranked: list[RankedOut]
-    nearest: list[NearestOut]
-    calibrated: bool
+    confidence: float
+    p_known: float
     rule: str
     promise: str
+    calibrated: bool
+    ranked: list[RankedOut]
+    nearest: list[NearestOut]
+    transform: TransformOut
+    responsibilities: dict[str, float]
 
 
 @recognition_router.post("/recognize", response_model=AnswerOut, summary="Recognize a whole movement")
 def recognize(studio: Reads, body: RecognizeRequest) -> dict[str, Any]:
     """Its symbol, or null for unknown; with p-values that are calibrated where there are enough demonstrations."""
-    return records.plain_answer(
-        studio.library.recognize(records.trajectory(body.times, body.positions), body.error_rate)
-    )
+    return studio.library.recognize(records.trajectory(body.times, body.positions), body.error_rate).to_dict()

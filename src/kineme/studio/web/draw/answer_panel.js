@@ -65,12 +65,12 @@ export class AnswerPanel {
 
   /**
    * How likely each name is, if it is a known one: the same while it is drawn and after.
-   * @param {{name: string, probability: number|null}[]} ranked
+   * @param {{label: string, probability: number|null}[]} ranked
    */
   list(ranked) {
     write(byId("ranks-kind"), "If it is a known one");
     for (const [k, row] of this.rows.entries())
-      this.set(row, ranked[k]?.name ?? "\u00a0", ranked[k]?.probability ?? null);
+      this.set(row, ranked[k]?.label ?? "\u00a0", ranked[k]?.probability ?? null);
   }
 
   set(/** @type {any} */ one, /** @type {string} */ name, /** @type {number|null} */ value) {
@@ -90,14 +90,14 @@ export class AnswerPanel {
     ]
       .filter(Boolean)
       .join(", ");
-    const name = state.decided ?? best?.name;
-    if (!best || (state.decided === null && state.progress < BEGUN)) this.words("Still open", "…", note, "open");
-    else if (state.certainty === "new") this.words("New, so far", "Unknown", `most like ${best.name}`, "open");
-    else this.words(`${capital(state.certainty)}, so far`, name, note, state.decided === null ? "open" : "known");
+    const name = state.label ?? best?.label;
+    if (!best || (state.label === null && state.progress < BEGUN)) this.words("Still open", "…", note, "open");
+    else if (state.certainty === "new") this.words("New, so far", "Unknown", `most like ${best.label}`, "open");
+    else this.words(`${capital(state.certainty)}, so far`, name, note, state.label === null ? "open" : "known");
     this.progress(state.progress ?? 0);
     this.list(state.ranked);
     this.why([]);
-    if (state.decided !== null && state.certainty !== "new") this.speak(`${capital(state.certainty)} ${name}, so far.`);
+    if (state.label !== null && state.certainty !== "new") this.speak(`${capital(state.certainty)} ${name}, so far.`);
   }
 
   /** Of the whole movement. @param {any} answer */
@@ -105,7 +105,7 @@ export class AnswerPanel {
     const [best] = answer.ranked;
     const isNew = answer.certainty === "new";
     const word = capital(answer.certainty);
-    if (isNew) this.words(word, "Unknown", `most like ${best.name}`, "unknown");
+    if (isNew) this.words(word, "Unknown", `most like ${best.label}`, "unknown");
     else
       this.words(
         word,
@@ -122,7 +122,7 @@ export class AnswerPanel {
         `p-values of names: ${answer.ranked
           .slice(0, ROWS)
           .filter((/** @type {any} */ one) => one.p_value !== null)
-          .map((/** @type {any} */ one) => `${one.name} ${pValue(one.p_value)}`)
+          .map((/** @type {any} */ one) => `${one.label} ${pValue(one.p_value)}`)
           .join(", ")}`,
         nearest ? `similarity to the nearest: ${nearest.similarity.toFixed(2)}` : "",
         answer.promise,

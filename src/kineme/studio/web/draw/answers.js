@@ -56,7 +56,10 @@ function showRecognized(session, answer) {
   session.panel.final(answer);
   session.label = answer.label;
   byId("draw-move").disabled = answer.label === null;
-  suggestNames(session, answer.ranked);
+  suggestNames(
+    session,
+    answer.ranked.map((/** @type {any} */ candidate) => candidate.label),
+  );
   focusName(session);
 }
 
@@ -64,7 +67,10 @@ function showRecognized(session, answer) {
 function showTooFew(session) {
   const { symbols } = library();
   const text = `Only ${symbols[0].name} is known. Draw something else and name it, too: two names can be told apart.`;
-  suggestNames(session, symbols);
+  suggestNames(
+    session,
+    symbols.map((/** @type {any} */ symbol) => symbol.name),
+  );
   showNew(session, "Too few to compare", text);
 }
 
@@ -76,12 +82,8 @@ function showNew(session, kind, text) {
   focusName(session);
 }
 
-/** @param {Session} session @param {{name: string}[]} symbols */
-const suggestNames = (session, symbols) =>
-  session.naming.allow(
-    true,
-    symbols.slice(0, SUGGESTED).map((symbol) => symbol.name),
-  );
+/** @param {Session} session @param {string[]} names */
+const suggestNames = (session, names) => session.naming.allow(true, names.slice(0, SUGGESTED));
 
 /**
  * Show what the server could not do.
