@@ -68,6 +68,7 @@ EXEMPT = {
     "recognition.early.live_state.LiveState.certainty": "of one stream",
     "recognition.early.live_state.LiveState.in_words": "of one stream",
     "recognition.early.live_state.LiveState.probabilities": "of one stream",
+    "recognition.early.live_state.LiveState.to_dict": "of one stream",
     "recognition.early.live_state.LiveStatus.messages": "of one stream; its length counts problems",
     "movements.preparation.perturbations.Perturbation.apply": "random numbers are drawn for the batch in its order",
     "recognition.recognizer.Recognizer.score": "a score of the whole set",

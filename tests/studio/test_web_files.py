@@ -39,13 +39,13 @@ def test_there_is_a_page_its_tokens_and_its_modules():
 
 
 FINDING = """
-import { found } from "./parts/find.js";
+import { matching } from "./parts/find.js";
 const described = (k) => ({ name: `Place it on shelf ${k}`, description: k === 3 ? "Careful" : null });
 const symbols = Array.from({ length: 20 }, (_, k) => described(k));
 const field = { value: "SHELF  17", hidden: true };
 const names = (some) => some.map((one) => one.name);
-const last = [names(found(field, symbols)), names(found({ value: "careful" }, symbols)), field.hidden];
-console.log(JSON.stringify([...last, found(field, symbols.slice(0, 5)).length, field.value]));
+const last = [names(matching(field, symbols)), names(matching({ value: "careful" }, symbols)), field.hidden];
+console.log(JSON.stringify([...last, matching(field, symbols.slice(0, 5)).length, field.value]));
 """
 
 

@@ -162,7 +162,7 @@ def pause_rule(allowance: float = 1.0) -> dict[str, float]:
     """Return how pauses within movements are cut short; they count `allowance` times as long."""
     shares = _numbers(pauses, "PAUSE", "REST", "LAST_REST")
     return {name: allowance * share for name, share in shares.items()} | _numbers(
-        pauses, "RADIUS", "GAP", "SHORTEST", "WINDOWS", "FEWEST", "EQUAL", "WHOLE", "ROUNDS"
+        pauses, "RADIUS", "GAP", "SHORTEST", "WINDOWS", "FEWEST", "EQUAL", "SAME_COUNT", "ROUNDS"
     )
 
 

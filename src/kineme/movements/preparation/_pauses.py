@@ -13,8 +13,8 @@ from kineme.movements.preparation.pauses import (
     RADIUS,
     REST,
     ROUNDS,
+    SAME_COUNT,
     SHORTEST,
-    WHOLE,
     WINDOWS,
 )
 from kineme.movements.trajectories._compiled import nth_smallest
@@ -155,7 +155,7 @@ def _shorten_rests(steps, moving, motion, most):  # type: ignore[no-untyped-def]
             limit = LAST_REST * motion
         if total > EQUAL * limit and limit > 0:
             changes, count, share = True, j - begin, limit / total
-            left = max(FEWEST, int(np.ceil(share * count - WHOLE)))
+            left = max(FEWEST, int(np.ceil(share * count - SAME_COUNT)))
             for p in range(count):
                 steps[begin + p] *= share
                 moving[begin + p] = p == 0 or p * left // count != (p - 1) * left // count

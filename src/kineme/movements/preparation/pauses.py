@@ -26,7 +26,7 @@ LAST_REST = 0.25
 #: Samples of a window: at least so many, and the largest power of two with so many windows in the movement.
 SHORTEST, WINDOWS = 4, 32
 FEWEST = 3  # steps that a rest is left, at least
-EQUAL, WHOLE = 1 + 1e-9, 1e-6  # of times, and of numbers of samples: differences that are rounding
+EQUAL, SAME_COUNT = 1 + 1e-9, 1e-6  # of times, and of numbers of samples: differences that are rounding
 ROUNDS = 2  # what is cut makes windows narrower, so that a shorter rest is seen
 _OPERATIONS, _PER_NUMBER = 60_000, 100  # of NumPy, of which many calls are needed
 
@@ -133,7 +133,7 @@ def _fill_shortened(
     begins, n_steps, shares = begins[long], n_steps[long], limit[long] / total[long]
     run, place = np.repeat(np.arange(len(begins)), n_steps), np.arange(n_steps.sum())
     place -= np.repeat(np.cumsum(n_steps) - n_steps, n_steps)
-    left = np.maximum(FEWEST, np.ceil(shares * n_steps - WHOLE).astype(np.intp))
+    left = np.maximum(FEWEST, np.ceil(shares * n_steps - SAME_COUNT).astype(np.intp))
     at = begins[run] + place
     steps[at] *= shares[run]
     moving[at] = (place == 0) | (place * left[run] // n_steps[run] != (place - 1) * left[run] // n_steps[run])

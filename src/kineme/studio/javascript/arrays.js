@@ -54,16 +54,16 @@ export function product(a, i, b, j, n) {
  * @returns {Float64Array}
  */
 export function interpolate(targets, x, y) {
-  const found = new Float64Array(targets.length);
+  const interpolated = new Float64Array(targets.length);
   const last = x.length - 1;
   for (let p = 0, j = 0; p < targets.length; p++) {
     const t = targets[p];
     while (j < last - 1 && x[j + 1] <= t) j++;
-    if (t >= x[last]) found[p] = y[last];
-    else if (t <= x[0]) found[p] = y[0];
-    else found[p] = y[j] + ((y[j + 1] - y[j]) * (t - x[j])) / (x[j + 1] - x[j]);
+    if (t >= x[last]) interpolated[p] = y[last];
+    else if (t <= x[0]) interpolated[p] = y[0];
+    else interpolated[p] = y[j] + ((y[j + 1] - y[j]) * (t - x[j])) / (x[j + 1] - x[j]);
   }
-  return found;
+  return interpolated;
 }
 
 /** Numbers from a to b at n even steps. @returns {Float64Array} */
@@ -102,5 +102,5 @@ export function logSumExp(values) {
 /** Shares of numbers given by their logarithms: none negative, their sum 1. @returns {Float64Array} */
 export function softmax(logs) {
   const top = logSumExp(logs);
-  return Float64Array.from(logs, (one) => Math.exp(one - top));
+  return Float64Array.from(logs, (log) => Math.exp(log - top));
 }

@@ -26,59 +26,59 @@ export const N_POINTS = 199; // even samples from which the phases are computed
  * A path at even values of a phase: d rows of n_points numbers.
  * @param {Float64Array|Float32Array} path d rows
  * @param {number} d
- * @param {Representation} one
+ * @param {Representation} representation
  * @param {Float64Array} [matrix] (n_points, n) where time does not fall on samples
  */
-function along(path, d, one, matrix) {
+function along(path, d, representation, matrix) {
   const n = path.length / d;
-  const m = one.n_points;
-  const found = new Float64Array(d * m);
+  const m = representation.n_points;
+  const rows = new Float64Array(d * m);
   const every = (n - 1) / (m - 1);
-  const phase = one.arc_share > 0 ? arcLengthPhase(path, d, one.arc_share) : null;
+  const phase = representation.arc_share > 0 ? arcLengthPhase(path, d, representation.arc_share) : null;
   for (let k = 0; k < d; k++) {
     const own = path.subarray(k * n, (k + 1) * n);
-    if (phase) found.set(interpolate(linspace(0, 1, m), phase, own), k * m);
-    else if (Number.isInteger(every)) for (let p = 0; p < m; p++) found[k * m + p] = own[p * every];
-    else for (let p = 0; p < m; p++) for (let t = 0; t < n; t++) found[k * m + p] += matrix[p * n + t] * own[t];
+    if (phase) rows.set(interpolate(linspace(0, 1, m), phase, own), k * m);
+    else if (Number.isInteger(every)) for (let p = 0; p < m; p++) rows[k * m + p] = own[p * every];
+    else for (let p = 0; p < m; p++) for (let t = 0; t < n; t++) rows[k * m + p] += matrix[p * n + t] * own[t];
   }
-  return found;
+  return rows;
 }
 
 /** A path minus its center, divided by its size, as far as the normalization says. */
 function normalized(path, d, { translation, scale }) {
   const n = path.length / d;
   const squares = new Float64Array(d);
-  const found = Float64Array.from(path);
+  const rows = Float64Array.from(path);
   for (let k = 0; k < d; k++) {
     let center = 0;
     for (let t = 0; t < n; t++) center += path[k * n + t] / n;
     for (let t = 0; t < n; t++) squares[k] += (path[k * n + t] - center) ** 2 / n;
-    if (translation) for (let t = 0; t < n; t++) found[k * n + t] -= center;
+    if (translation) for (let t = 0; t < n; t++) rows[k * n + t] -= center;
   }
-  if (scale === "none") return found;
-  const whole = Math.sqrt(squares.reduce((sum, one) => sum + one, 0)) || 1;
+  if (scale === "none") return rows;
+  const extent = Math.sqrt(squares.reduce((sum, square) => sum + square, 0)) || 1;
   for (let k = 0; k < d; k++) {
     const own = Math.sqrt(squares[k]);
-    const size = scale === "per-dimension" && own > FLAT * whole ? own : whole;
-    for (let t = 0; t < n; t++) found[k * n + t] /= size;
+    const size = scale === "per-dimension" && own > FLAT * extent ? own : extent;
+    for (let t = 0; t < n; t++) rows[k * n + t] /= size;
   }
-  return found;
+  return rows;
 }
 
 /** Rows times a matrix (n, n): the forcing term of a DMP fitted to a path of n points. */
 function forcing(path, d, operator, translation) {
   const n = path.length / d;
-  const found = new Float64Array(d * n);
+  const rows = new Float64Array(d * n);
   for (let k = 0; k < d; k++) {
     let mean = 0;
     for (let t = 0; t < n; t++) {
       const x = path[k * n + t];
       mean += x / n;
-      for (let p = 0; p < n; p++) found[k * n + p] += x * operator[t * n + p];
+      for (let p = 0; p < n; p++) rows[k * n + p] += x * operator[t * n + p];
     }
-    if (!translation) for (let p = 0; p < n; p++) found[k * n + p] += mean;
+    if (!translation) for (let p = 0; p < n; p++) rows[k * n + p] += mean;
   }
-  return found;
+  return rows;
 }
 
 /**
@@ -90,11 +90,11 @@ function forcing(path, d, operator, translation) {
  */
 export function featureRows(path, how, arrays) {
   const d = how.n_dims;
-  return how.by_rows.map((one) => {
-    const matrix = one.resample === undefined ? undefined : arrays[one.resample];
-    const single = Float32Array.from(normalized(along(path, d, one, matrix), d, how));
-    if (one.quantity !== "forcing") return single;
-    return Float32Array.from(forcing(single, d, arrays[one.operator], how.translation));
+  return how.by_rows.map((representation) => {
+    const matrix = representation.resample === undefined ? undefined : arrays[representation.resample];
+    const single = Float32Array.from(normalized(along(path, d, representation, matrix), d, how));
+    if (representation.quantity !== "forcing") return single;
+    return Float32Array.from(forcing(single, d, arrays[representation.operator], how.translation));
   });
 }
 
@@ -144,31 +144,31 @@ export function roomForShapes(m, d, { n_segments, n_points }) {
 /** Positions at n even values along a path, each d numbers, interpolated linearly. */
 function evenly(path, d, n, factor) {
   const T = path.length / d;
-  const found = new Float64Array(n * d);
+  const positions = new Float64Array(n * d);
   for (let p = 0; p < n; p++) {
     const at = (p * (T - 1)) / (n - 1);
     const before = Math.min(Math.floor(at), T - 2);
     const share = at - before;
     for (let k = 0; k < d; k++) {
-      found[p * d + k] = factor * (path[k * T + before] * (1 - share) + path[k * T + before + 1] * share);
+      positions[p * d + k] = factor * (path[k * T + before] * (1 - share) + path[k * T + before + 1] * share);
     }
   }
-  return found;
+  return positions;
 }
 
 /** n vectors divided by their lengths; zero where they have none. */
 function units(n, d, vector) {
-  const found = new Float64Array(n * d);
+  const directions = new Float64Array(n * d);
   for (let p = 0; p < n; p++) {
     let square = 0;
     for (let k = 0; k < d; k++) {
-      found[p * d + k] = vector(p, k);
-      square += found[p * d + k] ** 2;
+      directions[p * d + k] = vector(p, k);
+      square += directions[p * d + k] ** 2;
     }
     const length = Math.sqrt(square);
-    for (let k = 0; k < d; k++) found[p * d + k] = length > NO_LENGTH ? found[p * d + k] / length : 0;
+    for (let k = 0; k < d; k++) directions[p * d + k] = length > NO_LENGTH ? directions[p * d + k] / length : 0;
   }
-  return found;
+  return directions;
 }
 
 function directed(vectors, p, d) {
@@ -186,12 +186,17 @@ function angle(vectors, p, q, d) {
 
 /**
  * A movement as it is compared: its smooth path, rows with their squared norms, and shapes.
- * @param {import("./preparation.js").Movement} one
+ * @param {import("./preparation.js").Movement} movement
  * @param {Object} how
  * @param {Object} arrays
  */
-export function describeMovement(one, how, arrays) {
-  return describePath(evenPath(withoutPauses(one, how.pauses), how.cutoff, N_POINTS), one.positions, how, arrays);
+export function describeMovement(movement, how, arrays) {
+  return describePath(
+    evenPath(withoutPauses(movement, how.pauses), how.cutoff, N_POINTS),
+    movement.positions,
+    how,
+    arrays,
+  );
 }
 
 /** The same of a smooth path relative to a first position. */

@@ -230,19 +230,19 @@ function sums(rows, columns, nearest, taken, P) {
 /**
  * Squared distances of a described movement to m stored ones: R rows of m numbers.
  * @param {Object} how the header's comparison
- * @param {{rows: Float32Array[], squares: number[], shapes: Object}} one
+ * @param {{rows: Float32Array[], squares: number[], shapes: Object}} described
  * @param {Stored} stored
  * @returns {Float64Array}
  */
-export function squaredDistances(how, one, stored) {
+export function squaredDistances(how, described, stored) {
   const { rule, by_rows: blocks, by_pairs: measures, n_dims: d } = how;
   const m = stored.m;
-  const found = new Float64Array((blocks.length + measures.length) * m);
+  const distances = new Float64Array((blocks.length + measures.length) * m);
   const compare = measures.length
     ? pairDistances(
         how.shapes,
         d,
-        one.shapes,
+        described.shapes,
         measures.includes(2),
         measures.some((k) => k < 2),
       )
@@ -256,20 +256,20 @@ export function squaredDistances(how, one, stored) {
       const turns = compare !== null && r === how.rotating;
       const best = align(
         rule,
-        one.rows[r],
+        described.rows[r],
         0,
         stored.rows[r],
         j * n * d,
         n,
-        Math.sqrt(one.squares[r] * square),
+        Math.sqrt(described.squares[r] * square),
         turns ? R : null,
       );
-      found[r * m + j] = Math.max(one.squares[r] + square - 2 * best, 0);
+      distances[r * m + j] = Math.max(described.squares[r] + square - 2 * best, 0);
     }
     if (compare === null) continue;
     for (let k = 0; k < d * d; k++) R[k] = Math.fround(R[k]);
     compare(stored.shapes, j, R, squares);
-    for (let k = 0; k < measures.length; k++) found[(blocks.length + k) * m + j] = squares[measures[k]];
+    for (let k = 0; k < measures.length; k++) distances[(blocks.length + k) * m + j] = squares[measures[k]];
   }
-  return found;
+  return distances;
 }

@@ -19,7 +19,7 @@ function forecast(stored, evidence, label, begun, duration) {
     first,
     n_movements: m,
     comparison: { n_dims: d },
-  } = stored.known.header;
+  } = stored.recognizer.header;
   const [G, { paths, prefixes, S }] = [early.n_progress, stored];
   const from = first[label] * G;
   const own = evidence.subarray(from, (first[label + 1] ?? m) * G);
@@ -75,7 +75,7 @@ export function follow(stored, { confidence = 0.9, patience = 0.05 } = {}) {
     certainty: least,
     comparison: { n_dims: d, cutoff, pauses },
     early,
-  } = stored.known.header;
+  } = stored.recognizer.header;
   const decide = decision(confidence, patience);
   let [leader, furthest] = [-1, 0];
   /**

@@ -31,7 +31,7 @@ function logPriors(stored, begun, duration) {
     duration_spread: durationSpread,
     timing_spread: timingSpread,
     numbers,
-  } = stored.known.header.early;
+  } = stored.recognizer.header.early;
   const [length, longer] = [begun.lengths[0], duration].map(finiteLog);
   const square = product(begun.timing, 0, begun.timing, 0, S);
   const over = (value, spread) => (spread === null ? 0 : 0.5 * (value / spread) ** 2);
@@ -49,14 +49,14 @@ function choose(rough, first, G, compared) {
   const n = rough.length;
   if (n <= compared) return Array.from(rough, (_, h) => h);
   const least = Float64Array.from(rough).sort()[n - compared];
-  const found = [];
+  const chosen = [];
   first.forEach((start, c) => {
     const end = (first[c + 1] ?? n / G) * G;
     let best = -Infinity;
     for (let h = start * G; h < end; h++) best = Math.max(best, rough[h]);
-    for (let h = start * G; h < end; h++) if (rough[h] >= least || rough[h] >= best) found.push(h);
+    for (let h = start * G; h < end; h++) if (rough[h] >= least || rough[h] >= best) chosen.push(h);
   });
-  return found;
+  return chosen;
 }
 
 /** Logarithm of the odds that movements of that speed at their end are over. */
@@ -72,7 +72,7 @@ function logOdds({ over, before, numbers }, speed) {
  * See kineme.recognition.early.evidence.
  */
 export function logEvidence(stored, begun, path, start, duration) {
-  const { header } = stored.known;
+  const { header } = stored.recognizer;
   const {
     early,
     first,
@@ -121,14 +121,14 @@ function logRotation({ rule: { n_dims: d, prior }, numbers }, R) {
 
 /** Add the evidence that the movement is over. */
 function addOver(stored, path, start, evidence, priors) {
-  const { header, arrays, stored: references } = stored.known;
+  const { header, arrays, stored: references } = stored.recognizer;
   const { early, first, n_movements: m } = header;
   const { n_progress: G, numbers } = early;
   const most = Float64Array.from({ length: m }, (_, j) => priors[j * G + G - 1]);
   if (most[argmax(most)] < evidence[argmax(evidence)] - numbers.negligible) return;
   const how = early.own_rotations ? { ...header.comparison, rule: early.rule } : header.comparison;
-  const whole = describePath(path, start, how, arrays);
-  const similar = logAverages(how, kernelLogs(how, squaredDistances(how, whole, references))).map(
+  const described = describePath(path, start, how, arrays);
+  const similar = logAverages(how, kernelLogs(how, squaredDistances(how, described, references))).map(
     (log) => numbers.power * log,
   );
   const counts = first.map((begin, c) => (first[c + 1] ?? m) - begin);
@@ -144,7 +144,7 @@ function addOver(stored, path, start, evidence, priors) {
 
 /** Share of each class, and, last, of an unknown movement, in the evidence. */
 export function shares(stored, evidence) {
-  const { early, first, n_movements: m } = stored.known.header;
+  const { early, first, n_movements: m } = stored.recognizer.header;
   const { n_progress: G, numbers } = early;
   const logs = first.map((begin, c) => {
     const end = first[c + 1] ?? m;

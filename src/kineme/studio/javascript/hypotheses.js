@@ -26,7 +26,7 @@ export function beginnings(paths, d, progress, { shapes: how, numbers }) {
   const room = (size) => new Float64Array(n * G * size);
   const [squares, sizes, lengths, elapsed, endSpeeds] = [1, 1, 1, 1, 1].map(room);
   const [rows, timing, shapes] = [new Float32Array(n * G * d * S), room(S), roomForShapes(n * G, d, how)];
-  const found = { rows, timing, shapes, squares, sizes, lengths, elapsed, endSpeeds };
+  const prefixes = { rows, timing, shapes, squares, sizes, lengths, elapsed, endSpeeds };
   const even = linspace(0, 1, N_POINTS);
   for (let i = 0; i < n; i++) {
     const path = paths.subarray(i * d * N_POINTS, (i + 1) * d * N_POINTS);
@@ -38,20 +38,20 @@ export function beginnings(paths, d, progress, { shapes: how, numbers }) {
       const own = new Float64Array(d * S);
       for (let k = 0; k < d; k++)
         own.set(interpolate(targets, phase, path.subarray(k * N_POINTS, (k + 1) * N_POINTS)), k * S);
-      describeBeginning(found, at, own, times, d, S);
+      describeBeginning(prefixes, at, own, times, d, S);
       const before = interpolate([(1 - numbers.last) * times[S - 1]], even, phase)[0];
       endSpeeds[at] = Math.log(Math.max((1 - before / progress[g]) / numbers.last, numbers.least_speed));
     }
   }
-  return found;
+  return prefixes;
 }
 
 /** Write beginning number `at` with its samples (d, S) and their times. */
-function describeBeginning(found, at, own, times, d, S) {
+function describeBeginning(prefixes, at, own, times, d, S) {
   for (let t = 1; t < S; t++) {
     let square = 0;
     for (let k = 0; k < d; k++) square += (own[k * S + t] - own[k * S + t - 1]) ** 2;
-    found.lengths[at] += Math.sqrt(square);
+    prefixes.lengths[at] += Math.sqrt(square);
   }
   let total = 0;
   for (let k = 0; k < d; k++) {
@@ -62,23 +62,23 @@ function describeBeginning(found, at, own, times, d, S) {
       total += row[t] ** 2;
     }
   }
-  found.sizes[at] = Math.sqrt(total / S);
-  const per = 1 / ((found.sizes[at] || 1) * Math.sqrt(S));
+  prefixes.sizes[at] = Math.sqrt(total / S);
+  const per = 1 / ((prefixes.sizes[at] || 1) * Math.sqrt(S));
   for (let t = 0; t < d * S; t++) own[t] *= per;
-  found.rows.set(own, at * d * S);
-  const single = found.rows.subarray(at * d * S, (at + 1) * d * S);
-  found.squares[at] = product(single, 0, single, 0, d * S);
-  found.elapsed[at] = times[S - 1];
-  for (let t = 0; t < S; t++) found.timing[at * S + t] = times[t] / ((times[S - 1] || 1) * Math.sqrt(S));
-  fillShapes(own, d, found.shapes, at, Math.sqrt(S));
+  prefixes.rows.set(own, at * d * S);
+  const single = prefixes.rows.subarray(at * d * S, (at + 1) * d * S);
+  prefixes.squares[at] = product(single, 0, single, 0, d * S);
+  prefixes.elapsed[at] = times[S - 1];
+  for (let t = 0; t < S; t++) prefixes.timing[at * S + t] = times[t] / ((times[S - 1] || 1) * Math.sqrt(S));
+  fillShapes(own, d, prefixes.shapes, at, Math.sqrt(S));
 }
 
 /**
  * Every stored movement at every progress; made once.
- * @param {import("./recognition.js").Known} known
+ * @param {import("./recognition.js").Recognizer} recognizer
  */
-export function hypotheses(known) {
-  const { header, arrays } = known;
+export function hypotheses(recognizer) {
+  const { header, arrays } = recognizer;
   const { early, comparison, n_movements: m } = header;
   const G = early.n_progress;
   const progress = Float64Array.from({ length: G }, (_, g) => (g + 1) / G);
@@ -91,7 +91,7 @@ export function hypotheses(known) {
   const S = early.shapes.n_segments + 1;
   const each = (value) => Float64Array.from({ length: m * G }, (_, h) => value(h));
   return {
-    known,
+    recognizer,
     paths,
     progress,
     prefixes,

@@ -15,26 +15,26 @@
  * @property {number} fewest steps that a rest is left, at least
  * @property {number} rounds
  * @property {number} equal ratio of times that is rounding
- * @property {number} whole difference of counts that is rounding
+ * @property {number} same_count difference of counts that is rounding
  */
 
 /**
  * The movement without its pauses; the same object if it has none.
- * @param {import("./preparation.js").Movement} one
+ * @param {import("./preparation.js").Movement} movement
  * @param {PauseRule} rule
  * @returns {import("./preparation.js").Movement}
  */
-export function withoutPauses(one, rule) {
-  let cut = one;
+export function withoutPauses(movement, rule) {
+  let cut = movement;
   for (let round = 0; round < rule.rounds; round++) {
-    const { steps, kept, changes } = shortened(cut, rule);
+    const { steps, remaining, changes } = shortened(cut, rule);
     if (!changes) break;
     const elapsed = new Float64Array(steps.length);
     for (let j = 1; j < elapsed.length; j++) elapsed[j] = elapsed[j - 1] + steps[j - 1];
     const { positions, d } = cut;
     cut = {
-      times: elapsed.filter((_, j) => kept[j]),
-      positions: positions.filter((_, at) => kept[Math.floor(at / d)]),
+      times: elapsed.filter((_, j) => remaining[j]),
+      positions: positions.filter((_, at) => remaining[Math.floor(at / d)]),
       d,
     };
   }
@@ -67,14 +67,14 @@ function shortened({ times, positions, d }, rule) {
   });
   const changes = steps.some((step, j) => step > rule.equal * longest[j]);
   const counted = steps.map((step, j) => Math.min(step, longest[j]));
-  const { kept, shorter } = shortenRests(counted, resting, motion, rule.rest * reach * pace, rule);
-  return { steps: counted, kept, changes: changes || shorter };
+  const { remaining, shorter } = shortenRests(counted, resting, motion, rule.rest * reach * pace, rule);
+  return { steps: counted, remaining, changes: changes || shorter };
 }
 
 /** Shorten the steps of long rests; which samples are left, and whether there are such rests. */
 function shortenRests(steps, resting, motion, most, rule) {
   const n = steps.length;
-  const kept = new Uint8Array(n).fill(1);
+  const remaining = new Uint8Array(n).fill(1);
   let shorter = false;
   for (let j = 0; j < n; j++) {
     const begin = j;
@@ -86,13 +86,13 @@ function shortenRests(steps, resting, motion, most, rule) {
     shorter = true;
     const share = limit / total;
     const count = j - begin;
-    const left = Math.max(rule.fewest, Math.ceil(share * count - rule.whole));
+    const left = Math.max(rule.fewest, Math.ceil(share * count - rule.same_count));
     for (let p = 0; p < count; p++) {
       steps[begin + p] *= share;
-      kept[begin + p] = p === 0 || Math.floor((p * left) / count) !== Math.floor(((p - 1) * left) / count) ? 1 : 0;
+      remaining[begin + p] = p === 0 || Math.floor((p * left) / count) !== Math.floor(((p - 1) * left) / count) ? 1 : 0;
     }
   }
-  return { kept, shorter };
+  return { remaining, shorter };
 }
 
 /** Whether the step after each of n samples belongs to a window of samples that stays within a radius of its first. */

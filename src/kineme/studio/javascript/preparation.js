@@ -41,10 +41,10 @@ export function movement(times, positions, d) {
   return { times: t, positions: flat, d };
 }
 
-/** One dimension minus its first number. @param {Movement} one @param {number} k */
-function column(one, k) {
-  const { positions, d } = one;
-  return Float64Array.from(one.times, (_, j) => positions[j * d + k] - positions[k]);
+/** One dimension minus its first number. @param {Movement} movement @param {number} k */
+function column(movement, k) {
+  const { positions, d } = movement;
+  return Float64Array.from(movement.times, (_, j) => positions[j * d + k] - positions[k]);
 }
 
 /** Stamps of which consecutive ones are at least `CLOSEST` of the mean step apart. @param {Float64Array} times */
@@ -62,20 +62,20 @@ function spread(times) {
 /**
  * The smoothing spline at n even times, minus the first recorded position: d rows of n numbers.
  * It minimizes `sum_j (x_j - g(u_j))^2 + lam * integral g''(u)^2 du` (Reinsch 1967), with the lam of `cutoff` cycles.
- * @param {Movement} one
+ * @param {Movement} movement
  * @param {number|null} cutoff none: an interpolating spline
  * @param {number} n
  * @returns {Float64Array}
  */
-export function evenPath(one, cutoff, n) {
-  if (cutoff === null) return splinePath(one, n);
-  const last = one.times.length - 1;
-  const scale = 1 / (Math.cbrt(last / (2 * Math.PI * cutoff) ** 4) * (one.times[last] - one.times[0]));
-  const stamps = spread(one.times);
+export function evenPath(movement, cutoff, n) {
+  if (cutoff === null) return splinePath(movement, n);
+  const last = movement.times.length - 1;
+  const scale = 1 / (Math.cbrt(last / (2 * Math.PI * cutoff) ** 4) * (movement.times[last] - movement.times[0]));
+  const stamps = spread(movement.times);
   const v = stamps.map((t) => (t - stamps[0]) * scale);
-  const rows = new Float64Array(one.d * n);
-  for (let k = 0; k < one.d; k++) {
-    const x = column(one, k);
+  const rows = new Float64Array(movement.d * n);
+  for (let k = 0; k < movement.d; k++) {
+    const x = column(movement, k);
     if (x.some((value) => value !== 0)) rows.set(evaluate(v, x, smoothed(v, x), n), k * n);
   }
   return rows;
@@ -115,7 +115,7 @@ function smoothed(v, x) {
 
 /** Cubics with values x and second derivatives m at the knots v, from 0, at n even places. */
 function evaluate(v, x, m, n) {
-  const found = new Float64Array(n);
+  const samples = new Float64Array(n);
   const last = v.length - 1;
   for (let q = 0, j = 0; q < n; q++) {
     const at = (v[last] * q) / (n - 1);
@@ -123,22 +123,22 @@ function evaluate(v, x, m, n) {
     const gap = v[j + 1] - v[j];
     const s = (at - v[j]) / gap;
     const r = 1 - s;
-    found[q] = r * x[j] + s * x[j + 1] + ((gap * gap) / 6) * ((r ** 3 - r) * m[j] + (s ** 3 - s) * m[j + 1]);
+    samples[q] = r * x[j] + s * x[j + 1] + ((gap * gap) / 6) * ((r ** 3 - r) * m[j] + (s ** 3 - s) * m[j + 1]);
   }
-  return found;
+  return samples;
 }
 
 /**
  * The not-a-knot cubic spline at n even times, minus the first position: d rows of n numbers.
- * @param {Movement} one
+ * @param {Movement} movement
  * @param {number} n
  * @returns {Float64Array}
  */
-export function splinePath(one, n) {
-  const apart = separated(one);
+export function splinePath(movement, n) {
+  const apart = separated(movement);
   const v = apart.times.map((t) => t - apart.times[0]);
-  const rows = new Float64Array(one.d * n);
-  for (let k = 0; k < one.d; k++) {
+  const rows = new Float64Array(movement.d * n);
+  for (let k = 0; k < movement.d; k++) {
     const x = column(apart, k);
     rows.set(evaluate(v, x, bends(v, x), n), k * n);
   }
@@ -169,16 +169,16 @@ function bends(v, x) {
   return m;
 }
 
-/** The movement with each group of close samples replaced by its mean; usually there is none. @param {Movement} one */
-function separated(one) {
-  const { times, positions, d } = one;
+/** The movement with each group of close samples replaced by its mean; usually there is none. @param {Movement} movement */
+function separated(movement) {
+  const { times, positions, d } = movement;
   const T = times.length;
   const gaps = Float64Array.from({ length: T - 1 }, (_, j) => times[j + 1] - times[j]);
   const ordered = gaps.slice().sort();
-  if (!(ordered[0] < SHARE * ordered[T - 2])) return one;
+  if (!(ordered[0] < SHARE * ordered[T - 2])) return movement;
   const step = ordered[Math.floor(QUANTILE * (T - 1))];
   const merged = joined(times, gaps, step);
-  if (T - merged.reduce((sum, on) => sum + on, 0) < MIN_SAMPLES) return one;
+  if (T - merged.reduce((sum, on) => sum + on, 0) < MIN_SAMPLES) return movement;
   const heads = [];
   for (let j = 0; j < T; j++) if (!merged[j]) heads.push(j);
   const stamps = new Float64Array(heads.length);

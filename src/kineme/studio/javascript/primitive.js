@@ -9,14 +9,17 @@ import { primitiveOf, rollout } from "./rollout.js";
  */
 export function openPrimitive(text) {
   const snapshot = unpack(text);
-  const one = primitiveOf(snapshot, 0);
-  const end = rollout(snapshot, one).velocities.at(-1);
+  const primitive = primitiveOf(snapshot, 0);
+  const end = rollout(snapshot, primitive).velocities.at(-1);
   return {
-    ...one,
-    /** @param {import("./rollout.js").Wish} [asked] */
-    rollout: (asked = {}) => {
-      const { duration = one.duration } = asked;
-      return rollout(snapshot, one, { ...asked, endVelocity: end.map((v) => (v * one.duration) / duration) });
+    ...primitive,
+    /** @param {import("./rollout.js").Wish} [wish] */
+    rollout: (wish = {}) => {
+      const { duration = primitive.duration } = wish;
+      return rollout(snapshot, primitive, {
+        ...wish,
+        endVelocity: end.map((v) => (v * primitive.duration) / duration),
+      });
     },
   };
 }

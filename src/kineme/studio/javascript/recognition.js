@@ -11,9 +11,9 @@ const SHOWN = 3; // movements named in an answer
 /** A-averages of kernels given by their logarithms. */
 const MEANS = {
   arithmetic: (logs) => logSumExp(logs) - Math.log(logs.length),
-  geometric: (logs) => logs.reduce((sum, one) => sum + one, 0) / logs.length,
-  harmonic: (logs) => Math.log(logs.length) - logSumExp(logs.map((one) => -one)),
-  quadratic: (logs) => 0.5 * (logSumExp(logs.map((one) => 2 * one)) - Math.log(logs.length)),
+  geometric: (logs) => logs.reduce((sum, log) => sum + log, 0) / logs.length,
+  harmonic: (logs) => Math.log(logs.length) - logSumExp(logs.map((log) => -log)),
+  quadratic: (logs) => 0.5 * (logSumExp(logs.map((log) => 2 * log)) - Math.log(logs.length)),
   min: (logs) => Math.min(...logs),
 };
 
@@ -21,13 +21,13 @@ const MEANS = {
 const SHARES = {
   arithmetic: softmax,
   geometric: (logs) => logs.map(() => 1 / logs.length),
-  harmonic: (logs) => softmax(logs.map((one) => -one)),
-  quadratic: (logs) => softmax(logs.map((one) => 2 * one)),
-  min: (logs) => logs.map((one) => (one === Math.min(...logs) ? 1 : 0)),
+  harmonic: (logs) => softmax(logs.map((log) => -log)),
+  quadratic: (logs) => softmax(logs.map((log) => 2 * log)),
+  min: (logs) => logs.map((log) => (log === Math.min(...logs) ? 1 : 0)),
 };
 
 /**
- * @typedef {Object} Known what is known of the classes
+ * @typedef {Object} Recognizer what classes are told apart by
  * @property {Object} header
  * @property {Object} arrays
  * @property {import("./distances.js").Stored} stored
@@ -59,13 +59,13 @@ const SHARES = {
 /**
  * The stored movements, described by their smooth paths.
  * @param {import("./arrays.js").Snapshot} snapshot
- * @returns {Known}
+ * @returns {Recognizer}
  */
 export function knownClasses({ header, arrays }) {
   const how = header.comparison;
   const d = how.n_dims;
   const m = header.n_movements;
-  const rows = how.by_rows.map((one) => new Float32Array(m * d * one.n_points));
+  const rows = how.by_rows.map((representation) => new Float32Array(m * d * representation.n_points));
   const squares = how.by_rows.map(() => new Float64Array(m));
   const shapes = how.shapes ? roomForShapes(m, d, how.shapes) : null;
   for (let i = 0; i < m; i++) {
@@ -92,7 +92,7 @@ export function knownClasses({ header, arrays }) {
 export function kernelLogs(how, squares) {
   const { widths, weights } = how;
   const m = squares.length / widths.length;
-  const equal = weights.every((one) => one === weights[0]);
+  const equal = weights.every((weight) => weight === weights[0]);
   return squares.map((square, k) => {
     const r = Math.floor(k / m);
     const log = widths[r] === null ? 0 : -square / (2 * widths[r] ** 2);
@@ -104,10 +104,10 @@ export function kernelLogs(how, squares) {
 export function logAverages(how, logs) {
   const R = how.widths.length;
   const m = logs.length / R;
-  const one = new Float64Array(R);
+  const column = new Float64Array(R);
   return Float64Array.from({ length: m }, (_, j) => {
-    for (let r = 0; r < R; r++) one[r] = logs[r * m + j];
-    return MEANS[how.mean](one);
+    for (let r = 0; r < R; r++) column[r] = logs[r * m + j];
+    return MEANS[how.mean](column);
   });
 }
 
@@ -122,20 +122,20 @@ function largest(values, first) {
 
 /**
  * How a movement compares with every class.
- * @param {Known} known
+ * @param {Recognizer} recognizer
  * @param {Object} described
  */
-export function compare(known, described) {
-  const { comparison: how, first, classifier, medoids } = known.header;
-  const logs = kernelLogs(how, squaredDistances(how, described, known.stored));
-  const m = known.stored.m;
+export function compare(recognizer, described) {
+  const { comparison: how, first, classifier, medoids } = recognizer.header;
+  const logs = kernelLogs(how, squaredDistances(how, described, recognizer.stored));
+  const m = recognizer.stored.m;
   const average = logAverages(how, logs);
   const nearest = largest(average, first);
   let scores = nearest;
   let similar = nearest; // what odds are told by
   if (classifier === "nearest-each") {
     const each = how.widths.map((_, r) => largest(logs.subarray(r * m, (r + 1) * m), first));
-    scores = similar = Float64Array.from(first, (_, c) => MEANS[how.mean](Float64Array.from(each, (one) => one[c])));
+    scores = similar = Float64Array.from(first, (_, c) => MEANS[how.mean](Float64Array.from(each, (row) => row[c])));
   } else if (classifier === "prototype") {
     scores = Float64Array.from(medoids, (j) => average[j]);
   }
@@ -171,8 +171,8 @@ function shareAbove(calibrating, score) {
 }
 
 /** The rule and the rising scores that count for a class: its own if they suffice, else those of all, else none. */
-function counted(known, kind, c, errorRate) {
-  const { arrays, header } = known;
+function calibratedBy(recognizer, kind, c, errorRate) {
+  const { arrays, header } = recognizer;
   const part = (name, i) => arrays[name].subarray(arrays[`${name} ends`][i - 1] ?? 0, arrays[`${name} ends`][i]);
   const enough = (scores) => (scores.length + 1) * errorRate > 1 - 1e-12;
   const own = part(`own ${kind}`, c);
@@ -182,8 +182,8 @@ function counted(known, kind, c, errorRate) {
 }
 
 /** The p-value if somebody else made the movement; 0 where groups tell how much people differ. */
-function byStrangers(known, away) {
-  const { between, least, reach_of_strangers: most, reach_to_next: share } = known.header.calibration;
+function byStrangers(recognizer, away) {
+  const { between, least, reach_of_strangers: most, reach_to_next: share } = recognizer.header.calibration;
   if (!between) return 0;
   const [nearest, next = Infinity] = Float64Array.from(away).sort();
   const reach = Math.min(most * between, share * next);
@@ -192,77 +192,81 @@ function byStrangers(known, away) {
 
 /**
  * P-values of each class and of all together, see kineme.recognition.conformal.
- * @param {Known} known
+ * @param {Recognizer} recognizer
  * @param {Float64Array} nearest log similarity to the nearest movement of each class
  * @param {number} errorRate
  */
-function pValues(known, nearest, errorRate) {
-  const { calibration } = known.header;
+function pValues(recognizer, nearest, errorRate) {
+  const { calibration } = recognizer.header;
   const away = nearest.map((log) => distance(log, calibration));
-  const scores = away.map((one, c) => one / known.arrays.scales[c]);
-  const found = Array.from(scores, (_, c) => counted(known, "scores", c, errorRate));
-  const each = scores.map((score, c) => (found[c].scores ? shareAbove(found[c].scores, score) : broadLaw(score)));
+  const scores = away.map((gap, c) => gap / recognizer.arrays.scales[c]);
+  const rules = Array.from(scores, (_, c) => calibratedBy(recognizer, "scores", c, errorRate));
+  const each = scores.map((score, c) => (rules[c].scores ? shareAbove(rules[c].scores, score) : broadLaw(score)));
   const like = scores.reduce((best, score, c) => (score < scores[best] ? c : best), 0);
-  const all = counted(known, "novelties", like, errorRate);
-  const mean = all.pooled.reduce((sum, one) => sum + one, 0) / all.pooled.length;
+  const all = calibratedBy(recognizer, "novelties", like, errorRate);
+  const mean = all.pooled.reduce((sum, score) => sum + score, 0) / all.pooled.length;
   const guess = all.pooled.length
     ? law(scores[like] / Math.max(mean, calibration.least), calibration)
     : broadLaw(scores[like]);
   const shown = all.scores ? shareAbove(all.scores, scores[like]) : guess;
-  const strangers = byStrangers(known, away);
+  const strangers = byStrangers(recognizer, away);
   return {
     each,
-    known: Math.max(shown, strangers),
+    pKnown: Math.max(shown, strangers),
     rule: all.scores && shown <= errorRate && strangers > errorRate ? "strangers" : all.rule,
-    calibrated: found.every((one) => one.scores !== null),
+    calibrated: rules.every((rule) => rule.scores !== null),
   };
 }
 
 /** Probability of each class for movements of one of them: the odds are ratios of distances to the power fitted. */
-function probabilities(known, similar) {
-  const { calibration } = known.header;
+function probabilities(recognizer, similar) {
+  const { calibration } = recognizer.header;
   const { exponent, least } = calibration;
   return softmax(similar.map((log) => -exponent * Math.log(Math.max(distance(log, calibration), least))));
 }
 
 /**
  * The answer to a movement.
- * @param {Known} known
- * @param {import("./preparation.js").Movement} one
+ * @param {Recognizer} recognizer
+ * @param {import("./preparation.js").Movement} movement
  * @param {number} [errorRate] share of known movements that may be called unknown
  * @returns {Answer}
  */
-export function recognize(known, one, errorRate = 0.05) {
-  const { calibration, comparison: how, classes, first } = known.header;
-  const compared = compare(known, describeMovement(one, how, known.arrays));
-  const p = pValues(known, compared.nearest, errorRate);
+export function recognize(recognizer, movement, errorRate = 0.05) {
+  const { calibration, comparison: how, classes, first } = recognizer.header;
+  const compared = compare(recognizer, describeMovement(movement, how, recognizer.arrays));
+  const p = pValues(recognizer, compared.nearest, errorRate);
   const possible = p.each.some((share) => share > errorRate);
   const chosen = argmax(compared.scores.map((score, c) => (!possible || p.each[c] > errorRate ? score : -Infinity)));
-  const isKnown = p.known > errorRate;
+  const isKnown = p.pKnown > errorRate;
   const ranked = descending(compared.scores);
   const shown = isKnown ? chosen : ranked[0];
-  const odds = probabilities(known, compared.similar);
-  const own = compared.average.subarray(first[shown], first[shown + 1] ?? known.stored.m);
+  const odds = probabilities(recognizer, compared.similar);
+  const own = compared.average.subarray(first[shown], first[shown + 1] ?? recognizer.stored.m);
   const nearest = descending(own)
     .slice(0, SHOWN)
     .map((j) => ({ row: first[shown] + j, similarity: Math.exp(own[j]) }));
-  const m = known.stored.m;
+  const m = recognizer.stored.m;
   const shares = SHARES[how.mean](Float64Array.from(how.widths, (_, r) => compared.logs[r * m + nearest[0].row]));
   const responsibilities = {};
   for (const [r, name] of how.names.entries()) responsibilities[name] = (responsibilities[name] ?? 0) + shares[r];
   return {
     label: isKnown ? classes[chosen] : null,
-    certainty: certainty(known.header.certainty, odds[shown], {
+    certainty: certainty(recognizer.header.certainty, odds[shown], {
       isNew: !isKnown,
       isGuess: calibration.guesses.includes(p.rule),
     }),
-    confidence: isKnown ? odds[shown] : 1 - p.known,
-    p_known: p.known,
+    confidence: isKnown ? odds[shown] : 1 - p.pKnown,
+    p_known: p.pKnown,
     rule: p.rule,
     promise: calibration.promises[p.rule],
     calibrated: p.calibrated,
     ranked: ranked.map((c) => ({ label: classes[c], probability: odds[c], p_value: p.each[c] })),
-    nearest: nearest.map(({ row, similarity }) => ({ index: known.header.ids?.[row] ?? row, name: null, similarity })),
+    nearest: nearest.map(({ row, similarity }) => ({
+      index: recognizer.header.ids?.[row] ?? row,
+      name: null,
+      similarity,
+    })),
     transform: null,
     responsibilities,
   };

@@ -72,7 +72,7 @@ function forcing(how, formulation, u) {
     const gap = center(Math.min(i, N - 2)) - center(Math.min(i, N - 2) + 1);
     return (Math.log(overlap) * (s - center(i)) ** 2) / gap ** 2;
   });
-  const top = values.subarray(0, N).reduce((most, one) => Math.max(most, one), -Infinity);
+  const top = values.subarray(0, N).reduce((most, value) => Math.max(most, value), -Infinity);
   let sum = 0;
   for (let i = 0; i < N; i++) sum += values[i] = Math.exp(values[i] - top);
   const gate = gating === "phase" ? s : Math.min(1, s / Math.exp(-alpha));
@@ -104,10 +104,10 @@ function step(how, formulation, state, u, h) {
 /** A state with a third row, x'' = K (g - x) - D x' + f + coupling (g - x0); `values` are those of `forcing` then. */
 function withAcceleration({ n_basis: N, K, D }, state, values) {
   const M = N + 2;
-  const whole = new Float64Array(3 * M);
-  whole.set(state);
-  for (let i = 0; i < M; i++) whole[2 * M + i] = (i <= N ? values[i] : 0) - K * state[i] - D * state[M + i];
-  return whole;
+  const extended = new Float64Array(3 * M);
+  extended.set(state);
+  for (let i = 0; i < M; i++) extended[2 * M + i] = (i <= N ? values[i] : 0) - K * state[i] - D * state[M + i];
+  return extended;
 }
 
 /**
@@ -122,24 +122,24 @@ function decoder(how, formulation, n) {
   const steps = Math.max(1, Math.ceil((2 * (N - 1)) / (n - 1)));
   let state = new Float64Array(2 * (N + 2));
   state[2 * N + 3] = 1;
-  const found = [state];
+  const states = [state];
   const h = 1 / ((n - 1) * steps);
   for (let k = 0; k < (n - 1) * steps; k++) {
     state = step(how, formulation, state, k * h, h);
-    if ((k + 1) % steps === 0) found.push(state);
+    if ((k + 1) % steps === 0) states.push(state);
   }
-  return found.map((one, t) => withAcceleration(how, one, forcing(how, formulation, t / (n - 1))));
+  return states.map((state, t) => withAcceleration(how, state, forcing(how, formulation, t / (n - 1))));
 }
 
-const kept = new Map();
+const decoders = new Map();
 
-function keptDecoder(how, formulation, n) {
+function cachedDecoder(how, formulation, n) {
   const key = JSON.stringify([how, formulation, n]);
-  if (!kept.has(key)) {
-    if (kept.size > 20) kept.clear();
-    kept.set(key, decoder(how, formulation, n));
+  if (!decoders.has(key)) {
+    if (decoders.size > 20) decoders.clear();
+    decoders.set(key, decoder(how, formulation, n));
   }
-  return kept.get(key);
+  return decoders.get(key);
 }
 
 /**
@@ -162,19 +162,21 @@ export function primitiveOf({ header, arrays }, c, formulation) {
 }
 
 /** The same path in another formulation: what its goal adds is another, and the weights make up for it. */
-export function inFormulation({ header, arrays }, one, formulation) {
-  if (formulation === one.formulation) return one;
+export function inFormulation({ header, arrays }, primitive, formulation) {
+  if (formulation === primitive.formulation) return primitive;
   const how = header.movements;
-  if (!how.encodes) throw new Error(`expected ${one.formulation}, in which these primitives were fitted`);
-  const [old, now] = [one.formulation, formulation].map((name) => keptDecoder(how, name, how.n_points));
+  if (!how.encodes) throw new Error(`expected ${primitive.formulation}, in which these primitives were fitted`);
+  const [old, now] = [primitive.formulation, formulation].map((name) => cachedDecoder(how, name, how.n_points));
   const apart = old.map((state, t) => state[how.n_basis] - now[t][how.n_basis]);
   const [more, faster] = fitted(arrays, how, apart);
-  const weights = Float64Array.from(one.weights, (weight, i) => {
+  const weights = Float64Array.from(primitive.weights, (weight, i) => {
     const k = Math.floor(i / how.n_basis);
-    return weight + (one.goal[k] - one.start[k]) * more[i % how.n_basis];
+    return weight + (primitive.goal[k] - primitive.start[k]) * more[i % how.n_basis];
   });
-  const velocity = one.velocity.map((v, k) => v + ((one.goal[k] - one.start[k]) * faster) / one.duration);
-  return { ...one, weights, velocity, formulation };
+  const velocity = primitive.velocity.map(
+    (v, k) => v + ((primitive.goal[k] - primitive.start[k]) * faster) / primitive.duration,
+  );
+  return { ...primitive, weights, velocity, formulation };
 }
 
 /**
@@ -189,16 +191,16 @@ function fitted(arrays, { n_basis: N, n_points: n }, y) {
 /**
  * Learn a movement; see `kineme.DMP.learn`.
  * @param {import("./arrays.js").Snapshot} snapshot
- * @param {import("./preparation.js").Movement} one
+ * @param {import("./preparation.js").Movement} movement
  * @returns {Primitive}
  */
-export function encode({ header, arrays }, one) {
+export function encode({ header, arrays }, movement) {
   const how = header.movements;
   if (!how.encodes) throw new Error("expected a library whose primitives are fitted to the path as it was recorded");
-  const { d, times, positions } = one;
+  const { d, times, positions } = movement;
   const n = how.n_points;
-  const rows = splinePath(one, n);
-  const pull = keptDecoder(how, how.formulation, n).map((state) => state[how.n_basis]);
+  const rows = splinePath(movement, n);
+  const pull = cachedDecoder(how, how.formulation, n).map((state) => state[how.n_basis]);
   const at = (t) => Array.from({ length: d }, (_, k) => positions[t * d + k]);
   const [start, goal] = [at(0), at(times.length - 1)];
   const duration = times[times.length - 1] - times[0];
@@ -207,7 +209,7 @@ export function encode({ header, arrays }, one) {
     const [own, v0] = fitted(
       arrays,
       how,
-      pull.map((one, t) => rows[k * n + t] - one * rows[k * n + n - 1]),
+      pull.map((gain, t) => rows[k * n + t] - gain * rows[k * n + n - 1]),
     );
     weights.set(own, k * how.n_basis);
     return v0 / duration;
@@ -234,27 +236,27 @@ export function encode({ header, arrays }, one) {
 /**
  * The movement to a new start and goal; see `kineme.dmp.Primitives.rollout`.
  * @param {import("./arrays.js").Snapshot} snapshot
- * @param {Primitive} one
- * @param {Wish} [asked]
+ * @param {Primitive} primitive
+ * @param {Wish} [wish]
  * @returns {{times: Float64Array, positions: number[][], velocities: number[][], accelerations: number[][]}}
  */
-export function rollout({ header, arrays }, one, asked = {}) {
+export function rollout({ header, arrays }, primitive, wish = {}) {
   const how = header.movements;
   const N = how.n_basis;
   const {
-    start = one.start,
-    goal = one.goal,
-    duration = one.duration,
+    start = primitive.start,
+    goal = primitive.goal,
+    duration = primitive.duration,
     via = [],
     endVelocity,
     samples = how.n_points,
-  } = asked;
+  } = wish;
   const amplitude = goal.map((g, k) => g - start[k]);
-  const learned = one.goal.map((g, k) => g - one.start[k]);
-  const ratio = FORMULATIONS[one.formulation].ratio(amplitude, learned, one.extents);
+  const learned = primitive.goal.map((g, k) => g - primitive.start[k]);
+  const ratio = FORMULATIONS[primitive.formulation].ratio(amplitude, learned, primitive.extents);
   const numbers = start.map((_, k) => {
-    const own = Array.from({ length: N }, (_, i) => one.weights[k * N + i] * ratio[k]);
-    return Float64Array.from([...own, amplitude[k], one.velocity[k] * one.duration]);
+    const own = Array.from({ length: N }, (_, i) => primitive.weights[k * N + i] * ratio[k]);
+    return Float64Array.from([...own, amplitude[k], primitive.velocity[k] * primitive.duration]);
   });
   const row = (state, order) =>
     numbers.map((own) => product(own, 0, state, order * (N + 2), N + 2) / duration ** order);
@@ -262,9 +264,9 @@ export function rollout({ header, arrays }, one, asked = {}) {
   if (via.length || endVelocity) {
     const faster = (end) =>
       endVelocity ? row(end, 1).map((v, k) => (endVelocity[k] - v) * duration) : goal.map(() => 0);
-    passThrough(how, arrays.smooth, one.formulation, via, goal, numbers, map, faster);
+    passThrough(how, arrays.smooth, primitive.formulation, via, goal, numbers, map, faster);
   }
-  const states = keptDecoder(how, one.formulation, samples);
+  const states = cachedDecoder(how, primitive.formulation, samples);
   const [velocities, accelerations] = [1, 2].map((order) => states.map((state) => row(state, order)));
   return { times: linspace(0, duration, samples), positions: states.map(map), velocities, accelerations };
 }
@@ -274,7 +276,7 @@ export function rollout({ header, arrays }, one, asked = {}) {
  * much faster it shall be there `faster` says.
  */
 function passThrough(how, smooth, formulation, via, goal, numbers, map, faster) {
-  const grid = keptDecoder(how, formulation, Math.max(how.n_points, 2 * how.n_basis));
+  const grid = cachedDecoder(how, formulation, Math.max(how.n_points, 2 * how.n_basis));
   const intervals = grid.length - 1;
   const states = [...via.map(([u]) => u), 1].map((u) => {
     if (!(u > 0 && u <= 1)) throw new Error(`expected via points at shares of the duration from 0 to 1, got ${u}`);
@@ -282,8 +284,8 @@ function passThrough(how, smooth, formulation, via, goal, numbers, map, faster) 
     const h = u - before / intervals;
     return h > 0 ? step(how, formulation, grid[before], before / intervals, h) : grid[before];
   });
-  const asked = [...via.map(([, point]) => point), goal];
-  const missing = states.map((state, j) => map(state).map((x, k) => asked[j][k] - x));
+  const targets = [...via.map(([, point]) => point), goal];
+  const missing = states.map((state, j) => map(state).map((x, k) => targets[j][k] - x));
   missing.push(faster(states.at(-1)));
   const gain = gains(smooth, [...states, states.at(-1).subarray(how.n_basis + 2)], how.n_basis);
   for (const [k, own] of numbers.entries())
@@ -293,7 +295,7 @@ function passThrough(how, smooth, formulation, via, goal, numbers, map, faster) 
 /** Rows by which what is missing changes the weights: F' Q R'^-1 with F A' = Q R, see kineme.dmp.discrete.operators. */
 function gains(smooth, states, N) {
   const Q = states.map((state) => Float64Array.from({ length: N }, (_, i) => product(smooth, i * N, state, 0, N)));
-  const found = [];
+  const rows = [];
   const R = Q.map(() => new Float64Array(Q.length));
   Q.forEach((column, j) => {
     const length = Math.sqrt(product(column, 0, column, 0, N));
@@ -312,10 +314,10 @@ function gains(smooth, states, N) {
     const own = Float64Array.from({ length: N }, (_, k) => {
       let sum = 0;
       for (let i = 0; i < N; i++) sum += Q[j][i] * smooth[i * N + k];
-      for (let i = j + 1; i < Q.length; i++) sum -= R[j][i] * found[i][k];
+      for (let i = j + 1; i < Q.length; i++) sum -= R[j][i] * rows[i][k];
       return sum / R[j][j];
     });
-    found[j] = own;
+    rows[j] = own;
   }
-  return found;
+  return rows;
 }

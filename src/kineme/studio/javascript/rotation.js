@@ -160,10 +160,10 @@ export function bestRotation(rule, a, b) {
   for (let k = 0; k < 3; k++) {
     for (let h = 0; h < 3; h++) for (let t = 0; t < n; t++) G[3 * k + h] += a[k * n + t] * b[h * n + t];
   }
-  const largest = G.reduce((most, one) => Math.max(most, Math.abs(one)), 0) || 1;
+  const largest = G.reduce((most, value) => Math.max(most, Math.abs(value)), 0) || 1;
   for (let k = 0; k < 9; k++) M[k] = G[k] /= largest;
   solve(null); // for its cofactors: |adj G| is about the product of the two largest singular values
-  const [square, adjoint] = [G, A].map((one) => one.reduce((sum, x) => sum + x * x, 0));
+  const [square, adjoint] = [G, A].map((matrix) => matrix.reduce((sum, x) => sum + x * x, 0));
   const tie = adjoint <= (STRAIGHT * square) ** 2 ? STRAIGHT_TIE : LEAST_TIE;
   for (let k = 0; k < 9; k += 4) G[k] += tie / 4;
   largestTrace(G, R);

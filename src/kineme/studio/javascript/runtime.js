@@ -15,9 +15,9 @@ export function open(text) {
   const snapshot = unpack(text);
   const { header } = snapshot;
   const d = header.comparison.n_dims;
-  let known = null;
+  let recognizer = null;
   let begun = null;
-  const all = () => (known ??= knownClasses(snapshot));
+  const all = () => (recognizer ??= knownClasses(snapshot));
   const beginnings = () => (begun ??= hypotheses(all()));
   const learn = (times, positions) => encode(snapshot, movement(times, positions, d));
   return {
@@ -36,6 +36,6 @@ export function open(text) {
         ? primitiveOf(snapshot, header.classes.indexOf(what), formulation)
         : inFormulation(snapshot, what, formulation ?? what.formulation),
     /** The movement of a primitive to a new start and goal, through via points. */
-    rollout: (primitive, asked) => rollout(snapshot, primitive, asked),
+    rollout: (primitive, wish) => rollout(snapshot, primitive, wish),
   };
 }

@@ -29,7 +29,7 @@ const state = {
   played: null,
   note: "",
 };
-const known = createKnown(runtime, prototypes, choose);
+const symbols = createKnown(runtime, prototypes, choose);
 let [follow, frame] = [null, 0];
 
 /** What is in view: a typical movement fills it. */
@@ -38,8 +38,8 @@ function viewed() {
   if (!runtime.header.comparison.translation) return boxOf(prototypes.flat());
   const middle = (values) => values.sort((a, b) => a - b)[Math.floor(0.8 * (values.length - 1))];
   return {
-    center: boxes[0].center.map((_, k) => middle(boxes.map((one) => one.center[k]))),
-    half: middle(boxes.map((one) => one.half)),
+    center: boxes[0].center.map((_, k) => middle(boxes.map((bounds) => bounds.center[k]))),
+    half: middle(boxes.map((bounds) => bounds.half)),
   };
 }
 
@@ -160,7 +160,7 @@ function clear() {
     pointer: null,
     held: null,
   });
-  known.select(null);
+  symbols.select(null);
   bars([]);
   showAnswer();
   later();
@@ -180,7 +180,7 @@ function show(name, what, place) {
 function choose(name) {
   clear();
   show(name, name, placed(runtime, runtime.primitive(name), box));
-  known.select(name);
+  symbols.select(name);
   showAnswer();
   later();
   // In a narrow window what was chosen is above the list of what can be chosen.
@@ -197,7 +197,7 @@ function finish() {
     const place = { start: positions[0], goal: positions.at(-1) };
     if (runtime.header.movements.encodes) show(DRAWN, runtime.encode(times, positions), place);
     else if (state.answer.label !== null) show(state.answer.label, state.answer.label, place);
-    known.select(state.answer.label);
+    symbols.select(state.answer.label);
   } catch {
     state.note = "That was too short: draw a longer movement.";
     bars([]);
@@ -220,7 +220,7 @@ function down(event) {
   state.played = null;
   state.held = state.moving?.held(stage, placeOf(event)) ?? null;
   if (state.held) return;
-  known.select(null);
+  symbols.select(null);
   Object.assign(state, {
     stroke: { times: [], positions: [] },
     answer: null,
@@ -279,7 +279,7 @@ function key(event) {
     const part = event.shiftKey ? "start" : "goal";
     const step = STEP * byId("stage").clientHeight;
     const at = stage.project(state.moving[part]);
-    const [x, y] = ARROWS[event.key].map((one, k) => at[k] + one * step);
+    const [x, y] = ARROWS[event.key].map((direction, k) => at[k] + direction * step);
     state.note = state.moving.update({ [part]: stage.unproject(x, y, state.moving[part]) }) ?? "";
     showAnswer();
     later();
@@ -348,19 +348,19 @@ function start() {
   for (const id of ["turn", "tilt"])
     byId(id).addEventListener("input", () => {
       stage.turned(turned());
-      known.paint(turned());
+      symbols.paint(turned());
       later();
     });
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
-    known.paint(turned());
+    symbols.paint(turned());
     later();
   });
   new ResizeObserver(() => {
-    known.paint(turned());
+    symbols.paint(turned());
     later();
   }).observe(canvas);
   clear();
-  known.paint(turned());
+  symbols.paint(turned());
   // What is drawn first should not wait for what is made once.
   window.requestIdleCallback?.(() => runtime.follow()([0, 1, 2, 3], prototypes[0].slice(0, 4)));
 }

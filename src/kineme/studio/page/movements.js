@@ -30,13 +30,13 @@ export function placed(runtime, primitive, box) {
 export function createMoving(runtime, name, what, place) {
   let { start, goal } = place;
   let [via, formulation] = [[], runtime.header.movements.formulation];
-  let made = null;
+  let rollout = null;
 
   function update(change) {
     const before = { start, goal, via, formulation };
     ({ start = start, goal = goal, via = via, formulation = formulation } = change);
     try {
-      made = runtime.rollout(runtime.primitive(what, formulation), { start, goal, via });
+      rollout = runtime.rollout(runtime.primitive(what, formulation), { start, goal, via });
       return null;
     } catch (error) {
       // as a closed movement that cannot be scaled, or via points too close together
@@ -55,19 +55,19 @@ export function createMoving(runtime, name, what, place) {
     ].filter(([, x]) => distance(stage.project(x), at) < NEAR);
     if (ends.length)
       return { what: ends.sort((a, b) => distance(stage.project(a[1]), at) - distance(stage.project(b[1]), at))[0][0] };
-    const known = via.findIndex(([, x]) => distance(stage.project(x), at) < NEAR);
-    if (known >= 0) return { what: "via", time: via[known][0] };
-    const away = made.positions.map((x) => distance(stage.project(x), at));
+    const point = via.findIndex(([, x]) => distance(stage.project(x), at) < NEAR);
+    if (point >= 0) return { what: "via", time: via[point][0] };
+    const away = rollout.positions.map((x) => distance(stage.project(x), at));
     const nearest = away.indexOf(Math.min(...away));
     const time = nearest / (away.length - 1);
-    const free = time > ENDS && time < 1 - ENDS && via.every(([one]) => Math.abs(one - time) > APART);
+    const free = time > ENDS && time < 1 - ENDS && via.every(([other]) => Math.abs(other - time) > APART);
     return away[nearest] < NEAR_PATH && free && via.length < MOST_VIA ? { what: "via", time } : null;
   }
 
   /** Move what is held to a place; an error in words, or null. */
   function drag({ what: part, time }, x) {
     if (part !== "via") return update({ [part]: x });
-    const others = via.filter(([one]) => one !== time);
+    const others = via.filter(([other]) => other !== time);
     return update({ via: [...others, [time, x]].sort((a, b) => a[0] - b[0]) });
   }
 
@@ -86,10 +86,10 @@ export function createMoving(runtime, name, what, place) {
       return via;
     },
     get positions() {
-      return made.positions;
+      return rollout.positions;
     },
     get times() {
-      return made.times;
+      return rollout.times;
     },
   };
 }

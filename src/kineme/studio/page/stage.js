@@ -12,7 +12,7 @@ function viewOf(first, angles) {
   if (first.length === 4) return first;
   const [a, b] = angles.map((angle) => (angle * Math.PI) / 180);
   const [right, up, near] = [0, 1, 2].map((k) => first.slice(3 * k, 3 * k + 3));
-  const mix = (u, x, v, y) => u.map((one, k) => x * one + y * v[k]);
+  const mix = (u, x, v, y) => u.map((value, k) => x * value + y * v[k]);
   const behind = mix(near, Math.cos(a), right, -Math.sin(a));
   return [
     ...mix(right, Math.cos(a), near, Math.sin(a)),
@@ -110,8 +110,8 @@ export function createStage(canvas, view, box) {
 /** A place in the middle of what points cover, and half of how far they reach. */
 export function boxOf(points) {
   const [low, high] = [Math.min, Math.max].map((most) =>
-    points[0].map((_, k) => points.reduce((one, x) => most(one, x[k]), points[0][k])),
+    points[0].map((_, k) => points.reduce((extreme, x) => most(extreme, x[k]), points[0][k])),
   );
-  const center = low.map((one, k) => (one + high[k]) / 2);
-  return { center, half: Math.max(...high.map((one, k) => one - center[k])) || 1 };
+  const center = low.map((value, k) => (value + high[k]) / 2);
+  return { center, half: Math.max(...high.map((value, k) => value - center[k])) || 1 };
 }

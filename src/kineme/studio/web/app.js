@@ -24,15 +24,15 @@ const lastPart = (folder) =>
     .split(/[/\\]/)
     .pop() || folder;
 
-onLibrary((known) => {
-  byId("library-name").textContent = lastPart(known.folder);
-  byId("library-name").title = known.folder;
+onLibrary((contents) => {
+  byId("library-name").textContent = lastPart(contents.folder);
+  byId("library-name").title = contents.folder;
   byId("library-count").textContent =
-    `${counted(known.symbols.length, "symbol")}, ${counted(known.n_movements, "movement")}`;
-  byId("library-mode").hidden = !known.read_only;
-  byId("undo").disabled = !known.can_undo || known.read_only;
-  document.body.classList.toggle("read-only", known.read_only);
-  fill(byId("names"), ...known.symbols.map((/** @type {any} */ one) => make("option", { value: one.name })));
+    `${counted(contents.symbols.length, "symbol")}, ${counted(contents.n_movements, "movement")}`;
+  byId("library-mode").hidden = !contents.read_only;
+  byId("undo").disabled = !contents.can_undo || contents.read_only;
+  document.body.classList.toggle("read-only", contents.read_only);
+  fill(byId("names"), ...contents.symbols.map((/** @type {any} */ symbol) => make("option", { value: symbol.name })));
 });
 
 /** @param {boolean} here */

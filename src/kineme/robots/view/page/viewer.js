@@ -252,9 +252,9 @@
   }
 
   function mark(T, geometry, point, color) {
-    const made = new T.Mesh(geometry, new T.MeshBasicMaterial({ color }));
-    made.position.set(...point);
-    return made;
+    const mesh = new T.Mesh(geometry, new T.MeshBasicMaterial({ color }));
+    mesh.position.set(...point);
+    return mesh;
   }
 
   /** A tube along points, drawn over those of a lower order; `show` draws the part of it up to one of the points. */
@@ -286,13 +286,13 @@
     const geometry = new T.BufferGeometry();
     geometry.setAttribute("position", new T.Float32BufferAttribute(corners, 3));
     geometry.setIndex(faces);
-    const made = new T.Mesh(
+    const mesh = new T.Mesh(
       geometry,
       new T.MeshBasicMaterial({ color, opacity, transparent: true, depthWrite: opacity === 1 }),
     );
-    made.renderOrder = order;
-    made.show = (sample) => geometry.setDrawRange(0, 6 * sides * sample);
-    made.frustumCulled = false;
-    return made;
+    mesh.renderOrder = order;
+    mesh.show = (sample) => geometry.setDrawRange(0, 6 * sides * sample);
+    mesh.frustumCulled = false;
+    return mesh;
   }
 })();

@@ -30,7 +30,7 @@ function row(name) {
 export class AnswerPanel {
   constructor() {
     this.rows = [...Array(ROWS)].map(() => row("\u00a0"));
-    fill(byId("ranks"), ...this.rows.map((one) => one.element));
+    fill(byId("ranks"), ...this.rows.map((line) => line.element));
     this.last = "";
     this.idle();
   }
@@ -73,11 +73,11 @@ export class AnswerPanel {
       this.set(row, ranked[k]?.label ?? "\u00a0", ranked[k]?.probability ?? null);
   }
 
-  set(/** @type {any} */ one, /** @type {string} */ name, /** @type {number|null} */ value) {
-    write(one.name, name);
-    write(one.value, value === null ? "" : percent(value));
-    one.bar.style.setProperty("--share", String(value ?? 0));
-    one.element.classList.toggle("nothing", value === null);
+  set(/** @type {any} */ line, /** @type {string} */ name, /** @type {number|null} */ value) {
+    write(line.name, name);
+    write(line.value, value === null ? "" : percent(value));
+    line.bar.style.setProperty("--share", String(value ?? 0));
+    line.element.classList.toggle("nothing", value === null);
   }
 
   /** While it is drawn. @param {any} state @param {number} now Time of the last sample [s]. */
@@ -121,8 +121,8 @@ export class AnswerPanel {
         answer.p_known === null ? "" : `p-value of being known: ${pValue(answer.p_known)}`,
         `p-values of names: ${answer.ranked
           .slice(0, ROWS)
-          .filter((/** @type {any} */ one) => one.p_value !== null)
-          .map((/** @type {any} */ one) => `${one.label} ${pValue(one.p_value)}`)
+          .filter((/** @type {any} */ candidate) => candidate.p_value !== null)
+          .map((/** @type {any} */ candidate) => `${candidate.label} ${pValue(candidate.p_value)}`)
           .join(", ")}`,
         nearest ? `similarity to the nearest: ${nearest.similarity.toFixed(2)}` : "",
         answer.promise,

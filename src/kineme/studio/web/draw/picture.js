@@ -43,8 +43,8 @@ export class Picture {
 
   paint() {
     const { context } = this.board;
-    const ink = this.ink.map((one) => this.pixel(one.slice(1)));
-    const rest = this.rest.map((one) => this.pixel(one));
+    const ink = this.ink.map((sample) => this.pixel(sample.slice(1)));
+    const rest = this.rest.map((point) => this.pixel(point));
     if (this.turns) ground(context, this.frame.camera, this.frame.low, this.frame.high, color("--line"));
     if (rest.length && ink.length)
       line(context, [ink[ink.length - 1], ...rest], { color: color("--predicted"), width: 3, dash: [2, 9] });

@@ -14,8 +14,8 @@ const side = (path) =>
 /** @returns {number|null} Larger side of a movement of the library, a usual one. */
 export function usualSide() {
   const sides = library()
-    .symbols.filter((/** @type {any} */ one) => one.path?.length)
-    .map((/** @type {any} */ one) => side(one.path))
+    .symbols.filter((/** @type {any} */ symbol) => symbol.path?.length)
+    .map((/** @type {any} */ symbol) => side(symbol.path))
     .filter((/** @type {number} */ size) => size > 0);
   return sides.sort((/** @type {number} */ a, /** @type {number} */ b) => a - b)[sides.length >> 1] ?? null;
 }

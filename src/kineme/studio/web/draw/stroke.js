@@ -24,7 +24,7 @@ export function followPointer(canvas, hear) {
   /** @param {PointerEvent} event @returns {Sample[]} */
   const samplesOf = (event) => {
     const events = event.getCoalescedEvents?.() ?? [];
-    return (events.length ? events : [event]).map((one) => sampleOf(one)).filter(later);
+    return (events.length ? events : [event]).map((part) => sampleOf(part)).filter(later);
   };
   /** @param {PointerEvent} event @returns {Sample} */
   const sampleOf = (event) => [

@@ -1,6 +1,6 @@
 // The symbols as cards: a picture, a name, how many movements; a box to choose several.
 import { breakable, byId, counted, fill, keepingFocus, make } from "../parts/elements.js";
-import { found } from "../parts/find.js";
+import { matching } from "../parts/find.js";
 import { library } from "../parts/library_state.js";
 import { thumbnail } from "../parts/thumbnails.js";
 
@@ -40,9 +40,9 @@ function card(symbol, page) {
 /** @param {{open: (id: string) => void, opened: string|null, chose: () => void}} page */
 export function showCards(page) {
   const { symbols } = library();
-  for (const id of chosen) if (!symbols.some((/** @type {any} */ one) => one.id === id)) chosen.delete(id);
-  const shown = found(byId("find-symbol"), symbols);
+  for (const id of chosen) if (!symbols.some((/** @type {any} */ symbol) => symbol.id === id)) chosen.delete(id);
+  const shown = matching(byId("find-symbol"), symbols);
   byId("none-found").textContent =
     symbols.length && !shown.length ? "No symbol has these words in its name or description." : "";
-  keepingFocus(() => fill(byId("cards"), ...shown.map((/** @type {any} */ one) => card(one, page))));
+  keepingFocus(() => fill(byId("cards"), ...shown.map((/** @type {any} */ symbol) => card(symbol, page))));
 }

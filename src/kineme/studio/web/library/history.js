@@ -6,31 +6,31 @@ import { byId, fill, keepingFocus, make } from "../parts/elements.js";
 import { library } from "../parts/library_state.js";
 import { tried } from "../parts/toasts.js";
 
-/** @param {any} one A version. @param {number} seen */
-async function again(one, seen) {
+/** @param {any} entry A version. @param {number} seen */
+async function again(entry, seen) {
   const text =
-    `${one.said}. The library will be as it was then. Nothing is lost: later versions stay in the history, ` +
+    `${entry.said}. The library will be as it was then. Nothing is lost: later versions stay in the history, ` +
     "and this can be undone.";
-  if (await ask({ title: `Restore version ${one.number}?`, text, yes: "Restore" })) await restore(one.number, seen);
+  if (await ask({ title: `Restore version ${entry.number}?`, text, yes: "Restore" })) await restore(entry.number, seen);
 }
 
-/** @param {any} one @param {number} seen */
-const row = (one, seen) =>
+/** @param {any} entry @param {number} seen */
+const row = (entry, seen) =>
   make(
     "li",
     {},
-    make("span", { class: "numbers soft" }, `${one.number}`),
-    make("span", { class: "said" }, one.said),
-    make("time", { class: "soft small" }, String(one.time).replace("T", " ").slice(0, 19)),
-    one.can_restore
+    make("span", { class: "numbers soft" }, `${entry.number}`),
+    make("span", { class: "said" }, entry.said),
+    make("time", { class: "soft small" }, String(entry.time).replace("T", " ").slice(0, 19)),
+    entry.can_restore
       ? make(
           "button",
           {
             class: "button quiet",
             type: "button",
-            "data-key": `restore ${one.number}`,
-            "aria-label": `Restore version ${one.number}`,
-            on: { click: () => again(one, seen) },
+            "data-key": `restore ${entry.number}`,
+            "aria-label": `Restore version ${entry.number}`,
+            on: { click: () => again(entry, seen) },
           },
           "Restore",
         )
@@ -42,5 +42,5 @@ export async function showHistory() {
   const { version } = library();
   const answer = await tried(() => get("/api/library/history"));
   if (!answer || version !== library().version) return;
-  keepingFocus(() => fill(byId("versions"), ...answer.versions.map((/** @type {any} */ one) => row(one, version))));
+  keepingFocus(() => fill(byId("versions"), ...answer.versions.map((/** @type {any} */ entry) => row(entry, version))));
 }

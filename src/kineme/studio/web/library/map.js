@@ -108,8 +108,8 @@ export class MovementMap {
   /** Above, below or beside the dots of a name, where nothing else stands; null where there is no room. */
   freePlace(/** @type {number[][]} */ members, /** @type {number} */ half, /** @type {number[][]} */ taken) {
     const { width, height } = this.board;
-    const [across, along] = [members.map((one) => one[0]), members.map((one) => one[1])];
-    const middle = (/** @type {number[]} */ some) => some.reduce((sum, one) => sum + one, 0) / some.length;
+    const [across, along] = [members.map((pixel) => pixel[0]), members.map((pixel) => pixel[1])];
+    const middle = (/** @type {number[]} */ some) => some.reduce((sum, value) => sum + value, 0) / some.length;
     const x = Math.min(Math.max(middle(across), half), width - half);
     const places = [
       [x, Math.max(Math.min(...along) - 11, 14)],

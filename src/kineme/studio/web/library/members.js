@@ -63,7 +63,9 @@ export class Members {
     this.loading = false;
     if (!answer) return;
     if (this.shown === 0) fill(this.grid);
-    this.grid.append(...answer.movements.map((/** @type {any} */ one) => memberButton(one, this.chosen, this.changed)));
+    this.grid.append(
+      ...answer.movements.map((/** @type {any} */ movement) => memberButton(movement, this.chosen, this.changed)),
+    );
     this.shown += answer.movements.length;
     this.more.hidden = this.shown >= answer.total;
     this.more.textContent = `Show more of ${counted(answer.total, "movement")}`;

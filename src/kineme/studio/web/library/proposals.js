@@ -15,7 +15,7 @@ async function unlabeled() {
   while (all.size < Math.min(library().unlabeled, FETCHED)) {
     const { movements } = await get(`/api/library/movements?unlabeled=1&offset=${all.size}&limit=60`);
     if (!movements.length) break;
-    for (const one of movements) all.set(one.id, one);
+    for (const movement of movements) all.set(movement.id, movement);
   }
   return all;
 }
@@ -87,5 +87,7 @@ export async function showProposals() {
   if (!answer || !movements || version !== library().version) return;
   const { proposals } = answer;
   byId("proposals-text").textContent = `${counted(count, "movement")} without a name. ${groups(proposals.length)}`;
-  keepingFocus(() => fill(byId("proposal-cards"), ...proposals.map((/** @type {any} */ one) => card(one, movements))));
+  keepingFocus(() =>
+    fill(byId("proposal-cards"), ...proposals.map((/** @type {any} */ proposal) => card(proposal, movements))),
+  );
 }

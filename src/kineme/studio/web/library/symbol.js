@@ -76,14 +76,14 @@ function actions(symbol, members) {
     )
       await changes.deleteMovements(ids());
   };
-  const made = symbol
+  const buttons = symbol
     ? [
         button("Split off", split),
         button("Give another name", give),
         button("Remove the name", () => changes.assign(ids(), null)),
       ]
     : [button("Give a name", give, "main")];
-  return [...made, button("Delete", drop, "danger")];
+  return [...buttons, button("Delete", drop, "danger")];
 }
 
 /**
@@ -133,11 +133,11 @@ export class SymbolPanel {
     const hint = `Choose some to ${symbol ? "split, rename" : "name"} or delete.`;
     const count = make("p", { class: "soft small", role: "status" }, hint);
     const members = new Members(symbol ? `symbol=${encodeURIComponent(symbol.id)}` : "unlabeled=1", () => {
-      for (const one of acts) one.disabled = !members.ids().length;
+      for (const act of acts) act.disabled = !members.ids().length;
       count.textContent = members.ids().length ? `${counted(members.ids().length, "movement")} chosen` : hint;
     });
     const acts = library().read_only ? [] : actions(symbol, members);
-    for (const one of acts) one.disabled = true;
+    for (const act of acts) act.disabled = true;
     const bar = make("div", { class: "row", role: "group", "aria-label": "Chosen movements" }, ...acts);
     const close = make(
       "button",

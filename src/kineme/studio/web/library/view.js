@@ -42,8 +42,8 @@ export function startLibrary() {
   const cards = () => showCards({ open, opened: panel.opened, chose });
   /** @param {string|null} id The one that is open. */
   function marked(id) {
-    for (const one of document.querySelectorAll(".card-open"))
-      one.setAttribute("aria-current", String(/** @type {any} */ (one).dataset.key === `open ${id}`));
+    for (const card of document.querySelectorAll(".card-open"))
+      card.setAttribute("aria-current", String(/** @type {any} */ (card).dataset.key === `open ${id}`));
   }
   function open(/** @type {string} */ id) {
     panel.open(id, true);

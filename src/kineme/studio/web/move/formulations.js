@@ -19,19 +19,19 @@ export const FORMULATIONS = [
 
 /** @param {(name: string, on: boolean) => void} changed */
 export function showFormulations(changed) {
-  for (const one of FORMULATIONS) {
+  for (const formulation of FORMULATIONS) {
     const box = make("input", {
       type: "checkbox",
-      checked: one === FORMULATIONS[0],
-      on: { change: () => changed(one.name, box.checked) },
+      checked: formulation === FORMULATIONS[0],
+      on: { change: () => changed(formulation.name, box.checked) },
     });
     byId("formulations").append(
       make(
         "label",
         { class: "check" },
         box,
-        make("span", { class: `key ${one.key}` }),
-        make("span", {}, one.name, make("span", { class: "soft small says" }, one.says)),
+        make("span", { class: `key ${formulation.key}` }),
+        make("span", {}, formulation.name, make("span", { class: "soft small says" }, formulation.says)),
       ),
     );
   }

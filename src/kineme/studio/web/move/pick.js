@@ -1,6 +1,6 @@
 // What moves: the symbols as pictures in a row, one chosen.
 import { breakable, byId, fill, keepingFocus, make } from "../parts/elements.js";
-import { found } from "../parts/find.js";
+import { matching } from "../parts/find.js";
 import { library } from "../parts/library_state.js";
 import { thumbnail } from "../parts/thumbnails.js";
 
@@ -27,9 +27,9 @@ export function showPick(chosen, choose) {
       ),
     );
   };
-  const symbols = found(
+  const symbols = matching(
     byId("find-pick"),
-    library().symbols.filter((/** @type {any} */ one) => one.path),
+    library().symbols.filter((/** @type {any} */ symbol) => symbol.path),
   );
   keepingFocus(() => fill(byId("move-pick"), ...symbols.map(option)));
   const at = byId("move-pick").querySelector(":checked")?.closest("label");

@@ -33,8 +33,8 @@ export class MovePicture {
     const own = [
       start,
       goal,
-      ...via.map((/** @type {any} */ one) => one.point),
-      ...obstacles.map((/** @type {any} */ one) => one.center),
+      ...via.map((/** @type {any} */ { point }) => point),
+      ...obstacles.map((/** @type {any} */ { center }) => center),
     ];
     const around = [...path, ...own];
     const far = 1.5 * extent(around);

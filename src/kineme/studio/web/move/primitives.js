@@ -5,7 +5,7 @@ import { openPrimitive } from "../runtime/primitive.js";
 const SAMPLES = 201; // as many as the server answers with
 
 /** @type {Map<string, Promise<any>>} */
-const known = new Map();
+const primitives = new Map();
 
 /** @param {any} what @param {string} formulation @returns {Promise<any>} */
 async function ask(what, formulation) {
@@ -21,15 +21,15 @@ async function ask(what, formulation) {
  */
 export function primitiveOf(what, formulation, version) {
   const key = JSON.stringify([what, formulation, version]);
-  if (!known.has(key)) {
-    if (known.size > 60) known.clear();
+  if (!primitives.has(key)) {
+    if (primitives.size > 60) primitives.clear();
     const failed = () => {
-      known.delete(key); // next time it is asked again
+      primitives.delete(key); // next time it is asked again
       return null;
     };
-    known.set(key, ask(what, formulation).catch(failed));
+    primitives.set(key, ask(what, formulation).catch(failed));
   }
-  return /** @type {Promise<any>} */ (known.get(key));
+  return /** @type {Promise<any>} */ (primitives.get(key));
 }
 
 /**

@@ -62,12 +62,12 @@ export class Rollouts {
     if (this.asking) return;
     this.asking = true;
     while (this.wanted) {
-      const [asked, movement] = [this.wanted, this.movement];
+      const [wanted, movement] = [this.wanted, this.movement];
       this.wanted = null;
-      const { path, problem } = await answerTo(asked);
+      const { path, problem } = await answerTo(wanted);
       if (movement !== this.movement) continue;
       this.problem = problem;
-      if (path && (!this.wanted || !this.primitive || asked.obstacles)) this.path = path;
+      if (path && (!this.wanted || !this.primitive || wanted.obstacles)) this.path = path;
       this.changed();
     }
     this.asking = false;

@@ -8,14 +8,14 @@ const shape = ({ start, goal, via, obstacles, share }) => JSON.stringify({ start
 export class Steps {
   constructor() {
     /** @type {string[]} The plan after each change, the first one as it was shown. */
-    this.kept = [];
+    this.plans = [];
   }
 
   /** @param {import("./plan.js").Plan} plan As it is now. */
   keep(plan) {
     const now = shape(plan);
-    if (now !== this.kept[this.kept.length - 1]) this.kept.push(now);
-    if (this.kept.length > KEPT) this.kept.shift();
+    if (now !== this.plans[this.plans.length - 1]) this.plans.push(now);
+    if (this.plans.length > KEPT) this.plans.shift();
   }
 
   /**
@@ -24,9 +24,9 @@ export class Steps {
    * @returns {boolean} Whether there was one.
    */
   back(plan) {
-    if (this.kept.length < 2) return false;
-    this.kept.pop();
-    Object.assign(plan, JSON.parse(this.kept[this.kept.length - 1]));
+    if (this.plans.length < 2) return false;
+    this.plans.pop();
+    Object.assign(plan, JSON.parse(this.plans[this.plans.length - 1]));
     return true;
   }
 }

@@ -73,7 +73,7 @@ export async function showStyles(symbol, changed, current) {
         ),
       ),
     ),
-    ...sliders.map((/** @type {any} */ one) => one.row),
+    ...sliders.map(({ row }) => row),
   );
   byId("styles").hidden = false;
 }

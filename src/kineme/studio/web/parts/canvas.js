@@ -11,7 +11,7 @@ export class Board {
     this.context = canvas.getContext("2d");
     this.width = 0;
     this.height = 0;
-    this.asked = 0;
+    this.frame = 0;
     /** @type {(() => void)|null} After the canvas has another size. */
     this.resized = null;
     boards.add(this);
@@ -34,9 +34,9 @@ export class Board {
 
   /** Paint in the next frame. */
   draw() {
-    if (this.asked) return;
-    this.asked = requestAnimationFrame(() => {
-      this.asked = 0;
+    if (this.frame) return;
+    this.frame = requestAnimationFrame(() => {
+      this.frame = 0;
       this.now();
     });
   }

@@ -24,4 +24,4 @@ export const draggedGoal = (symbol) => (dragged?.symbol === symbol ? dragged.dis
 
 /** @param {any[]} symbols @returns {string|null} The chosen one, or the first where it is gone. */
 export const toMove = (symbols) =>
-  symbols.some((one) => one.id === chosen) ? chosen : (symbols.find((one) => one.path)?.id ?? null);
+  symbols.some((symbol) => symbol.id === chosen) ? chosen : (symbols.find((symbol) => symbol.path)?.id ?? null);

@@ -41,7 +41,7 @@ export function facing(paths) {
     return (1 - ASKEW * askew) * (along(right, right) * along(up, up) - along(right, up) ** 2);
   };
   let [best, largest] = [OBLIQUE, FLATTER * area(OBLIQUE)];
-  for (const above of STEPS.filter((one) => one >= 0)) {
+  for (const above of STEPS.filter((step) => step >= 0)) {
     for (const around of STEPS) {
       const view = { around: STEP * around, above: STEP * above };
       if (area(view) > BETTER * largest) [best, largest] = [view, area(view)];

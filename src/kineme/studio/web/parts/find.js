@@ -17,11 +17,11 @@ export function startFinding(field, changed, first) {
  * @param {any[]} symbols
  * @returns {any[]}
  */
-export function found(field, symbols) {
+export function matching(field, symbols) {
   field.hidden = symbols.length <= MANY;
   if (field.hidden) field.value = "";
   const words = field.value.toLowerCase().split(/\s+/);
-  return symbols.filter((one) =>
-    words.every((word) => `${one.name} ${one.description ?? ""}`.toLowerCase().includes(word)),
+  return symbols.filter((symbol) =>
+    words.every((word) => `${symbol.name} ${symbol.description ?? ""}`.toLowerCase().includes(word)),
   );
 }

@@ -15,7 +15,7 @@ const EMPTY = {
 };
 
 /** @type {any} */
-let known = EMPTY;
+let current = EMPTY;
 let loaded = false;
 /** @type {string|null} */
 let tag = null;
@@ -24,16 +24,16 @@ let loading = null;
 /** @type {Promise<any>|null} */
 let next = null;
 /** @type {((library: any) => void)[]} */
-const told = [];
+const listeners = [];
 
 /** The library as of the last answer. */
-export const library = () => known;
+export const library = () => current;
 
 /** Whether an answer came at all. */
 export const isLoaded = () => loaded;
 
 /** @param {(library: any) => void} act Called after every change. */
-export const onLibrary = (act) => told.push(act);
+export const onLibrary = (act) => listeners.push(act);
 
 /**
  * The library as it is now: an answer that is under way may be older, and is followed by one more.
@@ -57,25 +57,25 @@ export function refresh() {
 
 async function load() {
   const answer = await newer("/api/library", tag);
-  if (!answer) return known;
-  ({ body: known, tag } = answer);
+  if (!answer) return current;
+  ({ body: current, tag } = answer);
   loaded = true;
-  for (const act of told) act(known);
-  return known;
+  for (const act of listeners) act(current);
+  return current;
 }
 
 /** @param {string} id @returns {any} The symbol of that id, or undefined. */
-export const symbolOf = (id) => known.symbols.find((/** @type {any} */ one) => one.id === id);
+export const symbolOf = (id) => current.symbols.find((/** @type {any} */ symbol) => symbol.id === id);
 
 /** @param {string} name @returns {any} */
-export const symbolNamed = (name) => known.symbols.find((/** @type {any} */ one) => one.name === name);
+export const symbolNamed = (name) => current.symbols.find((/** @type {any} */ symbol) => symbol.name === name);
 
 /** Tokens of colors that are told apart, of symbols and of columns. */
 export const COLORS = ["--blue", "--orange", "--green", "--purple", "--sky", "--amber"];
 
 /** The color and the mark of a symbol, by its position in the list. @param {string|null} id */
 export function lookOf(id) {
-  const at = known.symbols.findIndex((/** @type {any} */ one) => one.id === id);
+  const at = current.symbols.findIndex((/** @type {any} */ symbol) => symbol.id === id);
   if (at < 0) return { color: "--gray", mark: "ring" };
   return {
     color: COLORS[at % COLORS.length],

@@ -24,19 +24,19 @@ export class Plot {
   paint() {
     if (!this.curves.length) return;
     const { context, width, height } = this.board;
-    const end = Math.max(...this.curves.map((one) => one.times[one.times.length - 1]), 1e-9);
-    const high = Math.max(...this.curves.flatMap((one) => one.values), 1e-9);
+    const end = Math.max(...this.curves.map((curve) => curve.times[curve.times.length - 1]), 1e-9);
+    const high = Math.max(...this.curves.flatMap((curve) => curve.values), 1e-9);
     const [w, h] = [width - EDGE.left - EDGE.right, height - EDGE.top - EDGE.bottom];
     const at = (/** @type {number} */ t, /** @type {number} */ v) => [
       EDGE.left + (w * t) / end,
       EDGE.top + h * (1 - v / high),
     ];
     line(context, [at(0, 0), at(end, 0)], { color: color("--line"), width: 1 });
-    for (const one of this.curves)
+    for (const curve of this.curves)
       line(
         context,
-        one.times.map((t, k) => at(t - one.times[0], one.values[k])),
-        { color: color(one.look.color), width: 2.2, dash: one.look.dash },
+        curve.times.map((t, k) => at(t - curve.times[0], curve.values[k])),
+        { color: color(curve.look.color), width: 2.2, dash: curve.look.dash },
       );
     if (this.cursor !== null && this.cursor <= end)
       line(context, [at(this.cursor, 0), at(this.cursor, high)], { color: color("--text"), width: 1.5 });

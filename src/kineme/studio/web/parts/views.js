@@ -18,10 +18,10 @@ export const currentView = () => current;
 /** @param {string} view @param {boolean} focus Whether its tab gets the focus. */
 export function show(view, focus = false) {
   if (!VIEWS.includes(view)) return;
-  for (const one of VIEWS) {
-    byId(`view-${one}`).hidden = one !== view;
-    byId(`tab-${one}`).setAttribute("aria-selected", String(one === view));
-    byId(`tab-${one}`).tabIndex = one === view ? 0 : -1;
+  for (const name of VIEWS) {
+    byId(`view-${name}`).hidden = name !== view;
+    byId(`tab-${name}`).setAttribute("aria-selected", String(name === view));
+    byId(`tab-${name}`).tabIndex = name === view ? 0 : -1;
   }
   if (focus) byId(`tab-${view}`).focus();
   if (location.hash !== `#${view}`) history.replaceState(null, "", `#${view}`);

@@ -6,7 +6,7 @@ export const columnCount = (channels) => channels.reduce((sum, channel) => sum +
 
 /** Columns that channels are recognized by; an orientation turns in three ways, whatever its columns. */
 const moving = (/** @type {any[]} */ channels) =>
-  channels.reduce((sum, one) => sum + (one.kind === "orientation" ? 3 : one.columns?.length || 1), 0);
+  channels.reduce((sum, channel) => sum + (channel.kind === "orientation" ? 3 : channel.columns?.length || 1), 0);
 
 /**
  * Names of the channels that are chosen at first.
@@ -14,13 +14,14 @@ const moving = (/** @type {any[]} */ channels) =>
  * @param {any} library
  * @returns {Set<string>}
  */
-export function fitting(channels, { n_dims: wanted, channels: known, symbols }) {
-  const names = (/** @type {any[]} */ some) => new Set(some.map((one) => one.name));
+export function fitting(channels, { n_dims: wanted, channels: ours, symbols }) {
+  const names = (/** @type {any[]} */ some) => new Set(some.map((channel) => channel.name));
   if (!symbols.length || moving(channels) === wanted) return names(channels);
-  const alike = channels.filter((one) => known?.some((/** @type {any} */ other) => other.name === one.name));
+  const alike = channels.filter((channel) => ours?.some((/** @type {any} */ other) => other.name === channel.name));
   if (moving(alike) === wanted) return names(alike);
   const first = [];
-  for (const one of channels) if (one.kind === "position" && moving([...first, one]) <= wanted) first.push(one);
+  for (const channel of channels)
+    if (channel.kind === "position" && moving([...first, channel]) <= wanted) first.push(channel);
   return moving(first) === wanted ? names(first) : names(channels);
 }
 

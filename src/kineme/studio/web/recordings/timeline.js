@@ -31,8 +31,8 @@ export class Timeline {
   /** @param {any} plot */
   show(plot) {
     this.plot = plot;
-    this.whole = [plot.times[0] ?? 0, plot.times[plot.times.length - 1] ?? 1];
-    this.range = [...this.whole];
+    this.extent = [plot.times[0] ?? 0, plot.times[plot.times.length - 1] ?? 1];
+    this.range = [...this.extent];
     this.chosen = -1;
     this.board.fit();
     this.board.draw();
@@ -142,8 +142,8 @@ export class Timeline {
     const least = 0.02;
     span[which] =
       which === "begin"
-        ? Math.min(Math.max(time, this.whole[0]), span.end - least)
-        : Math.max(Math.min(time, this.whole[1]), span.begin + least);
+        ? Math.min(Math.max(time, this.extent[0]), span.end - least)
+        : Math.max(Math.min(time, this.extent[1]), span.begin + least);
     this.board.now();
   }
 
@@ -156,8 +156,8 @@ export class Timeline {
       const values = {
         "aria-label": `${which === "begin" ? "Begin" : "End"} of ${span.label ?? "unknown"}`,
         "aria-valuenow": span[which].toFixed(2),
-        "aria-valuemin": this.whole[0].toFixed(2),
-        "aria-valuemax": this.whole[1].toFixed(2),
+        "aria-valuemin": this.extent[0].toFixed(2),
+        "aria-valuemax": this.extent[1].toFixed(2),
         "aria-valuetext": `${span[which].toFixed(2)} seconds`,
       };
       for (const [name, value] of Object.entries(values)) button.setAttribute(name, value);
@@ -178,13 +178,13 @@ export class Timeline {
 
   pan(/** @type {number} */ by) {
     const length = this.range[1] - this.range[0];
-    const from = Math.min(Math.max(this.range[0] + by, this.whole[0]), this.whole[1] - length);
+    const from = Math.min(Math.max(this.range[0] + by, this.extent[0]), this.extent[1] - length);
     this.range = [from, from + length];
     this.board.draw();
   }
 
   zoom(/** @type {number} */ factor, around = (this.range[0] + this.range[1]) / 2) {
-    const [low, high] = this.whole;
+    const [low, high] = this.extent;
     const length = Math.min(Math.max((this.range[1] - this.range[0]) * factor, (high - low) / 2000), high - low);
     const share = (around - this.range[0]) / (this.range[1] - this.range[0]);
     const from = Math.min(Math.max(around - share * length, low), high - length);
@@ -194,8 +194,8 @@ export class Timeline {
 
   /** @param {WheelEvent} event */
   wheel(event) {
-    const whole = this.range[0] === this.whole[0] && this.range[1] === this.whole[1];
-    if (whole && event.deltaY > Math.abs(event.deltaX)) return; // nothing is left to show: the page scrolls
+    const isAll = this.range[0] === this.extent[0] && this.range[1] === this.extent[1];
+    if (isAll && event.deltaY > Math.abs(event.deltaX)) return; // nothing is left to show: the page scrolls
     if (Math.abs(event.deltaX) > Math.abs(event.deltaY))
       this.pan((event.deltaX / this.board.width) * (this.range[1] - this.range[0]));
     else this.zoom(1.0015 ** event.deltaY, this.time(event.offsetX));

@@ -48,8 +48,8 @@ class Recordings {
     byId("recording-name").textContent = name;
     fill(
       byId("tables"),
-      ...recording.tables.map((/** @type {any} */ one, /** @type {number} */ k) =>
-        make("option", { value: String(k) }, one.name),
+      ...recording.tables.map((/** @type {any} */ table, /** @type {number} */ k) =>
+        make("option", { value: String(k) }, table.name),
       ),
     );
     const labeled = recording.tables.filter((/** @type {any} */ table) => table.label !== null);
@@ -59,7 +59,7 @@ class Recordings {
       `${counted(recording.tables.length, "movement")}, ${labeled.length} with a label: ${labels}`;
     fill(
       byId("problems"),
-      ...recording.problems.map((/** @type {string} */ one) => make("p", { class: "small" }, one)),
+      ...recording.problems.map((/** @type {string} */ problem) => make("p", { class: "small" }, problem)),
     );
     this.table();
     byId("spot").focus({ preventScroll: true });
@@ -111,12 +111,12 @@ class Recordings {
     const names = new Set(this.chosenChannels());
     const wanted = new Set(
       this.read.tables[k].channels
-        .filter((/** @type {any} */ one) => names.has(one.name))
-        .flatMap((/** @type {any} */ one) => one.columns ?? [one.name]),
+        .filter((/** @type {any} */ channel) => names.has(channel.name))
+        .flatMap((/** @type {any} */ channel) => channel.columns ?? [channel.name]),
     );
     const columns = plot.columns
-      .map((/** @type {any} */ one, /** @type {number} */ at) => ({ ...one, color: COLORS[at % COLORS.length] }))
-      .filter((/** @type {any} */ one) => wanted.has(one.name) || names.has(one.name));
+      .map((/** @type {any} */ column, /** @type {number} */ at) => ({ ...column, color: COLORS[at % COLORS.length] }))
+      .filter((/** @type {any} */ column) => wanted.has(column.name) || names.has(column.name));
     return { ...plot, columns };
   }
 
@@ -144,17 +144,17 @@ class Recordings {
     this.timeline.spans = answer.spans;
     this.choose(-1);
     this.changed();
-    const known = answer.spans.filter((/** @type {any} */ one) => one.label !== null).length;
+    const named = answer.spans.filter((/** @type {any} */ span) => span.label !== null).length;
     const advice = answer.spans.length ? " Choose one to drag its edges." : "";
     byId("spans-state").textContent =
-      `${counted(known, "known movement")}, ${answer.spans.length - known} unknown.${advice}`;
+      `${counted(named, "known movement")}, ${answer.spans.length - named} unknown.${advice}`;
   }
 
   /** How much is searched. @param {string} path @param {AbortController} search */
   async tell(path, search) {
-    const told = await get(path).catch(() => null);
-    if (this.search === search && told?.share)
-      byId("spans-state").textContent = `Looking … ${Math.floor(100 * told.share)} %`;
+    const progress = await get(path).catch(() => null);
+    if (this.search === search && progress?.share)
+      byId("spans-state").textContent = `Looking … ${Math.floor(100 * progress.share)} %`;
   }
 
   /** @param {string} text */
@@ -193,19 +193,19 @@ class Recordings {
     const table = this.read.tables[Number(byId("tables").value)];
     const names = new Set(this.chosenChannels());
     const wrong = mismatch(
-      table.channels.filter((/** @type {any} */ one) => names.has(one.name)),
+      table.channels.filter((/** @type {any} */ channel) => names.has(channel.name)),
       library(),
     );
     byId("channels-note").textContent = wrong;
     byId("spot").textContent = this.search ? "Cancel" : "Find movements";
     byId("spot").disabled = wrong !== "" && !this.search;
     byId("learn-file").disabled = library().read_only || !names.size || (wrong !== "" && library().symbols.length > 0);
-    byId("learn-spans").disabled = library().read_only || !this.timeline.spans.some((one) => one.label !== null);
+    byId("learn-spans").disabled = library().read_only || !this.timeline.spans.some((span) => span.label !== null);
   }
 
   async learn() {
     const spans = this.timeline.spans
-      .filter((one) => one.label !== null)
+      .filter((span) => span.label !== null)
       .map(({ begin, end, label }) => ({ begin, end, label }));
     await learnSpans(this.read.recording, { ...this.body(), spans });
   }

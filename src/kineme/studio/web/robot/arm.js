@@ -12,7 +12,7 @@ const [WIDTH, HEIGHT] = [300, 80];
  */
 function chart(scene, joint, k) {
   const values = scene.positions.map((/** @type {number[]} */ row) => row[k]);
-  const limits = [joint.low, joint.high].filter((one) => Number.isFinite(one));
+  const limits = [joint.low, joint.high].filter((limit) => Number.isFinite(limit));
   const low = Math.min(...values, ...limits);
   const high = Math.max(...values, ...limits);
   const room = 0.08 * (high - low || 1);

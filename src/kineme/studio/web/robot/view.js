@@ -54,7 +54,7 @@ function row(check) {
 /** @param {any} answer */
 function showPreflight(answer) {
   const checks = [...(answer.checks ?? [])].sort((a, b) => Number(a.passed) - Number(b.passed));
-  const failed = checks.filter((one) => !one.passed).length;
+  const failed = checks.filter((check) => !check.passed).length;
   byId("robot-preflight").hidden = !checks.length;
   byId("robot-preflight").open = failed > 0;
   fill(byId("robot-checks"), ...checks.map(row));
@@ -98,10 +98,12 @@ async function shown() {
   if (currentView() !== "robot") return;
   const { symbols } = library();
   const id = toMove(symbols);
-  const movable = symbols.filter((/** @type {any} */ one) => one.path);
+  const movable = symbols.filter((/** @type {any} */ symbol) => symbol.path);
   fill(
     byId("robot-what"),
-    ...movable.map((/** @type {any} */ one) => make("option", { value: one.id, selected: one.id === id }, one.name)),
+    ...movable.map((/** @type {any} */ symbol) =>
+      make("option", { value: symbol.id, selected: symbol.id === id }, symbol.name),
+    ),
   );
   offer();
   arms ??= await tried(() => get("/api/robots"));
