@@ -67,7 +67,7 @@ class Comparison:
         """The A-average over representations."""
         return self.similarity.mean
 
-    @property
+    @cached_property
     def specification(self) -> ComparisonSpecification:
         """The same without widths and weights, so for other movements."""
         prior = self.procrustes.prior

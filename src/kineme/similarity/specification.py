@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any, Protocol
 
 import numpy as np
@@ -337,12 +337,12 @@ class ComparisonSpecification:
                 "out: under a prior, a large rotation costs similarity and none is forbidden"
             )
 
-    @property
+    @cached_property
     def by_rows(self) -> tuple[Representation, ...]:
         """The representations that are compared sample by sample; they come first."""
         return tuple(representation for representation in self.representations if not representation.in_pairs)
 
-    @property
+    @cached_property
     def by_pairs(self) -> tuple[Representation, ...]:
         """The representations that are compared pair by pair."""
         return self.representations[len(self.by_rows) :]

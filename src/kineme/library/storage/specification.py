@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -123,33 +124,37 @@ class Specification:
     def from_json(cls, meta: dict[str, str], path: Path) -> Specification:
         """Read what `to_json` wrote into the library at `path`; parameters are checked as if a user had typed them."""
         try:
-            parameters, dmp = parsed(meta["recognizer"]), parsed(meta["dmp"])
-            parameters["representations"] = tuple(Representation(**fields) for fields in parameters["representations"])
-            if parameters.get("rotation_prior") is not None:
-                prior = parameters["rotation_prior"]
-                vertical = prior["vertical"]
-                parameters["rotation_prior"] = RotationPrior(
-                    prior["concentration"], None if vertical is None else tuple(vertical), prior["tilt"]
-                )
-            if not isinstance(weights := parameters.get("weights", "auto"), str):
-                parameters["weights"] = tuple(map(float, weights))
-            normalization = Normalization(parameters.pop("translation", True), parameters.pop("scale", "path"))
-            comparison = ComparisonSpecification(
-                parameters.pop("representations", ROW_REPRESENTATIONS),
-                normalization,
-                parameters.pop("cutoff", 10.0),
-                parameters.pop("max_angle", None),
-                parameters.pop("mean", "arithmetic"),
-                parameters.pop("rotation_prior", None),
-            )
-            specification = cls(comparison, dmp=specification_from_dict(DMP, dmp), **parameters)
+            return _of_texts(meta["recognizer"], meta["dmp"])
         except (AttributeError, KeyError, TypeError, ValueError, OverflowError) as error:
             reason = error if isinstance(error, KinemeError) else f"{type(error).__name__}: {error}"
             raise DataError(
                 f"expected {path} to say how its movements are described, got a specification that does not fit "
                 f"({reason}); take the file from a backup or an export that you trust"
             ) from error
-        return specification
+
+
+@lru_cache(maxsize=16)  # a library is opened again and again
+def _of_texts(recognizer: str, dmp_text: str) -> Specification:
+    parameters, dmp = parsed(recognizer), parsed(dmp_text)
+    parameters["representations"] = tuple(Representation(**fields) for fields in parameters["representations"])
+    if parameters.get("rotation_prior") is not None:
+        prior = parameters["rotation_prior"]
+        vertical = prior["vertical"]
+        parameters["rotation_prior"] = RotationPrior(
+            prior["concentration"], None if vertical is None else tuple(vertical), prior["tilt"]
+        )
+    if not isinstance(weights := parameters.get("weights", "auto"), str):
+        parameters["weights"] = tuple(map(float, weights))
+    normalization = Normalization(parameters.pop("translation", True), parameters.pop("scale", "path"))
+    comparison = ComparisonSpecification(
+        parameters.pop("representations", ROW_REPRESENTATIONS),
+        normalization,
+        parameters.pop("cutoff", 10.0),
+        parameters.pop("max_angle", None),
+        parameters.pop("mean", "arithmetic"),
+        parameters.pop("rotation_prior", None),
+    )
+    return Specification(comparison, dmp=specification_from_dict(DMP, dmp), **parameters)
 
 
 def as_n_dims(text: str, path: Path) -> int:

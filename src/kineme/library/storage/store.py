@@ -62,6 +62,8 @@ class Store:
         self._n_reading = 0  # nesting depth of the thread that reads
         self._writer: sqlite3.Connection | None = None
         self._waking, self._asleep, self._closed = Lock(), False, False
+        self._n_dims: int | None = None  # these two are written once
+        self._channels: Channels | None = None
         if not self.path.exists():
             self._create(specification)
         with in_plain_words(self.path, wait), safety.awake():
@@ -149,16 +151,20 @@ class Store:
     @property
     def n_dims(self) -> int | None:
         """Dimensions that all movements share; None before the first one."""
-        with self.reading() as connection:
-            rows = select(connection, "meta", "key = 'n_dims'")
-        return as_n_dims(rows[0][1], self.path) if rows else None
+        if self._n_dims is None:
+            with self.reading() as connection:
+                rows = select(connection, "meta", "key = 'n_dims'")
+            self._n_dims = as_n_dims(rows[0][1], self.path) if rows else None
+        return self._n_dims
 
     @property
     def channels(self) -> Channels | None:
         """Channels that the movements were recorded as; None before the first one, and where that is not known."""
-        with self.reading() as connection:
-            rows = select(connection, "meta", "key = 'channels'")
-        return channels_of_text(rows[0][1], self.n_dims or 0, self.path) if rows else None
+        if self._channels is None:
+            with self.reading() as connection:
+                rows = select(connection, "meta", "key = 'channels'")
+            self._channels = channels_of_text(rows[0][1], self.n_dims or 0, self.path) if rows else None
+        return self._channels
 
     @contextmanager
     def reading(self) -> Iterator[sqlite3.Connection]:
