@@ -6,7 +6,7 @@
 # make test-lowest   the tests with the lowest versions of what kineme depends on
 # make package   wheel and source archive in out/package, checked, and tried in an empty environment of every Python found
 # make ros2   messages of ROS 2 itself, in .venv-ros2; the tests that need them are skipped where it is not there
-# make soak   faults of the action library, many times, and what make test tries a part of: an hour
+# make soak   faults of the action library, many times, and all tests with all that make test leaves out: an hour
 # make fuzz   files and libraries damaged at random, read in child processes: minutes; FUZZ_SEED, FUZZ_ROUNDS
 # make bench  speed and accuracy side by side with other libraries
 # make evaluate  recognition beside its rivals, in out/
@@ -85,7 +85,7 @@ ros2: .venv-ros2/ready
 	touch $@
 
 soak: $(DEV)/ready
-	KINEME_SOAK=1 $(DEV)/bin/pytest -n 2 --dist loadscope soak $$(grep -rlE 'soaking|KINEME_SOAK' tests --include='test_*.py') -p no:cacheprovider
+	KINEME_SOAK=1 $(DEV)/bin/pytest -n 2 --dist loadscope soak tests -p no:cacheprovider
 
 fuzz: $(DEV)/ready
 	$(DEV)/bin/pytest fuzz -p no:cacheprovider

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
 
-from soaking import examples
+from soaking import SOAK, examples, left_to_soak
 
 settings.register_profile(
     "deterministic",
@@ -22,6 +22,15 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.differing_executors],
 )
 settings.load_profile("deterministic")
+
+
+def pytest_collection_modifyitems(config, items):
+    """Leave repetitions to `make soak`; a test that is named has all its cases."""
+    if SOAK or any("::" in argument for argument in config.args):
+        return
+    if left := set(left_to_soak(items)):
+        config.hook.pytest_deselected(items=left)
+        items[:] = [item for item in items if item not in left]
 
 
 def pytest_collection_finish():

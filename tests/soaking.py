@@ -1,9 +1,16 @@
-"""What `make test` leaves to `make soak`: more examples, and combinations of values that are each tried with others."""
+"""What `make test` leaves to `make soak`: more examples, slow repetitions, and all combinations of values.
+
+A repetition is marked `pytest.mark.soak`, a test or some of its parameters. Of parametrizations that are stacked,
+`make test` tries each value of each of them with some values of the others; `combined` does so within one of them.
+"""
 
 from __future__ import annotations
 
 import os
+from collections import defaultdict
 from itertools import combinations, product
+
+import pytest
 
 SOAK = "KINEME_SOAK" in os.environ
 
@@ -11,6 +18,18 @@ SOAK = "KINEME_SOAK" in os.environ
 def examples(usual, soaked=60):
     """How many examples hypothesis draws."""
     return soaked if SOAK else usual
+
+
+def slow(*values):
+    """A row of parameters that `make soak` alone tries."""
+    return pytest.param(*values, marks=pytest.mark.soak)
+
+
+def some(values, *usual):
+    """Values of one parameter, of which `make test` tries those at the places `usual`."""
+    values = list(values)
+    chosen = [values[i] for i in usual]
+    return [value if value in chosen else slow(value) for value in values]
 
 
 def combined(*columns, together=2):
@@ -21,11 +40,36 @@ def combined(*columns, together=2):
     rows = list(product(*columns))
     if SOAK or together >= len(columns):
         return rows
-    places = list(combinations(range(len(columns)), together))
-    of_row = {i: {(place, tuple(map(repr, (row[k] for k in place)))) for place in places} for i, row in enumerate(rows)}
-    missing, chosen = set().union(*of_row.values()), []
+    return [rows[i] for i in _covering([tuple(map(repr, row)) for row in rows], together)]
+
+
+def _covering(rows, together=1):
+    """Places of as few rows as hold all that `together` columns hold in all rows; of equal rows that with new pairs."""
+    places = list(combinations(range(len(rows[0])), together))
+    pairs = list(combinations(range(len(rows[0])), together + 1))
+    of_row = [{(place, *(row[k] for k in place)) for place in places} for row in rows]
+    beside = [{(place, *(row[k] for k in place)) for place in pairs} for row in rows]
+    missing, new, chosen = set().union(*of_row), set().union(*beside), []
     while missing:
-        best = max(of_row, key=lambda i: len(of_row[i] & missing))
+        best = max(range(len(rows)), key=lambda i: (len(of_row[i] & missing), len(beside[i] & new)))
         missing -= of_row[best]
+        new -= beside[best]
         chosen.append(best)
-    return [rows[i] for i in sorted(chosen)]
+    return sorted(chosen)
+
+
+def left_to_soak(items):
+    """Collected tests that `make soak` alone runs."""
+    left, stacked = [], defaultdict(list)
+    for item in items:
+        if item.get_closest_marker("soak"):
+            left.append(item)
+        elif hasattr(item, "callspec"):
+            stacked[item.parent, item.originalname].append(item)
+    for cases in stacked.values():
+        # Parameters of one parametrization have the same index everywhere: together they are one column.
+        columns = {tuple(case.callspec.indices[name] for case in cases) for name in cases[0].callspec.indices}
+        if len(columns) > 1:
+            chosen = set(_covering(list(zip(*sorted(columns), strict=True))))
+            left += [case for i, case in enumerate(cases) if i not in chosen]
+    return left

@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 import kineme
 from kineme.anchoring.assignment import assign, suggest_merges, suggest_splits
 from kineme.recognition.recognizer import Recognizer
+from soaking import examples
 from unlabeled_samples import ALL_TOGETHER, draw_kinds
 
-quick = settings(max_examples=5, deadline=None, derandomize=True)
+quick = settings(max_examples=examples(3, 5), deadline=None, derandomize=True)
 seeds = st.integers(0, 10_000)
 
 

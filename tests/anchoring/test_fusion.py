@@ -14,10 +14,10 @@ from kineme.anchoring.proposals import by_shape, link_people, propose
 from kineme.errors import TrajectoryError
 from kineme.similarity.describe import describe, squared_distances
 from kineme.similarity.specification import ROW_REPRESENTATIONS, ComparisonSpecification
-from soaking import SOAK
+from soaking import SOAK, examples, slow
 from unlabeled_samples import draw_kinds, recovered
 
-quick = settings(max_examples=5, deadline=None, derandomize=True)
+quick = settings(max_examples=examples(2, 5), deadline=None, derandomize=True)
 seeds = st.integers(0, 10_000)
 
 
@@ -165,7 +165,7 @@ def who_of(n_classes, n_people, each):
     return np.tile(np.repeat(np.arange(n_people), each), n_classes)
 
 
-@pytest.mark.parametrize("seed", [0, 1, 3])
+@pytest.mark.parametrize("seed", [0, slow(1), slow(3)])
 def test_people_who_are_named_are_linked(seed):
     """Everyone's own way is so different that each is found as a cluster, unless it is told who made it."""
     demos, who = draw_people(6, 4, 5, seed, own=0.3), who_of(6, 4, 5)
@@ -235,6 +235,7 @@ def test_representations_count_by_their_weights():
     assert weights == (2.0, 2.0, 1.0, 2.0)
 
 
+@pytest.mark.soak
 def test_solids_of_five_people_are_told_apart_by_who_drew_them(gestures):
     """0.69 unless it is said who drew what."""
     demos, people = gestures
@@ -254,6 +255,7 @@ def test_digits_of_five_people_are_ten_clusters(digits):
         assert recovered(demos.labels, propose(demos, n_clusters=10)) >= 0.99
 
 
+@pytest.mark.soak
 def test_digits_of_one_person_are_ten_clusters(digits):
     demos, people = digits
     for person in np.unique(people):

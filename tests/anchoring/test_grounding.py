@@ -14,9 +14,10 @@ from hypothesis import strategies as st
 import kineme
 from kineme.anchoring.grounding import SymbolName, ground, grounding_schema, medoid_of, primitive_from
 from kineme.dmp.discrete.specification import FORMULATIONS
+from soaking import examples
 from unlabeled_samples import draw_kinds
 
-quick = settings(max_examples=8, deadline=None, derandomize=True)
+quick = settings(max_examples=examples(3, 8), deadline=None, derandomize=True)
 WAVE = SymbolName("sym-1", "wave", "a hand says hello", ("sym-0",))
 VALIDATOR = jsonschema.Draft202012Validator(grounding_schema())
 

@@ -13,9 +13,10 @@ from kineme.anchoring.figures import apart, classical_scaling
 from kineme.anchoring.space import ConceptualSpace, conceptual_space, morph
 from kineme.recognition.recognizer import Recognizer
 from kineme.similarity.specification import ComparisonSpecification
+from soaking import examples
 from unlabeled_samples import draw_kinds
 
-quick = settings(max_examples=8, deadline=None, derandomize=True)
+quick = settings(max_examples=examples(4, 8), deadline=None, derandomize=True)
 seeds = st.integers(0, 10_000)
 
 

@@ -181,14 +181,12 @@ def test_the_shell_completes_symbols_of_the_library_on_the_line(folder):
     assert _completed("kineme library show -l nowhere N") == []
 
 
-@pytest.mark.parametrize(
-    "name", ["a;reboot", "$(reboot)", "`x`", "two words", "*", "-y", "~", "a\nplain,b", "a,b", "a'b", "!x"]
-)
-def test_a_name_that_a_shell_would_act_on_is_completed_as_its_id(tmp_path, name):
+def test_a_name_that_a_shell_would_act_on_is_completed_as_its_id(tmp_path):
+    hostile = ["a;reboot", "$(reboot)", "`x`", "two words", "*", "-y", "~", "a\nplain,b", "a,b", "a'b", "!x"]
     with kineme.ActionLibrary(tmp_path / "a", create=True) as library:
-        library.learn(kineme.load_lasa(["CShape", "GShape"])[5:9], labels=[name, name, "größe/2", "größe/2"])
-        symbol = library[name]
-    assert sorted(_completed(f'kineme library show -l {tmp_path / "a"} ""')) == sorted([symbol.id, "größe/2"])
+        library.learn(kineme.load_lasa(["CShape", "GShape"])[: len(hostile) + 1], labels=[*hostile, "größe/2"])
+        ids = [library[name].id for name in hostile]
+    assert sorted(_completed(f'kineme library show -l {tmp_path / "a"} ""')) == sorted([*ids, "größe/2"])
 
 
 def _completed(words):

@@ -12,6 +12,7 @@ from kineme.io.tables import text_table
 from kineme.io.tables.text_table import read_text_table
 from kineme.movements.tables.layout import Layout
 from recordings_in_bytes import read_recordings_from_bytes
+from soaking import examples
 
 
 def outcome(data, layout=Layout()):  # noqa: B008 - frozen
@@ -107,7 +108,7 @@ def tables(draw):
 
 
 @given(tables(), st.sampled_from(["utf-8", "utf-8-sig", "utf-16"]), st.sampled_from([Layout(), Layout(units=0.1)]))
-@settings(max_examples=400)
+@settings(max_examples=examples(80, 400))
 @example("label,t,x\n wave,0,1\nb ,1,2\n", "utf-8", Layout())
 @example('t,x\n0,"a\n1",2\n', "utf-8", Layout())
 @example("id,t,x\n#1,0,1\n#1,1,2\n#2,0,1\n", "utf-8", Layout())
@@ -121,7 +122,7 @@ def test_all_paths_agree(text, encoding, layout):
 
 
 @given(st.text(',;\t \n\r"#%/0123456789.-+eEnaif_x', max_size=120))
-@settings(max_examples=300)
+@settings(max_examples=examples(60, 300))
 def test_all_paths_agree_on_any_text(text):
     data = text.encode()
     assert outcome(data) == in_stretches(data) == by_lines(data)

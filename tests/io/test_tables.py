@@ -15,6 +15,7 @@ from kineme.io.reading.recordings import read_recordings
 from kineme.movements.tables.columns import choose_roles, is_time
 from kineme.movements.tables.layout import Layout, distinct
 from recordings_in_bytes import read_recordings_from_bytes
+from soaking import examples
 
 SIX = [(k, 10.0 + k, 20.0 - k * k) for k in range(6)]
 
@@ -40,7 +41,7 @@ formats = st.sampled_from(["{!r}", "{:.17g}", "{:.17e}", "{:+.17E}", " {!r} ", '
     end=st.sampled_from(["\n", "\r\n", "\n\n", "\n# between\n"]),
     names=st.booleans(),
 )
-@settings(max_examples=300)
+@settings(max_examples=examples(60, 300))
 def test_any_number_in_any_notation_is_read_to_the_last_bit(values, style, separator, comma, end, names):
     if separator == "\t" and style.startswith(" "):
         style = style.strip()
@@ -62,7 +63,7 @@ def test_any_number_in_any_notation_is_read_to_the_last_bit(values, style, separ
     text=st.text("time,xy;\t 01.5e-+#%\"'\n\r\u00e4nalbeld", max_size=200) | st.text(max_size=80),
     skip=st.sampled_from(["movement", "sample"]),
 )
-@settings(max_examples=400)
+@settings(max_examples=examples(80, 400))
 def test_any_text_is_a_table_or_an_error(text, skip):
     try:
         found = read(text.encode("utf-8", "replace"), skip=skip)

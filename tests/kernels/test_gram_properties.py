@@ -7,10 +7,11 @@ from hypothesis import strategies as st
 from kernel_samples import ALL, KINDS, NAMED, rows
 
 from kineme.kernels import KERNELS, MEANS, RBF, TruncatedEuclidean, averaged
+from soaking import examples
 
 every_kernel = pytest.mark.parametrize("kernel", ALL.values(), ids=ALL)
 seeds = st.integers(0, 2**32 - 1)
-many = settings(max_examples=25, deadline=None)
+many = settings(max_examples=examples(8, 25), deadline=None)
 
 
 @every_kernel
@@ -56,28 +57,28 @@ def lowest_eigenvalue(gram):
 
 @pytest.mark.parametrize("name", [name for name, row in KERNELS.items() if row.psd])
 @given(kind=st.sampled_from(KINDS), seed=seeds)
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=examples(20, 80), deadline=None)
 def test_positive_semidefinite_where_the_table_says_so(name, kind, seed):
     assert lowest_eigenvalue(NAMED[name](rows(kind, seed))) > -1e-11
 
 
 @pytest.mark.parametrize(("name", "mean"), [(name, mean) for name, row in KERNELS.items() for mean in row.psd_means])
 @given(kind=st.sampled_from(KINDS), seed=seeds)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(12, 40), deadline=None)
 def test_averages_positive_semidefinite_where_the_table_says_so(name, mean, kind, seed):
     kernel = averaged(NAMED[name], 3, mean)
     assert lowest_eigenvalue(kernel(rows(kind, seed) + 0.0)) > -1e-11
 
 
 @given(kind=st.sampled_from(KINDS), seed=seeds, m=st.floats(1e-3, 1e3), sigma=st.floats(1e-3, 1e3))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(20, 150), deadline=None)
 def test_truncated_is_positive_semidefinite_for_every_width(kind, seed, m, sigma):
     gram = TruncatedEuclidean(m, sigma)(rows(kind, seed, p=2))
     assert lowest_eigenvalue(gram) > -1e-11
 
 
 @given(kind=st.sampled_from(KINDS), seed=seeds, sigma=st.floats(1e-6, 1e6))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(20, 150), deadline=None)
 def test_rbf_is_positive_semidefinite_for_every_width(kind, seed, sigma):
     assert lowest_eigenvalue(RBF(sigma)(rows(kind, seed))) > -1e-11
 

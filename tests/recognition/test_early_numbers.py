@@ -115,6 +115,7 @@ def test_pauses_of_beginnings_count_longer_than_those_of_whole_movements():
     assert right >= 178
 
 
+@pytest.mark.soak
 def test_digits_of_other_people_are_known_at_the_end_as_whole_movements_are(digits):
     demos, people = digits
     labels = np.asarray(demos.labels)

@@ -12,6 +12,7 @@ from kineme.recognition.outliers import (
     scaled,
     tail_p_values,
 )
+from soaking import slow
 
 
 def wrongly_labeled(labels, share, rng):
@@ -30,7 +31,7 @@ def counts(demos, labels, planted):
     return len(indices & set(planted.tolist())), len(indices - set(planted.tolist()))
 
 
-@pytest.mark.parametrize(("share", "least"), [(0.02, 0.85), (0.1, 0.75)])
+@pytest.mark.parametrize(("share", "least"), [slow(0.02, 0.85), (0.1, 0.75)])
 def test_wrong_labels_of_digits_are_found_and_few_others(digits, share, least):
     """The rates that docs/guide/outliers.md tells of: without the contrast, or with one neighbor, fewer are found."""
     demos, _ = digits

@@ -22,6 +22,7 @@ from kineme.movements.preparation.perturbations import Perturbation
 from kineme.movements.preparation.resample import arc_length_phase
 from kineme.similarity import scores as module
 from movement_samples import draw_shapes, turn
+from soaking import examples
 
 any_seed = given(seed=st.integers(0, 10**6))
 planes = pytest.mark.parametrize("d", [2, 3])
@@ -138,7 +139,7 @@ def test_prototype_is_the_demonstration_most_like_its_class():
 
 
 @any_seed
-@settings(max_examples=20)
+@settings(max_examples=examples(8, 20))
 def test_prototypes_are_the_same_compiled_and_plain_and_of_equal_ones_the_first(seed):
     counts = [2, 2, 3, 2, 4]
     demos = draw_shapes(counts, seed=seed, spread=0.5)

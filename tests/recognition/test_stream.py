@@ -234,7 +234,7 @@ def test_nothing_is_loaded_while_a_movement_is_under_way():
     """A fresh process: after `stream()`, no update imports anything, however many there are."""
     code = (
         "import sys, kineme\n"
-        "demos = kineme.load_lasa()\n"
+        "demos = kineme.load_lasa(['CShape', 'GShape'])\n"
         "live = kineme.Recognizer().fit(demos).stream()\n"
         "before = set(sys.modules)\n"
         "for t, x in zip(demos[3].times[::5], demos[3].positions[::5]):\n"

@@ -42,7 +42,7 @@ def random_stroke(robot, seed, seconds):
     return kineme.Trajectory(times=seconds * u, positions=InverseKinematics(robot).tip_position + path)
 
 
-@settings(max_examples=examples(8), deadline=None)
+@settings(max_examples=examples(5), deadline=None)
 @given(
     name=st.sampled_from(list(MODELS)),
     seed=st.integers(0, 2**32 - 1),

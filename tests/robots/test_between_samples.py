@@ -97,7 +97,7 @@ def test_an_acceleration_that_only_the_middle_of_a_gap_has_is_measured_as_it_is(
     assert check.passed is passes
 
 
-@settings(max_examples=examples(4), deadline=None)
+@settings(max_examples=examples(2), deadline=None)
 @given(
     name=st.sampled_from(["panda", "ur5e", "wam", "so101"]),
     rate=st.sampled_from([1.0, 3.0, 10.0, 25.0, 100.0, 1000.0, 10_000.0]),
@@ -158,7 +158,7 @@ def test_between_two_postures_that_are_looked_at_no_joint_moves_far_and_a_jump_c
 def test_a_learned_movement_begins_and_ends_at_a_stand_at_every_rate():
     robot = _robot("panda")
     primitive = kineme.DMP().learn([stroke(robot)])
-    for rate in (100.0, 10_000.0):
+    for rate in (100.0, 10_000.0 if SOAK else 1000.0):
         t = move(primitive, robot, rate=rate).trajectory
         assert np.abs(t.velocities[[0, -1]]).max() < 1e-7
         accelerations = np.diff(t.velocities, axis=0) / np.diff(t.times)[:, None]

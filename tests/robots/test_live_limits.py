@@ -79,7 +79,7 @@ def test_limits_hold_at_every_step_whatever_the_goal_does(name, follow, dt, seed
     robot = robot_of(name)
     options = {"feedback": "phase", "phase_stopping": 1e3} if waits else {}
     arm = ArmController(robot, primitive(name).controller(dt, **options), follow=follow)
-    states = [arm.state, *(arm.step(goal=goal) for goal in drawn_goals(name, seed, dt, 250))]
+    states = [arm.state, *(arm.step(goal=goal) for goal in drawn_goals(name, seed, dt, 250 if SOAK else 120))]
     check_limits(robot, np.array([state.joints for state in states]), dt)
     for before, after in pairwise(states):
         np.testing.assert_allclose(after.velocities * dt, after.joints - before.joints, atol=1e-14)
@@ -149,7 +149,7 @@ def test_what_was_missed_is_caught_up_without_overshooting(name, dt):
     check_limits(robot, np.array([first.joints, *(state.joints for state in states)]), dt)
 
 
-@pytest.mark.parametrize("name", MODELS if SOAK else MODELS[::3])
+@pytest.mark.parametrize("name", MODELS if SOAK else MODELS[:1])
 def test_an_arm_that_is_stretched_towards_a_goal_out_of_reach_comes_to_rest(name):
     arm = ArmController(robot_of(name), primitive(name).controller(0.005))
     goal = arm.state.movement.position + np.array([1.5, 0.2, 0.3])

@@ -14,6 +14,7 @@ from kineme.similarity.scores import most_similar, nearest_above
 from kineme.similarity.similarity import AveragedSimilarity
 from kineme.similarity.specification import DEFAULT_REPRESENTATIONS, ComparisonSpecification
 from movement_samples import draw_shapes
+from soaking import examples
 
 N = len(DEFAULT_REPRESENTATIONS)
 
@@ -22,7 +23,7 @@ def by_all(similarity, A, B):
     return similarity.log_average(A, B).argmax(axis=1)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(12, 40), deadline=None)
 @given(
     d=st.integers(1, 4),
     seed=st.integers(0, 10**6),
@@ -54,7 +55,7 @@ def test_it_is_the_one_that_comparing_all_finds(d, seed, width, spread, weights,
         np.testing.assert_array_equal(most_similar(similarity, A, B), by_all(similarity, A, B))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(12, 40), deadline=None)
 @given(
     d=st.integers(1, 4),
     seed=st.integers(0, 10**6),

@@ -22,7 +22,7 @@ from kineme.movements.preparation.pauses import cut_pauses
 from kineme.recognition.answer import LEAST_CONFIDENCE, certainty
 from kineme.studio.snapshot import Snapshot, pause_rule, snapshot_of_recognizer
 from movement_samples import draw_shapes, stepped, turn
-from soaking import SOAK
+from soaking import SOAK, slow
 
 pytestmark = pytest.mark.skipif(NODE is None, reason=REASON)
 
@@ -75,11 +75,6 @@ def one_in(n, demos, first=0):
     return (np.arange(len(demos)) - first) % 7 < n
 
 
-def repeated(*values):
-    """Parameters whose values are each tried with others already: `make soak` tries them together, too."""
-    return pytest.param(*values, marks=pytest.mark.skipif(not SOAK, reason="make soak tries it"))
-
-
 class Case(NamedTuple):
     """A snapshot, questions to the runtime about it, and what Python says to each."""
 
@@ -121,7 +116,7 @@ def compare_answers(case, runtime=RUNTIME):
 
 @pytest.mark.parametrize(
     ("space", "shots"),
-    [(False, 3), (True, 1), repeated(False, 1), repeated(True, 3)],
+    [(False, 3), (True, 1), slow(False, 1), slow(True, 3)],
     ids=["plane-3", "space-1", "plane-1", "space-3"],
 )
 def test_handwriting_is_recognized_as_in_python(shots, space):
@@ -157,7 +152,7 @@ def test_movements_of_people_are_recognized_as_in_python(name):
         ({"mean": "quadratic"}, 3),
         ({"mean": "min"}, 2),
         ({"max_angle": 0.0}, 2),
-        ({"max_angle": 0.0}, 3),
+        slow({"max_angle": 0.0}, 3),
         ({"max_angle": np.pi / 3}, 2),
         ({"max_angle": np.pi}, 3),
         ({"rotation_prior": kineme.recognition.RotationPrior(vertical=(0, 0, 1))}, 3),
@@ -286,11 +281,11 @@ def every_tenth(movements):
     [
         (False, {}),
         (True, {"translation": False, "max_angle": 0.0}),
-        repeated(True, {}),
-        repeated(True, {"max_angle": 0.0}),
-        repeated(False, {"translation": False}),
-        repeated(False, {"max_angle": 0.0}),
-        repeated(True, {"translation": False}),
+        slow(True, {}),
+        slow(True, {"max_angle": 0.0}),
+        slow(False, {"translation": False}),
+        slow(False, {"max_angle": 0.0}),
+        slow(True, {"translation": False}),
     ],
     ids=str,
 )
@@ -342,10 +337,10 @@ def compare_rollouts(case, runtime=RUNTIME):
         (True, "original"),
         (False, "amplitude-scaled"),
         (True, "decoupled"),
-        repeated(True, "bio-inspired"),
-        repeated(False, "original"),
-        repeated(True, "amplitude-scaled"),
-        repeated(False, "decoupled"),
+        slow(True, "bio-inspired"),
+        slow(False, "original"),
+        slow(True, "amplitude-scaled"),
+        slow(False, "decoupled"),
     ],
 )
 def test_movements_to_new_goals_are_those_of_python(space, formulation):

@@ -24,6 +24,7 @@ from kineme.io.reading.recordings import read_recordings
 from kineme.studio.server import app, read_upload, recording_routes, uploads
 from kineme.studio.server import studio as work_module
 from kineme.studio.server.refusals import MissingError
+from soaking import slow
 
 
 def _table(*kinds, rest=0.6, heads="t,x,y", clock=0.0):
@@ -162,7 +163,7 @@ def _poses(*kinds, heads="t,x,y,qw,qx,qy,qz", rest=0.6):
     return text.getvalue().encode(), spans
 
 
-@pytest.mark.parametrize("head", ["q", "orientation."])
+@pytest.mark.parametrize("head", ["q", slow("orientation.")])
 def test_orientations_that_are_chosen_by_their_channel_are_those_of_the_reader(tmp_path, open_studio, head):
     client = open_studio(tmp_path / "poses")
     four = [head + axis for axis in "wxyz"]

@@ -17,6 +17,7 @@ from kineme.dmp.discrete.specification import FORMULATIONS
 from kineme.dmp.generation.generate import Learned, MovementOptions, generate
 from kineme.errors import heard_warnings
 from kineme.orientation import PoseDMP
+from soaking import examples
 
 DURATION = 2.0
 
@@ -35,7 +36,7 @@ def away(made, share, point):
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=examples(3, 8), deadline=None)
 @given(share=st.floats(0.2, 0.8), side=st.floats(-0.15, 0.15), along=st.floats(0.3, 0.7), beside=st.floats(-0.1, 0.1))
 def test_a_via_point_is_passed_or_the_distance_is_said(formulation, share, side, along, beside):
     primitive = kineme.DMP(formulation).learn([curve()])

@@ -12,6 +12,7 @@ from kineme import DMP
 from kineme.dmp import Primitives
 from kineme.dmp.discrete.specification import FORMULATIONS
 from kineme.errors import SpecificationError, TrajectoryError
+from soaking import examples
 
 DEMOS = kineme.load_lasa(["GShape"])
 
@@ -24,7 +25,7 @@ def stepped(primitive, duration, goal, velocity, n_steps):
     return np.array([[one.position, one.velocity, one.acceleration] for one in states]).transpose(1, 0, 2)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=examples(8, 25), deadline=None)
 @given(
     st.sampled_from(sorted(FORMULATIONS)),
     st.sampled_from(["none", "phase"]),

@@ -13,7 +13,7 @@ from kineme.errors import TrajectoryError
 from kineme.movements.channels.channel import Channel
 from kineme.movements.trajectories.movements import of_channels
 from kineme.orientation import PoseDMP, PosePrimitives, conjugate, exp, log, product
-from soaking import examples
+from soaking import examples, some
 
 SPECIFICATIONS = [
     DMP(name, n_basis=25, n_points=120, gating=gating)
@@ -38,7 +38,7 @@ def angle(one, other):
     return np.linalg.norm(log(product(one, conjugate(other))), axis=-1)
 
 
-@pytest.mark.parametrize("dmp", SPECIFICATIONS, ids=lambda dmp: f"{dmp.formulation}-{dmp.gating}")
+@pytest.mark.parametrize("dmp", some(SPECIFICATIONS, 0, 3, 4), ids=lambda dmp: f"{dmp.formulation}-{dmp.gating}")
 @settings(max_examples=examples(1, 12), deadline=None)
 @given(seed=st.integers(0, 10**6))
 def test_each_part_follows_the_one_before_it(dmp, seed):

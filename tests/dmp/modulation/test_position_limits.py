@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import product
-
 import numpy as np
 import pytest
 
@@ -11,6 +9,7 @@ import kineme
 from kineme import DMP
 from kineme.dmp.discrete.specification import FITS, FORMULATIONS, GATINGS
 from kineme.errors import SpecificationError
+from soaking import combined
 
 
 @pytest.fixture(scope="module")
@@ -18,7 +17,7 @@ def learned():
     return DMP().learn(kineme.load_lasa(["GShape"]))
 
 
-@pytest.mark.parametrize(("formulation", "gating", "fit"), list(product(FORMULATIONS, GATINGS, FITS)))
+@pytest.mark.parametrize(("formulation", "gating", "fit"), combined(FORMULATIONS, GATINGS, FITS, together=1))
 def test_no_sample_is_outside_and_the_ends_stay(formulation, gating, fit):
     primitives = DMP(formulation, gating=gating, fit=fit, n_basis=30).learn(kineme.load_lasa(["GShape"])[:3])
     box = ([-18.0, -17.0], [30.0, np.inf])

@@ -16,7 +16,7 @@ from kineme.dmp import Primitives
 from kineme.dmp.discrete.operators import decoder, decoder_at, smoothness_factor
 from kineme.dmp.discrete.specification import FORMULATIONS, GATINGS
 from kineme.errors import ExtrapolationWarning, SpecificationError, TrajectoryError
-from soaking import combined
+from soaking import combined, examples
 
 FITS = (("forcing", "local"), ("forcing", "ridge"), ("trajectory", "local"))
 EVERY = [
@@ -190,7 +190,7 @@ class TestStretches:
         np.testing.assert_allclose(path.positions[0, [4, 5, 6]], asked, atol=1e-6 * 35)
         np.testing.assert_allclose(path.positions[0, 8], learned.goals[0], atol=1e-6 * 35)
 
-    @settings(max_examples=25, deadline=None)
+    @settings(max_examples=examples(8, 25), deadline=None)
     @given(
         st.sampled_from(range(0, len(EVERY), 2)),
         st.integers(5, 150),

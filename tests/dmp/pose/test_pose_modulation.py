@@ -13,6 +13,7 @@ from kineme.errors import ExtrapolationWarning, SpecificationError, TrajectoryEr
 from kineme.movements.channels.channel import Channel
 from kineme.movements.trajectories.movements import of_channels
 from kineme.orientation import PoseDMP, PosePrimitives, conjugate, exp, log, product
+from soaking import examples
 
 SPECIFICATIONS = [
     DMP(name, n_basis=25, n_points=120, gating=gating)
@@ -51,7 +52,7 @@ def beside(poses, rng, far=0.05, turned=0.3):
 
 
 @each
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=examples(3, 8), deadline=None)
 @given(seed=seeds)
 def test_poses_are_met_with_start_goal_and_velocities(dmp, seed):
     rng = np.random.default_rng(seed)
@@ -84,7 +85,7 @@ def stepped(controller, n):
 
 
 @each
-@settings(max_examples=4, deadline=None)
+@settings(max_examples=examples(2, 4), deadline=None)
 @given(seed=seeds)
 def test_the_controller_moves_the_same(dmp, seed):
     rng = np.random.default_rng(seed)
@@ -100,7 +101,7 @@ def test_the_controller_moves_the_same(dmp, seed):
 
 
 @each
-@settings(max_examples=4, deadline=None)
+@settings(max_examples=examples(2, 4), deadline=None)
 @given(seed=seeds)
 def test_goals_that_move_and_turn_are_those_of_the_controller(dmp, seed):
     rng = np.random.default_rng(seed)

@@ -13,6 +13,7 @@ import kineme
 from kineme import RhythmicDMP
 from kineme.dmp.rhythmic.operators import limit_cycle
 from kineme.errors import ExtrapolationWarning, SpecificationError, TrajectoryError
+from soaking import examples
 
 SPECIFICATIONS = [RhythmicDMP(fit=fit, n_basis=n) for fit in ("trajectory", "forcing") for n in (15, 30)]
 each = pytest.mark.parametrize("dmp", SPECIFICATIONS, ids=lambda dmp: f"{dmp.fit}-{dmp.n_basis}")
@@ -35,7 +36,7 @@ def at_phases(movement, phases):
 
 
 @each
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=examples(3, 8), deadline=None)
 @given(seed=seeds)
 def test_points_are_met_and_baseline_and_period_stay(dmp, seed):
     rng = np.random.default_rng(seed)
@@ -55,7 +56,7 @@ def test_points_are_met_and_baseline_and_period_stay(dmp, seed):
 
 
 @each
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=examples(2, 5), deadline=None)
 @given(seed=seeds)
 def test_the_controller_moves_the_same_and_scales_it_as_a_whole(dmp, seed):
     rng = np.random.default_rng(seed)

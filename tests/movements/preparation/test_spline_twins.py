@@ -91,7 +91,7 @@ def _within_its_extent(actual, expected, tolerance):
 
 @given(seed=st.integers(0, 10**6))
 def test_splines_of_many_movements_are_those_of_scipy_in_units_of_each_extent(compiled, seed):
-    movements = _company(seed, 200, least=4)  # 13 blocks of lanes
+    movements = _company(seed, examples(60, 200), least=4)  # several blocks of lanes
     rows = _spline_rows(_demonstrations(movements))
     for (t, x), row in zip(movements, rows, strict=True):
         _within_its_extent(row.T, CubicSpline(t, x - x[0])(np.linspace(0, t[-1], 33)), 1e-9)
@@ -101,9 +101,9 @@ def test_splines_of_many_movements_are_those_of_scipy_in_units_of_each_extent(co
 @example(seed=1)
 @given(seed=st.integers(0, 10**6))
 def test_smoothing_splines_of_many_movements_are_those_of_scipy_in_units_of_each_extent(compiled, seed):
-    movements = _company(seed, 200, least=5)
+    movements = _company(seed, examples(60, 200), least=5)
     demos = _demonstrations(movements)
-    rows = smooth_rows(demos, 0, 200, 6.0, 33)
+    rows = smooth_rows(demos, 0, len(demos), 6.0, 33)
     for movement, row, one in zip(movements, rows, preprocess(demos, [Smooth(6.0)]), strict=True):
         _check_smooth(row.T, movement, np.linspace(0, 1, 33))
         _check_smooth(one.positions - movement[1][0], movement, None)

@@ -10,6 +10,7 @@ import pytest
 
 from kineme import Recognizer, Trajectory, segment
 from kineme.errors import KinemeError
+from soaking import examples
 
 KINDS = {
     "constant": lambda rng, n, d: np.zeros((n, d)),
@@ -70,13 +71,13 @@ def _check(recording, method):
 
 @pytest.mark.parametrize("method", METHODS, ids=str)
 def test_any_recording_is_cut_or_refused(method):
-    for seed in range(120):
+    for seed in range(examples(40, 120)):
         with contextlib.suppress(KinemeError):
             _check(_recording(seed), method)
 
 
 def test_known_movements_are_looked_for_in_any_recording():
-    for seed in range(250):
+    for seed in range(examples(80, 250)):
         with contextlib.suppress(KinemeError):
             recording = _recording(seed)
             for one in _recognizer(recording.n_dims).spot(recording):
@@ -87,7 +88,7 @@ def test_known_movements_are_looked_for_in_any_recording():
 @pytest.mark.parametrize("n", [8, 9, 12])
 @pytest.mark.parametrize("by", ["rest", "speed", "change-points"])
 def test_a_few_random_samples_hold_no_movement_or_some(by, n):
-    for seed in range(40):
+    for seed in range(examples(12, 40)):
         x = np.random.default_rng(seed).normal(size=(n, 3))
         for one in (x, np.cumsum(x, axis=0)):
             with contextlib.suppress(KinemeError):
