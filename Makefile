@@ -1,6 +1,6 @@
 # make demo   the paper's tables and figures, in out/
 # make check  formatter, linter, type checker, and the tests that find most: minutes
-# make test   formatter, linter, type checker, tests
+# make test   formatter, linter, type checker, tests; make lint without the tests
 # make javascript  formatter, linter and type checker of the JavaScript; needs npm
 # make test-pythons  the same with every Python that is found here
 # make test-lowest   the tests with the lowest versions of what kineme depends on
@@ -26,16 +26,10 @@ DEV ?= .venv-dev
 # Tests start hundreds of commands: where Python writes no bytecode, each of them compiles the package again.
 export PYTHONDONTWRITEBYTECODE =
 
-.PHONY: demo check javascript test test-pythons test-lowest package ros2 always soak fuzz bench evaluate docs check-docs figures reference tables scene lock clean
+.PHONY: demo check javascript test lint warm test-pythons test-lowest package ros2 always soak fuzz bench evaluate docs check-docs figures reference tables scene lock clean
 
 demo: .venv/ready
 	.venv/bin/kineme reproduce --out out/
-
-define lint
-	$(DEV)/bin/ruff format --check .
-	$(DEV)/bin/ruff check .
-	$(DEV)/bin/mypy --cache-dir $(DEV)/mypy
-endef
 
 # A table of what takes batches, and one of wrong values, go through most of the package.
 FIRST = house layering front_door wrong_values
@@ -44,13 +38,22 @@ CHECKED = $(FIRST:%=tests/test_%.py) tests/properties tests/dmp/discrete tests/d
   $(patsubst %,tests/library/test_library_%.py,learning recognition changes exchange) \
   tests/io/test_read_recordings.py tests/cli/test_learn.py tests/cli/test_recognize_command.py tests/kernels/test_gram_formulas.py
 
-check: $(DEV)/ready
-	$(lint)
+check: lint
 	$(DEV)/bin/pytest -n 2 --dist loadscope $(CHECKED)
 
 test: $(DEV)/ready
-	$(lint)
+	$(MAKE) --no-print-directory -j 2 lint warm
 	$(DEV)/bin/pytest -n 2 --dist loadscope -rs
+
+lint: $(DEV)/ready
+	$(DEV)/bin/ruff format --check .
+	$(DEV)/bin/ruff check .
+	$(DEV)/bin/mypy --cache-dir $(DEV)/mypy
+
+# In a new checkout two workers would each compile all of it, to bytecode and to machine code.
+warm: $(DEV)/ready
+	$(DEV)/bin/python -c "import kineme; kineme.warm_up((1, 2, 3))"
+	$(DEV)/bin/pytest --collect-only -q -q -p no:cacheprovider >/dev/null
 
 # Each Python with an environment of its own; all are tried, though one fails.
 test-pythons:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from collections import defaultdict
-from itertools import combinations, product
+from itertools import chain, combinations, product
 
 import pytest
 
@@ -67,9 +67,14 @@ def left_to_soak(items):
         elif hasattr(item, "callspec"):
             stacked[item.parent, item.originalname].append(item)
     for cases in stacked.values():
-        # Parameters of one parametrization have the same index everywhere: together they are one column.
-        columns = {tuple(case.callspec.indices[name] for case in cases) for name in cases[0].callspec.indices}
+        columns = [_names(mark.args[0]) for mark in cases[0].iter_markers("parametrize")]
+        columns += [[name] for name in cases[0].callspec.params if name not in chain(*columns)]  # of fixtures
         if len(columns) > 1:
-            chosen = set(_covering(list(zip(*sorted(columns), strict=True))))
+            rows = [[tuple(id(case.callspec.params[name]) for name in column) for column in columns] for case in cases]
+            chosen = set(_covering(rows))
             left += [case for i, case in enumerate(cases) if i not in chosen]
     return left
+
+
+def _names(argnames):
+    return [name.strip() for name in argnames.split(",")] if isinstance(argnames, str) else argnames

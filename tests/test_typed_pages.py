@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import subprocess
@@ -14,11 +15,19 @@ from walk_through import page_name, pages
 
 ROOT = Path(__file__).parents[1]
 PAGES = pages()
-_UNTYPED = "matplotlib.*,mujoco.*,numba.*,pandas.*,pyarrow.*,scipy.*,sklearn.*"
-# The package itself is checked with its own settings, elsewhere.
-MYPYPATH = os.pathsep.join(str(ROOT / folder) for folder in ("src", "experiments"))
-_CONFIGURATION = f"[mypy]\nstrict = True\n[mypy-{_UNTYPED}]\nignore_missing_imports = True\n"
-_CONFIGURATION += "[mypy-kineme.*,kineme_experiments.*]\nfollow_imports = silent\n"
+# Settings and results of the package's own check, so that none of it is read twice; pages also say what returns Any.
+_OWN = re.search(
+    r"(?ms)^\[tool\.mypy\]\n.*?(?=^\[tool\.(?!mypy))", (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+)[0]
+_MORE = """
+[[tool.mypy.overrides]]
+module = ["mujoco.*"]
+ignore_missing_imports = true
+
+[[tool.mypy.overrides]]
+module = {modules}
+warn_return_any = true
+"""
 
 #: What comes back is a record, which an editor completes, and not Any.
 RESULTS = """
@@ -71,28 +80,22 @@ def _module(page):
 def checked(tmp_path_factory):
     """Lines of mypy about each page, by its name; all pages in one run."""
     folder = tmp_path_factory.mktemp("pages")
-    (folder / "mypy.ini").write_text(_CONFIGURATION)
-    for page in PAGES:
+    modules = [_module(page) for page in PAGES]
+    for page, module in zip(PAGES, modules, strict=True):
         blocks = re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
-        (folder / f"{_module(page)}.py").write_text("\n".join(blocks), encoding="utf-8")
+        (folder / f"{module}.py").write_text("\n".join(blocks), encoding="utf-8")
     (folder / "results.py").write_text(RESULTS)
-    command = [
-        sys.executable,
-        "-m",
-        "mypy",
-        "--config-file",
-        "mypy.ini",
-        "--cache-dir",
-        str(ROOT / ".mypy_cache" / "pages"),
-    ]
+    settings = folder / "pyproject.toml"
+    settings.write_text(_OWN + _MORE.format(modules=json.dumps([*modules, "results"])), encoding="utf-8")
+    command = [sys.executable, "-m", "mypy", "--config-file", settings, "--cache-dir", Path(sys.prefix) / "mypy"]
     if np.lib.NumpyVersion(np.__version__) < "2.2.0":
         command += ["--disable-error-code", "type-arg"]  # its ndarray names no type of elements by itself
     done = subprocess.run(
-        [*command, *sorted(path.name for path in folder.glob("*.py"))],
-        capture_output=True, text=True, check=False, cwd=folder, env={**os.environ, "MYPYPATH": MYPYPATH},
+        [*command, *sorted(folder.glob("*.py"))],
+        capture_output=True, text=True, check=False, cwd=ROOT, env={**os.environ, "MYPYPATH": str(folder)},
     )  # fmt: skip
     assert done.returncode in (0, 1), done.stderr
-    return done.stdout.splitlines()
+    return [line.removeprefix(f"{folder}{os.sep}") for line in done.stdout.splitlines()]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=page_name)
