@@ -11,7 +11,7 @@ from file_mutants import mutant, samples
 from limited_child import MIB, LimitedChild
 from soaking import SOAK
 
-ROUNDS = 40
+ROUNDS = 40 if SOAK else 12
 
 
 @pytest.fixture(scope="module")
