@@ -141,7 +141,7 @@ def test_stamps_since_1970_are_told_in_every_unit_at_every_rate(unit, since, rat
 
 
 @pytest.mark.parametrize(
-    ("step", "unit"), [(4.99, "s"), (5.0, "ms"), (999.0, "ms"), (1e3, "us"), (999e3, "us"), (1e6, "ns")]
+    ("step", "unit"), [(4.99, "s"), (5.0, "ms"), (999.0, "ms"), (1e3, "us"), (199e3, "us"), (1e6, "ns")]
 )
 def test_steps_of_stamps_that_count_from_anywhere_say_their_unit(step, unit):
     assert unit_by_size(step * np.arange(20.0))[0] == unit
@@ -195,7 +195,7 @@ def test_the_state_of_joints_as_rostopic_writes_it_has_the_columns_of_the_bag(tm
     (tmp_path / "a.csv").write_text("\n".join([",".join(heads), *rows]))
     read = kineme.read_recordings(tmp_path / "a.csv")
     assert read.demonstrations.dimensions == tuple(joints)
-    assert {one.kind for one in read.demonstrations.channels} == {"angle"}
+    assert {channel.kind for channel in read.demonstrations.channels} == {"angle"}
     np.testing.assert_allclose(read.demonstrations[0].positions[5], [0.1 * j + np.sin(0.5) for j in range(6)])
 
 
@@ -235,7 +235,9 @@ def test_ticks_of_100_ns_are_known_by_their_year_or_by_the_head(tmp_path, head, 
 def test_ticks_of_unknown_length_are_refused_until_it_is_said(tmp_path):
     rows = [f"{k * 333_333},{k},{k * k}" for k in range(30)]
     (tmp_path / "a.csv").write_text("\n".join(["ticks,x,y", *rows]))
-    with pytest.raises(kineme.errors.DataError, match=r"got 'ticks' in steps of 333333; .* units='100ns' .* --units"):
+    with pytest.raises(
+        kineme.errors.DataError, match=r"got 'ticks' in steps of 333333; .* units='us', '100ns' .* --units"
+    ):
         kineme.read_recordings(tmp_path / "a.csv", time="ticks")
     recordings = kineme.read_recordings(tmp_path / "a.csv", time="ticks", units="100ns")
     np.testing.assert_allclose(np.diff(recordings.demonstrations[0].times), 1 / 30, rtol=1e-5)
