@@ -237,7 +237,7 @@ def _bag(kind, compress=False):
         messages.append(("/chat", ns, m.string("wave")))
     with tempfile.TemporaryDirectory() as folder:
         path = write_bag(folder, kind, messages, compress=compress)
-        files = [path] if path.is_file() else [one for one in path.iterdir() if one.name != "metadata.yaml"]
+        files = [path] if path.is_file() else [part for part in path.iterdir() if part.name != "metadata.yaml"]
         return files[0].read_bytes()
 
 
@@ -247,7 +247,7 @@ def _lerobot(write):
     buffer = io.BytesIO()
     with tempfile.TemporaryDirectory() as name, zipfile.ZipFile(buffer, "w") as archive:
         folder = write(Path(name) / "set", lengths=(8, 9, 10))
-        for path in sorted(one for one in folder.rglob("*") if one.is_file()):
+        for path in sorted(path for path in folder.rglob("*") if path.is_file()):
             archive.writestr(str(path.relative_to(folder)), path.read_bytes())
     return buffer.getvalue()
 
@@ -264,8 +264,8 @@ def _elan():
 
 def _label_tables():
     rows = [{"start": 0.1, "end": 0.4, "label": "wave"}, {"start": 0.5, "end": 0.9, "label": "nod, twice"}]
-    lines = "\n".join(f'{one["start"]},{one["end"]},"{one["label"]}"' for one in rows)
-    tracks = "\n".join(f"{one['start']}\t{one['end']}\t{one['label']}" for one in rows)
+    lines = "\n".join(f'{row["start"]},{row["end"]},"{row["label"]}"' for row in rows)
+    tracks = "\n".join(f"{row['start']}\t{row['end']}\t{row['label']}" for row in rows)
     return {
         "named.labels.csv": f"start,end,label\n{lines}\n".encode(),
         "named.labels.txt": f"{tracks}\n\\\t1\t2\n".encode(),
@@ -399,7 +399,7 @@ def _word(rng, data, at):
 def _zip_mutant(rng, data):
     """One member damaged under a right checksum, or renamed, doubled, dropped."""
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        members = [(one.filename, archive.read(one)) for one in archive.infolist()]
+        members = [(member.filename, archive.read(member)) for member in archive.infolist()]
     k = int(rng.integers(len(members)))
     name, content = members[k]
     what = rng.random()
@@ -434,7 +434,7 @@ def _mat_mutant(rng, data):
     for _ in range(int(rng.integers(1, 4))):
         parts[k] = _damaged(rng, parts[k])
     packed = [zlib.compress(part) for part in parts]
-    return data[:128] + b"".join(b"\x0f\0\0\0" + len(one).to_bytes(4, "little") + one for one in packed)
+    return data[:128] + b"".join(b"\x0f\0\0\0" + len(element).to_bytes(4, "little") + element for element in packed)
 
 
 def read_mutant(name, data):
@@ -456,12 +456,12 @@ def read_mutant(name, data):
 def _read_lerobot(folder, data):
     """Read the data set, and copy it with a text about an episode."""
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        for one in archive.infolist():
-            path = folder / one.filename
+        for member in archive.infolist():
+            path = folder / member.filename
             with contextlib.suppress(OSError):  # of names that are no paths
                 if folder.resolve() in path.resolve().parents:
                     path.parent.mkdir(parents=True, exist_ok=True)
-                    path.write_bytes(archive.read(one))
+                    path.write_bytes(archive.read(member))
     n = check_recordings(kineme.read_recordings(folder))
     target = folder.parent / "copy"
     target.mkdir()

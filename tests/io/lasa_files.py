@@ -18,12 +18,12 @@ def demonstrations():
     return kineme.load_lasa(SHAPES)
 
 
-def _slug(one):
-    return one.name.replace(" ", "_")
+def _slug(movement):
+    return movement.name.replace(" ", "_")
 
 
 def _columns(demos):
-    names = np.repeat([_slug(one) for one in demos], demos.lengths)
+    names = np.repeat([_slug(movement) for movement in demos], demos.lengths)
     labels = np.repeat(demos.labels, demos.lengths)
     return {"demo": names, "label": labels, "time": demos.times, "x": demos.positions[:, 0], "y": demos.positions[:, 1]}
 
@@ -35,30 +35,34 @@ def _rows(columns, separator):
 
 
 def _per_movement(folder, ending, write):
-    for one in demonstrations():
-        (folder / one.label).mkdir(exist_ok=True)
-        write(folder / one.label / (_slug(one) + ending), one)
+    for movement in demonstrations():
+        (folder / movement.label).mkdir(exist_ok=True)
+        write(folder / movement.label / (_slug(movement) + ending), movement)
     return folder
 
 
-def _of_one(one):
-    return {"time": one.times, "x": one.positions[:, 0], "y": one.positions[:, 1]}
+def _of_one(movement):
+    return {"time": movement.times, "x": movement.positions[:, 0], "y": movement.positions[:, 1]}
 
 
 def csv_folder(folder):
-    return _per_movement(folder, ".csv", lambda path, one: path.write_text(_rows(_of_one(one), ",")))
+    return _per_movement(folder, ".csv", lambda path, movement: path.write_text(_rows(_of_one(movement), ",")))
 
 
 def tsv_folder(folder):
-    return _per_movement(folder, ".tsv", lambda path, one: path.write_text(_rows(_of_one(one), "\t")))
+    return _per_movement(folder, ".tsv", lambda path, movement: path.write_text(_rows(_of_one(movement), "\t")))
 
 
 def npz_folder(folder):
-    return _per_movement(folder, ".npz", lambda path, one: np.savez(path, times=one.times, positions=one.positions))
+    return _per_movement(
+        folder, ".npz", lambda path, movement: np.savez(path, times=movement.times, positions=movement.positions)
+    )
 
 
 def parquet_folder(folder):
-    return _per_movement(folder, ".parquet", lambda path, one: parquet.write_table(pa.table(_of_one(one)), path))
+    return _per_movement(
+        folder, ".parquet", lambda path, movement: parquet.write_table(pa.table(_of_one(movement)), path)
+    )
 
 
 def matlab_folder(folder):
@@ -84,8 +88,8 @@ def long_parquet(folder):
 
 
 def numbered_npz(folder):
-    arrays = {f"x_{k}": one.positions for k, one in enumerate(demonstrations())}
-    times = {f"t_{k}": one.times for k, one in enumerate(demonstrations())}
+    arrays = {f"x_{k}": movement.positions for k, movement in enumerate(demonstrations())}
+    times = {f"t_{k}": movement.times for k, movement in enumerate(demonstrations())}
     np.savez(folder / "all.npz", **arrays, **times, labels=demonstrations().labels.astype(str))
     return folder / "all.npz"
 
@@ -110,8 +114,8 @@ def joined_npz(folder):
 
 
 SOURCES = {
-    one.__name__: one
-    for one in (
+    write.__name__: write
+    for write in (
         csv_folder, tsv_folder, npz_folder, parquet_folder, matlab_folder,
         long_csv, long_semicolons, long_parquet, numbered_npz, block_npz, joined_npz,
     )

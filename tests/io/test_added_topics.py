@@ -29,12 +29,15 @@ def reader(path):
 def raw_messages(path):
     """(topic, type, definition's checksum, time, bytes) of all messages, in the order of reading."""
     with reader(path) as bag:
-        return [(one.topic, one.msgtype, one.digest, t, bytes(raw)) for one, t, raw in bag.messages()]
+        return [
+            (connection.topic, connection.msgtype, connection.digest, t, bytes(raw))
+            for connection, t, raw in bag.messages()
+        ]
 
 
 def texts_of(path, kind):
-    known = store(kind)
-    parse = known.deserialize_ros1 if kind == "ros1" else known.deserialize_cdr
+    types = store(kind)
+    parse = types.deserialize_ros1 if kind == "ros1" else types.deserialize_cdr
     return [(t, parse(raw, name).data) for topic, name, _, t, raw in raw_messages(path) if topic == TOPIC]
 
 
@@ -58,7 +61,7 @@ def copied(source, target, texts=TEXTS):
 def test_all_other_messages_are_the_same_bytes(tmp_path, kind, compress):
     source = recorded(tmp_path, kind, compress)
     target = copied(source, tmp_path / ("named.bag" if kind == "ros1" else "named"))
-    assert [one for one in raw_messages(target) if one[0] != TOPIC] == raw_messages(source)
+    assert [message for message in raw_messages(target) if message[0] != TOPIC] == raw_messages(source)
     assert texts_of(target, kind) == sorted(TEXTS)
     with reader(source) as old, reader(target) as new:
         assert set(new.topics) == {*old.topics, TOPIC}
@@ -66,18 +69,18 @@ def test_all_other_messages_are_the_same_bytes(tmp_path, kind, compress):
         assert new.topics[TOPIC].msgcount == len(TEXTS)
         assert (new.start_time, new.end_time) == (old.start_time, old.end_time)
         assert new.message_count == old.message_count + len(TEXTS)
-    times = [one[3] for one in raw_messages(target)]
+    times = [message[3] for message in raw_messages(target)]
     assert times == sorted(times)
 
 
 def test_texts_are_asked_for_with_the_times_of_the_first_and_the_last_message(tmp_path):
-    known = [*stamps(), *(ns + 5 for ns in stamps(20)), *(ns + 7 for ns in stamps(3))]
-    asked = []
+    recorded_at = [*stamps(), *(ns + 5 for ns in stamps(20)), *(ns + 7 for ns in stamps(3))]
+    spans = []
     for kind in KINDS:
         source = recorded(tmp_path, kind, name=kind)
         target = tmp_path / f"named_{kind}{source.suffix}"
-        copy_with_topic(source, target, TOPIC, lambda *span: asked.append(span) or TEXTS)
-    assert asked == [(min(known), max(known))] * len(KINDS)
+        copy_with_topic(source, target, TOPIC, lambda *span: spans.append(span) or TEXTS)
+    assert spans == [(min(recorded_at), max(recorded_at))] * len(KINDS)
 
 
 def test_messages_outside_of_the_recording_extend_it(tmp_path):
@@ -95,13 +98,13 @@ def test_a_bare_file_of_ros_2(tmp_path, ending):
     kind = "mcap" if ending == ".mcap" else "sqlite3"
     source = recorded(tmp_path, kind) / f"run{ending}"
     target = copied(source, tmp_path / f"named{ending}")
-    assert [one for one in raw_messages(target) if one[0] != TOPIC] == raw_messages(source)
+    assert [message for message in raw_messages(target) if message[0] != TOPIC] == raw_messages(source)
     assert texts_of(target, kind) == sorted(TEXTS)
 
 
 def test_a_copy_is_compressed_as_its_bag(tmp_path):
-    kept = recorded(tmp_path, "ros1", compress=True, name="lz4"), recorded(tmp_path, "ros1", name="none")
-    for source in kept:
+    sources = recorded(tmp_path, "ros1", compress=True, name="lz4"), recorded(tmp_path, "ros1", name="none")
+    for source in sources:
         data = copied(source, tmp_path / f"b_{source.name}").read_bytes()
         assert set(re.findall(rb"compression=(\w+)", data)) == {source.stem.encode()}
         # a version of 1, independent blocks, no size, a checksum of the content: what roslz4 reads
@@ -119,7 +122,7 @@ def test_connections_that_are_equal_become_one(tmp_path):
     with reader(source) as old, reader(copied(source, tmp_path / "b.bag")) as new:
         assert [len(old.topics["/aa"].connections), len(new.topics["/aa"].connections)] == [2, 1]
         assert old.topics["/aa"].msgcount == new.topics["/aa"].msgcount == 10
-    assert [one for one in raw_messages(tmp_path / "b.bag") if one[0] != TOPIC] == raw_messages(source)
+    assert [message for message in raw_messages(tmp_path / "b.bag") if message[0] != TOPIC] == raw_messages(source)
 
 
 def plain(message):
@@ -137,8 +140,8 @@ def test_the_package_mcap_reads_the_copy(tmp_path):
         read = make_reader(file, validate_crcs=True)
         new = [(channel.topic, plain(message)) for _, channel, message in read.iter_messages()]
         counts = read.get_summary().statistics
-    assert [one for one in new if one[0] != TOPIC] == old
-    assert [one["log_time"] for name, one in new if name == TOPIC] == [t for t, _ in sorted(TEXTS)]
+    assert [message for message in new if message[0] != TOPIC] == old
+    assert [message["log_time"] for name, message in new if name == TOPIC] == [t for t, _ in sorted(TEXTS)]
     assert counts.message_count == len(new)
 
 
@@ -148,31 +151,31 @@ def test_checksums_attachments_and_metadata_of_an_mcap_stay(tmp_path):
 
     source = tmp_path / "a.mcap"
     with source.open("wb") as file:
-        one = writer.Writer(file, chunk_size=300, enable_crcs=True, enable_data_crcs=True)
-        one.start(profile="ros2", library="test")
-        channel = one.register_channel(
-            "/s", "cdr", one.register_schema("std_msgs/msg/String", "ros2msg", b"string data")
+        mcap = writer.Writer(file, chunk_size=300, enable_crcs=True, enable_data_crcs=True)
+        mcap.start(profile="ros2", library="test")
+        channel = mcap.register_channel(
+            "/s", "cdr", mcap.register_schema("std_msgs/msg/String", "ros2msg", b"string data")
         )
         raw = bytes(store("mcap").serialize_cdr(Maker("mcap").string("x" * 50), "std_msgs/msg/String"))
         for k, ns in enumerate(stamps()):
-            one.add_message(channel, ns, raw, ns - 10**9, k)
-        one.add_attachment(START, START, "notes.txt", "text/plain", b"abc")
-        one.add_metadata("who", {"person": "anna"})
-        one.finish()
+            mcap.add_message(channel, ns, raw, ns - 10**9, k)
+        mcap.add_attachment(START, START, "notes.txt", "text/plain", b"abc")
+        mcap.add_metadata("who", {"person": "anna"})
+        mcap.finish()
     target = copied(source, tmp_path / "b.mcap")
     with target.open("rb") as file:
         read = make_reader(file, validate_crcs=True)
         messages = [(c.topic, m.sequence, m.publish_time) for _, c, m in read.iter_messages() if c.topic != TOPIC]
         assert messages == [("/s", k, ns - 10**9) for k, ns in enumerate(stamps())]
-        assert [one.data for one in read.iter_attachments()] == [b"abc"]
-        assert [one.metadata for one in read.iter_metadata()] == [{"person": "anna"}]
+        assert [attachment.data for attachment in read.iter_attachments()] == [b"abc"]
+        assert [metadata.metadata for metadata in read.iter_metadata()] == [{"person": "anna"}]
     from mcap.records import Message
     from mcap.stream_reader import StreamReader
 
     with target.open("rb") as file:
         records = list(StreamReader(file, validate_crcs=True).records)
     assert len(records) > 50
-    times = [one.log_time for one in records if isinstance(one, Message)]
+    times = [record.log_time for record in records if isinstance(record, Message)]
     assert times == sorted(times)  # whenever they were published
 
 
@@ -182,13 +185,13 @@ def test_an_mcap_without_chunks_or_index_is_copied_with_both(tmp_path, options):
     writer = pytest.importorskip("mcap.writer")
     if "index_types" in options:
         options = {"index_types": writer.IndexType.NONE}
-    known = store("mcap")
-    raw = bytes(known.serialize_cdr(Maker("mcap").string("x"), "std_msgs/msg/String"))
+    types = store("mcap")
+    raw = bytes(types.serialize_cdr(Maker("mcap").string("x"), "std_msgs/msg/String"))
     messages = [("/s", "std_msgs/msg/String", ns, raw) for ns in stamps(5)]
     write_mcap(tmp_path / "a.mcap", messages, **options)
     target = copied(tmp_path / "a.mcap", tmp_path / "b.mcap")
     assert texts_of(target, "mcap") == sorted(TEXTS)
-    assert [one[3:] for one in raw_messages(target) if one[0] != TOPIC] == [(ns, raw) for ns in stamps(5)]
+    assert [message[3:] for message in raw_messages(target) if message[0] != TOPIC] == [(ns, raw) for ns in stamps(5)]
 
 
 def test_chunks_of_a_copy_overlap_no_more_than_those_of_the_file(tmp_path):
@@ -198,7 +201,7 @@ def test_chunks_of_a_copy_overlap_no_more_than_those_of_the_file(tmp_path):
     source = write_bag(tmp_path, "mcap", [("/s", ns, text) for ns in stamps(50)])
     texts = [(ns + 1, "x") for ns in stamps(50)]
     with reader(copied(source, tmp_path / "b", texts)) as new:
-        spans = [(one.message_start_time, one.message_end_time) for one in new.storage.storages[0].chunks]
+        spans = [(chunk.message_start_time, chunk.message_end_time) for chunk in new.storage.storages[0].chunks]
     assert len(spans) > 3
     assert all(end <= start for (_, end), (start, _) in pairwise(spans))
 
@@ -223,13 +226,15 @@ def test_how_topics_were_offered_stays(tmp_path, kind, version):
         )
         plain = writer.add_connection("/t", "std_msgs/msg/String", typestore=store(kind))
         for ns in stamps(5):
-            for one in (static, plain):
-                writer.write(one, ns, store(kind).serialize_cdr(m.string("x"), "std_msgs/msg/String"))
+            for messages in (static, plain):
+                writer.write(messages, ns, store(kind).serialize_cdr(m.string("x"), "std_msgs/msg/String"))
     with reader(tmp_path / "run") as old, reader(copied(tmp_path / "run", tmp_path / "named")) as new:
-        before = [one._replace(owner=None) for one in old.connections]
-        assert [one._replace(owner=None) for one in new.connections if one.topic != TOPIC] == before
+        before = [connection._replace(owner=None) for connection in old.connections]
+        assert [
+            connection._replace(owner=None) for connection in new.connections if connection.topic != TOPIC
+        ] == before
         assert before[0].ext.offered_qos_profiles == offered()
-        (added,) = (one for one in new.connections if one.topic == TOPIC)
+        (added,) = (connection for connection in new.connections if connection.topic == TOPIC)
         assert (added.ext.serialization_format, added.ext.offered_qos_profiles) == ("cdr", [])
         assert new.message_count == 10 + len(TEXTS)
         assert (new.start_time, new.duration) == (old.start_time, max(old.duration, SECOND // 4 + 1))
@@ -238,16 +243,23 @@ def test_how_topics_were_offered_stays(tmp_path, kind, version):
 def test_who_published_and_what_is_latched_stays_in_a_bag_of_ros_1(tmp_path):
     from rosbags.rosbag1 import Writer
 
-    m, known = Maker("ros1"), store("ros1")
+    m, types = Maker("ros1"), store("ros1")
     with Writer(tmp_path / "run.bag") as writer:
         for who in ("/node_a", "/node_b"):
-            one = writer.add_connection("/s", "std_msgs/msg/String", typestore=known, callerid=who, latching=1)
+            new_connection = writer.add_connection(
+                "/s", "std_msgs/msg/String", typestore=types, callerid=who, latching=1
+            )
             for ns in stamps(5):
-                writer.write(one, ns, known.serialize_ros1(m.string(who), "std_msgs/msg/String"))
+                writer.write(new_connection, ns, types.serialize_ros1(m.string(who), "std_msgs/msg/String"))
     with reader(tmp_path / "run.bag") as old, reader(copied(tmp_path / "run.bag", tmp_path / "named.bag")) as new:
-        before = [one._replace(owner=None) for one in old.connections]
-        assert [(one.ext.callerid, one.ext.latching) for one in before] == [("/node_a", 1), ("/node_b", 1)]
-        assert [one._replace(owner=None) for one in new.connections if one.topic != TOPIC] == before
+        before = [connection._replace(owner=None) for connection in old.connections]
+        assert [(connection.ext.callerid, connection.ext.latching) for connection in before] == [
+            ("/node_a", 1),
+            ("/node_b", 1),
+        ]
+        assert [
+            connection._replace(owner=None) for connection in new.connections if connection.topic != TOPIC
+        ] == before
 
 
 def test_each_message_goes_into_the_file_of_its_time(tmp_path):
@@ -261,8 +273,8 @@ def test_each_message_goes_into_the_file_of_its_time(tmp_path):
     database.close()
     shutil.move(second / "b.db3", first / "b.db3")
     yaml = YAML()
-    whole = yaml.load(first / "metadata.yaml")
-    about = whole["rosbag2_bagfile_information"]
+    metadata = yaml.load(first / "metadata.yaml")
+    about = metadata["rosbag2_bagfile_information"]
     about["relative_file_paths"].append("b.db3")
     about["message_count"] *= 2
     for topic in about["topics_with_message_count"]:
@@ -271,16 +283,16 @@ def test_each_message_goes_into_the_file_of_its_time(tmp_path):
     later = {"path": "b.db3", "starting_time": {"nanoseconds_since_epoch": START + 10 * SECOND}}
     about["files"].append({**later, "duration": {"nanoseconds": SECOND}, "message_count": 73})
     about["custom_data"] = {"who": "anna"}
-    yaml.dump(whole, first / "metadata.yaml")
+    yaml.dump(metadata, first / "metadata.yaml")
     texts = [(START - 9, "before a"), (START + SECOND // 4, "in a")]
     texts += [(START + 10 * SECOND + 9, "in b"), (START + 10 * SECOND + 10, "in b")]
     target = copied(first, tmp_path / "named", texts)
     assert texts_of(target / "a.db3", "sqlite3") == texts[:2]
     assert texts_of(target / "b.db3", "sqlite3") == texts[2:]
     assert texts_of(target, "sqlite3") == texts
-    assert [one for one in raw_messages(target) if one[0] != TOPIC] == raw_messages(first)
+    assert [message for message in raw_messages(target) if message[0] != TOPIC] == raw_messages(first)
     new = yaml.load(target / "metadata.yaml")["rosbag2_bagfile_information"]
-    assert [one["message_count"] for one in new["files"]] == [75, 75]
+    assert [file["message_count"] for file in new["files"]] == [75, 75]
     assert new["custom_data"] == {"who": "anna"}
 
 
@@ -314,14 +326,14 @@ def test_files_that_are_compressed_as_a_whole_are_refused(tmp_path):
 
     source = recorded(tmp_path, "mcap")
     yaml = YAML()
-    whole = yaml.load(source / "metadata.yaml")
+    metadata = yaml.load(source / "metadata.yaml")
     from rosbags.rosbag2.storage_mcap import zstd
 
     (source / "run.mcap.zstd").write_bytes(zstd.compress((source / "run.mcap").read_bytes()))
     (source / "run.mcap").unlink()
-    about = whole["rosbag2_bagfile_information"]
+    about = metadata["rosbag2_bagfile_information"]
     about |= {"compression_mode": "file", "compression_format": "zstd", "relative_file_paths": ["run.mcap.zstd"]}
-    yaml.dump(whole, source / "metadata.yaml")
+    yaml.dump(metadata, source / "metadata.yaml")
     with pytest.raises(kineme.errors.DataError, match=r"not compressed as a whole.*ros2 bag convert"):
         copied(source, tmp_path / "b")
 

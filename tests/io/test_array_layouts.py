@@ -39,12 +39,12 @@ def read(arrays, **options):
     ],
 )
 def test_natural_layouts(arrays, places, layout):
-    found = read(arrays)
-    assert [one.place for one in found.sources] == places
-    assert found.detected[0][0].layout == layout
-    for one in found.demonstrations:
-        np.testing.assert_array_equal(one.times, T)
-        np.testing.assert_array_equal(one.positions, X)
+    recordings = read(arrays)
+    assert [source.place for source in recordings.sources] == places
+    assert recordings.detected[0][0].layout == layout
+    for movement in recordings.demonstrations:
+        np.testing.assert_array_equal(movement.times, T)
+        np.testing.assert_array_equal(movement.positions, X)
 
 
 SKELETON = np.sin(np.linspace(0, 3, 40))[:, None, None] + np.random.default_rng(0).normal(size=(7, 3))  # (40, 7, 3)
@@ -80,14 +80,14 @@ def test_joints_over_time_are_no_movements_of_joints(tmp_path, kind):
         kineme.errors.DataError, match=r"shape \(40, 7, 3\), which may be one .* say every=40 if it is, every=7 if"
     ):
         read_recordings(path, units=0.02)
-    (one,) = read_recordings(path, units=0.02, every=40).demonstrations
-    np.testing.assert_array_equal(one.positions, SKELETON.reshape(40, 21))
-    assert [(channel.name, channel.kind) for channel in one.channels] == [
+    (skeleton,) = read_recordings(path, units=0.02, every=40).demonstrations
+    np.testing.assert_array_equal(skeleton.positions, SKELETON.reshape(40, 21))
+    assert [(channel.name, channel.kind) for channel in skeleton.channels] == [
         (f"{k}.{axis}", "position") for k in range(7) for axis in "xyz"
     ]
-    assert one.duration == pytest.approx(39 * 0.02)
+    assert skeleton.duration == pytest.approx(39 * 0.02)
     many = read_recordings(path, units=0.02, every=7).demonstrations
-    np.testing.assert_array_equal([one.positions for one in many], SKELETON)
+    np.testing.assert_array_equal([movement.positions for movement in many], SKELETON)
 
 
 def test_movements_of_one_coordinate_are_no_points(tmp_path):
@@ -104,9 +104,9 @@ def test_times_say_which_axis_of_three_is_time(tmp_path, kind, name):
         np.savez(path, **{name: SKELETON, "times": times})
     else:
         path.write_text(json.dumps({name: SKELETON.tolist(), "times": times.tolist()}))
-    (one,) = read_recordings(path).demonstrations
-    np.testing.assert_array_equal(one.positions, SKELETON.reshape(40, 21))
-    np.testing.assert_array_equal(one.times, times)
+    (movement,) = read_recordings(path).demonstrations
+    np.testing.assert_array_equal(movement.positions, SKELETON.reshape(40, 21))
+    np.testing.assert_array_equal(movement.times, times)
     if name == "positions":
         np.savez(path.with_suffix(".npz"), positions=np.moveaxis(SKELETON, 1, 0), times=times)
         assert len(read_recordings(path.with_suffix(".npz"))) == 7
@@ -120,10 +120,10 @@ def test_labels_become_text(labels, expected):
 
 
 def test_without_times_each_movement_takes_a_second_unless_the_step_is_given():
-    found = read({"x_0": X, "x_1": X[:4]})
-    np.testing.assert_array_equal(found.demonstrations.durations, [1, 1])
-    assert found.detected[0][0].units_from == "no times: one second each"
-    assert found.detected[0][0].time is None
+    recordings = read({"x_0": X, "x_1": X[:4]})
+    np.testing.assert_array_equal(recordings.demonstrations.durations, [1, 1])
+    assert recordings.detected[0][0].units_from == "no times: one second each"
+    assert recordings.detected[0][0].time is None
     stepped = read({"x_0": X, "x_1": X[:4]}, units=0.1)
     np.testing.assert_allclose(stepped.demonstrations.durations, [0.4, 0.3])
 
@@ -171,9 +171,9 @@ def test_arrays_that_do_not_fit_together(arrays, words):
 def test_a_bad_movement_among_arrays_costs_itself_alone():
     bad = X.copy()
     bad[2, 1] = np.nan
-    found = read({"x_0": X, "x_1": bad, "x_2": X[:2], "t_0": T, "t_1": T, "t_2": T[:2]}, fill_gaps=0)
-    assert [one.place for one in found.sources] == ["0"]
-    lacking, short = [one.reason for one in found.problems]
+    recordings = read({"x_0": X, "x_1": bad, "x_2": X[:2], "t_0": T, "t_1": T, "t_2": T[:2]}, fill_gaps=0)
+    assert [source.place for source in recordings.sources] == ["0"]
+    lacking, short = [problem.reason for problem in recordings.problems]
     assert lacking.startswith("movement 1: expected a number in 'y', got nothing in ")
     assert short == "movement 2: expected at least 4 samples, got 2"
 
@@ -190,8 +190,8 @@ def test_the_arrays_of_the_caller_are_left_alone():
     x, t = X.copy(), T.copy() * 1000
     x.setflags(write=False)
     t.setflags(write=False)
-    found = arrays_movements({"positions": x, "times": t}, Layout(), "NPZ")
-    assert not np.shares_memory(found.block.times, t)
+    parsed = arrays_movements({"positions": x, "times": t}, Layout(), "NPZ")
+    assert not np.shares_memory(parsed.block.times, t)
 
 
 def test_json_knows_the_same_layouts(tmp_path):
@@ -231,10 +231,10 @@ def matlab(path, content):
 
 
 def demos(n, transpose=False):
-    found = np.empty(n, dtype=object)
+    ragged = np.empty(n, dtype=object)
     for k in range(n):
-        found[k] = {"pos": X[:, :2].T, "t": T[None], "vel": X[:, :2].T}
-    return found
+        ragged[k] = {"pos": X[:, :2].T, "t": T[None], "vel": X[:, :2].T}
+    return ragged
 
 
 @pytest.mark.parametrize("n", [1, 3])

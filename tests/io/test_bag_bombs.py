@@ -54,7 +54,7 @@ def bomb(folder, kind, compression):
 
 
 def file_of(path):
-    return path if path.is_file() else next(one for one in sorted(path.iterdir()) if one.name != "metadata.yaml")
+    return path if path.is_file() else next(file for file in sorted(path.iterdir()) if file.name != "metadata.yaml")
 
 
 def refusal(child, path):
@@ -107,8 +107,8 @@ def test_a_bomb_of_the_package_mcap(tmp_path, child, compression, indexed):
 
     options = {} if indexed else {"index_types": IndexType.NONE, "use_statistics": False, "use_summary_offsets": False}
     options |= {} if indexed else {"repeat_channels": False, "repeat_schemas": False}
-    raw = (bytes(store("mcap").serialize_cdr(one, one.__msgtype__)) for _, _, one in joints("mcap"))
-    messages = [("/joints", "sensor_msgs/msg/JointState", START + k, one) for k, one in enumerate(raw)]
+    raw = (bytes(store("mcap").serialize_cdr(message, message.__msgtype__)) for _, _, message in joints("mcap"))
+    messages = [("/joints", "sensor_msgs/msg/JointState", START + k, data) for k, data in enumerate(raw)]
     messages += [("/joints", "sensor_msgs/msg/JointState", START + SECOND, bytes(SIZE))]
     path = write_mcap(tmp_path / "a.mcap", messages, compression=CompressionType[compression], **options)
     assert "a chunk of MCAP at byte" in refusal(child, path)
@@ -122,7 +122,7 @@ def test_a_message_whose_size_is_not_said(tmp_path, child):
     stream = zstd.ZstdCompressor()
     raw = b"".join(stream.compress(bytes(MIB)) for _ in range(SIZE // MIB)) + stream.flush()
     assert zstd.get_frame_info(raw).decompressed_size is None
-    some = [(topic, ns, (one.__msgtype__, compressed(one))) for topic, ns, one in joints("mcap")]
+    some = [(topic, ns, (message.__msgtype__, compressed(message))) for topic, ns, message in joints("mcap")]
     path = write_bag(tmp_path, "mcap", [*some, ("/joints", START + SECOND, ("sensor_msgs/msg/JointState", raw))])
     metadata = (path / "metadata.yaml").read_text()
     metadata = metadata.replace("compression_mode: ''", "compression_mode: message")
@@ -175,8 +175,8 @@ def test_chunks_of_one_time_are_in_memory_together(tmp_path, child, at_once):
     messages = []
     for k in range(4):
         ns = START + (0 if at_once else k * SECOND)
-        one = m.joint_state(ns, ["a"], [k])
-        raw = bytes(store("mcap").serialize_cdr(one, one.__msgtype__))
+        message = m.joint_state(ns, ["a"], [k])
+        raw = bytes(store("mcap").serialize_cdr(message, message.__msgtype__))
         messages += [("/joints", "sensor_msgs/msg/JointState", ns, raw), ("/other", "x/msg/Y", ns, bytes(40 * MIB))]
     path = write_mcap(tmp_path / "a.mcap", messages, chunk_size=30 * MIB)
     if at_once:

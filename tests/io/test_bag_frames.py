@@ -22,13 +22,13 @@ def matrices(rows):
 
 
 def tf(m, ns, *transforms, topic="/tf", late=0):
-    return topic, ns + late, m.tf(*(m.transform_stamped(ns, *one) for one in transforms))
+    return topic, ns + late, m.tf(*(m.transform_stamped(ns, *transform) for transform in transforms))
 
 
 def only(path, frame=None, **options):
     read = read_recordings(path, frame=frame, **options)
     (movement,) = read.demonstrations
-    return movement, read.detected[0][0], [one.reason for one in read.problems]
+    return movement, read.detected[0][0], [problem.reason for problem in read.problems]
 
 
 def a_robot(m, n=60):
@@ -110,7 +110,7 @@ def test_frames_and_topics_are_put_side_by_side(tmp_path):
     m = Maker("mcap")
     messages, base, *_ = a_robot(m)
     messages += [("/joints", ns, m.joint_state(ns, ["grip"], [k])) for k, ns in enumerate(stamps(60))]
-    path = write_bag(tmp_path, "mcap", sorted(messages, key=lambda one: one[1]))
+    path = write_bag(tmp_path, "mcap", sorted(messages, key=lambda message: message[1]))
     movement, how, _ = only(path, ["world:base", "base:hand"], topic="/joints")
     assert how.columns[0] == "world:base.position.x"
     assert how.columns[7] == "base:hand.position.x"

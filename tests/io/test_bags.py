@@ -13,14 +13,14 @@ EVERY = pytest.mark.parametrize("kind", KINDS)
 
 
 def seconds(ns):
-    return np.array([one // SECOND for one in ns]) + np.array([one % SECOND for one in ns]) / SECOND
+    return np.array([stamp // SECOND for stamp in ns]) + np.array([stamp % SECOND for stamp in ns]) / SECOND
 
 
 def only(path, **options):
     """The only movement of a bag, how it was read, and the problems."""
     read = read_recordings(path, **options)
     (movement,) = read.demonstrations
-    return movement, read.detected[0][0], [one.reason for one in read.problems]
+    return movement, read.detected[0][0], [problem.reason for problem in read.problems]
 
 
 @pytest.mark.parametrize("compress", [False, True])
@@ -123,7 +123,7 @@ def test_several_topics_are_put_side_by_side_at_the_stamps_of_the_first(tmp_path
     first, second = stamps(40, 100.0), stamps(30, 50.0, START - SECOND // 100)
     messages = [("/arm", ns, m.joint_state(ns, ["a"], [k])) for k, ns in enumerate(first)]
     messages += [("/grip", ns, m.joint_state(ns, ["g"], [(ns - START) / SECOND])) for ns in second]
-    path = write_bag(tmp_path, kind, sorted(messages, key=lambda one: one[1]))
+    path = write_bag(tmp_path, kind, sorted(messages, key=lambda message: message[1]))
     movement, how, problems = only(path, topic=["/arm", "grip"])
     assert how.columns == ("a", "g")
     np.testing.assert_allclose(movement.recorded[:, 0], range(40))
@@ -215,14 +215,14 @@ def test_each_planned_trajectory_is_a_movement(tmp_path, kind):
     messages.append(("/plan", START + 5, m.joint_trajectory("c", [0], [[1]])))
     messages.append(("/plan", START + 6, m.joint_trajectory("ab", [0], [[1]])))
     read = read_recordings(write_bag(tmp_path, kind, messages))
-    assert [(one.place, len(x)) for one, x in zip(read.sources, read.demonstrations, strict=True)] == [
+    assert [(source.place, len(x)) for source, x in zip(read.sources, read.demonstrations, strict=True)] == [
         ("0", 10),
         ("1", 12),
     ]
     how = read.detected[0][0]
     assert (how.columns, how.time, how.movement) == (("a", "b"), "time_from_start", ("message",))
     np.testing.assert_allclose(read.demonstrations[1].times, np.arange(12) / 10)
-    assert [one.reason for one in read.problems] == [
+    assert [problem.reason for problem in read.problems] == [
         "movement 2: expected at least 4 samples, got 2",
         "topic /plan: message 4: expected a position for each of 2 joints, got 1",
         "topic /plan: 1 message with other columns ['c']",

@@ -94,7 +94,7 @@ def test_ros_1_reads_a_copy_with_a_topic_more(bag, tmp_path):
     copy_with_topic(bag, tmp_path / "named.bag", "/kineme/annotations", lambda first, last: texts)
     _, before, counts = _read_by_ros(bag)
     said, after, all_counts = _read_by_ros(tmp_path / "named.bag")
-    assert said == [list(one) for one in texts]
+    assert said == [list(text) for text in texts]
     assert after == before
     assert all_counts == {**counts, "/kineme/annotations": 2}
 
@@ -120,7 +120,7 @@ def in_order_of_roscpp(data):
             fields.append(data[k : k + length])
             k += length
         body = end + 4 + int.from_bytes(data[end : end + 4], "little")
-        parts += [data[at : at + 4], *sorted(fields, key=lambda one: one[4:]), data[end:body]]
+        parts += [data[at : at + 4], *sorted(fields, key=lambda field: field[4:]), data[end:body]]
         at = body
     return b"".join(parts)
 
@@ -136,7 +136,7 @@ def test_a_copy_of_what_roscpp_recorded_is_read_by_all(bag, tmp_path, appended):
     copy_with_topic(path, copy, "/kineme/annotations", lambda first, last: texts)
     _, before, counts = _read_by_ros(path)
     said, after, all_counts = _read_by_ros(copy)
-    assert said == [list(one) for one in texts]
+    assert said == [list(text) for text in texts]
     assert sorted(after) == sorted(before)
     assert all_counts == {**counts, "/kineme/annotations": 1}
     assert counts.get("/later", 0) == 20 * appended

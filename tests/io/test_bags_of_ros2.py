@@ -113,8 +113,8 @@ def test_messages_of_ros_2(bag):
 
 def stored(path):
     """Topic, type, time of recording and bytes of all messages, by programs that are not used to read bags here."""
-    files = [path] if path.is_file() else [one for one in sorted(path.iterdir()) if one.suffix in (".mcap", ".db3")]
-    rows = [row for one in files for row in (in_mcap(one) if one.suffix == ".mcap" else in_sqlite(one))]
+    files = [path] if path.is_file() else [file for file in sorted(path.iterdir()) if file.suffix in (".mcap", ".db3")]
+    rows = [row for file in files for row in (in_mcap(file) if file.suffix == ".mcap" else in_sqlite(file))]
     is_each = path.is_dir() and "compression_mode: message" in (path / "metadata.yaml").read_text().lower()
     return [(*row[:3], expanded(row[3]) if is_each else row[3]) for row in rows]
 
@@ -124,7 +124,7 @@ def in_mcap(path):
 
     with path.open("rb") as file:
         read = make_reader(file, validate_crcs=True).iter_messages(log_time_order=False)
-        return [(channel.topic, schema.name, one.log_time, one.data) for schema, channel, one in read]
+        return [(channel.topic, schema.name, message.log_time, message.data) for schema, channel, message in read]
 
 
 def in_sqlite(path):

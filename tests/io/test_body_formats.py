@@ -42,12 +42,12 @@ def storage(kind="Quaternion"):
 @pytest.mark.parametrize("separator", ["\t", "  "])
 @pytest.mark.parametrize(("in_degrees", "unit"), [("yes", "deg"), ("no", "rad")])
 def test_coordinates_of_opensim_have_the_units_that_the_head_says(in_degrees, unit, separator):
-    found = read(motion(in_degrees, separator=separator), "walk.mot")
-    assert found.detected[0][0].format == "OpenSim CSV"
-    assert found.detected[0][0].measured_in == (unit, "m", unit)
-    assert [one.kind for one in found.demonstrations.channels] == ["angle", "position", "angle"]
-    np.testing.assert_allclose(found.demonstrations.times, T, atol=1e-7)
-    np.testing.assert_allclose(found.demonstrations.recorded[:, 2], np.sin(T + 2), atol=1e-7)
+    recordings = read(motion(in_degrees, separator=separator), "walk.mot")
+    assert recordings.detected[0][0].format == "OpenSim CSV"
+    assert recordings.detected[0][0].measured_in == (unit, "m", unit)
+    assert [channel.kind for channel in recordings.demonstrations.channels] == ["angle", "position", "angle"]
+    np.testing.assert_allclose(recordings.demonstrations.times, T, atol=1e-7)
+    np.testing.assert_allclose(recordings.demonstrations.recorded[:, 2], np.sin(T + 2), atol=1e-7)
 
 
 def test_forces_and_controls_of_opensim_have_no_unit_of_angles():
@@ -63,8 +63,8 @@ def test_forces_and_controls_of_opensim_have_no_unit_of_angles():
 def test_a_motion_file_of_simm_and_states_with_speeds():
     lines = ["name walk.mot", "datacolumns 3", f"datarows {N}", "otherdata 1", "range 0 0.4", "endheader"]
     rows = "\n".join(f"{t} {np.sin(t)} {np.cos(t)}" for t in T)
-    found = read("\n".join([*lines, "time\thip\tknee", rows]), "walk.mot")
-    assert found.demonstrations.dimensions == ("hip", "knee")
+    recordings = read("\n".join([*lines, "time\thip\tknee", rows]), "walk.mot")
+    assert recordings.demonstrations.dimensions == ("hip", "knee")
     hip = "/jointset/hip_r/hip_flexion_r"
     states = read(motion("no", "states", (f"{hip}/value", f"{hip}/speed")), "states.sto")
     assert states.detected[0][0].columns == (f"{hip}/value",)
@@ -72,12 +72,12 @@ def test_a_motion_file_of_simm_and_states_with_speeds():
 
 
 def test_cells_of_opensense_are_quaternions():
-    found = read(storage(), "imu.sto")
-    assert [(one.name, one.kind, one.order) for one in found.demonstrations.channels] == [
+    recordings = read(storage(), "imu.sto")
+    assert [(channel.name, channel.kind, channel.order) for channel in recordings.demonstrations.channels] == [
         ("pelvis_imu", "orientation", "wxyz"),
         ("tibia_r_imu", "orientation", "wxyz"),
     ]
-    np.testing.assert_allclose(found.demonstrations.recorded[:, 4:], quaternions(), atol=1e-12)
+    np.testing.assert_allclose(recordings.demonstrations.recorded[:, 4:], quaternions(), atol=1e-12)
     points = read(storage("Vec3"), "points.sto")
     assert points.detected[0][0].columns[3:] == ("tibia_r_imu.x", "tibia_r_imu.y", "tibia_r_imu.z")
 
@@ -118,15 +118,15 @@ def mvnx(times=None, doctype="", lost=None):
 
 
 def test_segments_of_mvnx_are_poses_and_joints_can_be_chosen():
-    found = read(mvnx(), "walk.mvnx")
-    how = found.detected[0][0]
+    recordings = read(mvnx(), "walk.mvnx")
+    how = recordings.detected[0][0]
     assert how.format == "Xsens MVNX"
     assert how.columns[:4] == ("Pelvis.position.x", "Pelvis.position.y", "Pelvis.position.z", "L5.position.x")
     assert {*how.measured_in} == {"m", ""}
-    np.testing.assert_allclose(found.demonstrations.times, T, atol=1e-12)
-    assert [one.kind for one in found.demonstrations.channels] == ["position"] * 6 + ["orientation"] * 2
+    np.testing.assert_allclose(recordings.demonstrations.times, T, atol=1e-12)
+    assert [channel.kind for channel in recordings.demonstrations.channels] == ["position"] * 6 + ["orientation"] * 2
     assert how.columns[6:10] == tuple(f"Pelvis.orientation.{part}" for part in "wxyz")
-    np.testing.assert_allclose(found.demonstrations.recorded[:, 6:10], quaternions(), atol=1e-8)
+    np.testing.assert_allclose(recordings.demonstrations.recorded[:, 6:10], quaternions(), atol=1e-8)
     assert "jL5S1.angle.x" in how.ignored
     joints = read(mvnx(), "walk.mvnx", columns="j*")
     assert joints.detected[0][0].measured_in == ("deg", "deg", "deg")
@@ -134,8 +134,8 @@ def test_segments_of_mvnx_are_poses_and_joints_can_be_chosen():
 
 
 def test_frames_of_mvnx_without_a_quantity_are_gaps_and_stamps_that_stand_still_follow_from_the_rate():
-    found = read(mvnx(lost=5), "walk.mvnx")
-    assert found.sources[0].filled == 1
+    recordings = read(mvnx(lost=5), "walk.mvnx")
+    assert recordings.sources[0].filled == 1
     np.testing.assert_allclose(read(mvnx(times=[0] * N), "walk.mvnx").demonstrations.times, T)
     late = [round(1000 * t) + 5 * (k == N - 1) for k, t in enumerate(T)]  # by more than a millisecond
     np.testing.assert_allclose(read(mvnx(times=late), "walk.mvnx").demonstrations.times, np.array(late) / 1e3)
@@ -199,15 +199,15 @@ def rotations(tmp_path_factory):
 
 def test_c3d_with_rotations_alone_is_poses_of_segments(rotations):
     data, poses, _ = rotations
-    found = read(data, "a.c3d")
-    assert [one.name for one in found.demonstrations.channels if one.kind == "orientation"] == [
+    recordings = read(data, "a.c3d")
+    assert [channel.name for channel in recordings.demonstrations.channels if channel.kind == "orientation"] == [
         "pelvis.orientation",
         "thigh.orientation",
     ]
-    assert found.detected[0][0].columns[:3] == ("pelvis.position.x", "pelvis.position.y", "pelvis.position.z")
-    assert found.detected[0][0].measured_in[:4] == ("mm", "mm", "mm", "")
-    np.testing.assert_allclose(found.demonstrations.times, T)
-    recorded = found.demonstrations.recorded
+    assert recordings.detected[0][0].columns[:3] == ("pelvis.position.x", "pelvis.position.y", "pelvis.position.z")
+    assert recordings.detected[0][0].measured_in[:4] == ("mm", "mm", "mm", "")
+    np.testing.assert_allclose(recordings.demonstrations.times, T)
+    recorded = recordings.demonstrations.recorded
     np.testing.assert_allclose(recorded[:, :3], poses[:3, 3, 0].T, atol=1e-4)
     np.testing.assert_allclose(recorded[:, 10:], np.column_stack([np.cos(T), np.sin(T), 0 * T, 0 * T]), atol=1e-6)
 
@@ -223,11 +223,13 @@ def test_unknown_rotations_of_c3d_are_gaps_and_a_truncated_file_says_so(rotation
 
 def test_rotations_beside_points_of_c3d_are_left_aside_unless_they_are_chosen(rotations):
     _, poses, data = rotations
-    found = read(data, "a.c3d")
-    assert found.detected[0][0].columns == ("A.x", "A.y", "A.z")
-    assert "pelvis.orientation.w" in found.detected[0][0].ignored
+    recordings = read(data, "a.c3d")
+    assert recordings.detected[0][0].columns == ("A.x", "A.y", "A.z")
+    assert "pelvis.orientation.w" in recordings.detected[0][0].ignored
     both = read(data, "a.c3d", columns=["A", "thigh"])
-    assert [one.name for one in both.demonstrations.channels if one.kind == "orientation"] == ["thigh.orientation"]
+    assert [channel.name for channel in both.demonstrations.channels if channel.kind == "orientation"] == [
+        "thigh.orientation"
+    ]
     np.testing.assert_allclose(both.demonstrations.recorded[:, 3:6], poses[:3, 3, 1].T, atol=1e-4)
 
 
@@ -260,5 +262,5 @@ def test_what_a_model_computed_in_c3d_is_no_place(tmp_path):
     assert len(places.detected[0][0].ignored) == 6
     chosen = ["LKneeAngles.x", "LKneeMoment.y"]
     angle = read((tmp_path / "a.c3d").read_bytes(), "a.c3d", columns=chosen).demonstrations
-    assert [one.unit for one in angle.channels] == ["deg", "Nmm"]
+    assert [channel.unit for channel in angle.channels] == ["deg", "Nmm"]
     np.testing.assert_array_equal(angle[0].recorded[:, 0], 21 + np.arange(20.0))

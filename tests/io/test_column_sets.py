@@ -48,9 +48,9 @@ def test_marker_files_in_millimeters_and_in_meters_have_one_unit(tmp_path):
     trc(tmp_path / "c.trc", "mm", 1000.0)
     recordings = kineme.read_recordings(tmp_path)
     assert (len(recordings), recordings.problems) == (3, ())
-    assert {one.unit for one in recordings.demonstrations.channels} == {"mm"}
-    for one in recordings.demonstrations:
-        np.testing.assert_allclose(one.positions, 1000.0 * (1 + PATH), rtol=1e-12)
+    assert {channel.unit for channel in recordings.demonstrations.channels} == {"mm"}
+    for movement in recordings.demonstrations:
+        np.testing.assert_allclose(movement.positions, 1000.0 * (1 + PATH), rtol=1e-12)
     assert "units are converted: m to mm" in inspect(recordings).notes
 
 
@@ -69,8 +69,8 @@ def test_units_in_heads_are_converted_to_those_of_most(tmp_path, here, there, fa
     recordings = kineme.read_recordings(tmp_path)
     assert (len(recordings), recordings.problems) == (3, ())
     assert recordings.demonstrations.dimensions == tuple(here)
-    for one in recordings.demonstrations:
-        np.testing.assert_allclose(one.positions, factor * PATH, rtol=1e-12)
+    for movement in recordings.demonstrations:
+        np.testing.assert_allclose(movement.positions, factor * PATH, rtol=1e-12)
 
 
 def test_columns_are_put_in_order_and_converted_by_their_names(tmp_path):
@@ -79,8 +79,8 @@ def test_columns_are_put_in_order_and_converted_by_their_names(tmp_path):
     table(tmp_path / "2.csv", ["y [mm]", "x [mm]", "z [mm]"], 1000 * PATH[:, [1, 0, 2]])
     recordings = kineme.read_recordings(tmp_path)
     assert recordings.problems == ()
-    for one in recordings.demonstrations:
-        np.testing.assert_allclose(one.positions, 1000 * PATH, rtol=1e-12)
+    for movement in recordings.demonstrations:
+        np.testing.assert_allclose(movement.positions, 1000 * PATH, rtol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -101,7 +101,7 @@ def test_files_of_other_columns_are_left_out_and_said(tmp_path, heads, reason):
         table(tmp_path / f"{k}.csv", ["hand_x [mm]", "hand_y [mm]", "hand_z [mm]"], PATH)
     table(tmp_path / "other.csv", heads, PATH)
     recordings = kineme.read_recordings(tmp_path)
-    assert [one.path for one in recordings.sources] == ["0.csv", "1.csv"]
+    assert [source.path for source in recordings.sources] == ["0.csv", "1.csv"]
     (problem,) = recordings.problems
     assert problem.file == "other.csv"
     assert reason in problem.reason
@@ -150,8 +150,8 @@ def test_columns_of_one_file_in_several_units_are_in_that_of_most(tmp_path, name
     recordings = kineme.read_recordings(tmp_path)
     demos = recordings.demonstrations
     np.testing.assert_allclose(demos[0].positions, 1000 * PATH, rtol=1e-12)
-    assert {one.unit for one in demos.channels} == {"mm"}
-    assert [name_of(one.name) for one in demos.channels] == ["x", "y", "z"]
+    assert {channel.unit for channel in demos.channels} == {"mm"}
+    assert [name_of(channel.name) for channel in demos.channels] == ["x", "y", "z"]
     (note,) = (note for note in inspect(recordings).notes if "converted" in note)
     assert note.startswith("units are converted to those of most columns: y")
 
@@ -197,11 +197,11 @@ def test_a_library_of_converted_columns_recognizes_files_that_have_more(tmp_path
         table(tmp_path / label / "0.csv", IN_WORDS, (1 + k) * PATH[:, [0, 1, 2][:: 1 - 2 * k]])
     with kineme.ActionLibrary(tmp_path / "actions", create=True) as library:
         library.learn(kineme.read_recordings([tmp_path / "a", tmp_path / "b"]).demonstrations)
-        known = known_sources(library.store)
-    assert known.columns == ("x_mm", "y [mm]", "z_mm")
+        sources = known_sources(library.store)
+    assert sources.columns == ("x_mm", "y [mm]", "z_mm")
     table(tmp_path / "asked.csv", [*IN_WORDS, "volt"], np.column_stack([PATH, T]))
-    recordings = read_paths([tmp_path / "asked.csv"], Layout(reference=known), NameRule())
-    assert recordings.demonstrations.dimensions == known.columns
+    recordings = read_paths([tmp_path / "asked.csv"], Layout(reference=sources), NameRule())
+    assert recordings.demonstrations.dimensions == sources.columns
     assert recordings.demonstrations[0].positions[-1, 1] == pytest.approx(1000.0)
 
 
@@ -210,8 +210,8 @@ def test_an_unknown_unit_that_all_files_have_is_kept_as_text(tmp_path):
         table(tmp_path / f"{k}.csv", ["X (a.u.)", "Y (a.u.)", "Z (a.u.)"], PATH)
     table(tmp_path / "2.csv", ["X (g)", "Y (g)", "Z (g)"], PATH)
     recordings = kineme.read_recordings(tmp_path)
-    assert {one.unit for one in recordings.demonstrations.channels} == {"a.u."}
-    assert [one.file for one in recordings.problems] == ["2.csv"]
+    assert {channel.unit for channel in recordings.demonstrations.channels} == {"a.u."}
+    assert [problem.file for problem in recordings.problems] == ["2.csv"]
 
 
 def test_the_sensors_of_one_box_are_no_demonstrations_of_one_movement(tmp_path):
@@ -219,7 +219,7 @@ def test_the_sensors_of_one_box_are_no_demonstrations_of_one_movement(tmp_path):
         table(tmp_path / "Left Foot" / f"{name}.csv", ["z", "y", "x"], PATH)
     table(tmp_path / "Left Foot" / "Battery.csv", ["percentage", "voltage", "current"], PATH)
     recordings = kineme.read_recordings(tmp_path)
-    assert [one.path for one in recordings.sources] == ["Left Foot/Accelerometer.csv"]
+    assert [source.path for source in recordings.sources] == ["Left Foot/Accelerometer.csv"]
     assert len(recordings.problems) == 4
     assert "gyroscope where most files are of accelerometer; read them apart" in recordings.problems[1].reason
     for k in (1, 2):
@@ -242,8 +242,8 @@ def test_two_skeletons_never_merge(tmp_path):
     bvh(tmp_path / "b.bvh", ["Hips", "Spine", "Neck"])
     bvh(tmp_path / "c.bvh", ["pelvis", "torso", "head"])
     recordings = kineme.read_recordings(tmp_path)
-    assert [one.path for one in recordings.sources] == ["a.bvh", "b.bvh"]
-    assert [one.file for one in recordings.problems] == ["c.bvh"]
+    assert [source.path for source in recordings.sources] == ["a.bvh", "b.bvh"]
+    assert [problem.file for problem in recordings.problems] == ["c.bvh"]
 
 
 def test_files_without_names_are_taken_by_their_count(tmp_path):
@@ -255,10 +255,10 @@ def test_files_without_names_are_taken_by_their_count(tmp_path):
     recordings = kineme.read_recordings(tmp_path)
     assert recordings.problems == ()
     assert len(recordings) == 5
-    assert [one.path for one in recordings.sources] == sorted(one.path for one in recordings.sources)
+    assert [source.path for source in recordings.sources] == sorted(source.path for source in recordings.sources)
     assert recordings.demonstrations.channels is None
-    for one in recordings.demonstrations:
-        np.testing.assert_allclose(one.positions, PATH, rtol=1e-12)
+    for movement in recordings.demonstrations:
+        np.testing.assert_allclose(movement.positions, PATH, rtol=1e-12)
 
 
 def test_one_file_of_more_columns_is_left_out_and_the_chosen_columns_bring_it_back(tmp_path):
@@ -266,16 +266,16 @@ def test_one_file_of_more_columns_is_left_out_and_the_chosen_columns_bring_it_ba
         table(tmp_path / f"{k}.csv", ["x", "y"], PATH[:, :2])
     table(tmp_path / "more.csv", ["y", "x", "battery"], PATH[:, [1, 0, 2]])
     recordings = kineme.read_recordings(tmp_path)
-    assert [one.file for one in recordings.problems] == ["more.csv"]
+    assert [problem.file for problem in recordings.problems] == ["more.csv"]
     chosen = kineme.read_recordings(tmp_path, columns=["x", "y"])
     assert chosen.problems == ()
-    for one in chosen.demonstrations:
-        np.testing.assert_allclose(one.positions, PATH[:, :2], rtol=1e-12)
+    for movement in chosen.demonstrations:
+        np.testing.assert_allclose(movement.positions, PATH[:, :2], rtol=1e-12)
 
 
 def test_columns_chosen_by_their_numbers_may_have_any_names(tmp_path):
     table(tmp_path / "0.csv", ["left_x", "left_y", "left_z"], PATH)
     table(tmp_path / "1.csv", ["right_x", "right_y", "right_z"], PATH)
-    assert [one.file for one in kineme.read_recordings(tmp_path).problems] == ["1.csv"]
+    assert [problem.file for problem in kineme.read_recordings(tmp_path).problems] == ["1.csv"]
     by_number = kineme.read_recordings(tmp_path, columns=[1, 2, 3])
     assert (len(by_number), by_number.problems) == (2, ())

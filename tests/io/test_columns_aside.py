@@ -44,8 +44,8 @@ def test_derivatives_and_confidences_are_left_aside_beside_their_positions(tmp_p
     assert all(head in note for head in others[:6])
     assert "--columns" in note
     assert note in inspect(read).notes
-    kept = kineme.read_recordings(path, columns=[*positions, *others])
-    assert kept.demonstrations.n_dims == len(positions) + len(others)
+    recordings = kineme.read_recordings(path, columns=[*positions, *others])
+    assert recordings.demonstrations.n_dims == len(positions) + len(others)
 
 
 @pytest.mark.parametrize(

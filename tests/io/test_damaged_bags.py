@@ -22,7 +22,7 @@ def a_bag(folder, kind, n=50, name="run", **options):
 
 
 def file_of(path):
-    return path if path.is_file() else next(one for one in sorted(path.iterdir()) if one.name != "metadata.yaml")
+    return path if path.is_file() else next(file for file in sorted(path.iterdir()) if file.name != "metadata.yaml")
 
 
 def beside(folder, make_movement):
@@ -30,8 +30,8 @@ def beside(folder, make_movement):
     t, x = make_movement(1, 2)
     write_movement(folder / "good.csv", {"times": t, "positions": x})
     read = read_recordings(folder)
-    assert "good.csv" in [one.path for one in read.sources]
-    return [str(one) for one in read.problems]
+    assert "good.csv" in [source.path for source in read.sources]
+    return [str(problem) for problem in read.problems]
 
 
 @pytest.mark.parametrize("share", [0.0, 0.001, 0.3, 0.7, 0.999])
@@ -155,8 +155,8 @@ def test_a_folder_whose_metadata_are_of_another_program_is_one_of_files(tmp_path
     if text is not None:
         (path / "metadata.yaml").write_text(text)
     read = read_recordings(path)
-    assert [one.path for one in read.sources] == ["run.mcap"]
-    assert [one.file for one in read.problems] == ([] if text is None else ["metadata.yaml"])
+    assert [source.path for source in read.sources] == ["run.mcap"]
+    assert [problem.file for problem in read.problems] == ([] if text is None else ["metadata.yaml"])
 
 
 def test_file_names_in_metadata_that_are_paths_lead_nowhere(tmp_path):
@@ -234,7 +234,7 @@ def test_fewer_messages_than_the_bag_says_are_named(tmp_path):
     (path / "metadata.yaml").write_text(re.sub("message_count: 50", "message_count: 70", text))
     read = read_recordings(path)
     assert len(read) == 1
-    assert [one.reason for one in read.problems] == ["topic /joints: expected 70 messages, got 50"]
+    assert [problem.reason for problem in read.problems] == ["topic /joints: expected 70 messages, got 50"]
 
 
 def test_a_damaged_transform_topic_is_named(tmp_path):

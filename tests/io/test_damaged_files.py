@@ -24,9 +24,9 @@ def child():
 def test_whole_files_are_read_and_damaged_ones_refused_in_words(child, name):
     assert child.call("file_mutants:read_mutant", name, samples()[name]).how == "done"
     rng = np.random.default_rng(zlib.crc32(name.encode()))
-    found = [child.call("file_mutants:read_mutant", name, mutant(rng, samples()[name], name)) for _ in range(ROUNDS)]
-    assert [one for one in found if not one.is_good] == []
-    assert any(one.how == "refused" for one in found)
+    outcomes = [child.call("file_mutants:read_mutant", name, mutant(rng, samples()[name], name)) for _ in range(ROUNDS)]
+    assert [outcome for outcome in outcomes if not outcome.is_good] == []
+    assert any(outcome.how == "refused" for outcome in outcomes)
 
 
 def test_metadata_that_end_the_process_are_not_asked_for(child):

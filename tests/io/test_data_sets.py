@@ -41,37 +41,37 @@ def toy(tmp_path, monkeypatch):
 def test_a_data_set_is_one_entry_among_files(tmp_path, toy):
     toy()
     (tmp_path / "a.csv").write_text("t,x,y\n" + "".join(f"{k},{k},{k * k}\n" for k in range(5)))
-    assert [one.relative_to(tmp_path) for one in files_under(tmp_path)[0]] == [Path("a.csv"), Path("bow/set")]
+    assert [path.relative_to(tmp_path) for path in files_under(tmp_path)[0]] == [Path("a.csv"), Path("bow/set")]
     read = read_recordings(tmp_path)
-    assert [(one.path, one.place, one.label) for one in read.sources] == [
+    assert [(source.path, source.place, source.label) for source in read.sources] == [
         ("a.csv", "", None),
         ("bow/set", "0", "wave"),
         ("bow/set", "1", "bow"),
     ]
-    assert [str(one) for one in read.problems] == ["bow/set: episode 2: expected more"]
+    assert [str(problem) for problem in read.problems] == ["bow/set: episode 2: expected more"]
 
 
 def test_a_data_set_given_directly_is_one_source_under_its_own_name(toy, monkeypatch):
     where = toy()
     read = read_recordings(where)
-    assert [(one.path, one.label) for one in read.sources] == [("set", "wave"), ("set", None)]
+    assert [(source.path, source.label) for source in read.sources] == [("set", "wave"), ("set", None)]
     assert read.sources[0].size == sum((where / name).stat().st_size for name in ("about.json", "a.bin", "parts/b.bin"))
     monkeypatch.chdir(where)
-    assert {one.path for one in read_recordings(".").sources} == {"set"}
+    assert {source.path for source in read_recordings(".").sources} == {"set"}
     with pytest.raises(kineme.errors.DataError, match="episode 2"):
         read_recording(where)
 
 
 def test_the_checksum_is_of_the_files_that_are_read_and_of_their_names(toy):
     where = toy()
-    known = read_recordings(where).sources[0].sha256
+    checksum = read_recordings(where).sources[0].sha256
     (where / "video.mp4").write_text("another")
     os.utime(where / "a.bin", (0, 0))
-    assert read_recordings(where).sources[0].sha256 == known
+    assert read_recordings(where).sources[0].sha256 == checksum
     (where / "parts" / "b.bin").rename(where / "parts" / "d.bin")
     renamed = read_recordings(where).sources[0].sha256
     (where / "a.bin").write_text("a.bim")
-    assert len({known, renamed, read_recordings(where).sources[0].sha256}) == 3
+    assert len({checksum, renamed, read_recordings(where).sources[0].sha256}) == 3
 
 
 def test_the_limit_is_on_what_is_kept_not_on_the_size_of_the_files(toy, monkeypatch):

@@ -28,7 +28,7 @@ def test_names_and_kinds_are_kept_and_counters_are_left_out(tmp_path):
         write(tmp_path / f"{k}.csv", quaternion=k + 1)
     recordings = kineme.read_recordings(tmp_path)
     demos = recordings.demonstrations
-    assert [(one.name, one.kind) for one in demos.channels] == [
+    assert [(channel.name, channel.kind) for channel in demos.channels] == [
         ("pose.position.x", "position"),
         ("pose.orientation", "orientation"),
         ("panda_joint1", "angle"),
@@ -41,9 +41,9 @@ def test_names_and_kinds_are_kept_and_counters_are_left_out(tmp_path):
     assert np.abs(np.diff(demos[1].positions[:, 4])).max() < 0.1  # no jump where the joint wraps
     np.testing.assert_allclose(np.linalg.norm(demos.recorded[:, 1:5], axis=1), 1.0)
     assert set(demos.recorded[:, 6]) == {0.0, 1.0}
-    one = kineme.read_recording(tmp_path / "2.csv")
-    assert one.channels == demos.channels
-    np.testing.assert_array_equal(one.recorded, demos[2].recorded)
+    recording = kineme.read_recording(tmp_path / "2.csv")
+    assert recording.channels == demos.channels
+    np.testing.assert_array_equal(recording.recorded, demos[2].recorded)
 
 
 def test_a_quaternion_of_zero_costs_its_movement_and_names_the_line(tmp_path):
@@ -84,9 +84,9 @@ def test_quaternions_in_two_orders_are_read_in_that_of_most_files(tmp_path):
     recordings = kineme.read_recordings(tmp_path)
     assert recordings.problems == ()
     demos = recordings.demonstrations
-    assert [one.order for one in demos.channels if one.kind == "orientation"] == ["wxyz"]
-    for one in demos[1:]:
-        np.testing.assert_allclose(one.recorded, demos[0].recorded)
+    assert [channel.order for channel in demos.channels if channel.kind == "orientation"] == ["wxyz"]
+    for movement in demos[1:]:
+        np.testing.assert_allclose(movement.recorded, demos[0].recorded)
     assert sum(n for _, n in recordings.detected) == 3
     assert len(recordings.detected) == 3
     (note,) = [note for note in inspect(recordings).notes if "order" in note]
@@ -107,7 +107,7 @@ def test_plain_columns_in_two_orders_are_told_apart_by_their_names(tmp_path):
     recordings = kineme.read_recordings(tmp_path)
     demos = recordings.demonstrations
     np.testing.assert_allclose(demos[0].positions, demos[1].positions)
-    assert [(one.name, one.unit) for one in demos.channels] == [("x [m]", "m"), ("y [m]", "m")]
+    assert [(channel.name, channel.unit) for channel in demos.channels] == [("x [m]", "m"), ("y [m]", "m")]
 
 
 @pytest.mark.parametrize("first", ["continuous", "switched"])
@@ -158,12 +158,12 @@ def test_headers_of_messages_are_no_coordinates(tmp_path, before):
     """As `rostopic echo -p`, PlotJuggler and bagpy write them."""
     u = np.linspace(0, 1, N)
     q = exp(np.outer(u, [0, 0.2, 2.0]))[:, [1, 2, 3, 0]]
-    heads = ["%time", *(f"{before}header.{one}" for one in ("seq", "stamp", "stamp.nsecs", "frame_id"))]
+    heads = ["%time", *(f"{before}header.{part}" for part in ("seq", "stamp", "stamp.nsecs", "frame_id"))]
     heads += [f"{before}pose.position.x", *(f"{before}pose.orientation.{part}" for part in "xyzw")]
     table = np.column_stack([1.7e18 + 1e9 * u, np.arange(N), 1.7e18 + 1e9 * u, 1e9 * u, np.zeros(N), u**2, q])
     np.savetxt(tmp_path / "a.csv", table, delimiter=",", header=",".join(heads), comments="")
     recordings = kineme.read_recordings(tmp_path)
-    assert [one.kind for one in recordings.demonstrations.channels] == ["position", "orientation"]
+    assert [channel.kind for channel in recordings.demonstrations.channels] == ["position", "orientation"]
     assert recordings.detected[0][0].ignored == tuple(heads[1:5])
     assert recordings.demonstrations.durations[0] == pytest.approx(1)
 
@@ -174,9 +174,9 @@ def test_columns_of_a_quaternion_that_stand_apart_are_read_alike_from_files_and_
     columns = {"t": u, "qw": q[:, 0], "x": u**2, "qx": q[:, 1], "y": 1 - u, "qy": q[:, 2], "qz": q[:, 3]}
     frame = pd.DataFrame(columns)
     frame.to_csv(tmp_path / "apart.csv", index=False)
-    for one in (kineme.read_recordings(tmp_path / "apart.csv").demonstrations, kineme.Demonstrations.of(frame)):
-        assert one.dimensions == ("q.rx", "q.ry", "q.rz", "x", "y")
-        np.testing.assert_allclose(one.recorded, np.column_stack([q, u**2, 1 - u]), atol=1e-12)
+    for demos in (kineme.read_recordings(tmp_path / "apart.csv").demonstrations, kineme.Demonstrations.of(frame)):
+        assert demos.dimensions == ("q.rx", "q.ry", "q.rz", "x", "y")
+        np.testing.assert_allclose(demos.recorded, np.column_stack([q, u**2, 1 - u]), atol=1e-12)
 
 
 def test_a_quaternion_that_is_none_costs_its_sample_alone_where_that_is_asked_for(tmp_path):
@@ -194,5 +194,7 @@ def test_the_rollout_of_poses_has_the_channels_of_the_recording_and_one_of_rotat
     write(tmp_path / "0.csv")
     demos = kineme.read_recordings(tmp_path / "0.csv").demonstrations
     poses = kineme.Demonstrations.of(PoseDMP().learn(demos).rollout())
-    assert [(one.name, one.kind) for one in poses.channels] == [(one.name, one.kind) for one in demos.channels]
+    assert [(channel.name, channel.kind) for channel in poses.channels] == [
+        (channel.name, channel.kind) for channel in demos.channels
+    ]
     assert kineme.Demonstrations.of(kineme.DMP().learn(demos).rollout()).channels is None

@@ -107,8 +107,8 @@ def test_a_saved_model_has_the_same_limit(tmp_path, monkeypatch):
     monkeypatch.setenv(VARIABLE, str(path.stat().st_size - 1))
     with pytest.raises(kineme.errors.DataError, match=VARIABLE):
         kineme.dmp.Primitives.load(path)
-    with zipfile.ZipFile(path) as whole:
-        members = [(name, whole.read(name) + bytes(2**20)) for name in whole.namelist()]
+    with zipfile.ZipFile(path) as saved:
+        members = [(name, saved.read(name) + bytes(2**20)) for name in saved.namelist()]
     path.write_bytes(archive(*members))
     monkeypatch.setenv(VARIABLE, "100000")
     with pytest.raises(kineme.errors.DataError, match=VARIABLE):
@@ -125,9 +125,9 @@ def test_arrays_that_nobody_needs_are_not_read(monkeypatch):
 
 def test_more_bytes_than_an_entry_admits_are_not_expanded():
     """The archive says 176 bytes, the stream holds 120 MiB: reading without a bound expands before it counts."""
-    whole = archive(("positions.npy", bytes(120 * MIB)), ("times.npy", entry(T)))
-    small = whole.replace(struct.pack("<I", 120 * MIB), struct.pack("<I", 176))
-    assert small != whole
+    honest = archive(("positions.npy", bytes(120 * MIB)), ("times.npy", entry(T)))
+    small = honest.replace(struct.pack("<I", 120 * MIB), struct.pack("<I", 176))
+    assert small != honest
     with LimitedChild(("kineme.io.reading.recordings",), memory=60 * MIB) as child:
         outcome = child.call("recordings_in_bytes:read_recordings_from_bytes", small, "a.npz", Layout())
     assert outcome.how == "refused", outcome
@@ -184,8 +184,8 @@ def test_offsets_that_decrease_are_refused_in_every_type(dtype, offsets):
     x = np.random.default_rng(0).normal(size=(12, 2))
     with pytest.raises(kineme.errors.DataError, match="whole numbers that do not decrease"):
         read(npz(positions=x, times=np.arange(12) / 100, offsets=np.array(offsets, dtype)))
-    whole = read(npz(positions=x, times=np.arange(12) / 100, offsets=np.array([0, 4, 12], dtype)))
-    assert whole.demonstrations.lengths.tolist() == [4, 8]
+    recordings = read(npz(positions=x, times=np.arange(12) / 100, offsets=np.array([0, 4, 12], dtype)))
+    assert recordings.demonstrations.lengths.tolist() == [4, 8]
 
 
 def as_json(**entries):
@@ -202,9 +202,9 @@ def as_json(**entries):
     ],
 )
 def test_labels_of_json_are_texts_each_by_itself(labels, expected):
-    found = read(as_json(labels=labels), "a.json")
-    assert tuple(found.labels) == expected
-    repr(found.labels).encode()
+    recordings = read(as_json(labels=labels), "a.json")
+    assert tuple(recordings.labels) == expected
+    repr(recordings.labels).encode()
 
 
 @pytest.mark.parametrize("labels", [["a", ["b"], "c"], ["a", {"b": 1}, "c"], ["a", float("nan"), "c"]])
@@ -250,9 +250,9 @@ def test_a_limit_that_is_no_number_is_told_before_anything_is_read(tmp_path, mon
 def test_stamps_out_of_range_are_refused(skip):
     good = "a,0,0\na,1,1\na,2,4\na,3,9\n"
     bad = "b,-1.5e308,0\nb,0,1\nb,1,2\nb,2,3\nb,1.5e308,4\n"
-    found = read(f"id,t,x\n{good}{bad}".encode(), "a.csv", units="s", skip=skip)
-    assert found.demonstrations.lengths.tolist() == [4]  # of the other, three samples are left at most
-    assert "expected times up to 1e+50 s, got -1.5e+308 at sample 0" in found.problems[0].reason
+    recordings = read(f"id,t,x\n{good}{bad}".encode(), "a.csv", units="s", skip=skip)
+    assert recordings.demonstrations.lengths.tolist() == [4]  # of the other, three samples are left at most
+    assert "expected times up to 1e+50 s, got -1.5e+308 at sample 0" in recordings.problems[0].reason
     with pytest.raises(
         kineme.errors.TrajectoryError, match=r"trajectory 0: expected times up to 1e\+50, got -1.5e\+308"
     ):

@@ -26,7 +26,7 @@ def fill(folder, *names):
 def test_the_innermost_folder_is_the_label_and_the_top_is_none(tmp_path):
     fill(tmp_path, "z.csv", "wave/b.csv", "wave/a.csv", "left/wave/c.csv", "a b; $(c)/d.csv", "winken \u2603/e.csv")
     read = read_recordings(tmp_path)
-    assert [(one.path, one.label) for one in read.sources] == [
+    assert [(source.path, source.label) for source in read.sources] == [
         ("a b; $(c)/d.csv", "a b; $(c)"),
         ("left/wave/c.csv", "wave"),
         ("wave/a.csv", "wave"),
@@ -46,7 +46,7 @@ def test_a_label_in_the_file_wins_over_the_folder(tmp_path):
 def test_hidden_files_and_folders_are_passed_over(tmp_path):
     fill(tmp_path, "wave/a.csv", "wave/.b.csv", ".git/c.csv")
     read = read_recordings(tmp_path)
-    assert [one.path for one in read.sources] == ["wave/a.csv"]
+    assert [source.path for source in read.sources] == ["wave/a.csv"]
     assert read.problems == ()
 
 
@@ -66,8 +66,8 @@ def test_links_may_lead_anywhere(tmp_path):
     (data / "again").symlink_to(data / "point")
     (data / "broken.csv").symlink_to(tmp_path / "nothing.csv")
     read = read_recordings(data, follow_links=True)
-    assert [one.path for one in read.sources] == ["away/nod/c.csv", "point/b.csv", "wave/a.csv"]
-    assert [(one.file, one.reason) for one in read.problems] == [("broken.csv", LEADS_NOWHERE)]
+    assert [source.path for source in read.sources] == ["away/nod/c.csv", "point/b.csv", "wave/a.csv"]
+    assert [(problem.file, problem.reason) for problem in read.problems] == [("broken.csv", LEADS_NOWHERE)]
 
 
 @posix
@@ -82,9 +82,9 @@ def test_links_out_of_the_folder_are_not_followed_unless_one_says_so(tmp_path):
     (tmp_path / "door").symlink_to(data)
     for folder in (data, tmp_path / "door"):
         read = read_recordings(folder)
-        assert [one.path for one in read.sources] == ["wave/a.csv", "within.csv"]
-        assert [one.file for one in read.problems] == ["away", "beside", "up", "wave/other.csv"]
-        assert {one.reason for one in read.problems} == {
+        assert [source.path for source in read.sources] == ["wave/a.csv", "within.csv"]
+        assert [problem.file for problem in read.problems] == ["away", "beside", "up", "wave/other.csv"]
+        assert {problem.reason for problem in read.problems} == {
             "a link that leads out of the folder; to read it, say follow_links=True, in the shell --follow-links"
         }
     assert len(read_recordings(data, follow_links=True)) == 5
@@ -97,24 +97,24 @@ def test_a_link_to_itself_is_a_problem(tmp_path):
     (tmp_path / "round").symlink_to("about")
     (tmp_path / "about").symlink_to("round")
     read = read_recordings(tmp_path)
-    assert [one.path for one in read.sources] == ["a.csv"]
-    assert [one.file for one in read.problems] == ["about", "b.csv", "round"]
+    assert [source.path for source in read.sources] == ["a.csv"]
+    assert [problem.file for problem in read.problems] == ["about", "b.csv", "round"]
     assert read.problems[1].reason == LEADS_NOWHERE
 
 
 def test_a_file_larger_than_the_memory_costs_itself_alone(tmp_path, monkeypatch):
     fill(tmp_path, "a.csv", "b.csv", "c.csv")
-    whole = Path.read_bytes
+    read_bytes = Path.read_bytes
 
     def too_large(path):
         if path.name == "b.csv":
             raise MemoryError
-        return whole(path)
+        return read_bytes(path)
 
     monkeypatch.setattr(Path, "read_bytes", too_large)
     read = read_recordings(tmp_path)
-    assert [one.path for one in read.sources] == ["a.csv", "c.csv"]
-    assert [one.file for one in read.problems] == ["b.csv"]
+    assert [source.path for source in read.sources] == ["a.csv", "c.csv"]
+    assert [problem.file for problem in read.problems] == ["b.csv"]
     assert "memory" in read.problems[0].reason
 
 
@@ -124,8 +124,8 @@ def test_a_file_beyond_the_limit_costs_itself_alone(tmp_path, monkeypatch):
         file.truncate(2**40)  # a hole: it takes no place on the disk
     monkeypatch.setenv("KINEME_MAX_FILE_BYTES", "20000")
     read = read_recordings(tmp_path)
-    assert [one.path for one in read.sources] == ["a.csv"]
-    assert [one.file for one in read.problems] == ["b.csv"]
+    assert [source.path for source in read.sources] == ["a.csv"]
+    assert [problem.file for problem in read.problems] == ["b.csv"]
     assert "at most 20,000 bytes of memory, got one that takes 1,099,511,627,776" in read.problems[0].reason
     assert "set the environment variable KINEME_MAX_FILE_BYTES to more" in read.problems[0].reason
     monkeypatch.setenv("KINEME_MAX_FILE_BYTES", "a lot")
@@ -153,19 +153,19 @@ def test_a_file_that_vanishes_while_reading_is_a_problem(tmp_path):
             yield path
 
     read = read_recordings(tmp_path, progress=vanish)
-    assert [one.path for one in read.sources] == ["a.csv", "c.csv"]
-    assert [str(one) for one in read.problems] == [
+    assert [source.path for source in read.sources] == ["a.csv", "c.csv"]
+    assert [str(problem) for problem in read.problems] == [
         "b.csv: expected a file that can be read, got: No such file or directory"
     ]
 
 
 def test_a_file_that_changes_between_looking_and_reading_is_hashed_as_it_was_read(tmp_path, monkeypatch):
     fill(tmp_path, "a.csv")
-    whole = Path.read_bytes
+    read_bytes = Path.read_bytes
 
     def grown(path):
         path.write_text(TEXT + "9,9\n")
-        return whole(path)
+        return read_bytes(path)
 
     monkeypatch.setattr(Path, "read_bytes", grown)
     read = read_recordings(tmp_path)
@@ -189,12 +189,12 @@ def test_a_folder_that_cannot_be_listed_is_a_problem(tmp_path, monkeypatch):
 
 def test_a_file_that_must_not_be_read_is_a_problem(tmp_path, monkeypatch):
     fill(tmp_path, "a.csv", "b.csv")
-    whole = Path.read_bytes
+    read_bytes = Path.read_bytes
 
     def refuse(path):
         if path.name == "b.csv":
             raise PermissionError(13, "Permission denied", str(path))
-        return whole(path)
+        return read_bytes(path)
 
     monkeypatch.setattr(Path, "read_bytes", refuse)
     (problem,) = read_recordings(tmp_path).problems

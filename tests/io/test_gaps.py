@@ -55,12 +55,12 @@ def test_c3d_files_with_occlusions_are_read_and_what_was_done_is_said_once(tmp_p
     lost[190:, 1] = np.nan
     write_c3d(tmp_path / "wave" / "gaps.c3d", lost, lost=[(2, slice(100, 115)), (1, slice(60, 64))])
     read = read_recordings(tmp_path)
-    whole, gaps = sorted(read.sources, key=lambda one: one.path, reverse=True)
+    complete, gaps = sorted(read.sources, key=lambda source: source.path, reverse=True)
     assert read.problems == ()
-    assert (whole.filled, whole.cropped) == (0, 0.0)
+    assert (complete.filled, complete.cropped) == (0, 0.0)
     assert (gaps.filled, gaps.longest_gap, gaps.cropped) == (19, pytest.approx(0.16), pytest.approx(0.4))
-    found = read.demonstrations[[one.path for one in read.sources].index(gaps.path)]
-    np.testing.assert_allclose(found.positions, x[30:190].reshape(160, -1), atol=0.5)
+    movement = read.demonstrations[[source.path for source in read.sources].index(gaps.path)]
+    np.testing.assert_allclose(movement.positions, x[30:190].reshape(160, -1), atol=0.5)
     assert notes_on_gaps(read) == [
         "gaps of up to 0.16 s were filled in 1 movement, 19 samples in all; --fill-gaps 0 fills none",
         "1 movement cropped to where all columns have values, by up to 0.4 s, 0.4 s in all",
@@ -79,10 +79,10 @@ def test_markers_that_are_missing_most_of_the_time_are_named_with_the_option_tha
         write_c3d(tmp_path / f"{k}.c3d", x)
     with pytest.raises(
         DataError, match=r"found none; 3 could not be read.*3 movements were not read.*LFIN in 3"
-    ) as told:
+    ) as warned:
         read_recordings(tmp_path)
-    assert "expected a number in 'LFIN', got nothing in 75 % of the samples, for up to 1.51 s" in str(told.value)
-    assert "--exclude LFIN or --fill-gaps 1.6 or --skip sample" in str(told.value)
+    assert "expected a number in 'LFIN', got nothing in 75 % of the samples, for up to 1.51 s" in str(warned.value)
+    assert "--exclude LFIN or --fill-gaps 1.6 or --skip sample" in str(warned.value)
     read = read_recordings(tmp_path, exclude="LFIN")
     assert read.demonstrations.dimensions == ("LASI.x", "LASI.y", "LASI.z", "RASI.x", "RASI.y", "RASI.z")
     assert len(read) == 3
@@ -96,8 +96,8 @@ def test_a_crop_that_would_cost_half_of_a_movement_names_the_markers_instead(tmp
     write_c3d(tmp_path / "a.c3d", x)
     with pytest.raises(DataError, match=r"in 'LASI', got nothing in 56 % of the samples; say --exclude LASI or --skip"):
         read_recordings(tmp_path / "a.c3d")
-    kept = read_recordings(tmp_path / "a.c3d", skip="sample")
-    assert (kept.demonstrations.lengths.tolist(), kept.problems) == ([85], ())
+    recordings = read_recordings(tmp_path / "a.c3d", skip="sample")
+    assert (recordings.demonstrations.lengths.tolist(), recordings.problems) == ([85], ())
     x = points()
     x[:80, 0] = np.nan
     x[160:, 1] = np.nan  # less than a quarter: cropped
@@ -198,8 +198,8 @@ def test_angles_orientations_and_switches_are_filled_as_what_they_are():
     gripper = (t > 0.5).astype(float)
     gap = slice(45, 55)
     columns = np.column_stack([with_gap(yaw, gap), with_gap(q, gap), with_gap(gripper, gap)])
-    found = read(table(t, columns, ("yaw [deg]", "q.w", "q.x", "q.y", "q.z", "gripper")))
-    filled = found.demonstrations.recorded
+    recordings = read(table(t, columns, ("yaw [deg]", "q.w", "q.x", "q.y", "q.z", "gripper")))
+    filled = recordings.demonstrations.recorded
     np.testing.assert_allclose(filled[:, 0], 350 + 20 * t, atol=1e-9)
     np.testing.assert_allclose(np.abs((filled[:, 1:5] * q).sum(axis=1)), 1.0, atol=1e-9)
     np.testing.assert_array_equal(filled[gap, 5], 0.0)
@@ -214,7 +214,7 @@ def test_an_angle_that_only_its_wraps_tell_stays_one_where_gaps_are_filled(low):
     crossing = int(np.flatnonzero(np.abs(np.diff(wrapped)) > 180)[1])
     for gap in (slice(crossing + 20, crossing + 24), slice(crossing - 1, crossing + 3)):
         demos = read(table(t, np.column_stack([with_gap(wrapped, gap), t]), ("c", "x"))).demonstrations
-        assert [(one.kind, one.period) for one in demos.channels] == [("angle", 360.0), ("position", None)]
+        assert [(channel.kind, channel.period) for channel in demos.channels] == [("angle", 360.0), ("position", None)]
         np.testing.assert_allclose(demos.recorded[:, 0], a - a[0] + wrapped[0], atol=1e-9)
 
 
@@ -252,9 +252,9 @@ def test_gaps_of_arrays_and_tables_are_filled_alike(tmp_path, suffix):
         pandas = pytest.importorskip("pandas")
         pytest.importorskip("pyarrow")
         pandas.DataFrame({"time": t, "x": lost[:, 0], "y": lost[:, 1]}).to_parquet(path)
-    found = read_recordings(path)
-    np.testing.assert_allclose(found.demonstrations.positions, x, atol=1e-4)
-    assert found.sources[0].filled == 5
+    recordings = read_recordings(path)
+    np.testing.assert_allclose(recordings.demonstrations.positions, x, atol=1e-4)
+    assert recordings.sources[0].filled == 5
 
 
 def test_a_library_takes_its_columns_from_recordings_with_more(tmp_path):

@@ -42,12 +42,14 @@ def aloha(file):
 
 
 def test_groups_are_movements_and_data_sets_are_chosen(write):
-    found = kineme.read_recordings(write(robomimic), columns="obs/robot0_eef_pos", units=0.05)
-    assert [(source.place, source.label) for source in found.sources] == [(f"data/demo_{k}", None) for k in range(3)]
-    assert found.demonstrations.dimensions == tuple(f"obs/robot0_eef_pos.{axis}" for axis in "xyz")
-    assert found.demonstrations.lengths.tolist() == [10, 11, 12]
-    np.testing.assert_array_equal(found.demonstrations[1].positions, X[:11])
-    np.testing.assert_allclose(found.demonstrations.durations, 0.05 * np.array([9, 10, 11]))
+    recordings = kineme.read_recordings(write(robomimic), columns="obs/robot0_eef_pos", units=0.05)
+    assert [(source.place, source.label) for source in recordings.sources] == [
+        (f"data/demo_{k}", None) for k in range(3)
+    ]
+    assert recordings.demonstrations.dimensions == tuple(f"obs/robot0_eef_pos.{axis}" for axis in "xyz")
+    assert recordings.demonstrations.lengths.tolist() == [10, 11, 12]
+    np.testing.assert_array_equal(recordings.demonstrations[1].positions, X[:11])
+    np.testing.assert_allclose(recordings.demonstrations.durations, 0.05 * np.array([9, 10, 11]))
 
 
 def test_without_a_choice_the_vectors_are_listed(write):
@@ -59,8 +61,8 @@ def test_without_a_choice_the_vectors_are_listed(write):
 
 
 def test_a_file_may_be_one_movement(write):
-    found = kineme.read_recordings(write(aloha), columns="observations/qpos", units=0.02)
-    assert (len(found), found.demonstrations.n_dims) == (1, 14)
+    recordings = kineme.read_recordings(write(aloha), columns="observations/qpos", units=0.02)
+    assert (len(recordings), recordings.demonstrations.n_dims) == (1, 14)
 
 
 def test_groups_with_names_are_labels_and_arrays_of_their_own_are_movements(write):
@@ -69,9 +71,9 @@ def test_groups_with_names_are_labels_and_arrays_of_their_own_are_movements(writ
             file[f"{name}/t"], file[f"{name}/pos"] = T, X
         file["nod"].attrs["label"] = "bow"
 
-    found = kineme.read_recordings(write(named))
-    assert {source.place: source.label for source in found.sources} == {"wave": "wave", "nod": "bow"}
-    assert found.demonstrations.dimensions == ("x", "y", "z")
+    recordings = kineme.read_recordings(write(named))
+    assert {source.place: source.label for source in recordings.sources} == {"wave": "wave", "nod": "bow"}
+    assert recordings.demonstrations.dimensions == ("x", "y", "z")
 
     def bare(file):
         file["wave"], file["nod"] = X, X[:9]
@@ -135,7 +137,7 @@ def test_units_are_those_of_the_attributes(tmp_path):
             group["wrist"] = 100 * u
             group["wrist"].attrs["unit"] = b"deg"
     demos = kineme.read_recordings(path).demonstrations
-    assert [one.unit for one in demos.channels] == ["mm", "mm", "deg"]
+    assert [channel.unit for channel in demos.channels] == ["mm", "mm", "deg"]
     np.testing.assert_allclose(demos.durations, 0.58)
     with h5py.File(path, "a") as file:
         file["wave_1/hand"].attrs["units"] = ["m", "mm"]
@@ -151,7 +153,7 @@ def test_units_of_movements_without_times_are_read_and_must_agree(tmp_path):
             file[name] = np.column_stack([u, u**2])[:n]
             file[name].attrs["units"] = "mm"
     read = kineme.read_recordings(path, units=0.1)
-    assert [one.unit for one in read.demonstrations.channels] == ["mm", "mm"]
+    assert [channel.unit for channel in read.demonstrations.channels] == ["mm", "mm"]
     with h5py.File(path, "a") as file:
         file["nod"].attrs["units"] = "m"
     with pytest.raises(kineme.errors.KinemeError, match="unit"):
@@ -173,10 +175,10 @@ def test_rates_and_scales_are_those_of_the_attributes_and_records_are_columns(tm
                 hand.attrs["conversion"] = 0.01
                 stated = hand if name == "rate" else file.create_dataset("acquisition/hand/starting_time", data=0.0)
                 stated.attrs["sampling_rate" if name == "rate" else "rate"] = 10.0
-        found = kineme.read_recordings(tmp_path / f"{name}.h5")
-        np.testing.assert_allclose(found.demonstrations[-1].positions, x, err_msg=name)
-        np.testing.assert_allclose(found.demonstrations.durations, 1.0 if name == "table" else 2.9)
-        assert found.labels.tolist() == (["wave", "nod"] if name == "sets" else ["hand"])
+        recordings = kineme.read_recordings(tmp_path / f"{name}.h5")
+        np.testing.assert_allclose(recordings.demonstrations[-1].positions, x, err_msg=name)
+        np.testing.assert_allclose(recordings.demonstrations.durations, 1.0 if name == "table" else 2.9)
+        assert recordings.labels.tolist() == (["wave", "nod"] if name == "sets" else ["hand"])
 
 
 def test_labels_that_take_much_more_than_the_file_are_refused(tmp_path):

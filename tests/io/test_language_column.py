@@ -59,21 +59,21 @@ def source(tmp_path):
 
 
 def test_every_frame_carries_the_texts_of_its_episode(tmp_path, source):
-    found = lists(copied(source, tmp_path / "named"))
-    assert len(found) == 75
-    assert all(rows == EXPECTED[k] for k, rows in found)
+    named = lists(copied(source, tmp_path / "named"))
+    assert len(named) == 75
+    assert all(rows == EXPECTED[k] for k, rows in named)
 
 
 def test_stamps_are_those_of_frames(tmp_path, source):
     target = copied(source, tmp_path / "named")
     frames = pd.read_parquet(target / SHARDS[0])
     stored = set(frames.timestamp[frames.episode_index == 0].tolist())
-    assert {one["timestamp"] for rows in frames[LANGUAGE] for one in rows} <= stored
+    assert {row["timestamp"] for rows in frames[LANGUAGE] for row in rows} <= stored
 
 
 def test_the_type_is_that_of_lerobot(tmp_path, source):
     kind = parquet.read_schema(copied(source, tmp_path / "named") / SHARDS[0]).field(LANGUAGE).type
-    fields = {one.name: (one.type, one.nullable) for one in kind.value_type}
+    fields = {field.name: (field.type, field.nullable) for field in kind.value_type}
     assert list(fields) == ["role", "content", "style", "timestamp", "camera", "tool_calls"]
     assert fields["role"] == (pa.string(), False)
     assert fields["timestamp"] == (pa.float32(), False)
@@ -150,7 +150,7 @@ def test_a_column_as_another_program_infers_it(tmp_path, source):
     with_rows(source, lambda k: [{**SUBTASK, "tool_calls": None}])
     new = parquet.read_table(copied(source, tmp_path / "named") / SHARDS[0]).column(LANGUAGE)
     assert new.type == parquet.read_schema(source / SHARDS[0]).field(LANGUAGE).type
-    assert [one["content"] for one in new[0].as_py()] == ["reach", '{"symbol": "né"}', "later"]
+    assert [row["content"] for row in new[0].as_py()] == ["reach", '{"symbol": "né"}', "later"]
 
 
 @pytest.mark.skipif(not hasattr(pa, "json_"), reason="pyarrow before 19 has no type for JSON")
@@ -163,16 +163,16 @@ def test_a_column_of_json(tmp_path, source):
     table = parquet.read_table(source / SHARDS[0])
     row_ = pa.StructArray.from_arrays(
         [
-            pa.array([SUBTASK[one.name]], type=one.type) if one.name in SUBTASK else pa.nulls(1, one.type)
-            for one in fields
+            pa.array([SUBTASK[field.name]], type=field.type) if field.name in SUBTASK else pa.nulls(1, field.type)
+            for field in fields
         ],
         fields=fields,
     )
     column = pa.ListArray.from_arrays(pa.array([0, 1] + [1] * (len(table) - 1), pa.int32()), row_, type=kind)
     parquet.write_table(table.append_column(LANGUAGE, column), source / SHARDS[0])
     new = parquet.read_table(copied(source, tmp_path / "named") / SHARDS[0]).column(LANGUAGE)
-    assert [one["content"] for one in new[0].as_py()] == ["reach", '{"symbol": "né"}', "later"]
-    assert [one["content"] for one in new[1].as_py()] == ['{"symbol": "né"}', "later"]
+    assert [row["content"] for row in new[0].as_py()] == ["reach", '{"symbol": "né"}', "later"]
+    assert [row["content"] for row in new[1].as_py()] == ['{"symbol": "né"}', "later"]
 
 
 def test_another_column_of_that_name_is_refused(tmp_path, source):

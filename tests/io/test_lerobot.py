@@ -33,17 +33,19 @@ def change(folder, frames, k=0):
 
 
 def test_episodes_are_movements_and_tasks_are_labels(folder):
-    found = kineme.read_recordings(folder)
-    demos, how = found.demonstrations, found.detected[0][0]
+    recordings = kineme.read_recordings(folder)
+    demos, how = recordings.demonstrations, recordings.detected[0][0]
     assert demos.dimensions == tuple(NAMES)
     assert demos.lengths.tolist() == [20, 30, 25]
-    assert [source.place for source in found.sources] == ["episode 0", "episode 1", "episode 2"]
-    assert found.labels.tolist() == [TASKS[0], TASKS[1], TASKS[0]]
-    assert (found.problems, how.time, how.units) == ((), "timestamp [s]", "s")
+    assert [source.place for source in recordings.sources] == ["episode 0", "episode 1", "episode 2"]
+    assert recordings.labels.tolist() == [TASKS[0], TASKS[1], TASKS[0]]
+    assert (recordings.problems, how.time, how.units) == ((), "timestamp [s]", "s")
     assert how.format.startswith("LeRobot v")
     assert how.ignored == ("action", "next.done", "observation.images.top")
-    assert "LeRobot does not declare the units of joints: they are taken as they are stored" in inspect(found).notes
-    assert {source.path for source in found.sources} == {"set"}
+    assert (
+        "LeRobot does not declare the units of joints: they are taken as they are stored" in inspect(recordings).notes
+    )
+    assert {source.path for source in recordings.sources} == {"set"}
     np.testing.assert_array_equal(demos[1].times, np.arange(30) / 50)  # exactly, though they are stored as float32
     stored = np.vstack(pd.read_parquet(shard_of(folder))["observation.state"])[:20]
     np.testing.assert_array_equal(demos[0].positions, stored.astype(np.float64))
@@ -52,9 +54,9 @@ def test_episodes_are_movements_and_tasks_are_labels(folder):
 def test_features_are_chosen_whole_or_by_their_entries(folder):
     both = kineme.read_recordings(folder, columns=["observation.state", "action"]).demonstrations
     assert both.dimensions == tuple(f"{name}.{entry}" for name in ("observation.state", "action") for entry in NAMES)
-    one = kineme.read_recordings(folder, columns="action.elbow_flex.pos").demonstrations
-    assert one.dimensions == ("elbow_flex.pos",)
-    np.testing.assert_array_equal(one.positions[:, 0], both.positions[:, 4])
+    demos = kineme.read_recordings(folder, columns="action.elbow_flex.pos").demonstrations
+    assert demos.dimensions == ("elbow_flex.pos",)
+    np.testing.assert_array_equal(demos.positions[:, 0], both.positions[:, 4])
     mixed = kineme.read_recordings(folder, columns=["action.gripper.pos", "observation.state.shoulder_pan.pos"])
     np.testing.assert_array_equal(mixed.demonstrations.positions, both.positions[:, [5, 0]])
     with pytest.raises(DataError, match=r"expected a column 'velocity', got the columns \['observation.state.shoulder"):
@@ -63,9 +65,9 @@ def test_features_are_chosen_whole_or_by_their_entries(folder):
 
 def test_entries_are_chosen_as_inspect_prints_them(folder):
     assert kineme.read_recordings(folder).demonstrations.dimensions == tuple(NAMES)
-    one = kineme.read_recordings(folder, columns=[NAMES[2], "action.elbow_flex.pos"]).demonstrations[0]
-    whole = kineme.read_recordings(folder, columns=["observation.state", "action"]).demonstrations[0]
-    np.testing.assert_array_equal(one.positions, whole.positions[:, [2, 4]])
+    movement = kineme.read_recordings(folder, columns=[NAMES[2], "action.elbow_flex.pos"]).demonstrations[0]
+    both = kineme.read_recordings(folder, columns=["observation.state", "action"]).demonstrations[0]
+    np.testing.assert_array_equal(movement.positions, both.positions[:, [2, 4]])
     with pytest.raises(
         DataError, match=r"expected a column 'wrist', got the columns \['observation\.state\.shoulder_pan"
     ):
@@ -77,8 +79,8 @@ def test_units_that_the_description_says_are_those_of_the_columns(folder):
     info = json.loads(path.read_text())
     info["features"]["observation.state"]["units"] = ["deg", None, "%"]
     path.write_text(json.dumps(info))
-    one = kineme.read_recordings(folder).demonstrations[0]
-    assert [(channel.name, channel.unit) for channel in one.channels] == [
+    movement = kineme.read_recordings(folder).demonstrations[0]
+    assert [(channel.name, channel.unit) for channel in movement.channels] == [
         ("shoulder_pan.pos [deg]", "deg"), ("elbow_flex.pos", None), ("gripper.pos [%]", "%"),
     ]  # fmt: skip
     assert kineme.read_recordings(folder, columns="shoulder_pan.pos").demonstrations.dimensions[0].endswith("[deg]")
@@ -87,7 +89,9 @@ def test_units_that_the_description_says_are_those_of_the_columns(folder):
 def test_without_a_state_the_vector_features_are_listed(folder):
     path = folder / "meta" / "info.json"
     info = json.loads(path.read_text())
-    features = {f"arm.{name}" if name == "observation.state" else name: one for name, one in info["features"].items()}
+    features = {
+        f"arm.{name}" if name == "observation.state" else name: feature for name, feature in info["features"].items()
+    }
     path.write_text(json.dumps(info | {"features": features}))
     words = r"expected the feature 'observation.state', got \['arm.observation.state \(3\)', 'action \(3\)'\]"
     with pytest.raises(DataError, match=words):
@@ -95,28 +99,28 @@ def test_without_a_state_the_vector_features_are_listed(folder):
 
 
 def test_a_data_set_in_a_folder_is_one_source_and_goes_into_a_library(folder, tmp_path):
-    found = kineme.read_recordings(folder.parent)
-    assert {source.path for source in found.sources} == {"set"}
+    recordings = kineme.read_recordings(folder.parent)
+    assert {source.path for source in recordings.sources} == {"set"}
     with kineme.ActionLibrary(tmp_path / "library", create=True) as library:
-        report = library.learn(found)
+        report = library.learn(recordings)
     assert (report.added, sorted(report.symbols)) == (3, sorted(TASKS))
 
 
 def test_a_missing_or_damaged_shard_names_its_episodes(folder):
     shard_of(folder).unlink()
-    found = kineme.read_recordings(folder)
+    recordings = kineme.read_recordings(folder)
     lost = ["episode 0"] if (folder / "meta" / "tasks.jsonl").exists() else ["episode 0", "episode 1"]
-    assert len(found) == 3 - len(lost)
-    assert f"set: expected the shard {'data/chunk-000'}" in str(found.problems[0])
-    assert f"found none; left out {'episode 0' if len(lost) == 1 else 'episodes 0, 1'}" in found.problems[0].reason
+    assert len(recordings) == 3 - len(lost)
+    assert f"set: expected the shard {'data/chunk-000'}" in str(recordings.problems[0])
+    assert f"found none; left out {'episode 0' if len(lost) == 1 else 'episodes 0, 1'}" in recordings.problems[0].reason
 
 
 def test_a_damaged_shard_is_named(folder):
     shard_of(folder, -1).write_bytes(b"PAR1 cut")
-    found = kineme.read_recordings(folder)
-    assert len(found) == 2
-    assert "to be a Parquet file, got a damaged one" in found.problems[0].reason
-    assert found.problems[0].reason.endswith("left out episode 2")
+    recordings = kineme.read_recordings(folder)
+    assert len(recordings) == 2
+    assert "to be a Parquet file, got a damaged one" in recordings.problems[0].reason
+    assert recordings.problems[0].reason.endswith("left out episode 2")
     for shard in folder.glob("data/*/*"):
         shard.unlink()
     with pytest.raises(DataError, match="expected shards that can be read, got none; the first: expected the shard"):
@@ -139,29 +143,29 @@ def swapped(frames):
 )
 def test_an_episode_that_is_not_whole_is_named_and_the_others_are_read(folder, frames, words):
     change(folder, frames)
-    found = kineme.read_recordings(folder)
-    assert words in "; ".join(map(str, found.problems))
-    assert "episode 2" in [source.place for source in found.sources]
-    assert "episode 0" not in [source.place for source in found.sources]
+    recordings = kineme.read_recordings(folder)
+    assert words in "; ".join(map(str, recordings.problems))
+    assert "episode 2" in [source.place for source in recordings.sources]
+    assert "episode 0" not in [source.place for source in recordings.sources]
 
 
 def test_episodes_in_another_order_are_read_and_named(tmp_path):
     folder = write_v3(tmp_path / "set")
     change(folder, lambda frames: pd.concat([frames[frames["episode_index"] == k] for k in (1, 0)]))
-    found = kineme.read_recordings(folder)
-    assert [source.place for source in found.sources] == ["episode 1", "episode 0", "episode 2"]
-    assert "episode 0: its frames stand behind those of episode 1" in found.problems[0].reason
+    recordings = kineme.read_recordings(folder)
+    assert [source.place for source in recordings.sources] == ["episode 1", "episode 0", "episode 2"]
+    assert "episode 0: its frames stand behind those of episode 1" in recordings.problems[0].reason
     change(folder, lambda frames: pd.concat([frames[:5], frames[-5:], frames[5:-5]]))
-    found = kineme.read_recordings(folder)
-    assert "expected its frames in one place, got them in" in found.problems[0].reason
+    recordings = kineme.read_recordings(folder)
+    assert "expected its frames in one place, got them in" in recordings.problems[0].reason
 
 
 def test_an_episode_without_frames_in_a_shard_that_is_there_is_named(tmp_path):
     folder = write_v3(tmp_path / "set")
     change(folder, lambda frames: frames[frames["episode_index"] == 0])
-    found = kineme.read_recordings(folder)
-    assert [source.place for source in found.sources] == ["episode 0", "episode 2"]
-    assert found.problems[0].reason == "episode 1: expected frames in data/chunk-000/file-000.parquet, got none"
+    recordings = kineme.read_recordings(folder)
+    assert [source.place for source in recordings.sources] == ["episode 0", "episode 2"]
+    assert recordings.problems[0].reason == "episode 1: expected frames in data/chunk-000/file-000.parquet, got none"
 
 
 def test_a_vector_of_another_length_costs_its_episode_or_its_frame(tmp_path):
@@ -173,9 +177,9 @@ def test_a_vector_of_another_length_costs_its_episode_or_its_frame(tmp_path):
         return frames
 
     change(folder, shortened)
-    found = kineme.read_recordings(folder)
-    assert "movement episode 0: expected 3 numbers in 'observation.state', got 2" in found.problems[0].reason
-    assert len(found) == 2
+    recordings = kineme.read_recordings(folder)
+    assert "movement episode 0: expected 3 numbers in 'observation.state', got 2" in recordings.problems[0].reason
+    assert len(recordings) == 2
     tolerant = kineme.read_recordings(folder, skip="sample")
     assert tolerant.demonstrations.lengths.tolist() == [18, 30, 25]
 
@@ -187,13 +191,13 @@ def test_stamps_that_do_not_follow_the_rate_are_kept(tmp_path):
     np.testing.assert_allclose(times, 1.5 * np.arange(20) / 50, atol=1e-6)
 
 
-@pytest.mark.parametrize(("shift", "kept"), [(5e-5, False), (5e-4, True), (5e-3, True)])
-def test_stamps_within_a_tenth_of_a_millisecond_are_those_of_the_rate(tmp_path, shift, kept):
+@pytest.mark.parametrize(("shift", "stays"), [(5e-5, False), (5e-4, True), (5e-3, True)])
+def test_stamps_within_a_tenth_of_a_millisecond_are_those_of_the_rate(tmp_path, shift, stays):
     """LeRobot stores them in single precision, and refuses data sets that differ by more."""
     folder = write_v3(tmp_path / "set")
     change(folder, lambda frames: frames.assign(timestamp=frames["timestamp"] + shift * (frames["frame_index"] == 7)))
     times = kineme.read_recordings(folder).demonstrations[0].times
-    assert abs(times[7] - (7 / 50 + shift * kept)) < 1e-6
+    assert abs(times[7] - (7 / 50 + shift * stays)) < 1e-6
 
 
 def test_an_episode_of_several_tasks_has_the_most_frequent_one(tmp_path):
@@ -218,7 +222,7 @@ def test_an_episode_of_several_tasks_has_the_most_frequent_one(tmp_path):
 def test_a_damaged_description_says_what_is_wrong(folder, change, words):
     path = folder / "meta" / "info.json"
     info = json.loads(path.read_text()) | change
-    path.write_text(json.dumps({name: one for name, one in info.items() if one is not None}))
+    path.write_text(json.dumps({name: value for name, value in info.items() if value is not None}))
     with pytest.raises(DataError, match=words):
         kineme.read_recordings(folder)
     path.write_text("{")
@@ -249,18 +253,22 @@ def test_missing_metadata_is_named(tmp_path):
 def test_damaged_tasks_cost_the_labels_alone(tmp_path):
     folder = write_v3(tmp_path / "three")
     (folder / "meta" / "tasks.parquet").write_bytes(b"PAR1 cut")
-    found = kineme.read_recordings(folder)
-    assert found.labels.tolist() == [None] * 3
-    assert found.problems[0].reason.startswith("expected tasks.parquet in the meta folder of a LeRobot data set")
+    recordings = kineme.read_recordings(folder)
+    assert recordings.labels.tolist() == [None] * 3
+    assert recordings.problems[0].reason.startswith("expected tasks.parquet in the meta folder of a LeRobot data set")
     (folder / "meta" / "tasks.parquet").unlink()
-    found = kineme.read_recordings(folder)
-    assert "expected meta/tasks.parquet or meta/tasks.jsonl, found none; episodes have no" in found.problems[0].reason
+    recordings = kineme.read_recordings(folder)
+    assert (
+        "expected meta/tasks.parquet or meta/tasks.jsonl, found none; episodes have no" in recordings.problems[0].reason
+    )
     folder = write_v2(tmp_path / "two")
     tasks = folder / "meta" / "tasks.jsonl"
     tasks.write_text('{"task_index": "0", "task": "a"}\n{"task_index": 1, "task": "Wave"}\n{')
-    found = kineme.read_recordings(folder)
-    assert found.labels.tolist() == [None, "Wave", None]
-    assert [one.reason.split(": ")[0] for one in found.problems] == [f"meta/tasks.jsonl, line {k}" for k in (1, 3)]
+    recordings = kineme.read_recordings(folder)
+    assert recordings.labels.tolist() == [None, "Wave", None]
+    assert [problem.reason.split(": ")[0] for problem in recordings.problems] == [
+        f"meta/tasks.jsonl, line {k}" for k in (1, 3)
+    ]
 
 
 def test_damaged_descriptions_of_episodes_cost_those_alone(tmp_path):
@@ -268,19 +276,21 @@ def test_damaged_descriptions_of_episodes_cost_those_alone(tmp_path):
     path = folder / "meta" / "episodes.jsonl"
     lines = path.read_text().splitlines()
     path.write_text("\n".join([lines[0], lines[1][:-9], "", lines[2]]))
-    found = kineme.read_recordings(folder)
-    assert [source.place for source in found.sources] == ["episode 0", "episode 2"]
-    assert "meta/episodes.jsonl, line 2: expected an object with episode_index, length" in found.problems[0].reason
+    recordings = kineme.read_recordings(folder)
+    assert [source.place for source in recordings.sources] == ["episode 0", "episode 2"]
+    assert "meta/episodes.jsonl, line 2: expected an object with episode_index, length" in recordings.problems[0].reason
     path.write_text("\n".join([lines[0], json.dumps(json.loads(lines[1]) | {"length": 2**70}), lines[2]]))
     assert "line 2: expected an object with" in kineme.read_recordings(folder).problems[0].reason
     folder = write_v3(tmp_path / "three", lengths=(10,) * 6)
-    whole = next(folder.glob("meta/episodes/*/*"))
-    pd.read_parquet(whole)[:4].to_parquet(whole)
-    (whole.parent / "file-001.parquet").write_bytes(b"cut")
-    found = kineme.read_recordings(folder)
-    assert [source.place for source in found.sources] == [f"episode {k}" for k in range(4)]
-    assert found.problems[0].reason.startswith("expected file-001.parquet in the meta folder of a LeRobot data set")
-    whole.write_bytes(b"cut")
+    intact = next(folder.glob("meta/episodes/*/*"))
+    pd.read_parquet(intact)[:4].to_parquet(intact)
+    (intact.parent / "file-001.parquet").write_bytes(b"cut")
+    recordings = kineme.read_recordings(folder)
+    assert [source.place for source in recordings.sources] == [f"episode {k}" for k in range(4)]
+    assert recordings.problems[0].reason.startswith(
+        "expected file-001.parquet in the meta folder of a LeRobot data set"
+    )
+    intact.write_bytes(b"cut")
     with pytest.raises(DataError, match=r"got none in its meta folder; the first problem: expected file-000.parquet"):
         kineme.read_recordings(folder)
 
@@ -297,8 +307,8 @@ def test_several_chunks_of_several_files_described_in_another_order(tmp_path):
     rows.loc[4:, "data/file_index"] -= 2
     rows[3:].to_parquet(path)
     rows[:3].to_parquet(path.parent / "file-001.parquet")
-    found = kineme.read_recordings(folder)
-    assert (found.problems, found.demonstrations.lengths.tolist()) == ((), [10, 11, 12, 13, 14, 15, 16])
+    recordings = kineme.read_recordings(folder)
+    assert (recordings.problems, recordings.demonstrations.lengths.tolist()) == ((), [10, 11, 12, 13, 14, 15, 16])
 
 
 def test_an_episode_without_frames_and_one_with_a_missing_number(tmp_path):
@@ -309,11 +319,11 @@ def test_an_episode_without_frames_and_one_with_a_missing_number(tmp_path):
         return frames
 
     change(folder, spoiled)
-    found = kineme.read_recordings(folder, fill_gaps=0)
-    assert [source.place for source in found.sources] == ["episode 2", "episode 3"]
-    reasons = [one.reason for one in found.problems]
+    recordings = kineme.read_recordings(folder, fill_gaps=0)
+    assert [source.place for source in recordings.sources] == ["episode 2", "episode 3"]
+    reasons = [problem.reason for problem in recordings.problems]
     assert "episode 1: expected frames in data/chunk-000/file-000.parquet, got none" in reasons
-    assert any(one.startswith("movement episode 0: expected a number in ") for one in reasons)
+    assert any(reason.startswith("movement episode 0: expected a number in ") for reason in reasons)
     assert kineme.read_recordings(folder).sources[0].filled == 1
 
 
@@ -327,16 +337,16 @@ def test_an_episode_without_frames_and_one_with_a_missing_number(tmp_path):
 def test_a_shard_without_its_numbers_is_named_with_its_episodes(tmp_path, frames, words):
     folder = write_v3(tmp_path / "set")
     change(folder, frames, 1)
-    found = kineme.read_recordings(folder)
-    assert len(found) == 2
-    assert f"the shard data/chunk-000/file-001.parquet: {words}" in found.problems[0].reason
-    assert found.problems[0].reason.endswith("; left out episode 2")
+    recordings = kineme.read_recordings(folder)
+    assert len(recordings) == 2
+    assert f"the shard data/chunk-000/file-001.parquet: {words}" in recordings.problems[0].reason
+    assert recordings.problems[0].reason.endswith("; left out episode 2")
 
 
 def test_frames_of_no_episode_are_named_without_a_number(tmp_path):
     folder = write_v3(tmp_path / "set")
     change(folder, lambda frames: frames.astype({"episode_index": "Int64"}).where(frames["index"] != 29, other=None))
-    reasons = "; ".join(one.reason for one in kineme.read_recordings(folder).problems)
+    reasons = "; ".join(problem.reason for problem in kineme.read_recordings(folder).problems)
     assert "frames without an episode_index: expected frame 0 next" in reasons
     assert "episode -1" not in reasons
 
@@ -344,8 +354,12 @@ def test_frames_of_no_episode_are_named_without_a_number(tmp_path):
 def test_pictures_alone_are_refused_by_their_names(folder):
     path = folder / "meta" / "info.json"
     info = json.loads(path.read_text())
-    kept = {name: one for name, one in info["features"].items() if one["dtype"] == "video" or name == "timestamp"}
-    path.write_text(json.dumps(info | {"features": kept}))
+    features = {
+        name: feature
+        for name, feature in info["features"].items()
+        if feature["dtype"] == "video" or name == "timestamp"
+    }
+    path.write_text(json.dumps(info | {"features": features}))
     with pytest.raises(DataError, match=r"expected features of numbers .* got only .*'observation.images.top'"):
         kineme.read_recordings(folder)
 
@@ -395,7 +409,9 @@ def test_files_of_episodes_count_together(monkeypatch, tmp_path):
     for k in (1, 2):
         rows.to_parquet(path.parent / f"file-00{k}.parquet")
     monkeypatch.setenv("KINEME_MAX_FILE_BYTES", "1000000")  # 600,000 for 3000 episodes
-    reasons = [one.reason for one in kineme.read_recordings(folder).problems if "takes at most" in one.reason]
+    reasons = [
+        problem.reason for problem in kineme.read_recordings(folder).problems if "takes at most" in problem.reason
+    ]
     assert len(reasons) == 1
     assert "file-002.parquet that takes at most" in reasons[0]
 

@@ -34,8 +34,8 @@ def one(x=X, t=T):
 def test_recordings_are_those_that_scipy_reads(shape):
     data = lasa._resources()[shape].read_bytes()
     expected = np.atleast_1d(loadmat(io.BytesIO(data), squeeze_me=True, struct_as_record=False)["demos"])
-    found = read_demos(data)
-    for theirs, t, x in zip(expected, found.times, found.positions, strict=True):
+    demos = read_demos(data)
+    for theirs, t, x in zip(expected, demos.times, demos.positions, strict=True):
         np.testing.assert_array_equal(t, theirs.t)
         np.testing.assert_array_equal(x, theirs.pos.T)
 
@@ -44,9 +44,9 @@ def test_recordings_are_those_that_scipy_reads(shape):
 @pytest.mark.parametrize("dtype", ["f8", "f4", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", "?"])
 def test_numbers_of_every_type(compressed, dtype):
     x = (100 * np.abs(X)).astype(dtype)
-    found = read_demos(saved(compressed, demos=one(x), name="wave"))
-    assert found.name == "wave"
-    np.testing.assert_array_equal(found.positions[0], x.astype(float))
+    demos = read_demos(saved(compressed, demos=one(x), name="wave"))
+    assert demos.name == "wave"
+    np.testing.assert_array_equal(demos.positions[0], x.astype(float))
 
 
 @pytest.mark.parametrize("compressed", [False, True])
@@ -57,9 +57,9 @@ def test_cells_arrays_of_structures_and_what_stands_beside_them(compressed):
     records[0, 0], records[0, 1] = (X.T, "x", T), (2 * X.T, {"a": cells}, T[:, None])
     beside = {"before": {"deep": {"deeper": [1j, "text"]}}, "a": np.eye(30) * 1j, "zz": np.array(["ab", "c"])}
     assert [x.shape for x in read_demos(saved(compressed, **beside, demos=cells)).positions] == [(6, 2), (6, 1)]
-    found = read_demos(saved(compressed, **beside, demos=records))
-    np.testing.assert_array_equal(found.positions[1], 2 * X)
-    np.testing.assert_array_equal(found.times[1], T)
+    demos = read_demos(saved(compressed, **beside, demos=records))
+    np.testing.assert_array_equal(demos.positions[1], 2 * X)
+    np.testing.assert_array_equal(demos.times[1], T)
 
 
 def test_files_of_big_endian_machines():
@@ -80,17 +80,17 @@ def test_files_of_big_endian_machines():
     packed = zlib.compress(demos)
     header = b"MATLAB 5.0".ljust(124) + b"\1\0MI"
     for body in (demos, struct.pack(">II", 15, len(packed)) + packed):
-        found = read_demos(header + body)
-        np.testing.assert_array_equal(found.positions[0], X)
-        np.testing.assert_array_equal(found.times[0], T)
+        in_that_order = read_demos(header + body)
+        np.testing.assert_array_equal(in_that_order.positions[0], X)
+        np.testing.assert_array_equal(in_that_order.times[0], T)
 
 
 def test_the_file_that_killed_the_reader():
     """Types that there are not, in the tag of any element: SciPy's reader follows them out of its table."""
-    whole = saved(demos=one(), name="wave")
-    for at in range(128, len(whole), 8):
+    data = saved(demos=one(), name="wave")
+    for at in range(128, len(data), 8):
         for kind in (0, 8, 10, 11, 14, 16, 19, 255, 65535):
-            spoiled = whole[:at] + struct.pack("<H", kind) + whole[at + 2 :]
+            spoiled = data[:at] + struct.pack("<H", kind) + data[at + 2 :]
             with suppress(kineme.errors.DataError):
                 assert len(read_demos(spoiled).times[0]) <= len(T)
 
@@ -105,9 +105,9 @@ def test_a_compressed_bomb_is_not_expanded(monkeypatch):
 
 
 def test_what_compressed_data_say_of_themselves_is_not_believed():
-    whole = saved(True, demos=one())
-    size = int.from_bytes(whole[132:136], "little")
-    plain = zlib.decompress(whole[136 : 136 + size])
+    data = saved(True, demos=one())
+    size = int.from_bytes(data[132:136], "little")
+    plain = zlib.decompress(data[136 : 136 + size])
     for spoiled in (
         plain[:-8],
         plain + bytes(2**20),
@@ -117,16 +117,16 @@ def test_what_compressed_data_say_of_themselves_is_not_believed():
     ):
         packed = zlib.compress(spoiled)
         with pytest.raises(kineme.errors.DataError, match="expected a"):
-            read_demos(whole[:128] + struct.pack("<II", 15, len(packed)) + packed)
+            read_demos(data[:128] + struct.pack("<II", 15, len(packed)) + packed)
     with pytest.raises(kineme.errors.DataError, match="truncated"):
-        read_demos(whole[:-4])
+        read_demos(data[:-4])
 
 
 def test_a_file_that_was_cut_is_refused_wherever_that_was():
-    whole = saved(demos=one(), beside=np.arange(9.0))
-    for at in range(0, len(whole) - 1, 7):
+    data = saved(demos=one(), beside=np.arange(9.0))
+    for at in range(0, len(data) - 1, 7):
         with pytest.raises(kineme.errors.DataError, match="expected a MATLAB file with 'demos', got"):
-            read_demos(whole[:at])
+            read_demos(data[:at])
 
 
 CELLS_T = np.arange(12) / 10
@@ -147,16 +147,16 @@ def read_mat(tmp_path, **variables):
 def test_cells_structures_and_variables_are_movements_or_columns(tmp_path):
     cells = np.empty((1, 2), object)
     cells[0, 0], cells[0, 1] = CELLS_X, CELLS_X[:9].T  # samples along the longer axis
-    found = read_mat(tmp_path, trials=cells)
-    assert [source.place for source in found.sources] == ["trials/0", "trials/1"]
-    np.testing.assert_array_equal(found.demonstrations[1].positions, CELLS_X[:9])
+    recordings = read_mat(tmp_path, trials=cells)
+    assert [source.place for source in recordings.sources] == ["trials/0", "trials/1"]
+    np.testing.assert_array_equal(recordings.demonstrations[1].positions, CELLS_X[:9])
     structures = np.zeros((1, 2), [("t", object), ("q", object), ("label", object)])
     for k, label in enumerate(("wave", "nod")):
         structures[0, k] = (CELLS_T, CELLS_X.T, label)
-    found = read_mat(tmp_path, data=structures)
-    assert found.labels.tolist() == ["wave", "nod"]
-    np.testing.assert_array_equal(found.demonstrations[0].positions, CELLS_X)
-    np.testing.assert_array_equal(found.demonstrations[0].times, CELLS_T)
+    recordings = read_mat(tmp_path, data=structures)
+    assert recordings.labels.tolist() == ["wave", "nod"]
+    np.testing.assert_array_equal(recordings.demonstrations[0].positions, CELLS_X)
+    np.testing.assert_array_equal(recordings.demonstrations[0].times, CELLS_T)
     assert read_mat(tmp_path, t=CELLS_T, a=CELLS_T, b=CELLS_T**2).demonstrations.dimensions == ("a", "b")
     rated = read_mat(tmp_path, q=CELLS_X, grip=CELLS_T, fps=50.0)
     np.testing.assert_allclose(np.diff(rated.demonstrations.times), 0.02)
@@ -167,5 +167,5 @@ def test_cells_structures_and_variables_are_movements_or_columns(tmp_path):
 def test_matrices_with_their_own_times_win_over_the_longer_axis(tmp_path):
     few = np.arange(5) / 5
     wide = np.arange(40.0).reshape(8, 5)
-    found = read_mat(tmp_path, trial={"t": few, "q": wide})
-    np.testing.assert_array_equal(found.demonstrations.positions, wide.T)
+    recordings = read_mat(tmp_path, trial={"t": few, "q": wide})
+    np.testing.assert_array_equal(recordings.demonstrations.positions, wide.T)

@@ -74,16 +74,16 @@ PLACES = [{"x": k / 7, "y": k * k / 9, "pose": {"yaw": k / 3}} for k in range(30
 def test_messages_in_json_are_samples(tmp_path, compression):
     from mcap.writer import CompressionType
 
-    stamped = [{"timestamp": {"sec": k // 10, "nsec": k % 10 * 100_000_000}} | one for k, one in enumerate(PLACES)]
+    stamped = [{"timestamp": {"sec": k // 10, "nsec": k % 10 * 100_000_000}} | place for k, place in enumerate(PLACES)]
     path = write_json_mcap(
         tmp_path / "a.mcap", {"/hand": PLACES, "/stamped": stamped}, compression=CompressionType[compression]
     )
     with pytest.raises(kineme.errors.DataError, match=r"got the topics \['/hand', '/stamped'\]; say which .*--topic"):
         read_recordings(path)
     for topic, step in (("/hand", 0.05), ("/stamped", 0.1)):
-        (one,) = read_recordings(path, topic=topic).demonstrations
-        np.testing.assert_array_equal(one.recorded, [[k / 7, k * k / 9, k / 3] for k in range(30)])
-        np.testing.assert_allclose(np.diff(one.times), step, atol=1e-6)
+        (movement,) = read_recordings(path, topic=topic).demonstrations
+        np.testing.assert_array_equal(movement.recorded, [[k / 7, k * k / 9, k / 3] for k in range(30)])
+        np.testing.assert_allclose(np.diff(movement.times), step, atol=1e-6)
     with pytest.raises(kineme.errors.DataError, match="messages that are objects, got b'3'"):
         read_recordings(write_json_mcap(tmp_path / "b.mcap", {"/n": [3] * 9}))
 

@@ -103,25 +103,25 @@ Frame Time: 0.0333333
 
 
 def test_vicon_markers_have_names_units_and_times_from_the_rate():
-    found = read(vicon())
-    demos, how = found.demonstrations, found.detected[0][0]
+    recordings = read(vicon())
+    demos, how = recordings.demonstrations, recordings.detected[0][0]
     assert demos.dimensions == ("LASI.x", "LASI.y", "LASI.z", "RASI.x", "RASI.y", "RASI.z")
     np.testing.assert_allclose(demos.times, np.arange(N) / 100, atol=1e-12)
     np.testing.assert_array_equal(demos.positions[:, 1], np.arange(N) ** 2)
     assert how.format == "Vicon CSV"
     assert set(how.measured_in) == {"mm"}
     assert how.ignored == ("frame", "sub frame")
-    assert "RASI.z in mm" in as_words(inspect(found))
+    assert "RASI.z in mm" in as_words(inspect(recordings))
     assert read(vicon(), columns="RASI").demonstrations.dimensions == ("RASI.x", "RASI.y", "RASI.z")
 
 
 def test_a_gap_names_its_line_and_marker_and_costs_its_sample_alone_if_asked():
     with pytest.raises(DataError, match=r"line 35: expected a number in 'RASI.x', got nothing"):
         read(vicon(gap=3), fill_gaps=0)
-    found = read(vicon(gap=3), skip="sample", fill_gaps=0)
-    assert found.demonstrations.lengths.tolist() == [N - 1]
-    assert found.problems[0].line == 35
-    np.testing.assert_allclose(found.demonstrations.times[2:4], [0.02, 0.04])
+    recordings = read(vicon(gap=3), skip="sample", fill_gaps=0)
+    assert recordings.demonstrations.lengths.tolist() == [N - 1]
+    assert recordings.problems[0].line == 35
+    np.testing.assert_allclose(recordings.demonstrations.times[2:4], [0.02, 0.04])
     assert len(read(vicon(gap=3), columns="LASI").demonstrations.positions) == N
 
 
@@ -136,63 +136,63 @@ def test_frames_that_are_missing_leave_a_gap_in_time():
 def test_vicon_poses_are_named_as_poses():
     rows = ["Objects", "100", ",,Global Angle (Quaternion) Cup:Cup", "Frame,Sub Frame,RX,RY,RZ,RW,TX,TY,TZ"]
     rows += [",,,,,,mm,mm,mm", *(f"{k},0,0,0,0,1,{k},2,{k * k}" for k in range(N))]
-    found = read("\n".join(rows))
+    recordings = read("\n".join(rows))
     names = [f"Cup.orientation.{axis}" for axis in "xyzw"] + [f"Cup.position.{axis}" for axis in "xyz"]
-    assert list(recorded_names(found.demonstrations.channels)) == names
-    assert found.detected[0][0].measured_in == ("", "", "", "", "mm", "mm", "mm")
+    assert list(recorded_names(recordings.demonstrations.channels)) == names
+    assert recordings.detected[0][0].measured_in == ("", "", "", "", "mm", "mm", "mm")
 
 
 def test_devices_count_sub_frames_by_their_own_rate():
-    found = read(vicon().partition("Trajectories")[0])
-    np.testing.assert_allclose(np.diff(found.demonstrations.times), 0.001)
+    recordings = read(vicon().partition("Trajectories")[0])
+    np.testing.assert_allclose(np.diff(recordings.demonstrations.times), 0.001)
 
 
 def test_motive_rigid_bodies_are_poses_and_what_follows_from_them_is_left_aside():
-    found = read(motive())
+    recordings = read(motive())
     names = [f"Cup.orientation.{axis}" for axis in "xyzw"] + [f"Cup.position.{axis}" for axis in "xyz"]
-    assert list(recorded_names(found.demonstrations.channels)) == [
+    assert list(recorded_names(recordings.demonstrations.channels)) == [
         *names,
         *(f"Marker1.position.{axis}" for axis in "xyz"),
     ]
-    assert found.detected[0][0].format == "OptiTrack CSV"
-    assert found.detected[0][0].measured_in == ("", "", "", "", *["m"] * 6)
-    np.testing.assert_allclose(found.demonstrations.times, np.arange(N) / 120, atol=1e-6)
+    assert recordings.detected[0][0].format == "OptiTrack CSV"
+    assert recordings.detected[0][0].measured_in == ("", "", "", "", *["m"] * 6)
+    np.testing.assert_allclose(recordings.demonstrations.times, np.arange(N) / 120, atol=1e-6)
     markers = read(motive(rigid=False)).demonstrations
     assert markers.dimensions == ("Marker1.x", "Marker1.y", "Marker1.z")
 
 
 def test_qualisys_times_come_from_the_frequency_or_from_their_column():
     for headed in (False, True):
-        found = read(qualisys(headed), "a.tsv")
-        assert found.demonstrations.dimensions == ("Head.x", "Head.y", "Head.z", "Wrist.x", "Wrist.y", "Wrist.z")
-        np.testing.assert_allclose(found.demonstrations.times, np.arange(N) / 200, atol=1e-9)
-        assert set(found.detected[0][0].measured_in) == {"mm"}
+        recordings = read(qualisys(headed), "a.tsv")
+        assert recordings.demonstrations.dimensions == ("Head.x", "Head.y", "Head.z", "Wrist.x", "Wrist.y", "Wrist.z")
+        np.testing.assert_allclose(recordings.demonstrations.times, np.arange(N) / 200, atol=1e-9)
+        assert set(recordings.detected[0][0].measured_in) == {"mm"}
 
 
 def test_zeros_in_place_of_a_lost_marker_are_a_gap():
-    found = read(qualisys(lost=(3, 4)), "a.tsv", skip="sample", fill_gaps=0)
-    assert found.demonstrations.lengths.tolist() == [N - 2]
-    assert "'Wrist', got nothing" in found.problems[0].reason
+    recordings = read(qualisys(lost=(3, 4)), "a.tsv", skip="sample", fill_gaps=0)
+    assert recordings.demonstrations.lengths.tolist() == [N - 2]
+    assert "'Wrist', got nothing" in recordings.problems[0].reason
     everywhere = read(qualisys(lost=range(N)), "a.tsv")  # a marker that was never found is left aside
     assert everywhere.demonstrations.dimensions == ("Head.x", "Head.y", "Head.z")
 
 
 @pytest.mark.parametrize("zeros", ["0\t0\t0", "0.000\t0.000\t0.000", "\t\t"])
 def test_zeros_and_nothing_in_place_of_a_marker_of_trc_are_a_gap(zeros):
-    whole, lost = trc(), trc()
+    complete, lost = trc(), trc()
     for k in (5, 6):
         lost = lost.replace(f"\t{k}\t{k * k}\t3\t", f"\t{zeros}\t")
-    found = read(lost, "walk.trc")
-    assert (found.sources[0].filled, found.problems) == (2, ())
-    expected = read(whole, "walk.trc").demonstrations.positions
-    np.testing.assert_allclose(found.demonstrations.positions, expected, atol=0.5)
+    recordings = read(lost, "walk.trc")
+    assert (recordings.sources[0].filled, recordings.problems) == (2, ())
+    expected = read(complete, "walk.trc").demonstrations.positions
+    np.testing.assert_allclose(recordings.demonstrations.positions, expected, atol=0.5)
 
 
 def test_qualisys_bodies_are_positions_and_angles():
-    found = read(qualisys_bodies(), "a.tsv")
+    recordings = read(qualisys_bodies(), "a.tsv")
     names = ["Cup.position.x", "Cup.position.y", "Cup.position.z", "Cup.roll", "Cup.pitch", "Cup.yaw"]
-    assert list(recorded_names(found.demonstrations.channels)) == names
-    assert found.detected[0][0].measured_in == ("mm", "mm", "mm", "deg", "deg", "deg")
+    assert list(recorded_names(recordings.demonstrations.channels)) == names
+    assert recordings.detected[0][0].measured_in == ("mm", "mm", "mm", "deg", "deg", "deg")
 
 
 @pytest.mark.parametrize("separator", [",", ";"])
@@ -203,16 +203,18 @@ def test_trc_that_a_program_for_tables_has_saved(separator):
     saved = "\n".join(separator.join(line + [""] * (widest - len(line))) for line in lines)
     head, _, samples = saved.partition("\n1" + separator)
     for empty in ("", "\n" + separator * (widest - 1)):
-        found = read(f"{head}{empty}\n1{separator}{samples}", "walk.trc")
-        np.testing.assert_array_equal(found.demonstrations.recorded, read(trc(), "walk.trc").demonstrations.recorded)
-        assert found.detected[0][0].columns == read(trc(), "walk.trc").detected[0][0].columns
+        recordings = read(f"{head}{empty}\n1{separator}{samples}", "walk.trc")
+        np.testing.assert_array_equal(
+            recordings.demonstrations.recorded, read(trc(), "walk.trc").demonstrations.recorded
+        )
+        assert recordings.detected[0][0].columns == read(trc(), "walk.trc").detected[0][0].columns
 
 
 def test_trc_markers_have_names_units_and_times():
-    found = read(trc(), "walk.trc")
-    assert found.demonstrations.dimensions == ("LASI.x", "LASI.y", "LASI.z", "RASI.x", "RASI.y", "RASI.z")
-    assert set(found.detected[0][0].measured_in) == {"mm"}
-    np.testing.assert_array_equal(found.demonstrations.times, np.arange(N) / 100)
+    recordings = read(trc(), "walk.trc")
+    assert recordings.demonstrations.dimensions == ("LASI.x", "LASI.y", "LASI.z", "RASI.x", "RASI.y", "RASI.z")
+    assert set(recordings.detected[0][0].measured_in) == {"mm"}
+    np.testing.assert_array_equal(recordings.demonstrations.times, np.arange(N) / 100)
     with pytest.raises(DataError, match="expected the heads 'Frame#', 'Time'"):
         read(trc().replace("Frame#", "Row"), "walk.trc")
 
@@ -245,10 +247,10 @@ def test_an_export_without_what_it_needs_says_so(content, words):
 @pytest.mark.parametrize("units", ["ms,mm,deg", "[ms],[mm],[deg]", ",mm,deg"])
 def test_a_row_of_units_below_the_heads_is_not_a_sample(units):
     rows = "".join(f"{10 * k},{k},{k * k}\n" for k in range(N))
-    found = read(f"time,x,y\n{units}\n{rows}")
-    how = found.detected[0][0]
-    assert (how.measured_in, found.problems) == (("mm", "deg"), ())
-    np.testing.assert_allclose(found.demonstrations.times, np.arange(N) / 100)
+    recordings = read(f"time,x,y\n{units}\n{rows}")
+    how = recordings.detected[0][0]
+    assert (how.measured_in, recordings.problems) == (("mm", "deg"), ())
+    np.testing.assert_allclose(recordings.demonstrations.times, np.arange(N) / 100)
     assert how.units_from == ("head" if "ms" in units else "by its steps")
 
 
@@ -260,10 +262,10 @@ def test_names_and_gaps_below_the_heads_are_not_units():
 
 
 def test_bvh_channels_are_named_by_their_joints():
-    found = read(BVH, "walk.bvh")
-    assert found.demonstrations.dimensions[5:7] == ("Hips.Yrotation", "Lower Spine.Zrotation")
-    assert found.detected[0][0].measured_in == ("", "", "", *["deg"] * 6)
-    np.testing.assert_allclose(found.demonstrations.times, np.arange(N) * 0.0333333)
+    recordings = read(BVH, "walk.bvh")
+    assert recordings.demonstrations.dimensions[5:7] == ("Hips.Yrotation", "Lower Spine.Zrotation")
+    assert recordings.detected[0][0].measured_in == ("", "", "", *["deg"] * 6)
+    np.testing.assert_allclose(recordings.demonstrations.times, np.arange(N) * 0.0333333)
     assert read(BVH, "walk.bvh", columns="Lower Spine").demonstrations.n_dims == 3
 
 
@@ -271,9 +273,9 @@ def test_bvh_files_that_turn_about_their_axes_in_another_order_are_not_mixed(tmp
     """The three angles of one turn are others in another order, though their names are the same."""
     for k, order in enumerate(("Xrotation Yrotation Zrotation", *["Zrotation Xrotation Yrotation"] * 2)):
         (tmp_path / f"{k}.bvh").write_text(BVH.replace("Zrotation Xrotation Yrotation", order))
-    found = read_recordings(tmp_path)
-    assert [one.path for one in found.sources] == ["1.bvh", "2.bvh"]
-    (problem,) = found.problems
+    recordings = read_recordings(tmp_path)
+    assert [source.path for source in recordings.sources] == ["1.bvh", "2.bvh"]
+    (problem,) = recordings.problems
     assert (problem.file, "expected the rotations of 'hips' in the order zxy" in problem.reason) == ("0.bvh", True)
     names = [f"Hips.{axis}rotation" for axis in "XYZ"]
     with pytest.raises(DataError, match="in the order zxy, as the file has them, got xyz"):
@@ -283,9 +285,9 @@ def test_bvh_files_that_turn_about_their_axes_in_another_order_are_not_mixed(tmp
 @pytest.mark.parametrize("tail", ["\t", ""])
 def test_names_of_trc_may_end_in_more_tabs_than_samples(tail):
     text = f"{trc()}\r\n".replace("\t\r\n", f"{tail}\r\n").replace("RASI\t\t" + tail, "RASI\t\t\t")
-    found = read(text, "walk.trc")
-    np.testing.assert_array_equal(found.demonstrations.positions, read(trc(), "walk.trc").demonstrations.positions)
-    assert found.problems == ()
+    recordings = read(text, "walk.trc")
+    np.testing.assert_array_equal(recordings.demonstrations.positions, read(trc(), "walk.trc").demonstrations.positions)
+    assert recordings.problems == ()
 
 
 @pytest.mark.parametrize(
@@ -329,12 +331,12 @@ def c3d_bytes(tmp_path_factory):
 
 
 def test_c3d_points_are_named_and_lost_ones_are_gaps(c3d_bytes):
-    found = read(c3d_bytes, "a.c3d", skip="sample", fill_gaps=0)
-    assert found.demonstrations.dimensions == ("LASI.x", "LASI.y", "LASI.z", "RASI.x", "RASI.y", "RASI.z")
-    np.testing.assert_allclose(found.demonstrations.positions[:, 0], np.delete(np.arange(N), [5, 7]))
-    np.testing.assert_allclose(found.demonstrations.times, np.delete(np.arange(N), [5, 7]) / 100)
-    assert set(found.detected[0][0].measured_in) == {"mm"}
-    assert "got nothing in 8.3 % of the samples, 8.3 % of 'RASI'" in found.problems[0].reason
+    recordings = read(c3d_bytes, "a.c3d", skip="sample", fill_gaps=0)
+    assert recordings.demonstrations.dimensions == ("LASI.x", "LASI.y", "LASI.z", "RASI.x", "RASI.y", "RASI.z")
+    np.testing.assert_allclose(recordings.demonstrations.positions[:, 0], np.delete(np.arange(N), [5, 7]))
+    np.testing.assert_allclose(recordings.demonstrations.times, np.delete(np.arange(N), [5, 7]) / 100)
+    assert set(recordings.detected[0][0].measured_in) == {"mm"}
+    assert "got nothing in 8.3 % of the samples, 8.3 % of 'RASI'" in recordings.problems[0].reason
     some = read(c3d_bytes, "a.c3d", columns="LASI", skip="sample", fill_gaps=0)
     assert some.demonstrations.lengths.tolist() == [N - 1]
 
@@ -355,15 +357,15 @@ def test_the_marker_that_one_file_lacks_is_named(tmp_path):
         points[:3] += np.sin(np.arange(N)) * np.arange(3 * len(markers)).reshape(3, -1, 1)
         content["data"]["points"] = points
         content.write(str(tmp_path / f"{name}.c3d"))
-    found = read_recordings(tmp_path)
-    assert len(found) == 2
-    lacking, more = (one.reason for one in found.problems)
+    recordings = read_recordings(tmp_path)
+    assert len(recordings) == 2
+    lacking, more = (problem.reason for problem in recordings.problems)
     assert lacking.startswith(
         "3 dimensions where most have 6: it lacks ['M30.x', 'M30.y', 'M30.z']; say --exclude M30 "
     )
     assert more.startswith("9 dimensions where most have 6: it has ['EXTRA.x', 'EXTRA.y', 'EXTRA.z'] besides; say --ex")
-    found = read_recordings(tmp_path, exclude=["M30", "EXTRA"])
-    assert (len(found), found.problems) == (4, ())
+    recordings = read_recordings(tmp_path, exclude=["M30", "EXTRA"])
+    assert (len(recordings), recordings.problems) == (4, ())
 
 
 def test_a_damaged_c3d_file_says_so(c3d_bytes):

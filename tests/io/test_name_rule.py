@@ -27,7 +27,7 @@ def test_a_pattern_says_label_and_person_and_what_does_not_match_is_a_problem(tm
     read = kineme.read_recordings(tmp_path, label_pattern=PATTERN)
     assert read.labels.tolist() == ["wave", "wave_hand"]
     assert read.people == ["ann", "bob"]
-    assert [str(one) for one in read.problems] == [
+    assert [str(problem) for problem in read.problems] == [
         "notes.csv: expected a name like {person}_{label}_{n}.csv, as the label pattern says, got notes.csv"
     ]
 

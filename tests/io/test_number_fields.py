@@ -38,13 +38,13 @@ def typed(kind):
     """A store of rosbags that knows the types of its own."""
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-    known = get_typestore(Stores.ROS1_NOETIC if kind == "ros1" else Stores.LATEST)
-    known.register(get_types_from_msg(GRIP, "my_msgs/msg/Grip"))
-    return known
+    types = get_typestore(Stores.ROS1_NOETIC if kind == "ros1" else Stores.LATEST)
+    types.register(get_types_from_msg(GRIP, "my_msgs/msg/Grip"))
+    return types
 
 
-def grip(known, header, k):
-    make = known.types
+def grip(types, header, k):
+    make = types.types
     finger = make["my_msgs/msg/Finger"]
     fingers = [finger("f" * (i + k % 3), i, k + i / 7, np.array([k, -i], np.float32)) for i in range(4)]
     return make["my_msgs/msg/Grip"](
@@ -55,19 +55,19 @@ def grip(known, header, k):
 
 
 def recorded(tmp_path, kind, n=20, others=()):
-    known, m = typed(kind), Maker(kind)
-    serialize = known.serialize_ros1 if kind == "ros1" else known.serialize_cdr
+    types, m = typed(kind), Maker(kind)
+    serialize = types.serialize_ros1 if kind == "ros1" else types.serialize_cdr
     path = tmp_path / ("run.bag" if kind == "ros1" else "run")
     from bag_files import _writer
 
     with _writer(path, kind, False) as writer:
-        topic = writer.add_connection("/grip", "my_msgs/msg/Grip", typestore=known)
+        topic = writer.add_connection("/grip", "my_msgs/msg/Grip", typestore=types)
         for k, ns in enumerate(stamps(n)):
-            writer.write(topic, ns + 7, serialize(grip(known, m.header(ns), k), "my_msgs/msg/Grip"))
+            writer.write(topic, ns + 7, serialize(grip(types, m.header(ns), k), "my_msgs/msg/Grip"))
         for name, kind_of, messages in others:
-            one = writer.add_connection(name, kind_of, typestore=known)
+            connection = writer.add_connection(name, kind_of, typestore=types)
             for ns, message in messages:
-                writer.write(one, ns, serialize(message, kind_of))
+                writer.write(connection, ns, serialize(message, kind_of))
     return path
 
 
@@ -75,23 +75,23 @@ def recorded(tmp_path, kind, n=20, others=()):
 def test_fields_of_a_type_of_ones_own_are_columns_by_their_path(tmp_path, kind):
     path = recorded(tmp_path, kind)
     read = kineme.read_recordings(path, topic="/grip")
-    (one,) = read.demonstrations
+    (movement,) = read.demonstrations
     heads = ["closed", "force"]
     heads += [f"fingers.{k}.{name}" for k in range(2) for name in ("angle", "tip.0", "tip.1")]
     heads += ["count", "wrench.0", "wrench.1", "wrench.2", "axis.x", "axis.y", "axis.z"]
-    assert [column for channel in one.channels for column in channel.columns] == heads
+    assert [column for channel in movement.channels for column in channel.columns] == heads
     expected = [
         [k > 5, k / 3, *(x for i in range(2) for x in (k + i / 7, k, -i)), 1000 + k, k, 0.5, -k, k / 2, 1, -1]
         for k in range(20)
     ]
-    np.testing.assert_array_equal(one.recorded, np.array(expected, dtype=float))
-    np.testing.assert_allclose(one.times, np.array(stamps(20)) / SECOND, rtol=0, atol=5e-7)
+    np.testing.assert_array_equal(movement.recorded, np.array(expected, dtype=float))
+    np.testing.assert_allclose(movement.times, np.array(stamps(20)) / SECOND, rtol=0, atol=5e-7)
     assert read.detected[0][0].time == "header.stamp"
     assert read.detected[0][0].ignored == ("fingers.0.id", "fingers.1.id")
     (topics, *_) = bag_contents(path)
     assert ("/grip", "my_msgs/msg/Grip", 20, "17 numbers: a movement, by --topic") in topics.rows
     chosen = kineme.read_recordings(path, topic="/grip", columns=["force", "axis"]).demonstrations[0]
-    np.testing.assert_array_equal(chosen.positions[:, :2], one.recorded[:, [1, 12]])
+    np.testing.assert_array_equal(chosen.positions[:, :2], movement.recorded[:, [1, 12]])
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -107,13 +107,15 @@ def test_imu(tmp_path, kind):
         )
         for ns, row in zip(stamps(), rows, strict=True)
     ]  # fmt: skip
-    path = write_bag(tmp_path, kind, [("/imu", ns + 3, one) for ns, one in zip(stamps(), messages, strict=True)])
-    (one,) = kineme.read_recordings(path).demonstrations  # the only topic with numbers
-    assert next((channel.name, channel.kind) for channel in one.channels) == ("orientation", "orientation")
-    np.testing.assert_allclose(one.recorded, np.hstack((rows[:, 3:], rows[:, :3], 2 * rows[:, :3])), atol=1e-12)
-    np.testing.assert_allclose(one.times, np.array(stamps()) / SECOND, rtol=0, atol=5e-7)
-    whole = kineme.read_recordings(path, columns="orientation_covariance").demonstrations[0]
-    np.testing.assert_array_equal(whole.recorded[3], np.arange(9.0))
+    path = write_bag(
+        tmp_path, kind, [("/imu", ns + 3, message) for ns, message in zip(stamps(), messages, strict=True)]
+    )
+    (movement,) = kineme.read_recordings(path).demonstrations  # the only topic with numbers
+    assert next((channel.name, channel.kind) for channel in movement.channels) == ("orientation", "orientation")
+    np.testing.assert_allclose(movement.recorded, np.hstack((rows[:, 3:], rows[:, :3], 2 * rows[:, :3])), atol=1e-12)
+    np.testing.assert_allclose(movement.times, np.array(stamps()) / SECOND, rtol=0, atol=5e-7)
+    covariance = kineme.read_recordings(path, columns="orientation_covariance").demonstrations[0]
+    np.testing.assert_array_equal(covariance.recorded[3], np.arange(9.0))
 
 
 def test_movements_come_before_numbers_and_those_of_ros_itself_are_left_aside(tmp_path):
@@ -132,8 +134,8 @@ def test_bytes_in_the_other_order(tmp_path):
     raw = b"\x00\x00\x00\x00" + struct.pack(">i", 7)
     messages = [("/n", ns, ("std_msgs/msg/Int32", raw)) for ns in stamps(5)]
     messages += [("/n", START + SECOND, ("std_msgs/msg/Int32", b"\x00\x01\x00\x00" + struct.pack("<i", 9)))]
-    (one,) = kineme.read_recordings(write_bag(tmp_path, "mcap", messages)).demonstrations
-    assert one.recorded[:, 0].tolist() == [7] * 5 + [9]
+    (movement,) = kineme.read_recordings(write_bag(tmp_path, "mcap", messages)).demonstrations
+    assert movement.recorded[:, 0].tolist() == [7] * 5 + [9]
 
 
 def test_a_sequence_of_none_is_not_aligned_and_one_that_is_cut_off_is_damaged():
@@ -164,18 +166,18 @@ def test_damaged_messages_are_named_and_the_others_read(tmp_path, kind):
     from kineme.io.ros.bags import open_bag
     from kineme.io.ros.number_fields import number_fields
 
-    known = typed(kind)
-    whole = (known.serialize_ros1 if kind == "ros1" else known.serialize_cdr)(
-        grip(known, m.header(START), 8), "my_msgs/msg/Grip"
+    types = typed(kind)
+    data = (types.serialize_ros1 if kind == "ros1" else types.serialize_cdr)(
+        grip(types, m.header(START), 8), "my_msgs/msg/Grip"
     )
     (tmp_path / "g").mkdir()
     with open_bag(recorded(tmp_path / "g", kind)) as bag:
         fields = number_fields(bag, bag.topics[0])
     for _ in range(500):
-        spoiled = np.frombuffer(whole, np.uint8).copy()
+        spoiled = np.frombuffer(data, np.uint8).copy()
         spoiled[random.integers(0, len(spoiled), 4)] = random.integers(0, 256, 4)
         with suppress(ValueError):
-            assert len(fields.decode(spoiled.tobytes()[: random.integers(1, len(whole) + 1)]).row) == len(fields.heads)
+            assert len(fields.decode(spoiled.tobytes()[: random.integers(1, len(data) + 1)]).row) == len(fields.heads)
 
 
 @pytest.mark.parametrize(
@@ -193,9 +195,9 @@ def test_definitions_that_say_no_numbers_are_refused(tmp_path, text, words):
     from rosbags.rosbag2 import StoragePlugin, Writer
 
     with Writer(tmp_path / "run", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        one = writer.add_connection("/odd", "my_msgs/msg/Odd", msgdef=text, rihs01="RIHS01_" + "0" * 64)
+        connection = writer.add_connection("/odd", "my_msgs/msg/Odd", msgdef=text, rihs01="RIHS01_" + "0" * 64)
         for ns in stamps(9):
-            writer.write(one, ns, b"\x00\x01\x00\x00" + bytes(64))
+            writer.write(connection, ns, b"\x00\x01\x00\x00" + bytes(64))
     with pytest.raises(kineme.errors.DataError, match=words):
         kineme.read_recordings(tmp_path / "run", topic="/odd")
     assert bag_contents(tmp_path / "run")[0].rows[0][3] == "nothing: no numbers"

@@ -32,40 +32,40 @@ def read(table, **options):
     ],
 )
 def test_numbers_are_kept_to_the_last_bit(column):
-    found = read({"time": column, "x": pa.array(X)}).demonstrations
-    np.testing.assert_array_equal(found.times, T)
-    np.testing.assert_array_equal(found.positions[:, 0], X)
+    demos = read({"time": column, "x": pa.array(X)}).demonstrations
+    np.testing.assert_array_equal(demos.times, T)
+    np.testing.assert_array_equal(demos.positions[:, 0], X)
 
 
 @pytest.mark.parametrize("unit", ["ms", "us", "ns"])
 def test_dates_and_durations_count_in_their_own_unit(unit):
     since = (T * 1e9).round().astype(np.int64)
     dates = (np.datetime64("2024-05-06T07:08:09", "ns") + since.astype("m8[ns]")).astype(f"M8[{unit}]")
-    found = read({"stamp": pa.array(dates), "x": X})
-    assert found.detected[0][0][4:6] == ("ns", "dates")
-    np.testing.assert_allclose(found.demonstrations.times - 1714979289, T, atol=3e-7)
+    recordings = read({"stamp": pa.array(dates), "x": X})
+    assert recordings.detected[0][0][4:6] == ("ns", "dates")
+    np.testing.assert_allclose(recordings.demonstrations.times - 1714979289, T, atol=3e-7)
     spans = read({"time": pa.array(since.astype("m8[ns]").astype(f"m8[{unit}]")), "x": X})
     np.testing.assert_allclose(spans.demonstrations.times, T, rtol=1e-12)
 
 
 def test_names_may_be_numbers_or_a_dictionary_and_what_is_not_needed_is_not_read():
     names = pa.array(["wave"] * 4 + ["nod"] * 4).dictionary_encode()
-    found = read(
+    recordings = read(
         {"id": [1] * 4 + [2] * 4, "label": names, "time": np.tile(T[:4], 2), "x": np.arange(8), "list": [[1.0]] * 8}
     )
-    assert [(one.place, one.label) for one in found.sources] == [("1", "wave"), ("2", "nod")]
-    assert found.detected[0][0].ignored == ("list",)
-    assert found.detected[0][0].columns == ("x",)
+    assert [(source.place, source.label) for source in recordings.sources] == [("1", "wave"), ("2", "nod")]
+    assert recordings.detected[0][0].ignored == ("list",)
+    assert recordings.detected[0][0].columns == ("x",)
 
 
 def test_missing_values_cost_their_movement_or_themselves():
     columns = {"demo": ["a"] * 6 + ["b"] * 6, "time": np.tile(T, 2), "x": pa.array([1.0, None, *range(10)])}
-    found = read(columns, fill_gaps=0)
-    assert [one.place for one in found.sources] == ["b"]
-    assert found.problems[0].reason.startswith("movement a: expected a number in 'x', got nothing in 17 % of the")
+    recordings = read(columns, fill_gaps=0)
+    assert [source.place for source in recordings.sources] == ["b"]
+    assert recordings.problems[0].reason.startswith("movement a: expected a number in 'x', got nothing in 17 % of the")
     assert read(columns, skip="sample", fill_gaps=0).demonstrations.lengths.tolist() == [5, 6]
-    whole = read({**columns, "x": pa.array([1, None, *range(10)], pa.int64())}, fill_gaps=0)
-    assert [one.place for one in whole.sources] == ["b"]
+    of_integers = read({**columns, "x": pa.array([1, None, *range(10)], pa.int64())}, fill_gaps=0)
+    assert [source.place for source in of_integers.sources] == ["b"]
 
 
 def test_columns_of_something_else_are_refused_by_name():
@@ -96,8 +96,8 @@ def test_names_may_be_missing_and_dictionaries_differ(chunked):
     if chunked:
         names = pa.chunked_array([names[:6].dictionary_encode(), names[6:].dictionary_encode()])
     table = {"id": [1] * 4 + [2] * 4 + [3] * 4, "label": names, "time": np.tile(T[:4], 3), "x": np.arange(12)}
-    found = read(table)
-    assert {one.place: one.label for one in found.sources} == {"1": "wave", "2": None, "3": "nod"}
+    recordings = read(table)
+    assert {source.place: source.label for source in recordings.sources} == {"1": "wave", "2": None, "3": "nod"}
 
 
 @pytest.mark.parametrize(
@@ -121,8 +121,8 @@ def test_columns_of_one_name_are_refused():
 
 
 def test_names_with_dots_are_names():
-    found = read({"observation.time": T, "observation.state": X, "observation": X}, time="observation.time")
-    assert found.demonstrations.n_dims == 2
+    recordings = read({"observation.time": T, "observation.state": X, "observation": X}, time="observation.time")
+    assert recordings.demonstrations.n_dims == 2
 
 
 def test_a_bomb_is_not_expanded(monkeypatch):
@@ -138,8 +138,8 @@ def test_a_bomb_is_not_expanded(monkeypatch):
 def test_one_long_name_costs_its_own_length(monkeypatch):
     name, n = "x" * 2**16, 2000
     monkeypatch.setenv("KINEME_MAX_FILE_BYTES", str(2**20))
-    found = read({"label": [name] * n, "time": np.arange(n) / 100, "x": np.zeros(n)}, units="s")
-    assert tuple(found.labels) == (name,)
+    recordings = read({"label": [name] * n, "time": np.arange(n) / 100, "x": np.zeros(n)}, units="s")
+    assert tuple(recordings.labels) == (name,)
 
 
 @pytest.mark.parametrize("which", [[0, 5], [-1, 0]])
@@ -154,9 +154,9 @@ def test_numbers_of_names_that_are_not_there_are_damage(which):
 
 def test_lists_are_one_column_for_each_number_where_they_are_meant():
     state = pa.array(np.column_stack((X, T)).tolist(), pa.list_(pa.float32(), 2))
-    found = read({"time": T, "q": state})
-    assert found.demonstrations.dimensions == ("q.0", "q.1")
-    np.testing.assert_array_equal(found.demonstrations.positions[:, 0], X.astype(np.float32))
+    recordings = read({"time": T, "q": state})
+    assert recordings.demonstrations.dimensions == ("q.0", "q.1")
+    np.testing.assert_array_equal(recordings.demonstrations.positions[:, 0], X.astype(np.float32))
     both = {"time": T, "q": state, "dq": state, "x": X}
     assert read(both).demonstrations.dimensions == ("x",)
     assert read(both, columns="dq").demonstrations.dimensions == ("dq.0", "dq.1")
@@ -171,8 +171,8 @@ def test_lists_are_one_column_for_each_number_where_they_are_meant():
 def test_lists_of_other_lengths_and_missing_ones_cost_their_samples():
     rows = [[1.0, 2.0], [1.0], None, [2.0, None], [3.0, 5.0], [4.0, 4.0], [5.0, 1.0], [6.0, 9.0]]
     table = {"time": np.arange(8) / 10, "q": pa.array(rows, pa.list_(pa.float64()))}
-    found = read(table, skip="sample")
-    assert found.demonstrations.lengths.tolist() == [5]
+    recordings = read(table, skip="sample")
+    assert recordings.demonstrations.lengths.tolist() == [5]
     with pytest.raises(kineme.errors.DataError, match="expected 2 numbers in 'q', got 1"):
         read(table)
     nested = pa.array([[[1.0, 2.0], [3.0, k]] for k in range(6)], pa.list_(pa.list_(pa.float64())))

@@ -25,7 +25,7 @@ def test_a_movement_begins_where_the_person_or_the_label_changes(table):
     assert read.people == ["ann", "ann", "bob", "ann"]
     assert list(read.labels) == ["wave", "nod", "nod", "wave"]
     assert read.demonstrations.dimensions == ("x", "y")
-    assert [one.place for one in read.sources] == ["0", "1", "2", "3"]
+    assert [source.place for source in read.sources] == ["0", "1", "2", "3"]
     assert read.detected[0][0].person == ("who",)
 
 

@@ -30,13 +30,13 @@ def test_every_movement_knows_its_file_and_its_place_there(tmp_path, source):
     read = read_recordings(path)
     folder = path if path.is_dir() else path.parent
     assert len(read) == len(read.sources) == len(read.demonstrations)
-    assert len({(one.path, one.place) for one in read.sources}) == len(read)
-    for one, name in zip(read.sources, read.demonstrations.names, strict=True):
-        file = folder / one.path
-        assert one.sha256 == hashlib.sha256(file.read_bytes()).hexdigest()
-        assert (one.size, one.mtime) == (file.stat().st_size, file.stat().st_mtime)
-        assert name == (f"{one.path}#{one.place}" if one.place else one.path)
-    assert sum(n for _, n in read.detected) == len({one.path for one in read.sources})
+    assert len({(source.path, source.place) for source in read.sources}) == len(read)
+    for origin, name in zip(read.sources, read.demonstrations.names, strict=True):
+        file = folder / origin.path
+        assert origin.sha256 == hashlib.sha256(file.read_bytes()).hexdigest()
+        assert (origin.size, origin.mtime) == (file.stat().st_size, file.stat().st_mtime)
+        assert name == (f"{origin.path}#{origin.place}" if origin.place else origin.path)
+    assert sum(n for _, n in read.detected) == len({source.path for source in read.sources})
 
 
 @pytest.mark.parametrize(
@@ -67,8 +67,8 @@ def test_other_dimensions_than_most_are_a_problem(tmp_path, make_movement):
         t, x = make_movement(k, n_dims)
         write_movement(tmp_path / f"{k}.json", {"times": t, "positions": x})
     read = read_recordings(tmp_path)
-    assert [one.path for one in read.sources] == ["0.json", "2.json"]
-    reasons = [(one.file, one.reason) for one in read.problems]
+    assert [source.path for source in read.sources] == ["0.json", "2.json"]
+    reasons = [(problem.file, problem.reason) for problem in read.problems]
     assert reasons == [("1.json", "3 dimensions where most have 2"), ("3.json", "1 dimensions where most have 2")]
 
 
@@ -83,7 +83,7 @@ def test_labels_are_on_all_demonstrations_or_on_none_but_always_with_the_sources
     bare = read_recordings(tmp_path / "wave").without_labels()
     assert tuple(bare.labels) == (None,)
     assert isinstance(read.labels, np.ndarray)  # as those of demonstrations: a label compared with it chooses movements
-    assert [one.name for one in read[read.labels == "wave"]] == ["wave/a.csv"]
+    assert [movement.name for movement in read[read.labels == "wave"]] == ["wave/a.csv"]
     with pytest.raises(ValueError, match="read-only"):
         read.labels[0] = "nod"
     assert bare.demonstrations.labels is None
@@ -112,7 +112,7 @@ def test_garbage_under_any_name_is_a_problem_never_a_crash(tmp_path, ending, dat
     t, x = make_movement(1)
     write_movement(tmp_path / "good.csv", {"times": t, "positions": x})
     read = read_recordings(tmp_path)
-    assert [one.file for one in read.problems] == [f"bad{ending}"]
+    assert [problem.file for problem in read.problems] == [f"bad{ending}"]
     assert len(read) == 1
     with pytest.raises(kineme.errors.DataError, match=rf"bad\{ending}: \w+"):
         read_recording(tmp_path / f"bad{ending}")
@@ -121,10 +121,10 @@ def test_garbage_under_any_name_is_a_problem_never_a_crash(tmp_path, ending, dat
 @pytest.mark.parametrize("source", ["npz_folder", "parquet_folder", "matlab_folder"])
 def test_a_file_cut_or_altered_anywhere_gives_a_movement_or_a_problem(tmp_path, source):
     lasa_files.SOURCES[source](tmp_path)
-    path = next(one for one in sorted(tmp_path.rglob("*")) if one.is_file())
-    whole, rng = path.read_bytes(), np.random.default_rng(5)
+    path = next(path for path in sorted(tmp_path.rglob("*")) if path.is_file())
+    data, rng = path.read_bytes(), np.random.default_rng(5)
     for trial in range(60):
-        damaged = bytearray(whole[: rng.integers(len(whole))] if trial % 2 else whole)
+        damaged = bytearray(data[: rng.integers(len(data))] if trial % 2 else data)
         for place in rng.integers(max(1, min(len(damaged), 2000)), size=4 if damaged else 0):
             damaged[place] = rng.integers(256)
         path.write_bytes(damaged)

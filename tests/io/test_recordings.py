@@ -28,17 +28,17 @@ def table(separator=",", header="time,x,y", comment=""):
 def test_tables_of_many_kinds(tmp_path, separator, header, ending):
     path = tmp_path / f"wave{ending}"
     path.write_text(table(separator, header, comment="# recorded by hand\n"), encoding="utf-8")
-    one = read_recording(path)
-    np.testing.assert_array_equal(one.times, TIMES)
-    np.testing.assert_array_equal(one.positions, PATH)
-    assert one.name == path.name
+    recording = read_recording(path)
+    np.testing.assert_array_equal(recording.times, TIMES)
+    np.testing.assert_array_equal(recording.positions, PATH)
+    assert recording.name == path.name
 
 
 def test_time_may_stand_in_any_column_and_carry_a_unit(tmp_path):
     (tmp_path / "a.csv").write_text("x [m],time [s],y [m]\n" + "\n".join(f"{k},{k / 10},{k * k}" for k in range(5)))
-    one = read_recording(tmp_path / "a.csv")
-    np.testing.assert_allclose(one.times, np.arange(5) / 10)
-    np.testing.assert_array_equal(one.positions[:, 1], np.arange(5) ** 2)
+    recording = read_recording(tmp_path / "a.csv")
+    np.testing.assert_allclose(recording.times, np.arange(5) / 10)
+    np.testing.assert_array_equal(recording.positions[:, 1], np.arange(5) ** 2)
 
 
 def test_a_byte_order_mark_and_windows_lines_are_read(tmp_path):
@@ -49,9 +49,9 @@ def test_a_byte_order_mark_and_windows_lines_are_read(tmp_path):
 @pytest.mark.parametrize("ending", sorted(WRITERS))
 def test_what_is_written_is_read_back_bit_for_bit(tmp_path, ending):
     columns = {"times": TIMES, "positions": PATH / 3}
-    one = read_recording(write_movement(tmp_path / f"x{ending}", columns))
-    np.testing.assert_array_equal(one.times, TIMES)
-    np.testing.assert_array_equal(one.positions, PATH / 3)
+    recording = read_recording(write_movement(tmp_path / f"x{ending}", columns))
+    np.testing.assert_array_equal(recording.times, TIMES)
+    np.testing.assert_array_equal(recording.positions, PATH / 3)
 
 
 def test_whatever_holds_one_movement_is_written(tmp_path):
@@ -152,7 +152,9 @@ def test_the_page_lists_every_format():
 
     page = (Path(__file__).parents[2] / "docs" / "guide" / "recordings.md").read_text(encoding="utf-8")
     table = page.partition("## What is read")[2].partition("\n## ")[0]
-    assert [ending for ending in (*FORMATS, *(one.marker for one in DATA_SETS)) if f"`{ending}`" not in table] == []
+    assert [
+        ending for ending in (*FORMATS, *(data_set.marker for data_set in DATA_SETS)) if f"`{ending}`" not in table
+    ] == []
 
 
 @pytest.mark.parametrize("ending", sorted(WRITERS))
@@ -161,9 +163,9 @@ def test_generated_poses_are_read_as_poses(tmp_path, ending):
     q = kineme.orientation.exp(np.outer(u, [0.3, 0, 2.0]))
     rollout = kineme.orientation.PoseDMP().learn([np.column_stack([u, u**2, 1 - u, q])]).rollout(n_samples=60)
     path = write_movement(tmp_path / f"x{ending}", rollout)
-    one = read_recording(path)
-    assert [(c.name, c.kind) for c in one.channels or ()][2:] == [("z", "position"), ("q", "orientation")]
-    np.testing.assert_allclose(one.recorded, rollout.positions[0], atol=1e-12)
+    recording = read_recording(path)
+    assert [(c.name, c.kind) for c in recording.channels or ()][2:] == [("z", "position"), ("q", "orientation")]
+    np.testing.assert_allclose(recording.recorded, rollout.positions[0], atol=1e-12)
     if ending == ".csv":
         assert path.read_text().startswith("time,x,y,z,qw,qx,qy,qz,v_x,v_y,v_z,v_q.rx,v_q.ry,v_q.rz,a_x")
 

@@ -17,30 +17,30 @@ def read(text, name="a.csv", **options):
 
 
 def lines(values, labels=None):
-    rows = [list(map(repr, one.ravel().tolist())) for one in values]
+    rows = [list(map(repr, movement.ravel().tolist())) for movement in values]
     return "\n".join(",".join([str(labels[k]), *row] if labels else row) for k, row in enumerate(rows))
 
 
-def positions(found):
-    return [one.positions for one in found]
+def positions(demos):
+    return [movement.positions for movement in demos]
 
 
 def test_a_history_of_points_is_a_movement_in_each_line():
-    found = read(lines(POINTS, [0, 0, 1, 1, 2, 2]), rows=True, columns=("x", "y"), units=1 / 30)
-    np.testing.assert_array_equal(np.array(positions(found)), POINTS)
-    assert found.labels.tolist() == ["0", "0", "1", "1", "2", "2"]
-    assert found.sources[4].place == "line 5"
-    np.testing.assert_allclose(found.demonstrations.durations, 15 / 30)
-    assert found.detected[0][0].label == ("column 0",)
+    recordings = read(lines(POINTS, [0, 0, 1, 1, 2, 2]), rows=True, columns=("x", "y"), units=1 / 30)
+    np.testing.assert_array_equal(np.array(positions(recordings)), POINTS)
+    assert recordings.labels.tolist() == ["0", "0", "1", "1", "2", "2"]
+    assert recordings.sources[4].place == "line 5"
+    np.testing.assert_allclose(recordings.demonstrations.durations, 15 / 30)
+    assert recordings.detected[0][0].label == ("column 0",)
     assert read(lines(POINTS), rows=True, columns=("x", "y")).labels.tolist() == [None] * 6
 
 
 def test_heads_say_the_coordinates_and_the_label():
     heads = ",".join(["gesture", *(f"{axis}{k}" for k in range(16) for axis in "xy")])
-    found = read(f"{heads}\n{lines(POINTS, [7] * 6)}", rows=True)
-    assert found.demonstrations.dimensions == ("x", "y")
-    assert found.labels.tolist() == ["7"] * 6
-    np.testing.assert_array_equal(np.array(positions(found)), POINTS)
+    recordings = read(f"{heads}\n{lines(POINTS, [7] * 6)}", rows=True)
+    assert recordings.demonstrations.dimensions == ("x", "y")
+    assert recordings.labels.tolist() == ["7"] * 6
+    np.testing.assert_array_equal(np.array(positions(recordings)), POINTS)
 
 
 def test_words_are_labels_wherever_they_stand_and_a_given_column_wins():
@@ -51,9 +51,9 @@ def test_words_are_labels_wherever_they_stand_and_a_given_column_wins():
 
 
 def test_one_coordinate_has_a_label_where_whole_numbers_stand_beside_fractions():
-    found = read(lines(POINTS, [1, 2] * 3).replace(",", "\t"), "a.tsv", rows=True, columns="x")
-    assert found.labels.tolist() == ["1", "2"] * 3
-    assert found.demonstrations.lengths.tolist() == [32] * 6
+    recordings = read(lines(POINTS, [1, 2] * 3).replace(",", "\t"), "a.tsv", rows=True, columns="x")
+    assert recordings.labels.tolist() == ["1", "2"] * 3
+    assert recordings.demonstrations.lengths.tolist() == [32] * 6
     assert read(lines(POINTS), rows=True, columns="x").labels.tolist() == [None] * 6
     assert read(lines(POINTS, ["1.0000000e+00", "2."] * 3), rows=True, columns="x").labels.tolist() == ["1", "2"] * 3
     begins_at_0 = read(lines(POINTS, ["0.000"] * 6), rows=True, columns="x")
@@ -61,21 +61,23 @@ def test_one_coordinate_has_a_label_where_whole_numbers_stand_beside_fractions()
 
 
 def test_a_class_at_the_end_of_lines_is_no_coordinate():
-    found = read(
+    recordings = read(
         "\n".join(f"{row},{k % 3}" for k, row in enumerate(lines(POINTS).split("\n"))), rows=True, columns=("x", "y")
     )
-    np.testing.assert_array_equal(np.array(positions(found)), POINTS)
-    assert found.labels.tolist() == ["0", "1", "2"] * 2
+    np.testing.assert_array_equal(np.array(positions(recordings)), POINTS)
+    assert recordings.labels.tolist() == ["0", "1", "2"] * 2
     with pytest.raises(kineme.errors.DataError, match=r"got fractions in both; say which with label=.*--label-column"):
         read("\n".join(f"{row},0.5" for row in lines(POINTS).split("\n")), rows=True, columns=("x", "y"))
 
 
 def test_lines_may_differ_in_length_and_be_padded():
     text = "a,1,2,3,4,5,6,7,9,,\nb,1,2,3,5,6,7,7,8,9,NaN,,\nc,1,2,3,4,6,7,8,9,10,12\n"
-    found = read(text, rows=True, columns=("x", "y"))
-    assert found.demonstrations.lengths.tolist() == [4, 5]
-    assert found.labels.tolist() == ["a", "c"]
-    assert [one.reason for one in found.problems] == ["line 2: expected samples of 2 coordinates, got 9 numbers"]
+    recordings = read(text, rows=True, columns=("x", "y"))
+    assert recordings.demonstrations.lengths.tolist() == [4, 5]
+    assert recordings.labels.tolist() == ["a", "c"]
+    assert [problem.reason for problem in recordings.problems] == [
+        "line 2: expected samples of 2 coordinates, got 9 numbers"
+    ]
 
 
 def test_what_rows_leave_open_is_said():
@@ -85,8 +87,8 @@ def test_what_rows_leave_open_is_said():
         Layout(rows=True, every=5)
     with pytest.raises(kineme.errors.DataError, match="expected text, of which each line is a movement"):
         read(b"PK", "a.npz", rows=True)
-    found = read(lines(POINTS, [0] * 6) + "\n0,oops,1,2,3,4,5,6,7\n", rows=True, columns=("x", "y"))
-    assert [one.reason for one in found.problems] == ["line 7: expected numbers, got 'oops'"]
+    recordings = read(lines(POINTS, [0] * 6) + "\n0,oops,1,2,3,4,5,6,7\n", rows=True, columns=("x", "y"))
+    assert [problem.reason for problem in recordings.problems] == ["line 7: expected numbers, got 'oops'"]
 
 
 SERIES = "# an archive\n@problemName Demo\n@timeStamps {timed}\n@univariate false\n@classLabel true wave nod\n@data\n"
@@ -94,23 +96,23 @@ SERIES = "# an archive\n@problemName Demo\n@timeStamps {timed}\n@univariate fals
 
 def test_series_of_an_archive_have_a_column_between_colons_and_the_class_last():
     text = SERIES.format(timed="false") + "1,2,3,4.5:0,1,0,2:wave\n1,2,?,4,5:0,1,?,1,7:nod\n1,2,4,4,?:0,1,1,3,?:wave\n"
-    found = read(text, "demo_TRAIN.ts", skip="sample", fill_gaps=0)
-    assert found.labels.tolist() == ["wave", "nod", "wave"]
-    assert found.demonstrations.lengths.tolist() == [4, 4, 4]
-    np.testing.assert_array_equal(positions(found)[0], [[1, 0], [2, 1], [3, 0], [4.5, 2]])
-    assert any("no times" in how.units_from for how, _ in found.detected)
+    recordings = read(text, "demo_TRAIN.ts", skip="sample", fill_gaps=0)
+    assert recordings.labels.tolist() == ["wave", "nod", "wave"]
+    assert recordings.demonstrations.lengths.tolist() == [4, 4, 4]
+    np.testing.assert_array_equal(positions(recordings)[0], [[1, 0], [2, 1], [3, 0], [4.5, 2]])
+    assert any("no times" in how.units_from for how, _ in recordings.detected)
     assert read(text, "a.ts", units=0.1, skip="sample", fill_gaps=0).demonstrations.durations[0] == pytest.approx(0.3)
 
 
 def test_series_with_times_have_them():
     text = SERIES.format(timed="true") + "(0,1),(0.5,2),(0.75,3),(1,5):(0,1),(0.5,1),(0.75,2),(1,2):wave\n"
-    (one,) = read(text, "a.ts")
-    np.testing.assert_array_equal(one.times, [0, 0.5, 0.75, 1])
-    np.testing.assert_array_equal(one.positions[:, 1], [1, 1, 2, 2])
+    (movement,) = read(text, "a.ts")
+    np.testing.assert_array_equal(movement.times, [0, 0.5, 0.75, 1])
+    np.testing.assert_array_equal(movement.positions[:, 1], [1, 1, 2, 2])
     dated = ",".join(f"(2007-01-01 00:0{k}:30,{k * k})" for k in range(4))
-    (one,) = read(SERIES.format(timed="true") + f"{dated}:{dated}:nod\n", "a.ts")
-    np.testing.assert_array_equal(one.times - one.times[0], [0, 60, 120, 180])
-    assert (one.positions.shape, one.label) == ((4, 2), "nod")
+    (movement,) = read(SERIES.format(timed="true") + f"{dated}:{dated}:nod\n", "a.ts")
+    np.testing.assert_array_equal(movement.times - movement.times[0], [0, 60, 120, 180])
+    assert (movement.positions.shape, movement.label) == ((4, 2), "nod")
     odd = text + "(0,1),(0.5,2),(0.75,3),(1,5):(0,1),(0.6,1),(0.75,2),(1,2):wave\n"
     assert "line 8: expected columns at the same times" in read(odd, "a.ts").problems[0].reason
 
@@ -130,18 +132,18 @@ def logged(n, label=None):
 
 
 def test_blocks_of_samples_are_movements():
-    found = read(logged(12 * 5), every=12, units=0.01)
-    assert found.demonstrations.lengths.tolist() == [12] * 5
-    assert [one.place for one in found.sources] == ["0", "1", "2", "3", "4"]
-    np.testing.assert_allclose(found.demonstrations.durations, 0.11)
-    np.testing.assert_array_equal(positions(found)[2][:, 0], [100 * k for k in range(24, 36)])
-    assert "blocks of 12 samples" in found.detected[0][0].layout
+    recordings = read(logged(12 * 5), every=12, units=0.01)
+    assert recordings.demonstrations.lengths.tolist() == [12] * 5
+    assert [source.place for source in recordings.sources] == ["0", "1", "2", "3", "4"]
+    np.testing.assert_allclose(recordings.demonstrations.durations, 0.11)
+    np.testing.assert_array_equal(positions(recordings)[2][:, 0], [100 * k for k in range(24, 36)])
+    assert "blocks of 12 samples" in recordings.detected[0][0].layout
 
 
 def test_blocks_keep_the_labels_and_begin_where_labels_change():
-    found = read(logged(48, lambda k: "punch" if k < 36 else "flex"), every=12, units=0.01)
-    assert found.labels.tolist() == ["punch", "punch", "punch", "flex"]
-    assert [one.place for one in found.sources] == ["0/0", "0/1", "0/2", "1/0"]
+    recordings = read(logged(48, lambda k: "punch" if k < 36 else "flex"), every=12, units=0.01)
+    assert recordings.labels.tolist() == ["punch", "punch", "punch", "flex"]
+    assert [source.place for source in recordings.sources] == ["0/0", "0/1", "0/2", "1/0"]
     people = read(
         logged(48, lambda k: "ann" if k < 12 else "bob").replace("label", "who"), every=12, units=0.01, person="who"
     )
@@ -154,9 +156,9 @@ def test_blocks_keep_the_labels_and_begin_where_labels_change():
 
 def test_blocks_of_any_format_and_a_rest_that_is_no_block_is_refused(tmp_path):
     np.savez(tmp_path / "a.npz", positions=RANDOM.normal(size=(40, 3)), times=np.tile(np.arange(10) / 10, 4))
-    found = kineme.read_recordings(tmp_path / "a.npz", every=10)
-    assert found.demonstrations.lengths.tolist() == [10] * 4
-    np.testing.assert_array_equal(found[3].times, np.arange(10) / 10)
+    recordings = kineme.read_recordings(tmp_path / "a.npz", every=10)
+    assert recordings.demonstrations.lengths.tolist() == [10] * 4
+    np.testing.assert_array_equal(recordings[3].times, np.arange(10) / 10)
     with pytest.raises(
         kineme.errors.DataError, match="expected blocks of 9 samples, got 40 samples: 4 blocks and 4 more"
     ):
@@ -172,9 +174,9 @@ def test_a_line_may_have_more_columns_than_samples():
 
 def test_a_log_without_heads_and_times_has_no_time_where_all_columns_are_chosen():
     log = "\n".join(f"{k},{100 - k * k},{k % 5}" for k in range(24))
-    found = read(log, every=12, units=0.01, columns=(0, 1, 2))
-    assert (found.demonstrations.n_dims, found.detected[0][0].time) == (3, None)
-    np.testing.assert_allclose(found.demonstrations.durations, 0.11)
+    recordings = read(log, every=12, units=0.01, columns=(0, 1, 2))
+    assert (recordings.demonstrations.n_dims, recordings.detected[0][0].time) == (3, None)
+    np.testing.assert_allclose(recordings.demonstrations.durations, 0.11)
     with pytest.raises(kineme.errors.DataError, match="expected a column of times"):
         read(log, every=12, columns=(0, 1, 2))
 

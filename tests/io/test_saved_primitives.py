@@ -46,11 +46,11 @@ def test_loaded_arrays_are_protected(tmp_path):
         after.starts[0] = 0
 
 
-@pytest.mark.parametrize("kept", [0.0, 0.1, 0.5, 0.9, 0.999])
-def test_a_truncated_file_is_refused(tmp_path, kept):
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 0.9, 0.999])
+def test_a_truncated_file_is_refused(tmp_path, share):
     path = learned().save(tmp_path / "x")
     data = path.read_bytes()
-    path.write_bytes(data[: int(kept * len(data))])
+    path.write_bytes(data[: int(share * len(data))])
     with pytest.raises(
         kineme.errors.DataError, match=r"x to be an archive of arrays, got something foreign, truncated"
     ):
@@ -151,7 +151,7 @@ def test_a_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
     with pytest.raises(OSError, match="expected room to write, got a full disk"):
         learned(n_basis=12).save(path)
     assert path.read_bytes() == before
-    assert [one.name for one in tmp_path.iterdir()] == ["x"]
+    assert [path.name for path in tmp_path.iterdir()] == ["x"]
 
 
 def test_labels_that_are_objects_are_refused(tmp_path):

@@ -21,17 +21,17 @@ def test_files_folders_and_patterns_are_read_together_each_once(tmp_path, monkey
         _write(tmp_path / name, shift=len(name))
     (tmp_path / "b3.csv").write_text("nothing\n")
     read = kineme.read_recordings(["a", "b*.csv", "b1.csv", "none.csv"])
-    assert [one.path for one in read.sources] == ["a/1.csv", "a/wave/2.csv", "b1.csv", "b2.csv"]
+    assert [source.path for source in read.sources] == ["a/1.csv", "a/wave/2.csv", "b1.csv", "b2.csv"]
     assert read.labels.tolist() == [None, "wave", None, None]
-    assert sorted(one.file for one in read.problems) == ["b3.csv", "none.csv"]
-    assert [one.path for one in kineme.read_recordings("a").sources] == ["1.csv", "wave/2.csv"]
-    assert [one.path for one in kineme.read_recordings("**/*.csv").sources][:2] == ["a/1.csv", "a/wave/2.csv"]
+    assert sorted(problem.file for problem in read.problems) == ["b3.csv", "none.csv"]
+    assert [source.path for source in kineme.read_recordings("a").sources] == ["1.csv", "wave/2.csv"]
+    assert [source.path for source in kineme.read_recordings("**/*.csv").sources][:2] == ["a/1.csv", "a/wave/2.csv"]
 
 
 def test_a_file_whose_name_is_a_pattern_is_meant_itself(tmp_path):
     for name in ("[a].csv", "a.csv"):
         _write(tmp_path / name)
-    assert [one.path for one in kineme.read_recordings(tmp_path / "[a].csv").sources] == ["[a].csv"]
+    assert [source.path for source in kineme.read_recordings(tmp_path / "[a].csv").sources] == ["[a].csv"]
 
 
 def test_nothing_there_says_so(tmp_path):
@@ -46,12 +46,12 @@ def test_trim_leaves_out_rests_and_keeps_channels(tmp_path):
     _write(tmp_path / "rests.csv", rest=40)
     lines = (tmp_path / "rests.csv").read_text().splitlines()
     (tmp_path / "rests.csv").write_text(
-        "\n".join([f"{lines[0]},gripper", *(f"{one},{k // 70}" for k, one in enumerate(lines[1:]))])
+        "\n".join([f"{lines[0]},gripper", *(f"{line},{k // 70}" for k, line in enumerate(lines[1:]))])
     )
     (tmp_path / "plain.csv").unlink()
     read = kineme.read_recordings(tmp_path, trim=True, kinds={"gripper": "discrete"}).demonstrations
     assert 40 < len(read[0]) < 62
-    assert [one.name for one in read.channels] == ["x", "y", "gripper"]
+    assert [channel.name for channel in read.channels] == ["x", "y", "gripper"]
     assert read.recorded.shape == (len(read[0]), 3)
     assert set(read.recorded[:, 2]) == {0.0, 1.0}
     assert len(kineme.read_recordings(tmp_path).demonstrations[0]) == 140

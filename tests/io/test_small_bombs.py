@@ -22,8 +22,8 @@ TABLES = {
 
 @pytest.fixture(scope="module")
 def child():
-    with LimitedChild(("kineme.io.reading.recordings",), memory=2048 * MIB, seconds=SECONDS) as one:
-        yield one
+    with LimitedChild(("kineme.io.reading.recordings",), memory=2048 * MIB, seconds=SECONDS) as process:
+        yield process
 
 
 @pytest.mark.parametrize("name", TABLES)
@@ -91,8 +91,8 @@ def test_a_data_set_that_is_written_in_parts_of_little_is_read(tmp_path):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file.create_dataset("wave/t", data=t, chunks=(100,), compression="gzip")
         file.create_dataset("wave/x", (20_000,), "f8", chunks=(100,), compression="gzip")[:5000] = t[:5000]
-    (one,) = kineme.read_recordings(tmp_path / "a.h5")
-    np.testing.assert_array_equal(one.positions[:5000, 0], t[:5000])
+    (movement,) = kineme.read_recordings(tmp_path / "a.h5")
+    np.testing.assert_array_equal(movement.positions[:5000, 0], t[:5000])
 
 
 def test_rows_that_are_all_alike_are_not_expanded(child, tmp_path):

@@ -21,7 +21,7 @@ def outcome(data, layout=Layout()):  # noqa: B008 - frozen
         table, roles = read_text_table(data, layout)
     except kineme.errors.DataError as error:
         return str(error)
-    columns = [np.asarray(one).tolist() for one in table.columns]
+    columns = [np.asarray(column).tolist() for column in table.columns]
     return repr(
         (table.heads, columns, table.n_rows, table.faults, roles, [table.line_of(k) for k in range(table.n_rows)])
     )

@@ -54,9 +54,9 @@ def test_any_number_in_any_notation_is_read_to_the_last_bit(values, style, separ
     else:
         rows = [["time", "a", "b"], *rows]
     kinds = {"a": "position", "b": "position"}  # 0, 359, 0 could be an angle
-    found = read(end.join(separator.join(row) for row in rows) + end, units="s", kinds=kinds).demonstrations
-    np.testing.assert_array_equal(found.positions, np.array(values))
-    np.testing.assert_array_equal(found.times, np.arange(len(values)))
+    demos = read(end.join(separator.join(row) for row in rows) + end, units="s", kinds=kinds).demonstrations
+    np.testing.assert_array_equal(demos.positions, np.array(values))
+    np.testing.assert_array_equal(demos.times, np.arange(len(values)))
 
 
 @given(
@@ -66,12 +66,12 @@ def test_any_number_in_any_notation_is_read_to_the_last_bit(values, style, separ
 @settings(max_examples=examples(80, 400))
 def test_any_text_is_a_table_or_an_error(text, skip):
     try:
-        found = read(text.encode("utf-8", "replace"), skip=skip)
+        recordings = read(text.encode("utf-8", "replace"), skip=skip)
     except kineme.errors.DataError as error:
         assert "a.csv" in str(error)  # noqa: PT017 - both ends are right
     else:
-        assert np.isfinite(found.demonstrations.positions).all()
-        assert (found.demonstrations.lengths >= 4).all()
+        assert np.isfinite(recordings.demonstrations.positions).all()
+        assert (recordings.demonstrations.lengths >= 4).all()
 
 
 @pytest.mark.parametrize(
@@ -87,8 +87,8 @@ def test_any_text_is_a_table_or_an_error(text, skip):
 def test_what_numpy_writes_is_read(tmp_path, monkeypatch, write):
     monkeypatch.chdir(tmp_path)
     write()
-    one = read_recordings("x.csv").demonstrations[0]
-    np.testing.assert_array_equal(np.column_stack((one.times, one.positions)), np.array(SIX))
+    movement = read_recordings("x.csv").demonstrations[0]
+    np.testing.assert_array_equal(np.column_stack((movement.times, movement.positions)), np.array(SIX))
 
 
 @pytest.mark.parametrize(
@@ -102,9 +102,9 @@ def test_what_numpy_writes_is_read(tmp_path, monkeypatch, write):
     ],
 )
 def test_encodings(data):
-    found = read(data)
-    assert found.detected[0][0].columns == ("x [µm]", "y")
-    np.testing.assert_array_equal(found.demonstrations.positions, np.array(SIX)[:, 1:])
+    recordings = read(data)
+    assert recordings.detected[0][0].columns == ("x [µm]", "y")
+    np.testing.assert_array_equal(recordings.demonstrations.positions, np.array(SIX)[:, 1:])
 
 
 @pytest.mark.parametrize(
@@ -125,18 +125,18 @@ def test_encodings(data):
 def test_units_of_time_are_told_by_head_or_by_size(head, scale, units):
     times = np.arange(8) / 100
     text = lines([(repr(float(t)), 1, k) for k, t in enumerate(times * scale)], f"{head},x,y")
-    found = read(text)
-    how = found.detected[0][0]
+    recordings = read(text)
+    how = recordings.detected[0][0]
     assert (how.units, how.units_from) == units
-    np.testing.assert_allclose(found.demonstrations.times, times, rtol=1e-15, atol=0)
+    np.testing.assert_allclose(recordings.demonstrations.times, times, rtol=1e-15, atol=0)
 
 
 @pytest.mark.parametrize(("scale", "units"), [(1, "s"), (1e3, "ms"), (1e6, "us"), (1e9, "ns")])
 def test_stamps_since_1970_tell_their_unit_whatever_the_rate(scale, units):
     times = 1.7e9 + np.arange(8) / 4
-    found = read(lines([(f"{t * scale:.2f}", 1, k) for k, t in enumerate(times)], "stamp,x,y"))
-    assert found.detected[0][0][4:6] == (units, "since 1970")
-    np.testing.assert_allclose(found.demonstrations.times, times, rtol=1e-15)
+    recordings = read(lines([(f"{t * scale:.2f}", 1, k) for k, t in enumerate(times)], "stamp,x,y"))
+    assert recordings.detected[0][0][4:6] == (units, "since 1970")
+    np.testing.assert_allclose(recordings.demonstrations.times, times, rtol=1e-15)
 
 
 @pytest.mark.parametrize(("head", "step"), [("RelativeTime", 333_333), ("relative_time", 100_000), ("time", 250_000)])
@@ -149,17 +149,17 @@ def test_stamps_that_may_be_ticks_of_a_camera_are_refused_until_it_is_said(head,
 
 @pytest.mark.parametrize(("units", "divisor"), [("ms", 1000), ("us", 10**6), (0.5, 2), ("milliseconds", 1000)])
 def test_units_that_are_given_win(units, divisor):
-    found = read(lines(SIX, "time [s],x,y"), units=units)
-    assert found.detected[0][0][4:6] == (units, "given")
-    np.testing.assert_array_equal(found.demonstrations.times, np.arange(6) / divisor)
+    recordings = read(lines(SIX, "time [s],x,y"), units=units)
+    assert recordings.detected[0][0][4:6] == (units, "given")
+    np.testing.assert_array_equal(recordings.demonstrations.times, np.arange(6) / divisor)
 
 
 def test_rows_without_stamps_are_a_given_step_apart():
     with pytest.raises(kineme.errors.DataError, match="or the step between samples with units= where there is none"):
         read(lines(SIX, "a,b,c"))
-    found = read(lines(SIX, "a,b,c"), units=0.02)
-    np.testing.assert_allclose(found.demonstrations.times, np.arange(6) * 0.02)
-    assert found.demonstrations.n_dims == 3
+    recordings = read(lines(SIX, "a,b,c"), units=0.02)
+    np.testing.assert_allclose(recordings.demonstrations.times, np.arange(6) * 0.02)
+    assert recordings.demonstrations.n_dims == 3
     long = read(lines([("p" if k < 4 else "q", *SIX[k % 6]) for k in range(8)], "trial,a,b,c"), units=0.02)
     np.testing.assert_allclose(long.demonstrations.times, np.tile(np.arange(4) * 0.02, 2))
 
@@ -195,11 +195,11 @@ def test_columns_find_their_roles(heads, roles):
 
 def test_roles_that_are_given_win():
     text = lines([("n", *row) for row in SIX], "note,clock,x,y")
-    found = read(text, time="clock", columns=("y", "x"), label="note")
-    np.testing.assert_array_equal(found.demonstrations.positions, np.array(SIX)[:, [2, 1]])
-    assert tuple(found.labels) == ("n",)
+    recordings = read(text, time="clock", columns=("y", "x"), label="note")
+    np.testing.assert_array_equal(recordings.demonstrations.positions, np.array(SIX)[:, [2, 1]])
+    assert tuple(recordings.labels) == ("n",)
     by_number = read(text, time=1, columns=(3, "2"), label=0)
-    np.testing.assert_array_equal(by_number.demonstrations.positions, found.demonstrations.positions)
+    np.testing.assert_array_equal(by_number.demonstrations.positions, recordings.demonstrations.positions)
     assert read(text, time="clock").detected[0][0].ignored == ("note",)
 
 
@@ -229,29 +229,29 @@ def test_ambiguous_columns_are_refused():
 
 def test_movements_of_a_long_table_may_be_interleaved_and_share_their_number_between_labels():
     rows = [(label, k % 2, t, x, y) for t, x, y in SIX for k, label in enumerate(("wave", "wave", "point", "point"))]
-    found = read(lines(rows, "label,trial,time,x,y"))
-    assert [(one.label, one.place) for one in found.sources] == [
+    recordings = read(lines(rows, "label,trial,time,x,y"))
+    assert [(source.label, source.place) for source in recordings.sources] == [
         (label, f"{label}/{k}") for label in ("wave", "point") for k in "01"
     ]
-    for one in found.demonstrations:
-        np.testing.assert_array_equal(np.column_stack((one.times, one.positions)), np.array(SIX))
+    for movement in recordings.demonstrations:
+        np.testing.assert_array_equal(np.column_stack((movement.times, movement.positions)), np.array(SIX))
 
 
 def test_labels_alone_begin_a_movement_where_they_change_or_time_begins_anew():
     rows = [(label, *row) for label in ("wave", "wave", "rest", "wave") for row in SIX]
     rows += [("nod", 100 + row[0], *row[1:]) for row in SIX]
-    found = read(lines(rows, "label,time,x,y"))
-    assert tuple(found.labels) == ("wave", "wave", "rest", "wave", "nod")
-    assert [one.place for one in found.sources] == ["0", "1", "2", "3", "4"]
-    assert found.demonstrations.lengths.tolist() == [6] * 5
+    recordings = read(lines(rows, "label,time,x,y"))
+    assert tuple(recordings.labels) == ("wave", "wave", "rest", "wave", "nod")
+    assert [source.place for source in recordings.sources] == ["0", "1", "2", "3", "4"]
+    assert recordings.demonstrations.lengths.tolist() == [6] * 5
 
 
 def test_names_are_text_whatever_they_look_like():
     rows = [(name, label, *row) for name, label in (("001", "1e3"), ("1", "nan"), ("a, b; c", "")) for row in SIX]
     text = "\n".join(["id\tlabel\ttime\tx\ty", *("\t".join(map(str, row)) for row in rows)])
-    found = read(text)
-    assert [one.place for one in found.sources] == ["001", "1", "a, b; c"]
-    assert tuple(found.labels) == ("1e3", "nan", None)
+    recordings = read(text)
+    assert [source.place for source in recordings.sources] == ["001", "1", "a, b; c"]
+    assert tuple(recordings.labels) == ("1e3", "nan", None)
 
 
 FAULTS = [
@@ -270,21 +270,21 @@ GAP = "expected a number in 'x', got nothing in 17 % of the samples, for up to 2
 def test_a_bad_cell_costs_its_movement_and_is_found_by_its_line(cell, reason, good):
     rows = [("a", k, 10 + k, 20 - k) for k in range(good)] + [("b", k, 10 + k, 20 - k) for k in range(6)]
     rows[good + 2] = ("b", 2, cell, 18.0)
-    found = read("# a comment\n\n" + lines(rows, "demo,time,x,y"))
-    (problem,) = found.problems
+    recordings = read("# a comment\n\n" + lines(rows, "demo,time,x,y"))
+    (problem,) = recordings.problems
     assert (problem.file, problem.line, problem.reason) == ("a.csv", 3 + good + 3, f"movement b: {reason}")
-    assert [one.place for one in found.sources] == ["a"]
-    kept = read("# a comment\n\n" + lines(rows, "demo,time,x,y"), skip="sample")
-    assert kept.demonstrations.lengths.tolist() == [good, 5]
-    assert kept.problems[0].reason == f"movement b: {reason}; this sample left out"
+    assert [source.place for source in recordings.sources] == ["a"]
+    thinned = read("# a comment\n\n" + lines(rows, "demo,time,x,y"), skip="sample")
+    assert thinned.demonstrations.lengths.tolist() == [good, 5]
+    assert thinned.problems[0].reason == f"movement b: {reason}; this sample left out"
 
 
 @pytest.mark.parametrize("gap", ["", "nan", "NA", "null"])
 def test_a_column_without_values_at_the_beginning_is_not_taken_for_text(gap):
     rows = [(k / 100, gap if k < 30 else k * k, k) for k in range(100)]
-    found = read(lines(rows, "time,x,y"))
-    assert found.demonstrations.dimensions == ("x", "y")
-    assert found.demonstrations.lengths.tolist() == [70]
+    recordings = read(lines(rows, "time,x,y"))
+    assert recordings.demonstrations.dimensions == ("x", "y")
+    assert recordings.demonstrations.lengths.tolist() == [70]
     states = [(k / 100, "none" if k < 30 else "moving", k) for k in range(100)]
     assert read(lines(states, "time,state,y")).demonstrations.dimensions == ("y",)
 
@@ -299,16 +299,16 @@ def test_an_empty_cell_costs_its_movement_where_its_gap_is_too_long_to_be_filled
     assert (problem.line, problem.missing, problem.samples) == (3 + good + 3, ("x",), 0)
     said = f"movement b: {GAP} or --skip sample, in Python exclude= or fill_gaps= or skip="
     assert problem.reason == said
-    kept = read(text, skip="sample")
-    assert kept.demonstrations.lengths.tolist() == [good, 5]
-    assert kept.problems[0].reason.endswith("1 sample like this left out")
-    assert (kept.problems[0].missing, kept.problems[0].samples) == ((), 1)
+    recordings = read(text, skip="sample")
+    assert recordings.demonstrations.lengths.tolist() == [good, 5]
+    assert recordings.problems[0].reason.endswith("1 sample like this left out")
+    assert (recordings.problems[0].missing, recordings.problems[0].samples) == ((), 1)
     filled = read(text, fill_gaps=2.0)
     np.testing.assert_allclose(filled.demonstrations[1].positions[2], [12, 18])
 
 
 @pytest.mark.parametrize(
-    ("times", "reason", "kept"),
+    ("times", "reason", "remaining"),
     [
         ((0, 1, 1, 2, 3, 4), "got duplicate stamps 1 and 1 s at sample 2", [0, 1, 2, 3, 4]),
         ((0, 1, 2, 1.5, 1.7, 3), "got decreasing stamps 2 and 1.5 s at sample 3", [0, 1, 2, 3]),
@@ -316,22 +316,22 @@ def test_an_empty_cell_costs_its_movement_where_its_gap_is_too_long_to_be_filled
         ((5, 0, 1, 2, 3, 6), "got decreasing stamps 5 and 0 s at sample 1", None),
     ],
 )
-def test_time_must_go_on(times, reason, kept):
+def test_time_must_go_on(times, reason, remaining):
     text = lines([(t, k, -k) for k, t in enumerate(times)], "time,x,y")
     with pytest.raises(kineme.errors.DataError, match=rf"line [345]: .*{reason}"):
         read(text)
-    if kept is None:
+    if remaining is None:
         with pytest.raises(kineme.errors.DataError, match="expected at least 4 samples, got 2"):
             read(text, skip="sample")
     else:
-        assert read(text, skip="sample").demonstrations.times.tolist() == kept
+        assert read(text, skip="sample").demonstrations.times.tolist() == remaining
 
 
 @pytest.mark.parametrize("text", ["time,x,y,\n" + "".join(f"{k},1,{k},\n" for k in range(5))])
 def test_a_separator_at_the_end_of_every_line_is_no_column(text):
-    found = read(text)
-    assert found.demonstrations.n_dims == 2
-    assert found.detected[0][0].ignored == ("",)
+    recordings = read(text)
+    assert recordings.demonstrations.n_dims == 2
+    assert recordings.detected[0][0].ignored == ("",)
 
 
 def test_many_faults_are_told_once_per_movement():
@@ -339,9 +339,9 @@ def test_many_faults_are_told_once_per_movement():
     rows[0], rows[3] = (0, 0, 0), (3, "oops", 3)
     with pytest.raises(kineme.errors.DataError, match=r"line 5: expected a number in 'x', got 'oops'"):
         read(lines(rows))
-    kept = read(lines(rows), skip="sample")
-    assert kept.problems[1].reason.endswith("; 8 samples like this left out")
-    assert kept.demonstrations.lengths.tolist() == [21]
+    recordings = read(lines(rows), skip="sample")
+    assert recordings.problems[1].reason.endswith("; 8 samples like this left out")
+    assert recordings.demonstrations.lengths.tolist() == [21]
 
 
 @pytest.mark.parametrize(
@@ -369,8 +369,8 @@ def test_missing_numbers_agree_with_an_independent_reader():
     text = "time,x,y,z\n" + "\n".join(f"{k},{','.join(row)}" for k, row in enumerate(cells)) + "\n"
     expected = np.genfromtxt(io.StringIO(text), delimiter=",", skip_header=1)
     expected = expected[np.isfinite(expected).all(axis=1)]
-    found = read(text, skip="sample").demonstrations
-    np.testing.assert_array_equal(np.column_stack((found.times, found.positions)), expected)
+    demos = read(text, skip="sample").demonstrations
+    np.testing.assert_array_equal(np.column_stack((demos.times, demos.positions)), expected)
 
 
 @pytest.mark.parametrize("style", ["{}", "{}Z", "{}+02:00", " {} "])
@@ -379,12 +379,12 @@ def test_missing_numbers_agree_with_an_independent_reader():
 def test_dates_are_time_stamps(style, between, head):
     dates = [f"2024-05-06{between}07:08:{9 + k / 4:09.6f}" for k in range(6)]
     rows = [",".join(map(str, (style.format(date), k, -k))) for k, date in enumerate(dates)]
-    found = read("\n".join([head] * bool(head) + rows))
-    np.testing.assert_allclose(np.diff(found.demonstrations.times), 0.25, atol=3e-7)
+    recordings = read("\n".join([head] * bool(head) + rows))
+    np.testing.assert_allclose(np.diff(recordings.demonstrations.times), 0.25, atol=3e-7)
     offset = 7200 if "+" in style else 0
-    assert found.demonstrations.times[0] == 1714979289 - offset
-    assert found.detected[0][0][4:6] == ("s", "dates")
-    assert found.demonstrations.n_dims == 2
+    assert recordings.demonstrations.times[0] == 1714979289 - offset
+    assert recordings.detected[0][0][4:6] == ("s", "dates")
+    assert recordings.demonstrations.n_dims == 2
 
 
 def test_a_cell_that_is_no_date_is_found_by_its_line():
@@ -396,24 +396,24 @@ def test_a_cell_that_is_no_date_is_found_by_its_line():
 
 
 def test_decimal_commas_between_blanks():
-    found = read("0,0 1,5\n0,1 2,5\n0,2 3,5\n0,3 4,5\n").demonstrations
+    demos = read("0,0 1,5\n0,1 2,5\n0,2 3,5\n0,3 4,5\n").demonstrations
     np.testing.assert_array_equal(
-        np.column_stack((found.times, found.positions)), [[0, 1.5], [0.1, 2.5], [0.2, 3.5], [0.3, 4.5]]
+        np.column_stack((demos.times, demos.positions)), [[0, 1.5], [0.1, 2.5], [0.2, 3.5], [0.3, 4.5]]
     )
     named = read("t x\n0,0 1,5\n0,1 2,5\n0,2 3,5\n0,3 4,5\n").demonstrations
-    np.testing.assert_array_equal(named.positions, found.positions)
+    np.testing.assert_array_equal(named.positions, demos.positions)
 
 
 @pytest.mark.parametrize("mark", [".", ","])
 def test_marks_between_thousands_are_no_decimal_marks(mark):
     x = np.linspace(900, 1200, 40).round()
-    grouped = [f"{one:,.0f}".replace(",", mark) for one in x]
+    grouped = [f"{number:,.0f}".replace(",", mark) for number in x]
     text = "t;x\n" + "\n".join(f"{k};{cell}" for k, cell in enumerate(grouped))
     with pytest.raises(
         kineme.errors.DataError, match=rf"'x' without marks between thousands, got '1\{mark}0.*' beside '900'"
     ):
         read(text)
-    shortest = [f"{one:g}".replace(".", mark) for one in (x / 1000).round(3)]  # 0.9, 1, 1.008: decimals
+    shortest = [f"{number:g}".replace(".", mark) for number in (x / 1000).round(3)]  # 0.9, 1, 1.008: decimals
     text = "t;x\n" + "\n".join(f"{k};{cell}" for k, cell in enumerate(shortest))
     np.testing.assert_allclose(read(text).demonstrations[0].positions[:, 0], (x / 1000).round(3))
 
@@ -456,9 +456,9 @@ def test_several_lines_of_heads_are_one(tmp_path, names):
     frame = pd.DataFrame(np.arange(60.0).reshape(10, 6) ** 2, columns=columns)
     frame.index.name = None if names[0] else "time"
     frame.to_csv(tmp_path / "a.csv")
-    found = read_recordings(tmp_path / "a.csv", units=0.1).demonstrations
-    assert found.dimensions == ("nose.x", "nose.y", "paw.x", "paw.y")
-    np.testing.assert_array_equal(found[0].positions, frame.to_numpy()[:, [0, 1, 3, 4]])
+    demos = read_recordings(tmp_path / "a.csv", units=0.1).demonstrations
+    assert demos.dimensions == ("nose.x", "nose.y", "paw.x", "paw.y")
+    np.testing.assert_array_equal(demos[0].positions, frame.to_numpy()[:, [0, 1, 3, 4]])
 
 
 def test_times_that_are_not_understood_are_shown():
@@ -474,9 +474,9 @@ def test_lines_above_the_heads_are_passed_over(mark):
     rows = "\n".join(mark.join((str(k / 10), str(k * k), "1.5")) for k in range(9))
     said = {"sep=;": mark == ";", f"Device{mark}A12\nRate{mark}60": True, "Made by me on May 3": True, "ok\n\n\n": True}
     for above in (key for key, applies in said.items() if applies):
-        found = read(f"{above}\ntime{mark}x{mark}y\n{rows}")
-        assert found.demonstrations.dimensions == ("x", "y"), above
-        np.testing.assert_array_equal(found.demonstrations[0].positions[:, 0], np.arange(9.0) ** 2)
+        recordings = read(f"{above}\ntime{mark}x{mark}y\n{rows}")
+        assert recordings.demonstrations.dimensions == ("x", "y"), above
+        np.testing.assert_array_equal(recordings.demonstrations[0].positions[:, 0], np.arange(9.0) ** 2)
     for above in (mark.join("12"), mark.join(("time", "x"))):  # another table, or heads that lack one
         with pytest.raises(kineme.errors.DataError):
             read(f"{above}\n{rows}")
@@ -485,8 +485,8 @@ def test_lines_above_the_heads_are_passed_over(mark):
 def test_a_line_that_numbers_the_columns_is_no_sample():
     rows = [(k / 10, 1.5 * k, k) for k in range(5)]
     np.testing.assert_array_equal(read(lines(rows, "0,1,2")).demonstrations.times, np.arange(5) / 10)
-    whole = [(k, k + 1, k + 2) for k in range(5)]
-    assert read("\n".join(",".join(map(str, row)) for row in whole)).demonstrations.lengths.tolist() == [5]
+    integers = [(k, k + 1, k + 2) for k in range(5)]
+    assert read("\n".join(",".join(map(str, row)) for row in integers)).demonstrations.lengths.tolist() == [5]
 
 
 def test_columns_of_one_name_are_numbered_as_pandas_does_and_not_chosen_by_it():
@@ -520,11 +520,11 @@ def test_numbered_names_are_all_different(names, expected):
 @pytest.mark.parametrize("head", ["label", "trial", "subject"])
 def test_names_like_comments_beside_numbers_are_names_and_rows_commented_out_are_none(label, head):
     rows = [(name, *row) for name in ("1", "2", label) for row in SIX]
-    found = read(lines([*rows, ("#1", 9, 9, 9), ("# 2", 9, 9, 9)], f"{head},time,x,y"))
-    names = [one.label if head == "label" else one.place for one in found.sources]
+    recordings = read(lines([*rows, ("#1", 9, 9, 9), ("# 2", 9, 9, 9)], f"{head},time,x,y"))
+    names = [source.label if head == "label" else source.place for source in recordings.sources]
     assert names == (["1", "2", label] if head != "subject" else names)
-    assert (len(found), found.problems) == (3, ())
-    assert found.demonstrations.lengths.tolist() == [6, 6, 6]
+    assert (len(recordings), recordings.problems) == (3, ())
+    assert recordings.demonstrations.lengths.tolist() == [6, 6, 6]
 
 
 LONG = 2**53 + 1

@@ -37,25 +37,25 @@ def npy(array):
     return buffer.getvalue()
 
 
-def where(found):
-    return [(source.place, source.label) for source in found.sources]
+def where(recordings):
+    return [(source.place, source.label) for source in recordings.sources]
 
 
 def test_samples_with_names_are_a_table():
-    found = read_json(SAMPLES)
-    np.testing.assert_array_equal(found.demonstrations.times, T)
-    np.testing.assert_array_equal(found.demonstrations.positions, X)
-    assert found.demonstrations.dimensions == ("x", "y")
+    recordings = read_json(SAMPLES)
+    np.testing.assert_array_equal(recordings.demonstrations.times, T)
+    np.testing.assert_array_equal(recordings.demonstrations.positions, X)
+    assert recordings.demonstrations.dimensions == ("x", "y")
     assert read_json(SAMPLES, columns="y").demonstrations.dimensions == ("y",)
     lines = "\n".join(map(json.dumps, SAMPLES))
     np.testing.assert_array_equal(read(lines, "a.jsonl").demonstrations.positions, X)
 
 
 def test_samples_may_carry_labels_movements_vectors_and_objects():
-    long = [one | {"demo": k // 5, "label": "wave"} for k, one in enumerate(SAMPLES)]
-    found = read_json(long)
-    assert where(found) == [("0.0", "wave"), ("1.0", "wave")]
-    nested = [{"t": one["t"], "q": [1, one["x"]], "pose": {"position": {"x": one["y"]}}} for one in SAMPLES]
+    long = [sample | {"demo": k // 5, "label": "wave"} for k, sample in enumerate(SAMPLES)]
+    recordings = read_json(long)
+    assert where(recordings) == [("0.0", "wave"), ("1.0", "wave")]
+    nested = [{"t": sample["t"], "q": [1, sample["x"]], "pose": {"position": {"x": sample["y"]}}} for sample in SAMPLES]
     assert read_json(nested).demonstrations.dimensions == ("q.0", "q.1", "pose.position.x")
     assert read_json(nested, columns="q").demonstrations.dimensions == ("q.0", "q.1")
 
@@ -71,14 +71,14 @@ def test_lists_and_names_of_movements():
 
 def test_a_movement_in_each_line():
     lines = [{"label": "wave", "times": T[:n].tolist(), "positions": X[:n].tolist()} for n in (5, 6)]
-    found = read("\n".join(map(json.dumps, lines)), "a.jsonl")
-    assert where(found) == [("0", "wave"), ("1", "wave")]
-    assert found.demonstrations.lengths.tolist() == [5, 6]
-    assert found.demonstrations.dimensions == ("x", "y")
+    recordings = read("\n".join(map(json.dumps, lines)), "a.jsonl")
+    assert where(recordings) == [("0", "wave"), ("1", "wave")]
+    assert recordings.demonstrations.lengths.tolist() == [5, 6]
+    assert recordings.demonstrations.dimensions == ("x", "y")
 
 
 def test_a_missing_number_costs_its_movement_or_its_sample():
-    broken = [dict(one) for one in SAMPLES]
+    broken = [dict(sample) for sample in SAMPLES]
     broken[3]["x"] = None
     del broken[4]["y"]
     with pytest.raises(DataError, match="got nothing in 10 % of the samples, 10 % of 'y'"):
@@ -119,21 +119,21 @@ def test_an_npy_file_is_one_movement_or_many():
 
 
 def test_arrays_by_name_are_movements_and_their_times_stand_beside():
-    found = read(npz(wave=X, nod=X[:7]), "a.npz")
-    assert where(found) == [("wave", "wave"), ("nod", "nod")]
-    assert found.detected[0][0].units_from == "no times: one second each"
-    found = read(npz(wave_1=X, wave_1_t=T, wave_2=X[:5], times_wave_2=2 * T[:5]), "a.npz")
-    assert where(found) == [("wave_1", None), ("wave_2", None)]
-    np.testing.assert_allclose(found.demonstrations.durations, [0.9, 0.8])
-    found = read(npz(**{"demo_0/q": X, "demo_0/t": T, "demo_1/q": X, "demo_1/t": T}), "a.npz")
-    assert where(found) == [("demo_0", None), ("demo_1", None)]
+    recordings = read(npz(wave=X, nod=X[:7]), "a.npz")
+    assert where(recordings) == [("wave", "wave"), ("nod", "nod")]
+    assert recordings.detected[0][0].units_from == "no times: one second each"
+    recordings = read(npz(wave_1=X, wave_1_t=T, wave_2=X[:5], times_wave_2=2 * T[:5]), "a.npz")
+    assert where(recordings) == [("wave_1", None), ("wave_2", None)]
+    np.testing.assert_allclose(recordings.demonstrations.durations, [0.9, 0.8])
+    recordings = read(npz(**{"demo_0/q": X, "demo_0/t": T, "demo_1/q": X, "demo_1/t": T}), "a.npz")
+    assert where(recordings) == [("demo_0", None), ("demo_1", None)]
     rated = read(npz(wave=X, fps=np.array(50)), "a.npz")
     np.testing.assert_allclose(np.diff(rated.demonstrations.times), 0.02)
 
 
 def test_arrays_beside_times_are_columns_and_several_vectors_must_be_chosen():
-    found = read(npz(t=T, q=X, gripper=X[:, 0]), "a.npz")
-    assert found.demonstrations.dimensions == ("q.0", "q.1", "gripper")
+    recordings = read(npz(t=T, q=X, gripper=X[:, 0]), "a.npz")
+    assert recordings.demonstrations.dimensions == ("q.0", "q.1", "gripper")
     both = npz(t=T, q=X, action=X)
     with pytest.raises(DataError, match=r"got q \(2\), action \(2\); say which with columns="):
         read(both, "a.npz")
@@ -149,32 +149,32 @@ def test_objects_are_refused_with_the_reason_and_what_to_do():
 
 
 def test_a_movement_that_lacks_an_array_costs_itself_alone():
-    found = read(npz(**{"a/q": X, "a/t": T, "b/q": X, "b/t": T, "c/t": T, "c/p": X}), "a.npz")
-    assert [source.place for source in found.sources] == ["a", "b"]
-    assert "c: expected an array 'q' as others have, got none" in str(found.problems[0])
+    recordings = read(npz(**{"a/q": X, "a/t": T, "b/q": X, "b/t": T, "c/t": T, "c/p": X}), "a.npz")
+    assert [source.place for source in recordings.sources] == ["a", "b"]
+    assert "c: expected an array 'q' as others have, got none" in str(recordings.problems[0])
 
 
 def test_movements_of_other_dimensions_cost_themselves_alone():
-    found = read(npz(wave=X, nod=X[:7], bow=np.ones((6, 3))), "a.npz")
-    assert [source.place for source in found.sources] == ["wave", "nod"]
-    assert "movement bow: 3 dimensions where most have 2" in str(found.problems[0])
+    recordings = read(npz(wave=X, nod=X[:7], bow=np.ones((6, 3))), "a.npz")
+    assert [source.place for source in recordings.sources] == ["wave", "nod"]
+    assert "movement bow: 3 dimensions where most have 2" in str(recordings.problems[0])
 
 
 def test_a_named_movement_with_its_own_times_is_one_movement_however_few_there_are(tmp_path):
     t, x = np.linspace(0, 3, 20), np.random.default_rng(0).normal(size=(20, 3))
     np.savez(tmp_path / "one.npz", wave=x, wave_t=t)
     np.savez(tmp_path / "two.npz", wave=x, wave_t=t, nod=x + 1, nod_t=2 * t)
-    one, two = (read_recordings(tmp_path / f"{name}.npz") for name in ("one", "two"))
-    assert (list(one.labels), list(two.labels)) == (["wave"], ["wave", "nod"])
-    assert one.demonstrations.dimensions == two.demonstrations.dimensions == ("x", "y", "z")
-    assert [round(float(each.times[-1]), 9) for each in [*one, *two]] == [3.0, 3.0, 6.0]
+    first, two = (read_recordings(tmp_path / f"{name}.npz") for name in ("one", "two"))
+    assert (list(first.labels), list(two.labels)) == (["wave"], ["wave", "nod"])
+    assert first.demonstrations.dimensions == two.demonstrations.dimensions == ("x", "y", "z")
+    assert [round(float(each.times[-1]), 9) for each in [*first, *two]] == [3.0, 3.0, 6.0]
 
 
 def test_columns_of_a_movement_beside_times_of_their_own_name_stay_together(tmp_path):
     t, x = np.linspace(0, 3, 20), np.random.default_rng(0).normal(size=(20, 3))
     np.savez(tmp_path / "a.npz", t=t, q=x, gripper=np.round(t / 3))
-    (one,) = read_recordings(tmp_path / "a.npz")
-    assert [channel.name for channel in one.channels] == ["q.0", "q.1", "q.2", "gripper"]
+    (movement,) = read_recordings(tmp_path / "a.npz")
+    assert [channel.name for channel in movement.channels] == ["q.0", "q.1", "q.2", "gripper"]
 
 
 def test_one_file_that_cannot_be_read_is_named_once(tmp_path):
@@ -186,20 +186,20 @@ def test_one_file_that_cannot_be_read_is_named_once(tmp_path):
 
 
 def test_columns_that_are_always_null_are_left_aside_and_named():
-    nulls = [one | {"effort": None, "label": None, "force": [None, None]} for one in SAMPLES]
-    for found in (read_json(nulls), read("\n".join(map(json.dumps, nulls)), "a.jsonl")):
-        assert found.demonstrations.dimensions == ("x", "y")
-        assert found.detected[0][0].ignored == ("effort", "force")
-        assert where(found) == [("", None)]
+    nulls = [sample | {"effort": None, "label": None, "force": [None, None]} for sample in SAMPLES]
+    for recordings in (read_json(nulls), read("\n".join(map(json.dumps, nulls)), "a.jsonl")):
+        assert recordings.demonstrations.dimensions == ("x", "y")
+        assert recordings.detected[0][0].ignored == ("effort", "force")
+        assert where(recordings) == [("", None)]
     with pytest.raises(DataError, match=r"got the columns .* there are no numbers in"):
-        read_json([{"t": one["t"], "x": None} for one in SAMPLES])
+        read_json([{"t": sample["t"], "x": None} for sample in SAMPLES])
 
 
 def test_a_movement_with_nulls_where_others_have_numbers_costs_itself_alone():
-    with_effort = [[one | {"effort": 1.0} for one in SAMPLES]] * 2
-    found = read_json([*with_effort, [one | {"effort": None} for one in SAMPLES]])
-    assert len(found) == 2
-    assert "expected numbers in 'effort', got none" in str(found.problems[0])
+    with_effort = [[sample | {"effort": 1.0} for sample in SAMPLES]] * 2
+    recordings = read_json([*with_effort, [sample | {"effort": None} for sample in SAMPLES]])
+    assert len(recordings) == 2
+    assert "expected numbers in 'effort', got none" in str(recordings.problems[0])
 
 
 def test_columns_without_any_number_are_left_aside_in_tables_too():
@@ -208,9 +208,9 @@ def test_columns_without_any_number_are_left_aside_in_tables_too():
     buffer = io.BytesIO()
     frame.to_parquet(buffer)
     for data, name in ((frame.to_csv(index=False), "a.csv"), (buffer.getvalue(), "a.parquet")):
-        found = read(data, name)
-        assert found.demonstrations.dimensions == ("x", "y")
-        assert found.detected[0][0].ignored == ("effort",)
+        recordings = read(data, name)
+        assert recordings.demonstrations.dimensions == ("x", "y")
+        assert recordings.detected[0][0].ignored == ("effort",)
         with pytest.raises(DataError, match=r"expected (a number|finite)"):
             read(data, name, columns=["x", "effort"])
 
@@ -234,24 +234,24 @@ def test_a_rate_is_known_by_its_words_and_holds_for_all_below_it():
 @pytest.mark.parametrize("y", [np.array(["a", "b", "a"]), np.array([2, 0, 2]), np.array([2.0, 0.0, 2.0])])
 def test_sets_of_movements_have_the_labels_beside_them(y):
     sets = np.stack([X, X + 1, X + 2])
-    found = read(npz(X=sets, y=y, fs=20), "a.npz")
-    assert found.labels.tolist() == (["a", "b", "a"] if y.dtype.kind == "U" else ["2", "0", "2"])
-    np.testing.assert_array_equal(found.demonstrations[2].positions, X + 2)
-    np.testing.assert_allclose(found.demonstrations.durations, 9 / 20)
+    recordings = read(npz(X=sets, y=y, fs=20), "a.npz")
+    assert recordings.labels.tolist() == (["a", "b", "a"] if y.dtype.kind == "U" else ["2", "0", "2"])
+    np.testing.assert_array_equal(recordings.demonstrations[2].positions, X + 2)
+    np.testing.assert_allclose(recordings.demonstrations.durations, 9 / 20)
     parts = read(npz(X_train=sets, y_train=y, X_test=sets[:2], y_test=y[:2]), "a.npz")
-    assert parts.labels.tolist() == [*found.labels.tolist(), *found.labels.tolist()[:2]]
+    assert parts.labels.tolist() == [*recordings.labels.tolist(), *recordings.labels.tolist()[:2]]
     assert read(npz(X_train=sets), "a.npz").labels.tolist() == [None] * 3
 
 
 def test_points_of_a_body_in_each_sample_are_columns():
     hands = [[{"x": x, "y": y, "z": 0}, {"x": y, "y": x, "z": 1}] for x, y in X.tolist()]
     timed = [{"timestamp": t, "landmarks": hand} for t, hand in zip(T.tolist(), hands, strict=True)]
-    found = read_json(timed)
-    assert found.demonstrations.dimensions == tuple(f"landmarks.{k}.{axis}" for k in (0, 1) for axis in "xyz")
-    np.testing.assert_array_equal(found.demonstrations[0].positions[:, :2], X)
-    numbered = [{"frame": k, "landmarks": [[*one.values()] for one in hand]} for k, hand in enumerate(hands)]
+    recordings = read_json(timed)
+    assert recordings.demonstrations.dimensions == tuple(f"landmarks.{k}.{axis}" for k in (0, 1) for axis in "xyz")
+    np.testing.assert_array_equal(recordings.demonstrations[0].positions[:, :2], X)
+    numbered = [{"frame": k, "landmarks": [[*point.values()] for point in hand]} for k, hand in enumerate(hands)]
     np.testing.assert_array_equal(
-        read_json({"fps": 10, "frames": numbered}).demonstrations[0].positions, found.demonstrations[0].positions
+        read_json({"fps": 10, "frames": numbered}).demonstrations[0].positions, recordings.demonstrations[0].positions
     )
     names = [{"score": 0.5, "keypoints": [{"name": "nose", "x": x, "score": 1}]} for x, _ in X.tolist()]
     assert read_json(names, units=0.1).demonstrations.dimensions == ("score", "keypoints.nose.x")
@@ -263,9 +263,9 @@ def test_parts_of_a_sample_are_told_by_their_names_and_not_by_their_places():
 
     pairs = list(zip(T.tolist(), X[:, 0].tolist(), strict=True))
     sides = [("Left", "Right"), ("Right", "Left")]
-    found = read_json([sample(t, x, *sides[k % 2]) for k, (t, x) in enumerate(pairs)]).demonstrations
-    assert found.dimensions == ("hands.Left.x", "hands.Right.x")
-    np.testing.assert_array_equal(found[0].positions, np.column_stack([X[:, 0] + 1, X[:, 0]]))
+    demos = read_json([sample(t, x, *sides[k % 2]) for k, (t, x) in enumerate(pairs)]).demonstrations
+    assert demos.dimensions == ("hands.Left.x", "hands.Right.x")
+    np.testing.assert_array_equal(demos[0].positions, np.column_stack([X[:, 0] + 1, X[:, 0]]))
     with pytest.raises(DataError, match=r"expected parts of 'hands' with different names in each sample"):
         read_json([sample(t, x, "Left", "Left") for t, x in pairs])
     with pytest.raises(DataError, match=r"expected as many 'points' in each sample, .* got 1 to 2; give each a name"):
@@ -277,9 +277,9 @@ def test_parts_of_a_sample_are_told_by_their_names_and_not_by_their_places():
 
 def test_an_axis_that_is_a_list_runs_over_time():
     rows = [{"label": label, "x": (X[:, 0] + k).tolist(), "y": X[:, 1].tolist()} for k, label in enumerate("ab")]
-    found = read("\n".join(map(json.dumps, rows)), "a.jsonl", units=0.1)
-    assert (found.labels.tolist(), found.demonstrations.dimensions) == (["a", "b"], ("x", "y"))
-    np.testing.assert_array_equal(found.demonstrations[1].positions, X + np.array([1, 0]))
+    recordings = read("\n".join(map(json.dumps, rows)), "a.jsonl", units=0.1)
+    assert (recordings.labels.tolist(), recordings.demonstrations.dimensions) == (["a", "b"], ("x", "y"))
+    np.testing.assert_array_equal(recordings.demonstrations[1].positions, X + np.array([1, 0]))
 
 
 def test_tables_of_records_have_their_columns():
@@ -289,7 +289,7 @@ def test_tables_of_records_have_their_columns():
 
 def _points(rise, upper=True, first=0, last=30):
     points = [{"X": float(k), "Y": rise * k * k, "T": 1000 + 16 * k} for k in range(first, last)]
-    return points if upper else [{key.lower(): value for key, value in one.items()} for one in points]
+    return points if upper else [{key.lower(): value for key, value in point.items()} for point in points]
 
 
 @pytest.mark.parametrize(
@@ -297,8 +297,8 @@ def _points(rise, upper=True, first=0, last=30):
     [
         ({"Name": "circle", "Points": _points(1.0)}, ["circle"]),
         ({"name": "circle", "points": _points(1.0, upper=False)}, ["circle"]),
-        ({"gestures": [{"name": one, "points": _points(k + 1.0, False)} for k, one in enumerate("ab")]}, ["a", "b"]),
-        ([{"Name": one, "Points": _points(k + 1.0)} for k, one in enumerate("ab")], ["a", "b"]),
+        ({"gestures": [{"name": name, "points": _points(k + 1.0, False)} for k, name in enumerate("ab")]}, ["a", "b"]),
+        ([{"Name": name, "Points": _points(k + 1.0)} for k, name in enumerate("ab")], ["a", "b"]),
         ({"Name": "x", "Strokes": [_points(1.0, last=12), _points(1.0, first=12)]}, ["x"]),
         ({"Name": "circle_07", "Points": _points(1.0)}, [None]),
     ],
@@ -308,9 +308,9 @@ def test_drawn_gestures_are_labeled_by_their_names(tmp_path, content, labels):
     (tmp_path / "a.json").write_text(json.dumps(content))
     recordings = read_recordings(tmp_path / "a.json")
     assert recordings.labels.tolist() == labels
-    for k, one in enumerate(recordings.demonstrations):
-        np.testing.assert_array_equal(one.positions, [[j, (k + 1.0) * j * j] for j in range(30)])
-        np.testing.assert_allclose(np.diff(one.times), 0.016, atol=1e-9)
+    for k, movement in enumerate(recordings.demonstrations):
+        np.testing.assert_array_equal(movement.positions, [[j, (k + 1.0) * j * j] for j in range(30)])
+        np.testing.assert_allclose(np.diff(movement.times), 0.016, atol=1e-9)
 
 
 def _landmarks(k, n=5):
@@ -329,9 +329,9 @@ def test_landmarks_of_frames_are_no_movements(tmp_path, content):
     (tmp_path / "a.json").write_text(json.dumps(content))
     with pytest.raises(DataError, match=r"one movement of 20 samples of 5 points.* every=20 .*--every"):
         read_recordings(tmp_path / "a.json", units=0.03)
-    (one,) = read_recordings(tmp_path / "a.json", units=0.03, every=20).demonstrations
+    (movement,) = read_recordings(tmp_path / "a.json", units=0.03, every=20).demonstrations
     expected = [[[mark[axis] for axis in "xyz"] for mark in _landmarks(k)] for k in range(20)]
-    np.testing.assert_array_equal(one.positions, np.reshape(expected, (20, 15)))
+    np.testing.assert_array_equal(movement.positions, np.reshape(expected, (20, 15)))
 
 
 def test_hands_of_a_frame_are_numbered_and_what_they_are_held_for_is_left_aside(tmp_path):

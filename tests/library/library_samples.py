@@ -38,8 +38,16 @@ def contents(library):
         return library.version, [], repr(library.symbols())
     back, primitives = library.movements(ids=ids), library.primitives(ids=ids)
     symbols = [
-        (one.id, one.name, one.description, one.members.tolist(), one.prototype, one.threshold, one.parents)
-        for one in library.symbols()
+        (
+            symbol.id,
+            symbol.name,
+            symbol.description,
+            symbol.members.tolist(),
+            symbol.prototype,
+            symbol.threshold,
+            symbol.parents,
+        )
+        for symbol in library.symbols()
     ]
     arrays = (back.positions, back.offsets, back.times, library.features(ids), primitives.scaled_weights)
     ends = (primitives.starts, primitives.goals, primitives.velocities, primitives.extents, primitives.durations)
@@ -51,5 +59,5 @@ def contents(library):
         [array.tobytes() for array in (*arrays, *ends)],
         (labels, back.names),
         symbols,
-        [(one.id, one.action, one.detail) for one in library.history()],
+        [(version.id, version.action, version.detail) for version in library.history()],
     )

@@ -15,8 +15,8 @@ from kineme.orientation import exp
 
 @pytest.fixture
 def library(tmp_path):
-    with ActionLibrary(tmp_path / "actions", create=True) as made:
-        yield made
+    with ActionLibrary(tmp_path / "actions", create=True) as actions:
+        yield actions
 
 
 def _source(**options):
@@ -25,7 +25,7 @@ def _source(**options):
 
 def _rounded(demos):
     """The same movements, read a little differently."""
-    return [one.positions.astype(np.float32) for one in demos]
+    return [movement.positions.astype(np.float32) for movement in demos]
 
 
 def test_samples_say_more_than_the_place_in_a_file(library):
@@ -66,7 +66,7 @@ def test_what_is_read_from_a_library_is_known_to_it(library, ragged, origin):
     """It is stored in single precision, and read in double."""
     demos = draw_movements(20, 3, ragged=ragged)
     demos = kineme.Demonstrations.from_arrays(
-        [one.positions for one in demos], times=[one.times + origin for one in demos]
+        [movement.positions for movement in demos], times=[movement.times + origin for movement in demos]
     )
     ids = library.learn(demos).ids
     for again in (library.movements(), list(library.movements())):
@@ -96,4 +96,4 @@ def test_the_same_way_begun_in_another_direction_is_another_movement(library):
     straight, reversed_ = table.copy(), table.copy()
     straight[["qw", "qx", "qy", "qz"]] = (1.0, 0.0, 0.0, 0.0)
     reversed_[["qw", "qx", "qy", "qz"]] = (0.0, 0.0, 0.0, 1.0)
-    assert [library.learn(kineme.Demonstrations.of(one)).added for one in (straight, reversed_)] == [1, 1]
+    assert [library.learn(kineme.Demonstrations.of(path)).added for path in (straight, reversed_)] == [1, 1]

@@ -23,8 +23,8 @@ LABELS = [["wave"] * 3 + ["nod"] * 4 + ["bow"] * 5, [f"kind {k}" for k in range(
 
 
 def _answers(library):
-    found = LibraryRecognizer(library.store, exhaustive=0).recognize(library.movements())
-    return [(a.label, a.ranked, a.confidence, dict(a.p_values), [n.index for n in a.nearest]) for a in found]
+    answers = LibraryRecognizer(library.store, exhaustive=0).recognize(library.movements())
+    return [(a.label, a.ranked, a.confidence, dict(a.p_values), [n.index for n in a.nearest]) for a in answers]
 
 
 def _expected(library):
@@ -48,9 +48,9 @@ def served(tmp_path_factory):
 def test_classes_that_share_scores_keep_their_own_novelties():
     """A class whose scale is raised has other novelties than one of the same size whose scale is not."""
     scores, novelties, own = np.array([0.2, 0.5]), np.array([0.3, 1.6]), (np.array([0.1]), np.array([0.4]))
-    known = Calibration(np.array([0.1, 2.0]), own, (scores, scores), own, (novelties, novelties))
-    made = known.with_least_scales(np.array([1.0, 1.0]))
-    again = calibration_cache._deserialized(calibration_cache._serialized(made, "key"), "key", 2)
+    calibration = Calibration(np.array([0.1, 2.0]), own, (scores, scores), own, (novelties, novelties))
+    scaled = calibration.with_least_scales(np.array([1.0, 1.0]))
+    again = calibration_cache._deserialized(calibration_cache._serialized(scaled, "key"), "key", 2)
     np.testing.assert_array_equal(again.scales, [1.0, 2.0])
     np.testing.assert_array_equal(again.pooled_novelties, [[1.0, 1.6], [0.3, 1.6]])
     np.testing.assert_array_equal(np.concatenate(again.own_novelties), [1.0, 0.4])
@@ -74,10 +74,10 @@ def test_a_cache_of_other_members_is_not_believed_however_many_they_are(tmp_path
         before = _answers(library)
         library.assign(ids[:1], "nod")
         library.assign(ids[4:5], "wave")
-        found = _answers(library)
+        answers = _answers(library)
         (tmp_path / CALIBRATION).unlink()
-        assert found == _answers(library)
-        assert found != before
+        assert answers == _answers(library)
+        assert answers != before
 
 
 def _header(data, **changes):
@@ -106,9 +106,9 @@ def _archive(**changes):
 
     def spoil(data, key):
         with np.load(io.BytesIO(data[32:])) as arrays:
-            kept = dict(arrays) | changes
+            changed = dict(arrays) | changes
         file = io.BytesIO()
-        np.savez(file, **{name: array for name, array in kept.items() if array is not None})
+        np.savez(file, **{name: array for name, array in changed.items() if array is not None})
         return calibration_cache._seal(file.getvalue(), key) + file.getvalue()
 
     return spoil
@@ -201,20 +201,20 @@ def of_all(tmp_path, monkeypatch):
 def _all_answers(library):
     recognizer = LibraryRecognizer(library.store)
     calibration = recognizer.model().calibration
-    found = recognizer.recognize(library.movements())
-    return [(a.label, a.ranked, a.confidence, a.p_known, a.rule, dict(a.p_values)) for a in found], calibration
+    answers = recognizer.recognize(library.movements())
+    return [(a.label, a.ranked, a.confidence, a.p_known, a.rule, dict(a.p_values)) for a in answers], calibration
 
 
 def test_the_calibration_of_a_small_library_is_computed_once(of_all, tmp_path):
     library, computed = of_all
-    expected, made = _all_answers(library)
-    (found, read), (again, _) = _all_answers(library), _all_answers(library)
-    assert found == again == expected
+    expected, calibration = _all_answers(library)
+    (answers, read), (again, _) = _all_answers(library), _all_answers(library)
+    assert answers == again == expected
     assert len(computed) == 1
-    assert (made.between, made.exponent) == (read.between, read.exponent) != (0.0, EXPONENT)
-    for name in vars(made).keys() - {"between", "exponent"}:
-        for one, other in zip(getattr(made, name), getattr(read, name), strict=True):
-            np.testing.assert_array_equal(one, other)
+    assert (calibration.between, calibration.exponent) == (read.between, read.exponent) != (0.0, EXPONENT)
+    for name in vars(calibration).keys() - {"between", "exponent"}:
+        for array, other in zip(getattr(calibration, name), getattr(read, name), strict=True):
+            np.testing.assert_array_equal(array, other)
     (tmp_path / calibration_cache.FILE_OF_ALL).write_bytes(b"spoiled")
     assert _all_answers(library)[0] == expected
     assert len(computed) == 2
@@ -227,7 +227,7 @@ def test_the_calibration_of_a_small_library_is_computed_once(of_all, tmp_path):
 def test_a_change_of_the_library_makes_it_again(of_all, tmp_path, change):
     library, computed = of_all
     _all_answers(library)
-    kept = (tmp_path / calibration_cache.FILE_OF_ALL).read_bytes()
+    cached = (tmp_path / calibration_cache.FILE_OF_ALL).read_bytes()
     if change == "learn":
         library.learn(draw_movements(1, n_samples=13, labels=["wave"]))
     elif change == "assign":
@@ -242,7 +242,7 @@ def test_a_change_of_the_library_makes_it_again(of_all, tmp_path, change):
         key = calibration_cache._key(library.store, members_of(library.store), digests)
         assert key != calibration_cache._key(library.store, members_of(library.store), digests[:-5] + b"7)]]]")
         return
-    (tmp_path / calibration_cache.FILE_OF_ALL).write_bytes(kept)
+    (tmp_path / calibration_cache.FILE_OF_ALL).write_bytes(cached)
     _, fresh = _all_answers(library)
     assert len(computed) == 2
     (tmp_path / calibration_cache.FILE_OF_ALL).unlink()
@@ -253,10 +253,10 @@ def test_a_hostile_calibration_of_all_is_made_again(of_all, tmp_path):
     library, computed = of_all
     expected, _ = _all_answers(library)
     path = tmp_path / calibration_cache.FILE_OF_ALL
-    kept, members = path.read_bytes(), members_of(library.store)
+    cached, members = path.read_bytes(), members_of(library.store)
     key = calibration_cache._key(library.store, members, calibration_cache._digests(library.store, members))
     for changes in ({"novel own": np.full(12, -1.0)}, {"novel ends": np.array([0, 99, 12])}, {"novel own": None}):
-        path.write_bytes(_archive(**changes)(kept, key))
+        path.write_bytes(_archive(**changes)(cached, key))
         assert _all_answers(library)[0] == expected
-        assert path.read_bytes() == kept
+        assert path.read_bytes() == cached
     assert len(computed) == 4

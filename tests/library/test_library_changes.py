@@ -19,9 +19,9 @@ NAMES = ["wave", "nod", "a'b; DROP TABLE movement", "../etc/passwd", "é", "é",
 
 @pytest.fixture
 def library(tmp_path):
-    with ActionLibrary(tmp_path / "actions", create=True) as made:
-        made.learn(draw_movements(N, labels=["wave", "nod", "bow"] * 4))
-        yield made
+    with ActionLibrary(tmp_path / "actions", create=True) as actions:
+        actions.learn(draw_movements(N, labels=["wave", "nod", "bow"] * 4))
+        yield actions
 
 
 class Model:
@@ -32,7 +32,7 @@ class Model:
         self.shows = dict.fromkeys(range(1, N + 1))  # movement -> key
 
     def key(self, name):
-        return next((key for key, known in self.names.items() if known == name), None)
+        return next((key for key, other in self.names.items() if other == name), None)
 
     def apply(self, action, a, b, ids):
         """Change the model as the library should; True if that is possible."""
@@ -90,7 +90,7 @@ def _do(library, action, a, b, ids):
 
 
 def _said(library):
-    return [(one.name, one.members.tolist()) for one in library.symbols()], library.ids().tolist()
+    return [(symbol.name, symbol.members.tolist()) for symbol in library.symbols()], library.ids().tolist()
 
 
 ACTIONS = ["assign", "release", "delete movements", "delete", "rename", "merge", "split"]
@@ -150,7 +150,7 @@ def test_any_text_is_a_name_and_only_a_name(library, name):
     assert library[name].description == name
     assert library[name + name].members.tolist() == [2]
     assert library.movements(name).labels.tolist() == [name] * 4
-    assert [one.name for one in library.symbols() if one.id == library[name].id] == [name]
+    assert [symbol.name for symbol in library.symbols() if symbol.id == library[name].id] == [name]
     assert library.verify() == []
     assert sorted(path.name for path in library.folder.iterdir())[0] == "library.sqlite"
 

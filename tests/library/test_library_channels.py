@@ -47,9 +47,9 @@ def poses(n=6, channels=CHANNELS, seed=0):
 
 @pytest.fixture
 def library(tmp_path):
-    with ActionLibrary(tmp_path / "actions", create=True) as made:
-        made.learn(poses())
-        yield made
+    with ActionLibrary(tmp_path / "actions", create=True) as actions:
+        actions.learn(poses())
+        yield actions
 
 
 def test_what_was_recorded_comes_back_in_any_order(library, tmp_path):
@@ -71,9 +71,9 @@ def test_what_a_gripper_said_comes_back_exactly(tmp_path):
     """Single precision would say 0.0799999982, which no program finds equal to the 0.08 that was recorded."""
     t = np.linspace(0, 1, 20)
     shown = pd.DataFrame({"t": t, "x": t, "y": t**2, "gripper": np.where(t > 0.6, 0.08, -1.1e-3)})
-    with ActionLibrary(tmp_path / "new", create=True) as made:
-        made.learn(Demonstrations.of(shown), ["a"])
-        np.testing.assert_array_equal(made.movements("a")[0].recorded[:, 2], shown["gripper"])
+    with ActionLibrary(tmp_path / "new", create=True) as actions:
+        actions.learn(Demonstrations.of(shown), ["a"])
+        np.testing.assert_array_equal(actions.movements("a")[0].recorded[:, 2], shown["gripper"])
 
 
 def test_movements_that_differ_in_a_gripper_or_in_where_the_tool_points_are_two(library):
@@ -87,18 +87,21 @@ def test_movements_that_differ_in_a_gripper_or_in_where_the_tool_points_are_two(
 
 def test_a_symbol_generates_unit_quaternions_and_the_gripper_under_their_names(library):
     options = MovementOptions(goal=np.array([1.0, 2, 3, 0, 0, 0, 1]), settle=0.01)
-    made = generate(learned_of(library.store, "a"), options)
-    assert made.names.positions == tuple(name for one in CHANNELS for name in one.columns)
-    np.testing.assert_allclose(np.linalg.norm(made.columns["positions"][:, 4:], axis=1), 1)
-    np.testing.assert_allclose(made.columns["positions"][-1, 1:4], [1, 2, 3], atol=0.05)
-    assert abs(made.columns["positions"][-1, 7]) > 0.99
-    steps = np.abs(np.diff(made.columns["positions"][:, 0]))
+    generated = generate(learned_of(library.store, "a"), options)
+    assert generated.names.positions == tuple(name for channel in CHANNELS for name in channel.columns)
+    np.testing.assert_allclose(np.linalg.norm(generated.columns["positions"][:, 4:], axis=1), 1)
+    np.testing.assert_allclose(generated.columns["positions"][-1, 1:4], [1, 2, 3], atol=0.05)
+    assert abs(generated.columns["positions"][-1, 7]) > 0.99
+    steps = np.abs(np.diff(generated.columns["positions"][:, 0]))
     assert sorted(set(steps)) == [0.0, 1.0]
     assert steps.sum() == 1
 
 
 def test_other_channels_are_refused_by_name(library):
-    other = tuple(one if one.kind != "discrete" else one._replace(name="claw", columns=("claw",)) for one in CHANNELS)
+    other = tuple(
+        channel if channel.kind != "discrete" else channel._replace(name="claw", columns=("claw",))
+        for channel in CHANNELS
+    )
     with pytest.raises(TrajectoryError, match=r"as all others of the library .*, got \['claw', 'tool.x'"):
         library.learn(poses(channels=other))
     with pytest.raises(TrajectoryError, match="got plain coordinates"):
@@ -144,7 +147,7 @@ def test_columns_of_another_size_are_refused(library, spoil):
         from kineme.library.storage.rows import seal
 
         table = connection.execute("SELECT * FROM recorded WHERE movement = 1")
-        names = [one[0] for one in table.description]
+        names = [column[0] for column in table.description]
         row = dict(zip(names, table.fetchone(), strict=True))
         (blob,) = [name for name, value in row.items() if isinstance(value, bytes)]
         row[blob] = spoil(row[blob])
@@ -155,7 +158,7 @@ def test_columns_of_another_size_are_refused(library, spoil):
 
 
 def _spoiled(**changes):
-    channels = [one._asdict() for one in CHANNELS]
+    channels = [channel._asdict() for channel in CHANNELS]
     channels[changes.pop("at")] |= changes
     return json.dumps(channels)
 
@@ -177,7 +180,7 @@ def _spoiled(**changes):
 def test_a_channel_of_which_one_thing_is_wrong_is_refused(text, tmp_path):
     with pytest.raises(DataError, match="recorded as"):
         channels_of_text(text, 6, tmp_path)
-    assert channels_of_text(json.dumps([one._asdict() for one in CHANNELS]), 6, tmp_path) == CHANNELS
+    assert channels_of_text(json.dumps([channel._asdict() for channel in CHANNELS]), 6, tmp_path) == CHANNELS
 
 
 @pytest.mark.parametrize("text", ["[]", "x", '[{"name": 1}]', "[" * 100_000])
@@ -194,9 +197,9 @@ def test_channels_that_are_none_are_refused(library, text):
 
 
 def test_recognition_and_prediction_are_those_of_the_recognizer(library):
-    asked = poses(seed=3)
-    expected = kineme.Recognizer().fit(poses()).predict(asked)
-    assert [answer.ranked[0] for answer in library.recognize(asked)] == expected.tolist()
+    questions = poses(seed=3)
+    expected = kineme.Recognizer().fit(poses()).predict(questions)
+    assert [answer.ranked[0] for answer in library.recognize(questions)] == expected.tolist()
 
 
 def test_a_library_says_what_it_was_recorded_as_and_refuses_other_kinds(library):
@@ -208,11 +211,11 @@ def test_a_library_says_what_it_was_recorded_as_and_refuses_other_kinds(library)
 
 
 def test_recorded_columns_without_channels_are_recognized_and_learned_as_those_of_the_library(library):
-    asked = poses(seed=3)
-    raw = [kineme.Trajectory(one.times, one.recorded, one.label) for one in asked]
-    expected = [answer.ranked[0] for answer in library.recognize(asked)]
+    questions = poses(seed=3)
+    raw = [kineme.Trajectory(movement.times, movement.recorded, movement.label) for movement in questions]
+    expected = [answer.ranked[0] for answer in library.recognize(questions)]
     assert [answer.ranked[0] for answer in library.recognize(raw)] == expected
-    assert library.learn(asked).added == 6
+    assert library.learn(questions).added == 6
     assert library.learn(raw).added == 0
     assert library.verify() == []
 
@@ -220,29 +223,29 @@ def test_recorded_columns_without_channels_are_recognized_and_learned_as_those_o
 def nameless(demos):
     """Poses as arrays: positions, and quaternions (w, x, y, z)."""
     blocks = np.split(demos.recorded[:, [1, 2, 3, 7, 4, 5, 6]], demos.offsets[1:-1])
-    return Demonstrations.from_arrays(blocks, demos.labels, [one.times for one in demos])
+    return Demonstrations.from_arrays(blocks, demos.labels, [movement.times for movement in demos])
 
 
 @pytest.mark.parametrize("exhaustive", [0, 100])
 @pytest.mark.parametrize("shown", [nameless, lambda demos: demos], ids=["nameless", "named"])
 def test_generated_poses_are_recognized(library, exhaustive, shown):
-    made = PoseDMP().learn(shown(poses())).rollout(n_samples=100)
-    asked = LibraryRecognizer(library.store, exhaustive=exhaustive)
-    assert [answer.label for answer in asked.recognize(made)] == list("ababab")
+    generated = PoseDMP().learn(shown(poses())).rollout(n_samples=100)
+    recognizer = LibraryRecognizer(library.store, exhaustive=exhaustive)
+    assert [answer.label for answer in recognizer.recognize(generated)] == list("ababab")
 
 
 def test_generated_poses_are_learned_as_poses(tmp_path):
-    made = PoseDMP().learn(nameless(poses())).rollout(n_samples=100)
+    generated = PoseDMP().learn(nameless(poses())).rollout(n_samples=100)
     with ActionLibrary(tmp_path / "actions", create=True) as library:
-        library.learn(made)
+        library.learn(generated)
         assert library.n_dims == 6
-        assert [one.kind for one in library.channels] == ["position"] * 3 + ["orientation"]
-        assert library.learn(made).added == 0
+        assert [channel.kind for channel in library.channels] == ["position"] * 3 + ["orientation"]
+        assert library.learn(generated).added == 0
         assert library.verify() == []
     with ActionLibrary(tmp_path / "plain", create=True) as library:
-        library.learn(made.positions, labels=list(made.labels))
+        library.learn(generated.positions, labels=list(generated.labels))
         assert (library.n_dims, library.channels) == (7, None)
-        assert library.learn(made[:2]).added == 2, "of plain columns more of them"
+        assert library.learn(generated[:2]).added == 2, "of plain columns more of them"
 
 
 def test_angles_of_a_stored_library_wrap_by_what_they_were_recorded_with(tmp_path):
@@ -251,7 +254,10 @@ def test_angles_of_a_stored_library_wrap_by_what_they_were_recorded_with(tmp_pat
     channels = (Channel("joint", "angle", ("joint",)), Channel("x", "position", ("x",)))
     raw = Demonstrations.from_arrays(angles, list("abab"))
     demos = Demonstrations.from_dataframe(
-        [pd.DataFrame({"t": one.times, "joint": one.positions[:, 0], "x": one.positions[:, 1]}) for one in raw]
+        [
+            pd.DataFrame({"t": movement.times, "joint": movement.positions[:, 0], "x": movement.positions[:, 1]})
+            for movement in raw
+        ]
     )
     assert demos.channels == (channels[0]._replace(period=2 * np.pi), channels[1])
     assert np.ptp(demos.positions[:, 0]) > 13, "more than a turn, so that values alone would be degrees"
@@ -273,14 +279,16 @@ def test_columns_of_the_same_names_are_learned_as_the_library_has_them(tmp_path,
         return Demonstrations.of(pd.DataFrame({"t": t, "x": x, "y": t, "gripper": gripper}))
 
     shown = {"in steps": recorded(np.round(t / 2), 0), "continuously": recorded(np.clip(t - 0.5, 0, 1), 1)}
-    assert [one.kind for one in shown["in steps"].channels] != [one.kind for one in shown["continuously"].channels]
-    with ActionLibrary(tmp_path / "grips", create=True) as made:
-        made.learn(shown.pop(first), ["grip"])
-        before = made.channels
-        made.learn(shown.popitem()[1], ["grip"])
-        assert made.channels == before
-        assert len(made) == 2
-        assert {one.label for one in made.recognize(recorded(np.round(t / 2), 0))} == {"grip"}
+    assert [channel.kind for channel in shown["in steps"].channels] != [
+        channel.kind for channel in shown["continuously"].channels
+    ]
+    with ActionLibrary(tmp_path / "grips", create=True) as actions:
+        actions.learn(shown.pop(first), ["grip"])
+        before = actions.channels
+        actions.learn(shown.popitem()[1], ["grip"])
+        assert actions.channels == before
+        assert len(actions) == 2
+        assert {answer.label for answer in actions.recognize(recorded(np.round(t / 2), 0))} == {"grip"}
 
 
 def frames(heads, columns):
@@ -301,14 +309,14 @@ OTHER_UNITS = {
 @pytest.mark.filterwarnings("ignore:units are converted")
 @pytest.mark.parametrize("other", OTHER_UNITS)
 def test_columns_are_learned_and_recognized_by_name_in_the_unit_of_the_library(tmp_path, other):
-    shown, asked = frames(("x [m]", "y [m]", "z [m]"), lambda x: x), frames(*OTHER_UNITS[other])
+    shown, question = frames(("x [m]", "y [m]", "z [m]"), lambda x: x), frames(*OTHER_UNITS[other])
     with ActionLibrary(tmp_path / "actions", create=True) as library:
         library.learn(shown, list("abab"))
         before = library.channels
-        answers = library.recognize(asked)
+        answers = library.recognize(question)
         assert [answer.label for answer in answers] == list("abab")
         np.testing.assert_allclose([answer.transform.scale[0] for answer in answers], 1.0, rtol=1e-3)
-        assert library.learn(asked).ids.tolist() == [1, 2, 3, 4], "they are the same movements"
+        assert library.learn(question).ids.tolist() == [1, 2, 3, 4], "they are the same movements"
         assert library.channels == before
         assert library.verify() == []
 
@@ -380,9 +388,9 @@ def test_columns_are_taken_by_name_from_recordings_with_more_and_a_missing_one_i
         pd.DataFrame({"t": u} | {head: columns[head] for head in chosen}).to_csv(tmp_path / f"{name}.csv", index=False)
     with ActionLibrary(tmp_path / "library", create=True) as actions:
         actions.learn([kineme.read_recording(tmp_path / "a.csv")], ["wave"])
-        asked = kineme.read_recording(tmp_path / "more.csv")
+        recording = kineme.read_recording(tmp_path / "more.csv")
         if lost is None:
-            assert actions.recognize(asked).nearest[0].similarity == pytest.approx(1.0)
+            assert actions.recognize(recording).nearest[0].similarity == pytest.approx(1.0)
         else:
             with pytest.raises(TrajectoryError, match=f"with the columns {lost} too, which were learned, got .*--col"):
-                actions.recognize(asked)
+                actions.recognize(recording)

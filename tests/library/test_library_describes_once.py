@@ -70,11 +70,11 @@ def test_what_is_stored_is_proposed_assigned_and_reviewed_by_its_features(tmp_pa
 
 def test_anchoring_describes_each_movement_once(described):
     arrays, labels = _movements()
-    known = Recognizer().fit(arrays[:24], labels[:24])
+    recognizer = Recognizer().fit(arrays[:24], labels[:24])
     assert described() == 24
-    found = kineme.anchoring.assign(arrays[24:], known)
+    assigned = kineme.anchoring.assign(arrays[24:], recognizer)
     assert described() == 8
-    assert len(found.labels) == 8
+    assert len(assigned.labels) == 8
     kineme.anchoring.propose(arrays)
     assert described() == len(arrays)
     kineme.anchoring.suggest_splits(arrays[:24], labels[:24])

@@ -112,15 +112,15 @@ def test_a_library_in_use_is_not_taken_for_an_export(tmp_path):
 def test_what_a_killed_export_left_is_deleted_by_one_of_another_day(eventful, tmp_path):
     with ActionLibrary(eventful) as library:
         library.export(tmp_path / "one")
-        whole, long_ago = (tmp_path / "one").read_bytes(), time.time() - 2 * 86400
+        exported, long_ago = (tmp_path / "one").read_bytes(), time.time() - 2 * 86400
         old = [".one.0123abcd", ".other.kinemelib.89abcdef", ".one.0123abcd-journal"]
-        kept = [".one.aaaaaaaa", ".mine.0123abcd", ".library.0123abcdef", "one.0123abcd"]
-        for name in old + kept:
-            (tmp_path / name).write_bytes(b"mine" if name == ".mine.0123abcd" else whole)
+        others = [".one.aaaaaaaa", ".mine.0123abcd", ".library.0123abcdef", "one.0123abcd"]
+        for name in old + others:
+            (tmp_path / name).write_bytes(b"mine" if name == ".mine.0123abcd" else exported)
             if name != ".one.aaaaaaaa":  # one that another process writes now
                 os.utime(tmp_path / name, (long_ago, long_ago))
         library.export(tmp_path / "two")
-    assert sorted(path.name for path in tmp_path.iterdir()) == sorted([*kept, "one", "two"])
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted([*others, "one", "two"])
 
 
 def test_nothing_is_overwritten(eventful, tmp_path):

@@ -28,8 +28,8 @@ from kineme.library.storage.connection import FILE
 
 @pytest.fixture
 def folder(tmp_path):
-    with ActionLibrary(tmp_path / "actions", create=True) as made:
-        made.learn(draw_movements(12, labels=["wave", "nod", "bow"] * 4))
+    with ActionLibrary(tmp_path / "actions", create=True) as actions:
+        actions.learn(draw_movements(12, labels=["wave", "nod", "bow"] * 4))
     return tmp_path / "actions"
 
 
@@ -271,24 +271,24 @@ def test_a_header_of_no_known_format_is_damaged(folder):
 
 
 def test_a_truncated_library_is_damaged(folder):
-    whole = (folder / FILE).read_bytes()
-    (folder / FILE).write_bytes(whole[: len(whole) // 2])
+    stored = (folder / FILE).read_bytes()
+    (folder / FILE).write_bytes(stored[: len(stored) // 2])
     with pytest.raises(DataError, match=r"damaged bytes"), ActionLibrary(folder) as library:
         contents(library)
 
 
 def test_two_processes_may_make_a_library_at_the_same_time(tmp_path):
     with ThreadPoolExecutor(4) as pool:
-        made = list(pool.map(lambda _: ActionLibrary(tmp_path / "actions", create=True), range(4)))
-    assert len({library.store.id for library in made}) == 1
-    for library in made:
+        libraries = list(pool.map(lambda _: ActionLibrary(tmp_path / "actions", create=True), range(4)))
+    assert len({library.store.id for library in libraries}) == 1
+    for library in libraries:
         library.close()
 
 
 def test_importing_the_front_door_does_not_open_a_database():
     code = "import sys, kineme; print('sqlite3' in sys.modules); kineme.ActionLibrary; print('sklearn' in sys.modules)"
-    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
-    assert found == ["False", "False"]
+    printed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert printed == ["False", "False"]
 
 
 def _flip(path, at, mask=0xFF):
@@ -338,7 +338,7 @@ def test_flipped_bytes_are_named_and_never_read_as_numbers(folder, query, named,
 def test_flipped_text_is_noticed_too(folder, query, table, read):
     _flip(folder / FILE, _stored_bytes(folder, query) - 4, 0x01)
     with ActionLibrary(folder, read_only=True) as library:
-        assert any(re.match(rf"row \d+ of table {table}: damaged bytes", str(one)) for one in library.verify())
+        assert any(re.match(rf"row \d+ of table {table}: damaged bytes", str(problem)) for problem in library.verify())
         with pytest.raises(DataError, match=rf"row \d+ of table {table} as stored, got damaged bytes"):
             read(library)
 
@@ -347,10 +347,10 @@ def test_wherever_a_byte_is_flipped_what_is_read_is_right_or_refused(folder):
     with ActionLibrary(folder) as library:
         library.annotate("wave", "with the hand")
         expected = contents(library)
-    whole = (folder / FILE).read_bytes()
+    stored = (folder / FILE).read_bytes()
     rng = np.random.default_rng(0)
     refused = harmless = 0
-    for at in rng.choice(np.flatnonzero(np.frombuffer(whole, np.uint8)), 150, replace=False).tolist():
+    for at in rng.choice(np.flatnonzero(np.frombuffer(stored, np.uint8)), 150, replace=False).tolist():
         _flip(folder / FILE, at, int(rng.integers(1, 256)))
         try:
             with ActionLibrary(folder, read_only=True) as library:
@@ -363,7 +363,7 @@ def test_wherever_a_byte_is_flipped_what_is_read_is_right_or_refused(folder):
                     refused += 1
         except DataError:
             refused += 1
-        (folder / FILE).write_bytes(whole)
+        (folder / FILE).write_bytes(stored)
     assert refused > 100
     assert harmless + refused == 150
 
@@ -394,8 +394,8 @@ def test_verify_names_what_is_missing_or_refers_to_nothing(folder):
         other.execute("DELETE FROM symbol WHERE key = 3")
         other.execute("UPDATE raw SET positions = zeroblob(12) WHERE movement = 5")
     with ActionLibrary(folder) as library:
-        found = {str(problem) for problem in library.verify()}
-    assert found == {
+        problems = {str(problem) for problem in library.verify()}
+    assert problems == {
         "the features of movement 2: not there",
         "the samples of movement 5: damaged bytes",
         "the samples of movement 5: of the wrong size",

@@ -99,13 +99,13 @@ def test_definitions_that_are_not_ours_are_neither_imported_nor_opened(export, t
 
 def test_a_library_of_the_first_release_opens_imports_and_is_whole(tmp_path):
     """Its definitions are what every later version must still write, word for word."""
-    kept = Path(__file__).with_name("library_0.1.0.xz")
-    (tmp_path / "export").write_bytes(lzma.decompress(kept.read_bytes()))
+    released = Path(__file__).with_name("library_0.1.0.xz")
+    (tmp_path / "export").write_bytes(lzma.decompress(released.read_bytes()))
     planted = _opened(tmp_path / "export", tmp_path)
     with ActionLibrary(planted) as library, ActionLibrary.import_(tmp_path / "export", tmp_path / "copy") as copy:
         assert library.verify() == copy.verify() == []
         assert contents(library) == contents(copy)
-        assert [one.name for one in library.symbols()] == ["head", "naïve 'wave'; --", "tilt"]
+        assert [symbol.name for symbol in library.symbols()] == ["head", "naïve 'wave'; --", "tilt"]
         assert library["tilt"].threshold == 0.25
         copy.rename("tilt", "lean")
         assert copy.verify() == []
@@ -113,8 +113,8 @@ def test_a_library_of_the_first_release_opens_imports_and_is_whole(tmp_path):
 
 def test_a_library_of_the_first_release_is_read_as_it_is(tmp_path):
     """Whoever only reads it changes no byte, and is told of no people; whoever writes adds the table of people."""
-    kept = Path(__file__).with_name("library_0.1.0.xz")
-    (tmp_path / "export").write_bytes(lzma.decompress(kept.read_bytes()))
+    released = Path(__file__).with_name("library_0.1.0.xz")
+    (tmp_path / "export").write_bytes(lzma.decompress(released.read_bytes()))
     planted = _opened(tmp_path / "export", tmp_path)
     before = (planted / FILE).read_bytes()
     with ActionLibrary(planted, read_only=True) as library:
@@ -141,13 +141,13 @@ def test_what_is_no_file_is_not_imported(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "loop").symlink_to(tmp_path / "loop")
     (tmp_path / "zero").symlink_to("/dev/zero")
-    for name, found in {
+    for name, got in {
         "folder": "something else",
         "pipe": "something else",
         "loop": "no file",
         "zero": "something",
     }.items():
-        _is_refused(tmp_path / name, tmp_path, rf"expected an exported library at .*{name}, found {found}")
+        _is_refused(tmp_path / name, tmp_path, rf"expected an exported library at .*{name}, found {got}")
 
 
 def test_a_link_to_an_export_is_copied_never_moved_or_linked(export, victim, tmp_path):
@@ -187,11 +187,11 @@ def test_a_file_of_holes_does_not_fill_the_disk(export, tmp_path, monkeypatch):
 
 
 def test_texts_in_another_encoding_are_refused(export, tmp_path):
-    with closing(sqlite3.connect(export)) as one, closing(sqlite3.connect(tmp_path / "wide")) as other:
+    with closing(sqlite3.connect(export)) as narrow, closing(sqlite3.connect(tmp_path / "wide")) as other:
         other.execute("PRAGMA encoding = 'UTF-16'")
-        for statement in one.iterdump():
+        for statement in narrow.iterdump():
             other.execute(statement)
-        other.execute(f"PRAGMA application_id = {one.execute('PRAGMA application_id').fetchone()[0]}")
+        other.execute(f"PRAGMA application_id = {narrow.execute('PRAGMA application_id').fetchone()[0]}")
         other.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
         other.commit()
     _is_refused(tmp_path / "wide", tmp_path, r"libraries? and nothing else, got texts in UTF-16|got texts in UTF-16le")
@@ -214,7 +214,7 @@ def test_a_library_that_was_never_imported_is_not_read_without_end(export, tmp_p
         for read in ENDLESS[table]:
             with pytest.raises(DataError, match=rf"{FILE} to be read within a time that its size|{FILE} once, got dam"):
                 read(library)
-        assert {one.name for one in library.folder.iterdir()} <= {FILE, f"{FILE}-wal", f"{FILE}-shm"}
+        assert {path.name for path in library.folder.iterdir()} <= {FILE, f"{FILE}-wal", f"{FILE}-shm"}
     assert time.monotonic() - start < 3000
 
 
@@ -225,7 +225,7 @@ def test_pages_that_lead_to_each_other_do_not_hang(export, tmp_path, monkeypatch
     _is_refused(export, tmp_path, r"damaged bytes")
     monkeypatch.setattr(safety, "_SECONDS", 0.2)
     with ActionLibrary(_opened(export, tmp_path), read_only=True) as library:
-        assert any("interrupted" in str(one) for one in library.verify())
+        assert any("interrupted" in str(problem) for problem in library.verify())
     assert time.monotonic() - start < 300
 
 

@@ -22,8 +22,8 @@ SINGLE = 2.0**-24  # relative error of a rounding to single precision
 
 @pytest.fixture
 def library(tmp_path):
-    with ActionLibrary(tmp_path / "actions", create=True) as made:
-        yield made
+    with ActionLibrary(tmp_path / "actions", create=True) as actions:
+        yield actions
 
 
 @given(seed=st.integers(0, 10**6), d=st.integers(1, 6), ragged=st.booleans())
@@ -32,15 +32,15 @@ def test_recordings_come_back_in_single_precision_from_their_start(tmp_path_fact
     with ActionLibrary(tmp_path_factory.mktemp("actions"), create=True) as library:
         ids = library.learn(demos).ids[[3, 1, 1, 6]]
         back = library.movements(ids=ids)
-    for shown, one in zip(back, [demos[i] for i in (3, 1, 1, 6)], strict=True):
-        np.testing.assert_array_equal(shown.positions[0], one.positions[0])
-        from_start = one.positions - one.positions[0]
-        error = shown.positions - one.positions
-        assert (np.abs(error) <= SINGLE * np.abs(from_start) + 2 * np.spacing(np.abs(one.positions))).all()
-        assert shown.times[0] == one.times[0]
-        slack = SINGLE * one.duration + 2 * np.spacing(np.abs(one.times[-1]))
-        np.testing.assert_allclose(shown.times, one.times, rtol=0, atol=slack)
-        assert shown.name == one.name
+    for shown, movement in zip(back, [demos[i] for i in (3, 1, 1, 6)], strict=True):
+        np.testing.assert_array_equal(shown.positions[0], movement.positions[0])
+        from_start = movement.positions - movement.positions[0]
+        error = shown.positions - movement.positions
+        assert (np.abs(error) <= SINGLE * np.abs(from_start) + 2 * np.spacing(np.abs(movement.positions))).all()
+        assert shown.times[0] == movement.times[0]
+        slack = SINGLE * movement.duration + 2 * np.spacing(np.abs(movement.times[-1]))
+        np.testing.assert_allclose(shown.times, movement.times, rtol=0, atol=slack)
+        assert shown.name == movement.name
 
 
 def test_even_times_are_computed_from_the_duration(library):
@@ -83,7 +83,7 @@ def test_primitives_are_what_the_dmp_learns_and_replay_the_movement(library):
 
 def test_a_short_movement_does_not_change_how_others_are_seen(library):
     """Four samples cannot be smoothed; the rest of the batch still is."""
-    noisy = [one.positions + np.random.default_rng(0).normal(0, 0.05, (40, 2)) for one in draw_movements(3)]
+    noisy = [movement.positions + np.random.default_rng(0).normal(0, 0.05, (40, 2)) for movement in draw_movements(3)]
     short = np.array([[0.0, 0], [1, 0], [1, 1], [0, 2]])
     library.learn([*noisy, short])
     how = library.specification
@@ -108,10 +108,10 @@ def test_the_same_movement_twice_in_one_call_is_one_movement(library):
 
 
 def test_place_and_time_tell_movements_apart_but_not_their_origin_in_time(library):
-    one = draw_movements(1, ragged=True)[0]
-    shifted = Trajectory(one.times, one.positions + 1.0)
-    slower = Trajectory(2 * one.times, one.positions)
-    report = library.learn([one, shifted, slower])
+    movement = draw_movements(1, ragged=True)[0]
+    shifted = Trajectory(movement.times, movement.positions + 1.0)
+    slower = Trajectory(2 * movement.times, movement.positions)
+    report = library.learn([movement, shifted, slower])
     assert report.added == 3
     x = draw_movements(1)[0].positions
     early, late = (Demonstrations.from_arrays([x], times=[t0 + np.arange(40) / 32]) for t0 in (0.0, 64.0))
@@ -127,7 +127,7 @@ def test_a_movement_is_known_by_its_place_in_a_file_read_in_the_same_way(library
     places = ["0", "1", "2", "3"]
     library.learn(demos, source=source, places=places)
     moved = Source.of_file(path.rename(tmp_path / "other.csv"), options={"unit": "m"})
-    rounded = [one.positions.astype(np.float32) for one in demos]
+    rounded = [movement.positions.astype(np.float32) for movement in demos]
     assert library.learn(rounded, source=moved, places=places).duplicates == 4
     other = Source.of_file(moved.path, options={"unit": "mm"})
     assert library.learn(rounded, source=other, places=places).added == 4
@@ -174,16 +174,16 @@ def test_movements_without_a_label_wait_for_one(library):
 
 def test_batches_make_no_difference(tmp_path, monkeypatch):
     demos = draw_movements(30, ragged=True, labels=["a", "b", "c"] * 10)
-    with ActionLibrary(tmp_path / "one", create=True) as one, ActionLibrary(tmp_path / "many", create=True) as many:
-        one.learn(demos)
+    with ActionLibrary(tmp_path / "one", create=True) as small, ActionLibrary(tmp_path / "many", create=True) as many:
+        small.learn(demos)
         monkeypatch.setattr(learning, "_BATCH_MOVEMENTS", 7)
         seen = []
         report = many.learn(demos, progress=lambda done, total: seen.append((done, total)))
         assert seen == [(7, 30), (14, 30), (21, 30), (28, 30), (30, 30)]
-        assert (report.version, many.version, one.version) == (5, 5, 1)
-        np.testing.assert_array_equal(many.movements().positions, one.movements().positions)
-        np.testing.assert_allclose(many.features(), one.features(), atol=1e-6)
-        assert [s.members.tolist() for s in many.symbols()] == [s.members.tolist() for s in one.symbols()]
+        assert (report.version, many.version, small.version) == (5, 5, 1)
+        np.testing.assert_array_equal(many.movements().positions, small.movements().positions)
+        np.testing.assert_allclose(many.features(), small.features(), atol=1e-6)
+        assert [s.members.tolist() for s in many.symbols()] == [s.members.tolist() for s in small.symbols()]
 
 
 def test_learning_that_was_interrupted_goes_on_where_it_ended(library, monkeypatch):
@@ -343,4 +343,4 @@ def test_a_library_is_not_iterated_over(library):
     with pytest.raises(TypeError, match="not iterable"):
         list(library)
     assert "a" in library
-    assert [one.name for one in library.symbols()] == ["a", "b"]
+    assert [symbol.name for symbol in library.symbols()] == ["a", "b"]

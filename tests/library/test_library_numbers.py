@@ -13,7 +13,7 @@ from kineme import ActionLibrary, Demonstrations
 def copies(n):
     """Two movements, n copies of each that differ a little."""
     rng = np.random.default_rng(4)
-    bases = [one.positions for one in draw_movements(2, seed=3)]
+    bases = [movement.positions for movement in draw_movements(2, seed=3)]
     return [base + 0.01 * np.ptp(base) * rng.normal(size=(1, 2)) * np.linspace(0, 1, 40)[:, None] ** k
             for base in bases for k in range(1, n + 1)]  # fmt: skip
 
@@ -26,7 +26,7 @@ def test_a_proposal_is_one_that_was_rejected_if_four_fifths_of_its_movements_wer
         library.reject(Bunch(members=ids[:n_rejected]))
         left = library.propose()
         assert sorted(map(len, left)) == ([10, 10] if again else [10])
-        assert np.isin(ids[10:], np.concatenate([one.members for one in left])).all()
+        assert np.isin(ids[10:], np.concatenate([symbol.members for symbol in left])).all()
 
 
 def test_two_rejections_are_not_taken_together(tmp_path):

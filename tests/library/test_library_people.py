@@ -54,11 +54,11 @@ def test_a_library_is_the_recognizer_fitted_with_the_same_groups(tmp_path_factor
     paths, labels, groups = _shown(copies=copies, seed=seed, d=d)
     order = np.random.default_rng(seed).permutation(len(paths))
     paths, labels, groups = paths[order], labels[order], groups[order]
-    told = [None if nameless and one == "ben" else one for one in groups]
-    asked = _shown(people=["dora"], seed=seed, d=d)[0]
-    with _library(tmp_path_factory.mktemp("people"), paths, labels, told) as library:
-        ours = library.recognize(list(asked), error_rate=0.1)
-    theirs = Recognizer().fit(paths, labels, groups=groups).recognize(list(asked), error_rate=0.1)
+    people = [None if nameless and person == "ben" else person for person in groups]
+    questions = _shown(people=["dora"], seed=seed, d=d)[0]
+    with _library(tmp_path_factory.mktemp("people"), paths, labels, people) as library:
+        ours = library.recognize(list(questions), error_rate=0.1)
+    theirs = Recognizer().fit(paths, labels, groups=groups).recognize(list(questions), error_rate=0.1)
     for a, b in zip(ours, theirs, strict=True):
         assert (a.label, a.rule) == (b.label, b.rule)
         assert a.p_known == pytest.approx(b.p_known, abs=1e-3)
@@ -87,13 +87,13 @@ def test_large_classes_compare_no_one_with_oneself(tmp_path, alike):
     """Also where only some of a class calibrate it, and the others are compared by their bounds."""
     paths, labels, groups = _shown(n_kinds=2, people=[f"p{k}" for k in range(12 if alike else 2)], copies=18 * 12)
     many = np.arange(len(paths)) % (18 * 12)
-    kept = many < 18 if alike else (groups == "p0") | (many < 3)
-    paths, labels, groups = paths[kept], labels[kept], groups[kept]
+    stays = many < 18 if alike else (groups == "p0") | (many < 3)
+    paths, labels, groups = paths[stays], labels[stays], groups[stays]
     with _library(tmp_path / "actions", paths, labels, groups) as library:
         ours = LibraryRecognizer(library.store, exhaustive=0).model().calibration
     theirs = Recognizer().fit(paths, labels, groups=groups).calibration()
     np.testing.assert_allclose(ours.scales, theirs.scales, rtol=0.1)
-    np.testing.assert_allclose(*(np.quantile(one.own[0], 0.5) for one in (ours, theirs)), rtol=0.1)
+    np.testing.assert_allclose(*(np.quantile(calibration.own[0], 0.5) for calibration in (ours, theirs)), rtol=0.1)
 
 
 def test_classes_of_one_person_each_are_told_apart_by_how_far_they_are(tmp_path):
@@ -157,7 +157,7 @@ def test_a_damaged_person_is_found(tmp_path):
     with closing(sqlite3.connect(tmp_path / "actions" / FILE)) as connection, connection:
         connection.execute("UPDATE shown_by SET person = 'dora' WHERE movement = 2")
     with ActionLibrary(tmp_path / "actions", read_only=True) as library:
-        assert [str(one) for one in library.verify()] == ["row 2 of table shown_by: damaged bytes"]
+        assert [str(problem) for problem in library.verify()] == ["row 2 of table shown_by: damaged bytes"]
 
 
 def test_fewer_movements_of_new_people_are_unknown_where_people_are_told_apart(tmp_path, development_data):
@@ -169,15 +169,15 @@ def test_fewer_movements_of_new_people_are_unknown_where_people_are_told_apart(t
     unknown = {True: [], False: []}
     for k, person in enumerate(np.unique(people)):
         rng = np.random.default_rng(k)
-        asked = digits[people[digits] == person]
+        questions = digits[people[digits] == person]
         pool = rng.permutation(digits[people[digits] != person])
         shown = np.concatenate([pool[labels[pool] == label][:8] for label in np.unique(labels[digits])])
-        for told in (True, False):
-            groups = people[shown] if told else None
+        for says_who in (True, False):
+            groups = people[shown] if says_who else None
             demos = read.demonstrations
-            with _library(tmp_path / f"{person} {told}", demos[shown], labels[shown], groups) as library:
-                answers = library.recognize(demos[asked])
-            unknown[told].append(np.mean([one.label is None for one in answers]))
+            with _library(tmp_path / f"{person} {says_who}", demos[shown], labels[shown], groups) as library:
+                answers = library.recognize(demos[questions])
+            unknown[says_who].append(np.mean([answer.label is None for answer in answers]))
     assert np.mean(unknown[True]) < 0.08
     assert np.mean(unknown[False]) > 0.1
 
@@ -185,24 +185,24 @@ def test_fewer_movements_of_new_people_are_unknown_where_people_are_told_apart(t
 def test_what_symbols_are_proposed_by_knows_the_people_too(tmp_path):
     paths, labels, groups = _shown()
     with _library(tmp_path, paths, labels, groups) as library:
-        known = known_symbols(library.store)
+        symbols = known_symbols(library.store)
     recognizer = Recognizer().fit(paths, labels, groups=groups)
     logs = np.log(np.linspace(0.01, 0.99, 40).reshape(10, 4))
     expected = recognizer.calibration().known_p_values(logs, 0.05)
-    np.testing.assert_allclose(known.calibration.known_p_values(logs, 0.05), expected, rtol=1e-3)
+    np.testing.assert_allclose(symbols.calibration.known_p_values(logs, 0.05), expected, rtol=1e-3)
     plain = Recognizer().fit(paths, labels).calibration().known_p_values(logs, 0.05)
     assert np.abs(plain - expected).max() > 0.1
 
 
 def test_proposals_are_clustered_with_the_people_who_were_named(tmp_path, monkeypatch):
     paths, _, groups = _shown()
-    told = []
+    calls = []
 
     def propose(*given, groups=None, **options):
-        told.append(groups)
+        calls.append(groups)
         return propose_clusters(*given, groups=groups, **options)
 
     monkeypatch.setattr(proposals, "propose_clusters", propose)
     with _library(tmp_path, paths, None, groups) as library:
         library.propose()
-    np.testing.assert_array_equal(told, [np.unique(groups, return_inverse=True)[1]])
+    np.testing.assert_array_equal(calls, [np.unique(groups, return_inverse=True)[1]])

@@ -64,14 +64,16 @@ def make(tmp_path):
 @pytest.mark.parametrize("counts", [[1] * 6, [10] * 4, [1, 2, 5, 9]])
 @pytest.mark.parametrize("d", [1, 2, 3])
 def test_a_small_library_answers_as_the_recognizer_of_its_movements(make, counts, d):
-    demos, asked = _kinds(counts, d), _questions(counts, d)
+    demos, questions = _kinds(counts, d), _questions(counts, d)
     recognizer = Recognizer(representations=make().specification.representations).fit(demos)
     order = np.argsort(demos.labels, kind="stable")
-    for ours, theirs in zip(make(demos).recognize(asked), recognizer.recognize(asked), strict=True):
+    for ours, theirs in zip(make(demos).recognize(questions), recognizer.recognize(questions), strict=True):
         assert ours.label == theirs.label
         assert ours.p_values == pytest.approx(theirs.p_values, abs=1e-4)
-        assert [one.index - 1 for one in ours.nearest] == [order[one.index] for one in theirs.nearest]
-        assert [one.name for one in ours.nearest] == [one.name for one in theirs.nearest]
+        assert [neighbor.index - 1 for neighbor in ours.nearest] == [
+            order[neighbor.index] for neighbor in theirs.nearest
+        ]
+        assert [neighbor.name for neighbor in ours.nearest] == [neighbor.name for neighbor in theirs.nearest]
         np.testing.assert_allclose(ours.transform.matrix, theirs.transform.matrix, atol=1e-4)
 
 
@@ -79,12 +81,12 @@ def test_a_small_library_answers_as_the_recognizer_of_its_movements(make, counts
 @pytest.mark.parametrize("count", [1, 2, 4, 12])
 def test_a_large_library_answers_as_the_nearest_of_all(make, count, d):
     """Classes of one size calibrate the same, whether sampled or not."""
-    demos, asked = _kinds([count] * 6, d, seed=count), _questions([count] * 6, d, seed=count)
+    demos, questions = _kinds([count] * 6, d, seed=count), _questions([count] * 6, d, seed=count)
     library = make(demos)
     ours = LibraryRecognizer(library.store, exhaustive=0)
     theirs = library.specification.recognizer().set_params(classifier="nearest").fit(demos)
     order = np.argsort(demos.labels, kind="stable")
-    for a, b in zip(ours.recognize(asked), theirs.recognize(asked), strict=True):
+    for a, b in zip(ours.recognize(questions), theirs.recognize(questions), strict=True):
         assert a.label == b.label
         assert a.ranked == b.ranked
         assert a.p_values == pytest.approx(b.p_values, abs=1e-4)
@@ -95,22 +97,22 @@ def test_a_large_library_answers_as_the_nearest_of_all(make, count, d):
 
 @pytest.mark.parametrize("weights", [(0, 1, 1, 1, 1), (0, 0, 0, 0, 1)], ids=["no positions", "point cloud alone"])
 def test_a_large_library_without_weight_on_positions_answers_as_the_nearest_of_all(make, weights):
-    demos, asked = _kinds([4] * 6), _questions([4] * 6)
+    demos, questions = _kinds([4] * 6), _questions([4] * 6)
     library = make(demos, recognizer=Recognizer(weights=weights, classifier="nearest"))
-    found = LibraryRecognizer(library.store, exhaustive=0).recognize(asked)
-    expected = Recognizer(weights=weights).fit(demos).predict(asked)
-    assert [one.ranked[0] for one in found] == expected.tolist()
+    answers = LibraryRecognizer(library.store, exhaustive=0).recognize(questions)
+    expected = Recognizer(weights=weights).fit(demos).predict(questions)
+    assert [answer.ranked[0] for answer in answers] == expected.tolist()
 
 
 def test_large_classes_keep_the_error_rate(make):
     """New members of classes larger than what is sampled of them are unknown about as often as was asked for."""
     kinds = _kinds([200] * 4, seed=7, spread=0.1)
     rng = np.random.default_rng(0)
-    known = rng.permutation(len(kinds))
+    order = rng.permutation(len(kinds))
     library = make()
-    library.learn(kinds[known[:640]], groups=range(640))  # each as if by somebody else
-    answers = LibraryRecognizer(library.store, exhaustive=0).recognize(kinds[known[640:]], error_rate=0.1)
-    labels = kinds.labels[known[640:]]
+    library.learn(kinds[order[:640]], groups=range(640))  # each as if by somebody else
+    answers = LibraryRecognizer(library.store, exhaustive=0).recognize(kinds[order[640:]], error_rate=0.1)
+    labels = kinds.labels[order[640:]]
     assert np.mean([a.label in {None, name} for a, name in zip(answers, labels, strict=True)]) == 1
     assert 0.03 < np.mean([a.label is None for a in answers]) < 0.2
 
@@ -121,17 +123,17 @@ def test_calibration_finds_the_nearest_of_a_large_class(make, d):
     library = make(_kinds([400, 5], d, seed=7, spread=0.1))
     model = LibraryRecognizer(library.store, exhaustive=0).model()
     stored, similarity = model.stored, model.comparison.similarity
-    members, asked = stored.members, sampled_calibration._positions(stored, 0)[::4]
+    members, questions = stored.members, sampled_calibration._positions(stored, 0)[::4]
     alone = np.arange(len(members))
-    others = sampled_calibration._proposed(similarity, stored, alone, 0, asked)
-    own = stored.described(similarity, members[asked])
-    found = sampled_calibration._to_own(similarity, own, stored.described(similarity, members[others.ravel()]))
-    every = np.setdiff1d(sampled_calibration._positions(stored, 0), asked)
+    others = sampled_calibration._proposed(similarity, stored, alone, 0, questions)
+    own = stored.described(similarity, members[questions])
+    to_own = sampled_calibration._to_own(similarity, own, stored.described(similarity, members[others.ravel()]))
+    every = np.setdiff1d(sampled_calibration._positions(stored, 0), questions)
     away = distances(similarity.log_average(own, stored.described(similarity, members[every])))
-    found, nearest = found.min(axis=1), away.min(axis=1)
-    assert (found >= nearest - 1e-4).all()
-    assert found.mean() < 1.012 * nearest.mean()
-    assert np.mean(found < nearest + 1e-4) > 0.85
+    to_own, nearest = to_own.min(axis=1), away.min(axis=1)
+    assert (to_own >= nearest - 1e-4).all()
+    assert to_own.mean() < 1.012 * nearest.mean()
+    assert np.mean(to_own < nearest + 1e-4) > 0.85
 
 
 def test_calibration_holds_few_bounds_at_once(make, monkeypatch):
@@ -139,9 +141,9 @@ def test_calibration_holds_few_bounds_at_once(make, monkeypatch):
     library, together = make(_kinds([60] * 4)), []
     bounds = StoredReferences.bounds
 
-    def noted(self, similarity, asked):
-        together.append(len(asked[0].values))
-        return bounds(self, similarity, asked)
+    def noted(self, similarity, questions):
+        together.append(len(questions[0].values))
+        return bounds(self, similarity, questions)
 
     monkeypatch.setattr(StoredReferences, "bounds", noted)
     few = LibraryRecognizer(library.store, exhaustive=0).model().calibration
@@ -170,40 +172,40 @@ DAMAGES = {"flipped": _flip, "truncated": _cut, "gone": lambda path, where: path
 @pytest.fixture(scope="module")
 def served(tmp_path_factory):
     """A library that has answered, what it was asked, its answers, and the caches that it made for them."""
-    asked = _questions([3] * 5)
+    questions = _questions([3] * 5)
     with ActionLibrary(tmp_path_factory.mktemp("actions"), create=True) as library:
         library.learn(_kinds([3] * 5))
-        before = _plain(LibraryRecognizer(library.store, exhaustive=0).recognize(asked))
+        before = _plain(LibraryRecognizer(library.store, exhaustive=0).recognize(questions))
         caches = {name: (library.folder / name).read_bytes() for name in (features_cache.FILE, calibration_cache.FILE)}
-    return library.folder, asked, before, caches
+    return library.folder, questions, before, caches
 
 
 @pytest.mark.parametrize("name", [features_cache.FILE, calibration_cache.FILE])
 @pytest.mark.parametrize("damage", DAMAGES)
 @given(where=st.floats(0, 0.999))
 def test_a_damaged_cache_is_made_again(served, name, damage, where):
-    folder, asked, before, caches = served
-    for each, whole in caches.items():
-        (folder / each).write_bytes(whole)
+    folder, questions, before, caches = served
+    for each, data in caches.items():
+        (folder / each).write_bytes(data)
     with ActionLibrary(folder) as library:
-        whole = caches[name]
+        data = caches[name]
         DAMAGES[damage](folder / name, where)
-        _same(_plain(LibraryRecognizer(library.store, exhaustive=0).recognize(asked)), before)
+        _same(_plain(LibraryRecognizer(library.store, exhaustive=0).recognize(questions)), before)
         again = (folder / name).read_bytes()
-        assert len(again) == len(whole)
-        assert again == whole or name == calibration_cache.FILE  # whose archive holds the time of day
+        assert len(again) == len(data)
+        assert again == data or name == calibration_cache.FILE  # whose archive holds the time of day
         assert not list(folder.glob(".*cache*"))
 
 
 def test_the_caches_of_another_library_are_not_believed(make):
     counts = [3] * 5
-    one, other = make(_kinds(counts, seed=1), "one"), make(_kinds(counts, seed=2), "other")
-    asked = _questions(counts, seed=2)
-    before = _plain(LibraryRecognizer(other.store, exhaustive=0).recognize(asked))
-    LibraryRecognizer(one.store, exhaustive=0).recognize(asked)
+    library, other = make(_kinds(counts, seed=1), "one"), make(_kinds(counts, seed=2), "other")
+    questions = _questions(counts, seed=2)
+    before = _plain(LibraryRecognizer(other.store, exhaustive=0).recognize(questions))
+    LibraryRecognizer(library.store, exhaustive=0).recognize(questions)
     for name in (features_cache.FILE, calibration_cache.FILE):
-        (other.folder / name).write_bytes((one.folder / name).read_bytes())
-    _same(_plain(LibraryRecognizer(other.store, exhaustive=0).recognize(asked)), before)
+        (other.folder / name).write_bytes((library.folder / name).read_bytes())
+    _same(_plain(LibraryRecognizer(other.store, exhaustive=0).recognize(questions)), before)
 
 
 def test_the_codes_of_a_history_that_was_rolled_back_are_not_believed(make, tmp_path):
@@ -212,18 +214,18 @@ def test_the_codes_of_a_history_that_was_rolled_back_are_not_believed(make, tmp_
     library = make(_kinds(counts, seed=1)[:8])
     library.export(tmp_path / "backup")
     library.learn(_kinds(counts, seed=1)[8:])
-    asked = _questions(counts, seed=1)
-    LibraryRecognizer(library.store, exhaustive=0).recognize(asked)
+    questions = _questions(counts, seed=1)
+    LibraryRecognizer(library.store, exhaustive=0).recognize(questions)
     again = ActionLibrary.import_(tmp_path / "backup", tmp_path / "again")
     with again:
         again.learn(_kinds(counts, seed=5)[8:])
-        before = _plain(LibraryRecognizer(again.store, exhaustive=0).recognize(asked))
+        before = _plain(LibraryRecognizer(again.store, exhaustive=0).recognize(questions))
         (again.folder / features_cache.FILE).write_bytes((library.folder / features_cache.FILE).read_bytes())
-        _same(_plain(LibraryRecognizer(again.store, exhaustive=0).recognize(asked)), before)
+        _same(_plain(LibraryRecognizer(again.store, exhaustive=0).recognize(questions)), before)
 
 
 def test_answers_follow_every_change(make):
-    demos, asked = _kinds([4] * 6), _questions([4] * 6)
+    demos, questions = _kinds([4] * 6), _questions([4] * 6)
     library = make(demos[:8])
     recognizing, fresh = LibraryRecognizer(library.store, exhaustive=0), []
     for change in (
@@ -235,24 +237,24 @@ def test_answers_follow_every_change(make):
         lambda: library.delete(library["wave"].members[:2]),
         lambda: library.delete("kind 04"),
     ):
-        recognizing.recognize(asked)
+        recognizing.recognize(questions)
         change()
         fresh = LibraryRecognizer(library.store, exhaustive=0)
-        _same(_plain(recognizing.recognize(asked)), _plain(fresh.recognize(asked)))
-    names = {name for answer in fresh.recognize(asked) for name in answer.p_values}
+        _same(_plain(recognizing.recognize(questions)), _plain(fresh.recognize(questions)))
+    names = {name for answer in fresh.recognize(questions) for name in answer.p_values}
     assert names == {"kind 00", "wave", "both", "kind 05"}
 
 
 def test_an_earlier_version_answers_as_it_did(make):
-    demos, asked = _kinds([4] * 6), _questions([4] * 6)
+    demos, questions = _kinds([4] * 6), _questions([4] * 6)
     library = make(demos[:12])
-    before, version = _plain(LibraryRecognizer(library.store, exhaustive=0).recognize(asked)), library.version
+    before, version = _plain(LibraryRecognizer(library.store, exhaustive=0).recognize(questions)), library.version
     library.learn(demos[12:])
     library.rename(demos.labels[0], "wave")
-    LibraryRecognizer(library.store, exhaustive=0).recognize(asked)
+    LibraryRecognizer(library.store, exhaustive=0).recognize(questions)
     with library.at(version) as past:
-        _same(_plain(LibraryRecognizer(past.store, exhaustive=0).recognize(asked)), before)
-        _same(_plain(past.recognize(asked)), _plain(past.recognize(asked)))
+        _same(_plain(LibraryRecognizer(past.store, exhaustive=0).recognize(questions)), before)
+        _same(_plain(past.recognize(questions)), _plain(past.recognize(questions)))
 
 
 def test_reading_only_leaves_nothing_behind(make):
@@ -268,9 +270,9 @@ def test_one_movement_gets_one_answer_and_unlabeled_ones_give_none(make):
     library = make(demos)
     nameless = library.learn(_questions([3] * 4), labels=[None] * 4).ids
     for recognizing in (library, LibraryRecognizer(library.store, exhaustive=0)):
-        for one in _questions([3] * 4):
-            answer = recognizing.recognize(one)
-            assert answer.ranked[0] == one.label
+        for question in _questions([3] * 4):
+            answer = recognizing.recognize(question)
+            assert answer.ranked[0] == question.label
             assert not {near.index for near in answer.nearest} & set(nameless.tolist())
 
 

@@ -29,10 +29,10 @@ def folder(tmp_path):
 
 def test_review_names_what_is_one_and_what_is_two(folder):
     with kineme.ActionLibrary(folder) as library:
-        found = library.review()
-        assert [(one.first, one.second) for one in found.merges] == [("also round", "round")]
-        assert [one.symbol for one in found.splits] == ["mixed"]
-        parts = sorted(sorted(part.tolist()) for part in found.splits[0].parts)
+        review = library.review()
+        assert [(pair.first, pair.second) for pair in review.merges] == [("also round", "round")]
+        assert [split.symbol for split in review.splits] == ["mixed"]
+        parts = sorted(sorted(part.tolist()) for part in review.splits[0].parts)
         assert parts == [list(range(15, 22)), list(range(22, 29))]
         library.merge(["also round", "round"], "round")
         library.split("mixed", parts[1], "sine")
@@ -48,8 +48,8 @@ def test_the_shell_reviews_and_splits(folder):
     assert "also round and round could be one" in text
     assert "mixed could be two: 7 movements, and " in text
     part = json.loads(run("review", "--json"))["splits"][0]["parts"][1]
-    made = json.loads(run("split", "mixed", "--into", "other", "--json", *(f"--movement={i}" for i in part)))
-    assert (made["name"], made["movements"]) == ("other", 7)
+    result = json.loads(run("split", "mixed", "--into", "other", "--json", *(f"--movement={i}" for i in part)))
+    assert (result["name"], result["movements"]) == ("other", 7)
     run("merge", "also round", "round", "--into", "round")
     assert run("review") == "the symbols are well apart, and none falls into two clusters\n"
 
@@ -65,12 +65,12 @@ def test_one_symbol_has_nothing_to_be_compared_with(tmp_path):
 def test_a_proposal_is_left_out_if_four_fifths_of_it_were_rejected(rejected, left):
     """The others are numbered anew."""
     members = (np.arange(10), np.arange(10, 14))
-    found = Proposals(
+    proposals = Proposals(
         tuple(Proposal(some, int(some[0]), 1.0, 1.0, 1 - k, 0.5) for k, some in enumerate(members)),
         np.repeat([0, 1], [10, 4]),
         np.ones(3),
     )
-    kept = _without(found, [np.arange(rejected)])
-    assert [len(one) for one in kept.proposals] == [10, 4][-left:]
-    assert kept.clusters.tolist() == ([-1] * 10 + [0] * 4 if left == 1 else [0] * 10 + [1] * 4)
-    assert kept[-1].nearest == (None if left == 1 else 0)
+    remaining = _without(proposals, [np.arange(rejected)])
+    assert [len(proposal) for proposal in remaining.proposals] == [10, 4][-left:]
+    assert remaining.clusters.tolist() == ([-1] * 10 + [0] * 4 if left == 1 else [0] * 10 + [1] * 4)
+    assert remaining[-1].nearest == (None if left == 1 else 0)

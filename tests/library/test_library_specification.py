@@ -22,9 +22,9 @@ from kineme.movements.preparation.resample import Resample
 )
 def test_a_library_with_large_numbers_is_opened_again(tmp_path, made_with):
     with ActionLibrary(tmp_path / "actions", create=True, **made_with) as library:
-        made = library.specification
+        specification = library.specification
     with ActionLibrary(tmp_path / "actions") as library:
-        assert library.specification == made
+        assert library.specification == specification
 
 
 @pytest.mark.parametrize(

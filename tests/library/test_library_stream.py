@@ -35,7 +35,7 @@ def test_a_stream_says_what_that_of_a_recognizer_says(library):
         ours.reset()
         theirs.reset()
         a, b = _follow(ours, movement), _follow(theirs, movement)
-        assert [one.label for one in a.ranked] == [one.label for one in b.ranked]
+        assert [ranked_label.label for ranked_label in a.ranked] == [ranked_label.label for ranked_label in b.ranked]
         assert a.unknown == pytest.approx(b.unknown, abs=1e-4)
         assert a.label == b.label
     answer = ours.finish()
@@ -65,14 +65,16 @@ def test_streams_share_what_is_prepared(library):
 
 
 def test_threads_ask_while_the_library_changes(library):
-    asked = library.movements()[0]
+    question = library.movements()[0]
 
     def ask(k):
         if k % 10 == 3:
-            library.learn([Trajectory(asked.times, asked.positions @ np.diag([1.0, 1.0 + k / 10]))], [f"more {k}"])
+            library.learn(
+                [Trajectory(question.times, question.positions @ np.diag([1.0, 1.0 + k / 10]))], [f"more {k}"]
+            )
         stream = library.stream()
-        _follow(stream, asked, 20)
-        return library.recognize(asked).nearest[0].similarity, stream.finish().nearest[0].similarity
+        _follow(stream, question, 20)
+        return library.recognize(question).nearest[0].similarity, stream.finish().nearest[0].similarity
 
     with ThreadPoolExecutor(6) as pool:
         assert np.array(list(pool.map(ask, range(30)))).min() > 0.99

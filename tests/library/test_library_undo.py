@@ -26,10 +26,18 @@ def _state(library):
     ids = library.ids()
     if not len(ids):
         return {}
-    first = {int(i): tuple(one.positions[:3].ravel().round(6)) for i, one in zip(ids, library.movements(), strict=True)}
+    first = {
+        int(i): tuple(movement.positions[:3].ravel().round(6))
+        for i, movement in zip(ids, library.movements(), strict=True)
+    }
     symbols = {
-        one.id: (one.name, one.description, sorted(first[i] for i in one.members.tolist()), first.get(one.prototype))
-        for one in library.symbols()
+        symbol.id: (
+            symbol.name,
+            symbol.description,
+            sorted(first[i] for i in symbol.members.tolist()),
+            first.get(symbol.prototype),
+        )
+        for symbol in library.symbols()
     }
     people = sorted(zip(first.values(), library.groups().astype(str), strict=True))
     rows = {first[int(i)]: row for i, row in zip(ids, library.features(), strict=True)}
@@ -37,18 +45,18 @@ def _state(library):
 
 
 CHANGES = {
-    "rename": lambda one: one.rename("wave", "hello"),
-    "annotate": lambda one: one.annotate("wave", "a greeting", prototype=1),
-    "delete a symbol": lambda one: one.delete("wave"),
-    "delete movements": lambda one: one.delete([1, 2, 3]),
-    "delete all": lambda one: one.delete(one.ids()),
-    "merge": lambda one: one.merge(["wave", "push"], "both"),
-    "merge into one": lambda one: one.merge(["wave"], "push"),
-    "split": lambda one: one.split("wave", [1, 4], "half"),
-    "assign": lambda one: one.assign([1, 2, 3], "push"),
-    "assign to a new one": lambda one: one.assign([1, 2, 3], "new"),
-    "release": lambda one: one.release([1, 2]),
-    "learn": lambda one: one.learn(draw_movements(3, 2, 9), ["wave", "other", None]),
+    "rename": lambda library: library.rename("wave", "hello"),
+    "annotate": lambda library: library.annotate("wave", "a greeting", prototype=1),
+    "delete a symbol": lambda library: library.delete("wave"),
+    "delete movements": lambda library: library.delete([1, 2, 3]),
+    "delete all": lambda library: library.delete(library.ids()),
+    "merge": lambda library: library.merge(["wave", "push"], "both"),
+    "merge into one": lambda library: library.merge(["wave"], "push"),
+    "split": lambda library: library.split("wave", [1, 4], "half"),
+    "assign": lambda library: library.assign([1, 2, 3], "push"),
+    "assign to a new one": lambda library: library.assign([1, 2, 3], "new"),
+    "release": lambda library: library.release([1, 2]),
+    "learn": lambda library: library.learn(draw_movements(3, 2, 9), ["wave", "other", None]),
 }
 
 
@@ -103,13 +111,13 @@ def test_what_others_change_between_two_batches_ends_what_one_undo_takes_back(li
 
     def after_another(store, batch, continues):
         if continues is not None:
-            with ActionLibrary(library.folder) as one:
-                one.rename("push", "shove")
+            with ActionLibrary(library.folder) as other:
+                other.rename("push", "shove")
         return commit(store, batch, continues)
 
     monkeypatch.setattr(learning, "commit", after_another)
     library.learn(draw_movements(8, 2, 9), ["wave", "other"] * 4)
-    assert [one.action for one in library.history()[version:]] == ["learn", "rename", "learn"]
+    assert [change.action for change in library.history()[version:]] == ["learn", "rename", "learn"]
     assert library.undo() == (version + 4, version + 2, "learn")
 
 
@@ -119,15 +127,15 @@ def test_what_others_change_between_two_batches_is_a_change_of_its_own(library, 
 
     def other(done, total):
         if done == 4:
-            with ActionLibrary(library.folder) as one:
-                one.rename("push", "shove")
+            with ActionLibrary(library.folder) as other:
+                other.rename("push", "shove")
 
     library.learn(draw_movements(8, 2, 9), ["wave", "other"] * 4, progress=other)
-    assert sorted(one.action for one in library.history()[version:]) == ["learn", "learn", "rename"]
+    assert sorted(change.action for change in library.history()[version:]) == ["learn", "learn", "rename"]
     while library.undo().to > version:
         pass
     assert _state(library) == before
-    assert not {"shove"} & {one.name for one in library.symbols()}
+    assert not {"shove"} & {symbol.name for symbol in library.symbols()}
 
 
 def test_an_undo_of_another_version_than_the_one_looked_at_is_refused(library):
@@ -139,11 +147,11 @@ def test_an_undo_of_another_version_than_the_one_looked_at_is_refused(library):
 
 
 def test_recognition_follows(library):
-    asked = library.movements()[0]
+    question = library.movements()[0]
     library.delete("wave")
-    assert library.recognize(asked).ranked == ("push",)
+    assert library.recognize(question).ranked == ("push",)
     library.undo()
-    assert library.recognize(asked).label == "wave"
+    assert library.recognize(question).label == "wave"
 
 
 def test_places_in_files_are_free_for_movements_that_return(library, tmp_path):
@@ -172,7 +180,7 @@ def test_a_proposal_that_was_accepted_is_one_change(library):
     assert library.history()[-1].detail["description"] == "down and up"
     library.undo()
     assert len(library.symbols()) == 2
-    assert not np.concatenate([one.members for one in library.symbols()]).size
+    assert not np.concatenate([symbol.members for symbol in library.symbols()]).size
     library.undo()
     assert _state(library) == _state(library.at(version))
 

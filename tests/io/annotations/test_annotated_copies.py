@@ -30,8 +30,8 @@ def said(path, kind):
     from rosbags.rosbag1 import Reader as Reader1
     from rosbags.rosbag2 import Reader as Reader2
 
-    known = store(kind)
-    parse = known.deserialize_ros1 if kind == "ros1" else known.deserialize_cdr
+    types = store(kind)
+    parse = types.deserialize_ros1 if kind == "ros1" else types.deserialize_cdr
     with (Reader1 if kind == "ros1" else Reader2)(path) as read:
         return [(t, json.loads(parse(raw, c.msgtype).data)) for c, t, raw in read.messages() if c.topic == TOPIC]
 
@@ -41,9 +41,9 @@ def test_a_bag_has_a_message_at_the_end_of_each_movement(tmp_path, kind, name):
     source = bag(tmp_path, kind)
     annotations = [one(1.7e9 + 0.1, 1.7e9 + 0.25, "wavé"), one(1.7e9 + 0.25, 1.7e9 + 0.5, None)]
     assert write_annotations(tmp_path / name, annotations, [source]) == [tmp_path / name]
-    found = said(tmp_path / name, kind)
-    np.testing.assert_allclose([t - START for t, _ in found], [SECOND / 4, SECOND / 2], atol=1000)
-    first, second = (content for _, content in found)
+    contents = said(tmp_path / name, kind)
+    np.testing.assert_allclose([t - START for t, _ in contents], [SECOND / 4, SECOND / 2], atol=1000)
+    first, second = (content for _, content in contents)
     assert first == {
         "place": "", "start": 1.7e9 + 0.1, "end": 1.7e9 + 0.25, "symbol": "wavé", "p_value": 0.25, "confidence": 0.75,
         "unknown": False,

@@ -50,24 +50,28 @@ def test_elan_has_the_structure_of_its_schema(tmp_path):
     assert root.tag == "ANNOTATION_DOCUMENT"
     assert {"AUTHOR", "DATE", "VERSION", "FORMAT"} <= set(root.attrib)
     order = ["HEADER", "TIME_ORDER", "TIER", "LINGUISTIC_TYPE", "CONSTRAINT"]  # the sequence of the schema
-    tags = [one.tag for one in root]
+    tags = [element.tag for element in root]
     assert tags == sorted(tags, key=order.index)
     assert set(tags) == set(order)
-    times = {one.get("TIME_SLOT_ID"): int(one.get("TIME_VALUE")) for one in root.iter("TIME_SLOT")}
-    types = {one.get("LINGUISTIC_TYPE_ID"): one for one in root.iter("LINGUISTIC_TYPE")}
-    tiers = {one.get("TIER_ID"): one for one in root.iter("TIER")}
-    assert all(one.get("LINGUISTIC_TYPE_REF") in types for one in tiers.values())
-    ids = [one.get("ANNOTATION_ID") for one in root.iter() if one.get("ANNOTATION_ID")]
+    times = {element.get("TIME_SLOT_ID"): int(element.get("TIME_VALUE")) for element in root.iter("TIME_SLOT")}
+    types = {element.get("LINGUISTIC_TYPE_ID"): element for element in root.iter("LINGUISTIC_TYPE")}
+    tiers = {element.get("TIER_ID"): element for element in root.iter("TIER")}
+    assert all(tier.get("LINGUISTIC_TYPE_REF") in types for tier in tiers.values())
+    ids = [element.get("ANNOTATION_ID") for element in root.iter() if element.get("ANNOTATION_ID")]
     assert len(set(ids)) == len(ids) == 6
     spans = [
-        (times[one.get("TIME_SLOT_REF1")], times[one.get("TIME_SLOT_REF2")], one.findtext("ANNOTATION_VALUE"))
-        for one in tiers["symbol"].iter("ALIGNABLE_ANNOTATION")
+        (
+            times[element.get("TIME_SLOT_REF1")],
+            times[element.get("TIME_SLOT_REF2")],
+            element.findtext("ANNOTATION_VALUE"),
+        )
+        for element in tiers["symbol"].iter("ALIGNABLE_ANNOTATION")
     ]
     assert [span[:2] for span in spans] == [(500, 1750), (2000, 4000)]
     assert spans[1][2] == "unknown"
     p_values = [*tiers["p-value"].iter("REF_ANNOTATION")]
-    assert [one.findtext("ANNOTATION_VALUE") for one in p_values] == ["0.4", "0.01"]
-    assert [one.get("ANNOTATION_REF") for one in p_values] == ["a1", "a2"]
+    assert [element.findtext("ANNOTATION_VALUE") for element in p_values] == ["0.4", "0.01"]
+    assert [element.get("ANNOTATION_REF") for element in p_values] == ["a1", "a2"]
     assert tiers["p-value"].get("PARENT_REF") == "symbol"
     constraint = types[tiers["p-value"].get("LINGUISTIC_TYPE_REF")].get("CONSTRAINTS")
     assert constraint == root.find("CONSTRAINT").get("STEREOTYPE") == "Symbolic_Association"
@@ -77,13 +81,13 @@ def test_a_control_character_in_a_symbol_leaves_the_document_readable(tmp_path):
     odd = Annotation("long.csv", "", 1.0, 1.0, "a\x00\x1b<&", 0.4, 0.93)
     (path,) = write_annotations(tmp_path / "what.eaf", [odd], [LONG])
     assert ElementTree.parse(path).findtext(".//ANNOTATION_VALUE") == "a\\x00\\x1b<&"
-    assert [one.get("TIME_VALUE") for one in ElementTree.parse(path).iter("TIME_SLOT")] == ["1000", "1001"]
+    assert [element.get("TIME_VALUE") for element in ElementTree.parse(path).iter("TIME_SLOT")] == ["1000", "1001"]
 
 
 def test_several_movements_become_a_file_each_in_a_folder(tmp_path):
     several = [Annotation(*where, 0.0, 1.0, "wave", 0.5, 0.9) for where in (("a/b.mcap", "1"), ("a/B.mcap", "1"))]
     written = write_annotations(tmp_path / "named", several, [LONG], "audacity")
-    assert [one.name for one in written] == ["a-b-1.txt", "a-B-1-2.txt"]
+    assert [path.name for path in written] == ["a-b-1.txt", "a-B-1-2.txt"]
     with pytest.raises(DataError, match="name a folder"):
         write_annotations(tmp_path / "what.eaf", several, [LONG])
 

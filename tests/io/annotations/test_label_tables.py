@@ -42,7 +42,7 @@ TABLES = {
     "audacity.txt": ("0.5\t1.75\twave\n\\\t100.0\t200.0\n2.000000\t4.000000\tnod\n", True),
     "underscores.csv": ("start_ms,end_ms,label\n500,1750,wave\n2000,4000,nod\n", False),
     "seconds.csv": ("start_s,end_s,end_effector,label\n0.5,1.75,1,wave\n2,4,1,nod\n", False),
-    "objects.json": (json.dumps([dict(zip(("start", "end", "label"), one, strict=True)) for one in SPANS]), False),
+    "objects.json": (json.dumps([dict(zip(("start", "end", "label"), span, strict=True)) for span in SPANS]), False),
     **{f"elan-{name}.txt": (text, True) for name, text in ELAN.items()},
 }
 
@@ -60,7 +60,7 @@ def test_every_table_says_when_and_what(tmp_path, name):
     text, since_start = TABLES[name]
     (tmp_path / name).write_bytes(b"\xef\xbb\xbf" * name.endswith("csv") + text.encode())
     table = read_labels(tmp_path / name)
-    assert [(one.start, one.end, one.label) for one in table.rows] == SPANS
+    assert [(row.start, row.end, row.label) for row in table.rows] == SPANS
     assert table.since_start is since_start
 
 
@@ -72,8 +72,8 @@ def test_what_was_written_is_read_again_and_cuts_the_same_stretches(tmp_path, re
     ]
     write_annotations(tmp_path / name, written, [tmp_path / "long.csv"])
     pieces = labeled_pieces(recordings, read_labels(tmp_path / name))
-    assert [one.label for one in pieces.sources] == ["wave", None]
-    ends = [(round(one.times[0], 6), round(one.times[-1], 6)) for one in pieces]
+    assert [source.label for source in pieces.sources] == ["wave", None]
+    ends = [(round(movement.times[0], 6), round(movement.times[-1], 6)) for movement in pieces]
     assert ends == [(1000.5, 1001.75), (1002.0, 1004.0)]
     assert pieces.demonstrations.channels == recordings.demonstrations.channels
     first, last = np.searchsorted(recordings[0].times, [1000.5 - 1e-6, 1001.75 + 1e-6])
@@ -84,7 +84,7 @@ def test_what_was_written_is_read_again_and_cuts_the_same_stretches(tmp_path, re
 def test_times_that_fit_only_from_the_first_sample_are_taken_so(tmp_path, recordings):
     (tmp_path / "plain.csv").write_text(TABLES["plain.csv"][0])
     pieces = labeled_pieces(recordings, read_labels(tmp_path / "plain.csv"))
-    assert [round(one.times[0], 6) for one in pieces] == [1000.5, 1002.0]
+    assert [round(movement.times[0], 6) for movement in pieces] == [1000.5, 1002.0]
     assert pieces.demonstrations.labels.tolist() == ["wave", "nod"]
 
 
@@ -100,12 +100,12 @@ def test_stretches_outside_are_problems_that_name_the_line(tmp_path, recordings)
     (tmp_path / "l.csv").write_text("start,end,label\n1000.5,1001.75,wave\n1006,1007,nod\n1001,1001.01,nod\n")
     pieces = labeled_pieces(recordings, read_labels(tmp_path / "l.csv"))
     assert len(pieces) == 1
-    assert [one.line for one in pieces.problems] == [3, 4]
+    assert [problem.line for problem in pieces.problems] == [3, 4]
     assert "lasts from 1000 to 1004.99 s" in str(pieces.problems[0])
     (tmp_path / "l.csv").write_text("start,end,label\n1004,1005.05,wave\n1003.5,1006,nod\n999,1001,nod\n")
     pieces = labeled_pieces(recordings, read_labels(tmp_path / "l.csv"))
-    assert [one.label for one in pieces.sources] == ["wave"]
-    assert [one.line for one in pieces.problems] == [3, 4]
+    assert [source.label for source in pieces.sources] == ["wave"]
+    assert [problem.line for problem in pieces.problems] == [3, 4]
     (tmp_path / "l.csv").write_text("start,end,label\n2000,2001,wave\n")
     with pytest.raises(DataError, match="found none; the first that is none"):
         labeled_pieces(recordings, read_labels(tmp_path / "l.csv"))
@@ -125,7 +125,9 @@ def test_a_stretch_that_is_labeled_twice_is_a_problem_that_names_both_lines(tmp_
     (tmp_path / "l.csv").write_text("start,end,label\n1000.5,1001.75,wave\n1000.5,1001.75,nod\n")
     pieces = labeled_pieces(recordings, read_labels(tmp_path / "l.csv"))
     assert pieces.demonstrations.labels.tolist() == ["wave"]
-    assert [one.what for one in pieces.problems] == ["line 3: expected one label for a stretch, line 2 has it too"]
+    assert [problem.what for problem in pieces.problems] == [
+        "line 3: expected one label for a stretch, line 2 has it too"
+    ]
 
 
 def test_columns_say_which_recording_a_row_is_of(tmp_path, recordings):
@@ -137,7 +139,7 @@ def test_columns_say_which_recording_a_row_is_of(tmp_path, recordings):
     text = "recording,start,end,label\na/long.csv,1000.5,1001.75,wave\nb/long.csv,1002,1004,nod\n"
     (tmp_path / "labels.csv").write_text(text)
     pieces = labeled_pieces(several, read_labels(tmp_path / "labels.csv"))
-    assert [(one.path, one.label) for one in pieces.sources] == [("a/long.csv", "wave"), ("b/long.csv", "nod")]
+    assert [(source.path, source.label) for source in pieces.sources] == [("a/long.csv", "wave"), ("b/long.csv", "nod")]
     (tmp_path / "labels.csv").write_text(TABLES["plain.csv"][0])
     with pytest.raises(DataError, match="beside one recording, got 2"):
         labeled_pieces(several, read_labels(tmp_path / "labels.csv"))
@@ -169,7 +171,9 @@ def test_a_table_that_is_none_is_refused_by_name(tmp_path, name, text, said):
 
 
 @given(
-    data=st.one_of(st.binary(max_size=200), st.sampled_from([*TABLES.values()]).flatmap(lambda one: _spoiled(one[0])))
+    data=st.one_of(
+        st.binary(max_size=200), st.sampled_from([*TABLES.values()]).flatmap(lambda table: _spoiled(table[0]))
+    )
 )
 def test_whatever_the_bytes_only_an_error_for_users_comes_out(tmp_path_factory, data):
     folder = tmp_path_factory.mktemp("labels")
@@ -179,7 +183,7 @@ def test_whatever_the_bytes_only_an_error_for_users_comes_out(tmp_path_factory, 
             table = read_labels(folder / f"a{ending}")
         except KinemeError:
             continue
-        assert all(one.end > one.start for one in table.rows)
+        assert all(row.end > row.start for row in table.rows)
 
 
 def _spoiled(text):
@@ -196,7 +200,7 @@ def test_pandas_writes_a_table_that_is_read(tmp_path):
     text = io.StringIO()
     pandas.DataFrame(SPANS, columns=["start", "end", "label"]).to_csv(text)
     (tmp_path / "l.csv").write_text(text.getvalue())
-    assert [(one.start, one.end, one.label) for one in read_labels(tmp_path / "l.csv").rows] == SPANS
+    assert [(row.start, row.end, row.label) for row in read_labels(tmp_path / "l.csv").rows] == SPANS
 
 
 def test_a_name_that_two_recordings_have_is_said_and_labels_neither(tmp_path, recordings):
@@ -209,14 +213,14 @@ def test_a_name_that_two_recordings_have_is_said_and_labels_neither(tmp_path, re
     labels.parent.mkdir()
     labels.write_text("recording,start,end,label\na.csv,1000.5,1001.75,wave\ns2/a.csv,1002,1004,nod\n")
     pieces = labeled_pieces(several, read_labels(labels))
-    assert [(one.path, one.label) for one in pieces.sources] == [("s2/a.csv", "nod")]
+    assert [(source.path, source.label) for source in pieces.sources] == [("s2/a.csv", "nod")]
     (problem,) = pieces.problems
     assert problem.what.startswith("line 2: expected one recording a.csv, got s1/a.csv, s2/a.csv; write its folder")
     labels.write_text("recording,start,end,label\n/home/anna/s1/a.csv,1000.5,1001.75,wave\n")
-    assert [one.path for one in labeled_pieces(several, read_labels(labels)).sources] == ["s1/a.csv"]
+    assert [source.path for source in labeled_pieces(several, read_labels(labels)).sources] == ["s1/a.csv"]
     (tmp_path / "a.csv").write_bytes((tmp_path / "s1" / "a.csv").read_bytes())
     pieces = labeled_pieces(read_recordings(tmp_path), read_labels(labels))
-    assert [one.path for one in pieces.sources] == ["s1/a.csv"]  # and not the shorter a.csv
+    assert [source.path for source in pieces.sources] == ["s1/a.csv"]  # and not the shorter a.csv
 
 
 def test_clocks_count_hours():

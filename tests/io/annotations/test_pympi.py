@@ -21,8 +21,8 @@ def test_pympi_reads_what_was_annotated(tmp_path):
     below = read.get_ref_annotation_data_for_tier("p-value")
     assert [(start, end, text) for start, end, text, _ in below] == [(500, 1750, "0.4"), (2000, 4000, "0.01")]
     read.to_file(str(tmp_path / "again.eaf"))
-    again = [(one.start, one.end, one.label) for one in read_labels(tmp_path / "again.eaf").rows]
-    assert again == [(one.start, one.end, one.label) for one in read_labels(path).rows]
+    again = [(row.start, row.end, row.label) for row in read_labels(tmp_path / "again.eaf").rows]
+    assert again == [(row.start, row.end, row.label) for row in read_labels(path).rows]
 
 
 def test_what_a_person_annotated_is_read(tmp_path):
@@ -33,6 +33,6 @@ def test_what_a_person_annotated_is_read(tmp_path):
         document.add_annotation("gesture", start, end, label)
     document.to_file(str(tmp_path / "by_hand.eaf"))
     table = read_labels(tmp_path / "by_hand.eaf")
-    found = [(one.start, one.end, one.label) for one in table.rows]
-    assert found == [(0.5, 1.75, "wave"), (2.0, 4.0, "point at <x> & y")]
+    spans = [(row.start, row.end, row.label) for row in table.rows]
+    assert spans == [(0.5, 1.75, "wave"), (2.0, 4.0, "point at <x> & y")]
     assert table.since_start is True

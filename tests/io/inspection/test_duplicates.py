@@ -10,14 +10,14 @@ from kineme.io.inspection.inspect import duplicates_among
 from kineme.io.reading.recordings import read_recordings
 
 
-@pytest.mark.parametrize(("difference", "found"), [(0.0, [[0, 1]]), (5e-7, [[0, 1]]), (2e-6, []), (1e-2, [])])
-def test_stamps_of_equal_movements_agree_to_a_millionth_of_the_duration(difference, found):
+@pytest.mark.parametrize(("difference", "groups"), [(0.0, [[0, 1]]), (5e-7, [[0, 1]]), (2e-6, []), (1e-2, [])])
+def test_stamps_of_equal_movements_agree_to_a_millionth_of_the_duration(difference, groups):
     x = np.random.default_rng(0).normal(size=(50, 2))
     t = np.linspace(0.0, 3.0, 50)
     other = t + 100.0  # wherever it starts
     other[20] += 3.0 * difference
     demos = Demonstrations.from_arrays([x, x, x[::-1]], times=[t, other, t])
-    assert duplicates_among(demos) == found
+    assert duplicates_among(demos) == groups
 
 
 def test_movements_that_differ_in_a_gripper_are_no_duplicates(tmp_path):

@@ -30,31 +30,38 @@ def ragged(seed, n=12):
 @pytest.mark.parametrize("seed", range(8))
 def test_sampling_agrees_with_a_loop_over_movements(seed):
     demos = ragged(seed)
-    found = sampling_of(demos)
-    for i, one in enumerate(demos):
-        steps = np.diff(one.times)
+    sampling = sampling_of(demos)
+    for i, movement in enumerate(demos):
+        steps = np.diff(movement.times)
         median = np.median(steps)
         even = steps[steps <= GAP * median]
-        assert found.rates[i] == pytest.approx(1 / median)
-        assert found.jitters[i] == pytest.approx(np.sqrt(np.mean((even / median - 1) ** 2)))
-        assert found.gaps[i] == len(steps) - len(even)
-        assert found.longest[i] == pytest.approx(steps.max())
+        assert sampling.rates[i] == pytest.approx(1 / median)
+        assert sampling.jitters[i] == pytest.approx(np.sqrt(np.mean((even / median - 1) ** 2)))
+        assert sampling.gaps[i] == len(steps) - len(even)
+        assert sampling.longest[i] == pytest.approx(steps.max())
 
 
 def test_even_sampling_has_no_jitter_and_no_gaps(make_movement):
     t, x = make_movement(3)
-    found = sampling_of(Demonstrations.from_arrays([x, x], times=[t, t + 7]))
-    np.testing.assert_allclose(found.rates, (len(t) - 1) / 2.0)
-    np.testing.assert_allclose(found.jitters, 0, atol=1e-9)
-    assert found.gaps.tolist() == [0, 0]
+    sampling = sampling_of(Demonstrations.from_arrays([x, x], times=[t, t + 7]))
+    np.testing.assert_allclose(sampling.rates, (len(t) - 1) / 2.0)
+    np.testing.assert_allclose(sampling.jitters, 0, atol=1e-9)
+    assert sampling.gaps.tolist() == [0, 0]
 
 
 def test_equal_movements_are_found_wherever_they_start_in_time(make_movement):
-    made = [make_movement(seed, n_samples=50) for seed in range(6)]
-    nudged = made[2][1].copy()
+    movements = [make_movement(seed, n_samples=50) for seed in range(6)]
+    nudged = movements[2][1].copy()
     nudged[[10, 20]] += [[1e-3], [-1e-3]]  # the same ends and sum
-    slower = (made[3][0] * 2, made[3][1])
-    listed = [*made, (made[1][0] + 5, made[1][1]), (made[2][0], nudged), slower, made[1], made[5]]
+    slower = (movements[3][0] * 2, movements[3][1])
+    listed = [
+        *movements,
+        (movements[1][0] + 5, movements[1][1]),
+        (movements[2][0], nudged),
+        slower,
+        movements[1],
+        movements[5],
+    ]
     demos = Demonstrations.from_arrays([x for _, x in listed], times=[t for t, _ in listed])
     assert duplicates_among(demos) == [[1, 6, 9], [5, 10]]
 
@@ -69,25 +76,25 @@ def recordings(folder, make_movement, n_dims=2, labels=("wave", "nod", "wave", N
 
 
 def test_an_inspection_counts_and_measures(tmp_path, make_movement):
-    found = inspect(recordings(tmp_path, make_movement))
-    assert (found.movements, found.files, found.dimensions) == (4, 4, 2)
-    assert [(one.label, one.movements) for one in found.labels] == [("nod", 1), ("wave", 2), (None, 1)]
-    wave = found.labels[1]
+    inspection = inspect(recordings(tmp_path, make_movement))
+    assert (inspection.movements, inspection.files, inspection.dimensions) == (4, 4, 2)
+    assert [(label.label, label.movements) for label in inspection.labels] == [("nod", 1), ("wave", 2), (None, 1)]
+    wave = inspection.labels[1]
     assert wave.samples == (40, 41, 42)
     assert wave.duration == pytest.approx((2, 2, 2))
     assert wave.rate == pytest.approx((39 / 2, 20, 41 / 2), rel=0.01)
     sides = [np.ptp(make_movement([k, 2], 2, n_samples=40 + k)[1], axis=0).max() for k in (0, 2)]
     assert (wave.extent.least, wave.extent.greatest) == pytest.approx((min(sides), max(sides)))
-    assert [one.file for one in found.problems] == ["bad.csv"]
-    assert found.notes == (
+    assert [problem.file for problem in inspection.problems] == ["bad.csv"]
+    assert inspection.notes == (
         "only one movement labeled nod",
         "1 movements have no label: their files lie in no folder of their own",
     )
 
 
 def test_words_and_data_say_the_same(tmp_path, make_movement):
-    found = inspect(recordings(tmp_path, make_movement))
-    words, data = as_words(found), json.loads(json.dumps(as_data(found), allow_nan=False))
+    inspection = inspect(recordings(tmp_path, make_movement))
+    words, data = as_words(inspection), json.loads(json.dumps(as_data(inspection), allow_nan=False))
     assert words.splitlines()[0] == "4 movements of 2 dimensions in 4 files"
     assert "CSV, wide: time 'time' in s (assumed); coordinates x, y (4 files)" in words
     assert "bad.csv: expected at least 4 samples, got 1" in words
@@ -98,19 +105,19 @@ def test_words_and_data_say_the_same(tmp_path, make_movement):
 
 def test_gaps_and_odd_rates_are_noticed():
     text = "time,x\n" + "".join(f"{k},{k}\n" for k in (0, 1, 2, 3, 9, 10))
-    found = inspect(read_recordings_from_bytes(text.encode(), "a.csv", Layout()))
-    assert (found.labels[0].gaps, found.labels[0].longest_gap) == (1, 6)
-    odd, pause = found.notes
+    inspection = inspect(read_recordings_from_bytes(text.encode(), "a.csv", Layout()))
+    assert (inspection.labels[0].gaps, inspection.labels[0].longest_gap) == (1, 6)
+    odd, pause = inspection.notes
     assert odd == "1 samples per second are unusual; if the unit of time is another, give --units"
     assert pause.startswith("1 movement without samples for up to 6 s, the first a.csv; if these are several movements")
-    assert "1 (to 6 s)" in as_words(found)
+    assert "1 (to 6 s)" in as_words(inspection)
 
 
 def test_guesses_that_differ_between_files_are_noticed(tmp_path):
     for name, step in (("a", 4), ("b", 6)):
         (tmp_path / f"{name}.csv").write_text("time,x\n" + "".join(f"{k * step},{k}\n" for k in range(9)))
-    found = inspect(read_recordings(tmp_path))
-    assert "time counts in ms here, in s there, to judge by its size; give --units" in found.notes
+    inspection = inspect(read_recordings(tmp_path))
+    assert "time counts in ms here, in s there, to judge by its size; give --units" in inspection.notes
     assert inspect(read_recordings(tmp_path, units="ms")).notes == ()
 
 
@@ -148,14 +155,14 @@ def test_long_lists_are_cut_in_words_only_and_a_reason_of_many_files_is_said_onc
     recordings(tmp_path, make_movement)
     for k in range(30):
         (tmp_path / f"a.{k:02}").write_text("")
-    found = inspect(read_recordings(tmp_path))
-    assert "  and 11 more" in as_words(found)
+    inspection = inspect(read_recordings(tmp_path))
+    assert "  and 11 more" in as_words(inspection)
     for k in range(30):
         (tmp_path / f"a.{k:02}").rename(tmp_path / f"{k:02}.md")
-    found = inspect(read_recordings(tmp_path))
-    assert "  00.md, 01.md, 02.md and 27 more: expected a file ending in" in as_words(found)
-    assert "  and " not in as_words(found)
-    assert len(as_data(found)["problems"]) == 31
+    inspection = inspect(read_recordings(tmp_path))
+    assert "  00.md, 01.md, 02.md and 27 more: expected a file ending in" in as_words(inspection)
+    assert "  and " not in as_words(inspection)
+    assert len(as_data(inspection)["problems"]) == 31
 
 
 def test_many_columns_are_said_in_few_lines_and_those_that_never_move_are_named():
@@ -163,14 +170,14 @@ def test_many_columns_are_said_in_few_lines_and_those_that_never_move_are_named(
     moving = [f"joint_{k}" for k in range(30)]
     heads = ["time", *moving, "fixed_1", "fixed_2"]
     rows = [",".join(map(repr, [at, *(float(np.sin(at + k)) for k in range(30)), 1.5, 0.25])) for at in t.tolist()]
-    found = inspect(read_recordings_from_bytes("\n".join([",".join(heads), *rows]).encode(), "a.csv", Layout()))
-    words = as_words(found)
+    inspection = inspect(read_recordings_from_bytes("\n".join([",".join(heads), *rows]).encode(), "a.csv", Layout()))
+    words = as_words(inspection)
     assert "joint_22, joint_23 and 8 more" in words
     assert "  joint_0, joint_1, joint_2, joint_3" in words.partition("kinds:")[2]
     assert "joint_11 and 18 more: angle; wraps are taken away" in words
-    assert "2 of 32 channels never move: fixed_1, fixed_2; --exclude leaves them out" in found.notes
+    assert "2 of 32 channels never move: fixed_1, fixed_2; --exclude leaves them out" in inspection.notes
     assert len(words.splitlines()) < 20
-    assert as_data(found)["detected"][0]["columns"] == tuple(heads[1:])
+    assert as_data(inspection)["detected"][0]["columns"] == tuple(heads[1:])
 
 
 @pytest.mark.parametrize("n_dims", [1, 2, 3, 5])
