@@ -21,7 +21,7 @@ _IN_PASSING = 2**26
 
 
 def max_file_bytes() -> int:
-    """The limit [bytes]."""
+    """Return the limit [bytes]."""
     given = os.environ.get(VARIABLE)
     if given is None:
         return _by_default()
@@ -34,7 +34,7 @@ def max_file_bytes() -> int:
 
 
 def most_in_passing() -> int:
-    """The limit on what is in memory on the way only, such as a chunk of a bag [bytes]: at least 64 MiB."""
+    """Return the limit on what is in memory on the way only, such as a chunk of a bag [bytes]: at least 64 MiB."""
     return max(max_file_bytes(), _IN_PASSING)
 
 
@@ -54,7 +54,7 @@ def check_in_passing(n_bytes: int, what: str) -> None:
 
 
 def read_limited(stream: BinaryIO) -> bytes:
-    """All bytes of a stream of unknown length, up to the limit."""
+    """Read all bytes of a stream of unknown length, up to the limit."""
     chunks: list[bytes] = []
     n_bytes = 0
     while chunk := stream.read(_CHUNK):

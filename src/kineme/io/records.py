@@ -55,7 +55,7 @@ def note_on_missing(problems: Sequence[Problem]) -> list[str]:
 
 
 def in_shell(names: Sequence[str]) -> str:
-    """Columns as one argument of an option, quoted where a shell needs it."""
+    """Write columns as one argument of an option, quoted where a shell needs it."""
     return quote(",".join(f'"{name}"' if "," in name else name for name in names))
 
 

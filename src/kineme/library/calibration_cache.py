@@ -117,7 +117,7 @@ def _deserialized(data: bytes, key: str, n: int) -> Calibration:
     if seal != _seal(data, key):
         raise ValueError("damaged, or of other members")
     with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
-        which = _whole(arrays["which"], n, n)
+        which = _indices(arrays["which"], n, n)
         pooled, novelties = (
             [_real(arrays[f"{name} {k}"]) for k in range(int(which.max()) + 1)] for name in ("pooled", "novelties")
         )
@@ -135,13 +135,13 @@ def _deserialized(data: bytes, key: str, n: int) -> Calibration:
 
 def _split(scores: NDArray[Any], ends: NDArray[Any], n: int) -> tuple[Array, ...]:
     """Return the scores of each of n classes."""
-    scores, ends = _real(scores), _whole(ends, n, len(scores))
+    scores, ends = _real(scores), _indices(ends, n, len(scores))
     if (np.diff(ends) < 0).any() or ends[-1] != len(scores):
         raise ValueError("no calibration")
     return tuple(np.split(scores, ends[:-1]))
 
 
-def _whole(array: NDArray[Any], n: int, end: int) -> NDArray[Any]:
+def _indices(array: NDArray[Any], n: int, end: int) -> NDArray[Any]:
     if array.shape != (n,) or array.dtype.kind not in "iu" or (array < 0).any() or (array > end).any():
         raise ValueError("no calibration")
     return array

@@ -32,7 +32,7 @@ _RAGGED = (
 
 
 def arrays_movements(arrays: Mapping[str, Any], layout: Layout, kind: str) -> Parsed:
-    """The movements in named arrays.
+    """Return the movements in named arrays.
 
     - ``positions`` (T, d) or (T,), ``times`` (T,): one movement.
     - ``positions`` (n, T, d), ``times`` (T,) or (n, T): many of equal length.
@@ -77,7 +77,7 @@ class Named(NamedTuple):
 def parsed_arrays(
     xs: Sequence[Array], ts: Sequence[Array] | None, named: Named, layout: Layout, detected: tuple[str, str]
 ) -> Parsed:
-    """Movements xs (T_i, d) with stamps ts (T_i,) as `Parsed`."""
+    """Return movements xs (T_i, d) with stamps ts (T_i,) as `Parsed`."""
     labels, time, places, columns = named
     dims = sorted({x.shape[1] for x in xs})
     if len(dims) != 1 or dims == [0]:
@@ -149,7 +149,7 @@ def sets_or_points(xs: list[Array], every: int | None) -> list[Array]:
 
 
 def point_names(n_points: int, width: int) -> list[str]:
-    """Names of the coordinates of points without names: 0.x, 0.y, 0.z, 1.x, ..."""
+    """Return names of the coordinates of points without names: 0.x, 0.y, 0.z, 1.x, ..."""
     ends = "xyz"[:width] if width in (2, 3) else range(width)
     return [f"{k}.{end}" for k in range(n_points) for end in ends]
 
@@ -193,7 +193,7 @@ class _Joined(Mapping[str, Any]):
 
 
 def numbers_of(values: Any, of_time: bool = False) -> Array:
-    """An array as float64; dates and durations as nanoseconds. Integers are rounded in stamps, `of_time`, alone."""
+    """Give an array as float64; dates and durations as nanoseconds. Only in stamps, `of_time`, integers are rounded."""
     try:
         array = np.asarray(values)
     except ValueError as error:
@@ -211,7 +211,7 @@ def numbers_of(values: Any, of_time: bool = False) -> Array:
 
 
 def _no_number(array: NDArray[Any]) -> Any:
-    """The first entry that is not a number."""
+    """Return the first entry that is not a number."""
     for number in array.ravel().tolist():
         try:
             float(np.float64(number))
@@ -293,7 +293,7 @@ def _labels(arrays: Mapping[str, Any], n: int) -> list[str | None]:
 
 
 def _label(value: Any) -> str | None:
-    """A label as text; None where there is none."""
+    """Return a label as text; None where there is none."""
     if isinstance(value, (list, dict, tuple)) or value != value:  # noqa: PLR0124 - only NaN differs from itself
         raise DataError(f"expected labels that are texts or numbers, got {value!r}")
     if isinstance(value, bytes):

@@ -75,7 +75,7 @@ class Body(NamedTuple):
 
 
 def body_movements(arrays: Mapping[str, Any], layout: Layout, kind: str) -> Parsed | None:
-    """The movements of a body or a robot; None where arrays are of no such.
+    """Return the movements of a body or a robot; None where arrays are of no such.
 
     Rotation vectors become quaternions, so that turns beyond pi do not jump. ``split_points`` (n + 1,) of LocoMuJoCo
     divides them into n movements.
@@ -102,7 +102,7 @@ def body_movements(arrays: Mapping[str, Any], layout: Layout, kind: str) -> Pars
 
 
 def _clock(arrays: Mapping[str, Any], body: Body, layout: Layout) -> tuple[dict[str, Array], Rate | None, str | None]:
-    """The columns of times, the rate, and the head of the times that follow from it."""
+    """Return the columns of times, the rate, and the head of the times that follow from it."""
     stamps = {name: _values(arrays, name, body.n_samples) for name in arrays if is_time(name)}
     timed = {name: x[:, 0] for name, x in stamps.items() if x is not None and x.shape[1] == 1}
     if timed:
@@ -119,7 +119,7 @@ def _clock(arrays: Mapping[str, Any], body: Body, layout: Layout) -> tuple[dict[
 
 
 def _smpl(arrays: Mapping[str, Any]) -> Body | None:
-    """Rotation vectors of all joints of a model, or of some, with the translation of the root."""
+    """Return rotation vectors of all joints of a model, or of some, with the translation of the root."""
     name = first_named(arrays, _ALL_JOINTS)
     x = None if name is None else _values(arrays, name)
     model = next((model for model, joints in _MODELS.items() if x is not None and x.shape[1] == 3 * len(joints)), None)
@@ -141,13 +141,13 @@ def _smpl(arrays: Mapping[str, Any]) -> Body | None:
 
 
 def _rotations(joints: Sequence[str], x: Array) -> dict[str, Array]:
-    """Rotation vectors (T, 3 J) as columns of quaternions, by their joints."""
+    """Return rotation vectors (T, 3 J) as columns of quaternions, by their joints."""
     q = exp(x.reshape(len(x), -1, 3))
     return {f"{joint}.{part}": q[:, j, k] for j, joint in enumerate(joints) for k, part in enumerate("wxyz")}
 
 
 def _robot(arrays: Mapping[str, Any]) -> Body | None:
-    """Joints by their names, with the pose of the root where there is one; of MuJoCo's ``qpos`` it is in the array."""
+    """Return joints by their names, with the pose of the root, if any; of MuJoCo's ``qpos`` it is in the array."""
     name = first_named(arrays, _JOINTS)
     x = None if name is None else _values(arrays, name)
     if name is None or x is None or np.ndim(arrays[name]) != 2:
@@ -172,7 +172,7 @@ def _robot(arrays: Mapping[str, Any]) -> Body | None:
 
 
 def _named_points(arrays: Mapping[str, Any]) -> Body | None:
-    """Points (T, J, 2) or (T, J, 3) that are named so, where a rate or times say that the first axis is time."""
+    """Return points (T, J, 2) or (T, J, 3) that are named so, where a rate or times say that the first axis is time."""
     name = first_named(arrays, _POINTS)
     x = None if name is None else _values(arrays, name)
     if name is None or x is None or np.ndim(arrays[name]) != 3 or np.shape(arrays[name])[2] not in (2, 3):
@@ -191,7 +191,7 @@ _KINDS: tuple[Callable[[Mapping[str, Any]], Body | None], ...] = (_smpl, _robot,
 
 
 def _points_of(arrays: Mapping[str, Any], names: Sequence[str], n: int) -> tuple[list[str], dict[str, Array]]:
-    """The array of a point over time, and its columns; nothing where there is none."""
+    """Return the array of a point over time, and its columns; nothing where there is none."""
     name = first_named(arrays, names)
     x = None if name is None else _values(arrays, name, n)
     if name is None or x is None or x.shape[1] != 3:
@@ -200,7 +200,7 @@ def _points_of(arrays: Mapping[str, Any], names: Sequence[str], n: int) -> tuple
 
 
 def _others(arrays: Mapping[str, Any], body: Body) -> dict[str, Array]:
-    """All other columns over time, which a caller may choose."""
+    """Return all other columns over time, which a caller may choose."""
     columns: dict[str, Array] = {}
     for name in arrays:
         x = None if name in body.arrays else _values(arrays, name, body.n_samples)
@@ -211,7 +211,7 @@ def _others(arrays: Mapping[str, Any], body: Body) -> dict[str, Array]:
 
 
 def _values(arrays: Mapping[str, Any], name: str, n: int | None = None) -> Array | None:
-    """An array of n samples as columns (n, width); None for anything else, as texts, objects and other lengths."""
+    """Give an array of n samples as columns (n, width); None for anything else, as texts, objects and other lengths."""
     try:
         x = numbers_of(arrays[name])
     except DataError:
@@ -222,7 +222,7 @@ def _values(arrays: Mapping[str, Any], name: str, n: int | None = None) -> Array
 
 
 def _texts(arrays: Mapping[str, Any], names: Sequence[str]) -> list[str]:
-    """The first array of texts of one of these names, or none."""
+    """Return the first array of texts of one of these names, or none."""
     for name in names:
         if name in arrays:
             try:
@@ -235,7 +235,7 @@ def _texts(arrays: Mapping[str, Any], names: Sequence[str]) -> list[str]:
 
 
 def _segments(arrays: Mapping[str, Any], body: Body) -> Segments | None:
-    """The movements between the split points, where there are several."""
+    """Return the movements between the split points, where there are several."""
     cuts = _values(arrays, "split_points") if "split_points" in arrays else None
     if cuts is None or len(cuts) < 3:
         return None

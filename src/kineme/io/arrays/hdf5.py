@@ -28,7 +28,7 @@ _NAMES = frozenset({"label", "task"})  # attributes
 
 
 def hdf5_movements(path: Path, layout: Layout) -> Parsed:
-    """The movements in an HDF5 file: groups of data sets of one length; only those that are needed are read.
+    """Return the movements in an HDF5 file: groups of data sets of one length; only those that are needed are read.
 
     Data sets that lie in other files are passed over: a file from elsewhere must not make the program read others.
     """
@@ -44,13 +44,13 @@ def hdf5_movements(path: Path, layout: Layout) -> Parsed:
 
 
 def _tree(group: Any, h5py: Any, counted: list[int], depth: int = 0, unit: Any = None) -> dict[str, Any]:
-    """A group as a mapping: data sets that are not read yet, single numbers and texts, groups.
+    """Return a group as a mapping: data sets that are not read yet, single numbers and texts, groups.
 
     `unit` is that of the group around it, for data sets that have none.
     """
     tree: dict[str, Any] = {}
     unit = _unit_in(group, group.attrs) or unit
-    tree |= _said(group, group.attrs)
+    tree |= _label_and_rate(group, group.attrs)
     for name in group:
         counted[0] += 1
         if counted[0] > _MOST:
@@ -63,7 +63,7 @@ def _tree(group: Any, h5py: Any, counted: list[int], depth: int = 0, unit: Any =
                 tree[name] = _tree(member, h5py, counted, depth + 1, unit)
         elif isinstance(member, h5py.Dataset) and not member.external and not member.is_virtual:
             names = tuple(member.attrs)
-            rate = rate_of(_said(member, names)) if names else None
+            rate = rate_of(_label_and_rate(member, names)) if names else None
             if member.shape == ():
                 tree[name] = _single(member[()])
                 tree |= {} if rate is None else {"rate": rate.hertz}  # as of NWB's starting_time
@@ -79,7 +79,7 @@ def _tree(group: Any, h5py: Any, counted: list[int], depth: int = 0, unit: Any =
 
 
 def _labels(stored: Any) -> list[str | float | None]:
-    """The texts of a data set that labels movements, one after the other: all may be the same large one in the file."""
+    """Read the texts of a data set that labels movements, one by one: all may be the same large one in the file."""
     n_letters, labels = stored.shape[0] * max(1, stored.dtype.itemsize), []
     for k in range(stored.shape[0]):
         if n_letters > _LETTERS:
@@ -89,8 +89,8 @@ def _labels(stored: Any) -> list[str | float | None]:
     return labels
 
 
-def _said(stored: Any, names: Iterable[str]) -> dict[str, Any]:
-    """The label and the rate among the attributes of a group or of a data set."""
+def _label_and_rate(stored: Any, names: Iterable[str]) -> dict[str, Any]:
+    """Return the label and the rate among the attributes of a group or of a data set."""
     values = {
         name: _single(stored.attrs[name]) for name in names if name.lower() in _NAMES or seconds_named(name) is not None
     }
@@ -98,7 +98,7 @@ def _said(stored: Any, names: Iterable[str]) -> dict[str, Any]:
 
 
 def _unit_in(stored: Any, names: Iterable[str]) -> Any:
-    """The unit in the attributes of a group or of a data set, or one for each of its columns; None without."""
+    """Return the unit in the attributes of a group or of a data set, or one for each of its columns; None without."""
     for name in names:
         if name.lower() in _UNITS:
             value = stored.attrs[name]
@@ -151,7 +151,7 @@ class _Stored:
 
 
 def _single(value: Any) -> str | float | None:
-    """A text or a number; None for anything else."""
+    """Return a text or a number; None for anything else."""
     if isinstance(value, bytes):
         return value.decode("utf-8", "replace")
     if isinstance(value, str):

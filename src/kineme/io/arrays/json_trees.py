@@ -38,7 +38,7 @@ _NUMBER, _LIST = 32, 88  # bytes of a Python object
 
 
 def json_movements(data: bytes, layout: Layout) -> Parsed:
-    """The movements in JSON: named arrays, samples ``[{"t": 0, "x": 1}, ...]``, lists of either, or these by name."""
+    """Read movements in JSON: named arrays, samples ``[{"t": 0, "x": 1}, ...]``, lists of either, or these by name."""
     check_objects(data)
     try:
         entries = json.loads(data, object_pairs_hook=_each_once)
@@ -55,7 +55,7 @@ def json_movements(data: bytes, layout: Layout) -> Parsed:
 
 
 def json_lines_movements(data: bytes, layout: Layout) -> Parsed:
-    """The movements in JSON lines: a sample in each line, or a movement in each line."""
+    """Return the movements in JSON lines: a sample in each line, or a movement in each line."""
     check_objects(data)
     entries = []
     for k, line in enumerate(data.decode("utf-8-sig").splitlines(), 1):
@@ -71,7 +71,7 @@ def json_lines_movements(data: bytes, layout: Layout) -> Parsed:
 
 
 def _frame(entries: Mapping[str, Any]) -> dict[str, list[Any]] | None:
-    """The columns of a data frame as pandas writes it by columns, by its index, or split; None of something else.
+    """Give the columns of a data frame as pandas writes it by columns, by its index, or split; None of something else.
 
     Its index is a column too: the times if it holds dates.
     """
@@ -110,7 +110,7 @@ def _with_index(index: list[Any], columns: dict[str, list[Any]]) -> dict[str, li
 
 
 def _columns_of(frame: Mapping[str, list[Any]]) -> dict[str, Any]:
-    """Columns as arrays; of times that are texts the seconds, which their head says."""
+    """Return columns as arrays; of times that are texts the seconds, which their head says."""
     tree = {}
     for head, cells in frame.items():
         if is_time(head) and any(isinstance(cell, str) for cell in cells):
@@ -129,7 +129,7 @@ def check_objects(data: bytes) -> None:
 
 
 def size_of_objects(data: bytes) -> int:
-    """The memory [bytes] that JSON takes with the Python objects that it becomes."""
+    """Return the memory [bytes] that JSON takes with the Python objects that it becomes."""
     lists = data.count(b"[") + data.count(b"{")
     return len(data) + _NUMBER * data.count(b",") + _LIST * lists
 
@@ -143,7 +143,7 @@ def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def as_tree(value: Any) -> Any:
-    """Parsed JSON as a tree of arrays."""
+    """Return parsed JSON as a tree of arrays."""
     if isinstance(value, Mapping):
         if any(_OPENPOSE.fullmatch(name) for name in value):
             raise DataError(
@@ -183,7 +183,7 @@ def as_tree(value: Any) -> Any:
 
 
 def _stacked(rows: list[Any]) -> Any:
-    """Points (T, J, d) over time as one array, of a list of arrays (J, d)."""
+    """Return points (T, J, d) over time as one array, of a list of arrays (J, d)."""
     alike = all(isinstance(row, np.ndarray) and row.ndim == 2 and row.shape == rows[0].shape for row in rows)
     return np.stack(rows) if alike and rows[0].dtype.kind == "f" else rows
 
@@ -219,7 +219,7 @@ def _name(part: Mapping[str, Any], keys: Sequence[str] = _NAMES) -> str | None:
 
 
 def _columns(samples: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Samples with names as one array for each name, NaN where it is missing; parts of a sample by name or number."""
+    """Return samples with names as an array for each name, NaN where it is missing; parts by name or number."""
     flat = [_flat(sample) for sample in samples]
     names = dict.fromkeys(name for cells in flat for name in cells)
     for name in [name for name in names if name.endswith(f".{_COUNT}")]:
@@ -258,7 +258,7 @@ def _flat(sample: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _array(values: list[Any]) -> Any:
-    """Numbers as an array, NaN for null; texts as objects; a `DataError` for rows that differ in length.
+    """Return numbers as an array, NaN for null; texts as objects; a `DataError` for rows that differ in length.
 
     Nulls alone say nothing of numbers: they are empty texts, which are left aside.
     """
@@ -281,7 +281,7 @@ def _array(values: list[Any]) -> Any:
 
 
 def json_messages(path: Path, layout: Layout) -> Parsed:
-    """The movement of a topic. Its times are those in the messages, or where they have none those of the recording."""
+    """Read a topic as a movement. Its times are those in the messages, or where these have none of the recording."""
     with needs("mcap", "read MCAP", "ros"):
         from mcap.records import Channel, Message
 

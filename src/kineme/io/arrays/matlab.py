@@ -73,7 +73,7 @@ def read_demos(data: bytes) -> Demos:
 
 
 def _of_structure(record: Any) -> tuple[Array, Array]:
-    """Times (T,) and positions (T, d) of a structure with ``t`` (T,) and ``pos`` (d, T)."""
+    """Return times (T,) and positions (T, d) of a structure with ``t`` (T,) and ``pos`` (d, T)."""
     if not isinstance(record, dict):
         raise ValueError("something else than structures in it")
     if missing := [field for field in _FIELDS if field not in record]:
@@ -88,7 +88,7 @@ def _of_structure(record: Any) -> tuple[Array, Array]:
 
 
 def mat_movements(data: bytes, layout: Layout) -> Parsed:
-    """The movements in a MATLAB file: those of ``demos``, see `read_demos`, else of all its variables.
+    """Return the movements in a MATLAB file: those of ``demos``, see `read_demos`, else of all its variables.
 
     Structures with times hold one movement; cells and arrays of structures hold many. Matrices among the variables
     count only beside times or a rate, or where the caller gives the step between samples.
@@ -117,12 +117,12 @@ def mat_movements(data: bytes, layout: Layout) -> Parsed:
 
 
 def as_tree(variables: Mapping[str, Matrix], order: str) -> dict[str, Any]:
-    """Variables as a tree, in which every array has its samples along the first axis."""
+    """Return variables as a tree, in which every array has its samples along the first axis."""
     return _upright({name: _node(matrix, order, [0]) for name, matrix in variables.items()})
 
 
 def _node(matrix: Matrix, order: str, taken: list[int], depth: int = 0, wanted: Container[str] | None = None) -> Any:
-    """A matrix as a branch of a tree; of structures only the wanted fields are read, which have to be real numbers."""
+    """Read a matrix as a branch of a tree; of structures only the wanted fields, which have to be real numbers."""
     if depth > _DEEPEST:
         return None
     if matrix.kind in NUMBERS and not (matrix.is_complex and wanted is None):
@@ -147,7 +147,7 @@ def _node(matrix: Matrix, order: str, taken: list[int], depth: int = 0, wanted: 
 
 
 def _children(matrix: Matrix, order: str, count: int, skipped: int) -> Iterator[Matrix]:
-    """The matrices in a cell array or a structure, behind what describes its fields."""
+    """Yield the matrices in a cell array or a structure, behind what describes its fields."""
     parts = elements(matrix.content, order)
     for _ in range(skipped):
         next(parts, None)
@@ -158,7 +158,7 @@ def _children(matrix: Matrix, order: str, count: int, skipped: int) -> Iterator[
 
 
 def _upright(tree: Any) -> Any:
-    """Matrices with their samples along the first axis: as many as there are times, else the longer axis."""
+    """Return matrices with their samples along the first axis: as many as there are times, else the longer axis."""
     if isinstance(tree, list):
         return [_upright(node) for node in tree if node is not None]
     if not isinstance(tree, dict):
@@ -199,7 +199,7 @@ class Matrix(NamedTuple):
 
 
 def byte_order(data: bytes) -> str:
-    """The byte order ``"<"`` or ``">"`` of the header; a `ValueError` if this is not a file of version 5."""
+    """Return the byte order ``"<"`` or ``">"`` of the header; a `ValueError` if this is not a file of version 5."""
     order = {b"\0\1IM": "<", b"\1\0MI": ">"}.get(data[HEADER - 4 : HEADER])
     if order is None:
         raise ValueError("something foreign or truncated")
@@ -207,7 +207,7 @@ def byte_order(data: bytes) -> str:
 
 
 def elements(data: memoryview, order: str) -> Iterator[Element]:
-    """Consecutive elements; a `ValueError` if one ends beyond the data."""
+    """Yield consecutive elements; a `ValueError` if one ends beyond the data."""
     at = 0
     while at < len(data):
         if len(data) - at < 8:
@@ -226,7 +226,7 @@ def elements(data: memoryview, order: str) -> Iterator[Element]:
 
 
 def matrices(data: bytes, order: str, wanted: Container[str] | None = None) -> dict[str, Matrix]:
-    """The variables with these names, by default all; others are neither decompressed nor read."""
+    """Return the variables with these names, by default all; others are neither decompressed nor read."""
     variables, taken = {}, 0
     for element in elements(memoryview(data)[HEADER:], order):
         if element.type == _COMPRESSED:
@@ -243,7 +243,7 @@ def matrices(data: bytes, order: str, wanted: Container[str] | None = None) -> d
 
 
 def _expanded(packed: memoryview, order: str, wanted: Container[str] | None) -> Matrix:
-    """The matrix in a compressed element; only its header if its name is not wanted."""
+    """Return the matrix in a compressed element; only its header if its name is not wanted."""
     stream = zlib.decompressobj()
     head = stream.decompress(packed, _PEEK)
     if len(head) < 8:
@@ -262,7 +262,7 @@ def _expanded(packed: memoryview, order: str, wanted: Container[str] | None) -> 
 
 
 def as_matrix(element: Element, order: str) -> Matrix:
-    """An element as a matrix; an element without data is an empty matrix."""
+    """Return an element as a matrix; an element without data is an empty matrix."""
     if element.type != _MATRIX:
         raise ValueError(f"an element of type {element.type} in place of a matrix")
     return _matrix(element.data, order) if len(element.data) else Matrix(6, False, (0, 0), "", element.data)
@@ -285,7 +285,7 @@ def _matrix(data: memoryview, order: str) -> Matrix:
 
 
 def field_names(matrix: Matrix, order: str) -> list[str]:
-    """The names of a structure's fields, which the first two elements of its content tell."""
+    """Return the names of a structure's fields, which the first two elements of its content tell."""
     parts = elements(matrix.content, order)
     width, names = next(parts, None), next(parts, None)
     size = int.from_bytes(width.data, "little" if order == "<" else "big") if width else 0
@@ -296,7 +296,7 @@ def field_names(matrix: Matrix, order: str) -> list[str]:
 
 
 def numbers(matrix: Matrix, order: str) -> Array:
-    """The content of a matrix of real numbers, squeezed."""
+    """Return the content of a matrix of real numbers, squeezed."""
     if matrix.kind not in NUMBERS or matrix.is_complex:
         raise ValueError("complex numbers" if matrix.is_complex else "something else than numbers")
     content = next(elements(matrix.content, order), None)
@@ -310,7 +310,7 @@ def numbers(matrix: Matrix, order: str) -> Array:
 
 
 def text(matrix: Matrix, order: str) -> str | None:
-    """The content of a matrix that is one line of text, else None."""
+    """Return the content of a matrix that is one line of text, else None."""
     content = next(elements(matrix.content, order), None) if matrix.kind == TEXT else None
     if content is None or content.type not in _ENCODINGS or len(matrix.dims) != 2 or matrix.dims[0] != 1:
         return None

@@ -92,7 +92,7 @@ class Npz(Mapping[str, NDArray[Any]]):
 
 
 def array_of_npy(data: bytes, path: Path) -> NDArray[Any]:
-    """The array in the bytes of an npy file."""
+    """Return the array in the bytes of an npy file."""
     try:
         return _decoded(data, "it", path, check_expanded)
     except DataError:

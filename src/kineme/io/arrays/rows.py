@@ -47,7 +47,7 @@ class _Series(NamedTuple):
 
 
 def row_movements(data: bytes, layout: Layout) -> Parsed:
-    """The movements of a table, one in each line: its label, then the coordinates of sample after sample.
+    """Return the movements of a table, one in each line: its label, then the coordinates of sample after sample.
 
     The coordinates of a sample are named by `layout.columns`, or by heads such as x0, y0, x1, y1. The label is in the
     column `layout.label`; by default in the first or the last one if it holds words, or a whole number beside a whole
@@ -82,7 +82,7 @@ def row_movements(data: bytes, layout: Layout) -> Parsed:
 
 
 def _table(data: bytes) -> tuple[list[_Line], list[str]]:
-    """The lines, split into cells, and the heads, if there are any."""
+    """Return the lines, split into cells, and the heads, if there are any."""
     check_expanded(len(data) + _CELL * sum(map(data.count, (b",", b";", b"\t", b" "))))
     texts = [(number, line) for number, line in enumerate(lines_of(data), 1) if not is_skipped(line)]
     if not texts:
@@ -96,7 +96,7 @@ def _table(data: bytes) -> tuple[list[_Line], list[str]]:
 
 
 def _names(layout: Layout, heads: Sequence[str]) -> list[str]:
-    """The names of the coordinates of a sample."""
+    """Return the names of the coordinates of a sample."""
     if layout.coordinates is not None:
         return [str(name) for name in layout.coordinates]
     stems = [match[1] for head in heads if (match := _COUNTED.fullmatch(head))]
@@ -110,7 +110,7 @@ def _names(layout: Layout, heads: Sequence[str]) -> list[str]:
 
 
 def _label_column(lines: Sequence[_Line], heads: Sequence[str], width: int, layout: Layout) -> int | None:
-    """The column of the labels, or None where there is none."""
+    """Return the column of the labels, or None where there is none."""
     first = lines[0].cells
     if layout.label is not None:
         return column_numbers(heads or [f"column {k}" for k in range(len(first))], [layout.label])[0]
@@ -123,7 +123,7 @@ def _label_column(lines: Sequence[_Line], heads: Sequence[str], width: int, layo
 
 
 def _class_column(lines: Sequence[_Line], width: int) -> int | None:
-    """The column of classes that are whole numbers beside samples of `width` coordinates, or None."""
+    """Return the column of classes that are whole numbers beside samples of `width` coordinates, or None."""
     peeked, n_cells = lines[:_PEEK], len(lines[0].cells)
     last = n_cells - 1 if all(len(line.cells) == n_cells for line in lines) else 0
     ends = [k for k in (0, last) if all(_WHOLE.fullmatch(line.cells[k]) for line in peeked)]
@@ -143,7 +143,7 @@ def _class_column(lines: Sequence[_Line], width: int) -> int | None:
 
 
 def series_movements(data: bytes, layout: Layout) -> Parsed:
-    """The movements of a ``.ts`` file, as sktime and aeon write them: one in each line below ``@data``.
+    """Return the movements of a ``.ts`` file, as sktime and aeon write them: one in each line below ``@data``.
 
     The columns of a movement are separated by colons, its values by commas, each alone or as ``(time,value)``; the
     label is last where ``@classLabel`` says so. A value of ``@targetLabel`` is no label.
@@ -175,7 +175,7 @@ def series_movements(data: bytes, layout: Layout) -> Parsed:
 
 
 def _head(data: bytes) -> tuple[dict[str, str], list[tuple[int, str]]]:
-    """The attributes in lower case, and the lines below ``@data`` with their numbers."""
+    """Return the attributes in lower case, and the lines below ``@data`` with their numbers."""
     flags: dict[str, str] = {}
     lines = enumerate(lines_of(data), 1)
     for _, line in lines:
@@ -214,7 +214,7 @@ def _timed(part: str) -> tuple[Array, Array]:
 
 
 def _side_by_side(columns: Sequence[tuple[Array, Array]], timed: bool) -> tuple[Array, Array]:
-    """The columns of a movement as times (T,) and positions (T, d), without padding at the end."""
+    """Return the columns of a movement as times (T,) and positions (T, d), without padding at the end."""
     if not columns:
         raise ValueError("expected values of at least one dimension, got none")
     lengths = [len(x) for _, x in columns]
@@ -230,7 +230,7 @@ def _side_by_side(columns: Sequence[tuple[Array, Array]], timed: bool) -> tuple[
 
 
 def _parsed(series: _Series, names: Sequence[str], layout: Layout, kind: str, timed: bool = False) -> Parsed:
-    """Movements of the width of the first, with what the others lack."""
+    """Return movements of the width of the first, with what the others lack."""
     if not series.positions:
         reason = f"; {series.left_out[0]}" if series.left_out else ""
         raise DataError(f"expected a movement in each line, got none{reason}")

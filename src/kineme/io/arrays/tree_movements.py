@@ -21,7 +21,7 @@ from kineme.io.arrays.arrays import (
     point_names,
     sets_or_points,
 )
-from kineme.io.arrays.trees import NAMES, STAMP, Found, Style, listed_shapes, movements_in
+from kineme.io.arrays.trees import NAMES, STAMP, Style, TreeMovement, listed_shapes, movements_in
 from kineme.io.limits import check_expanded
 from kineme.movements.tables.columns import choose_roles, is_time
 from kineme.movements.tables.layout import Layout, Parsed, listed, no_lines
@@ -33,7 +33,7 @@ _POINTS = frozenset({"position", "positions", "pos", "translation", "xyz", "poin
 
 
 def tree_movements(tree: Any, layout: Layout, kind: str, style: Style = NAMES, many: str = "refuse") -> Parsed:
-    """The movements of a tree, see `kineme.io.arrays.trees`.
+    """Return the movements of a tree, see `kineme.io.arrays.trees`.
 
     Several arrays of more than one column, of which `layout` chooses none, are refused unless `many` is "take": they
     may mean different things, such as states and commands, or be parts of one state.
@@ -70,8 +70,8 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: Style = NAMES, m
     return parsed._replace(detected=parsed.detected._replace(ignored=(*parsed.detected.ignored, *static)))
 
 
-def _of_one_array(movements: list[Found], layout: Layout) -> list[Found]:
-    """Movements that may be the points of one, as `sets_or_points` tells them; others as they are.
+def _of_one_array(movements: list[TreeMovement], layout: Layout) -> list[TreeMovement]:
+    """Return movements that may be the points of one, as `sets_or_points` tells them; others as they are.
 
     They are one array (n, T, d), or n lists of points with names for their coordinates, and have no times.
     """
@@ -104,8 +104,8 @@ def _of_one_array(movements: list[Found], layout: Layout) -> list[Found]:
     return [movements[0]._replace(place="", entries=dict(zip(heads, x[0].T, strict=True)))]
 
 
-def _bare(movements: Sequence[Found], layout: Layout, kind: str) -> Parsed:
-    """Movements that are arrays alone, without times."""
+def _bare(movements: Sequence[TreeMovement], layout: Layout, kind: str) -> Parsed:
+    """Return movements that are arrays alone, without times."""
     if len(movements) == 1 and not isinstance(layout.units, float | int):
         raise DataError(
             "expected times beside the positions, got one array alone; say the seconds between two samples with "
@@ -135,8 +135,8 @@ def _bare(movements: Sequence[Found], layout: Layout, kind: str) -> Parsed:
     return parsed._replace(detected=parsed.detected._replace(measured_in=measured_in), left_out=odd)
 
 
-def _plainly_named(movement: Found) -> Found:
-    """The only array of several columns that means positions loses its name: its coordinates are x, y, z."""
+def _plainly_named(movement: TreeMovement) -> TreeMovement:
+    """Take the name from the only array of several columns that means positions: its coordinates are x, y, z."""
     wide = [name for name, entry in movement.entries.items() if len(entry.shape) > 1]
     if len(wide) == 1 and wide[0] in POSITIONS:
         return movement._replace(
@@ -145,8 +145,8 @@ def _plainly_named(movement: Found) -> Found:
     return movement
 
 
-def _heads(movement: Found, names: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """A head for each column, and the array that it is of."""
+def _heads(movement: TreeMovement, names: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return a head for each column, and the array that it is of."""
     heads, owners = [], []
     for name in names:
         shape = movement.entries[name].shape
@@ -171,15 +171,18 @@ def _is_text(entry: Any) -> bool:
 
 
 def _units_of(array: Any, width: int) -> list[str]:
-    """The unit of each of the columns of an array, empty where it says none."""
+    """Return the unit of each of the columns of an array, empty where it says none."""
     unit = getattr(array, "unit", None) or ""
     return [unit] * width if isinstance(unit, str) else unit if len(unit) == width else [""] * width
 
 
 def _table(
-    movements: Sequence[Found], first: Found, columns: tuple[Sequence[str], Sequence[str]], needed: Mapping[str, bool]
+    movements: Sequence[TreeMovement],
+    first: TreeMovement,
+    columns: tuple[Sequence[str], Sequence[str]],
+    needed: Mapping[str, bool],
 ) -> Table:
-    """The arrays that are needed, one movement after the other; what a movement lacks is a fault of its first row.
+    """Give the arrays that are needed, one movement after the other; what a movement lacks is a fault of its first row.
 
     `needed` says of each whether it holds coordinates, which are not rounded.
     """
@@ -213,8 +216,8 @@ def _table(
     return Table(tuple(heads), filled, int(offsets[-1]), no_lines, faults, None, units, movement_parts)
 
 
-def _part(movement: Found, name: str, length: int, kind: tuple[int, bool, bool]) -> tuple[Any, str]:
-    """An array of a movement as columns (T, d), of numbers or of texts, and what is wrong with it."""
+def _part(movement: TreeMovement, name: str, length: int, kind: tuple[int, bool, bool]) -> tuple[Any, str]:
+    """Return an array of a movement as columns (T, d), of numbers or of texts, and what is wrong with it."""
     width, of_texts, of_time = kind
     if name == STAMP:
         stamps = np.full(length, np.nan) if movement.rate is None else movement.rate.stamps(length)
@@ -233,7 +236,7 @@ def _part(movement: Found, name: str, length: int, kind: tuple[int, bool, bool])
 
 
 def nested(arrays: Mapping[str, Any]) -> Any:
-    """Arrays whose names hold slashes as groups within groups."""
+    """Return arrays whose names hold slashes as groups within groups."""
     if not any("/" in name for name in arrays):
         return arrays
     tree: dict[str, Any] = {}

@@ -62,7 +62,7 @@ class Rate(NamedTuple):
     hertz: float  # NaN where the file says several that differ, which are named
 
     def stamps(self, n: int) -> Any:
-        """The times [s] of n samples."""
+        """Return the times [s] of n samples."""
         if math.isnan(self.hertz):
             raise DataError(
                 f"expected one rate, got {self.name}; say the seconds between two samples with units=, in the shell "
@@ -73,7 +73,7 @@ class Rate(NamedTuple):
 
 @lru_cache(maxsize=4096)  # thousands of groups have the same names
 def seconds_named(name: str) -> float | None:
-    """The seconds of a unit of a step by its name, ``dt``, ``interval_ms``; 0 of a rate, None of another name."""
+    """Give the seconds of a unit of a step by its name, ``dt``, ``interval_ms``; 0 of a rate, None of another name."""
     words = {*words_of(name)}
     if words <= _RATE_WORDS | _BESIDE_RATE and words & _RATE_WORDS:
         return 0.0
@@ -83,7 +83,7 @@ def seconds_named(name: str) -> float | None:
     return (*units, 1.0)[0] if is_step and len(units) < 2 else None
 
 
-class Found(NamedTuple):
+class TreeMovement(NamedTuple):
     """A movement in a tree: its place, its label if known, its arrays by name, empty for a bare one, and its rate."""
 
     place: str
@@ -101,8 +101,8 @@ class Found(NamedTuple):
 
 def movements_in(
     tree: Any, style: Style = NAMES, place: str = "", label: str | None = None, rate: Rate | None = None
-) -> Iterator[Found]:
-    """The movements in a tree, in its order, at the rate of the group around them where they say none.
+) -> Iterator[TreeMovement]:
+    """Yield the movements in a tree, in its order, at the rate of the group around them where they say none.
 
     An array has ``shape`` and ``dtype``, and is converted to one of NumPy only when it is needed. The style is `NAMES`
     where arrays are named, `GROUPS` where they lie in groups.
@@ -124,17 +124,17 @@ def is_array(tree: Any) -> bool:
     return hasattr(tree, "dtype") and hasattr(tree, "shape") and len(tree.shape) > 0 and tree.dtype.kind in "biufmMO"
 
 
-def _of_array(array: Any, place: str, label: str | None, labels: Sequence[str] = ()) -> Iterator[Found]:
+def _of_array(array: Any, place: str, label: str | None, labels: Sequence[str] = ()) -> Iterator[TreeMovement]:
     if len(array.shape) == 3:
         for k in range(array.shape[0]):
-            yield Found(f"{place}/{k}" if place else str(k), labels[k] if labels else label, {"": array[k]})
+            yield TreeMovement(f"{place}/{k}" if place else str(k), labels[k] if labels else label, {"": array[k]})
     elif len(array.shape) in (1, 2):
-        yield Found(place, label, {"": array})
+        yield TreeMovement(place, label, {"": array})
 
 
 def _of_group(
     tree: Mapping[str, Any], style: Style, place: str, label: str | None, rate: Rate | None
-) -> Iterator[Found]:
+) -> Iterator[TreeMovement]:
     label = _own_label(tree) or label
     labels = _labels_of_sets(tree)
     of_labels = {name for name, _ in labels.values()}
@@ -152,7 +152,7 @@ def _of_group(
     own_times = all(name in times or _is_stamp_of(name, arrays) for name in arrays)
     if arrays and not own_times and not labels and (_are_columns(arrays, style, rate) or _continues(arrays, groups)):
         entries = {inner: entry for inner, entry in _flat(tree, style.separator) if _fits(entry)}
-        yield Found(place, label, {k: entry for k, entry in entries.items() if not _is_rate(k, entries)}, rate)
+        yield TreeMovement(place, label, {k: entry for k, entry in entries.items() if not _is_rate(k, entries)}, rate)
         return
     for name, array in arrays.items():
         if _is_stamp_of(name, arrays):
@@ -166,7 +166,7 @@ def _of_group(
 
 
 def _labels_of_sets(tree: Mapping[str, Any]) -> dict[str, tuple[str, list[str]]]:
-    """For arrays of movements (n, T, d) the array that labels them, ``y`` of ``X``, ``y_train`` of ``X_train``."""
+    """Give for arrays of movements (n, T, d) the array that labels them, ``y`` of ``X``, ``y_train`` of ``X_train``."""
     labels = {}
     for name, array in tree.items():
         if not is_array(array) or len(array.shape) != 3:
@@ -188,7 +188,7 @@ def is_label(name: str) -> bool:
 
 
 def as_label(value: Any) -> str | None:
-    """A label as text; whole numbers without their fraction, None where there is none."""
+    """Return a label as text; whole numbers without their fraction, None where there is none."""
     if isinstance(value, bytes):
         return value.decode("utf-8", "replace") or None
     if isinstance(value, float) and value.is_integer():
@@ -241,7 +241,7 @@ def _fits(array: Any) -> bool:
 
 
 def rate_of(tree: Mapping[str, Any]) -> Rate | None:
-    """The rate in a group; an array is read only if it has the name of one. Steps count as `unit_by_size` has it."""
+    """Find the rate in a group; only an array with such a name is read. Steps count as `unit_by_size` has it."""
     rates = []
     for name in tree:
         if not _is_rate(name, tree):
@@ -258,7 +258,7 @@ def rate_of(tree: Mapping[str, Any]) -> Rate | None:
 
 
 def _number(value: Any) -> float | None:
-    """A number alone, also as a text."""
+    """Return a number alone, also as a text."""
     try:
         return float(np.asarray(value).item())
     except (TypeError, ValueError):
@@ -271,7 +271,7 @@ def _is_rate(name: str, tree: Mapping[str, Any]) -> bool:
 
 
 def _own_label(tree: Mapping[str, Any]) -> str | None:
-    """The label that a group says; beside points or strokes its name is one, as of the $1 recognizer."""
+    """Return the label that a group says; beside points or strokes its name is one, as of the $1 recognizer."""
     drawn = any(name.lower() in _DRAWN and isinstance(branch, (Mapping, list)) for name, branch in tree.items())
     for name, branch in tree.items():
         if not isinstance(branch, str) or not branch:
@@ -289,12 +289,12 @@ def has_times(names: Iterable[str]) -> bool:
 
 
 def label_of(name: str) -> str | None:
-    """The label in the name of a movement; None if it only counts: ``demo_3``, ``wave_2``, ``7``."""
+    """Return the label in the name of a movement; None if it only counts: ``demo_3``, ``wave_2``, ``7``."""
     words = words_of(name)
     structural = set(words) <= MOVEMENT_WORDS | _STRUCTURAL or (words[:1] == ("x",) and set(words[1:]) <= _STRUCTURAL)
     return None if not words or words[-1].isdecimal() or (structural and words != ("x",)) else name
 
 
 def listed_shapes(entries: Mapping[str, Any], names: Sequence[str]) -> str:
-    """Names of arrays with the width of each, for a message."""
+    """Return names of arrays with the width of each, for a message."""
     return ", ".join(f"{name} ({int(np.prod(entries[name].shape[1:]))})" for name in names)

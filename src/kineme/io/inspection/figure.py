@@ -27,7 +27,7 @@ _LETTERS, _BESIDE = 11, 24  # letters of the legend in an inch, and those that s
 
 
 def draw_recordings(recordings: Recordings, unlike: Collection[int] = ()) -> Figure:
-    """Small multiples, one per label; movements that are unlike the others of theirs, by their indices, in orange.
+    """Draw small multiples, one per label; movements that are unlike the others of theirs, by their indices, in orange.
 
     One dimension is drawn over time, two in the plane, of three and more the first three in space. Every panel has a
     scale of its own, the same for its axes; below it stand the sides of the box around what is drawn.
@@ -93,7 +93,7 @@ def _draw_label(axes: Any, recordings: Recordings, label: str | None, unlike: se
 
 
 def _path(movement: Trajectory) -> Any:
-    """The points of a movement that are drawn, (points, 2 or 3)."""
+    """Return the points of a movement that are drawn, (points, 2 or 3)."""
     drawn = evenly_spaced(len(movement), _POINTS)
     x = movement.positions[drawn, :3]
     return x if x.shape[1] > 1 else np.column_stack((movement.times[drawn] - movement.times[0], x))

@@ -82,7 +82,7 @@ class Inspection(NamedTuple):
 
 
 def nothing_read(file: str, reason: str) -> Inspection:
-    """The inspection of a file of which no movement is read."""
+    """Return the inspection of a file of which no movement is read."""
     return Inspection(0, 0, 0, (), (), None, (), (Problem(file, None, reason),), ())
 
 
@@ -113,7 +113,7 @@ def inspect(recordings: Recordings) -> Inspection:
 
 
 def labels_in_order(recordings: Recordings) -> list[str | None]:
-    """Each label once, in alphabetic order, None last."""
+    """Return each label once, in alphabetic order, None last."""
     labels = set(recordings.labels)
     named = sorted(label for label in labels if label is not None)
     return [*named, *([None] if None in labels else [])]
@@ -162,7 +162,7 @@ def _notes(recordings: Recordings, labels: tuple[LabelSummary, ...]) -> list[str
 
 
 def _notes_on_channels(demos: Demonstrations) -> list[str]:
-    """Columns whose values do not fit their kind, and those that never change."""
+    """Return columns whose values do not fit their kind, and those that never change."""
     channels, x, starts, notes = demos.channels or (), demos.recorded, demos.offsets[:-1], list[str]()
     columns_of_channels = columns_of(channels)
     if len(columns_recorded(channels).heads) >= _MANY:
@@ -180,7 +180,7 @@ def _notes_on_channels(demos: Demonstrations) -> list[str]:
 
 
 def duplicates_among(demonstrations: Demonstrations) -> list[list[int]]:
-    """Groups of indices of equal movements, each group in order.
+    """Return groups of indices of equal movements, each group in order.
 
     Candidates have equal lengths, ends and sums, computed for all movements at once; they are compared by sample.
     """
@@ -214,13 +214,13 @@ def _equal(demonstrations: Demonstrations, alike: list[int]) -> list[list[int]]:
 
 
 def extents_of(demos: Demonstrations) -> Array:
-    """The sides (n, d) of the box around each movement."""
+    """Return the sides (n, d) of the box around each movement."""
     x, starts = demos.positions, demos.offsets[:-1]
     return np.asarray(np.maximum.reduceat(x, starts, axis=0) - np.minimum.reduceat(x, starts, axis=0))
 
 
 def notes_on_extents(demos: Demonstrations) -> list[str]:
-    """A sentence if some columns reach much further than all others, as a gripper in mm beside joints in radians.
+    """Give a sentence if some columns reach much further than all others, as a gripper in mm beside joints in radians.
 
     Columns that belong together are one group: one axis or one joint may move alone. Rotations are left aside, they
     are brought to the size of positions.
@@ -247,7 +247,7 @@ def notes_on_extents(demos: Demonstrations) -> list[str]:
 
 
 def notes_on_sizes(demos: Demonstrations) -> list[str]:
-    """A sentence if movements of one label differ in size as millimeters and meters do, whose unit no file says."""
+    """Say that movements of one label differ in size as millimeters and meters do, if no file says their unit."""
     extents = extents_of(demos).max(axis=1, initial=0.0)
     labels = np.full(len(demos), None) if demos.labels is None else demos.labels
     for label in dict.fromkeys(labels.tolist()):
@@ -266,7 +266,7 @@ def notes_on_sizes(demos: Demonstrations) -> list[str]:
 
 
 def _group(channel: Channel) -> str:
-    """The same of columns that count in one unit: it is known, or their names are those of axes or joints."""
+    """Return a text that columns of one unit share: the unit is known, or their names are those of axes or joints."""
     if channel.unit or channel.kind == "angle":
         return channel.unit or "an angle"
     stem = _END.sub("", channel.name).lower()
@@ -274,7 +274,7 @@ def _group(channel: Channel) -> str:
 
 
 def as_data(inspection: Inspection) -> dict[str, Any]:
-    """Nested lists and dictionaries; units as the fields of `Inspection` and `LabelSummary` say."""
+    """Return nested lists and dictionaries; units as the fields of `Inspection` and `LabelSummary` say."""
     return {
         "movements": inspection.movements,
         "files": inspection.files,
@@ -294,7 +294,7 @@ def as_data(inspection: Inspection) -> dict[str, Any]:
 
 
 def as_words(inspection: Inspection) -> str:
-    """A table of labels, how files were read, duplicates, and what could not be read."""
+    """Write a table of labels, how files were read, duplicates, and what could not be read."""
     rows = [_row(summary) for summary in inspection.labels]
     title = (
         f"{counted(inspection.movements, 'movement')} of {counted(inspection.dimensions, 'dimension')} "
@@ -306,8 +306,10 @@ def as_words(inspection: Inspection) -> str:
     channels = inspection.channels or ()
     parts += _listed("kinds", _kinds(channels))
     parts += _listed("the same movement more than once", [" = ".join(group) for group in inspection.duplicates])
-    parts += _listed("not read", _once([problem for problem in inspection.problems if not problem.samples]))
-    parts += _listed("read but for samples", _once([problem for problem in inspection.problems if problem.samples]))
+    parts += _listed("not read", _by_reason([problem for problem in inspection.problems if not problem.samples]))
+    parts += _listed(
+        "read but for samples", _by_reason([problem for problem in inspection.problems if problem.samples])
+    )
     parts += _listed("note", list(inspection.notes))
     return "\n\n".join(parts)
 
@@ -319,8 +321,8 @@ def _listed(head: str, lines: list[str]) -> list[str]:
     return ["\n".join([f"{head}:", *(f"  {printable(line)}" for line in lines[:_SHOWN]), *more])]
 
 
-def _once(problems: Sequence[Problem]) -> list[str]:
-    """A line for each reason, with the files that share it."""
+def _by_reason(problems: Sequence[Problem]) -> list[str]:
+    """Return a line for each reason, with the files that share it."""
     files: dict[str, dict[str, None]] = {}
     for problem in problems:
         files.setdefault(problem.what, {})[problem.file] = None
@@ -339,13 +341,13 @@ def _row(summary: LabelSummary) -> tuple[str, ...]:
 
 
 def _rate_range(values: Range) -> str:
-    """The median alone if minimum and maximum are equal, else all three."""
+    """Return the median alone if minimum and maximum are equal, else all three."""
     least, median, greatest = (f"{value:.4g}" if value < 1e6 else f"{value:.3g}" for value in values)
     return median if least == greatest else f"{median} ({least} to {greatest})"
 
 
 def _kinds(channels: Channels) -> list[str]:
-    """A line for each channel that is no position; of many, a line for each kind."""
+    """Return a line for each channel that is no position; of many, a line for each kind."""
     lever = lever_of(channels)
     others = [(channel, _kind(channel, lever)) for channel in channels if channel.kind != "position"]
     if len(others) <= _CHANNELS:
@@ -381,7 +383,7 @@ def _understood(how: Detected) -> str:
 
 
 def _coordinates(how: Detected) -> str:
-    """The coordinates with their units, once if they have the same."""
+    """Return the coordinates with their units, once if they have the same."""
     units = set(how.measured_in)
     if len(units) == 1:
         return f"{first_names(how.columns, _COLUMNS)} in {units.pop()}"
@@ -390,7 +392,7 @@ def _coordinates(how: Detected) -> str:
 
 
 def contents_of_all(paths: Sequence[Path], follow_links: bool = False) -> list[Contents]:
-    """The contents of all recordings at these paths; of several that have some, each row begins with its file."""
+    """Give the contents of all recordings at these paths; of several that have some, each row begins with its file."""
     try:
         entries, _ = entries_of(paths, follow_links) if paths else ([], [])
     except (DataError, OSError):  # reading gives the reason
@@ -412,7 +414,7 @@ def contents_of_all(paths: Sequence[Path], follow_links: bool = False) -> list[C
 
 
 def contents_of(path: Path) -> list[Contents]:
-    """The contents of one recording.
+    """Return the contents of one recording.
 
     There are none of a folder of files, of formats that hold movements alone, and of what cannot be opened: reading it
     gives the reason.
@@ -428,12 +430,12 @@ def contents_of(path: Path) -> list[Contents]:
 
 
 def contents_as_data(contents: list[Contents]) -> dict[str, Any]:
-    """A list of dictionaries under each name."""
+    """Return a list of dictionaries under each name."""
     return {content.name: [dict(zip(content.heads, row, strict=True)) for row in content.rows] for content in contents}
 
 
 def contents_as_words(contents: list[Contents]) -> list[str]:
-    """A table of each: what several files have alike once, and of a long list only what holds movements."""
+    """Return a table of each: what several files have alike once, and of a long list only what holds movements."""
     return [_in_words(_alike_once(content)) for content in contents]
 
 
@@ -449,7 +451,7 @@ def _in_words(content: Contents) -> str:
 
 
 def _alike_once(content: Contents) -> Contents:
-    """Rows that several files have alike but for their counts, once: the range of these, and in how many files."""
+    """Give rows that several files have alike but for their counts, once: the range of these, and in how many files."""
     if content.heads[0] != _FILE:
         return content
     n_files = len({file for file, *_ in content.rows})
@@ -467,7 +469,7 @@ def _alike_once(content: Contents) -> Contents:
 
 
 def _range_of_counts(cells: list[str | int]) -> str:
-    """A text that all rows have, or the least and the greatest of their numbers."""
+    """Return a text that all rows have, or the least and the greatest of their numbers."""
     numbers = [cell for cell in cells if isinstance(cell, int)]
     if not numbers:
         return str(cells[0])

@@ -146,7 +146,7 @@ def write_shard(source: Path, target: Path, motions: Mapping[int, Sequence[Motio
 
 @contextmanager
 def _reading() -> Iterator[None]:
-    """Damage is an error of the data; what is wrong with the disk when writing stays one of the system."""
+    """Raise damage as an error of the data; what is wrong with the disk when writing stays one of the system."""
     try:
         yield
     except OSError as error:
@@ -154,7 +154,7 @@ def _reading() -> Iterator[None]:
 
 
 def _compression(metadata: Any, leaves: Sequence[str]) -> str | dict[str, str]:
-    """Leaf of a column -> how the source compresses it; the new column as the first one."""
+    """Return leaf of a column -> how the source compresses it; the new column as the first one."""
     if not metadata.num_row_groups or not metadata.num_columns:
         return "snappy"
     group = metadata.row_group(0)
@@ -165,7 +165,7 @@ def _compression(metadata: Any, leaves: Sequence[str]) -> str | dict[str, str]:
 
 
 def _extended(table: Any, motions: Mapping[int, list[Motion]], column: Column, kind: Any, schema: Any) -> Any:
-    """Rows of a shard with the column, new or longer."""
+    """Return rows of a shard with the column, new or longer."""
     import pyarrow as pa
 
     numbers, episode_of = np.unique(table.column("episode_index").to_numpy(), return_inverse=True)
@@ -178,7 +178,7 @@ def _extended(table: Any, motions: Mapping[int, list[Motion]], column: Column, k
 
 
 def language_type(schema: Any) -> Any:
-    """The type of the column: that which the shard has, else LeRobot's, with calls of tools as texts in JSON."""
+    """Return the type of the column: that which the shard has, else LeRobot's, with calls of tools as texts in JSON."""
     import pyarrow as pa
 
     if LANGUAGE in schema.names:
@@ -200,13 +200,13 @@ def language_type(schema: Any) -> Any:
 
 
 def language_leaves(kind: Any) -> list[str]:
-    """Paths of the parts of the column in a Parquet file."""
+    """Return paths of the parts of the column in a Parquet file."""
     leaves = [f"{LANGUAGE}.list.element.{field.name}" for field in kind.value_type]
     return [*leaves, *(f"{leaf}.list.element" for leaf in leaves)]
 
 
 def with_language(old: Any, motions: Sequence[Sequence[Motion]], episode_of: NDArray[np.intp], kind: Any) -> Any:
-    """The column of some rows: those of others that are there, behind them the texts of each row's episode.
+    """Return the column of some rows: those of others that are there, behind them the texts of each row's episode.
 
     `old` is the column so far, an array of Arrow or None; `motions` are those of some episodes, `episode_of` (T,) says
     which of these a row belongs to, and `kind` is a `language_type`.
@@ -223,7 +223,7 @@ def with_language(old: Any, motions: Sequence[Sequence[Motion]], episode_of: NDA
 def _lengthened(
     old: Any, added: Any, counts: NDArray[np.int64], episode_of: NDArray[np.intp], kind: Any, keep_nulls: bool
 ) -> Any:
-    """Lists with those of the episode behind: what is added stands episode after episode, `counts` of each."""
+    """Return lists with those of the episode behind: what is added stands episode after episode, `counts` of each."""
     import pyarrow as pa
 
     flat, before = _lists_of_others(old)
@@ -241,7 +241,7 @@ def _lengthened(
 
 
 def _lists_of_others(old: Any) -> tuple[Any, NDArray[np.int64]]:
-    """The rows in all lists that are not of this package, and how many each list has."""
+    """Return the rows in all lists that are not of this package, and how many each list has."""
     import pyarrow as pa
     import pyarrow.compute as pc
 
@@ -272,7 +272,7 @@ def _language_rows(motions: Sequence[Motion], kind: Any) -> Any:
 
 
 def text_type(schema: Any) -> Any:
-    """The type of the column; a `DataError` if the shard has another of that name."""
+    """Return the type of the column; a `DataError` if the shard has another of that name."""
     import pyarrow as pa
 
     kind = schema.field(MOTION_TEXTS).type if MOTION_TEXTS in schema.names else pa.string()
@@ -282,12 +282,12 @@ def text_type(schema: Any) -> Any:
 
 
 def text_leaves(kind: Any) -> list[str]:
-    """Paths of the parts of the column in a Parquet file."""
+    """Return paths of the parts of the column in a Parquet file."""
     return [MOTION_TEXTS]
 
 
 def with_texts(old: Any, motions: Sequence[Sequence[Motion]], episode_of: NDArray[np.intp], kind: Any) -> Any:
-    """The column of some rows, see `with_language`."""
+    """Return the column of some rows, see `with_language`."""
     import pyarrow as pa
 
     plain = {"role": ROLE, "style": STYLE, "camera": None, "tool_calls": None}
@@ -303,7 +303,7 @@ def with_texts(old: Any, motions: Sequence[Sequence[Motion]], episode_of: NDArra
 
 
 def _texts_of_others(text: str) -> list[Any]:
-    """The rows of a text that are not of this package."""
+    """Return the rows of a text that are not of this package."""
     if not text:
         return []
     try:

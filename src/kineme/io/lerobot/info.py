@@ -52,7 +52,7 @@ class Info(NamedTuple):
 
 
 def read_json(path: Path, what: str) -> Any:
-    """The content of a JSON file of a data set; a `DataError` that names it if that is damaged or not there."""
+    """Read the content of a JSON file of a data set; a `DataError` that names it if that is damaged or not there."""
     try:
         check_expanded(min(path.stat().st_size, _MOST_BYTES) * 10)
         return json.loads(path.read_bytes())
@@ -87,7 +87,7 @@ def read_info(folder: Path) -> Info:
 
 
 def _entries(name: str, feature: Any) -> tuple[str, ...]:
-    """The names of a feature's entries, with their units where it says them; none for images, texts and counters."""
+    """Name a feature's entries, with their units where it says them; none for images, texts and counters."""
     if name in COUNTERS or not isinstance(feature, Mapping) or not str(feature.get("dtype")).startswith(_NUMBERS):
         return ()
     shape = feature.get("shape")
@@ -107,7 +107,7 @@ def _entries(name: str, feature: Any) -> tuple[str, ...]:
 
 
 def _names(names: Any) -> list[str]:
-    """Names as a flat list; they stand in a list or below words such as motors or axes."""
+    """Return names as a flat list; they stand in a list or below words such as motors or axes."""
     if isinstance(names, Mapping):
         return [name for group in names.values() for name in _names(group)]
     return [str(name) for name in names] if isinstance(names, list) else []
@@ -124,7 +124,7 @@ class Episodes(NamedTuple):
 
 
 def read_episodes(folder: Path, info: Info) -> Episodes:
-    """The episodes as meta/episodes says."""
+    """Read the episodes as meta/episodes says."""
     problems: list[str] = []
     places: tuple[NDArray[np.int64], ...]
     if info.version == 2:
@@ -158,7 +158,7 @@ def read_episodes(folder: Path, info: Info) -> Episodes:
 
 
 def read_tasks(folder: Path) -> tuple[dict[int, str], list[str]]:
-    """Task number -> its text; what of the tasks could not be read, or that no file says them."""
+    """Read task number -> its text; what of the tasks could not be read, or that no file says them."""
     parquet, lines = (folder / name for name in _TASKS)
     problems: list[str] = []
     tasks: dict[int, str] = {}
@@ -175,7 +175,7 @@ def read_tasks(folder: Path) -> tuple[dict[int, str], list[str]]:
 
 
 def _lines(path: Path, integers: Sequence[str], problems: list[str], text: str = "") -> Iterator[dict[str, Any]]:
-    """Objects that have whole numbers, and the text if one is named; other lines are problems."""
+    """Yield objects that have whole numbers, and the text if one is named; other lines are problems."""
     try:
         check_expanded(10 * path.stat().st_size)
         lines = path.read_text(encoding="utf-8").splitlines()
@@ -199,7 +199,7 @@ def _lines(path: Path, integers: Sequence[str], problems: list[str], text: str =
 
 
 def _table(folder: Path, names: Sequence[str], problems: list[str]) -> list[NDArray[np.int64]]:
-    """Columns of all files of meta/episodes that can be read, in the order of the files."""
+    """Return columns of all files of meta/episodes that can be read, in the order of the files."""
     import pyarrow as pa
 
     files = sorted(folder.glob(_V3))
@@ -224,7 +224,7 @@ def _table(folder: Path, names: Sequence[str], problems: list[str]) -> list[NDAr
 
 
 def _texts_of_tasks(path: Path) -> dict[int, str]:
-    """The first column of texts is that of the tasks, by preference that of LeRobot or of an unnamed index."""
+    """Read the tasks from the first column of texts, by preference from that of LeRobot or of an unnamed index."""
     import pyarrow as pa
     from pyarrow import parquet
 
@@ -247,7 +247,7 @@ def _texts_of_tasks(path: Path) -> dict[int, str]:
 
 
 def _rows(path: Path, names: Sequence[str], a_row: int, before: int = 0, texts: Sequence[str] = ()) -> Any:
-    """Columns of a Parquet file as a table of Arrow; a row takes so many bytes, and there are others before."""
+    """Return columns of a Parquet file as a table of Arrow; a row takes so many bytes, and there are others before."""
     import pyarrow as pa
     from pyarrow import parquet
 

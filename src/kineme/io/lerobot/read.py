@@ -74,7 +74,7 @@ def lerobot_movements(folder: Path, layout: Layout) -> Parsed:
 
 
 def _chosen(info: Info, layout: Layout) -> tuple[dict[str, int], tuple[str, ...], list[int]]:
-    """Features that are read with their widths; heads of the coordinates; their columns among those features."""
+    """Return features that are read with their widths; heads of the coordinates; their columns among those features."""
     if not info.heads:
         only = f"only {listed(info.others)}" if info.others else "none"
         raise DataError(f"expected features of numbers in a LeRobot data set, got {only}")
@@ -119,7 +119,7 @@ def _numbers_of(full: Sequence[str], short: Sequence[str], columns: Sequence[Col
 
 
 def _all_frames(folder: Path, declared: Episodes, features: dict[str, int]) -> tuple[Frames, dict[str, str]]:
-    """The frames of all shards in the order of their episodes; shard -> why it could not be read."""
+    """Return the frames of all shards in the order of their episodes; shard -> why it could not be read."""
     parts: list[Frames] = []
     unread: dict[str, str] = {}
     taken, width = 0, sum(features.values())
@@ -142,14 +142,14 @@ def _all_frames(folder: Path, declared: Episodes, features: dict[str, int]) -> t
 
 
 def _stamps(frames: Frames, offsets: NDArray[np.intp], fps: float) -> Array:
-    """Seconds since the beginning of each episode: of its frames at the declared rate, else as they are stored."""
+    """Give seconds since the beginning of each episode: of its frames at the declared rate, else as they are stored."""
     even = frames.frames / fps
     others = np.add.reduceat(~(np.abs(frames.stamps - even) <= _TOLERANCE), offsets[:-1]) > 0
     return np.where(np.repeat(others, np.diff(offsets)), frames.stamps, even)
 
 
 def _labels(frames: Frames, offsets: NDArray[np.intp], tasks: dict[int, str]) -> list[str | None]:
-    """The task of each episode, the most frequent one where there are several."""
+    """Return the task of each episode, the most frequent one where there are several."""
     first = frames.tasks[offsets[:-1]]
     mixed = np.add.reduceat(frames.tasks != np.repeat(first, np.diff(offsets)), offsets[:-1]) > 0
     for i in np.flatnonzero(mixed).tolist():
@@ -161,7 +161,7 @@ def _labels(frames: Frames, offsets: NDArray[np.intp], tasks: dict[int, str]) ->
 def whole_episodes(
     frames: Frames, declared: Episodes, unread: Collection[str]
 ) -> tuple[Frames, NDArray[np.intp], list[str]]:
-    """The frames of the whole episodes, where each begins and ends, and what is wrong with the others.
+    """Return the frames of the whole episodes, where each begins and ends, and what is wrong with the others.
 
     An episode that stands behind a later one is kept, and named among the problems; those of shards that could not be
     read (`unread`) are not.
@@ -195,14 +195,14 @@ def whole_episodes(
 
 
 def episode_names(numbers: Sequence[int]) -> str:
-    """Numbers of episodes for a message; the first and the last of many in a row."""
+    """Return numbers of episodes for a message; the first and the last of many in a row."""
     if len(numbers) > 2 and numbers[-1] - numbers[0] == len(numbers) - 1:
         return f"episodes {numbers[0]} to {numbers[-1]}"
     return f"{'episode' if len(numbers) == 1 else 'episodes'} {first_names(numbers, _SHOWN)}"
 
 
 def _divided(numbers: NDArray[np.int64]) -> dict[int, str]:
-    """Episodes whose frames stand in several places."""
+    """Return episodes whose frames stand in several places."""
     episodes, counts = np.unique(numbers, return_counts=True)
     several = counts > 1
     return {
@@ -212,7 +212,7 @@ def _divided(numbers: NDArray[np.int64]) -> dict[int, str]:
 
 
 def _disordered(frames: Frames, offsets: NDArray[np.intp], numbers: NDArray[np.int64]) -> dict[int, str]:
-    """Episodes whose frames do not count from 0 in steps of 1."""
+    """Return episodes whose frames do not count from 0 in steps of 1."""
     expected = np.arange(len(frames.frames)) - np.repeat(offsets[:-1], np.diff(offsets))
     odd = np.flatnonzero(frames.frames != expected)
     runs, firsts = np.unique(np.searchsorted(offsets, odd, side="right") - 1, return_index=True)
@@ -223,7 +223,7 @@ def _disordered(frames: Frames, offsets: NDArray[np.intp], numbers: NDArray[np.i
 
 
 def _miscounted(numbers: NDArray[np.int64], lengths: NDArray[np.intp], declared: Episodes) -> dict[int, str]:
-    """Episodes that are not declared, or with another length."""
+    """Return episodes that are not declared, or with another length."""
     where = np.searchsorted(declared.numbers, numbers).clip(max=len(declared.numbers) - 1)
     is_declared = declared.numbers[where] == numbers
     wrong = dict.fromkeys(numbers[~is_declared].tolist(), "expected an episode that the meta folder declares")
@@ -235,7 +235,7 @@ def _miscounted(numbers: NDArray[np.int64], lengths: NDArray[np.intp], declared:
 
 
 def _taken(frames: Frames, mask: NDArray[np.bool_]) -> Frames:
-    """The kept frames; what is wrong with them keeps its rows."""
+    """Return the kept frames; what is wrong with them keeps its rows."""
     row = np.cumsum(mask) - 1
     faults = {int(row[k]): reason for k, reason in frames.faults.items() if mask[k]}
     values, episodes, numbers, tasks, stamps, _ = frames
@@ -255,7 +255,7 @@ class Frames(NamedTuple):
 
 
 def read_shard(folder: Path, shard: str, features: Mapping[str, int], taken: int) -> list[Frames]:
-    """The frames of a shard, in parts, with the features that are read, by their widths.
+    """Read the frames of a shard, in parts, with the features that are read, by their widths.
 
     `taken` are the bytes of earlier shards, for the limit.
     """
@@ -287,7 +287,7 @@ def read_shard(folder: Path, shard: str, features: Mapping[str, int], taken: int
 
 
 def joined(parts: list[Frames]) -> Frames:
-    """Consecutive frames as one."""
+    """Return consecutive frames as one."""
     starts = np.concatenate(([0], np.cumsum([len(part.values) for part in parts]))).tolist()
     faults = {
         start + row: reason for start, part in zip(starts, parts, strict=False) for row, reason in part.faults.items()
@@ -308,11 +308,11 @@ def _frames(batch: Any, features: Mapping[str, int]) -> Frames:
             rows = _numbers(column, name)[:, None]
         values.append(rows)
     names = batch.schema.names
-    tasks = _whole(batch.column("task_index")) if "task_index" in names else np.full(batch.num_rows, -1, np.int64)
+    tasks = _integers(batch.column("task_index")) if "task_index" in names else np.full(batch.num_rows, -1, np.int64)
     stamps = _numbers(batch.column("timestamp"), "timestamp")
     return Frames(
-        np.concatenate(values, axis=1), _whole(batch.column("episode_index")), _whole(batch.column("frame_index")),
-        tasks, stamps, faults,
+        np.concatenate(values, axis=1), _integers(batch.column("episode_index")),
+        _integers(batch.column("frame_index")), tasks, stamps, faults,
     )  # fmt: skip
 
 
@@ -323,6 +323,6 @@ def _numbers(column: Any, name: str) -> Array:
         raise DataError(f"expected numbers in {name!r}, got {column.type}") from error
 
 
-def _whole(column: Any) -> NDArray[np.int64]:
-    """Whole numbers, -1 where there is none."""
+def _integers(column: Any) -> NDArray[np.int64]:
+    """Return whole numbers, -1 where there is none."""
     return np.asarray(column.fill_null(-1).to_numpy(zero_copy_only=False), dtype=np.int64)

@@ -93,7 +93,7 @@ def _check(info: Any, entry: Mapping[str, Any], fps: float) -> None:
 
 
 def _append(folder: Path, info: dict[str, Any], features: Features, task: str) -> int:
-    """Data first, then tasks, the episode, statistics, and info, which counts them."""
+    """Write data first, then tasks, the episode, statistics, and info, which counts them."""
     number, start = int(info["total_episodes"]), int(info["total_frames"])
     length = len(next(iter(features.values())))
     tasks = _tasks(folder)
@@ -148,7 +148,7 @@ def _append(folder: Path, info: dict[str, Any], features: Features, task: str) -
 
 
 def _tasks(folder: Path) -> list[str]:
-    """Texts of the tasks in the order of their numbers."""
+    """Return texts of the tasks in the order of their numbers."""
     from pyarrow import parquet
 
     if not (folder / _TASKS).is_file():
@@ -183,7 +183,7 @@ def _write_json(path: Path, content: Any) -> None:
 
 
 def statistics_of(values: NDArray[Any]) -> Statistics:
-    """Statistics of one feature over the frames of an episode, values of shape (T,) or (T, d)."""
+    """Return statistics of one feature over the frames of an episode, values of shape (T,) or (T, d)."""
     rows = np.asarray(values, dtype=np.float64).reshape(len(values), -1)
     statistics = {"min": rows.min(axis=0), "max": rows.max(axis=0), "mean": rows.mean(axis=0), "std": rows.std(axis=0)}
     quantiles = dict(zip(_QUANTILES, np.quantile(rows, list(_QUANTILES.values()), axis=0), strict=True))
@@ -195,7 +195,7 @@ def statistics_of(values: NDArray[Any]) -> Statistics:
 
 
 def merged_statistics(first: Statistics | None, second: Statistics) -> Statistics:
-    """Statistics of all frames from those of two parts; the quantiles are weighted means, as LeRobot takes them."""
+    """Merge the statistics of two parts of the frames; the quantiles are weighted means, as LeRobot takes them."""
     if first is None:
         return second
     a, b = (

@@ -55,7 +55,7 @@ class ExportHead(NamedTuple):
 
 
 def filled(cells: Iterable[str]) -> Iterator[str]:
-    """Cells, the empty ones with what stands before them: names above the first of several columns."""
+    """Yield cells, the empty ones with what stands before them: names above the first of several columns."""
     last = ""
     for cell in cells:
         last = cell or last
@@ -63,7 +63,7 @@ def filled(cells: Iterable[str]) -> Iterator[str]:
 
 
 def positive(cell: str) -> float | None:
-    """A cell as a rate, or None if it is none."""
+    """Return a cell as a rate, or None if it is none."""
     try:
         rate = float(cell.replace(",", "."))
     except ValueError:
@@ -72,14 +72,14 @@ def positive(cell: str) -> float | None:
 
 
 def without_common_subject(names: Iterable[str]) -> list[str]:
-    """Names such as ``subject:marker`` without the subject where there is but one."""
+    """Return names such as ``subject:marker`` without the subject where there is but one."""
     parts = [name.partition(":") for name in names]
     subjects = {first for first, colon, _ in parts if colon}
     return [rest if colon and len(subjects) == 1 else first + colon + rest for first, colon, rest in parts]
 
 
 def opensim_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) -> ExportHead | None:
-    """The head of a motion or storage file of OpenSim, or None if the first lines do not look like one.
+    """Return the head of a motion or storage file of OpenSim, or None if the first lines do not look like one.
 
     Source: OpenSim, "Motion (.mot) Files" and "Storage (.sto) Files", in the older and the newer version of their head.
     Lines such as ``nRows=153`` and ``inDegrees=yes``, or of SIMM ``datarows 153``, end with ``endheader``; then come a
@@ -120,7 +120,7 @@ def opensim_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]
 
 
 def _unit(name: str, in_degrees: str, title: str) -> str:
-    """The unit of a column: ``inDegrees`` says it of coordinates that turn, and those that shift are in meters.
+    """Return the unit of a column: ``inDegrees`` says it of coordinates that turn, and those that shift are in meters.
 
     Without degrees, radians are sure only where the title says that the columns are coordinates.
     """
@@ -136,7 +136,7 @@ def _unit(name: str, in_degrees: str, title: str) -> str:
 
 
 def optitrack_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) -> ExportHead | None:
-    """The head of an export of Motive, or None if the first line does not look like one.
+    """Return the head of an export of Motive, or None if the first line does not look like one.
 
     Source: OptiTrack, "Data Export: CSV", versions 1.2 and later of the format. The first line holds names and values
     in turn: ``Format Version,1.23,...,Export Frame Rate,120,...,Length Units,Meters``. After an empty line there are
@@ -182,7 +182,7 @@ def optitrack_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str
 
 
 def qualisys_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) -> ExportHead | None:
-    """The head of an export of Qualisys Track Manager, or None if the first line does not look like one.
+    """Return the head of an export of Qualisys Track Manager, or None if the first line does not look like one.
 
     Source: Qualisys, "Motion data (.tsv)" and "6DOF data (.tsv)". Lines of a keyword, a tab and its value:
     ``FREQUENCY``, ``NO_OF_FRAMES``, ``MARKER_NAMES`` or ``BODY_NAMES``, ...; then, if asked for, a row of heads; then
@@ -221,7 +221,7 @@ def qualisys_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]
 
 
 def _columns(names: Sequence[str], bodies: bool) -> tuple[list[str], list[str]]:
-    """Heads and units; residuals and the rotation matrix beside the angles are left aside."""
+    """Return heads and units; residuals and the rotation matrix beside the angles are left aside."""
     if not bodies:
         return [f"{name}.{axis}" for name in names for axis in "xyz"], ["mm"] * 3 * len(names)
     groups = [("position.", "mm")] * 3 + [("", "deg")] * 3 + [("", "")] * 10
@@ -242,7 +242,7 @@ def _is_number(cell: str) -> bool:
 
 
 def trc_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) -> ExportHead | None:
-    """The head of a TRC file, or None if the first line does not look like one.
+    """Return the head of a TRC file, or None if the first line does not look like one.
 
     Tracked markers over time, as Cortex of Motion Analysis writes them, and OpenSim, OptiTrack and others after it.
 
@@ -277,7 +277,7 @@ def trc_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) ->
 
 
 def vicon_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) -> ExportHead | None:
-    """The head of the first section of markers, else of segments, objects, joints, outputs, devices; or None.
+    """Return the head of the first section of markers, else of segments, objects, joints, outputs, devices; or None.
 
     Source: Vicon, "Nexus User Guide: Export data to ASCII". A file has one or more sections: a line with the name of
     the section, a line with its rate, a row with ``subject:marker`` above the first column of each, the row of heads
@@ -300,7 +300,10 @@ def vicon_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) 
         raise DataError(f"expected a rate, names and the heads 'Frame, Sub Frame, ...' below the section {section!r}")
     n = len(heads)
     plain = without_common_subject(filled((names + [""] * n)[:n]))
-    turned = _quaternions(heads[:n])
+    turned = [False] * n  # columns of RX, RY, RZ, RW side by side
+    for k in range(n - 3):
+        if tuple(head.lower() for head in heads[k : k + 4]) == _QUATERNION:
+            turned[k : k + 4] = [True] * 4
     columns = [_head(section, *column) for column in zip(plain, heads[:n], turned, strict=True)]
     columns[0] = "frame"
     columns[1] = "sub frame" if n > 1 and heads[1].lower() == "sub frame" else columns[1]
@@ -313,15 +316,6 @@ def vicon_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) 
 
 def _name(line: str) -> str:
     return line.strip(" \t\r\n,\ufeff").lower()
-
-
-def _quaternions(heads: Sequence[str]) -> list[bool]:
-    """Per column whether it is one of RX, RY, RZ, RW side by side."""
-    plain, turned = [head.lower() for head in heads], [False] * len(heads)
-    for k in range(len(plain) - 3):
-        if tuple(plain[k : k + 4]) == _QUATERNION:
-            turned[k : k + 4] = [True] * 4
-    return turned
 
 
 def _head(section: str, name: str, head: str, quaternion: bool) -> str:

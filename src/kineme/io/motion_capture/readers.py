@@ -100,7 +100,7 @@ class _Content:
 
 
 def read_mvnx_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
-    """The columns of an MVNX file: ``Pelvis.position.x``, ``Pelvis.orientation.w``, ``jRightElbow.angle.x``, ...
+    """Read the columns of an MVNX file: ``Pelvis.position.x``, ``Pelvis.orientation.w``, ``jRightElbow.angle.x``, ...
 
     Unless columns are chosen, angles of joints are learned only where there are no segments. What a frame lacks is NaN.
     """
@@ -147,7 +147,7 @@ def _refuse(*_: Any) -> None:
 
 
 def _times(content: _Content) -> Any:
-    """Seconds, from the stamps of the frames [ms], or from the rate where these are missing or do not increase."""
+    """Give seconds, from the stamps of the frames [ms], or from the rate where these are missing or do not increase."""
     try:
         times = np.array([float(stamp) for stamp in content.stamps]) / 1e3
     except ValueError:
@@ -164,7 +164,7 @@ def _times(content: _Content) -> Any:
 
 
 def _numbers(texts: list[str], count: int, what: tuple[str, int], faults: dict[int, str]) -> Any:
-    """The numbers (count, width) of all frames, NaN where a frame has none; other counts are faults of their frames."""
+    """Parse numbers (count, width) of all frames, NaN where a frame has none; other counts are faults of frames."""
     name, width = what
     values = np.full((count, width), np.nan)
     for row, text in enumerate(texts):
@@ -189,7 +189,7 @@ _OFF = 1e-2  # of a matrix that counts as a rotation, from orthonormal
 
 
 def read_c3d_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
-    """The positions of all points over time, of a file without points the poses of all segments; what is lost is NaN.
+    """Read the positions of all points over time, without points the poses of all segments; what is lost is NaN.
 
     Poses of segments beside points, and what a model computed instead of places, as the angles of joints, are left
     aside unless columns name them.
@@ -225,7 +225,7 @@ def read_c3d_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
 
 
 def _content(reader: Any, data: bytes) -> tuple[list[str], Any, list[str], float]:
-    """Names of the columns, their values (T, d), their units, and the rate [Hz]."""
+    """Return names of the columns, their values (T, d), their units, and the rate [Hz]."""
     count, rate = int(reader.point_used), float(reader.point_rate)
     n_frames = int(reader.last_frame) - int(reader.first_frame) + 1
     unit = reader.get("POINT:UNITS")
@@ -263,7 +263,7 @@ def _content(reader: Any, data: bytes) -> tuple[list[str], Any, list[str], float
 def _beside(
     reader: Any, data: bytes, rate: float, n_frames: int, length: str
 ) -> tuple[list[str], Any, list[str]] | None:
-    """The poses of segments beside points, as `_content`; None where there are none of the same rate."""
+    """Return the poses of segments beside points, as `_content`; None where there are none of the same rate."""
     used = reader.get("ROTATION:USED")
     if used is None or used.int16_value < 1:
         return None
@@ -286,7 +286,7 @@ def _computed(reader: Any, count: int) -> list[str | None]:
 
 
 def _labels(reader: Any, group: str, kind: str = "LABELS") -> list[str]:
-    """All labels of points or rotations; of more than 255 the others are in LABELS2, LABELS3 and so on."""
+    """Return all labels of points or rotations; of more than 255 the others are in LABELS2, LABELS3 and so on."""
     labels: list[str] = []
     for name in (kind, *(f"{kind}{k}" for k in range(2, _MOST_LABELS))):
         if (parameter := reader.get(f"{group}:{name}")) is None:
@@ -296,13 +296,13 @@ def _labels(reader: Any, group: str, kind: str = "LABELS") -> list[str]:
 
 
 def _names(labels: Any, count: int, what: str) -> list[str]:
-    """A name for each of so many points or segments, numbered where the file has none."""
+    """Return a name for each of so many points or segments, numbered where the file has none."""
     names = [label.strip() for label in labels][:count]
     return [label or f"{what} {k}" for k, label in enumerate([*names, *[""] * (count - len(names))], 1)]
 
 
 def _rotations(reader: Any, data: bytes, n_frames: int, length: str) -> tuple[list[str], Any, list[str], float]:
-    """Positions and orientations of segments, as `_content`; NaN where a matrix is unknown or no rotation."""
+    """Return positions and orientations of segments, as `_content`; NaN where a matrix is unknown or no rotation."""
     said = {name: reader.get(f"ROTATION:{name}") for name in ("USED", "DATA_START", "RATIO", "RATE")}
     count, block = (0 if said[name] is None else said[name].int16_value for name in ("USED", "DATA_START"))
     ratio = 1 if said["RATIO"] is None else max(1, said["RATIO"].int16_value)
@@ -337,7 +337,7 @@ def _rotations(reader: Any, data: bytes, n_frames: int, length: str) -> tuple[li
 
 
 def read_bvh_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
-    """The channels of a BVH file and its time stamps, from the time of a frame."""
+    """Read the channels of a BVH file and its time stamps, from the time of a frame."""
     check_expanded(3 * len(data))
     lines = data.decode("utf-8", "replace").lstrip("\ufeff").splitlines()
     if not lines or next((line.strip() for line in lines if line.strip()), "").upper() != "HIERARCHY":
@@ -368,7 +368,7 @@ def read_bvh_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
 
 
 def _channels(lines: Sequence[str]) -> list[str]:
-    """The channels of all joints in their order."""
+    """Return the channels of all joints in their order."""
     joint, names = "", []
     for k, line in enumerate(lines, 1):
         words = line.split()
@@ -388,7 +388,7 @@ def _channels(lines: Sequence[str]) -> list[str]:
 
 
 def _step(lines: Sequence[str], at: int) -> tuple[float, int]:
-    """Seconds between frames, and the line of the first frame, counted from 0."""
+    """Return seconds between frames, and the line of the first frame, counted from 0."""
     for k, line in enumerate(islice(lines, at + 1, at + 6), at + 1):
         key, colon, value = line.partition(":")
         if colon and key.strip().lower() == "frame time":
@@ -401,7 +401,7 @@ def _step(lines: Sequence[str], at: int) -> tuple[float, int]:
 def _values(
     lines: Sequence[str], first: int, width: int
 ) -> tuple[np.ndarray[tuple[int, int], np.dtype[np.float64]], dict[int, str]]:
-    """The numbers of all frames, NaN in a line that is not one number per channel, and what is wrong there."""
+    """Return the numbers of all frames, NaN in a line that is not one number per channel, and what is wrong there."""
     rows = [line for line in lines[first:] if line.strip()]
     if not rows:
         raise DataError("expected frames below the time of a frame, got none")

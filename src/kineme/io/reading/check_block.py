@@ -45,7 +45,7 @@ Flags = NDArray[np.bool_]
 
 
 def check_block(block: Block, file: str, layout: Layout, columns: Sequence[str]) -> tuple[Block, list[Problem]]:
-    """The valid movements, gaps filled and ends cropped, and one problem for each invalid movement.
+    """Return the valid movements, gaps filled and ends cropped, and one problem for each invalid movement.
 
     `skip` of the layout says what is dropped for a sample that is missing, infinite, out of range, or not later than
     the one before: its movement, or the sample alone. Movements of fewer than `MIN_SAMPLES` samples, or with an extent
@@ -79,7 +79,7 @@ def check_block(block: Block, file: str, layout: Layout, columns: Sequence[str])
 
 
 def _without_missing(block: Block, file: str, skip: str, columns: Sequence[str]) -> tuple[Block, list[Problem]]:
-    """A block without the movements, or with `skip` the samples alone, that lack values; a problem for each."""
+    """Return a block without the movements, or with `skip` the samples alone, that lack values; a problem for each."""
     lacking: Flags = np.asarray(np.isnan(block.positions).any(axis=1))
     counts = np.diff(np.concatenate(([0], np.cumsum(lacking)))[block.offsets])
     readable: Flags = np.asarray(
@@ -99,7 +99,7 @@ def _without_missing(block: Block, file: str, skip: str, columns: Sequence[str])
 
 
 def _unusable(block: Block, skip: str) -> Flags:
-    """Per sample: out of range, or not later than the sample before; if samples are dropped, than all kept before."""
+    """Mark samples out of range, or not later than the sample before; if samples are dropped, than all kept before."""
     total = len(block.positions)
     odd: Flags = np.asarray((np.abs(block.positions) > LARGEST_POSITION).any(axis=1))  # what is missing comes later
     if block.faults:
@@ -135,7 +135,7 @@ def _problem(block: Block, file: str, i: int, k: int, odd: tuple[int, str]) -> P
 
 
 def movement_of(block: Block, i: int) -> str:
-    """Movement i at the beginning of a message; empty if the file holds but one."""
+    """Return movement i at the beginning of a message; empty if the file holds but one."""
     return f"movement {' '.join(block.places[i].splitlines())}: " if block.places[i] else ""
 
 
@@ -161,7 +161,7 @@ def _reason(block: Block, i: int, k: int) -> str:
 
 
 def _keep(block: Block, mask: Flags) -> Block:
-    """The kept samples of every movement."""
+    """Return the kept samples of every movement."""
     offsets = np.concatenate(([0], np.cumsum(mask)))[block.offsets].astype(np.intp)
     rows = np.flatnonzero(mask) if block.rows is None else block.rows[mask]
     times = None if block.times is None else block.times[mask]
@@ -169,7 +169,7 @@ def _keep(block: Block, mask: Flags) -> Block:
 
 
 def take_movements(block: Block, chosen: Flags) -> Block:
-    """The chosen movements of a block."""
+    """Return the chosen movements of a block."""
     if chosen.all():
         return block
     taken = _keep(block, np.repeat(chosen, np.diff(block.offsets)))
@@ -258,7 +258,7 @@ def fill_gaps(block: Block, columns: Sequence[str], layout: Layout) -> Block:
 
 
 def _span_of_all(missing: Flags, skip: str) -> slice:
-    """The samples from the first to the last one in which all columns of a movement (T, d) have values."""
+    """Return the samples from the first to the last one in which all columns of a movement (T, d) have values."""
     n = len(missing)
     complete = np.flatnonzero(~missing.any(axis=1))
     if len(complete) and complete[-1] + 1 - complete[0] >= max(MIN_SAMPLES, 0 if skip == "sample" else _LEAST * n):
@@ -303,7 +303,7 @@ def _fill(values: Array, times: Array, most: float, channels: Sequence[tuple[Cha
 
 
 def _between(channel: Channel, samples: tuple[Array, Array], times: Array) -> Array:
-    """Values (m, c) of a channel at m times between those at which (n, c) are known."""
+    """Return values (m, c) of a channel at m times between those at which (n, c) are known."""
     stamps, values = samples
     after = np.searchsorted(stamps, times)
     if channel.kind == "discrete":
@@ -325,7 +325,7 @@ def _between(channel: Channel, samples: tuple[Array, Array], times: Array) -> Ar
 
 
 def _smooth(stamps: Array, values: Array, times: Array) -> Array:
-    """Values (m, c) at m times on the curve through those (n, c) at stamps (n,)."""
+    """Return values (m, c) at m times on the curve through those (n, c) at stamps (n,)."""
     if len(stamps) < 3:
         return np.interp(times, stamps, values[:, 0])[:, None]
     from scipy.interpolate import Akima1DInterpolator

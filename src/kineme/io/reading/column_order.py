@@ -32,7 +32,7 @@ _NAMED = 6  # columns that a note names
 def in_one_set(
     files: Sequence[FileRead], by_number: bool = False
 ) -> tuple[list[FileRead], list[FileRead], list[Problem]]:
-    """Files, of equally many columns, with the columns of most, in the order and in the units of these.
+    """Return files, of equally many columns, with the columns of most, in the order and in the units of these.
 
     Behind them are those whose columns have no names, and problems. Where the caller chose the columns `by_number`,
     names do not matter.
@@ -85,7 +85,7 @@ def dimensions_unlike(files: Sequence[FileRead], most: Sequence[FileRead]) -> li
 
 
 def notes_on_order(detected: Iterable[Detected], ours: Columns) -> list[str]:
-    """A sentence if files have the columns in another order, and one if they have them in other units."""
+    """Return a sentence if files have the columns in another order, and one if they have them in other units."""
     several = [own for own in map(_columns_of, detected) if {*own.names} == {*ours.names}]
     notes = []
     if others := [own for own in several if own.names != ours.names]:
@@ -100,7 +100,7 @@ def notes_on_order(detected: Iterable[Detected], ours: Columns) -> list[str]:
 
 
 def notes_on_aside(detected: Iterable[Detected]) -> list[str]:
-    """A sentence if columns are left aside since they are no coordinates beside the positions of their names."""
+    """Return a sentence if columns are left aside since they are no coordinates beside the positions of their names."""
     several = {how.columns + how.ignored: {*how.ignored} for how in detected}
     aside = [head for heads, ignored in several.items() for head in heads if head in beside_positions(heads) & ignored]
     named = [*dict.fromkeys(aside)]
@@ -113,7 +113,7 @@ def notes_on_aside(detected: Iterable[Detected]) -> list[str]:
 
 
 def _differences(own: Columns, ours: Columns) -> str:
-    """The columns of a file that most have not, and the other way round; and the options that read all files."""
+    """Return the columns of a file that most have not, and the other way round; and the options that read all files."""
     here, there = (
         [head for head, name in zip(several.heads, several.names, strict=True) if name not in other.names]
         for several, other in ((own, ours), (ours, own))
@@ -146,7 +146,7 @@ def _width(file: FileRead) -> int:
 
 
 def sensors_of(path: str) -> frozenset[str]:
-    """Words in the name of a file that say which sensor of a device wrote it."""
+    """Return words in the name of a file that say which sensor of a device wrote it."""
     return _SENSORS.intersection(words_of(PurePosixPath(path).stem))
 
 

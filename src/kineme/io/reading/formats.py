@@ -66,7 +66,7 @@ class DataSet(NamedTuple):
     says: bytes = b""  # what is among the first bytes of the marker, where other programs write files of that name
 
     def files(self, folder: Path) -> list[Path]:
-        """The files that are read, sorted; hidden ones are passed over."""
+        """Return the files that are read, sorted; hidden ones are passed over."""
         paths = {path for pattern in (self.marker, *self.parts) for path in folder.glob(pattern) if path.is_file()}
         relative = sorted(path.relative_to(folder) for path in paths)
         return [folder / path for path in relative if not any(part.startswith(".") for part in path.parts)]
@@ -145,7 +145,7 @@ DATA_SETS: tuple[DataSet, ...] = (
 
 
 def data_set_of(folder: Path) -> DataSet | None:
-    """The row of `DATA_SETS` for a folder; None for a folder of files and for what is no folder."""
+    """Return the row of `DATA_SETS` for a folder; None for a folder of files and for what is no folder."""
     return next((data_set for data_set in DATA_SETS if _is_marked(folder, data_set)), None)
 
 
@@ -170,7 +170,7 @@ class Entry(NamedTuple):
 
 
 def entries_of(paths: Sequence[Path], follow_links: bool = False) -> tuple[list[Entry], list[Problem]]:
-    """All files of files, folders and patterns such as ``optitrack/*.csv``, each once, and problems."""
+    """Return all files of files, folders and patterns such as ``optitrack/*.csv``, each once, and problems."""
     entries: dict[Path, Entry] = {}
     problems: list[Problem] = []
     alone = is_alone(paths)
@@ -204,7 +204,7 @@ def is_alone(paths: Sequence[Path]) -> bool:
 
 
 def root_of(*paths: Path) -> Path:
-    """The folder that the names of sources are relative to: a folder of files itself, else the one around a file.
+    """Give the folder that the names of sources are relative to: a folder of files itself, else the one around a file.
 
     Of several paths it is the working folder: their names are as they were given.
     """
@@ -214,12 +214,12 @@ def root_of(*paths: Path) -> Path:
 
 
 def name_of(path: Path) -> Path:
-    """The name of a file or a data set; of the current folder too."""
+    """Return the name of a file or a data set; of the current folder too."""
     return Path(path.name or path.resolve().name)
 
 
 def in_words(paths: Sequence[Path]) -> str:
-    """The paths for a message."""
+    """Return the paths for a message."""
     return first_names(paths, _NAMED)
 
 
@@ -228,7 +228,7 @@ def _is_folder_of_files(path: Path) -> bool:
 
 
 def files_under(folder: Path, follow_links: bool = False) -> tuple[list[Path], list[Problem]]:
-    """All files that are not hidden, sorted, and the problems with links and folders.
+    """Return all files that are not hidden, sorted, and the problems with links and folders.
 
     A folder that is one data set (`kineme.io.reading.formats.DATA_SETS`) stands for all of its files.
     Names that begin with a dot are skipped. Links to folders are followed last, and no folder is entered twice. A link
@@ -281,6 +281,6 @@ def _is_folder(entry: os.DirEntry[str]) -> bool:
 
 
 def as_text(path: Path | str) -> str:
-    r"""A path with forward slashes; bytes that are not UTF-8 are escaped as ``\xff``, so that it can be stored."""
+    r"""Give a path with forward slashes; bytes that are not UTF-8 are escaped as ``\xff``, so that it can be stored."""
     plain = path.as_posix() if isinstance(path, Path) else path
     return plain.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")

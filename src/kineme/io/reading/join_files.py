@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -34,7 +34,7 @@ _NAMED = 4  # files that a note names
 
 
 def join_files(files: Sequence[Placed], layout: Layout) -> list[Placed]:
-    """One recording of all files of a folder that hold one movement each on one clock; other files as they are.
+    """Return one recording of all files of a folder that hold one movement each on one clock; other files as they are.
 
     The samples are those of the file that has most in a second, while all of them last. Others are interpolated:
     linearly, angles without their wraps, orientations by turning evenly; a discrete channel keeps the value before.
@@ -93,7 +93,7 @@ def _heads(read: FileRead) -> list[str]:
 
 
 def _selected(read: FileRead, layout: Layout) -> FileRead:
-    """A recording with the columns that are chosen, in their order."""
+    """Return a recording with the columns that are chosen, in their order."""
     if read.detected is None or read.block is None:
         return read
     parsed = Parsed(read.detected, read.block)
@@ -133,7 +133,7 @@ def notes_on_clocks(files: Sequence[Placed]) -> tuple[str, ...]:
 
 
 def _folders(files: Sequence[Placed]) -> Mapping[Path, list[Placed]]:
-    """The files of each folder."""
+    """Return the files of each folder."""
     folders: dict[Path, list[Placed]] = {}
     for read, entry in files:
         folders.setdefault(entry.path.parent, []).append((read, entry))
@@ -157,7 +157,7 @@ def _span(read: FileRead) -> tuple[float, float]:
 
 
 def _together(files: Sequence[FileRead]) -> list[str]:
-    """The files that share at least half of the time of the densest one, which is the first."""
+    """Return the files that share at least half of the time of the densest one, which is the first."""
     if len(files) < 2:
         return []
     durations = [end - begin for begin, end in map(_span, files)]
@@ -187,7 +187,7 @@ def _are_sensors(files: Sequence[FileRead]) -> bool:
 
 
 def _joined(members: Sequence[Placed], together: Sequence[str], given: Given) -> Placed:
-    """The recording of files whose times overlap, the densest one named first in `together`."""
+    """Return the recording of files whose times overlap, the densest one named first in `together`."""
     entry = members[0][1]
     folder = entry.path.parent
     of_root = entry.relative.parent == Path()
@@ -235,12 +235,17 @@ def _joined(members: Sequence[Placed], together: Sequence[str], given: Given) ->
 
 
 def _part(read: FileRead, at: Array, given: Given) -> tuple[list[str], list[str], list[str], Array]:
-    """Heads, units, columns left aside, and values of a file at other times."""
+    """Return heads, units, columns left aside, and values of a file at other times."""
     block, detected = read.block, read.detected
     assert block is not None
     assert detected is not None
     stem = Path(read.path).stem
-    own = dict(_own(given, stem, detected.columns))
+    own = {}  # the kinds that are given for columns of this file, by its own heads
+    for key, kind in given.items():
+        heads = [name.strip() for name in key.split(",")]
+        plain = [head.removeprefix(f"{stem}.") for head in heads]
+        if all(head.startswith(f"{stem}.") for head in heads) and {*plain} <= {*detected.columns}:
+            own[",".join(plain)] = kind
     channels = find_channels(detected.columns, block.positions, block.offsets, own, detected.measured_in)
     columns = in_order(block.positions, detected.columns, channels)
     if not any(True for _ in off_norm(columns, channels)):
@@ -266,12 +271,3 @@ def _part(read: FileRead, at: Array, given: Given) -> tuple[list[str], list[str]
         [f"{stem}.{name}" for name in detected.ignored],
         values,
     )
-
-
-def _own(given: Given, stem: str, heads: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """The kinds that are given for columns of a file, by its own heads."""
-    for key, kind in given.items():
-        names = [name.strip() for name in key.split(",")]
-        plain = [name.removeprefix(f"{stem}.") for name in names]
-        if all(name.startswith(f"{stem}.") for name in names) and {*plain} <= {*heads}:
-            yield ",".join(plain), kind

@@ -144,7 +144,7 @@ class Recordings(MovementSequence):
         return f"Recordings({self.demonstrations!r}, {files}, {problems})"
 
     def without_labels(self) -> Recordings:
-        """The same movements, with no label on any."""
+        """Return the same movements, with no label on any."""
         plain = Demonstrations.of_movements(replace(self.demonstrations.movements, labels=None))
         sources = tuple(source._replace(label=None) for source in self.sources)
         return replace(self, demonstrations=plain, sources=sources)
@@ -158,7 +158,7 @@ def merge_files(
     skip: str = "movement",
     by_number: bool = False,
 ) -> Recordings:
-    """One `Recordings` of all files that hold movements, and of the problems that came before.
+    """Return one `Recordings` of all files that hold movements, and of the problems that came before.
 
     `where` is what is read, for the message where there is none. `kinds` are the channels that are given, see
     `kineme.movements.channels.detect.find_channels`; `skip` says what a quaternion that is not of norm 1 costs. Where
@@ -224,7 +224,7 @@ def _concatenated(arrays: Sequence[Any]) -> Any:
 
 
 def _stamps(block: Block) -> Any:
-    """Time stamps; if a file has none, even ones over one second."""
+    """Return time stamps; if a file has none, even ones over one second."""
     if block.times is not None:
         return block.times
     lengths = np.diff(block.offsets)
@@ -235,7 +235,7 @@ def _stamps(block: Block) -> Any:
 def with_channels(
     files: Sequence[FileRead], given: Given, skip: str = "movement", by_number: bool = False
 ) -> tuple[list[FileRead], Channels | None, list[Problem]]:
-    """The channels of files with equally many columns, the files that have them, and problems.
+    """Return the channels of files with equally many columns, the files that have them, and problems.
 
     Kinds are found for all files together: a gripper that no file opens is one still, and one that some file moves
     continuously is a position in all of them. Columns are put in order and converted by their names, see `in_one_set`.
@@ -263,7 +263,7 @@ def with_channels(
 
 
 def _channels_of(files: Sequence[FileRead], given: Given) -> Channels:
-    """The channels of files that all have the same heads."""
+    """Return the channels of files that all have the same heads."""
     blocks, detected = [_block(file) for file in files], files[0].detected
     assert detected is not None
     return find_channels(
@@ -276,7 +276,7 @@ def _channels_of(files: Sequence[FileRead], given: Given) -> Channels:
 
 
 def _without_wraps(files: Sequence[FileRead], given: Given) -> list[FileRead]:
-    """Files of several heads, in the columns of each the angles continuous."""
+    """Return files of several heads, in the columns of each the angles continuous."""
     groups: dict[tuple[str, ...], list[FileRead]] = {}
     for file in files:
         groups.setdefault(file.detected.columns if file.detected else (), []).append(file)
@@ -298,7 +298,7 @@ def _without_wraps(files: Sequence[FileRead], given: Given) -> list[FileRead]:
 
 
 def _check_orientations(file: FileRead, channels: Channels, skip: str) -> tuple[FileRead, list[Problem]]:
-    """A file with the columns of channels side by side, without movements or samples whose quaternions are none."""
+    """Return a file with the columns of channels side by side, without samples or movements of wrong quaternions."""
     heads = file.detected.columns if file.detected else ()
     block = replace(_block(file), positions=in_order(_block(file).positions, heads, channels))
     problems, faults = list[Problem](), dict[int, str]()
@@ -322,7 +322,7 @@ def _check_orientations(file: FileRead, channels: Channels, skip: str) -> tuple[
 
 
 def each_person(path: Path, sources: Sequence[Source]) -> list[str | None]:
-    """The person of each movement, or None where it is unknown.
+    """Return the person of each movement, or None where it is unknown.
 
     Where a column or a label pattern names the person, that one. In an npz archive, an array named as in `NAMES`, one
     entry for each movement. Else the folder above that of the label: ``person/label/recording``. `path` is what was
@@ -343,7 +343,7 @@ def _person(source: Source, listed: list[str] | None) -> str | None:
 
 
 def _people_in(file: Path) -> list[str] | None:
-    """The people named in a file, or None."""
+    """Return the people named in a file, or None."""
     if file.suffix.lower() != ".npz":
         return None
     arrays = Npz(file.read_bytes(), file)
@@ -402,7 +402,7 @@ class Sampling(NamedTuple):
 
 
 def sampling_of(demonstrations: Demonstrations) -> Sampling:
-    """Rates, jitters and gaps of every movement."""
+    """Return rates, jitters and gaps of every movement."""
     offsets, lengths = demonstrations.offsets, demonstrations.lengths - 1
     inner = np.ones(len(demonstrations.times) - 1, dtype=bool)
     inner[offsets[1:-1] - 1] = False  # from one movement to the next

@@ -124,7 +124,7 @@ def _parsed(parse: Callable[[Layout], Parsed], form: Format, relative: Path, lay
 
 
 def _parts(path: Path, relative: Path, follow_links: bool) -> tuple[list[Path], Format]:
-    """The files that hold a source, and its format."""
+    """Return the files that hold a source, and its format."""
     data_set = data_set_of(path)
     if data_set is None:
         return [path], format_of(relative)
@@ -149,7 +149,7 @@ def _sha256(parts: Sequence[Path], path: Path) -> str:
 
 
 def format_of(path: Path) -> Format:
-    """The row of `FORMATS` for a file's extension."""
+    """Return the row of `FORMATS` for a file's extension."""
     form = FORMATS.get(path.suffix.lower())
     if path.suffix.lower() in _SPREADSHEETS:
         raise DataError(f"expected a table of text, got the spreadsheet {path.name}; save its sheet as .csv")
@@ -159,12 +159,12 @@ def format_of(path: Path) -> Format:
 
 
 def _storable(label: str) -> str:
-    """A label without lone surrogates, which JSON can hold but which cannot be encoded as UTF-8."""
+    """Return a label without lone surrogates, which JSON can hold but which cannot be encoded as UTF-8."""
     return label.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def _plainly(error: BaseException) -> str:
-    """The message of an exception on one line."""
+    """Return the message of an exception on one line."""
     return " ".join(_reason(error).splitlines())
 
 
@@ -217,28 +217,28 @@ def select_columns(parse: Callable[[Layout], Parsed], layout: Layout) -> Parsed:
     names = layout.reference.columns if layout.reference is not None and layout.coordinates is None else ()
     if names and not any(name.isdecimal() for name in names):
         try:
-            return _kept(parse(replace(layout, columns=names)), layout)
+            return _without_excluded(parse(replace(layout, columns=names)), layout)
         except KinemeError:
             pass  # it has other columns, which may be compared in their order
     parsed = parse(layout)
     if layout.reference is not None and layout.by_number:
-        return _named_as(_kept(parsed, layout), layout.reference)
+        return _named_as(_without_excluded(parsed, layout), layout.reference)
     heads = parsed.detected.columns
     places = numbers_by_name(heads, names)
     lost = [name for name, place in zip(names, places, strict=True) if place is None]
     if names and not lost and len(names) < len(heads):  # in other units, which their heads end in
         chosen = tuple(heads[place] for place in places if place is not None)
-        return _kept(parse(replace(layout, columns=chosen)), layout)
+        return _without_excluded(parse(replace(layout, columns=chosen)), layout)
     if 0 < len(lost) < len(names) != len(heads):
         raise DataError(
             f"expected the columns of the library, got none of {listed(lost)} but {listed(heads)}; record them too, or "
             "choose as many others with columns=, in the shell --columns"
         )
-    return _kept(parsed, layout)
+    return _without_excluded(parsed, layout)
 
 
-def _kept(parsed: Parsed, layout: Layout) -> Parsed:
-    """A file without the columns that are excluded or, unless they were chosen, hold nothing."""
+def _without_excluded(parsed: Parsed, layout: Layout) -> Parsed:
+    """Return a file without the columns that are excluded or, unless they were chosen, hold nothing."""
     detected, block = parsed.detected, parsed.block
     heads = detected.columns
     dropped = excluded_numbers(heads, layout.excluded)
@@ -263,7 +263,7 @@ def _kept(parsed: Parsed, layout: Layout) -> Parsed:
 
 
 def _named_as(parsed: Parsed, others: Known) -> Parsed:
-    """A file with the names of as many columns of the movements to compare with, in its own units."""
+    """Return a file with the names of as many columns of the movements to compare with, in its own units."""
     detected = parsed.detected
     names = next((heads for heads in (others.columns, others.moving) if len(heads) == len(detected.columns)), None)
     if names is None:

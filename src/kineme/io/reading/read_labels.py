@@ -76,7 +76,7 @@ class Heads(NamedTuple):
 
 
 def heads_of(cells: Sequence[str]) -> Heads | None:
-    """The roles of the columns of a table with these heads; None if they are none."""
+    """Return the roles of the columns of a table with these heads; None if they are none."""
     names = [cell.strip().strip('"#').strip().lower() for cell in cells]
     either = [[k for k, name in enumerate(names) if wanted.match(name)] for wanted in (_START, _END)]
     starts, ends = ([k for k in some if _is_time(names[k])] for some in either)
@@ -113,7 +113,7 @@ def _is_time(name: str) -> bool:
 
 
 def _unit_of(name: str) -> str:
-    """The unit of the times below a head in lower case: in brackets, or its last word; else seconds."""
+    """Return the unit of the times below a head in lower case: in brackets, or its last word; else seconds."""
     unit, word = unit_named(split_head(name)[1] or ""), _LAST_WORD.search(name)
     if unit is not None and unit.quantity == "time":
         return unit.symbol
@@ -121,7 +121,7 @@ def _unit_of(name: str) -> str:
 
 
 def heads_of_cells(cells: Sequence[str]) -> Heads | None:
-    """The roles of the columns of a table without heads, start, end and label in this order; None if they are none."""
+    """Find the columns of a table without heads: start, end and label in this order; None if there are none."""
     clocks = [k for k, cell in enumerate(cells) if ":" in cell and seconds_of(cell) is not None]
     numbers = [k for k, cell in enumerate(cells[:-1]) if ":" not in cell and seconds_of(cell) is not None]
     times = clocks if len(clocks) > 1 else numbers
@@ -129,7 +129,7 @@ def heads_of_cells(cells: Sequence[str]) -> Heads | None:
 
 
 def row_of(cells: Sequence[str], heads: Heads, line: int) -> LabelRow:
-    """A row as a record."""
+    """Return a row as a record."""
     if len(cells) <= max(heads.start, heads.end, heads.label):
         raise DataError(f"line {line}: expected start, end and label, got {list(cells)}")
     times = []
@@ -150,7 +150,7 @@ def row_of(cells: Sequence[str], heads: Heads, line: int) -> LabelRow:
 
 
 def seconds_of(cell: str) -> float | None:
-    """A time as seconds or as hh:mm:ss.sss; None if it is neither."""
+    """Return a time as seconds or as hh:mm:ss.sss; None if it is neither."""
     text = cell.strip()
     if clock := _CLOCK.fullmatch(text):
         hours, minutes, seconds = clock.groups()
@@ -247,7 +247,7 @@ def _elan(data: bytes) -> tuple[list[LabelRow], bool]:
 
 
 def labeled_pieces(recordings: Recordings, table: LabelTable) -> Recordings:
-    """The stretches of recordings that a table labels, as movements of their own.
+    """Return the stretches of recordings that a table labels, as movements of their own.
 
     A stretch begins and ends at the samples nearest to its times. Times by the recording's clock that all lie outside
     of it, and would fit counted from its first sample, are taken so. Columns named recording and place say which
@@ -315,7 +315,7 @@ def labeled_pieces(recordings: Recordings, table: LabelTable) -> Recordings:
 
 
 def _of_none(table: LabelTable, sources: Sequence[Source], meant: Mapping[str, Sequence[str]]) -> list[Problem]:
-    """The rows of recordings that are not there, as one problem."""
+    """Return the rows of recordings that are not there, as one problem."""
     lost = [row for row in table.rows if not any(_is_of(row, source, meant) for source in sources)]
     if not lost:
         return []
@@ -327,7 +327,7 @@ def _of_none(table: LabelTable, sources: Sequence[Source], meant: Mapping[str, S
 
 
 def _paths_of(recording: str, paths: Collection[str]) -> list[str]:
-    """The recordings that a name may mean: itself, else those in folders below, else the end of a longer path."""
+    """Give the recordings that a name may mean: itself, else those in folders below, else the end of a longer path."""
     if recording in paths:
         return [recording]
     below = sorted(path for path in paths if path.endswith(f"/{recording}"))
@@ -348,7 +348,7 @@ def _counts_from_start(rows: Sequence[LabelRow], times: Array) -> bool:
 
 
 def _samples(row: LabelRow, times: Array, origin: float) -> tuple[int, int]:
-    """The samples from the one nearest to the start to the one nearest to the end: first, and one past the last."""
+    """Find the samples from the nearest to the start to the nearest to the end: first, and one past the last."""
     half = 0.5 * float(np.median(np.diff(times)))
     start = int(np.searchsorted(times, origin + row.start - half))
     return start, int(np.searchsorted(times, origin + row.end + half))
@@ -360,7 +360,7 @@ def _place(source: Source, times: Array, start: int, stop: int) -> str:
 
 
 def _cut(demos: Demonstrations, stretches: Sequence[tuple[int, int]], sources: Sequence[Source]) -> Demonstrations:
-    """The stretches of samples as movements; what is learned of orientations and angles begins anew in each."""
+    """Return the stretches of samples as movements; what is learned of orientations and angles begins anew in each."""
     movements, samples = demos.movements, np.concatenate([np.arange(*stretch) for stretch in stretches])
     offsets = np.concatenate(([0], np.cumsum([stop - start for start, stop in stretches])))
     times, labels = movements.stamps[samples], [source.label for source in sources]

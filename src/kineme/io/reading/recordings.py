@@ -206,7 +206,7 @@ def read_paths(  # noqa: PLR0913 - those of `read_recordings`, in records
 
 
 def trimmed(recordings: Recordings) -> Recordings:
-    """Recordings without the rests at both ends of each movement, see `TrimRest`."""
+    """Return recordings without the rests at both ends of each movement, see `TrimRest`."""
     moving = TrimRest().apply(recordings.demonstrations)
     return replace(recordings, demonstrations=Demonstrations.of_movements(moving))
 
@@ -242,7 +242,7 @@ def read_recording(path: str | Path) -> Trajectory:
 
 
 def paths_of(paths: Sequence[Path], recordings: Recordings) -> list[Path]:
-    """The files and data sets that recordings were read from at these paths; for the standard input there is none."""
+    """List files and data sets that recordings were read from at these paths; none for the standard input."""
     root = root_of(*(path for path in paths if str(path) != "-"))
     return [root / name for name in dict.fromkeys(source.path for source in recordings.sources)]
 
@@ -302,7 +302,7 @@ class NameRule:
         return PERSON in {part.field for part in self.parts}
 
     def apply(self, read: FileRead, path: Path) -> FileRead:
-        """A file with the labels that its path says; one that the pattern does not match is a problem."""
+        """Return a file with the labels that its path says; one that the pattern does not match is a problem."""
         if read.block is None:
             return read
         label = _folder(path, 1 if self.label_by == FOLDER else self.label_by) if self._by_folder else None
@@ -332,7 +332,7 @@ class NameRule:
 
 
 def match(parts: tuple[Part, ...], name: str) -> dict[str, str] | None:
-    """The text of each field, none of them empty or with a slash; None if the name is not like the pattern."""
+    """Return the text of each field, none of them empty or with a slash; None if the name is not like the pattern."""
 
     @cache  # so that no name takes more than the square of its length
     def fields(k: int, start: int) -> tuple[str, ...] | None:
@@ -356,14 +356,14 @@ def match(parts: tuple[Part, ...], name: str) -> dict[str, str] | None:
 
 
 def _folder(path: Path, level: str | int | None) -> str | None:
-    """The name of the folder so many levels up, or None above the topmost."""
+    """Return the name of the folder so many levels up, or None above the topmost."""
     up = int(level or 1)
     names = _parts(path, up + 1)
     return names[-1 - up] if len(names) > up else None
 
 
 def _parts(path: Path, n: int) -> list[str]:
-    """The names of a path; of as much of the whole path as has n of them."""
+    """Return the names of a path; of as much of the whole path as has n of them."""
     parts = [part for part in path.parts if part not in {path.anchor, ".", ".."}]
     if len(parts) < n or ".." in path.parts:
         absolute = Path(os.path.abspath(path))

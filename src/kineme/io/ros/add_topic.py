@@ -45,7 +45,7 @@ def copy_with_topic(source: Path, target: Path, name: str, texts: Callable[[int,
 
 
 def _copy_folder(bag: bags.Bag, source: Path, target: Path, added: AddedTopic) -> None:
-    """Each message goes into the file that was recorded at its time; the description of the folder counts them."""
+    """Write each message into the file that was recorded at its time; the description of the folder counts them."""
     from ruamel.yaml import YAML
 
     yaml = YAML()
@@ -89,7 +89,7 @@ def _copy_file(source: Path, target: Path, added: AddedTopic, storage: Any) -> N
 
 
 def _divided(added: AddedTopic, starts: Sequence[int]) -> dict[int, AddedTopic]:
-    """Number of a file -> the messages after its start and before the start of the next."""
+    """Return number of a file -> the messages after its start and before the start of the next."""
     order = sorted(range(len(starts)), key=starts.__getitem__)
     parts: dict[int, list[tuple[int, bytes]]] = {}
     for stamp, raw in added.messages:
@@ -130,7 +130,7 @@ class AddedTopic(NamedTuple):
 
 
 def added_topic(bag: bags.Bag, name: str, texts: Sequence[tuple[int, str]]) -> AddedTopic:
-    """Texts with their times of recording [ns] as messages of that bag's version of ROS."""
+    """Return texts with their times of recording [ns] as messages of that bag's version of ROS."""
     if any(topic.name == name for topic in bag.topics):
         raise DataError(f"expected a bag without the topic {name}, got one that has it; annotate the recording itself")
     store: Any = standard_types(bag.version)

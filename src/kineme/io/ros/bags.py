@@ -177,7 +177,7 @@ def check_records(path: Path) -> bytes:
 
 
 def _check_mcap(file: BinaryIO, at: int) -> bytes:
-    """Rosbags takes each nine zeros for a record, of which there may be billions, and reads records whole."""
+    """Refuse zeros, each nine of which rosbags takes for a record, and records that are large: it reads them whole."""
     magic, profile = _MAGIC[".mcap"], b"ros2"  # what has no header is left to rosbags
     end = file.seek(0, os.SEEK_END)
     file.seek(max(end - len(magic), 0))
@@ -200,7 +200,7 @@ def _check_mcap(file: BinaryIO, at: int) -> bytes:
 
 @contextmanager
 def plain_name(path: Path, ending: str) -> Iterator[Path]:
-    """The path, or a link to it: the name of a database is an address to SQLite, where these characters mean more."""
+    """Yield the path, or a link to it: a database's name is an address to SQLite, in which ?, # and % mean more."""
     files = [file for kind in ("*.db3*", "*.mcap*") for file in path.glob(kind)] if not ending else [path]
     if ending not in ("", ".db3") or not _MEAN_MORE & set("".join(map(str, files))):
         yield path
@@ -233,7 +233,7 @@ def logs_beside(path: Path) -> list[str]:
 
 @contextmanager
 def refused(expected: str, remedy: str) -> Iterator[None]:
-    """Whatever rosbags raises on a damaged bag, as a `DataError`."""
+    """Raise whatever rosbags raises on a damaged bag as a `DataError`."""
     try:
         yield
     except (KinemeError, MemoryError):
@@ -354,7 +354,7 @@ class Folder(NamedTuple):
 
 @contextmanager
 def expanded_folder(path: Path) -> Iterator[Folder]:
-    """The folder, or one with its files expanded.
+    """Yield the folder, or one with its files expanded.
 
     A folder that is none of ROS 2, or whose files are missing, is left to rosbags to refuse.
     """

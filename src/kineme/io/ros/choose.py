@@ -93,7 +93,7 @@ def _as_known(bag: Bag, movements: Known, candidates: Sequence[Topic]) -> Choice
 
 
 def _topics_of_numbers(bag: Bag) -> list[Topic]:
-    """Topics of other types with numbers, which are read if they are asked for or alone; not those of ROS itself."""
+    """Find topics of numbers, of other types, which are read if asked for or alone; not those of ROS itself."""
     topics = [topic for topic in bag.topics if topic.type not in (*TYPES, *TRANSFORMS) and holds_samples(topic)]
     readable = []
     for topic in topics:
@@ -115,7 +115,7 @@ def can_be_read(topic: Topic) -> bool:
 
 
 def listed_topics(topics: Sequence[Topic]) -> str:
-    """Topics with their types and numbers of messages, for a message."""
+    """Return topics with their types and numbers of messages, for a message."""
     if not topics:
         return "none"
     shown = [f"{topic.name} ({topic.type}, {counted(topic.n_messages, 'message')})" for topic in topics]
@@ -123,7 +123,7 @@ def listed_topics(topics: Sequence[Topic]) -> str:
 
 
 def pair_of(text: str) -> Edge:
-    """Two frames written as ``parent:child``."""
+    """Return two frames written as ``parent:child``."""
     parent, colon, child = text.partition(":")
     if not colon or not parent or not child or ":" in child:
         raise DataError(f"expected two frames as parent:child, got {text!r}")
@@ -158,7 +158,7 @@ def _only_frames(bag: Bag, transforms: Sequence[Topic]) -> Edge:
 
 
 def fitting_topics(bag: Bag, topics: Sequence[Topic], movements: Known) -> list[Topic]:
-    """The topics with columns of the same names; if there are none, with as many columns, of the same kinds."""
+    """Return the topics with columns of the same names; if there are none, with as many columns, of the same kinds."""
     if not movements.columns:
         return []
     columns = {topic.name: _first_sample(bag, topic) for topic in topics}
@@ -168,7 +168,7 @@ def fitting_topics(bag: Bag, topics: Sequence[Topic], movements: Known) -> list[
 
 
 def _first_sample(bag: Bag, topic: Topic) -> tuple[Heads, Sequence[float]]:
-    """The columns and numbers of the first sample of a topic; nothing if it has none soon."""
+    """Return the columns and numbers of the first sample of a topic; nothing if it has none soon."""
     row_of = TYPES[topic.type].row if topic.type in TYPES else None
     if row_of is None:
         return (), ()
@@ -199,7 +199,7 @@ class Step(NamedTuple):
 
 
 def transform_topics(bag: Bag) -> list[Topic]:
-    """The topics with transforms between frames."""
+    """Return the topics with transforms between frames."""
     return [topic for topic in bag.topics if topic.type in TRANSFORMS and topic.n_messages]
 
 
@@ -217,12 +217,12 @@ def transforms_in(bag: Bag, topics: Sequence[Topic], bad: list[str]) -> Iterator
 
 
 def edge_of(transform: Any) -> Edge:
-    """Parent and child, as in ROS 2 without a slash in front."""
+    """Return parent and child, as in ROS 2 without a slash in front."""
     return transform.header.frame_id.removeprefix("/"), transform.child_frame_id.removeprefix("/")
 
 
 def connected_graph(bag: Bag, topics: Sequence[Topic], wanted: Sequence[Edge], most: int | None = None) -> list[Edge]:
-    """The frames, read until all wanted pairs are connected, or `most` transforms, or to the end.
+    """Return the frames, read until all wanted pairs are connected, or `most` transforms, or to the end.
 
     Each is a child with the parent that it has most transforms of, in alphabetic order.
     """
@@ -251,7 +251,7 @@ def connected_graph(bag: Bag, topics: Sequence[Topic], wanted: Sequence[Edge], m
 
 
 def chain(edges: Sequence[Edge], parent: str, child: str) -> list[Step]:
-    """The transforms from one frame to another."""
+    """Return the transforms from one frame to another."""
     frames = sorted({frame for edge in edges for frame in edge})
     for frame in (parent, child):
         if frame not in frames:
@@ -269,7 +269,7 @@ def chain(edges: Sequence[Edge], parent: str, child: str) -> list[Step]:
 
 
 def _ways(edges: Sequence[Edge], start: str) -> dict[str, list[Step]]:
-    """The shortest ways from a frame to all that are connected with it."""
+    """Return the shortest ways from a frame to all that are connected with it."""
     near: dict[str, list[tuple[str, Step]]] = {}
     for parent, child in edges:
         near.setdefault(parent, []).append((child, Step((parent, child), True)))
@@ -285,7 +285,7 @@ def _ways(edges: Sequence[Edge], start: str) -> dict[str, list[Step]]:
 
 
 def bag_contents(path: Path) -> list[Contents]:
-    """Topics with types, numbers of messages and how they are read; and frames with numbers of transforms."""
+    """Return topics with types, numbers of messages and how they are read; and frames with numbers of transforms."""
     with open_bag(path) as bag:
         rows = tuple((topic.name, topic.type, topic.n_messages, _read_as(bag, topic)) for topic in bag.topics)
         topics = Contents("topics", ("topic", "type", "messages", "read as"), rows)
@@ -307,7 +307,7 @@ def _read_as(bag: Bag, topic: Topic) -> str:
 
 
 def _frames(bag: Bag) -> Contents:
-    """The transforms of the first messages: all of them would take as long as to read the bag."""
+    """Read the transforms of the first messages: all of them would take as long as to read the bag."""
     counts: Counter[Edge] = Counter()
     first: dict[Edge, Row] = {}
     moving: set[Edge] = set()

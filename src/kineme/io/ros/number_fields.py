@@ -39,12 +39,12 @@ class MessageType(NamedTuple):
 
 
 def nanoseconds_of(time: Any) -> int:
-    """A time or a duration of ROS [ns]."""
+    """Return a time or a duration of ROS [ns]."""
     return int(time.sec) * 1_000_000_000 + int(time.nanosec)
 
 
 def transform_row(transform: Any) -> Row:
-    """Translation and rotation, the numbers of `POSE`."""
+    """Return translation and rotation, the numbers of `POSE`."""
     p, q = transform.translation, transform.rotation
     return p.x, p.y, p.z, q.x, q.y, q.z, q.w
 
@@ -64,7 +64,7 @@ def _point_row(point: Any) -> Row:
 
 
 def _joint_state(message: Any) -> tuple[Heads, Row]:
-    """Positions of joints under their names; a message of velocities or efforts alone holds no sample."""
+    """Return positions of joints under their names; a message of velocities or efforts alone holds no sample."""
     row = message.position.tolist()
     if not row:
         return (), ()
@@ -173,7 +173,7 @@ class NumberFields:
         return [head for step in self.steps for head in step.heads]
 
     @cached_property
-    def _kept(self) -> list[int]:
+    def _samples(self) -> list[int]:
         return [k for k, head in enumerate(self._all) if not head.startswith("header.")]
 
     @cached_property
@@ -189,10 +189,10 @@ class NumberFields:
     @cached_property
     def heads(self) -> tuple[str, ...]:
         """The columns."""
-        return tuple(self._all[k] for k in self._kept)
+        return tuple(self._all[k] for k in self._samples)
 
     def decode(self, raw: bytes) -> Numbers:
-        """The numbers in the bytes of a message.
+        """Return the numbers in the bytes of a message.
 
         Raises
         ------
@@ -213,11 +213,11 @@ class NumberFields:
         if self._stamp is not None:
             seconds, nanoseconds = (int(row[k]) for k in self._stamp)
             stamp = seconds * 1_000_000_000 + nanoseconds
-        return Numbers([row[k] for k in self._kept], stamp)
+        return Numbers([row[k] for k in self._samples], stamp)
 
 
 def number_fields(bag: Bag, topic: Topic) -> NumberFields:
-    """The numbers of a topic, by the definition in the bag or, where it holds none, by that of the standard type."""
+    """Find the numbers of a topic, by the definition in the bag or, without one, by that of the standard type."""
     definitions = {connection.msgdef.data: connection.msgdef for connection in topic.connections}
     where = f"topic {topic.name}: expected the definition of {topic.type}"
     if len(definitions) > 1:
@@ -241,7 +241,7 @@ def number_fields(bag: Bag, topic: Topic) -> NumberFields:
 
 
 def _steps(types: Mapping[str, Any], name: str, prefix: str, version: int, deep: int) -> list[Step]:
-    """The steps of a type; numbers that follow each other are one step."""
+    """Return the steps of a type; numbers that follow each other are one step."""
     if not deep:
         raise DataError(f"expected types within types at most {_DEEPEST} deep, got more")
     steps: list[Step] = []
@@ -305,7 +305,7 @@ def _read(steps: tuple[Step, ...], raw: bytes, at: int, order: str, aligned: boo
 
 @lru_cache(maxsize=4096)
 def _layout(formats: str, phase: int, order: str) -> struct.Struct:
-    """Numbers in a row from an offset modulo 8 on, each at a multiple of its size; without padding for phase -1."""
+    """Place numbers in a row from an offset modulo 8 on, each at a multiple of its size; phase -1: no padding."""
     offset, padded = max(phase, 0), order
     for code in formats:
         size = struct.calcsize(f"={code}")
@@ -352,7 +352,7 @@ def decoder_of(bag: Bag, topic: Topic) -> Callable[[bytes], Any]:
 
 @cache
 def standard_types(version: int) -> Any:
-    """The store of the standard types of ROS, of rosbags."""
+    """Return the store of the standard types of ROS, of rosbags."""
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
     store = get_typestore(Stores.ROS1_NOETIC if version == 1 else Stores.LATEST)

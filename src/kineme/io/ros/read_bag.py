@@ -21,7 +21,7 @@ from kineme.io.ros.streams import (
     Samples,
     Stream,
     are_rotations,
-    check_kept,
+    check_samples,
     clock_of,
     from_ros,
     in_order,
@@ -86,7 +86,7 @@ def read_bag(path: Path, layout: Layout) -> Parsed:
 
 
 def _roles(heads: tuple[str, ...], time: int, layout: Layout, of_joints: bool = True) -> Roles:
-    """All columns but stamps, numbers of things, and covariances are coordinates, or those chosen.
+    """Take all columns but stamps, numbers of things, and covariances as coordinates, or those chosen.
 
     The names of joints are any words.
     """
@@ -112,7 +112,7 @@ def _parsed(table: Table, roles: Roles, layout: Layout, about: tuple[str, str, s
 def read_transforms(
     bag: Bag, topics: Sequence[Topic], wanted: Sequence[Edge], skip: str
 ) -> tuple[list[Stream], list[str]]:
-    """The pose of each child frame in its parent frame, and what was left out."""
+    """Read the pose of each child frame in its parent frame, and what was left out."""
     if not topics:
         raise DataError("expected a topic of transforms, such as /tf, got none")
     graph = connected_graph(bag, topics, wanted)
@@ -138,7 +138,7 @@ def read_transforms(
 def _collect(
     bag: Bag, topics: Sequence[Topic], needed: set[Edge], bad: list[str]
 ) -> tuple[dict[Edge, Samples], dict[str, Counter[str]]]:
-    """The needed transforms, and for their children how often each parent occurs."""
+    """Return the needed transforms, and for their children how often each parent occurs."""
     samples_of_edges = {edge: Samples.empty() for edge in needed}
     children = {child for _, child in needed}
     counts: Counter[Edge] = Counter()  # by names as they are in messages, of which there are few
@@ -154,7 +154,7 @@ def _collect(
             samples.recorded.append(recorded)
             samples.stamped.append(nanoseconds_of(header.stamp))
         if not n % _CHECKED:
-            check_kept(list(samples_of_edges.values()))
+            check_samples(list(samples_of_edges.values()))
     parents: dict[str, Counter[str]] = {child: Counter() for child in children}
     for names, n in counts.items():
         parent, child = (name.removeprefix("/") for name in names)
@@ -164,7 +164,7 @@ def _collect(
 
 
 def _usable(edge: Edge, samples: Samples, left_out: list[str]) -> Stream:
-    """The transforms of an edge whose rotations are rotations, each once: some nodes publish the last one again."""
+    """Take the transforms of an edge with valid rotations, each once: some nodes publish the last one again."""
     where = f"transform {edge[0]}:{edge[1]}"
     stream = stream_of(where, POSE, samples)
     assert stream.stamped is not None
@@ -219,7 +219,7 @@ def _is_fixed(stream: Stream) -> bool:
 
 
 def _at(seconds: Array, start: int, stream: Stream, of_headers: bool) -> Array:
-    """A transform at the common stamps, (n, 7)."""
+    """Return a transform at the common stamps, (n, 7)."""
     if _is_fixed(stream):
         return np.repeat(stream.values[:1], len(seconds), axis=0)
     stamps, values = in_order(stream, of_headers)
@@ -234,7 +234,7 @@ class _Group(NamedTuple):
 
 
 def _movements_of_messages(bag: Bag, topic: Topic, layout: Layout) -> Parsed:
-    """The movements of a topic, one a message. Of those with different columns, the most frequent are read.
+    """Return the movements of a topic, one a message. Of those with different columns, the most frequent are read.
 
     A message that cannot be read costs its own movement, whatever the layout says to skip.
     """

@@ -53,7 +53,7 @@ class Samples(NamedTuple):
 
     @classmethod
     def empty(cls) -> Samples:
-        """No samples yet."""
+        """Begin without samples."""
         return cls(array("d"), array("q"), array("q"))
 
     @property
@@ -77,7 +77,7 @@ class _Open(NamedTuple):
 def read_streams(
     bag: Bag, topics: Sequence[Topic], skip: str, columns: Sequence[Column] | None = None
 ) -> tuple[list[Stream], list[str]]:
-    """The samples of topics, and what was left out; `columns` are those that are asked for.
+    """Read the samples of topics, and what was left out; `columns` are those that are asked for.
 
     Messages of one topic may have different columns, as the states of joints that several nodes publish. They are
     streams of their own where they share no column; of those that do, the most frequent are read.
@@ -152,10 +152,10 @@ def _collect(bag: Bag, topics: Sequence[Topic], opened: Sequence[_Open]) -> None
             samples.stamped.append(stamp_of(message))
         n += 1
         if not n % _CHECKED:
-            check_kept([samples for each in opened for samples, _ in each.groups.values()])
+            check_samples([samples for each in opened for samples, _ in each.groups.values()])
 
 
-def check_kept(some: Sequence[Samples]) -> None:
+def check_samples(some: Sequence[Samples]) -> None:
     """Refuse to keep more numbers than the limit of memory allows; samples may occur several times."""
     check_expanded(
         _COPIES * sum(samples.n_bytes for samples in {id(samples): samples for samples in some}.values()), "a topic"
@@ -163,7 +163,7 @@ def check_kept(some: Sequence[Samples]) -> None:
 
 
 def _group(reading: _Open, heads: Heads) -> tuple[Samples, list[int] | None]:
-    """The samples with these columns, in whatever order they came first."""
+    """Return the samples with these columns, in whatever order they came first."""
     first = reading.first.setdefault(tuple(sorted(heads)), heads)
     if first == heads:
         reading.groups[heads] = Samples.empty(), None
@@ -174,7 +174,7 @@ def _group(reading: _Open, heads: Heads) -> tuple[Samples, list[int] | None]:
 
 
 def _streams(topic: Topic, reading: _Open, left_out: list[str]) -> list[Stream]:
-    """Streams of one topic, the longest first."""
+    """Return streams of one topic, the longest first."""
     groups = [(heads, samples) for heads, (samples, order) in reading.groups.items() if order is None]
     groups.sort(key=lambda group: -len(group[1].recorded))
     streams: list[Stream] = []
@@ -197,7 +197,7 @@ def stream_of(name: str, heads: Heads, samples: Samples, has_header: bool = True
 
 
 def rotations_in(heads: Heads) -> list[int]:
-    """The first of the four columns of every quaternion."""
+    """Return the first of the four columns of every quaternion."""
     ends = ("orientation.x", "orientation.y", "orientation.z", "orientation.w")
     starts = range(len(heads) - 3)
     return [k for k in starts if all(heads[k + i].endswith(end) for i, end in enumerate(ends))]
@@ -206,7 +206,7 @@ def rotations_in(heads: Heads) -> list[int]:
 def with_rotations(
     stream: Stream, where: str, skip: str, left_out: list[str], columns: Sequence[Column] | None = None
 ) -> Stream:
-    """The stream without quaternions that are none.
+    """Return the stream without quaternions that are none.
 
     Those that are zero in every sample were never set: their columns are left out, and so are those that `columns`, if
     given, does not ask for. Others cost their sample or, where `skip` is ``"movement"``, the movement.
@@ -217,7 +217,7 @@ def with_rotations(
         left_out.append(f"{where}{', '.join(stream.heads[k] for k in dropped)}, which are 0 in every message")
         stream = _without(stream, unset)
     wrong = [k for k in rotations_in(stream.heads) if not are_rotations(stream.values[:, k : k + 4]).all()]
-    stream = _without(stream, [k for k in wrong if not _is_asked(stream, range(k, k + 4), columns)])
+    stream = _without(stream, [k for k in wrong if not _is_chosen(stream, range(k, k + 4), columns)])
     good = np.ones(len(stream.values), dtype=bool)
     for k in rotations_in(stream.heads):
         good &= are_rotations(stream.values[:, k : k + 4])
@@ -237,7 +237,7 @@ def with_rotations(
 
 
 def _without(stream: Stream, rotations: Sequence[int]) -> Stream:
-    """The stream without the quaternions that begin at these columns."""
+    """Return the stream without the quaternions that begin at these columns."""
     if not rotations:
         return stream
     dropped = {k + i for k in rotations for i in range(4)}
@@ -245,7 +245,7 @@ def _without(stream: Stream, rotations: Sequence[int]) -> Stream:
     return replace(stream, heads=tuple(stream.heads[k] for k in columns), values=stream.values[:, columns])
 
 
-def _is_asked(stream: Stream, numbers: Iterable[int], columns: Sequence[Column] | None) -> bool:
+def _is_chosen(stream: Stream, numbers: Iterable[int], columns: Sequence[Column] | None) -> bool:
     """Tell whether one of the columns with these numbers is asked for: by its name, the beginning of it, or a pattern.
 
     A column that is asked for by its number may be any.
@@ -275,7 +275,7 @@ def clock_of(streams: Sequence[Stream]) -> tuple[bool, str]:
 
 
 def stamps_of(stream: Stream, of_headers: bool) -> Stamps:
-    """The stamps of one clock [ns]."""
+    """Return the stamps of one clock [ns]."""
     if not of_headers:
         return stream.recorded
     assert stream.stamped is not None
@@ -283,7 +283,7 @@ def stamps_of(stream: Stream, of_headers: bool) -> Stamps:
 
 
 def merge_streams(streams: Sequence[Stream], of_headers: bool) -> tuple[Stream, list[str]]:
-    """One stream with the columns of all, at the stamps of the first; and what was left out.
+    """Return one stream with the columns of all, at the stamps of the first; and what was left out.
 
     Samples of the first stream before another one begins, or after it ends, are left out. Columns are prefixed with
     the name of their stream where names occur twice.
@@ -321,7 +321,7 @@ def merge_streams(streams: Sequence[Stream], of_headers: bool) -> tuple[Stream, 
 
 
 def values_at(at: Array, times: Array, stream: Stream, values: Array) -> Array:
-    """Samples at other times, linearly, and of rotations on the sphere."""
+    """Return samples at other times, linearly, and of rotations on the sphere."""
     result = np.column_stack([np.interp(at, times, column) for column in values.T])
     for k in rotations_in(stream.heads):
         result[:, k : k + 4] = interpolated(at, times, values[:, k : k + 4])
@@ -329,7 +329,7 @@ def values_at(at: Array, times: Array, stream: Stream, values: Array) -> Array:
 
 
 def in_order(stream: Stream, of_headers: bool) -> tuple[Stamps, Array]:
-    """Stamps that increase strictly, and the samples."""
+    """Return stamps that increase strictly, and the samples."""
     ticks = stamps_of(stream, of_headers)
     if (np.diff(ticks) > 0).all():
         return ticks, stream.values
@@ -353,17 +353,17 @@ def are_rotations(q: Array) -> NDArray[np.bool_]:
 
 
 def from_ros(q: Array) -> Array:
-    """Quaternions (n, 4) with w last as ones of norm 1 with w first."""
+    """Return quaternions (n, 4) with w last as ones of norm 1 with w first."""
     return np.asarray(np.roll(q, 1, axis=1) / np.linalg.norm(q, axis=1, keepdims=True))
 
 
 def to_ros(q: Array) -> Array:
-    """Quaternions (n, 4) with w first as ones of norm 1 with w last."""
+    """Return quaternions (n, 4) with w first as ones of norm 1 with w last."""
     return np.asarray(np.roll(q, -1, axis=1) / np.linalg.norm(q, axis=1, keepdims=True))
 
 
 def interpolated(at: Array, times: Array, q: Array) -> Array:
-    """Rotations (m, 4) at other times (m,), by spherical linear interpolation between rows of q (n, 4) at times (n,).
+    """Turn rows of q (n, 4) at times (n,) into rotations (m, 4) at other times (m,), by spherical linear interpolation.
 
     Before the first time and after the last one the rotation stays.
     """

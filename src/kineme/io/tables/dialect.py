@@ -92,14 +92,14 @@ def check_line(line: str) -> None:
 
 
 def split(line: str, separator: str | None) -> list[str]:
-    """The cells of a line."""
+    """Return the cells of a line."""
     plain = line.rstrip("\r\n")
     cells = _quoted_cells(plain, separator) if '"' in line else plain.split(separator)
     return [cell.strip() for cell in cells]
 
 
 def _quoted_cells(line: str, separator: str | None) -> list[str]:
-    """The cells of a line with quoted cells; a doubled quote within them stands for one quote.
+    """Return the cells of a line with quoted cells; a doubled quote within them stands for one quote.
 
     Python's csv is not used: its limit on the length of cells holds for the whole process.
     """
@@ -117,7 +117,7 @@ def _quoted_cells(line: str, separator: str | None) -> list[str]:
 
 
 def detect_dialect(text: Iterable[str]) -> Dialect:
-    """The dialect of a table, from its first lines; no more lines are read than needed."""
+    """Detect the dialect of a table, from its first lines; no more lines are read than needed."""
     lines, rows = [], []
     for line in islice(text, _HEAD):
         check_line(line)
@@ -161,7 +161,7 @@ def detect_dialect(text: Iterable[str]) -> Dialect:
 
 
 def _n_heads(cells: Sequence[list[str]], comma: bool) -> int:
-    """The number of lines of heads: several where a name in the first stands above several columns, as of points."""
+    """Count the lines of heads: several where a name in the first stands above several columns, as of points."""
     top = [cell for cell in cells[0] if cell]
     lines = next((k for k, row in enumerate(cells) if any(is_number(cell, comma) for cell in row)), 1)
     alike = len({len(row) for row in cells[:lines]}) == 1 and len({*top}) < len(top)
@@ -169,7 +169,7 @@ def _n_heads(cells: Sequence[list[str]], comma: bool) -> int:
 
 
 def _joined(rows: Sequence[list[str]]) -> list[str]:
-    """Lines of heads as one: ``nose`` above ``x`` is nose.x. DeepLabCut's line of the scorer is left out."""
+    """Return lines of heads as one: ``nose`` above ``x`` is nose.x. DeepLabCut's line of the scorer is left out."""
     if len(rows) == 1:
         return rows[0]
     names = [row[1:] for row in rows if row[0] != "scorer"]
@@ -179,7 +179,7 @@ def _joined(rows: Sequence[list[str]]) -> list[str]:
 
 
 def units_in(cells: Sequence[str]) -> tuple[str, ...]:
-    """The units in a row that holds nothing but units, without brackets; empty if it is no such row."""
+    """Return the units in a row that holds nothing but units, without brackets; empty if it is no such row."""
     plain = tuple(cell.strip("[]() ") for cell in cells)
     letters = [cell.lower() in _LETTERS for cell in plain]
     n_units = sum(unit_named(cell) is not None for cell, letter in zip(plain, letters, strict=True) if not letter)
@@ -188,7 +188,7 @@ def units_in(cells: Sequence[str]) -> tuple[str, ...]:
 
 
 def _below_preamble(lines: Sequence[str], own: list[int], cells: Sequence[list[str]]) -> list[int]:
-    """The lines from the heads on, where lines of other lengths without rows of numbers stand above them.
+    """Return the lines from the heads on, where lines of other lengths without rows of numbers stand above them.
 
     So loggers write the device, the rate and the time. Below the heads all lines have as many cells.
     """
@@ -228,7 +228,7 @@ def _is_row(cells: Sequence[str], n_columns: int, separator: str) -> bool:
 
 
 def separator_of(lines: Sequence[str]) -> str | None:
-    """The mark between cells, by the first lines; None for blanks."""
+    """Return the mark between cells, by the first lines; None for blanks."""
     for mark in _SEPARATORS:
         if all(mark in line for line in lines):
             return None if mark == "," and all(map(_COMMA_NUMBERS.fullmatch, lines)) else mark
@@ -262,7 +262,7 @@ def _is_sample(cells: Sequence[list[str]], comma: bool) -> bool:
 
 
 def _commented_head(lines: Sequence[str], separator: str | None, n_columns: int) -> list[str]:
-    """The heads in the last comment above the samples, if it has as many words as columns, and one is for time."""
+    """Give the heads in the last comment above the samples, if it has as many words as columns, and one is for time."""
     comments = [line.strip().lstrip("#%/") for line in lines if line.strip()]
     if not comments:
         return []

@@ -43,7 +43,7 @@ def read_parquet_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
         file = parquet.ParquetFile(io.BytesIO(data))
         names, types = tuple(file.schema_arrow.names), file.schema_arrow.types
         heads, kinds, owners = _expanded(names, types, _lists_to_read(file, layout), file)
-        roles = choose_roles(_told(heads, kinds, [types[k] for k in owners], layout), kinds, layout)
+        roles = choose_roles(_without_commands(heads, kinds, [types[k] for k in owners], layout), kinds, layout)
         needed = sorted({owners[k] for k in range(len(heads)) if k not in roles.ignored})
         check_expanded(n_bytes := 8 * max(file.metadata.num_rows, 0) * (len(heads) - len(roles.ignored)))
         if n_bytes > _LARGE and n_bytes > _EXPANDED * len(data):
@@ -87,7 +87,7 @@ def read_parquet_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
 
 
 def _lists_to_read(file: Any, layout: Layout) -> set[str]:
-    """The columns of lists that count: all if the caller chooses, else one, and only where it is meant."""
+    """Return the columns of lists that count: all if the caller chooses, else one, and only where it is meant."""
     import pyarrow as pa
 
     names, types = file.schema_arrow.names, file.schema_arrow.types
@@ -98,7 +98,7 @@ def _lists_to_read(file: Any, layout: Layout) -> set[str]:
         return {_STATE}
     try:
         kinds = [_kind(pa, kind) for kind in types]
-        choose_roles(_told(names, kinds, types, layout), kinds, layout)
+        choose_roles(_without_commands(names, kinds, types, layout), kinds, layout)
     except DataError:
         if len(lists) > 1:
             got = ", ".join(sorted(lists))
@@ -110,8 +110,8 @@ def _lists_to_read(file: Any, layout: Layout) -> set[str]:
     return set()
 
 
-def _told(heads: Sequence[str], kinds: Sequence[str], types: Sequence[Any], layout: Layout) -> list[str]:
-    """Heads without that of a vector of commands, ``action``, which is no label, unless it is chosen."""
+def _without_commands(heads: Sequence[str], kinds: Sequence[str], types: Sequence[Any], layout: Layout) -> list[str]:
+    """Return heads without that of a vector of commands, ``action``, which is no label, unless it is chosen."""
     chosen = {layout.label, *(layout.keys or ()), *(layout.coordinates or ())}
     columns = zip(heads, kinds, types, strict=True)
     lost = _COMMANDS - chosen
@@ -121,7 +121,7 @@ def _told(heads: Sequence[str], kinds: Sequence[str], types: Sequence[Any], layo
 def _expanded(
     names: Sequence[str], types: Sequence[Any], lists: set[str], file: Any
 ) -> tuple[tuple[str, ...], tuple[str, ...], list[int]]:
-    """Heads and kinds of the columns, those of lists once for each number, and the column of the file of each."""
+    """Give heads and kinds of the columns, those of lists once for each number, and the column of the file of each."""
     import pyarrow as pa
 
     heads, kinds, owners = [], [], []
@@ -138,7 +138,7 @@ def _expanded(
 
 
 def _read(column: Any, head: str, is_text: bool, listed: tuple[int, dict[int, str]]) -> Any:
-    """A column as texts, as numbers, or as the numbers in its lists, whose faults are added to those known."""
+    """Read a column as texts, as numbers, or as the numbers in its lists, whose faults are added to those known."""
     width, faults = listed
     if is_text:
         return _texts(column, head)
@@ -157,7 +157,7 @@ def _kind(pa: Any, kind: Any) -> str:
 
 
 def _texts(column: Any, head: str) -> Any:
-    """Names as texts, empty for missing ones."""
+    """Return names as texts, empty for missing ones."""
     import pyarrow as pa
 
     if not pa.types.is_dictionary(column.type):
@@ -218,7 +218,7 @@ def width_of(kind: Any, file: Any, name: str) -> int:
 
 
 def rows_of_lists(column: Any, width: int, head: str) -> tuple[Array, dict[int, str]]:
-    """A list column as numbers (T, width), NaN where a row has none, and row -> what is wrong there."""
+    """Return a list column as numbers (T, width), NaN where a row has none, and row -> what is wrong there."""
     parts, n_rows = [np.empty((0, width))], 0
     faults: dict[int, str] = {}
     for chunk in getattr(column, "chunks", [column]):

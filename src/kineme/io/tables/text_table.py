@@ -193,7 +193,7 @@ def _check_grouped(column: Iterable[str], head: str) -> None:
 
 
 def _rounded(samples: Iterator[tuple[int, str]], dialect: Dialect, columns: Sequence[int]) -> dict[int, str]:
-    """Row -> the first integer in some columns that a number of 64 bits would round."""
+    """Return row -> the first integer in some columns that a number of 64 bits would round."""
     faults: dict[int, str] = {}
     for row, (_, line) in enumerate(samples):
         cells = split(line, dialect.separator)
@@ -206,7 +206,7 @@ def _rounded(samples: Iterator[tuple[int, str]], dialect: Dialect, columns: Sequ
 
 
 def export_head(lines: Iterable[str], n_bytes: int) -> tuple[ExportHead, Dialect] | None:
-    """The head of an export of `_MAKERS` and how its samples are written; None for other tables."""
+    """Return the head of an export of `_MAKERS` and how its samples are written; None for other tables."""
     lines = iter(lines)
     some = list(islice(lines, _FIRST))
     for line in some:
@@ -233,7 +233,7 @@ def export_head(lines: Iterable[str], n_bytes: int) -> tuple[ExportHead, Dialect
 
 
 def _head(lines: Sequence[str], probe: bool = False) -> Any:
-    """The head of an export, or None; with `probe` the name of its maker from the first lines alone."""
+    """Return the head of an export, or None; with `probe` the name of its maker from the first lines alone."""
     for maker, find in _MAKERS.items():
         try:
             head = find(lines, split)
@@ -290,7 +290,7 @@ def _with_times_and_gaps(head: ExportHead, names: Sequence[str], columns: list[A
 
 
 def _rows(data: bytes, encoding: str, dialect: Dialect, texts: set[int]) -> tuple[Any, dict[int, str]]:
-    """The samples as a structured array, and row -> what is wrong there."""
+    """Return the samples as a structured array, and row -> what is wrong there."""
     dtype = np.dtype([(f"c{k}", "O" if k in texts else "f8") for k in range(len(dialect.heads))])
     rows = _read_fast(data, encoding, dialect, dtype)
     return read_slowly(_samples(data, encoding, dialect), dialect, dtype) if rows is None else (rows, {})
@@ -315,7 +315,7 @@ def _check_lines(data: bytes) -> None:
 
 
 def lines_of(data: bytes) -> Iterator[str]:
-    """The lines of a text of any encoding that `read_text_table` takes; a `DataError` if it is none."""
+    """Return the lines of a text of any encoding that `read_text_table` takes; a `DataError` if it is none."""
     _check_lines(data)
     return _lines(data, _encoding(data))
 
@@ -333,7 +333,7 @@ def _encoding(data: bytes) -> str:
 
 
 def _lines(data: bytes, encoding: str) -> Iterator[str]:
-    """The lines, decoded; `_encoding` has checked that all bytes are valid."""
+    """Return the lines, decoded; `_encoding` has checked that all bytes are valid."""
     if encoding != "utf-16":
         return iter(io.TextIOWrapper(io.BytesIO(data), encoding=encoding))
     return _checked_lines(data, encoding)
@@ -350,7 +350,7 @@ def _checked_lines(data: bytes, encoding: str) -> Iterator[str]:
 
 
 def _samples(data: bytes, encoding: str, dialect: Dialect) -> Iterator[tuple[int, str]]:
-    """Line number, counted from 1, and text of every sample."""
+    """Return line number, counted from 1, and text of every sample."""
     numbered = enumerate(islice(_lines(data, encoding), dialect.first, dialect.end), dialect.first + 1)
     return ((k, line) for k, line in numbered if dialect.is_sample(line))
 
@@ -363,7 +363,7 @@ def _check_memory(data: bytes, dialect: Dialect) -> None:
 
 
 def _read_fast(data: bytes, encoding: str, dialect: Dialect, dtype: np.dtype[Any]) -> Any:
-    """All samples as a structured array, or None if a line differs from the others: then `read_slowly` is needed."""
+    """Read samples as a structured array, or None if a line differs from the others: then `read_slowly` is needed."""
     has_text = any(dtype[name].kind == "O" for name in dtype.names or ())
     if dialect.decimal_comma and has_text:
         return None  # a comma in a name is not a decimal mark
@@ -383,7 +383,7 @@ def _read_fast(data: bytes, encoding: str, dialect: Dialect, dtype: np.dtype[Any
 def read_slowly(
     samples: Iterable[tuple[int, str]], dialect: Dialect, dtype: np.dtype[Any]
 ) -> tuple[Any, dict[int, str]]:
-    """All samples, NaN for missing numbers, and row -> what is wrong there; an empty cell or NA is a gap."""
+    """Read all samples, NaN for missing numbers, and row -> what is wrong there; an empty cell or NA is a gap."""
     stretches, faults, n_rows, has_numbers = [], dict[int, str](), 0, False
     numeric = [name for name in dtype.names or () if dtype[name].kind == "f"]
     samples = iter(samples)
@@ -442,7 +442,7 @@ def _read_stretch(lines: list[str], dialect: Dialect, dtype: np.dtype[Any]) -> t
 
 
 def try_rows(lines: Iterable[str], dialect: Dialect, dtype: np.dtype[Any]) -> Any:
-    """Lines parsed by NumPy, texts stripped; None if a line differs from the others."""
+    """Return lines parsed by NumPy, texts stripped; None if a line differs from the others."""
     try:
         rows = np.loadtxt(lines, dtype, comments=None, delimiter=dialect.separator, quotechar='"', ndmin=1)
     except ValueError:

@@ -70,12 +70,12 @@ class Annotation:
 
 
 def as_row(annotation: Annotation) -> dict[str, Any]:
-    """An annotation as plain data, in the order of `HEADS`."""
+    """Return an annotation as plain data, in the order of `HEADS`."""
     return {head: getattr(annotation, head) for head in HEADS}
 
 
 def to_csv(annotations: Sequence[Annotation]) -> bytes:
-    """A row for each annotation; the symbol of unknown motion is empty, times are by the recording's clock."""
+    """Write a row for each annotation; the symbol of unknown motion is empty, times are by the recording's clock."""
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow(HEADS)
@@ -271,7 +271,7 @@ def _check_apart(path: Path, source: Path) -> None:
 
 
 def _check_new_folder(path: Path, source: Path) -> None:
-    """A folder with files is never written over: nobody knows whose they are."""
+    """Refuse a folder with files, which is never written over: nobody knows whose they are."""
     if path.suffix.lower() in FORMATS:
         raise DataError(f"expected the name of a folder for a copy of the folder {source}, got {path.name}")
     if path.is_file() or (path.is_dir() and any(path.iterdir())):
@@ -316,7 +316,7 @@ WRITERS: dict[str, Writer] = {
 
 
 def writer_of(path: Path, name: str | None, sources: Sequence[Path]) -> Writer:
-    """The writer of that name; without a name, by the ending of the path, or by the only recording."""
+    """Return the writer of that name; without a name, by the ending of the path, or by the only recording."""
     if name is not None:
         writer = WRITERS[name]
     else:
@@ -345,7 +345,7 @@ def _fits(writer: Writer, path: Path, sources: Sequence[Path]) -> bool:
 def targets_of(
     path: Path, sources: Sequence[Path], movements: Sequence[Movement], name: str | None = None
 ) -> dict[Path, list[Movement]]:
-    """The files to write, and the movements whose annotations each of them holds.
+    """Return the files to write, and the movements whose annotations each of them holds.
 
     The path is a file, or a folder where a format, whose key of `WRITERS` is `name`, holds one movement in a file. The
     sources are named as the user named them, and the movements are all that are annotated.

@@ -40,7 +40,7 @@ class ColumnNames(NamedTuple):
 
 
 def encode_movement(columns: Columns, ending: str, names: ColumnNames | None = None) -> bytes:
-    """The bytes of a file with that ending; see `WRITERS`. Without names the columns are x, y, z or q1, q2, ..."""
+    """Give the bytes of a file with that ending; see `WRITERS`. Without names the columns are x, y, z or q1, q2, ..."""
     if ending not in WRITERS:
         raise DataError(f"expected a file ending in one of {', '.join(WRITERS)}, got {ending or 'none'!r}")
     return WRITERS[ending](columns, names)
@@ -80,7 +80,7 @@ def write_movement(path: str | Path, movement: MovementsLike | Columns, names: C
 
 
 def _checked(columns: Mapping[str, ArrayLike], names: ColumnNames | None) -> Columns:
-    """A dict of columns as arrays, refused unless all belong to one movement."""
+    """Return a dict of columns as arrays, refused unless all belong to one movement."""
     if not set(_NAMES[:2]) <= set(columns) <= set(_NAMES):
         raise TrajectoryError(
             f"expected a dict of {', '.join(_NAMES[:2])} and, if you like, {', '.join(_DERIVATIVES)}, got "
@@ -121,17 +121,17 @@ def _heads(columns: Columns, names: ColumnNames | None) -> list[str]:
             "accelerations": list(names.rates),
         }
     marks = {"positions": ("", ""), "velocities": ("v_", "/s"), "accelerations": ("a_", "/s^2")}
-    return ["time", *(_marked(axis, *marks[name]) for name in columns if name != "times" for axis in axes[name])]
-
-
-def _marked(head: str, prefix: str, per: str) -> str:
-    """The head of a position or of a rate; the unit of a rate, if the head says one, is that per second."""
-    name, unit = split_head(head)
-    return f"{prefix}{head}" if unit is None or not per else f"{prefix}{name} [{unit}{per}]"
+    heads = ["time"]
+    for name in (name for name in columns if name != "times"):
+        prefix, per = marks[name]
+        for head in axes[name]:
+            bare, unit = split_head(head)  # the unit of a rate, if the head says one, is that per second
+            heads.append(f"{prefix}{head}" if unit is None or not per else f"{prefix}{bare} [{unit}{per}]")
+    return heads
 
 
 def _table(columns: Columns) -> Array:
-    """Times and all else side by side, in the order of `_heads`."""
+    """Return times and all else side by side, in the order of `_heads`."""
     return np.column_stack([columns["times"], *(columns[name] for name in columns if name != "times")])
 
 
@@ -142,7 +142,7 @@ def _csv(columns: Columns, names: ColumnNames | None) -> bytes:
 
 
 def _cell(text: str) -> str:
-    """A head of CSV, quoted where it must be; a line is a sample, so that no head has line breaks."""
+    """Return a head of CSV, quoted where it must be; a line is a sample, so that no head has line breaks."""
     text = as_cell(" ".join(text.splitlines()))
     return '"' + text.replace('"', '""') + '"' if set(text) & set(',"') else text
 
@@ -176,7 +176,7 @@ WRITERS: dict[str, Callable[[Columns, ColumnNames | None], bytes]] = {
 
 
 def distinct_stems(movements: Sequence[Movement]) -> list[str]:
-    """A name for each movement, without ending, such as ``long`` or ``session-3``; none twice, whatever the case.
+    """Give a name for each movement, without ending, such as ``long`` or ``session-3``; none twice, whatever the case.
 
     Characters that are neither letters nor digits become underscores, so that a name is never a path.
     """

@@ -124,7 +124,7 @@ class Check(NamedTuple):
     quick: str = ""
 
 
-def _whole(name: str, least: int = 1, most: int = LARGEST_ID) -> Check:
+def _integer(name: str, least: int = 1, most: int = LARGEST_ID) -> Check:
     limits = f"a whole number from {least}" if most == LARGEST_ID else f"a whole number from {least} to {most}"
     return Check(f"typeof({name}) = 'integer' AND {name} BETWEEN {least} AND {most}", limits)
 
@@ -154,7 +154,7 @@ def _or_none(name: str, check: Check) -> Check:
 
 
 #: The versions from which and until which a row is alive.
-_ADDED = {"added": _whole("added")}
+_ADDED = {"added": _integer("added")}
 _ALIVE = _ADDED | {
     "removed": Check(
         "(removed IS NULL OR (typeof(removed) = 'integer' AND removed >= added))", "no version before `added`"
@@ -165,32 +165,32 @@ _ALIVE = _ADDED | {
 CHECKS: dict[str, dict[str, Check]] = {
     "meta": {"key": _text("key", 1), "value": _text("value", 1, MAX_DOCUMENT)},
     "version": {
-        "id": _whole("id"),
+        "id": _integer("id"),
         "at": Check(
             "typeof(at) = 'text' AND at GLOB '[0-9][0-9][0-9][0-9]-[0-9]*' AND length(CAST(at AS BLOB)) < 40", "a time"
         ),
         "action": _text("action", 1, 64),
         "detail": _text("detail", 2, MAX_DOCUMENT),
-        **{count: _whole(count, 0) for count in COUNTED.values()},
+        **{count: _integer(count, 0) for count in COUNTED.values()},
     },
     "source": {
-        "id": _whole("id"),
+        "id": _integer("id"),
         "path": _text("path"),
         "sha256": _text("sha256"),
-        "size": _whole("size", 0),
+        "size": _integer("size", 0),
         "read_at": _text("read_at"),
         "kind": _text("kind"),
         "options": _text("options", 2, MAX_DOCUMENT),
         **_ADDED,
     },
     "movement": {
-        "id": _whole("id"),
-        "source": _or_none("source", _whole("source")),
+        "id": _integer("id"),
+        "source": _or_none("source", _integer("source")),
         "place": _or_none("place", _text("place")),
         "digest": Check("typeof(digest) = 'integer'", "a whole number"),
         "name": _or_none("name", _text("name")),
         "label": _or_none("label", _name("label")),
-        "n_samples": _whole("n_samples", MIN_SAMPLES, 1 << 40),
+        "n_samples": _integer("n_samples", MIN_SAMPLES, 1 << 40),
         "t0": _real("t0"),
         "duration": Check(
             f"{_real('duration').condition} AND duration > 0 AND t0 + duration / (n_samples - 1) > t0 "
@@ -200,40 +200,40 @@ CHECKS: dict[str, dict[str, Check]] = {
         **_ALIVE,
     },
     "raw": {
-        "movement": _whole("movement"),
+        "movement": _integer("movement"),
         "start": _bytes("start"),
         "positions": _bytes("positions"),
         "times": _or_none("times", _bytes("times")),
     },
-    "primitive": {"movement": _whole("movement"), "boundary": _bytes("boundary"), "weights": _bytes("weights")},
-    "feature": {"movement": _whole("movement"), "rows": _bytes("rows")},
+    "primitive": {"movement": _integer("movement"), "boundary": _bytes("boundary"), "weights": _bytes("weights")},
+    "feature": {"movement": _integer("movement"), "rows": _bytes("rows")},
     "symbol": {
-        "key": _whole("key"),
+        "key": _integer("key"),
         "id": Check(
             f"typeof(id) = 'text' AND length(CAST(id AS BLOB)) = 16 AND id GLOB 'sym-{'[0-9a-f]' * 12}'",
             "'sym-' and twelve hexadecimal digits",
         ),
-        "created": _whole("created"),
+        "created": _integer("created"),
     },
     "symbol_state": {
-        "id": _whole("id"),
-        "symbol": _whole("symbol"),
+        "id": _integer("id"),
+        "symbol": _integer("symbol"),
         "name": _name("name"),
         "description": _text("description", most=MAX_DOCUMENT),
-        "prototype": _or_none("prototype", _whole("prototype")),
+        "prototype": _or_none("prototype", _integer("prototype")),
         "threshold": _or_none("threshold", _real("threshold")),
         "parents": _text("parents", 2, MAX_DOCUMENT),
         **_ALIVE,
     },
     "member": {
-        "id": _whole("id"),
-        "movement": _whole("movement"),
-        "symbol": _whole("symbol"),
+        "id": _integer("id"),
+        "movement": _integer("movement"),
+        "symbol": _integer("symbol"),
         "how": Check("how IN ('label', 'anchored', 'recognized')", "how a movement came to its symbol"),
         **_ALIVE,
     },
-    "recorded": {"movement": _whole("movement"), "columns": _bytes("columns")},
-    "shown_by": {"movement": _whole("movement"), "person": _name("person"), **_ADDED},
+    "recorded": {"movement": _integer("movement"), "columns": _bytes("columns")},
+    "shown_by": {"movement": _integer("movement"), "person": _name("person"), **_ADDED},
 }
 
 #: Table -> the condition that is checked whenever a row is read, and the one of import and `verify`.
