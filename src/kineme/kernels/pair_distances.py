@@ -1,9 +1,7 @@
 """Elastic, turning and point-cloud distances of many pairs of movements, each after the rotation of its pair.
 
-`kineme.kernels.pair_distances` and `kineme.kernels.pair_distances` define them. Movements are described once, by
-`kineme.kernels.pair_distances.shapes_of`. A pair's distances do not depend on the pairs beside it.
-
-Shapes of movements, compared pair by pair: segments and points of paths, and the plain definitions of distances.
+Movements are described once, by `shapes_of`: as segments and points of their paths. A pair's distances do not depend on
+the pairs beside it.
 
 A *path* (d, S) holds positions at even steps along arc length, centered at their mean, with a root mean square distance
 of 1 from it. Its *segments* are the pieces between ``n_segments + 1`` even values along it; its *points* are
@@ -63,7 +61,7 @@ _NO_LENGTH = 1e-6  # of a movement of size 1: a shorter vector is the rounding e
 
 @dataclass(frozen=True)
 class ElasticSpec:
-    """Options of comparing segments by dynamic time warping; see `kineme.kernels.pair_distances`.
+    """Options of comparing segments by dynamic time warping; see the module.
 
     `position_weight`, `turning_weight`: weights of the squared differences of midpoints and of turning angles / pi;
     that of tangents is 1.
@@ -83,7 +81,7 @@ class ElasticSpec:
 
 @dataclass(frozen=True)
 class CloudSpec:
-    """Options of comparing points as a cloud; see `kineme.kernels.pair_distances`.
+    """Options of comparing points as a cloud; see the module.
 
     `turning_weight`, `line_weight`: weights of the squared difference of turning angles / pi and of the squared sine
     between the tangents' lines; that of positions is 1.
