@@ -109,8 +109,8 @@ def unit_by_size(stamps: Array, head: str = "") -> tuple[str, str]:
             return "100ns", since
     by_step = next((unit for unit, least in _STEPS if step >= least), None)
     may_be_ticks = by_step == "us" and ("relative" in words_of(head) or step >= _SLOW_IN_US)
-    if {*words_of(head)} & _TICK_WORDS or may_be_ticks:
-        us = "'us', " if may_be_ticks else ""
+    if (of_ticks := {*words_of(head)} & _TICK_WORDS) or may_be_ticks:
+        us = "" if of_ticks else "'us', "
         raise DataError(
             f"expected times whose unit can be told, got {head!r} in steps of {step:.6g}; say how long one is, as "
             f"units={us}'100ns' or a number of seconds, in the shell --units"
