@@ -192,25 +192,21 @@ def duplicates_among(demonstrations: Demonstrations) -> list[list[int]]:
     group = group.ravel()
     candidates = np.flatnonzero(size[group] > 1)
     candidates = candidates[np.argsort(group[candidates], kind="stable")]
-    groups = []
+    result: list[list[int]] = []
     for alike in np.split(candidates, np.flatnonzero(np.diff(group[candidates])) + 1):
-        groups += _equal(demonstrations, alike.tolist())
-    return sorted(groups)
-
-
-def _equal(demonstrations: Demonstrations, alike: list[int]) -> list[list[int]]:
-    groups: list[list[int]] = []
-    for i in alike:
-        movement = demonstrations[i]
-        for group in groups:
-            other = demonstrations[group[0]]
-            apart = np.abs((other.times - other.times[0]) - (movement.times - movement.times[0])).max()
-            if np.array_equal(other.recorded, movement.recorded) and apart <= _STAMP * other.duration:
-                group.append(i)
-                break
-        else:
-            groups.append([i])
-    return [group for group in groups if len(group) > 1]
+        groups: list[list[int]] = []
+        for i in alike.tolist():
+            movement = demonstrations[i]
+            for members in groups:
+                other = demonstrations[members[0]]
+                apart = np.abs((other.times - other.times[0]) - (movement.times - movement.times[0])).max()
+                if np.array_equal(other.recorded, movement.recorded) and apart <= _STAMP * other.duration:
+                    members.append(i)
+                    break
+            else:
+                groups.append([i])
+        result += [members for members in groups if len(members) > 1]
+    return sorted(result)
 
 
 def extents_of(demos: Demonstrations) -> Array:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 from collections import deque
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from glob import glob, has_magic
 from pathlib import Path
 from typing import NamedTuple
@@ -146,19 +147,16 @@ DATA_SETS: tuple[DataSet, ...] = (
 
 def data_set_of(folder: Path) -> DataSet | None:
     """Return the row of `DATA_SETS` for a folder; None for a folder of files and for what is no folder."""
-    return next((data_set for data_set in DATA_SETS if _is_marked(folder, data_set)), None)
-
-
-def _is_marked(folder: Path, data_set: DataSet) -> bool:
-    try:
-        marker = folder / data_set.marker
-        others = (path for pattern in data_set.beside for path in folder.glob(pattern))
-        if not marker.is_file() or (data_set.beside and not any(others)):
-            return False
-        with marker.open("rb") as file:
-            return data_set.says in file.read(_HEAD)
-    except OSError:
-        return False
+    for data_set in DATA_SETS:
+        with suppress(OSError):
+            marker = folder / data_set.marker
+            others = (path for pattern in data_set.beside for path in folder.glob(pattern))
+            if not marker.is_file() or (data_set.beside and not any(others)):
+                continue
+            with marker.open("rb") as file:
+                if data_set.says in file.read(_HEAD):
+                    return data_set
+    return None
 
 
 class Entry(NamedTuple):
