@@ -1,7 +1,8 @@
 """What `make test` leaves to `make soak`: more examples, slow repetitions, and all combinations of values.
 
-A repetition is marked `pytest.mark.soak`, a test or some of its parameters. Of parametrizations that are stacked,
-`make test` tries each value of each of them with some values of the others; `combined` does so within one of them.
+A repetition is marked `pytest.mark.soak`, a test or some of its parameters. Marked `pytest.mark.soak("combinations")`,
+a test whose parametrizations are stacked tries each value of each of them with some values of the others; `combined`
+does so within one of them.
 """
 
 from __future__ import annotations
@@ -62,17 +63,17 @@ def left_to_soak(items):
     """Collected tests that `make soak` alone runs."""
     left, stacked = [], defaultdict(list)
     for item in items:
-        if item.get_closest_marker("soak"):
+        marks = [mark.args for mark in item.iter_markers("soak")]
+        if () in marks:
             left.append(item)
-        elif hasattr(item, "callspec"):
+        elif ("combinations",) in marks:
             stacked[item.parent, item.originalname].append(item)
     for cases in stacked.values():
         columns = [_names(mark.args[0]) for mark in cases[0].iter_markers("parametrize")]
         columns += [[name] for name in cases[0].callspec.params if name not in chain(*columns)]  # of fixtures
-        if len(columns) > 1:
-            rows = [[tuple(id(case.callspec.params[name]) for name in column) for column in columns] for case in cases]
-            chosen = set(_covering(rows))
-            left += [case for i, case in enumerate(cases) if i not in chosen]
+        rows = [[tuple(id(case.callspec.params[name]) for name in column) for column in columns] for case in cases]
+        chosen = set(_covering(rows))
+        left += [case for i, case in enumerate(cases) if i not in chosen]
     return left
 
 

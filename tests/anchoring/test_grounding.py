@@ -41,6 +41,7 @@ def test_the_schema_knows_every_choice_of_a_specification():
     assert set(listed["formulation"]["enum"]) == set(FORMULATIONS)
 
 
+@pytest.mark.soak("combinations")
 @pytest.mark.parametrize("by", ["medoid", "mean"])
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 @given(seed=st.integers(0, 10_000), n=st.sampled_from([1, 2, 3, 6]), d=st.sampled_from([1, 2, 3, 7]))

@@ -33,6 +33,7 @@ def test_handwriting_without_labels(method):
     assert recovered(demos.labels, propose(demos, method)) >= 0.95
 
 
+@pytest.mark.soak("combinations")
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("seed", range(2))
 def test_handwriting_with_everything_perturbed(method, seed):
@@ -40,6 +41,7 @@ def test_handwriting_with_everything_perturbed(method, seed):
     assert recovered(demos.labels, propose(demos, method)) >= 0.9
 
 
+@pytest.mark.soak("combinations")
 @pytest.mark.parametrize("n_kinds", [5, 10, 15])
 @pytest.mark.parametrize("seed", range(2))
 def test_handwriting_in_part_and_unequal(n_kinds, seed):

@@ -100,6 +100,7 @@ def say_less_in_mcap(path, compression="zstd"):
     path.write_bytes(data)
 
 
+@pytest.mark.soak("combinations")
 @pytest.mark.parametrize("indexed", [True, False])
 @pytest.mark.parametrize("compression", ["LZ4", "ZSTD"])
 def test_a_bomb_of_the_package_mcap(tmp_path, child, compression, indexed):

@@ -125,6 +125,7 @@ def in_order_of_roscpp(data):
     return b"".join(parts)
 
 
+@pytest.mark.soak("combinations")
 @pytest.mark.parametrize("appended", [False, True])
 def test_a_copy_of_what_roscpp_recorded_is_read_by_all(bag, tmp_path, appended):
     """Index records of two orders of fields in one bag, where rosbag appended to it; rosbags reads only one order."""

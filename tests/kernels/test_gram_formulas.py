@@ -59,6 +59,7 @@ def test_rbf_and_laplacian_are_those_of_scikit_learn(dtype, offset):
     np.testing.assert_allclose(Laplacian(8.0)(a, b), laplacian_kernel(A, B, gamma=1 / 8), rtol=tolerance)
 
 
+@pytest.mark.soak("combinations")
 @pytest.mark.parametrize("compiled", ["never", "always"])
 @pytest.mark.parametrize(
     ("built_in", "g", "h"),

@@ -26,6 +26,7 @@ def assert_equal_up_to_rounding(plain, compiled):
     np.testing.assert_allclose(compiled, plain, rtol=0, atol=tolerance * np.abs(plain).max())
 
 
+@pytest.mark.soak("combinations")
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
 @pytest.mark.parametrize("kernel", ALL.values(), ids=ALL)
 def test_compiled_equals_twin_for_all_shapes(kernel, dtype, monkeypatch):

@@ -12,6 +12,7 @@ from kineme.kernels import RBF, Averaged, DistanceKernel, TruncatedEuclidean, av
 every_kernel = pytest.mark.parametrize("kernel", ALL.values(), ids=ALL)
 
 
+@pytest.mark.soak("combinations")
 @every_kernel
 @pytest.mark.parametrize("compiled", ["never", "always"])
 def test_read_only_rows_are_accepted_and_writable_ones_left_alone(kernel, compiled, monkeypatch):

@@ -153,6 +153,7 @@ def test_compiled_equals_plain(d, sizes, monkeypatch):
         np.testing.assert_allclose(one, other, atol=1e-5)
 
 
+@pytest.mark.soak("combinations")
 @pytest.mark.parametrize("d", DIMENSIONS)
 @pytest.mark.parametrize(("n", "m"), [(1, 40), (40, 3), (35, 37)])
 def test_bounds_are_below_the_distances_and_not_idle(d, n, m, choice):

@@ -68,6 +68,7 @@ def _best_of_many(C, max_angle, rng):
     return found.max()
 
 
+@pytest.mark.soak("combinations")
 @pytest.mark.parametrize("max_angle", LIMITS)
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_rotation_within_the_limit_is_better(kind, max_angle):
@@ -80,6 +81,7 @@ def test_no_rotation_within_the_limit_is_better(kind, max_angle):
     np.testing.assert_allclose(found, tried, atol=0.05 if near_pi else 1e-6)
 
 
+@pytest.mark.soak("combinations")
 @pytest.mark.parametrize("max_angle", [0.0, 1e-300, 1e-9, *LIMITS])
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_rotation_within_the_limit_attains_it(kind, max_angle):

@@ -77,6 +77,7 @@ def test_a_small_library_answers_as_the_recognizer_of_its_movements(make, counts
         np.testing.assert_allclose(ours.transform.matrix, theirs.transform.matrix, atol=1e-4)
 
 
+@pytest.mark.soak("combinations")
 @pytest.mark.parametrize("d", [1, 2, 3])
 @pytest.mark.parametrize("count", [1, 2, 4, 12])
 def test_a_large_library_answers_as_the_nearest_of_all(make, count, d):

@@ -106,6 +106,7 @@ def test_shares_sum_to_one_and_are_ranked(recognizer, followed):
         assert {guess.label for guess in state.ranked} == set(recognizer.classes_)
 
 
+@pytest.mark.soak("combinations")
 @pytest.mark.parametrize("fraction", [0.4, 0.7, 1.0])
 def test_the_stream_agrees_with_the_batch_on_a_beginning(recognizer, movement, fraction):
     end = int(fraction * len(movement.times))
@@ -127,6 +128,7 @@ def test_place_size_and_direction_do_not_change_what_is_said(recognizer, movemen
     np.testing.assert_allclose(moved.goal, 3.0 * R @ plain.goal + 70.0, atol=0.01)
 
 
+@pytest.mark.soak("combinations")
 @pytest.mark.parametrize(
     ("t", "x", "flag"),
     [

@@ -56,6 +56,7 @@ def test_letters_with_sharp_corners_are_timed_near_the_optimum_within_all_limits
     assert np.median(used.max(axis=1)) > 0.9  # a joint is at a limit nearly always
 
 
+@pytest.mark.soak("combinations")
 @pytest.mark.parametrize("arm", ["ur5e", "so101"])
 @pytest.mark.parametrize("seconds", [0.07, 0.31, 0.55])
 def test_slowed_down_passes_and_half_a_percent_faster_does_not(arm, seconds):

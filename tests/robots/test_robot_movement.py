@@ -21,6 +21,7 @@ from kineme.robots.planning.move import request_of
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")
 
 
+@pytest.mark.soak("combinations")
 @pytest.mark.parametrize("name", MODELS)
 @pytest.mark.parametrize("timing", ["generated", "slowed", "fastest"])
 def test_every_arm_follows_a_stroke_within_its_limits(name, timing):

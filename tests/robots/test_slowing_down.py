@@ -71,6 +71,7 @@ def test_what_a_refusal_promises_holds():
         assert made.preflight.passed
 
 
+@pytest.mark.soak("combinations")
 @pytest.mark.parametrize("timing", TIMINGS)
 @pytest.mark.parametrize("limit", ["max_velocity", "max_acceleration"])
 def test_an_approach_of_days_is_refused_before_it_fills_the_memory(timing, limit):

@@ -98,6 +98,7 @@ def test_pairs_are_bounded_only_where_that_may_rule_some_out(bar, bounded, monke
     assert len(calls) == bounded
 
 
+@pytest.mark.soak("combinations")
 @pytest.mark.parametrize("choice", ["never", "always"])
 @pytest.mark.parametrize("classifier", ["auto", "nearest", "prototype"])
 def test_few_pairs_are_compared_completely(choice, classifier, monkeypatch):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 
+@pytest.mark.soak("combinations")
 @pytest.mark.parametrize("formulation", ["original", "bio-inspired"])
 @pytest.mark.parametrize("n", [10, 50])
 def test_a_constant_coupling_is_exact_at_any_dt(learn, twin, steps, witness, agree, formulation, n):

@@ -95,6 +95,7 @@ def test_an_editor_knows_every_option_and_everything_a_step_can_be_told(moving):
     assert common - {"self"} <= set(inspect.signature(moving.controller(0.01).step).parameters)
 
 
+@pytest.mark.soak("combinations")
 @pytest.mark.parametrize("dt", [0.003, 0.05])
 def test_undisturbed_it_is_the_rollout(moving, twin, agree, dt):
     n = round(0.9 / dt)
@@ -159,6 +160,7 @@ def distance_to(path, point):
     return np.linalg.norm(path[:, :3] - point, axis=1).min()
 
 
+@pytest.mark.soak("combinations")
 def test_obstacles_are_avoided_and_the_movement_goes_on(steered, twin):
     n = 300
     free = column(states_of(controller_of(steered, 0.005, 200), n), "position")

@@ -21,6 +21,7 @@ def test_a_goal_in_the_first_step_is_the_rollouts_goal(primitive, steps, agree, 
     agree(positions, primitive.rollout(goal=goal, n_samples=101).positions[0], 1e-10)
 
 
+@pytest.mark.soak("combinations")
 @pytest.mark.parametrize(("share", "when", "goal_filter"), combined(SHARES.values(), [4, 18, 28], [None, 0.3]))
 def test_a_goal_changed_in_flight_is_reached(primitive, steps, share, when, goal_filter):
     controller, goal = primitive.controller(0.1, goal_filter=goal_filter), shifted(primitive, share)
@@ -32,6 +33,7 @@ def test_a_goal_changed_in_flight_is_reached(primitive, steps, share, when, goal
     np.testing.assert_allclose(controller.state.goal, goal, rtol=1e-15)
 
 
+@pytest.mark.soak("combinations")
 @pytest.mark.parametrize("formulation", ["original", "bio-inspired"])
 def test_a_goal_in_flight_obeys_the_printed_equation(learn, twin, steps, witness, agree, formulation):
     primitive = learn(formulation)

@@ -19,6 +19,7 @@ def test_its_own_state_fed_back_changes_nothing(primitive, steps, agree):
         agree(controller.step(last.position, last.velocity, tempo=0.8).position, expected[k + 1], 1e-10)
 
 
+@pytest.mark.soak("combinations")
 @pytest.mark.parametrize("formulation", ["original", "bio-inspired"])
 def test_after_a_push_it_obeys_the_printed_equation(learn, twin, steps, witness, agree, formulation):
     primitive = learn(formulation)

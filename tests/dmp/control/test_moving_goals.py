@@ -38,6 +38,7 @@ def test_a_goal_at_a_tenth_of_a_meter_per_second_is_trailed_by_4_cm_or_not_at_al
     assert distance_behind(primitive_of_2_s, told=True) < 1e-5
 
 
+@pytest.mark.soak("combinations")
 def test_it_moves_on_by_itself(primitive, twin):
     told, once = primitive.controller(0.02), primitive.controller(0.02)
     velocity, start = np.array([0.3, -0.2, 0.1]), primitive.goals[0] - [0.6, -0.4, 0.2]
@@ -59,6 +60,7 @@ def test_it_moves_on_by_itself(primitive, twin):
     assert Status.SETTLED in at_rest.status
 
 
+@pytest.mark.soak("combinations")
 def test_steps_of_any_length_lead_to_the_same_places(primitive, twin):
     """What moves evenly is carried exactly, as everything else that is undisturbed."""
     asked = {"goal": primitive.goals[0] - [1.0, 0.5, 0.0], "goal_velocity": [0.5, 0.25, 0.1]}
@@ -73,6 +75,7 @@ def test_steps_of_any_length_lead_to_the_same_places(primitive, twin):
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-8)
 
 
+@pytest.mark.soak("combinations")
 @pytest.mark.parametrize("formulation", ["original", "bio-inspired"])
 def test_it_obeys_the_printed_equation(learn, twin, steps, witness, agree, formulation):
     """The equation with a goal that is ahead by D / K of its velocity; scale f is of where the goal arrives."""

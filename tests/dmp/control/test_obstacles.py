@@ -122,6 +122,7 @@ def test_behind_or_out_of_reach_an_obstacle_has_no_effect(straight, steps, d):
     np.testing.assert_allclose(far, free, rtol=0, atol=1e-9)
 
 
+@pytest.mark.soak("combinations")
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("aside", [0.0, 0.02])
 def test_it_goes_around_an_obstacle_on_its_path_and_reaches_the_goal(straight, twin, steps, d, aside):
@@ -140,6 +141,7 @@ def test_many_obstacles(bio, twin, steps):
     assert controller.state.status.name == "SETTLED"
 
 
+@pytest.mark.soak("combinations")
 @pytest.mark.parametrize("moving", [False, True])
 def test_the_error_falls_with_the_square_of_dt(learn, twin, witness, moving):
     primitive = learn(n_dims=2)

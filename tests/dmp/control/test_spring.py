@@ -15,6 +15,7 @@ def many_at_once(stiffness, damping, h):
     return transitions(stiffness, damping, np.array([1.0, h]))[1]
 
 
+@pytest.mark.soak("combinations")
 @pytest.mark.parametrize(
     "function", [transition, _compiled._transition, many_at_once], ids=["plain", "compiled", "many"]
 )

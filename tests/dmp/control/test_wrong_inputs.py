@@ -60,6 +60,7 @@ def assert_goes_on(bio, told, status):
         assert state.status.rejected is (k % 3 == 1 and bool(status))
 
 
+@pytest.mark.soak("combinations")
 @pytest.mark.parametrize("name", STATUS)
 @pytest.mark.parametrize("value", BAD_VECTORS.values(), ids=BAD_VECTORS.keys())
 def test_a_bad_vector_is_left_out(bio, name, value):

@@ -22,6 +22,7 @@ def paths(pair, n_samples=401):
     return [one.rollout(n_samples=n_samples).positions for one in pair]
 
 
+@pytest.mark.soak("combinations")
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 @pytest.mark.parametrize("which", ["both", "left", "right"])
 def test_the_difference_is_kept_and_starts_and_goals_with_their_velocities(shapes, formulation, which):

@@ -51,6 +51,7 @@ def test_it_is_the_parts_one_after_another(parts):
     assert max(deviations(joined, chained(parts), np.cumsum([0.0, *durations[:-1]]))) < 0.004
 
 
+@pytest.mark.soak("combinations")
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 @pytest.mark.parametrize("fit", ["trajectory", "forcing"])
 def test_start_goal_and_their_velocities_are_those_of_the_parts(formulation, fit):

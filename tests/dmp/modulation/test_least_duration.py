@@ -17,6 +17,7 @@ def learned():
     return DMP().learn(kineme.load_lasa(["GShape"]))
 
 
+@pytest.mark.soak("combinations")
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 @pytest.mark.parametrize(
     "limits",

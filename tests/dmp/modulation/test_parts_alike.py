@@ -71,6 +71,7 @@ def test_what_differs_is_refused_with_both(together, other, why):
         together(hand, recorded(other))
 
 
+@pytest.mark.soak("combinations")
 @each
 @pytest.mark.parametrize(
     "other",

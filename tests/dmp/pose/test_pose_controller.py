@@ -112,6 +112,7 @@ def test_one_primitive_at_a_time():
         both[0].controller(0.02, goal=[2.0, 0, 0, 0])
 
 
+@pytest.mark.soak("combinations")
 @kinds
 @pytest.mark.parametrize("size", [1e3, 1e10, 1e49, 1e90, 1e149])
 def test_however_fast_it_is_said_to_turn_what_comes_back_is_a_pose(kind, size):

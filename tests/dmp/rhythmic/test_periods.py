@@ -37,6 +37,7 @@ def test_a_weak_odd_harmonic_doubles_the_period():
     np.testing.assert_allclose(found.cycles, 4.4, rtol=1e-6)
 
 
+@pytest.mark.soak("combinations")
 @pytest.mark.parametrize("cycles", [3.3, 6.6])
 @pytest.mark.parametrize("share", [0.1, 0.3])
 def test_what_varies_from_period_to_period_does_not_double_it(cycles, share):

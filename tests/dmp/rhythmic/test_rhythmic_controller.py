@@ -25,6 +25,7 @@ def _run(controller, n_steps, **told):
     return np.array([controller.step(**told).position for _ in range(n_steps)])
 
 
+@pytest.mark.soak("combinations")
 @pytest.mark.parametrize("dt", [0.001, 0.02, 0.4, 5.0])
 @pytest.mark.parametrize("which", [0, 1])
 def test_steps_of_any_length_follow_the_rollout(learned, twin, agree, dt, which):

@@ -74,6 +74,7 @@ def definition_of_matching(A, B, power):
     return min(one_way(*pair, start) for start in starts for pair in ((A, B), (B, A)))
 
 
+@pytest.mark.soak("combinations")
 @pytest.mark.parametrize("squared", [True, False])
 @pytest.mark.parametrize("choice", ["always", "never"])
 def test_matching_with_bounds_finds_what_a_full_search_finds(monkeypatch, squared, choice):

@@ -28,6 +28,7 @@ def test_exp_is_that_of_the_batch(size, seed):
     np.testing.assert_allclose(exp_one(p.tolist()), exp(p), rtol=1e-14, atol=1e-14)
 
 
+@pytest.mark.soak("combinations")
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("reach", [0.0, 0.5, 3.0, 5.0, 9.0])
 @given(seeds, st.booleans())

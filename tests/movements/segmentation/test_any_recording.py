@@ -85,6 +85,7 @@ def test_known_movements_are_looked_for_in_any_recording():
                 assert 0.0 <= one.confidence <= 1.0
 
 
+@pytest.mark.soak("combinations")
 @pytest.mark.parametrize("n", [8, 9, 12])
 @pytest.mark.parametrize("by", ["rest", "speed", "change-points"])
 def test_a_few_random_samples_hold_no_movement_or_some(by, n):

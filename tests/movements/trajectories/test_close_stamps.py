@@ -135,6 +135,7 @@ def test_a_group_is_shorter_than_a_tenth_of_a_step():
     assert len(merged[0]) == len(times) - 26 + len(inside)
 
 
+@pytest.mark.soak("combinations")
 @pytest.mark.parametrize("compiled", ["never", "always"])
 @pytest.mark.parametrize("gap", [1e-4, 1e-7, 1e-8, 1e-10, 1e-12])
 def test_smoothing_does_not_notice_how_close_close_stamps_are(monkeypatch, compiled, gap):
