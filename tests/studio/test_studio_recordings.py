@@ -164,7 +164,10 @@ def _poses(*kinds, heads="t,x,y,qw,qx,qy,qz", rest=0.6):
 
 
 @pytest.mark.parametrize("head", ["q", slow("orientation.")])
-def test_orientations_that_are_chosen_by_their_channel_are_those_of_the_reader(tmp_path, open_studio, head):
+def test_orientations_that_are_chosen_by_their_channel_are_those_of_the_reader(
+    tmp_path, open_studio, head, monkeypatch
+):
+    monkeypatch.setenv("KINEME_COMPILED", "never")  # to compile for four dimensions would take longer than all else
     client = open_studio(tmp_path / "poses")
     four = [head + axis for axis in "wxyz"]
     data, spans = _poses(0, 1, 2, heads=",".join(("t", "x", "y", *four)))
