@@ -76,9 +76,9 @@ def draw(page, movement, seconds=1.6, n=60, share=1.0, on="#draw-canvas"):
     scale = min(0.5 * box["width"] / size[0], 0.6 * box["height"] / size[1])
     away = (movement.positions - movement.positions.min(axis=0) - size / 2) * [scale, -scale]
     points = np.array([box["x"] + box["width"] / 2, box["y"] + box["height"] / 2]) + away
-    kept = np.linspace(0, len(points) - 1, n).astype(int)[: max(round(share * n), 2)]
+    picked = np.linspace(0, len(points) - 1, n).astype(int)[: max(round(share * n), 2)]
     times = (movement.times - movement.times[0]) / np.ptp(movement.times) * seconds
-    stroke(page, points[kept], times[kept], lift=share == 1.0)
+    stroke(page, points[picked], times[picked], lift=share == 1.0)
 
 
 def center(page, selector):

@@ -27,9 +27,9 @@ def ask(snapshot, questions, runtime=RUNTIME):
         done = subprocess.run([NODE, DRIVER, runtime, path], capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stderr
     answers = json.loads(done.stdout)
-    for one in answers:
-        assert "error" not in one, one["error"]
-    return [one["found"] for one in answers]
+    for answer in answers:
+        assert "error" not in answer, answer["error"]
+    return [answer["answer"] for answer in answers]
 
 
 def question(ask, movement, **more):

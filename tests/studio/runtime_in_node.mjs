@@ -14,23 +14,23 @@ const answers = {
     return ends.map((end) => update(times.slice(0, end), positions.slice(0, end)));
   },
   encode: ({ times, positions, formulation }) => {
-    const made = runtime.primitive(runtime.encode(times, positions), formulation);
-    return { ...made, weights: [...made.weights] };
+    const primitive = runtime.primitive(runtime.encode(times, positions), formulation);
+    return { ...primitive, weights: [...primitive.weights] };
   },
-  rollout: ({ symbol, times, positions, formulation, asked }) => {
-    const made = runtime.primitive(symbol ?? runtime.encode(times, positions), formulation);
-    const moved = runtime.rollout(made, asked);
+  rollout: ({ symbol, times, positions, formulation, wish }) => {
+    const primitive = runtime.primitive(symbol ?? runtime.encode(times, positions), formulation);
+    const moved = runtime.rollout(primitive, wish);
     return { times: [...moved.times], positions: moved.positions };
   },
-  primitive: ({ document, asked }) => {
-    const moved = openPrimitive(document).rollout(asked);
+  primitive: ({ document, wish }) => {
+    const moved = openPrimitive(document).rollout(wish);
     return { ...moved, times: [...moved.times] };
   },
 };
 
-function answered(one) {
+function answered(question) {
   try {
-    return { found: answers[one.ask](one) };
+    return { answer: answers[question.ask](question) };
   } catch (error) {
     return { error: error.message };
   }

@@ -43,7 +43,7 @@ def make_library(folder, symbols=4, members=3, d=2):
     return folder
 
 
-def asked(k, seed=99, **more):
+def request_of(k, seed=99, **more):
     """A drawing as a request."""
     times, positions = drawing(k, seed=seed)
     return {"times": times.tolist(), "positions": positions.tolist(), **more}
@@ -74,9 +74,9 @@ class Running:
         guard.start()
         self.line = self.process.stdout.readline() + self.process.stdout.readline()  # its address, and how to stop it
         guard.cancel()
-        found = re.search(r"(http://\S+?)/\?token=(\S+)", self.line)
-        assert found, self.process.communicate()
-        self.address, self.token = found.groups()
+        match = re.search(r"(http://\S+?)/\?token=(\S+)", self.line)
+        assert match, self.process.communicate()
+        self.address, self.token = match.groups()
 
     def end(self, how=signal.SIGINT):
         """Stop it; the exit code and what it wrote."""
@@ -104,9 +104,9 @@ class Served:
 
 @contextmanager
 def running(folder, *options, program=None):
-    one = Running(folder, *options, program=program)
+    studio = Running(folder, *options, program=program)
     try:
-        yield one
+        yield studio
     finally:
-        one.process.kill()
-        one.process.communicate()
+        studio.process.kill()
+        studio.process.communicate()

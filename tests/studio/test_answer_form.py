@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from node_runtime import NODE, REASON, ask, question
-from studio_samples import LIVE, asked, samples
+from studio_samples import LIVE, request_of, samples
 
 from kineme import ActionLibrary, Recognizer, Trajectory, write_movement
 from kineme.cli import main
@@ -24,7 +24,7 @@ KINDS = (2, 7)  # of the drawings: a symbol of the library, and none
 
 
 def _movement(k):
-    drawing = asked(k)
+    drawing = request_of(k)
     return Trajectory(np.array(drawing["times"]), np.array(drawing["positions"]))
 
 
@@ -71,7 +71,7 @@ def test_the_schema_is_one_and_knows_every_rule():
 
 def test_python_the_shell_and_the_studio_give_one_form(client, folder):
     ours = _of_python(folder)
-    served = [client.post("/api/recognize", json=asked(k)).json() for k in KINDS]
+    served = [client.post("/api/recognize", json=request_of(k)).json() for k in KINDS]
     with client.websocket_connect(LIVE) as socket:
         heard = []
         for k in KINDS:

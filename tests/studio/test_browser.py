@@ -56,8 +56,8 @@ def studio():
         return served[-1]
 
     yield start
-    for one in served:
-        one.end()
+    for server in served:
+        server.end()
 
 
 @pytest.fixture
@@ -116,9 +116,10 @@ def test_a_movement_of_no_known_letter_is_unknown(opened, served_letters):
 
 #: What looks as if it could change the library: buttons for that, and fields that are filled in for that.
 CHANGES = """() => [...document.querySelectorAll("main button, main textarea, main input, #undo")]
-  .filter((one) => one.checkVisibility())
-  .filter((one) => one.disabled || one.matches("textarea, .member") || /name|delete|learn|save/i.test(one.textContent))
-  .map((one) => one.id || one.textContent || one.className)"""
+  .filter((node) => node.checkVisibility())
+  .filter((node) => node.disabled || /name|delete|learn|save/i.test(node.textContent)
+    || node.matches("textarea, .member"))
+  .map((node) => node.id || node.textContent || node.className)"""
 
 
 def test_a_library_that_is_only_shown_offers_no_changes(opened, served_letters):
@@ -154,7 +155,7 @@ def test_a_studio_that_knows_nothing_says_what_to_do_and_learns_from_one_drawing
         wait_for_text(page, "#verdict-kind", "Learned")
         assert then in page.inner_text("#verdict-note")
     with kineme.ActionLibrary(tmp_path / "new", read_only=True) as library:
-        assert [one.name for one in library.symbols()] == ["GShape", "Sine"]
+        assert [symbol.name for symbol in library.symbols()] == ["GShape", "Sine"]
     draw(page, letters("GShape")[3])
     wait_until(page, ANSWERED)
     assert page.inner_text(".rank:first-child .rank-name") == "GShape"
@@ -191,9 +192,9 @@ def test_the_path_follows_the_goal_without_asking_the_server(opened, served_lett
     page.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
     assert page.evaluate(INKED, [*center(page, ".handle.via"), 30]) > 20
     loaded = (
-        "performance.getEntriesByName(location.origin + '/api/library').filter((one) => one.responseStatus === 200)"
+        "performance.getEntriesByName(location.origin + '/api/library').filter((entry) => entry.responseStatus === 200)"
     )
-    assert page.evaluate(f"{loaded}.map((one) => one.initiatorType)") == ["link"]  # once, beside the modules
+    assert page.evaluate(f"{loaded}.map((entry) => entry.initiatorType)") == ["link"]  # once, beside the modules
 
 
 def test_via_points_and_obstacles_change_the_path_and_can_be_removed(opened, served_letters):
@@ -242,25 +243,27 @@ def test_a_movement_is_exported(opened, served_letters, tmp_path):
 def test_two_tabs_show_the_same_library_and_undo_takes_back(opened, studio, tmp_path):
     running = studio(make_letters(tmp_path / "letters", shown=2))
     # What a tab shows may be gone when it asks for more of it: 404.
-    one, other = opened(running, "library", tolerated=("409", "404")), opened(running, "library", tolerated=("404",))
-    for page in (one, other):
+    first, other = opened(running, "library", tolerated=("409", "404")), opened(running, "library", tolerated=("404",))
+    for page in (first, other):
         wait_until(page, "document.querySelectorAll('.card-open').length === 4")
-    one.click(".card-open >> nth=0")
-    one.get_by_role("button", name="Rename").click()
-    one.keyboard.type("first")
-    one.keyboard.press("Enter")
-    for page in (one, other):
-        wait_until(page, "[...document.querySelectorAll('.card-name')].some((one) => one.textContent === 'first')")
+    first.click(".card-open >> nth=0")
+    first.get_by_role("button", name="Rename").click()
+    first.keyboard.type("first")
+    first.keyboard.press("Enter")
+    for page in (first, other):
+        wait_until(page, "[...document.querySelectorAll('.card-name')].some((name) => name.textContent === 'first')")
     other.locator("body").press("Control+z")
-    for page in (one, other):
-        wait_until(page, "![...document.querySelectorAll('.card-name')].some((one) => one.textContent === 'first')")
+    for page in (first, other):
+        wait_until(page, "![...document.querySelectorAll('.card-name')].some((name) => name.textContent === 'first')")
         assert sorted(page.locator(".card-name").all_inner_texts()) == sorted(LETTERS)
-    one.evaluate("import('/parts/changes.js').then((changes) => changes.undo(5))")  # as the message about the renaming
+    first.evaluate(
+        "import('/parts/changes.js').then((changes) => changes.undo(5))"
+    )  # as the message about the renaming
     wait_until(
-        one, "document.querySelector('.toast.failed')?.textContent.includes('look at what has changed') ?? false"
+        first, "document.querySelector('.toast.failed')?.textContent.includes('look at what has changed') ?? false"
     )
-    one.evaluate("import('/parts/changes.js').then(({ undo }) => Promise.all([undo(), undo()]))")
-    wait_until(one, "document.querySelectorAll('.card-open').length === 2")
+    first.evaluate("import('/parts/changes.js').then(({ undo }) => Promise.all([undo(), undo()]))")
+    wait_until(first, "document.querySelectorAll('.card-open').length === 2")
 
 
 #: How many movements are listed where more of them are asked for while the first are under way.
@@ -307,7 +310,7 @@ def test_symbols_are_merged_split_deleted_and_all_of_it_taken_back(opened, studi
     page.click("#history summary")
     page.get_by_role("button", name="Restore version 6").click()
     page.keyboard.press("Enter")
-    wait_until(page, "[...document.querySelectorAll('.card-name')].some((one) => one.textContent === 'part')")
+    wait_until(page, "[...document.querySelectorAll('.card-name')].some((name) => name.textContent === 'part')")
     wait_until(page, "document.querySelector('#versions li').textContent.includes('Restored version 6')")
 
 
@@ -337,7 +340,7 @@ def test_hostile_names_are_text(opened, studio, tmp_path):
     page.locator(".chip").first.click()
     wait_for_text(page, "#verdict-kind", "Learned")
     with kineme.ActionLibrary(folder, read_only=True) as library:
-        assert {one.name for one in library.symbols()} == set(HOSTILE)  # also where a name ends with a blank
+        assert {symbol.name for symbol in library.symbols()} == set(HOSTILE)  # also where a name ends with a blank
 
 
 def test_movements_without_a_name_are_proposed_and_named_together(opened, studio, tmp_path):
@@ -347,7 +350,9 @@ def test_movements_without_a_name_are_proposed_and_named_together(opened, studio
     page = opened(studio(tmp_path / "unnamed"), "library", width=820)
     wait_until(page, "document.querySelectorAll('.proposal').length > 1")
     shown = "[document.documentElement, ...document.querySelectorAll('.proposal')]"
-    assert set(page.evaluate(f"{shown}.map((one) => one.scrollWidth - one.clientWidth)")) == {0}  # nothing is cut
+    assert set(page.evaluate(f"{shown}.map((element) => element.scrollWidth - element.clientWidth)")) == {
+        0
+    }  # nothing is cut
     assert "Name movements that are here" in page.inner_text("#library-empty-text")
     first = page.locator(".proposal").first
     assert first.locator(".member").count() >= 3
@@ -371,9 +376,9 @@ def test_a_finger_draws_without_scrolling_and_without_a_keyboard_of_glass(opened
     page.evaluate("() => { HTMLInputElement.prototype.focus = function () { window.focused = this.id; }; }")
     box = page.locator("#draw-canvas").bounding_box()
     client = page.context.new_cdp_session(page)
-    one = letters("GShape")[SHOWN]
-    kept = np.linspace(0, len(one.times) - 1, 50).astype(int)
-    away = (one.positions[kept] - one.positions.min(axis=0)) / np.ptp(one.positions, axis=0).max()
+    movement = letters("GShape")[SHOWN]
+    picked = np.linspace(0, len(movement.times) - 1, 50).astype(int)
+    away = (movement.positions[picked] - movement.positions.min(axis=0)) / np.ptp(movement.positions, axis=0).max()
     points = np.column_stack((box["x"] + 40 + 220 * away[:, 0], box["y"] + 260 - 220 * away[:, 1]))
     now = time.time()
     for k, (x, y) in enumerate(points):
@@ -427,7 +432,7 @@ def test_the_program_that_the_page_shows_is_followed_by_the_page(opened, served_
     shown = page.locator("#live-source-text pre").all_text_contents()
     documented = re.findall(r"```(?:py|js)\n(.*?)```", (ROOT / "docs" / "guide" / "studio.md").read_text(), re.DOTALL)
     host = served_letters.address.removeprefix("http://")
-    assert shown == [one.strip().replace("127.0.0.1:8420", host) for one in documented]
+    assert shown == [text.strip().replace("127.0.0.1:8420", host) for text in documented]
     monkeypatch.setenv("KINEME_STUDIO_TOKEN", served_letters.token)
     connected = Event()  # without it, the program may be over before a busy page shows it
     monkeypatch.setattr("builtins.print", lambda *_: connected.wait(300))
@@ -489,23 +494,23 @@ def _labeled(name):
     rows = [
         (k, *row)
         for k in (5, 6)
-        for one in letters("Angle")[k : k + 1]
-        for row in zip(one.times, *one.positions.T, strict=True)
+        for movement in letters("Angle")[k : k + 1]
+        for row in zip(movement.times, *movement.positions.T, strict=True)
     ]
     return "movement,time,x,y,label\n" + "".join(f"{k},{t:.4f},{x:.4f},{y:.4f},{name}\n" for k, t, x, y in rows)
 
 
-_SAYS = "(words) => [...document.querySelectorAll('.toast')].some((one) => one.textContent.includes(words))"
+_SAYS = "(words) => [...document.querySelectorAll('.toast')].some((toast) => toast.textContent.includes(words))"
 
 
 def _one_after_the_other():
     """A table of two letters with rests behind them."""
     rows, at, end = [], 0.0, np.zeros(2)
     for shape in ("GShape", "Sine"):
-        one = letters(shape)[SHOWN]
-        kept = np.linspace(0, len(one.times) - 1, 200).astype(int)
-        positions = one.positions[kept] - one.positions[0] + end
-        times = one.times[kept] - one.times[0] + at
+        movement = letters(shape)[SHOWN]
+        picked = np.linspace(0, len(movement.times) - 1, 200).astype(int)
+        positions = movement.positions[picked] - movement.positions[0] + end
+        times = movement.times[picked] - movement.times[0] + at
         rest = np.arange(times[-1] + 0.02, times[-1] + 0.7, 0.02)
         end, at = positions[-1], rest[-1] + 0.02
         rows += [*zip(times, *positions.T, strict=True), *((t, *end) for t in rest)]
@@ -541,7 +546,7 @@ def test_a_dropped_recording_is_searched_corrected_and_learned(opened, studio, t
     page.locator("[data-key='edge end']").press("Shift+ArrowLeft")
     assert float(page.input_value("#spans tbody tr:nth-child(1) td:nth-child(2) input")) < before
     page.click("#learn-spans")
-    wait_until(page, "[...document.querySelectorAll('#names option')].some((one) => one.value === 'from a file')")
+    wait_until(page, "[...document.querySelectorAll('#names option')].some((option) => option.value === 'from a file')")
     assert not page.is_visible("#learn-file")
     page.route("**/api/recordings", lambda route: None, times=1)  # reading it takes long
     with page.expect_event("requestfailed"):  # it is given up for the next one
@@ -556,7 +561,7 @@ def test_a_dropped_recording_is_searched_corrected_and_learned(opened, studio, t
     page.unroute("**/spotted")
     assert page.input_value("#spans tbody tr:nth-child(1) input[type=text]") == "of a file"
     page.click("#learn-file")
-    wait_until(page, "[...document.querySelectorAll('#names option')].some((one) => one.value === 'of a file')")
+    wait_until(page, "[...document.querySelectorAll('#names option')].some((option) => option.value === 'of a file')")
     wait_until(page, _SAYS, "Learned the whole file")
     assert not page.evaluate(_SAYS, "Nothing is new")
     page.click("#learn-file")
@@ -594,15 +599,15 @@ def test_every_view_fits_its_window(opened, served_letters):
         assert page.evaluate("document.documentElement.scrollWidth") <= width, (width, view)
         small = page.evaluate(
             """() => [...document.querySelectorAll("button, select, input[type=text], input[type=number]")]
-            .filter((one) => one.checkVisibility() && one.getBoundingClientRect().width && !one.closest(".away"))
-            .filter((one) => Math.min(one.getBoundingClientRect().height, one.getBoundingClientRect().width) < 24)
-            .map((one) => one.outerHTML.slice(0, 80))"""
+            .filter((node) => node.checkVisibility() && node.getBoundingClientRect().width && !node.closest(".away"))
+            .filter((node) => Math.min(node.getBoundingClientRect().height, node.getBoundingClientRect().width) < 24)
+            .map((node) => node.outerHTML.slice(0, 80))"""
         )
         assert small == [], (width, view)
 
 
 #: What the panel says of a movement of which this much is done, with the evidence that it is unknown.
-SAYS = """([progress, unknown]) => import("/draw/answer_panel.js").then(({ AnswerPanel }) => {
+SAYS = """([progress, unknown]) => import("/parts/answer_panel.js").then(({ AnswerPanel }) => {
   const certainty = unknown > 0.5 ? "new" : "looks like";
   const ranked = [{ label: "A", probability: 1 }];
   new AnswerPanel().drawing({ ranked, unknown, certainty, label: null, progress, arrival: null }, 0);
@@ -611,10 +616,10 @@ SAYS = """([progress, unknown]) => import("/draw/answer_panel.js").then(({ Answe
 
 
 #: Keep what the page tells over its websocket.
-TOLD = """() => {
+SENT = """() => {
   const send = WebSocket.prototype.send;
-  window.told = [];
-  WebSocket.prototype.send = function (text) { window.told.push(text); send.call(this, text); };
+  window.sent = [];
+  WebSocket.prototype.send = function (text) { window.sent.push(text); send.call(this, text); };
 }"""
 
 
@@ -645,7 +650,7 @@ def test_drawing_does_not_move_anything_else(opened, served_letters):
 
 def test_a_drawing_is_what_the_hand_did_when_the_window_changes(opened, served_letters):
     page = opened(served_letters)
-    page.evaluate(TOLD)
+    page.evaluate(SENT)
     (x, y), height = center(page, "#draw-canvas"), page.locator("#draw-canvas").bounding_box()["height"]
     page.mouse.move(x, y)
     page.mouse.down()
@@ -658,9 +663,9 @@ def test_a_drawing_is_what_the_hand_did_when_the_window_changes(opened, served_l
     wait_until(page, "document.getElementById('view-draw').hidden")
     page.mouse.move(x - 44, y - 22)
     page.mouse.up()
-    wait_until(page, "window.told.some((text) => text.includes('finish'))")
-    told = [sample for text in page.evaluate("window.told") for sample in json.loads(text).get("samples", [])]
-    moved = np.subtract(told[-4:], told[0])[:, 1:] * height / 100  # the canvas is 100 high in units of the letters
+    wait_until(page, "window.sent.some((text) => text.includes('finish'))")
+    sent = [sample for text in page.evaluate("window.sent") for sample in json.loads(text).get("samples", [])]
+    moved = np.subtract(sent[-4:], sent[0])[:, 1:] * height / 100  # the canvas is 100 high in units of the letters
     np.testing.assert_allclose(moved, [(-38, 19), (-40, 20), (-42, 21), (-44, 22)], atol=1e-6)
 
 
@@ -711,8 +716,8 @@ def test_no_rule_of_accessibility_is_broken(opened, studio, tmp_path):
         page.emulate_media(color_scheme=scheme)
         for view in VIEWS:
             show(page, view)
-            found = axe.Axe().run(page, options=rules).response["violations"]
-            assert [(one["id"], [node["html"][:120] for node in one["nodes"]]) for one in found] == [], view
+            violations = axe.Axe().run(page, options=rules).response["violations"]
+            assert [(rule["id"], [node["html"][:120] for node in rule["nodes"]]) for rule in violations] == [], view
 
 
 def test_sliders_move_between_the_recordings_of_a_symbol(opened, served_letters):
@@ -727,8 +732,8 @@ def test_sliders_move_between_the_recordings_of_a_symbol(opened, served_letters)
     assert page.locator("#move-legend li").count() == 2
     with page.expect_response("**/api/rollout") as answered:
         page.locator("#styles input[type=range]").first.press("ArrowRight")
-    asked = answered.value.request.post_data_json
-    assert asked["what"]["style"]["values"][0] != 0
+    body = answered.value.request.post_data_json
+    assert body["what"]["style"]["values"][0] != 0
     assert answered.value.ok
 
 
@@ -747,9 +752,9 @@ def test_an_arm_executes_a_letter(opened, served_letters):
     wait_until(page, "document.querySelectorAll('.handle').length === 2")
     page.locator(".handle.goal").press("Shift+ArrowLeft")
     page.keyboard.press("5")
-    with page.expect_request("**/api/robots/move") as asked:
+    with page.expect_request("**/api/robots/move") as request:
         page.click("#robot-go")
-    assert len(asked.value.post_data_json["displacement"]) == 2  # it goes where the goal was dragged to
+    assert len(request.value.post_data_json["displacement"]) == 2  # it goes where the goal was dragged to
     page.select_option("#robot-what", label="Sine")
     for view in ("draw", "robot"):
         show(page, view)

@@ -23,9 +23,9 @@ HOSTILE = "<img src=x onerror=alert(1)>"
 @pytest.fixture
 def library(tmp_path):
     demos = draw_shapes([2, 1])
-    with kineme.ActionLibrary(tmp_path / "actions", create=True) as made:
-        made.learn(demos, [HOSTILE if label.endswith("0") else "wave" for label in demos.labels])
-        yield made
+    with kineme.ActionLibrary(tmp_path / "actions", create=True) as library:
+        library.learn(demos, [HOSTILE if label.endswith("0") else "wave" for label in demos.labels])
+        yield library
 
 
 def parts(page, tag):
@@ -99,7 +99,7 @@ def test_the_command_writes_a_page_and_never_over_another(library, tmp_path):
     done = CliRunner().invoke(main, [*command, "--force", "--json", "--most", "2"])
     assert json.loads(done.stdout)["movements"] == 2
     assert "2 of 3 movements" in file.read_text()
-    assert [one.name for one in tmp_path.iterdir() if one.name != "actions"] == ["actions.html"]
+    assert [path.name for path in tmp_path.iterdir() if path.name != "actions"] == ["actions.html"]
 
 
 def test_a_library_that_cannot_be_drawn_is_refused(tmp_path):

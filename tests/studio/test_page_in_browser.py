@@ -16,8 +16,8 @@ SHAPES = ["CShape", "GShape", "Sine", "WShape", "Line"]
 
 
 def lifted(demos):
-    arrays = [np.column_stack((one.positions, 0.2 * one.positions[:, 0])) for one in demos]
-    return kineme.Demonstrations.from_arrays(arrays, demos.labels, [one.times for one in demos])
+    arrays = [np.column_stack((movement.positions, 0.2 * movement.positions[:, 0])) for movement in demos]
+    return kineme.Demonstrations.from_arrays(arrays, demos.labels, [movement.times for movement in demos])
 
 
 def library_of(folder, space=False):
@@ -78,7 +78,7 @@ def test_a_letter_is_drawn_recognized_and_dragged(opened, width):
     page = opened(width=width)
     draw(page, until=0.8)
     wait_until(page, "kineme.state.live?.path.length === 20")
-    shown = page.locator("#bars li .name").all_inner_texts()
+    shown = page.locator("#ranks .rank-name").all_inner_texts()
     assert "GShape" in shown[:3]  # on a busy machine the mouse halts
     assert len(shown) == 5
     assert 0.2 < page.evaluate("kineme.state.live.progress") <= 1
@@ -87,8 +87,8 @@ def test_a_letter_is_drawn_recognized_and_dragged(opened, width):
     draw(page)
     assert page.evaluate("kineme.state.answer.ranked[0].label") == "GShape"
     word = page.evaluate("kineme.state.answer.certainty")
-    assert page.locator("#certainty").inner_text() == word.capitalize()
-    shares = page.locator("#bars li .value").all_inner_texts()
+    assert page.locator("#verdict-kind").inner_text() == word.capitalize()
+    shares = page.locator("#ranks .rank-value").all_inner_texts()
     assert abs(sum(int(share.removesuffix(" %")) for share in shares) - 100) <= 3
     assert "p-value" not in page.inner_text("main")
     before = page.evaluate("kineme.state.moving.positions")
@@ -102,7 +102,7 @@ def test_a_letter_is_drawn_recognized_and_dragged(opened, width):
         np.array(page.evaluate("kineme.state.moving.goal")) - before[-1]
     )
     page.click("#why summary")
-    assert "p-value" in page.inner_text("#numbers")
+    assert "p-value" in page.inner_text("#why-text")
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
     page.get_by_role("button", name=HOSTILE).click()
     seen = page.locator("#verdict").bounding_box()
@@ -160,7 +160,7 @@ def test_a_scribble_is_unknown_and_a_dot_is_asked_again(opened):
     page.mouse.up()
     assert page.locator("#verdict").inner_text() == "Unknown"
     page.mouse.click(box["x"] + 30, box["y"] + 30)
-    assert "too short" in page.locator("#reason").inner_text()
+    assert "too short" in page.locator("#verdict-note").inner_text()
 
 
 def test_names_are_text_and_what_is_saved_is_what_is_shown(opened):

@@ -35,38 +35,40 @@ RECORDINGS = Path(os.environ.get("KINEME_RECORDINGS", "nowhere"))
 def lifted(demos):
     """The same movements in space."""
     arrays = [
-        np.column_stack((one.positions, 0.3 * one.positions[:, 0] + 5 * np.sin(one.positions[:, 1] / 10)))
-        for one in demos
+        np.column_stack(
+            (movement.positions, 0.3 * movement.positions[:, 0] + 5 * np.sin(movement.positions[:, 1] / 10))
+        )
+        for movement in demos
     ]
-    return kineme.Demonstrations.from_arrays(arrays, demos.labels, [one.times for one in demos])
+    return kineme.Demonstrations.from_arrays(arrays, demos.labels, [movement.times for movement in demos])
 
 
 def perturbed(demos, seed=0):
     """Turned, elsewhere, in another size, noisy, with other and uneven stamps."""
     rng, arrays, times = np.random.default_rng(seed), [], []
-    for one in demos:
-        size = np.ptp(one.positions, axis=0).max()
+    for movement in demos:
+        size = np.ptp(movement.positions, axis=0).max()
         angle, seed = rng.uniform(-1, 1), int(rng.integers(100))
-        x = one.positions @ turn(angle, demos.n_dims, seed).T if demos.n_dims in (2, 3) else one.positions
+        x = movement.positions @ turn(angle, demos.n_dims, seed).T if demos.n_dims in (2, 3) else movement.positions
         x = x * np.exp(0.3 * rng.normal()) + size * rng.normal(size=demos.n_dims)
         x += 0.005 * size * rng.normal(size=x.shape)
         inner = rng.choice(np.arange(1, len(x) - 1), max(len(x) // int(rng.integers(2, 15)), 10), replace=False)
-        kept = np.concatenate(([0], np.sort(inner), [len(x) - 1]))
-        arrays.append(x[kept])
-        times.append(one.times[kept])
+        picked = np.concatenate(([0], np.sort(inner), [len(x) - 1]))
+        arrays.append(x[picked])
+        times.append(movement.times[picked])
     return kineme.Demonstrations.from_arrays(arrays, demos.labels, times)
 
 
 def interrupted(demos, seed=0):
     """With a rest of two seconds, and three without samples, each somewhere."""
     arrays, times = [], []
-    for i, one in enumerate(demos):
-        rng, t = np.random.default_rng([seed, i]), one.times.copy()
+    for i, movement in enumerate(demos):
+        rng, t = np.random.default_rng([seed, i]), movement.times.copy()
         t[int(rng.uniform(0.1, 0.9) * len(t)) :] += 3.0
         at, n_rest = int(rng.uniform(0.05, 0.95) * len(t)), int(2.0 / np.median(np.diff(t)))
         rest = t[at] + (np.arange(n_rest) + 1) * 2.0 / n_rest
         times.append(np.concatenate((t[: at + 1], rest, t[at + 1 :] + 2.0)))
-        arrays.append(np.insert(one.positions, [at + 1] * n_rest, one.positions[at], axis=0))
+        arrays.append(np.insert(movement.positions, [at + 1] * n_rest, movement.positions[at], axis=0))
     return kineme.Demonstrations.from_arrays(arrays, demos.labels, times)
 
 
@@ -79,21 +81,21 @@ class Case(NamedTuple):
     """A snapshot, questions to the runtime about it, and what Python says to each."""
 
     snapshot: Snapshot
-    asked: list
+    questions: list
     said: list
 
 
 def answers_of(recognizer, movements, *error_rates):
     rates = error_rates or (0.05,)
-    asked = [question("recognize", one, error_rate=rate) for rate in rates for one in movements]
-    said = [one for rate in rates for one in recognizer.recognize(movements, rate)]
-    return Case(snapshot_of_recognizer(recognizer), asked, said)
+    questions = [question("recognize", movement, error_rate=rate) for rate in rates for movement in movements]
+    said = [answer for rate in rates for answer in recognizer.recognize(movements, rate)]
+    return Case(snapshot_of_recognizer(recognizer), questions, said)
 
 
 def compare_answers(case, runtime=RUNTIME):
     """Worst difference of any number in the answers; infinite where a class, a verdict or an order differs."""
     worst = 0.0
-    for got, said in zip(ask(case.snapshot, case.asked, runtime), case.said, strict=True):
+    for got, said in zip(ask(case.snapshot, case.questions, runtime), case.said, strict=True):
         same = (
             got["label"],
             tuple(each["label"] for each in got["ranked"]),
@@ -103,7 +105,7 @@ def compare_answers(case, runtime=RUNTIME):
         )
         if same != (said.label, said.ranked, said.rule, said.calibrated, said.certainty):
             return np.inf
-        if [one["index"] for one in got["nearest"]] != [one.index for one in said.nearest]:
+        if [neighbor["index"] for neighbor in got["nearest"]] != [neighbor.index for neighbor in said.nearest]:
             return np.inf
         numbers = [got["p_known"] - said.p_known, got["confidence"] - said.confidence]
         numbers += [each["p_value"] - said.p_values[each["label"]] for each in got["ranked"]]
@@ -135,11 +137,11 @@ def test_movements_of_people_are_recognized_as_in_python(name):
     """Letters and gestures in space, shown by people."""
     with np.load(RECORDINGS / name) as z:
         ends, labels = z["offsets"][1:-1], z["labels"].astype(str)
-        arrays = [one.astype(float) for one in np.split(z["positions"], ends)]
-        times = [one.astype(float) - float(one[0]) for one in np.split(z["times"], ends)]
+        arrays = [array.astype(float) for array in np.split(z["positions"], ends)]
+        times = [array.astype(float) - float(array[0]) for array in np.split(z["times"], ends)]
     demos = kineme.Demonstrations.from_arrays(arrays, labels, times)
     rng = np.random.default_rng(0)
-    shown = np.concatenate([rng.permutation(np.flatnonzero(labels == one))[:3] for one in np.unique(labels)])
+    shown = np.concatenate([rng.permutation(np.flatnonzero(labels == label))[:3] for label in np.unique(labels)])
     others = rng.permutation(np.setdiff1d(np.arange(len(demos)), shown))[:400]
     assert compare_answers(answers_of(kineme.Recognizer().fit(demos[shown]), demos[others])) <= SIMILAR
 
@@ -187,11 +189,13 @@ def test_every_setting_is_that_of_python(settings, d, monkeypatch):
 def test_close_and_uneven_stamps_are_treated_as_in_python():
     demos = draw_shapes([2, 2, 2], seed=1)
     rng, arrays, times = np.random.default_rng(0), [], []
-    for one in draw_shapes([4, 4, 4], seed=1, spread=0.2):
-        t = one.times + np.where(rng.random(len(one.times)) < 0.2, 0.98 * np.diff(one.times, append=2.0), 0.0)
-        t[-1] = one.times[-1]
+    for movement in draw_shapes([4, 4, 4], seed=1, spread=0.2):
+        t = movement.times + np.where(
+            rng.random(len(movement.times)) < 0.2, 0.98 * np.diff(movement.times, append=2.0), 0.0
+        )
+        t[-1] = movement.times[-1]
         t = np.maximum.accumulate(t) + 1e-9 * np.arange(len(t))
-        arrays.append(one.positions)
+        arrays.append(movement.positions)
         times.append(t)
     close = kineme.Demonstrations.from_arrays(arrays, None, times)
     for cutoff in (None, 10.0):
@@ -207,8 +211,8 @@ def test_pauses_are_cut_short_as_in_python():
 
 
 CUTS = """const { withoutPauses } = await import(process.argv[1]);
-const cuts = JSON.parse(process.argv[2]).map((one) => withoutPauses(one, JSON.parse(process.argv[3])));
-console.log(JSON.stringify(cuts.map((one) => [[...one.times], [...one.positions]])));"""
+const cuts = JSON.parse(process.argv[2]).map((movement) => withoutPauses(movement, JSON.parse(process.argv[3])));
+console.log(JSON.stringify(cuts.map(({ times, positions }) => [[...times], [...positions]])));"""
 PAUSED = [
     [(16, 1.0), (1, 100.0, 2.0), (14, 1.0)],  # a gap of 2
     [(16, 1.0), (1, 100.0, 1.0), (15, 1.0)],
@@ -224,16 +228,16 @@ PAUSED = [
 def test_pauses_are_cut_to_the_same_samples_as_in_python():
     shapes = draw_shapes([2, 1], 3, n_samples=40)
     cases = [*interrupted(shapes), *shapes, *(stepped(steps)[0] for steps in PAUSED)]
-    asked = [
-        {"times": one.times.tolist(), "positions": one.positions.ravel().tolist(), "d": one.n_dims} for one in cases
+    movements = [
+        {"times": case.times.tolist(), "positions": case.positions.ravel().tolist(), "d": case.n_dims} for case in cases
     ]
     done = subprocess.run(
-        [NODE, "--input-type=module", "-e", CUTS, FOLDER / "pauses.js", json.dumps(asked), json.dumps(pause_rule())],
+        [NODE, "--input-type=module", "-e", CUTS, FOLDER / "pauses.js", *map(json.dumps, (movements, pause_rule()))],
         capture_output=True, text=True, timeout=300, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    for (times, positions), one in zip(json.loads(done.stdout), cases, strict=True):
-        cut = cut_pauses(one.times, one.positions, np.array([0, len(one.times)])) or (one.times, one.positions)
+    for (times, positions), case in zip(json.loads(done.stdout), cases, strict=True):
+        cut = cut_pauses(case.times, case.positions, np.array([0, len(case.times)])) or (case.times, case.positions)
         np.testing.assert_allclose(times, cut[0], rtol=0, atol=1e-9)
         np.testing.assert_allclose(positions, cut[1].ravel(), rtol=0, atol=1e-9)
 
@@ -243,17 +247,21 @@ ENDS = [3, 6, 12, 30, 50, 70, 90, 100]  # samples of a movement after which it i
 
 def states_of(recognizer, movements):
     said = []
-    for one in movements:
+    for movement in movements:
         live, begins = recognizer.stream(), [0, *ENDS]
-        said.append([live.update(one.times[a:b], one.positions[a:b]) for a, b in pairwise(begins)])
-    return Case(snapshot_of_recognizer(recognizer), [question("follow", one, ends=ENDS) for one in movements], said)
+        said.append([live.update(movement.times[a:b], movement.positions[a:b]) for a, b in pairwise(begins)])
+    return Case(
+        snapshot_of_recognizer(recognizer), [question("follow", movement, ends=ENDS) for movement in movements], said
+    )
 
 
 def compare_states(case, runtime=RUNTIME):
     """Worst difference while movements are under way, positions in their extent; infinite where a name differs."""
     worst, n_states = 0.0, 0
-    for asked, states, several in zip(case.asked, ask(case.snapshot, case.asked, runtime), case.said, strict=True):
-        size = np.ptp(asked["positions"], axis=0).max()
+    for query, states, several in zip(
+        case.questions, ask(case.snapshot, case.questions, runtime), case.said, strict=True
+    ):
+        size = np.ptp(query["positions"], axis=0).max()
         for got, said in zip(states, several, strict=True):
             if not said.ranked:
                 assert got is None
@@ -268,12 +276,12 @@ def compare_states(case, runtime=RUNTIME):
             numbers += [got["unknown"] - said.unknown, got["progress"] - said.progress]
             numbers += [(got["arrival"] - said.arrival) / said.arrival]
             worst = max(worst, np.abs(numbers).max(), np.abs(np.array(got["path"]) - said.path).max() / size)
-    assert n_states == 7 * len(case.asked)
+    assert n_states == 7 * len(case.questions)
     return worst
 
 
 def every_tenth(movements):
-    return [kineme.Trajectory(one.times[::10], one.positions[::10]) for one in movements]
+    return [kineme.Trajectory(movement.times[::10], movement.positions[::10]) for movement in movements]
 
 
 @pytest.mark.parametrize(
@@ -300,8 +308,8 @@ def rollouts_of(demos, formulation):
     """Of stored primitives, and of movements learned in the runtime: to new starts and goals, through via points."""
     snapshot = snapshot_of_recognizer(kineme.Recognizer().fit(demos))
     primitives = kineme.DMP(formulation).learn(demos)
-    rng, asked, said = np.random.default_rng(1), [], []
-    for i, one in enumerate(demos):
+    rng, questions, said = np.random.default_rng(1), [], []
+    for i, movement in enumerate(demos):
         size = primitives.extents[i].max()
         start, goal = (x[i] + 0.3 * size * rng.normal(size=demos.n_dims) for x in (primitives.starts, primitives.goals))
         if formulation == "original" and np.abs(primitives.goals[i] - primitives.starts[i]).min() < 0.01 * size:
@@ -314,16 +322,16 @@ def rollouts_of(demos, formulation):
         ):
             named = {"n_samples" if name == "samples" else name: value for name, value in options.items()}
             moved = primitives[i : i + 1].rollout(**named)
-            asked.append({"ask": "rollout", "symbol": one.label, "formulation": formulation, "asked": options})
-            asked.append(question("rollout", one, formulation=formulation, asked=options))
+            questions.append({"ask": "rollout", "symbol": movement.label, "formulation": formulation, "wish": options})
+            questions.append(question("rollout", movement, formulation=formulation, wish=options))
             said += [(moved, size)] * 2
-    return Case(snapshot, asked, said)
+    return Case(snapshot, questions, said)
 
 
 def compare_rollouts(case, runtime=RUNTIME):
     """Worst distance, in extents."""
     worst = 0.0
-    for got, (moved, size) in zip(ask(case.snapshot, case.asked, runtime), case.said, strict=True):
+    for got, (moved, size) in zip(ask(case.snapshot, case.questions, runtime), case.said, strict=True):
         np.testing.assert_allclose(got["times"], moved.times[0], atol=1e-9)
         worst = max(worst, np.abs(np.array(got["positions"]) - moved.positions[0]).max() / size)
     return worst
@@ -357,10 +365,10 @@ def test_primitives_of_other_specifications_move_as_in_python(dmp):
     demos = kineme.load_lasa(["CShape", "Sine"])[::7]
     primitives = dmp.learn(demos)
     snapshot = snapshot_of_recognizer(kineme.Recognizer().fit(demos), dmp)
-    asked = [{"ask": "rollout", "symbol": one.label, "asked": {"goal": [10.0, 5.0]}} for one in demos]
-    asked += [question("rollout", one, asked={"goal": [10.0, 5.0]}) for one in demos]
+    questions = [{"ask": "rollout", "symbol": movement.label, "wish": {"goal": [10.0, 5.0]}} for movement in demos]
+    questions += [question("rollout", movement, wish={"goal": [10.0, 5.0]}) for movement in demos]
     wanted = primitives.rollout(goal=[10.0, 5.0]).positions
-    for got, positions in zip(ask(snapshot, asked), [*wanted, *wanted], strict=True):
+    for got, positions in zip(ask(snapshot, questions), [*wanted, *wanted], strict=True):
         assert np.abs(np.array(got["positions"]) - positions).max() <= MOVED * np.ptp(positions, axis=0).max()
 
 
@@ -466,29 +474,29 @@ def test_a_wrong_constant_is_seen(file, right, wrong, worst, tmp_path):
     assert right in text
     path.write_text(text.replace(right, wrong))
     try:
-        found = worst(tmp_path / "javascript" / "runtime.js")
+        ratio = worst(tmp_path / "javascript" / "runtime.js")
     except AssertionError:  # node refused
         return
-    assert found > 1
+    assert ratio > 1
 
 
 def test_words_are_those_of_python_at_every_confidence():
-    asked = [
+    cases = [
         (confidence, {"isNew": is_new, "isGuess": is_guess, "isOver": is_over})
         for confidence in (0.5, 0.98999, 0.99, 0.995, 0.99899, 0.999, 1.0)
         for is_new, is_guess, is_over in product((False, True), repeat=3)
     ]
     script = (
-        f"import {{ certainty }} from {json.dumps((FOLDER / 'certainty.js').as_uri())}; const [least, asked] = "
-        f"{json.dumps([dict(LEAST_CONFIDENCE), asked])}; "
-        "console.log(JSON.stringify(asked.map(([confidence, what]) => certainty(least, confidence, what))))"
+        f"import {{ certainty }} from {json.dumps((FOLDER / 'certainty.js').as_uri())}; const [least, cases] = "
+        f"{json.dumps([dict(LEAST_CONFIDENCE), cases])}; "
+        "console.log(JSON.stringify(cases.map(([confidence, what]) => certainty(least, confidence, what))))"
     )
     done = subprocess.run(
         [NODE, "--input-type=module", "-e", script], capture_output=True, text=True, timeout=300, check=True
     )
     assert json.loads(done.stdout) == [
         certainty(confidence, is_new=what["isNew"], is_guess=what["isGuess"], is_over=what["isOver"])
-        for confidence, what in asked
+        for confidence, what in cases
     ]
 
 
@@ -507,15 +515,15 @@ def test_a_movement_that_cannot_be_used_is_refused_in_words():
     snapshot = snapshot_of_recognizer(kineme.Recognizer().fit(draw_shapes([1, 1])))
     movement = draw_shapes([1])[0]
     backward = replace(movement, times=movement.times)
-    asked = question("recognize", backward)
-    asked["times"] = asked["times"][::-1]
+    query = question("recognize", backward)
+    query["times"] = query["times"][::-1]
     with pytest.raises(AssertionError, match="rising times"):
-        ask(snapshot, [asked])
-    asked = question("recognize", movement)
-    asked["times"], asked["positions"] = asked["times"][:3], asked["positions"][:3]
+        ask(snapshot, [query])
+    query = question("recognize", movement)
+    query["times"], query["positions"] = query["times"][:3], query["positions"][:3]
     with pytest.raises(AssertionError, match="at least 4 samples"):
-        ask(snapshot, [asked])
-    asked = question("recognize", movement)
-    asked["positions"] = (movement.positions / np.ptp(movement.positions) * 1e102).tolist()
+        ask(snapshot, [query])
+    query = question("recognize", movement)
+    query["positions"] = (movement.positions / np.ptp(movement.positions) * 1e102).tolist()
     with pytest.raises(AssertionError, match="up to 1e100"):
-        ask(snapshot, [asked])
+        ask(snapshot, [query])

@@ -79,11 +79,11 @@ def test_a_library_answers_in_the_runtime_as_it_does_in_python(tmp_path):
         snapshot = snapshot_of_library(library)
         others = demos[~shown][:: 1 if SOAK else 4]
         said = library.recognize(others)
-    for got, one in zip(ask(snapshot, [question("recognize", o) for o in others]), said, strict=True):
-        assert got["label"] == one.label
-        assert [candidate["label"] for candidate in got["ranked"]] == list(one.ranked)
-        assert got["p_known"] == pytest.approx(one.p_known, abs=1e-5)
-        for near, neighbor in zip(got["nearest"], one.nearest, strict=True):
+    for got, answer in zip(ask(snapshot, [question("recognize", o) for o in others]), said, strict=True):
+        assert got["label"] == answer.label
+        assert [candidate["label"] for candidate in got["ranked"]] == list(answer.ranked)
+        assert got["p_known"] == pytest.approx(answer.p_known, abs=1e-5)
+        for near, neighbor in zip(got["nearest"], answer.nearest, strict=True):
             assert near["index"] == neighbor.index
             assert near["similarity"] == pytest.approx(neighbor.similarity, abs=1e-5)
 
@@ -95,7 +95,7 @@ def test_the_prototype_of_a_symbol_moves(tmp_path):
         library.annotate("kind 01", prototype=int(library.ids("kind 01")[2]))
         snapshot = snapshot_of_library(library)
         wanted = library.primitives(ids=library.ids("kind 01")[2:3]).rollout(goal=[3.0, 4.0]).positions[0]
-    (got,) = ask(snapshot, [{"ask": "rollout", "symbol": "kind 01", "asked": {"goal": [3.0, 4.0]}}])
+    (got,) = ask(snapshot, [{"ask": "rollout", "symbol": "kind 01", "wish": {"goal": [3.0, 4.0]}}])
     np.testing.assert_allclose(got["positions"], wanted, atol=1e-9)
 
 
@@ -147,7 +147,7 @@ def test_what_a_refusal_says_to_do_helps(tmp_path):
             snapshot_of_library(library)
         for symbol in library.symbols():
             other.learn(library.movements(symbol.name))
-        assert snapshot_of_library(other).header["classes"] == [one.name for one in library.symbols()]
+        assert snapshot_of_library(other).header["classes"] == [symbol.name for symbol in library.symbols()]
 
 
 def test_a_library_without_symbols_is_refused(tmp_path):

@@ -7,7 +7,7 @@ import json
 import pytest
 from click.testing import CliRunner
 from starlette.websockets import WebSocketDisconnect
-from studio_samples import BEARER, LIVE, TOKEN, asked
+from studio_samples import BEARER, LIVE, TOKEN, request_of
 
 from kineme.cli import main
 from kineme.studio.server import access, app
@@ -77,8 +77,8 @@ def test_other_users_of_the_machine_do_not_see_the_token(monkeypatch):
     monkeypatch.setenv("DISPLAY", ":0")
     monkeypatch.setattr("webbrowser.open", opened.append)
     monkeypatch.setattr("kineme.studio.server.serve.serve", lambda options, ready: ready("/?token=T", "/?once=C"))
-    told = CliRunner().invoke(main, ["studio", "-l", "actions"])
-    assert (told.exit_code, opened, "/?token=T" in told.output) == (0, ["/?once=C"], True)
+    result = CliRunner().invoke(main, ["studio", "-l", "actions"])
+    assert (result.exit_code, opened, "/?token=T" in result.output) == (0, ["/?once=C"], True)
 
 
 @pytest.mark.parametrize(("site", "status"), [("cross-site", 200), (None, 200), ("none", 303), ("same-origin", 303)])
@@ -94,18 +94,18 @@ def test_a_link_on_another_page_opens_it_too(client, site, status):
 
 
 def test_a_browser_without_the_token_is_told_so_on_a_page(client):
-    asked = {"Authorization": "", "Accept": "text/html,application/xhtml+xml,*/*;q=0.8"}
+    headers = {"Authorization": "", "Accept": "text/html,application/xhtml+xml,*/*;q=0.8"}
     for path, more, status, said in (
         ("/", {}, 401, "It expected the token"),
         ("/?token=old", {}, 401, "copy the whole of it"),
         ("/", {"Host": "<b>.example"}, 403, "&lt;b&gt;.example"),
     ):
-        answer = client.get(path, headers=asked | more)
+        answer = client.get(path, headers=headers | more)
         assert (answer.status_code, answer.headers["content-type"]) == (status, "text/html; charset=utf-8")
         assert said in answer.text
-        assert not [one for one in ("<script", TOKEN, "<b>", "style=") if one in answer.text]
+        assert not [text for text in ("<script", TOKEN, "<b>", "style=") if text in answer.text]
     assert client.get("/api/library", headers={"Authorization": ""}).json()["error"].startswith("expected the token")
-    posted = client.post("/api/library/undo", headers=asked)
+    posted = client.post("/api/library/undo", headers=headers)
     assert posted.json()["error"].startswith("expected the token")
 
 
@@ -169,7 +169,7 @@ def test_a_page_of_another_site_neither_writes_nor_reads_nor_listens(client, ori
 
 def test_the_own_page_and_programs_may_write(client):
     for headers in ({}, {"Origin": "http://127.0.0.1:8420"}, {"Sec-Fetch-Site": "same-origin"}):
-        answer = client.post("/api/library/movements", json=asked(7, label="new"), headers=headers)
+        answer = client.post("/api/library/movements", json=request_of(7, label="new"), headers=headers)
         assert answer.status_code == 200
 
 
@@ -212,7 +212,7 @@ def test_secrets_are_compared_in_constant_time(client, monkeypatch):
     compared = []
     monkeypatch.setattr(access.hmac, "compare_digest", lambda a, b: compared.append((a, b)))
     assert client.get("/", params={"token": "x"}, headers={"Authorization": f"Bearer {TOKEN}"}).status_code == 401
-    assert {one for one, _ in compared} == {b"", b"x", TOKEN.encode()}
+    assert {token for token, _ in compared} == {b"", b"x", TOKEN.encode()}
     assert {secret for _, secret in compared} == {TOKEN.encode()}
 
 
@@ -254,9 +254,9 @@ BODIES = {
     "lengths": json.dumps({"times": [0, 1, 2, 3, 4], "positions": [[0, 0], [1, 1], [2, 2], [3, 3]]}),
     "backwards": json.dumps({"times": [3, 2, 1, 0], "positions": [[0, 0], [1, 1], [2, 2], [3, 3]]}),
     "in space": json.dumps({"times": [0, 1, 2, 3], "positions": [[0, 0, 0], [1, 1, 1], [2, 2, 1], [3, 3, 1]]}),
-    "unknown field": json.dumps({**asked(1), "labels": ["x"]}),
-    "name": json.dumps(asked(1, label="a\0b")),
-    "half a character": '{"label": "\\ud800", ' + json.dumps(asked(1))[1:],
+    "unknown field": json.dumps({**request_of(1), "labels": ["x"]}),
+    "name": json.dumps(request_of(1, label="a\0b")),
+    "half a character": '{"label": "\\ud800", ' + json.dumps(request_of(1))[1:],
     "huge": json.dumps({"times": [0, 1, 2, 3], "positions": [[0, 0], [1, 10**400], [2, 2], [3, 3]]}),
 }
 
@@ -279,16 +279,16 @@ def _texts(schema, every):
         if schema.get("type") == "string" and "enum" not in schema:
             yield schema
         schema = list(schema.values())
-    for one in schema if isinstance(schema, list) else ():
-        yield from _texts(one, every)
+    for part in schema if isinstance(schema, list) else ():
+        yield from _texts(part, every)
 
 
 def test_texts_are_limited_and_hold_whole_characters(client):
     """A limit makes both so; JSON can hold half of a character, which no answer, file or library can."""
     described = client.get("/api/openapi.json").json()
     for path, methods in described["paths"].items():
-        for one in methods.values():
-            body = one.get("requestBody", {}).get("content", {}).get("application/json", {})
+        for operation in methods.values():
+            body = operation.get("requestBody", {}).get("content", {}).get("application/json", {})
             assert all("maxLength" in text for text in _texts(body, described["components"]["schemas"])), path
     body, kind = json.dumps({"what": {"symbol": "\ud800"}}), {"Content-Type": "application/json"}
     half = client.post("/api/rollout", content=body, headers=kind)
@@ -296,7 +296,7 @@ def test_texts_are_limited_and_hold_whole_characters(client):
 
 
 WRITES = [
-    ("post", "/api/library/movements", asked(5, label="x")),
+    ("post", "/api/library/movements", request_of(5, label="x")),
     ("post", "/api/library/movements/assign", {"ids": [1], "symbol": "x"}),
     ("post", "/api/library/movements/delete", {"ids": [1]}),
     ("post", "/api/library/symbols/merge", {"ids": ["x"], "into": "y"}),
@@ -316,11 +316,11 @@ def test_for_reading_only_every_change_is_refused(folder, open_studio):
         answer = client.request(method, path, json=body)
         assert answer.status_code == 403, path
         assert "without --read-only" in answer.json()["error"]
-    assert client.post("/api/recognize", json=asked(2)).json()["label"] == "kind 2"
+    assert client.post("/api/recognize", json=request_of(2)).json()["label"] == "kind 2"
     assert client.get("/api/library").json() == before
 
 
-READING = {f"/{one}" for one in ("recognize", "rollout", "primitive", "export", "robots/move", "recordings")}
+READING = {f"/{path}" for path in ("recognize", "rollout", "primitive", "export", "robots/move", "recordings")}
 READING.add("/recordings/{key}/spotted")
 
 
@@ -349,12 +349,12 @@ def test_an_error_of_our_own_is_no_traceback_for_the_client(client, monkeypatch,
 def test_the_interface_is_described(client):
     described = client.get("/api/openapi.json").json()
     for path, methods in described["paths"].items():
-        for method, one in methods.items():
-            assert one.get("summary"), (method, path)
-            assert one.get("description"), (method, path)
-            assert all(given.get("description") for given in one.get("parameters", [])), (method, path)
-            assert set(one["responses"]) == {"200", "4XX", "5XX"}, (method, path)
-            assert one["responses"]["200"]["content"], (method, path)
+        for method, operation in methods.items():
+            assert operation.get("summary"), (method, path)
+            assert operation.get("description"), (method, path)
+            assert all(given.get("description") for given in operation.get("parameters", [])), (method, path)
+            assert set(operation["responses"]) == {"200", "4XX", "5XX"}, (method, path)
+            assert operation["responses"]["200"]["content"], (method, path)
     refused = client.post("/api/recognize", json={}).json()
     assert set(refused) == set(described["components"]["schemas"]["Refusal"]["properties"])
     assert described["security"] == [{name: []} for name in described["components"]["securitySchemes"]]

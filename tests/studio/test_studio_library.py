@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from studio_samples import asked, drawing, make_library
+from studio_samples import drawing, make_library, request_of
 
 from kineme import ActionLibrary, Trajectory
 from kineme.cli import main
@@ -36,15 +36,15 @@ HOSTILE = [
 
 
 def _symbols(client):
-    return {one["name"]: one for one in client.get("/api/library").json()["symbols"]}
+    return {symbol["name"]: symbol for symbol in client.get("/api/library").json()["symbols"]}
 
 
 def test_the_library_is_shown(client, folder):
     shown = client.get("/api/library").json()
     assert (shown["n_movements"], shown["n_dims"], shown["unlabeled"], shown["version"]) == (12, 2, 0, 1)
     assert (shown["read_only"], shown["can_undo"], shown["folder"]) == (False, True, str(folder))
-    assert [one["name"] for one in shown["symbols"]] == [f"kind {k}" for k in range(4)]
-    assert all(one["n_members"] == 3 and 2 <= len(one["path"]) <= 64 for one in shown["symbols"])
+    assert [symbol["name"] for symbol in shown["symbols"]] == [f"kind {k}" for k in range(4)]
+    assert all(symbol["n_members"] == 3 and 2 <= len(symbol["path"]) <= 64 for symbol in shown["symbols"])
     with ActionLibrary(folder, read_only=True) as library:
         first = library.movements(ids=[1])[0].positions
     assert shown["symbols"][0]["path"][0] == pytest.approx(first[0].tolist(), abs=1e-4)
@@ -54,8 +54,8 @@ def test_the_library_is_shown(client, folder):
 
 def test_a_large_library_is_not_searched_for_garbage_while_it_is_listed(client, monkeypatch):
     """Python's search would go through the paths of 10,000 symbols again and again: two thirds of the time."""
-    searched, made = [], library_routes._library
-    monkeypatch.setattr(library_routes, "_library", lambda studio: (searched.append(gc.isenabled()), made(studio))[1])
+    searched, listed = [], library_routes._library
+    monkeypatch.setattr(library_routes, "_library", lambda studio: (searched.append(gc.isenabled()), listed(studio))[1])
     assert client.get("/api/library").status_code == 200
     assert searched == [False]
     assert gc.isenabled()
@@ -66,7 +66,7 @@ def test_a_new_library_is_made_and_learns_its_first_movement(tmp_path, open_stud
     shown = client.get("/api/library").json()
     assert (shown["n_movements"], shown["n_dims"], shown["symbols"], shown["can_undo"]) == (0, None, [], False)
     assert client.get("/api/library/map").json() == {"points": []}
-    answer = client.post("/api/library/movements", json=asked(1, label="first", group="Ann")).json()
+    answer = client.post("/api/library/movements", json=request_of(1, label="first", group="Ann")).json()
     assert answer == {"ids": [1], "version": 1}
     assert _symbols(client)["first"]["n_members"] == 1
     assert client.get("/api/library/movements").json()["movements"][0]["group"] == "Ann"
@@ -80,20 +80,20 @@ def test_no_library_to_read_only_is_refused(tmp_path, open_studio):
 def test_movements_are_listed_some_at_a_time(client):
     key = _symbols(client)["kind 2"]["id"]
     own = client.get("/api/library/movements", params={"symbol": key}).json()
-    assert (own["total"], [one["id"] for one in own["movements"]]) == (3, [7, 8, 9])
-    assert {one["symbol"] for one in own["movements"]} == {key}
+    assert (own["total"], [movement["id"] for movement in own["movements"]]) == (3, [7, 8, 9])
+    assert {movement["symbol"] for movement in own["movements"]} == {key}
     some = client.get("/api/library/movements", params={"offset": 10, "limit": 5}).json()
-    assert (some["total"], [one["id"] for one in some["movements"]]) == (12, [11, 12])
+    assert (some["total"], [movement["id"] for movement in some["movements"]]) == (12, [11, 12])
     assert client.get("/api/library/movements", params={"unlabeled": 1}).json() == {"total": 0, "movements": []}
     assert client.get("/api/library/movements", params={"symbol": "sym-none"}).status_code == 404
     assert client.get("/api/library/movements", params={"offset": -1}).status_code == 422
 
 
 def test_a_whole_movement_is_as_it_was_learned(client):
-    one = client.get("/api/library/movements/8").json()
+    movement = client.get("/api/library/movements/8").json()
     times, positions = drawing(2, seed=1)
-    assert one["times"] == pytest.approx(times.tolist(), abs=1e-6)
-    assert [x for x, _ in one["positions"]] == pytest.approx(positions[:, 0].tolist(), abs=1e-5)
+    assert movement["times"] == pytest.approx(times.tolist(), abs=1e-6)
+    assert [x for x, _ in movement["positions"]] == pytest.approx(positions[:, 0].tolist(), abs=1e-5)
     assert client.get("/api/library/movements/99").status_code == 404
     assert client.get("/api/library/movements/x").status_code == 422
 
@@ -101,17 +101,17 @@ def test_a_whole_movement_is_as_it_was_learned(client):
 def test_on_the_map_members_of_a_symbol_are_nearest_to_each_other(client):
     points = client.get("/api/library/map").json()["points"]
     assert len(points) == 12
-    for one in points:
-        others = [other for other in points if other is not one]
-        near = min(others, key=lambda other: (one["x"] - other["x"]) ** 2 + (one["y"] - other["y"]) ** 2)
-        assert near["symbol"] == one["symbol"]
+    for point in points:
+        others = [other for other in points if other is not point]
+        near = min(others, key=lambda other: (point["x"] - other["x"]) ** 2 + (point["y"] - other["y"]) ** 2)
+        assert near["symbol"] == point["symbol"]
 
 
 @pytest.mark.parametrize("name", HOSTILE)
 def test_any_name_is_text(client, folder, name):
-    assert client.post("/api/library/movements", json=asked(6, label=name)).status_code == 200
+    assert client.post("/api/library/movements", json=request_of(6, label=name)).status_code == 200
     assert name in _symbols(client)
-    assert client.post("/api/recognize", json=asked(6, seed=98)).json()["label"] == name
+    assert client.post("/api/recognize", json=request_of(6, seed=98)).json()["label"] == name
     with ActionLibrary(folder, read_only=True) as library:
         assert name in library
 
@@ -128,7 +128,7 @@ def test_symbols_are_renamed_described_split_merged_and_deleted(client):
     assert (_symbols(client)["wave"]["id"], _symbols(client)["wave"]["description"]) == (key, "a hand")
     change(f"symbols/{key}/split", ids=[1], name="half")
     assert (_symbols(client)["wave"]["n_members"], _symbols(client)["half"]["n_members"]) == (2, 1)
-    both = [one["id"] for name, one in _symbols(client).items() if name in {"wave", "half"}]
+    both = [symbol["id"] for name, symbol in _symbols(client).items() if name in {"wave", "half"}]
     change("symbols/merge", ids=both, into="whole")
     assert _symbols(client)["whole"]["n_members"] == 3
     change("movements/assign", ids=[4, 5], symbol="whole")
@@ -139,10 +139,12 @@ def test_symbols_are_renamed_described_split_merged_and_deleted(client):
     assert client.delete(f"/api/library/symbols/{_symbols(client)['whole']['id']}").status_code == 200
     assert "whole" not in _symbols(client)
     history = client.get("/api/library/history").json()
-    assert [one["what"] for one in history["versions"]][:4] == ["delete", "delete", "release", "assign"]
+    assert [version["what"] for version in history["versions"]][:4] == ["delete", "delete", "release", "assign"]
     for _ in range(8):
         assert client.post("/api/library/undo").status_code == 200
-    assert {name: one["n_members"] for name, one in _symbols(client).items()} == {f"kind {k}": 3 for k in range(4)}
+    assert {name: symbol["n_members"] for name, symbol in _symbols(client).items()} == {
+        f"kind {k}": 3 for k in range(4)
+    }
     assert _symbols(client)["kind 0"]["id"] == key
 
 
@@ -166,20 +168,20 @@ def test_what_is_shown_is_made_again_if_the_library_changes_meanwhile(client, fo
 
 
 def test_of_many_things_the_last_200_are_kept(client):
-    studio, made = client.app.state.studio, []
+    studio, computed = client.app.state.studio, []
     for k in [*range(250), 249, 0]:
-        assert studio.cached_item("squares", str(k), lambda k=k: made.append(k) or k * k) == k * k
-    assert made == [*range(250), 0]
+        assert studio.cached_item("squares", str(k), lambda k=k: computed.append(k) or k * k) == k * k
+    assert computed == [*range(250), 0]
     assert len(studio.cached("squares", dict)) == 200
 
 
 def test_a_library_that_another_process_writes_is_busy_not_wrong(client, folder):
     client.app.state.studio.library.store.wait = 0.05
     with ActionLibrary(folder) as other, other.store.writing("holds"):
-        answer = client.post("/api/library/movements", json=asked(7))
+        answer = client.post("/api/library/movements", json=request_of(7))
     assert answer.status_code == 503
     assert "try again when it has finished" in answer.json()["error"]
-    assert client.post("/api/library/movements", json=asked(7)).status_code == 200
+    assert client.post("/api/library/movements", json=request_of(7)).status_code == 200
 
 
 def test_undo_refuses_to_take_back_what_the_client_has_not_seen(client, folder):
@@ -216,7 +218,7 @@ def test_the_history_says_what_was_changed_and_a_version_is_restored(client):
         ("movements/assign", {"ids": [7, 8], "symbol": "half"}, "Assigned 2 movements to half"),
         ("movements/assign", {"ids": [7], "symbol": None}, "Took the name off 1 movement"),
         ("movements/delete", {"ids": [8]}, "Deleted 1 movement"),
-        ("movements", asked(8, label="new"), "Learned 1 movement; new: new"),
+        ("movements", request_of(8, label="new"), "Learned 1 movement; new: new"),
         ("undo", {}, "Took back version 10: Learned 1 movement; new: new"),
         ("undo", {}, "Took back version 9: Deleted 1 movement"),
         ("undo", {"to": 3}, "Restored version 3"),
@@ -224,9 +226,9 @@ def test_the_history_says_what_was_changed_and_a_version_is_restored(client):
     for path, body, _ in changes:
         assert client.post(f"/api/library/{path}", json=body).status_code == 200
     shown = client.get("/api/library/history").json()["versions"]
-    assert [one["said"] for one in shown[-2::-1]] == [words for _, _, words in changes]
+    assert [version["said"] for version in shown[-2::-1]] == [words for _, _, words in changes]
     assert shown[-1]["said"] == "Learned 12 movements; new: kind 0, kind 1, kind 2, kind 3"
-    assert [one["number"] for one in shown if not one["can_restore"]] == [13, 3]
+    assert [version["number"] for version in shown if not version["can_restore"]] == [13, 3]
     assert _symbols(client)["wave"]["description"] == "a hand"
     late = client.post("/api/library/undo", json={"version": 12, "to": 2})
     assert (late.status_code, client.get("/api/library").json()["version"]) == (409, 13)
@@ -249,7 +251,7 @@ def test_the_history_says_all_that_was_taken_back_and_ends_where_a_version_retur
 
 
 def _said(client):
-    return [one["said"] for one in client.get("/api/library/history").json()["versions"]]
+    return [version["said"] for version in client.get("/api/library/history").json()["versions"]]
 
 
 def test_every_change_says_its_own_version_whatever_others_change_meanwhile(client, folder, monkeypatch):
@@ -275,12 +277,12 @@ def test_every_change_says_its_own_version_whatever_others_change_meanwhile(clie
         ("movements/assign", {"ids": [7], "symbol": None}),
         ("movements/delete", {"ids": [8]}),
         ("undo", {}),
-        ("movements", asked(8, label="new")),
+        ("movements", request_of(8, label="new")),
     ]
     versions = [client.post(f"/api/library/{path}", json=body).json()["version"] for path, body in asking]
     versions.append(client.delete(f"/api/library/symbols/{_symbols(client)['half']['id']}").json()["version"])
     assert versions == [2 + 2 * k for k in range(10)]
-    again = client.post("/api/library/movements", json=asked(8)).json()
+    again = client.post("/api/library/movements", json=request_of(8)).json()
     assert again["version"] == client.get("/api/library").json()["version"] == versions[-1] + 1
 
 
@@ -288,16 +290,16 @@ def test_a_change_is_of_the_symbol_that_was_asked_for_whatever_others_call_so_me
     key, looked = _symbols(client)["kind 0"]["id"], Studio.symbol
 
     def swapped(studio, *options):
-        found = looked(studio, *options)
+        symbol = looked(studio, *options)
         with ActionLibrary(folder) as other:
-            for old, new in ((found.name, "for now"), ("kind 1", found.name), ("for now", "kind 1")):
+            for old, new in ((symbol.name, "for now"), ("kind 1", symbol.name), ("for now", "kind 1")):
                 other.rename(old, new)
-        return found
+        return symbol
 
     monkeypatch.setattr(Studio, "symbol", swapped)
     assert client.post(f"/api/library/symbols/{key}/describe", json={"text": "mine"}).status_code == 200
-    shown = {one["id"]: one["description"] for one in client.get("/api/library").json()["symbols"]}
-    assert {one for one, text in shown.items() if text} == {key}
+    shown = {symbol["id"]: symbol["description"] for symbol in client.get("/api/library").json()["symbols"]}
+    assert {symbol for symbol, text in shown.items() if text} == {key}
     monkeypatch.setattr(Studio, "symbol", lambda studio, *options: replace(looked(studio, *options), name="kind 2"))
     for path, body in (
         (f"symbols/{key}/rename", {"name": "wave"}),
@@ -306,10 +308,10 @@ def test_a_change_is_of_the_symbol_that_was_asked_for_whatever_others_call_so_me
     ):
         assert client.post(f"/api/library/{path}", json=body).status_code == 200
     monkeypatch.undo()
-    whole = _symbols(client)["whole"]["id"]
+    merged = _symbols(client)["whole"]["id"]
     assert set(_symbols(client)) == {"kind 0", "kind 2", "kind 3", "half", "whole"}
     monkeypatch.setattr(Studio, "symbol", lambda studio, *options: replace(looked(studio, *options), name="kind 2"))
-    assert client.delete(f"/api/library/symbols/{whole}").status_code == 200
+    assert client.delete(f"/api/library/symbols/{merged}").status_code == 200
     assert set(_symbols(client)) == {"kind 0", "kind 2", "kind 3", "half"}
 
 
@@ -329,14 +331,14 @@ def test_what_is_gone_meanwhile_is_a_conflict_and_what_never_was_is_missing(clie
 
 
 def test_a_movement_that_is_there_already_is_named_not_doubled(client):
-    first = client.post("/api/library/movements", json=asked(8)).json()
-    again = client.post("/api/library/movements", json=asked(8, label="named")).json()
+    first = client.post("/api/library/movements", json=request_of(8)).json()
+    again = client.post("/api/library/movements", json=request_of(8, label="named")).json()
     assert again["ids"] == first["ids"]
     assert client.get("/api/library").json()["n_movements"] == 13
 
 
 def test_the_answer_is_that_of_the_library(client, folder):
-    given = asked(3, seed=5)
+    given = request_of(3, seed=5)
     answer = client.post("/api/recognize", json=given).json()
     with ActionLibrary(folder, read_only=True) as library:
         ours = library.recognize(_array(given))
@@ -347,7 +349,7 @@ def test_the_answer_is_that_of_the_library(client, folder):
     assert [symbol["probability"] for symbol in ranked] == pytest.approx([ours.probabilities[k] for k in ours.ranked])
     assert [symbol["p_value"] for symbol in ranked] == pytest.approx([ours.p_values[k] for k in ours.ranked])
     assert (answer["confidence"], answer["p_known"]) == pytest.approx((ours.confidence, ours.p_known))
-    assert [neighbor["index"] for neighbor in answer["nearest"]] == [one.index for one in ours.nearest]
+    assert [neighbor["index"] for neighbor in answer["nearest"]] == [neighbor.index for neighbor in ours.nearest]
     json.dumps(answer, allow_nan=False)
 
 
@@ -357,7 +359,7 @@ def test_drawings_of_more_than_a_thousand_samples_are_taken(client):
     assert client.post("/api/recognize", json=long).json()["label"] == "kind 2"
     stored = client.post("/api/library/movements", json={**long, "label": "kind 2"}).json()["ids"]
     shown = client.get("/api/library/movements?limit=500").json()["movements"]
-    path = next(one["path"] for one in shown if one["id"] == stored[0])
+    path = next(movement["path"] for movement in shown if movement["id"] == stored[0])
     assert len(path) <= 64
     assert np.array(path)[[0, -1]] == pytest.approx(positions[[0, -1]], abs=1e-3)
 
@@ -369,7 +371,7 @@ def _array(given):
 
 
 def test_nothing_to_recognize_with_is_said(tmp_path, open_studio):
-    answer = open_studio(tmp_path / "new").post("/api/recognize", json=asked(1))
+    answer = open_studio(tmp_path / "new").post("/api/recognize", json=request_of(1))
     assert answer.status_code == 400
     assert "expected a library with movements that show a symbol" in answer.json()["error"]
 
@@ -379,7 +381,7 @@ def test_a_library_in_space(tmp_path, open_studio):
     shown = client.get("/api/library").json()
     assert shown["n_dims"] == 3
     assert len(shown["symbols"][0]["path"][0]) == 3
-    assert client.post("/api/recognize", json=asked(1)).status_code == 400
+    assert client.post("/api/recognize", json=request_of(1)).status_code == 400
 
 
 def test_while_another_process_writes_changes_wait_and_reading_goes_on(client, folder):
@@ -389,17 +391,17 @@ def test_while_another_process_writes_changes_wait_and_reading_goes_on(client, f
     versions = []
 
     def learn(k):
-        versions.append(client.post("/api/library/movements", json=asked(20 + k)).json()["version"])
+        versions.append(client.post("/api/library/movements", json=request_of(20 + k)).json()["version"])
 
     waiting = [threading.Thread(target=learn, args=(k,)) for k in range(9)]
-    for one in waiting:
-        one.start()
+    for thread in waiting:
+        thread.start()
     time.sleep(0.5)  # until they wait
     assert client.get("/api/library/history").status_code == 200
-    assert all(one.is_alive() for one in waiting)  # reading has not waited for them
+    assert all(thread.is_alive() for thread in waiting)  # reading has not waited for them
     other.execute("ROLLBACK")
-    for one in waiting:
-        one.join()
+    for thread in waiting:
+        thread.join()
     other.close()
     assert client.get("/api/library").json()["version"] == 10
     assert len(versions) == 9

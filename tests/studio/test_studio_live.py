@@ -11,7 +11,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from studio_samples import LIVE, asked, make_library, samples
+from studio_samples import LIVE, make_library, request_of, samples
 
 from kineme import ActionLibrary
 from kineme.errors import DataError, TrajectoryError
@@ -64,7 +64,7 @@ def test_states_are_those_of_a_stream_of_the_library_that_expects_another_tempo(
     with client.websocket_connect(LIVE) as socket:
         socket.send_json({"samples": rows[:30].tolist()})
         state = _said(socket, "state")
-    assert [one["label"] for one in state["ranked"]] == [one.label for one in ours.ranked]
+    assert [candidate["label"] for candidate in state["ranked"]] == [candidate.label for candidate in ours.ranked]
     assert state["ranked"][0]["confidence"] == pytest.approx(ours.ranked[0].confidence)
     assert state["ranked"][0]["probability"] == pytest.approx(ours.ranked[0].confidence / (1 - ours.unknown))
     assert state["certainty"] == ours.certainty
@@ -125,7 +125,7 @@ def test_samples_that_do_not_fit_are_skipped_and_counted(client):
         assert state["skipped"] >= 1
         socket.send_json({"samples": [[2.0, 1, 2, 3]]})
         state = _said(socket, "state")
-        assert any("skipped" in one for one in state["status"])
+        assert any("skipped" in sentence for sentence in state["status"])
         socket.send_json({"finish": True})
         assert _said(socket, "answer")["ranked"]
 
@@ -154,8 +154,8 @@ def test_too_little_to_answer_is_said(client):
 def test_what_was_named_is_known_to_the_next_drawing(client):
     with client.websocket_connect(LIVE) as socket:
         before = _draw(socket, 9)
-        assert "new" not in {one["label"] for one in before["ranked"]}
-        client.post("/api/library/movements", json=asked(9, label="new"))
+        assert "new" not in {candidate["label"] for candidate in before["ranked"]}
+        client.post("/api/library/movements", json=request_of(9, label="new"))
         assert _said(socket, "changed") == 2
         socket.send_json({"reset": True})
         _until_warm(client, 2)
@@ -181,11 +181,13 @@ def test_after_a_change_what_knew_the_library_before_answers_until_the_new_one_i
         socket.send_json({"finish": True})
         _said(socket, "answer")
         monkeypatch.setattr(Studio, "stream", slow)
-        version = client.post("/api/library/movements", json=asked(9, label="new")).json()["version"]
+        version = client.post("/api/library/movements", json=request_of(9, label="new")).json()["version"]
         rows = samples(9, 5)
         for start in range(0, 36, 6):
             socket.send_json({"samples": rows[start : start + 6]})
-            assert {one["label"] for one in _said(socket, "state")["ranked"]} <= {f"kind {k}" for k in range(4)}
+            assert {candidate["label"] for candidate in _said(socket, "state")["ranked"]} <= {
+                f"kind {k}" for k in range(4)
+            }
         may_make.set()
         _until_warm(client, version)
         socket.send_json({"samples": rows[36:42]})
@@ -195,20 +197,20 @@ def test_after_a_change_what_knew_the_library_before_answers_until_the_new_one_i
             ours = library.stream(early=DRAWN)
             for start in range(0, 42, 6):
                 some = np.array(rows[start : start + 6])
-                known = ours.update(some[:, 0], some[:, 1:])
-        assert state["progress"] == pytest.approx(known.progress)
+                expected = ours.update(some[:, 0], some[:, 1:])
+        assert state["progress"] == pytest.approx(expected.progress)
         may_make.clear()
-        client.post("/api/library/movements", json=asked(8, label="another"))
+        client.post("/api/library/movements", json=request_of(8, label="another"))
         socket.send_json({"reset": True})
         socket.send_json({"samples": samples(8, 5)})
-        assert "another" not in {one["label"] for one in _said(socket, "state")["ranked"]}
+        assert "another" not in {candidate["label"] for candidate in _said(socket, "state")["ranked"]}
         socket.send_json({"finish": True})
         may_make.set()
         assert _said(socket, "answer")["ranked"][0]["label"] == "another"
 
 
 def test_what_is_deleted_while_a_movement_is_under_way_is_no_answer_to_it(client):
-    symbols = {one["name"]: one["id"] for one in client.get("/api/library").json()["symbols"]}
+    symbols = {symbol["name"]: symbol["id"] for symbol in client.get("/api/library").json()["symbols"]}
     rows = samples(2)
     with client.websocket_connect(LIVE) as socket:
         for name, key in symbols.items():  # the last of them leaves nothing to recognize
@@ -218,7 +220,7 @@ def test_what_is_deleted_while_a_movement_is_under_way_is_no_answer_to_it(client
             socket.send_json({"samples": rows[40:]})
             socket.send_json({"finish": True})
             answer = _said(socket, "answer")
-            assert answer is None or name not in {one["label"] for one in answer["ranked"]}
+            assert answer is None or name not in {candidate["label"] for candidate in answer["ranked"]}
         assert answer is None
 
 
@@ -249,12 +251,12 @@ def test_in_an_empty_library_drawings_are_taken_and_nothing_is_said(tmp_path, op
 
 
 def test_changes_of_others_are_told_to_everyone(client, folder):
-    with client.websocket_connect(LIVE) as one, client.websocket_connect(LIVE) as two:
-        for socket in (one, two):
+    with client.websocket_connect(LIVE) as first, client.websocket_connect(LIVE) as two:
+        for socket in (first, two):
             socket.send_json({"watch": True})
         with ActionLibrary(folder) as other:
             other.rename("kind 1", "elsewhere")
-        assert _said(one, "changed") == _said(two, "changed") == 2
+        assert _said(first, "changed") == _said(two, "changed") == 2
 
 
 def test_own_changes_are_looked_at_at_once(client):
@@ -262,7 +264,7 @@ def test_own_changes_are_looked_at_at_once(client):
     changes.period = 60.0
     with client.websocket_connect(LIVE) as socket:
         for k in (20, 21):  # the first look may have begun with the old period
-            version = client.post("/api/library/movements", json=asked(k, label=str(k))).json()["version"]
+            version = client.post("/api/library/movements", json=request_of(k, label=str(k))).json()["version"]
             assert _said(socket, "changed") == version
 
 
@@ -278,14 +280,14 @@ def test_clients_that_leave_are_forgotten(client):
 
 
 def test_each_client_has_its_own_stream(client):
-    with client.websocket_connect(LIVE) as one, client.websocket_connect(LIVE) as two:
+    with client.websocket_connect(LIVE) as first, client.websocket_connect(LIVE) as two:
         a, b = samples(0), samples(3)
         for start in range(0, 60, 10):
-            one.send_json({"samples": a[start : start + 10]})
+            first.send_json({"samples": a[start : start + 10]})
             two.send_json({"samples": b[start : start + 10]})
-        for socket in (one, two):
+        for socket in (first, two):
             socket.send_json({"finish": True})
-        best = [_said(socket, "answer")["ranked"][0]["label"] for socket in (one, two)]
+        best = [_said(socket, "answer")["ranked"][0]["label"] for socket in (first, two)]
         assert best == ["kind 0", "kind 3"]
 
 
@@ -412,14 +414,14 @@ def test_a_page_that_does_not_read_delays_no_program_and_is_told_all_of_it_in_th
             source.update(np.array([[k, 1.0, 2.0]]), {"k": k})  # returns at once
             await asyncio.sleep(0)
         reads.set()
-        while sum(len(json.loads(one)["source"]["samples"]) for one in sent if "source" in one) < 500:
+        while sum(len(json.loads(text)["source"]["samples"]) for text in sent if "source" in text) < 500:
             await asyncio.sleep(0.01)
-        return [json.loads(one) for one in sent if "source" in one], len(sent)
+        return [json.loads(text) for text in sent if "source" in text], len(sent)
 
     messages, n = asyncio.run(told())
     assert n <= 4  # not one for each sample
     assert messages[-1]["source"]["state"] == {"k": 499}
-    rows = [row for one in messages for row in one["source"]["samples"]]
+    rows = [row for message in messages for row in message["source"]["samples"]]
     assert rows == [[k, 1.0, 2.0] for k in range(500)]
 
 

@@ -17,7 +17,7 @@ from pathlib import Path
 import httpx
 import pytest
 from click.testing import CliRunner
-from studio_samples import BEARER, ROOT, TOKEN, Running, asked, drawing, make_library, running, samples
+from studio_samples import BEARER, ROOT, TOKEN, Running, drawing, make_library, request_of, running, samples
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
@@ -30,8 +30,8 @@ from soaking import SOAK, slow
 
 @pytest.fixture(scope="module")
 def studio(tmp_path_factory):
-    with running(make_library(tmp_path_factory.mktemp("shared") / "actions")) as one:
-        yield one
+    with running(make_library(tmp_path_factory.mktemp("shared") / "actions")) as studio:
+        yield studio
 
 
 def _live(studio, **headers):
@@ -49,18 +49,18 @@ def _kineme(*words):
 
 
 def test_it_says_where_it_is_and_how_to_stop_it_and_ends_at_once_without_a_traceback(folder):
-    one = Running(folder)
-    assert (one.address.startswith("http://127.0.0.1:"), one.token) == (True, TOKEN)
-    with _live(one) as client:
+    studio = Running(folder)
+    assert (studio.address.startswith("http://127.0.0.1:"), studio.token) == (True, TOKEN)
+    with _live(studio) as client:
         client.send(json.dumps({"watch": True}))
-        code, out, err = one.end()
+        code, out, err = studio.end()
     assert "stop it with Ctrl-C" in out
     assert (code, err) in {(0, ""), (1, "")}
 
 
 def test_only_the_loopback_listens(studio):
     port = int(studio.address.rpartition(":")[2])
-    own = {found[4][0] for found in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)}
+    own = {address[4][0] for address in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)}
     for address in own - {"127.0.0.1"}:
         with pytest.raises(ConnectionRefusedError):
             socket.create_connection((address, port), 0.5)
@@ -106,9 +106,9 @@ def test_the_programs_of_the_page_run_and_are_shown(studio, language):
         shown = [json.loads(page.recv(300))]
         while not shown[-1].get("source", {}).get("gone"):
             shown.append(json.loads(page.recv(300)))
-    sources = [one["source"] for one in shown if "source" in one]
-    assert {one["name"] for one in sources if one.get("samples")} == {"hand tracker"}
-    assert sum(len(one.get("samples", [])) for one in sources) == 100
+    sources = [message["source"] for message in shown if "source" in message]
+    assert {source["name"] for source in sources if source.get("samples")} == {"hand tracker"}
+    assert sum(len(source.get("samples", [])) for source in sources) == 100
     assert "label" in sources[-2]["ended"]["answer"]
 
 
@@ -133,22 +133,22 @@ def test_raw_nonsense_is_survived(studio):
 
 
 def test_killed_at_any_time_nothing_that_was_answered_is_lost(folder):
-    kept = []
+    stored = []
     for round_ in range(0 if SOAK else 1, 9 if SOAK else 2):
-        with running(folder) as one:
-            stop = threading.Timer(0.03 + 0.15 * round_, one.process.kill)
+        with running(folder) as studio:
+            stop = threading.Timer(0.03 + 0.15 * round_, studio.process.kill)
             with suppress(httpx.HTTPError, json.JSONDecodeError):
                 for k in range(1000):
                     if k == 2:
                         stop.start()
-                    body = asked(100 + 1000 * round_ + k, label=f"new {round_} {k}")
-                    answer = httpx.post(f"{one.address}/api/library/movements", json=body, headers=BEARER)
-                    kept.append((answer.json()["ids"][0], body["label"]))
+                    body = request_of(100 + 1000 * round_ + k, label=f"new {round_} {k}")
+                    answer = httpx.post(f"{studio.address}/api/library/movements", json=body, headers=BEARER)
+                    stored.append((answer.json()["ids"][0], body["label"]))
             stop.join()
-    assert len(kept) >= 2
+    assert len(stored) >= 2
     with ActionLibrary(folder) as library:
         assert library.verify() == []
-        for key, name in kept:
+        for key, name in stored:
             assert key in library[name].members
 
 
@@ -158,7 +158,7 @@ def test_two_browsers_the_command_line_and_python_write_side_by_side(folder):
     def write(studio, who):
         with httpx.Client(headers=BEARER) as client:
             for k in range(5):
-                body = asked(1000 * who + k, label=f"{who} {k}")
+                body = request_of(1000 * who + k, label=f"{who} {k}")
                 answer = client.post(f"{studio.address}/api/library/movements", json=body)
                 assert answer.status_code == 200, answer.text
                 names.append(body["label"])
@@ -166,19 +166,19 @@ def test_two_browsers_the_command_line_and_python_write_side_by_side(folder):
     with running(folder) as studio, _live(studio) as page, ActionLibrary(folder) as library:
         page.send(json.dumps({"watch": True}))
         writers = [threading.Thread(target=write, args=(studio, who)) for who in (1, 2, 3)]
-        for one in writers:
-            one.start()
+        for writer in writers:
+            writer.start()
         for k in range(5):
             library.learn([Trajectory(*drawing(9000 + k))], [f"python {k}"])
         renamed = _kineme("library", "rename", "kind 0", "renamed", "-l", folder)
         assert renamed.returncode == 0, renamed.stderr
-        for one in writers:
-            one.join()
+        for writer in writers:
+            writer.join()
         library.rename("kind 1", "elsewhere")  # the last change is that of another process than the studio
-        told = 0
-        while told < library.version:
-            told = json.loads(page.recv(timeout=300))["changed"]
-        shown = {one["name"] for one in _get(studio)["symbols"]}
+        version = 0
+        while version < library.version:
+            version = json.loads(page.recv(timeout=300))["changed"]
+        shown = {symbol["name"] for symbol in _get(studio)["symbols"]}
         assert shown == {"renamed", "elsewhere", "kind 2", "kind 3", *names, *(f"python {k}" for k in range(5))}
         assert len(names) == 15
 
@@ -197,10 +197,10 @@ def test_fifty_clients_draw_at_once(studio):
             answers[who] = json.loads(client.recv(timeout=300))["answer"]["ranked"][0]["label"]
 
     threads = [threading.Thread(target=draw, args=(who,)) for who in range(50)]
-    for one in threads:
-        one.start()
-    for one in threads:
-        one.join()
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
     assert answers == {who: f"kind {who % 4}" for who in range(50)}
 
 
@@ -263,13 +263,13 @@ def test_on_a_network_and_for_reading_only_it_says_so_and_leaves_nothing_with_a_
 ):
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     before = signal.signal(signal.SIGHUP, signal.SIG_DFL)  # a terminal that closes is passed over after nohup
-    one = Running(folder, "--host", "0.0.0.0", "--read-only")
+    studio = Running(folder, "--host", "0.0.0.0", "--read-only")
     signal.signal(signal.SIGHUP, before)
-    assert "for reading only" in one.line
-    port = one.address.rpartition(":")[2]
+    assert "for reading only" in studio.line
+    port = studio.address.rpartition(":")[2]
     assert httpx.post(f"http://127.0.0.1:{port}/api/library/undo", headers=BEARER).status_code == 403
     assert list(tmp_path.glob("kineme-studio-*"))
-    _, _, err = one.end(signal.SIGHUP)
+    _, _, err = studio.end(signal.SIGHUP)
     assert "give it to those you trust" in err
     assert not list(tmp_path.glob("kineme-studio-*"))
 
@@ -287,5 +287,5 @@ from kineme.studio.server.studio import Studio
 Studio.{busy} = lambda self: ThreadPoolExecutor(1).submit(time.sleep, 3600).result()
 main()
 """
-    with running(folder, program=program) as one:
-        assert one.end()[0] == 0
+    with running(folder, program=program) as studio:
+        assert studio.end()[0] == 0

@@ -56,18 +56,18 @@ def test_a_recording_is_read_searched_corrected_and_learned(client):
     read = read.json()
     assert (len(read["tables"]), read["problems"]) == (1, [])
     table = read["tables"][0]
-    assert [one["name"] for one in table["channels"]] == ["x", "y"]
+    assert [channel["name"] for channel in table["channels"]] == ["x", "y"]
     assert table["rate"] == pytest.approx(40, rel=0.1)
     plot = read["plots"][0]
-    assert [one["name"] for one in plot["columns"]] == ["x", "y"]
+    assert [column["name"] for column in plot["columns"]] == ["x", "y"]
     assert len(plot["times"]) == len(plot["columns"][0]["values"]) <= 1000
     assert (plot["times"][0], plot["times"][-1]) == (0, pytest.approx(table["duration"]))
-    found = client.post(f"/api/recordings/{read['recording']}/spotted", json={}).json()
-    known = [one for one in found["spans"] if one["label"]]
-    assert {one["label"] for one in known} <= {"kind 0", "kind 1", "kind 2"}
-    assert len(known) >= 2
-    assert all(0 <= one["begin"] < one["end"] <= table["duration"] + 1e-9 for one in found["spans"])
-    assert found["rests"]
+    answer = client.post(f"/api/recordings/{read['recording']}/spotted", json={}).json()
+    named = [span for span in answer["spans"] if span["label"]]
+    assert {span["label"] for span in named} <= {"kind 0", "kind 1", "kind 2"}
+    assert len(named) >= 2
+    assert all(0 <= span["begin"] < span["end"] <= table["duration"] + 1e-9 for span in answer["spans"])
+    assert answer["rests"]
     corrected = [{"begin": a, "end": b, "label": "mine"} for a, b in spans[:2]]
     corrected += [{"begin": spans[2][0], "end": spans[2][1], "label": None}]
     body = {"table": table["name"], "channels": ["x", "y"], "spans": corrected}
@@ -75,7 +75,7 @@ def test_a_recording_is_read_searched_corrected_and_learned(client):
     assert learned.status_code == 200, learned.text
     assert len(learned.json()["ids"]) == 3
     shown = client.get("/api/library").json()
-    assert {one["name"]: one["n_members"] for one in shown["symbols"]}["mine"] == 2
+    assert {symbol["name"]: symbol["n_members"] for symbol in shown["symbols"]}["mine"] == 2
     assert shown["unlabeled"] == 1
     again = client.post(f"/api/recordings/{read['recording']}/learn", json=body).json()
     assert again["ids"] == learned.json()["ids"]
@@ -86,8 +86,8 @@ def test_other_columns_are_read_where_they_are_asked_for(client):
     key = _send(client, data).json()["recording"]
     spotted = client.post(f"/api/recordings/{key}/spotted", json={"channels": ["a", "b"]})
     assert spotted.status_code == 200
-    one = client.post(f"/api/recordings/{key}/spotted", json={"channels": ["a"]})
-    assert one.status_code == 400
+    answer = client.post(f"/api/recordings/{key}/spotted", json={"channels": ["a"]})
+    assert answer.status_code == 400
     wrong = client.post(f"/api/recordings/{key}/spotted", json={"channels": ["none"]})
     assert wrong.status_code == 400
     assert "none" in wrong.json()["error"]
@@ -100,8 +100,8 @@ def test_a_refused_table_says_what_can_be_done_in_the_studio_and_what_in_the_she
     said = "; change the file, or learn it in the shell: kineme learn with --time, --units"
     assert refused.json()["error"].endswith("got the columns ['a', 'b', 'c']" + said)
     key = _send(client, _table(0)[0]).json()["recording"]
-    one = client.post(f"/api/recordings/{key}/learn", json={"channels": ["x"]})
-    assert one.json()["error"].endswith("got 1; choose other channels, or make another library")
+    answer = client.post(f"/api/recordings/{key}/learn", json={"channels": ["x"]})
+    assert answer.json()["error"].endswith("got 1; choose other channels, or make another library")
 
 
 def test_labels_of_a_file_are_taken(client):
@@ -110,22 +110,22 @@ def test_labels_of_a_file_are_taken(client):
         t, x = drawing(k, seed=60 + i)
         rows += [f"{i},{a:.6f},{b:.6f},{c:.6f},{label}" for a, (b, c) in zip(t, x, strict=True)]
     read = _send(client, "\n".join(rows).encode()).json()
-    assert [one["label"] for one in read["tables"]] == ["wave", "nod", "wave", None]
+    assert [table["label"] for table in read["tables"]] == ["wave", "nod", "wave", None]
     learned = client.post(f"/api/recordings/{read['recording']}/learn", json={"channels": ["x", "y"]})
     assert learned.status_code == 200, learned.text
     assert len(learned.json()["ids"]) == 4
     shown = client.get("/api/library").json()
-    members = {one["name"]: one["n_members"] for one in shown["symbols"]}
+    members = {symbol["name"]: symbol["n_members"] for symbol in shown["symbols"]}
     assert (members["wave"], members["nod"], shown["unlabeled"]) == (2, 1, 1)
     assert client.post(f"/api/recordings/{read['recording']}/learn", json={"spans": []}).status_code == 422
 
 
 def test_of_each_file_the_columns_asked_for_last_are_kept(client):
     data, _ = _table(0, 1, heads="t,a,b")
-    kept, keys = client.app.state.studio.uploads._read, [_send(client, data).json()["recording"] for _ in range(2)]
+    cached, keys = client.app.state.studio.uploads._read, [_send(client, data).json()["recording"] for _ in range(2)]
     for columns in (["a"], ["b"], ["b", "a"]):
         client.app.state.studio.uploads.recordings(keys[0], columns)
-    assert list(kept) == [(keys[0], ()), (keys[1], ()), (keys[0], ("b", "a"))]
+    assert list(cached) == [(keys[0], ()), (keys[1], ()), (keys[0], ("b", "a"))]
 
 
 def test_what_is_read_apart_is_what_is_read_here(tmp_path):
@@ -173,22 +173,22 @@ def test_orientations_that_are_chosen_by_their_channel_are_those_of_the_reader(
     data, spans = _poses(0, 1, 2, heads=",".join(("t", "x", "y", *four)))
     read = _send(client, data).json()
     channels = read["tables"][0]["channels"]
-    assert [(one["kind"], one["columns"]) for one in channels[2:]] == [("orientation", four)]
+    assert [(channel["kind"], channel["columns"]) for channel in channels[2:]] == [("orientation", four)]
     chosen = [channels[k]["name"] for k in (2, 0)]  # not all of them, and in another order
     body = {"channels": chosen, "spans": [{"begin": a, "end": b, "label": f"k{i}"} for i, (a, b) in enumerate(spans)]}
     learned = client.post(f"/api/recordings/{read['recording']}/learn", json=body)
     assert learned.status_code == 200, learned.text
     (tmp_path / "a.csv").write_bytes(data)
-    (whole,) = read_recordings(tmp_path / "a.csv", columns=[*four, "x"]).demonstrations
+    (recording,) = read_recordings(tmp_path / "a.csv", columns=[*four, "x"]).demonstrations
     library = client.app.state.studio.library
-    assert library.channels == whole.channels
-    for one, (begin, end) in zip(library.movements(), spans, strict=True):
-        inside = (whole.times >= begin - 1e-9) & (whole.times <= end + 1e-9)
-        np.testing.assert_allclose(one.recorded, whole.recorded[inside], atol=1e-6)
+    assert library.channels == recording.channels
+    for movement, (begin, end) in zip(library.movements(), spans, strict=True):
+        inside = (recording.times >= begin - 1e-9) & (recording.times <= end + 1e-9)
+        np.testing.assert_allclose(movement.recorded, recording.recorded[inside], atol=1e-6)
     other = _send(client, _poses(1, 0, heads=",".join(("t", "x", "y", *four)))[0], "b.csv").json()["recording"]
-    for asked in ({"channels": chosen}, {}):
-        found = client.post(f"/api/recordings/{other}/spotted", json=asked).json()["spans"]
-        assert [one["label"] for one in found] == ["k1", "k0"]
+    for choice in ({"channels": chosen}, {}):
+        spotted = client.post(f"/api/recordings/{other}/spotted", json=choice).json()["spans"]
+        assert [span["label"] for span in spotted] == ["k1", "k0"]
 
 
 FILES = {
@@ -266,14 +266,14 @@ def test_folders_of_studios_that_were_killed_are_deleted_and_those_of_others_are
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     running = uploads.OwnFolder()
     left, new, other = (tmp_path / name for name in ("kineme-studio-left", "kineme-studio-new", "else"))
-    for one in (left, new, other):
-        one.mkdir()
-        (one / "sent.csv").write_text("1")
+    for folder in (left, new, other):
+        folder.mkdir()
+        (folder / "sent.csv").write_text("1")
     (tmp_path / "kineme-studio-link").symlink_to(other)
-    for one in (left, other, running.path):
-        os.utime(one, (1, 1))
+    for folder in (left, other, running.path):
+        os.utime(folder, (1, 1))
     second = uploads.OwnFolder()
-    assert {one.name for one in tmp_path.iterdir()} == {
+    assert {path.name for path in tmp_path.iterdir()} == {
         *("kineme-studio-new", "kineme-studio-link", "else"),
         *(running.path.name, second.path.name),
     }
@@ -338,12 +338,12 @@ def test_a_search_says_how_far_it_is_and_ends_where_another_one_begins(client, m
     seen, begun = [], Event()
     real = recording_routes.annotate
 
-    def slow(store, one, error_rate, progress):
+    def slow(store, recording, error_rate, progress):
         if begun.is_set():
-            return real(store, one, error_rate, progress)
+            return real(store, recording, error_rate, progress)
         begun.set()
         for k in range(1000):
-            progress(0.001 * k * one.demonstrations.durations[0])
+            progress(0.001 * k * recording.demonstrations.durations[0])
             seen.append(client.get(path).json()["share"])
         raise AssertionError
 
@@ -397,7 +397,7 @@ def test_a_recording_that_is_too_large_is_refused(client, monkeypatch):
     assert _send(client, b"1,2\n" * 1000).status_code == 413
     assert _send(client, parts()).status_code == 413
     folder = client.app.state.studio.uploads._folder.path
-    assert not [one for one in folder.rglob("*") if one.is_file()]
+    assert not [path for path in folder.rglob("*") if path.is_file()]
 
 
 def test_recordings_are_read_but_not_learned_for_reading_only(folder, open_studio):

@@ -24,9 +24,9 @@ def symbol(client):
 @pytest.fixture
 def arms(client):
     pytest.importorskip("pinocchio")
-    found = client.get("/api/robots").json()
-    assert (found["available"], found["why"]) == (True, None)
-    return found["robots"]
+    answer = client.get("/api/robots").json()
+    assert (answer["available"], answer["why"]) == (True, None)
+    return answer["robots"]
 
 
 def _move(client, symbol, **wanted):
@@ -36,26 +36,26 @@ def _move(client, symbol, **wanted):
 
 def test_an_arm_executes_a_symbol_with_its_checks_and_what_draws_it(client, symbol, arms):
     assert "panda" in arms
-    made = _move(client, symbol)
-    assert made.status_code == 200, made.text
-    made = made.json()
-    assert (made["passed"], made["refusal"]) == (True, None)
-    assert {"velocity", "acceleration", "position"} <= {one["what"] for one in made["checks"]}
-    assert all(one["passed"] for one in made["checks"])
-    assert len(made["joints"]) == 7
-    assert made["joints"][0]["low"] < made["joints"][0]["high"]
-    scene = made["scene"]
+    moved = _move(client, symbol)
+    assert moved.status_code == 200, moved.text
+    moved = moved.json()
+    assert (moved["passed"], moved["refusal"]) == (True, None)
+    assert {"velocity", "acceleration", "position"} <= {check["what"] for check in moved["checks"]}
+    assert all(check["passed"] for check in moved["checks"])
+    assert len(moved["joints"]) == 7
+    assert moved["joints"][0]["low"] < moved["joints"][0]["high"]
+    scene = moved["scene"]
     assert len(scene["times"]) == len(scene["positions"]) == len(scene["executed"])
     assert "<robot" in scene["urdf"]
 
 
 def test_what_an_arm_must_not_do_is_refused_with_the_checks_that_failed(client, symbol, arms):
-    made = _move(client, symbol, duration=0.2, slow_down=False).json()
-    assert (made["passed"], made["scene"]) == (False, None)
-    assert "cannot execute" in made["refusal"] or "expected" in made["refusal"]
-    assert not made["checks"] or not all(one["passed"] for one in made["checks"])
-    assert "tick 'Slow down where limits need it'" in made["refusal"]
-    assert "--" not in made["refusal"]
+    moved = _move(client, symbol, duration=0.2, slow_down=False).json()
+    assert (moved["passed"], moved["scene"]) == (False, None)
+    assert "cannot execute" in moved["refusal"] or "expected" in moved["refusal"]
+    assert not moved["checks"] or not all(check["passed"] for check in moved["checks"])
+    assert "tick 'Slow down where limits need it'" in moved["refusal"]
+    assert "--" not in moved["refusal"]
 
 
 def test_what_to_do_about_a_refusal_is_there_in_the_studio(client, symbol, arms):
@@ -101,6 +101,6 @@ def test_without_the_extra_it_says_what_to_install(client, monkeypatch):
         raise DataError("expected the package pin for arms; pip install 'kineme[robot]'")
 
     monkeypatch.setattr(robot_routes, "load", load)
-    found = client.get("/api/robots").json()
-    assert (found["available"], found["robots"]) == (False, [])
-    assert "kineme[robot]" in found["why"]
+    answer = client.get("/api/robots").json()
+    assert (answer["available"], answer["robots"]) == (False, [])
+    assert "kineme[robot]" in answer["why"]

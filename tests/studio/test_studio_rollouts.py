@@ -33,13 +33,15 @@ def _rollout(client, what, **wanted):
 
 
 def test_a_symbol_moves_as_demonstrated_and_to_another_goal(client, symbol):
-    made = _rollout(client, {"symbol": symbol})
-    assert made["times"][-1] == pytest.approx(1.5)
-    assert len(made["times"]) == len(made["positions"]) == len(made["velocities"]) == len(made["accelerations"]) >= 200
-    assert np.abs(np.array(made["positions"][0]) - drawing(2, seed=0)[1][0]).max() < 0.2
-    recorded = np.array(made["recorded"])  # of the recording that moves, which the first of the symbol need not be
+    moved = _rollout(client, {"symbol": symbol})
+    assert moved["times"][-1] == pytest.approx(1.5)
+    assert (
+        len(moved["times"]) == len(moved["positions"]) == len(moved["velocities"]) == len(moved["accelerations"]) >= 200
+    )
+    assert np.abs(np.array(moved["positions"][0]) - drawing(2, seed=0)[1][0]).max() < 0.2
+    recorded = np.array(moved["recorded"])  # of the recording that moves, which the first of the symbol need not be
     assert len(recorded) <= 64
-    np.testing.assert_allclose(recorded[[0, -1]], [made["start"], made["goal"]], atol=1e-3)
+    np.testing.assert_allclose(recorded[[0, -1]], [moved["start"], moved["goal"]], atol=1e-3)
     other = _rollout(client, {"symbol": symbol}, start=[1.0, 2.0], goal=[3.0, -1.0], duration=4.0, rate=50)
     assert other["positions"][0] == pytest.approx([1.0, 2.0])
     assert other["positions"][-1] == pytest.approx([3.0, -1.0])
@@ -48,12 +50,12 @@ def test_a_symbol_moves_as_demonstrated_and_to_another_goal(client, symbol):
 
 
 def test_it_passes_via_points_at_their_time(client, symbol):
-    made = _rollout(client, {"symbol": symbol}, via=[[0.7, [0.4, 0.9]], [0.3, [0.5, 0.5]]], rate=1000)
-    times, positions = np.array(made["times"]) / made["times"][-1], np.array(made["positions"])
+    moved = _rollout(client, {"symbol": symbol}, via=[[0.7, [0.4, 0.9]], [0.3, [0.5, 0.5]]], rate=1000)
+    times, positions = np.array(moved["times"]) / moved["times"][-1], np.array(moved["positions"])
     for share, point in ((0.3, [0.5, 0.5]), (0.7, [0.4, 0.9])):
         assert positions[np.abs(times - share).argmin()] == pytest.approx(point, abs=0.01)
     far = _rollout(client, {"symbol": symbol}, via=[[0.5, [90.0, 90.0]]])
-    assert any("via point" in one or "passes" in one for one in far["warnings"])
+    assert any("via point" in warning or "passes" in warning for warning in far["warnings"])
 
 
 def test_rollouts_do_not_wait_for_each_other_and_each_has_its_own_warnings(client, symbol, monkeypatch):
@@ -79,9 +81,9 @@ def test_it_goes_around_balls_or_says_that_it_does_not(client, symbol):
     shown = np.array(_rollout(client, {"symbol": symbol})["positions"])
     middle, size = shown[100], np.ptp(shown, axis=0).max()
     ball = {"center": (middle + 0.001 * size).tolist(), "radius": 0.05 * size}
-    made = _rollout(client, {"symbol": symbol}, obstacles=[ball])
-    gap = np.linalg.norm(np.array(made["positions"]) - ball["center"], axis=1).min()
-    assert gap >= ball["radius"] or made["warnings"]
+    moved = _rollout(client, {"symbol": symbol}, obstacles=[ball])
+    gap = np.linalg.norm(np.array(moved["positions"]) - ball["center"], axis=1).min()
+    assert gap >= ball["radius"] or moved["warnings"]
     assert np.linalg.norm(shown - ball["center"], axis=1).min() < ball["radius"]
     around_start = {"center": shown[0].tolist(), "radius": size}
     assert "whose radius is" in _rollout(client, {"symbol": symbol}, obstacles=[around_start])["warnings"][0]
@@ -90,19 +92,19 @@ def test_it_goes_around_balls_or_says_that_it_does_not(client, symbol):
 @pytest.mark.skipif(NODE is None, reason=REASON)
 def test_the_page_lets_it_move_as_the_server_does(client, folder, symbol):
     """In every formulation: elsewhere, through via points, slower; and so does a style."""
-    values = [0.5 * one for one in client.get(f"/api/library/symbols/{symbol}/styles").json()["highest"]]
-    whats = [({"symbol": symbol}, one) for one in FORMULATIONS]
+    values = [0.5 * value for value in client.get(f"/api/library/symbols/{symbol}/styles").json()["highest"]]
+    whats = [({"symbol": symbol}, formulation) for formulation in FORMULATIONS]
     whats += [({"movement": 5}, None), ({"style": {"symbol": symbol, "values": values}}, None)]
     via = [[0.3, [0.5, 0.5]], [0.71, [0.6, 0.9]]]
     elsewhere = {"start": [0.3, 0.1], "goal": [1.5, -1.0]}
     wanted = [{}, elsewhere, {**elsewhere, "duration": 4.0}, {**elsewhere, "via": via}]
     questions, answers = [], []
     for what, formulation in whats:
-        asked = {"what": what, "formulation": formulation}
-        document = client.post("/api/primitive", json=asked).json()
-        for one in wanted:
-            questions.append({"ask": "primitive", "document": document, "asked": {**one, "samples": 201}})
-            answers.append(_rollout(client, **asked, **one))
+        body = {"what": what, "formulation": formulation}
+        document = client.post("/api/primitive", json=body).json()
+        for wish in wanted:
+            questions.append({"ask": "primitive", "document": document, "wish": {**wish, "samples": 201}})
+            answers.append(_rollout(client, **body, **wish))
     for got, said in zip(ask(None, questions), answers, strict=True):
         for name in ("times", "positions", "velocities", "accelerations"):
             exact = np.array(said[name])
@@ -116,7 +118,7 @@ def test_what_only_the_server_lets_move_is_not_sent(client, tmp_path, open_studi
     table = np.column_stack((times > 0.7, positions, times, turn))
     channels = (
         Channel("grip", "discrete", ("grip",)),
-        *(Channel(one, "position", (one,), "m") for one in "xyz"),
+        *(Channel(axis, "position", (axis,), "m") for axis in "xyz"),
         Channel("q", "orientation", ("qw", "qx", "qy", "qz"), None, "wxyz"),
     )
     plain = Demonstrations.from_arrays([table, table * [1, 1.1, 1.1, 1.1, 1, 1, 1, 1]], None, [times] * 2)
@@ -124,26 +126,28 @@ def test_what_only_the_server_lets_move_is_not_sent(client, tmp_path, open_studi
         library.learn(Demonstrations.of_movements(of_channels(plain.movements, channels)), ["grasp"] * 2)
     other = open_studio(tmp_path / "channels")
     assert other.post("/api/primitive", json={"what": {"movement": 1}}).json() is None
-    made = _rollout(other, {"movement": 1})
-    assert made["columns"] == ["x", "y", "z", "qw", "qx", "qy", "qz"]  # of which start and goal are, as Move asks again
-    there = {one: made[one] for one in ("start", "goal")} | {"via": [[0.5, made["positions"][100]]]}
-    again = _rollout(other, {"movement": 1}, **there, obstacles=[{"center": made["positions"][60], "radius": 0.1}])
-    assert np.shape(again["positions"]) == np.shape(made["positions"])
+    moved = _rollout(other, {"movement": 1})
+    # Start and goal are of these columns, as Move asks again.
+    assert moved["columns"] == ["x", "y", "z", "qw", "qx", "qy", "qz"]
+    there = {name: moved[name] for name in ("start", "goal")} | {"via": [[0.5, moved["positions"][100]]]}
+    again = _rollout(other, {"movement": 1}, **there, obstacles=[{"center": moved["positions"][60], "radius": 0.1}])
+    assert np.shape(again["positions"]) == np.shape(moved["positions"])
     assert client.post("/api/primitive", json={"what": {"movement": 99}}).status_code == 404
 
 
 def test_formulations_differ(client, symbol):
     paths = [
-        _rollout(client, {"symbol": symbol}, goal=[5.0, 5.0], formulation=one)["positions"] for one in FORMULATIONS
+        _rollout(client, {"symbol": symbol}, goal=[5.0, 5.0], formulation=formulation)["positions"]
+        for formulation in FORMULATIONS
     ]
     assert all(np.abs(np.array(paths[0]) - np.array(other)).max() > 0.01 for other in paths[1:])
 
 
 def test_a_stored_movement_moves_too(client):
-    made = _rollout(client, {"movement": 5})
+    moved = _rollout(client, {"movement": 5})
     times, positions = drawing(1, seed=1)
-    exact = np.stack([np.interp(made["times"], times, positions[:, k]) for k in range(2)], axis=1)
-    assert np.abs(np.array(made["positions"]) - exact).max() < 0.05 * np.ptp(positions)
+    exact = np.stack([np.interp(moved["times"], times, positions[:, k]) for k in range(2)], axis=1)
+    assert np.abs(np.array(moved["positions"]) - exact).max() < 0.05 * np.ptp(positions)
 
 
 def test_styles_lie_between_the_members(client, folder, symbol):
@@ -151,10 +155,10 @@ def test_styles_lie_between_the_members(client, folder, symbol):
     with ActionLibrary(folder, read_only=True) as library:
         model = learn_styles(library.primitives("kind 2"))
     assert styles["highest"] == pytest.approx(model.highest.tolist())
-    made = _rollout(client, {"style": {"symbol": symbol, "values": [0.0] * len(styles["lowest"])}})
-    assert made["recorded"] is None
+    moved = _rollout(client, {"style": {"symbol": symbol, "values": [0.0] * len(styles["lowest"])}})
+    assert moved["recorded"] is None
     assert styles["formulation"] == "bio-inspired"
-    assert len(made["positions"]) >= 200
+    assert len(moved["positions"]) >= 200
     outside = {"what": {"style": {"symbol": symbol, "values": [99.0] * len(styles["lowest"])}}}
     assert client.post("/api/rollout", json=outside).status_code == 400
 
@@ -233,25 +237,25 @@ def test_those_who_wait_for_proposals_keep_nobody_else_waiting(unlabeled, monkey
             assert other.result(200).status_code == 200
         finally:
             may_go.set()
-        answers = [one.result() for one in waiting]
+        answers = [future.result() for future in waiting]
     assert len(searches) == 1
-    assert {one.status_code for one in answers} == {200}
-    assert len({one.text for one in answers}) == 1
+    assert {answer.status_code for answer in answers} == {200}
+    assert len({answer.text for answer in answers}) == 1
 
 
 def test_proposals_are_named_or_rejected(unlabeled):
     client = unlabeled
-    found = client.get("/api/proposals").json()["proposals"]
-    assert [len(one["members"]) for one in found] == [6, 6]
-    assert found[0]["medoid"] in found[0]["members"]
-    version = client.post(f"/api/proposals/{found[0]['id']}/accept", json={"name": "new"}).json()["version"]
+    proposals = client.get("/api/proposals").json()["proposals"]
+    assert [len(proposal["members"]) for proposal in proposals] == [6, 6]
+    assert proposals[0]["medoid"] in proposals[0]["members"]
+    version = client.post(f"/api/proposals/{proposals[0]['id']}/accept", json={"name": "new"}).json()["version"]
     assert version == client.get("/api/library").json()["version"]
-    shown = {one["name"]: one for one in client.get("/api/library").json()["symbols"]}
-    assert (shown["new"]["n_members"], shown["new"]["prototype"]) == (6, found[0]["medoid"])
-    assert [one["id"] for one in client.get("/api/proposals").json()["proposals"]] == [found[1]["id"]]
-    gone = client.post(f"/api/proposals/{found[0]['id']}/accept", json={"name": "again"})
+    shown = {symbol["name"]: symbol for symbol in client.get("/api/library").json()["symbols"]}
+    assert (shown["new"]["n_members"], shown["new"]["prototype"]) == (6, proposals[0]["medoid"])
+    assert [proposal["id"] for proposal in client.get("/api/proposals").json()["proposals"]] == [proposals[1]["id"]]
+    gone = client.post(f"/api/proposals/{proposals[0]['id']}/accept", json={"name": "again"})
     assert gone.status_code == 409
-    assert client.post(f"/api/proposals/{found[1]['id']}/reject").status_code == 200
+    assert client.post(f"/api/proposals/{proposals[1]['id']}/reject").status_code == 200
     assert client.get("/api/proposals").json()["proposals"] == []
     client.post("/api/library/undo")
     client.post("/api/library/undo")

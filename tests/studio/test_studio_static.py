@@ -11,7 +11,7 @@ import pytest
 from kineme.studio import javascript, web
 from kineme.studio.server import serve
 
-WEB, RUNTIME = (Path(one.__file__).parent for one in (web, javascript))
+WEB, RUNTIME = (Path(package.__file__).parent for package in (web, javascript))
 
 
 @pytest.mark.parametrize(

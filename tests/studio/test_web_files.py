@@ -43,7 +43,7 @@ import { matching } from "./parts/find.js";
 const described = (k) => ({ name: `Place it on shelf ${k}`, description: k === 3 ? "Careful" : null });
 const symbols = Array.from({ length: 20 }, (_, k) => described(k));
 const field = { value: "SHELF  17", hidden: true };
-const names = (some) => some.map((one) => one.name);
+const names = (some) => some.map((symbol) => symbol.name);
 const last = [names(matching(field, symbols)), names(matching({ value: "careful" }, symbols)), field.hidden];
 console.log(JSON.stringify([...last, matching(field, symbols.slice(0, 5)).length, field.value]));
 """
@@ -69,8 +69,8 @@ console.log(JSON.stringify(wrong));"""
 @needs_node
 def test_every_module_parses(tmp_path):
     (tmp_path / "wrong.js").write_text("export const = 1;")
-    found = _in_node(PARSES, tmp_path / "wrong.js", *SCRIPTS, options=["--experimental-vm-modules"])
-    assert list(found) == [str(tmp_path / "wrong.js")]
+    problems = _in_node(PARSES, tmp_path / "wrong.js", *SCRIPTS, options=["--experimental-vm-modules"])
+    assert list(problems) == [str(tmp_path / "wrong.js")]
 
 
 @pytest.fixture
@@ -117,21 +117,21 @@ def test_movements_in_space_are_seen_from_the_front_where_they_are_flat(modules)
     wave = np.column_stack((u, 2 * np.sin(u), 0.1 * np.cos(u)))
     knot = np.column_stack((np.cos(u), np.sin(u), np.sin(2 * u)))
     paths = [wave, wave[:, [0, 2, 1]], wave[:, [2, 0, 1]], knot]  # on a table, a wall, the wall beside it, none
-    seen = _in_node(FACING, modules, *(json.dumps(one.tolist()) for one in paths))
+    seen = _in_node(FACING, modules, *(json.dumps(path.tolist()) for path in paths))
     np.testing.assert_allclose(seen, [[0, np.pi / 2], [0, 0], [np.pi / 2, 0], [-0.6, 0.5]])
 
 
-SENDS = """const { Sending } = await import(`${process.argv[1]}/draw/sending.js`);
+SENDS = """const { Sending } = await import(`${process.argv[1]}/parts/sending.js`);
 let [here, sent] = [true, []];
 const what = (message) => message.samples ?? Object.keys(message)[0];
 const sending = new Sending((message) => here && sent.push(what(message)) > 0);
 const samples = (from, to) => Array.from({ length: to - from }, (_, k) => [from + k]);
-const said = () => sent.splice(0).map((one) => (typeof one === "string" ? one : [one[0][0], one.at(-1)[0]]));
-const told = {};
+const said = () => sent.splice(0).map((rows) => (typeof rows === "string" ? rows : [rows[0][0], rows.at(-1)[0]]));
+const log = {};
 sending.reset();
 sending.push(samples(0, 10));
 sending.push(samples(10, 20)); // waits for the answer to the first
-told.one = said();
+log.first = said();
 here = false; // while it is drawn
 sending.push(samples(20, 30));
 here = true;
@@ -140,14 +140,14 @@ sending.push(samples(30, 7000));
 sending.heard();
 sending.finish();
 sending.heard();
-told.again = said();
+log.again = said();
 sending.renewed(); // after its end, before the answer
 sending.heard();
 sending.heard();
-told.asked = said();
-told.wanted = sending.answered();
+log.requests = said();
+log.wanted = sending.answered();
 sending.renewed();
-told.answered = said();
+log.answered = said();
 const draw = (from, to) => (sending.reset(), sending.push(samples(from, to)));
 draw(0, 5);
 sending.finish();
@@ -155,23 +155,23 @@ sending.heard();
 draw(5, 9);
 sending.heard();
 sending.finish();
-told.answers = [sending.answered(), sending.answered()]; // the first is to the movement before
+log.answers = [sending.answered(), sending.answered()]; // the first is to the movement before
 draw(0, 5);
 draw(5, 9); // before the state of the one before came
-told.stale = [sending.heard(), sending.heard()];
+log.stale = [sending.heard(), sending.heard()];
 draw(0, 5);
 here = false;
 sending.lost();
-told.hears = sending.finish(); // though no answer came to the samples
-console.log(JSON.stringify(told));"""
+log.hears = sending.finish(); // though no answer came to the samples
+console.log(JSON.stringify(log));"""
 
 
 @needs_node
 def test_a_movement_is_sent_from_its_beginning_where_the_connection_is_new(modules):
     assert _in_node(SENDS, modules) == {
-        "one": ["reset", [0, 9]],
+        "first": ["reset", [0, 9]],
         "again": [[0, 29], [30, 5029], [5030, 6999]],
-        "asked": [[0, 4999], [5000, 6999], "finish"],
+        "requests": [[0, 4999], [5000, 6999], "finish"],
         "wanted": True,
         "answered": [],
         "answers": [False, True],
@@ -181,12 +181,12 @@ def test_a_movement_is_sent_from_its_beginning_where_the_connection_is_new(modul
 
 
 REFRESHES = """const { library, onLibrary, refresh } = await import(`${process.argv[1]}/parts/library_state.js`);
-let [version, asked, fails, tag] = [1, 0, false, null];
-const told = [];
-onLibrary((known) => told.push(known.version));
+let [version, requests, fails, tag] = [1, 0, false, null];
+const log = [];
+onLibrary((state) => log.push(state.version));
 globalThis.fetch = async (path, { headers }) => {
   const [now, refused] = [version, fails];
-  asked += 1;
+  requests += 1;
   if (tag && headers?.["If-None-Match"] === tag) return new Response(null, { status: 304 });
   await new Promise((done) => setTimeout(done, 5));
   if (refused) return new Response('{"error": "busy"}', { status: 503 });
@@ -195,7 +195,7 @@ globalThis.fetch = async (path, { headers }) => {
 const first = refresh();
 await Promise.resolve();
 version = 2;
-const seen = (await Promise.all([first, refresh(), refresh()])).map((one) => one.version);
+const seen = (await Promise.all([first, refresh(), refresh()])).map((library) => library.version);
 fails = true;
 const failing = refresh().catch((error) => error.message);
 await Promise.resolve();
@@ -204,18 +204,18 @@ const after = (await refresh()).version;
 tag = "for reading only"; // the studio was started anew: another answer about the same version
 await refresh();
 await refresh();
-console.log(JSON.stringify({ seen, asked, told, refused: await failing, after, now: library().version }));"""
+console.log(JSON.stringify({ seen, requests, log, refused: await failing, after, now: library().version }));"""
 
 
 FOLLOWED = """const { Rollouts } = await import(`${process.argv[1]}/move/rollouts.js`);
 const { primitiveOf } = await import(`${process.argv[1]}/move/primitives.js`);
-const asked = [];
+const requests = [];
 globalThis.fetch = (path, { body }) => {
   const { what } = JSON.parse(body);
-  return new Promise((answer) => asked.push({ path, what: what.symbol, answer }));
+  return new Promise((answer) => requests.push({ path, what: what.symbol, answer }));
 };
-const said = async (one, body, status = 200) => {
-  one.answer(new Response(JSON.stringify(body), { status }));
+const said = async (request, body, status = 200) => {
+  request.answer(new Response(JSON.stringify(body), { status }));
   await new Promise((done) => setTimeout(done, 5));
 };
 const plan = (symbol) => ({ symbol, start: [0], goal: [1], usual: 1, share: 1, style: null, via: [], obstacles: [] });
@@ -224,25 +224,25 @@ const rollouts = new Rollouts("original", () => seen.push(rollouts.path?.of ?? r
 rollouts.follow(plan("old"));
 rollouts.reset();
 rollouts.follow(plan("new"));
-await said(asked[0], { of: "old" });
-await said(asked[1], { of: "new" });
+await said(requests[0], { of: "old" });
+await said(requests[1], { of: "new" });
 rollouts.follow(plan("newer"));
 rollouts.reset();
-await said(asked[2], { error: "of newer" }, 400);
+await said(requests[2], { error: "of newer" }, 400);
 const primitives = ["first", "second", "third"].map(() => null);
 for (const k of [0, 1, 2]) {
   const primitive = primitiveOf({ symbol: "one" }, "original", 1);
-  if (asked[3 + k]) await said(asked[3 + k], k ? null : { error: "away" }, k ? 200 : 503);
+  if (requests[3 + k]) await said(requests[3 + k], k ? null : { error: "away" }, k ? 200 : 503);
   primitives[k] = await primitive;
 }
-console.log(JSON.stringify({ asked: asked.map((one) => `${one.path} ${one.what}`), seen, primitives }));"""
+console.log(JSON.stringify({ requests: requests.map(({ path, what }) => `${path} ${what}`), seen, primitives }));"""
 
 
 @needs_node
 def test_what_moves_is_never_the_path_of_another_movement_and_what_failed_is_asked_again(modules):
     moves, primitives = "/api/rollout", "/api/primitive"
     assert _in_node(FOLLOWED, modules) == {
-        "asked": [f"{moves} old", f"{moves} new", f"{moves} newer", f"{primitives} one", f"{primitives} one"],
+        "requests": [f"{moves} old", f"{moves} new", f"{moves} newer", f"{primitives} one", f"{primitives} one"],
         "seen": ["new"],
         "primitives": [None, None, None],
     }
@@ -320,8 +320,8 @@ def test_a_replay_that_begins_anew_is_the_only_one(modules):
 def test_what_is_asked_after_a_change_is_answered_with_that_change(modules):
     assert _in_node(REFRESHES, modules) == {
         "seen": [1, 2, 2],
-        "asked": 6,
-        "told": [1, 2, 3, 3],
+        "requests": 6,
+        "log": [1, 2, 3, 3],
         "refused": "busy",
         "after": 3,
         "now": 3,
@@ -350,7 +350,7 @@ def test_what_a_module_imports_is_there(path):
         assert source.startswith("."), source
         there = _imported(path, source)
         assert there.is_file(), source
-        for name in (one.strip() for one in names.split(",")):
+        for name in (part.strip() for part in names.split(",")):
             if name.startswith("* as "):
                 continue
             assert re.search(rf"export (?:async )?(?:function|class|const|let) {name}\b", there.read_text()), (
@@ -370,14 +370,14 @@ def test_a_view_knows_no_other_view(path):
     assert others <= {own, WEB / "parts", RUNTIME}
 
 
-def _reached(path, known):
+def _reached(path, modules):
     """All modules that one imports, and those that they import."""
     for source in re.findall(r' from "([^"]+)";', path.read_text()):
         there = _imported(path, source)
-        if there not in known:
-            known.add(there)
-            _reached(there, known)
-    return known
+        if there not in modules:
+            modules.add(there)
+            _reached(there, modules)
+    return modules
 
 
 def test_the_page_loads_all_modules_at_once():
@@ -409,16 +409,16 @@ def _statements_that_find_elements():
 def test_every_id_is_one_elements_and_is_used():
     pages = [path.read_text() for path in PAGES]
     ids = [re.findall(r'\sid="([^"]+)"', page) for page in pages]
-    assert all(len(one) == len(set(one)) for one in ids)
+    assert all(len(listed) == len(set(listed)) for listed in ids)
     wanted = {name for path in SCRIPTS for name in re.findall(r'byId\("([\w-]+)"\)', path.read_text())}
-    assert wanted - {name for one in ids for name in one} <= {"data"}  # made by robot/arm.js
+    assert wanted - {name for listed in ids for name in listed} <= {"data"}  # made by robot/arm.js
     views = json.loads(re.search(r"VIEWS = (\[.*?\])", (WEB / "parts" / "views.js").read_text())[1])
     used = {f"{part}-{view}" for part in ("tab", "view") for view in views}
     used |= {name for statement in _statements_that_find_elements() for name in re.findall(r'"([\w-]+)"', statement)}
     used |= {name for path in STYLES for name in re.findall(r"#([\w-]+)", path.read_text())}
     naming = r'\s(?:aria-\w+|for|list)="([^"]+)"'
     used |= {name for page in pages for several in re.findall(naming, page) for name in several.split()}
-    assert [name for one in ids for name in one if name not in used] == []
+    assert [name for listed in ids for name in listed if name not in used] == []
 
 
 def test_types_of_elements_by_their_ids_are_those_of_the_pages():
@@ -447,8 +447,8 @@ def test_what_a_module_exports_is_imported():
 
 def test_only_the_tokens_know_colors():
     others = [path for path in STYLES if path.name != "tokens.css"]
-    found = {_name(path): re.findall(r"#[0-9a-fA-F]{3,8}\b(?!\s*[{,:.>\[])", path.read_text()) for path in others}
-    assert not {name: colors for name, colors in found.items() if colors}
+    literals = {_name(path): re.findall(r"#[0-9a-fA-F]{3,8}\b(?!\s*[{,:.>\[])", path.read_text()) for path in others}
+    assert not {name: colors for name, colors in literals.items() if colors}
 
 
 def test_the_dark_scheme_is_other_tokens_and_nothing_else():
@@ -473,14 +473,14 @@ def _luminance(color):
     return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
 
 
-def _contrast(one, other):
-    light, dark = sorted((_luminance(one), _luminance(other)), reverse=True)
+def _contrast(color, other):
+    light, dark = sorted((_luminance(color), _luminance(other)), reverse=True)
     return (light + 0.05) / (dark + 0.05)
 
 
 ON_COLORS = """
 const { readableOn } = await import(`${process.argv[1]}/parts/lines.js`);
-console.log(JSON.stringify(process.argv.slice(2).map((one) => readableOn(one))));"""
+console.log(JSON.stringify(process.argv.slice(2).map((hex) => readableOn(hex))));"""
 
 
 @needs_node

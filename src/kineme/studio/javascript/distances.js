@@ -29,7 +29,8 @@ const FAR = 1e300;
  */
 
 /**
- * Elastic, turning and point-cloud distances of one movement to others; see kineme.kernels.pair_distances and point_cloud.
+ * Elastic, turning and point-cloud distances of one movement to others; see kineme.kernels.pair_distances and
+ * point_cloud.
  * @param {PairRule} how
  * @param {number} d
  * @param {import("./description.js").Shapes} own of the one movement

@@ -169,7 +169,10 @@ function bends(v, x) {
   return m;
 }
 
-/** The movement with each group of close samples replaced by its mean; usually there is none. @param {Movement} movement */
+/**
+ * The movement with each group of close samples replaced by its mean; usually there is none.
+ * @param {Movement} movement
+ */
 function separated(movement) {
   const { times, positions, d } = movement;
   const T = times.length;

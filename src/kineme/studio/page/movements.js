@@ -10,9 +10,17 @@ const MOST_VIA = 3;
 
 const distance = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1]);
 
-/** The sample of a rollout to show a primitive where it was learned, moved to the middle of a box. */
-export function placed(runtime, primitive, box) {
-  const { positions } = runtime.rollout(primitive);
+/** @typedef {ReturnType<typeof import("./snapshot.js").openSnapshot>} Snapshot */
+
+/**
+ * Start and goal of a symbol where it was learned, moved to the middle of a box.
+ * @param {Snapshot} backend
+ * @param {string} name
+ * @param {import("./stage.js").Box} box
+ */
+export function placed({ runtime, generate }, name, box) {
+  const { positions } = generate({ what: name });
+  const primitive = runtime.primitive(name);
   const shift = runtime.header.comparison.translation
     ? boxOf(positions).center.map((c, k) => box.center[k] - c)
     : box.center.map(() => 0);
@@ -22,12 +30,12 @@ export function placed(runtime, primitive, box) {
 
 /**
  * A movement that can be changed.
- * @param {Object} runtime
+ * @param {Snapshot} backend
  * @param {string} name
  * @param {Object|string} what a primitive that was learned, or a class
  * @param {{start: number[], goal: number[]}} place
  */
-export function createMoving(runtime, name, what, place) {
+export function createMoving({ runtime, generate }, name, what, place) {
   let { start, goal } = place;
   let [via, formulation] = [[], runtime.header.movements.formulation];
   let rollout = null;
@@ -36,7 +44,7 @@ export function createMoving(runtime, name, what, place) {
     const before = { start, goal, via, formulation };
     ({ start = start, goal = goal, via = via, formulation = formulation } = change);
     try {
-      rollout = runtime.rollout(runtime.primitive(what, formulation), { start, goal, via });
+      rollout = generate({ what, formulation, start, goal, via });
       return null;
     } catch (error) {
       // as a closed movement that cannot be scaled, or via points too close together

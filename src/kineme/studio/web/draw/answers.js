@@ -1,7 +1,7 @@
 // What the server says of the movement on the canvas: while it is drawn, and once it is over.
-import { post } from "../parts/api.js";
 import { byId } from "../parts/elements.js";
 import { library } from "../parts/library_state.js";
+import { server } from "../parts/server.js";
 import { currentView } from "../parts/views.js";
 
 const SUGGESTED = 3; // names that the movement may have
@@ -30,7 +30,7 @@ export function hearAnswer(session, answer) {
 /** Ask for the answer without the websocket. @param {Session} session */
 export async function requestAnswer(session) {
   const { movement } = session;
-  const answer = await post("/api/recognize", movement).catch((/** @type {any} */ error) => ({ error }));
+  const answer = await server.recognize(movement).catch((/** @type {any} */ error) => ({ error }));
   if (movement !== session.movement) return;
   if (!answer.error) showAnswer(session, answer);
   else if (!answer.error.status)

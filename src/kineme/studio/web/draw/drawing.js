@@ -59,7 +59,7 @@ function end(session) {
 /**
  * What hears the pointer and the pen of the keyboard.
  * @param {Session} session
- * @returns {import("./stroke.js").Hearer}
+ * @returns {import("../parts/stroke.js").Hearer}
  */
 export const hearerOf = (session) => ({
   begins: (pointer) => begin(session, pointer),

@@ -1,20 +1,20 @@
 // The movement that is on the canvas: under way, over, named; and the parts of the view that show it.
+import { AnswerPanel } from "../parts/answer_panel.js";
 import { byId } from "../parts/elements.js";
-import { isLoaded } from "../parts/library_state.js";
-import { AnswerPanel } from "./answer_panel.js";
+import { isLoaded, library } from "../parts/library_state.js";
+import { server } from "../parts/server.js";
 import { showInvitation } from "./invitation.js";
 import { Picture } from "./picture.js";
-import { Sending } from "./sending.js";
 
 export const FEWEST_SAMPLES = 4; // that make a movement
 
 /**
- * @typedef {{times: number[], positions: number[][]}} Movement
+ * @typedef {import("../parts/server.js").Movement} Movement
  *
  * @typedef {Object} Session
  * @property {Picture} picture
  * @property {AnswerPanel} panel
- * @property {Sending} sending
+ * @property {import("../parts/sending.js").Sending} sending
  * @property {import("./naming.js").Naming|null} naming
  * @property {boolean} drawing The pen is down.
  * @property {boolean} pending The movement is over, and its answer is still to come.
@@ -29,8 +29,8 @@ export const FEWEST_SAMPLES = 4; // that make a movement
 /** @param {(message: Object) => boolean} send @returns {Session} */
 export const createSession = (send) => ({
   picture: new Picture(byId("draw-canvas")),
-  panel: new AnswerPanel(),
-  sending: new Sending(send),
+  panel: new AnswerPanel({ invitation: () => (library().read_only ? "" : " Give it a name.") }),
+  sending: server.follow(send),
   naming: null,
   drawing: false,
   pending: false,

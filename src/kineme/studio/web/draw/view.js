@@ -3,6 +3,7 @@ import { chooseToMove } from "../parts/chosen.js";
 import { followTurns } from "../parts/dragging.js";
 import { byId } from "../parts/elements.js";
 import { library, onLibrary, symbolNamed } from "../parts/library_state.js";
+import { followPointer } from "../parts/stroke.js";
 import { currentView, show } from "../parts/views.js";
 import { hearAnswer, requestAnswer, showError, showState } from "./answers.js";
 import { hearerOf } from "./drawing.js";
@@ -12,7 +13,6 @@ import { followKeys } from "./keyboard_pen.js";
 import { describeLiveSource } from "./live_source.js";
 import { startNaming } from "./naming.js";
 import { clear, createSession } from "./session.js";
-import { followPointer } from "./stroke.js";
 
 /** @typedef {import("./session.js").Session} Session */
 

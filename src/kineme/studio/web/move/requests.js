@@ -1,8 +1,9 @@
 // What Move asks the server for: the movement of a symbol, its primitives, a file of it.
-import { download, post } from "../parts/api.js";
+import { download } from "../parts/api.js";
 import { chooseToMove } from "../parts/chosen.js";
 import { byId } from "../parts/elements.js";
 import { library, symbolOf } from "../parts/library_state.js";
+import { server } from "../parts/server.js";
 import { say, tried } from "../parts/toasts.js";
 import { showChange, showStructure } from "./edits.js";
 import { FORMULATIONS } from "./formulations.js";
@@ -29,7 +30,7 @@ export async function chooseSymbol(session, id) {
   picture.sketch(symbol.path);
   byId("move-name").textContent = symbol.name;
   const rollout = await tried(() =>
-    post("/api/rollout", { what: { symbol: symbol.id }, formulation: FORMULATIONS[0].name }),
+    server.generate({ what: { symbol: symbol.id }, formulation: FORMULATIONS[0].name }),
   );
   if (session.chosen !== chosen) return; // another symbol since then, or this one anew
   if (!rollout) {

@@ -1,7 +1,7 @@
 // The newest path of each formulation: at once by the runtime, with what is to be said of it from the server; never an
 // old one after a new one.
-import { post } from "../parts/api.js";
 import { library } from "../parts/library_state.js";
+import { server } from "../parts/server.js";
 import { question, what } from "./plan.js";
 import { moved, primitiveOf } from "./primitives.js";
 
@@ -10,7 +10,7 @@ const SETTLED = 120; // how long nothing must change before the server is asked 
 /** @param {any} question @returns {Promise<{path: any, problem: string}>} */
 async function answerTo(question) {
   try {
-    return { path: await post("/api/rollout", question), problem: "" };
+    return { path: await server.generate(question), problem: "" };
   } catch (error) {
     return { path: null, problem: error.message };
   }

@@ -40,6 +40,17 @@ export class Camera {
     this.scale = Math.min((room * width) / Math.max(across[0], 1e-9), (room * height) / Math.max(across[1], 1e-9));
   }
 
+  /**
+   * Show a place in the middle, and as much around it as fills a share of the smaller side.
+   * @param {number[]} middle @param {number} radius @param {number} share @param {number} width @param {number} height
+   */
+  center(middle, radius, share, width, height) {
+    this.size = [width, height];
+    this.flat = middle.length < 3;
+    this.middle = [0, 1, 2].map((k) => middle[k] ?? 0);
+    this.scale = (share * Math.min(width, height)) / (2 * radius);
+  }
+
   /** @param {number[]} point @returns {number[]} Pixels. */
   toScreen(point) {
     const { right, up } = this.axes();

@@ -1,10 +1,10 @@
 // What it is: a word, how far along, the candidates with their bars. Rows stay where they are.
-import { breakable, byId, fill, make, write } from "../parts/elements.js";
-import { library } from "../parts/library_state.js";
+// The studio and the page of a snapshot have the same one; only the studio has a meter, and words to be spoken.
+import { breakable, byId, fill, make, write } from "./elements.js";
 
 const ROWS = 5;
 const BEGUN = 0.1; // share of the path from which unknown is said: every beginning is unlike the whole
-const percent = (/** @type {number} */ share) => `${Math.round(100 * share)} %`;
+const percent = (/** @type {number} */ share) => `${Math.round(100 * Math.min(Math.max(share, 0), 1))} %`;
 const capital = (/** @type {string} */ word) => word[0].toUpperCase() + word.slice(1);
 const pValue = (/** @type {number} */ p) => (p < 0.001 ? "< 0.001" : p.toFixed(p < 0.1 ? 3 : 2));
 
@@ -28,7 +28,10 @@ function row(name) {
 }
 
 export class AnswerPanel {
-  constructor() {
+  /** @param {{advice?: string, invitation?: () => string}} [page] Advice for an answer; what to do with a new one. */
+  constructor({ advice = "", invitation = () => "" } = {}) {
+    this.advice = advice;
+    this.invitation = invitation;
     this.rows = [...Array(ROWS)].map(() => row("\u00a0"));
     fill(byId("ranks"), ...this.rows.map((line) => line.element));
     this.last = "";
@@ -42,10 +45,16 @@ export class AnswerPanel {
     this.why([]);
   }
 
-  /** @param {string} kind @param {string} word @param {string} note @param {string} state open, known, unknown */
+  /**
+   * @param {string} kind
+   * @param {string} word
+   * @param {string} note
+   * @param {string} state open, doubtful, known or unknown
+   */
   words(kind, word, note, state) {
     write(byId("verdict-kind"), kind);
     if (byId("verdict").textContent !== word) fill(byId("verdict"), ...breakable(word));
+    byId("verdict").title = word;
     write(byId("verdict-note"), note || "\u00a0");
     byId("verdict").parentElement.dataset.state = state;
   }
@@ -59,6 +68,7 @@ export class AnswerPanel {
   /** @param {number} share */
   progress(share) {
     const meter = byId("draw-progress");
+    if (!meter) return;
     meter.setAttribute("aria-valuenow", String(Math.round(100 * share)));
     /** @type {HTMLElement} */ (meter.firstElementChild).style.setProperty("--share", String(share));
   }
@@ -92,7 +102,7 @@ export class AnswerPanel {
       .join(", ");
     const name = state.label ?? best?.label;
     if (!best || (state.label === null && state.progress < BEGUN)) this.words("Still open", "…", note, "open");
-    else if (state.certainty === "new") this.words("New, so far", "Unknown", `most like ${best.label}`, "open");
+    else if (state.certainty === "new") this.words("New, so far", "Unknown", `most like ${best.label}`, "doubtful");
     else this.words(`${capital(state.certainty)}, so far`, name, note, state.label === null ? "open" : "known");
     this.progress(state.progress ?? 0);
     this.list(state.ranked);
@@ -105,14 +115,11 @@ export class AnswerPanel {
     const [best] = answer.ranked;
     const isNew = answer.certainty === "new";
     const word = capital(answer.certainty);
-    if (isNew) this.words(word, "Unknown", `most like ${best.label}`, "unknown");
-    else
-      this.words(
-        word,
-        answer.label,
-        answer.rule === "guess" ? "more drawings of each would say how sure" : "",
-        answer.certainty === "looks like" ? "open" : "known",
-      );
+    const like = isNew ? `most like ${best.label}` : "";
+    const guess = answer.rule === "guess" && (!isNew || this.advice) ? "more drawings of each would say how sure" : "";
+    const note = this.noteOf([like, guess].filter(Boolean), isNew ? "" : this.advice);
+    if (isNew) this.words(word, "Unknown", note, "unknown");
+    else this.words(word, answer.label, note, answer.certainty === "looks like" ? "open" : "known");
     this.progress(1);
     this.list(answer.ranked);
     const nearest = answer.nearest?.[0];
@@ -128,12 +135,18 @@ export class AnswerPanel {
         answer.promise,
       ].filter(Boolean),
     );
-    this.speak(isNew ? `New: unknown.${library().read_only ? "" : " Give it a name."}` : `${word} ${answer.label}.`);
+    this.speak(isNew ? `New: unknown.${this.invitation()}` : `${word} ${answer.label}.`);
+  }
+
+  /** Phrases alone, or as sentences with advice behind them. @param {string[]} phrases @param {string} advice */
+  noteOf(phrases, advice) {
+    if (!this.advice) return phrases.join("; ");
+    return [...phrases.map((phrase) => `${capital(phrase)}.`), advice].join(" ");
   }
 
   /** To a screen reader, once each. @param {string} text */
   speak(text) {
-    if (text === this.last) return;
+    if (text === this.last || !byId("spoken")) return;
     this.last = text;
     byId("spoken").textContent = text;
   }
