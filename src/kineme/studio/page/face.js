@@ -102,7 +102,7 @@ function movable(name, what, place) {
 }
 
 function choose(name) {
-  become(movable(name, name, placed(backend, name, box)));
+  become(movable(name, { symbol: name }, placed(backend, name, box)));
   symbols.select(name);
   // In a narrow window what was chosen is above the list of what can be chosen.
   document.querySelector(".answer").scrollIntoView({ block: "nearest" });
@@ -114,8 +114,9 @@ function finish() {
   following.finish();
   try {
     const answer = backend.recognize(drawn);
-    const name = header.movements.encodes ? DRAWN : answer.label;
-    const what = header.movements.encodes ? runtime.encode(drawn.times, drawn.positions) : answer.label;
+    const { encodes } = header.movements;
+    const name = encodes ? DRAWN : answer.label;
+    const what = encodes ? { primitive: runtime.encode(drawn.times, drawn.positions) } : { symbol: name };
     become({ answer, drawn, ...(name === null ? {} : movable(name, what, place)) });
   } catch {
     become({ note: "That was too short: draw a longer movement." });
@@ -127,11 +128,15 @@ const placeOf = (event) => {
   return [event.clientX - left, event.clientY - top];
 };
 
-/** Change what moves; the note says why it cannot be so. */
-function update(change) {
-  state.note = state.moving?.update(change) ?? "";
+/** What moves is another; the note says why it cannot be so. @param {string} [note] */
+function moved(note = "") {
+  stage.board.draw();
+  if (note === state.note) return; // words stay while a hand moves
+  state.note = note;
   show();
 }
+
+const update = (change) => moved(state.moving?.update(change) ?? "");
 
 /** Take hold of a point of what moves. @param {PointerEvent} event */
 function hold(event) {
@@ -140,12 +145,11 @@ function hold(event) {
   const held = state.moving?.held(stage, placeOf(event)) ?? null;
   const go = (now) => {
     const like = held.what === "via" ? box.center : state.moving[held.what];
-    state.note = state.moving.drag(held, stage.unproject(...placeOf(now), like)) ?? "";
-    show();
+    moved(state.moving.drag(held, stage.unproject(...placeOf(now), like)) ?? "");
   };
   const end = () => {
-    Object.assign(state, { held: null, note: "" });
-    show();
+    state.held = null;
+    moved();
   };
   if (held && drag(canvas, event, (now) => state.moving && go(now), end)) state.held = held;
 }

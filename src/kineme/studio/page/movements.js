@@ -19,7 +19,7 @@ const distance = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1]);
  * @param {import("./stage.js").Box} box
  */
 export function placed({ runtime, generate }, name, box) {
-  const { positions } = generate({ what: name });
+  const { positions } = generate({ what: { symbol: name } });
   const primitive = runtime.primitive(name);
   const shift = runtime.header.comparison.translation
     ? boxOf(positions).center.map((c, k) => box.center[k] - c)
@@ -32,7 +32,7 @@ export function placed({ runtime, generate }, name, box) {
  * A movement that can be changed.
  * @param {Snapshot} backend
  * @param {string} name
- * @param {Object|string} what a primitive that was learned, or a class
+ * @param {{symbol?: string, primitive?: Object}} what
  * @param {{start: number[], goal: number[]}} place
  */
 export function createMoving({ runtime, generate }, name, what, place) {

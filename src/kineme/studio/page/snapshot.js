@@ -44,7 +44,8 @@ export function openSnapshot(text) {
         },
       };
     },
-    /** `what` is the name of a symbol or a primitive that was learned; the rest as of `rollout` of the runtime. */
-    generate: ({ what, formulation, ...wish }) => runtime.rollout(runtime.primitive(what, formulation), wish),
+    /** Of a symbol, or of a primitive that was learned here. */
+    generate: ({ what: { symbol, primitive }, formulation, ...wish }) =>
+      runtime.rollout(runtime.primitive(symbol ?? primitive, formulation), wish),
   };
 }

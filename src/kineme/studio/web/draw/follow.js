@@ -1,6 +1,6 @@
 // A program's movement on the canvas, while it happens: as if it were drawn there.
 import { byId } from "../parts/elements.js";
-import { library } from "../parts/library_state.js";
+import { server } from "../parts/server.js";
 import { requestAnswer, showAnswer } from "./answers.js";
 import { showLegend } from "./invitation.js";
 import { Frame } from "./frame.js";
@@ -50,7 +50,7 @@ function follow(session, source) {
 function begin(session) {
   clear(session);
   session.pointer = "program";
-  const paths = library().symbols.map((symbol) => symbol.path);
+  const paths = server.symbols().map((symbol) => symbol.path);
   session.picture.frame = new Frame(usualSide() ?? 0.5, paths.filter(Boolean));
   showLegend(true);
 }

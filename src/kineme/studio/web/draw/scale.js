@@ -1,5 +1,5 @@
 // How large a drawing is: the canvas is as high as a movement of the library, in round numbers.
-import { library } from "../parts/library_state.js";
+import { server } from "../parts/server.js";
 
 const USUAL = 0.55; // of the canvas's height, what people draw
 
@@ -13,8 +13,9 @@ const side = (path) =>
 
 /** @returns {number|null} Larger side of a movement of the library, a usual one. */
 export function usualSide() {
-  const sides = library()
-    .symbols.filter((/** @type {any} */ symbol) => symbol.path?.length)
+  const sides = server
+    .symbols()
+    .filter((/** @type {any} */ symbol) => symbol.path?.length)
     .map((/** @type {any} */ symbol) => side(symbol.path))
     .filter((/** @type {number} */ size) => size > 0);
   return sides.sort((/** @type {number} */ a, /** @type {number} */ b) => a - b)[sides.length >> 1] ?? null;

@@ -1,7 +1,7 @@
 // What moves: the symbols as pictures in a row, one chosen.
 import { breakable, byId, fill, keepingFocus, make } from "../parts/elements.js";
 import { matching } from "../parts/find.js";
-import { library } from "../parts/library_state.js";
+import { server } from "../parts/server.js";
 import { thumbnail } from "../parts/thumbnails.js";
 
 /** @param {string|null} chosen @param {(id: string) => void} choose */
@@ -29,7 +29,7 @@ export function showPick(chosen, choose) {
   };
   const symbols = matching(
     byId("find-pick"),
-    library().symbols.filter((/** @type {any} */ symbol) => symbol.path),
+    server.symbols().filter((/** @type {any} */ symbol) => symbol.path),
   );
   keepingFocus(() => fill(byId("move-pick"), ...symbols.map(option)));
   const at = byId("move-pick").querySelector(":checked")?.closest("label");
