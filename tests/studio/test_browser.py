@@ -92,7 +92,8 @@ def test_a_letter_is_recognized_while_it_is_drawn(opened, served_letters, shape)
     draw(page, letters(shape)[SHOWN], share=0.8)
     assert page.is_visible("#draw-legend")
     wait_until(page, "name => document.querySelector('.rank-name').textContent === name", shape)
-    assert float(page.get_attribute("#draw-progress", "aria-valuenow")) > 30
+    # The name may be right before all that was drawn is answered.
+    wait_until(page, "Number(document.getElementById('draw-progress').getAttribute('aria-valuenow')) > 30")
     page.mouse.up()
     answers = set()
     for movement in letters(shape)[SHOWN:]:
