@@ -16,7 +16,7 @@ from kineme.errors import TrajectoryError
 from kineme.robots import load, move
 from kineme.robots.kinematics.descent import ORIENTATIONS, kinematics
 from kineme.robots.models.robot import MODELS
-from soaking import combined
+from soaking import combined, examples
 
 pinocchio = pytest.importorskip("pinocchio", reason="the extra robot is not installed")
 
@@ -116,7 +116,7 @@ def test_what_joints_showed_is_executed_as_fast_though_another_way_would_be_slow
     assert move(movement, robot, follow=follow, timing="slowed", rate=50.0).factor < 1.1
 
 
-@settings(max_examples=2)
+@settings(max_examples=examples(1, 2))
 @example(name="so101", seed=676, share=0.34)
 @given(name=st.sampled_from(list(SEEDS)), seed=st.integers(0, 999), share=st.floats(0.3, 0.97))
 def test_what_is_followed_in_full_is_followed_by_its_axis_and_by_its_position_alone(
