@@ -27,12 +27,15 @@ def checked(robot, positions, velocities=None, accelerations=None):
     return {(check.what, check.where): check for check in report.checks}
 
 
+@pytest.mark.parametrize("side", [0, 1])
 @pytest.mark.parametrize(("beyond", "passes"), [(-1e-3, True), (1e-3, False)])
-def test_a_joint_beyond_its_limit_fails(tmp_path, beyond, passes):
-    found = checked(simple_arm(tmp_path), [2.0 + beyond, 1.5])[("position", "j1")]
+def test_a_joint_beyond_its_limit_fails(tmp_path, side, beyond, passes):
+    robot = simple_arm(tmp_path)
+    limit, sign = (robot.lower[0], robot.upper[0])[side], (-1, 1)[side]
+    found = checked(robot, [limit + sign * beyond, 1.5])[("position", "j1")]
     assert found.passed is passes
-    assert found.worst == pytest.approx(2.0 + beyond)
-    assert found.limit == 2.0
+    assert found.worst == pytest.approx(limit + sign * beyond)
+    assert found.limit == limit
 
 
 @pytest.mark.parametrize(("beyond", "passes"), [(0.999, True), (1.001, False)])
