@@ -14,22 +14,15 @@ from walk_through import DOCS, otherwise, page_name, pages, shown_by, walk
 
 import kineme
 from kineme.cli import main
-from soaking import slow
 
 TUTORIAL = DOCS / "tutorials" / "action-library.md"  # test_tutorial.py runs it, and looks at more
 PAGES = [page for page in pages() if page != TUTORIAL]
-#: Pages that take ten seconds each; `test_typed_pages.py` checks their code, and what is below their commands.
-LONG = {
-    "docs/concepts/kernels.md", "docs/guide/recognition.md", "docs/guide/robots.md",
-    "docs/tutorials/a-million-movements.md", "docs/tutorials/from-bags-to-an-arm.md",
-    "docs/tutorials/gestures-from-a-camera-or-mouse.md", "docs/tutorials/unlabeled-to-a-planner.md",
-}  # fmt: skip
 MODULES = [
     module.name for module in pkgutil.walk_packages(kineme.__path__, "kineme.") if not module.name.endswith("__main__")
 ]
 
 
-@pytest.mark.parametrize("page", [slow(page) if page_name(page) in LONG else page for page in PAGES], ids=page_name)
+@pytest.mark.parametrize("page", PAGES, ids=page_name)
 def test_pages_run_and_print_what_they_show(page, tmp_path):
     steps = list(walk(page, tmp_path))
     others = {step.source: answer for step in steps if (answer := otherwise(step)) is not None}
