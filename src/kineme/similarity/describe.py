@@ -169,13 +169,18 @@ def _precision(how: ComparisonSpecification) -> DTypeLike:
     return np.float32 if how.normalization.translation else np.float64
 
 
-def even_paths(demos: Demonstrations, start: int, stop: int, cutoff: float | None, allowance: float = 1.0) -> Array:
+def even_paths(demos: Demonstrations, start: int, stop: int, cutoff: float | None) -> Array:
     """Return movements start:stop, smoothed, at even times, minus their first recorded position, (stop - start, d, T).
 
     Pauses are cut short first, see `cut_pauses`.
     """
-    if (shorter := without_pauses(demos, start, stop, allowance)) is not None:
+    if (shorter := without_pauses(demos, start, stop)) is not None:
         demos, start, stop = shorter, 0, stop - start
+    return smooth_evenly(demos, start, stop, cutoff)
+
+
+def smooth_evenly(demos: Demonstrations, start: int, stop: int, cutoff: float | None) -> Array:
+    """Return the same of movements whose pauses stay as they are."""
     if cutoff is None:
         return relative_rows(demos, start, stop, N_POINTS)
     return smooth_rows(demos, start, stop, cutoff, N_POINTS)

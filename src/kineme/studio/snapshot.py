@@ -58,6 +58,7 @@ _AGAIN = (
 
 FORMAT, VERSION = "kineme-snapshot", 4
 _KINDS = ("float64", "float32", "int32")
+_ROUNDING = 1e-6  # of a path's size: some units in the last place of single precision
 _ALIGNMENT = 8  # bytes: arrays in JavaScript begin at multiples of the size of their numbers
 
 
@@ -259,12 +260,13 @@ def early_parts(classes: KnownClasses, early: Early | None = None) -> Snapshot:
             **_numbers(beginnings, "LAST", "LEAST_SPEED"),
         },
     }
-    demos, cutoff = classes.references.all_movements(), classes.comparison.cutoff
-    paths = even_paths(demos, 0, len(demos), cutoff, beginnings.ALLOWANCE).astype(np.float32)
-    own = np.flatnonzero((paths != even_paths(demos, 0, len(demos), cutoff).astype(np.float32)).any(axis=(1, 2)))
+    demos = classes.references.all_movements()
+    wholes = even_paths(demos, 0, len(demos), classes.comparison.cutoff)
+    apart = np.abs(described.paths - (wholes - wholes[:, :, :1])).max(axis=(1, 2))
+    own = np.flatnonzero(apart > _ROUNDING * np.abs(wholes).max(axis=(1, 2)))
     arrays: dict[str, NDArray[Any]] = {
         "early movements": own.astype(np.int32),
-        "early paths": paths[own],
+        "early paths": described.paths[own].astype(np.float32),
         "durations": described.durations,
     }
     return Snapshot(header, arrays)

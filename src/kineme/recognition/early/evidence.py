@@ -25,7 +25,7 @@ from kineme.recognition.early.hypotheses import (
     positive,
 )
 from kineme.similarity.comparison import Comparison
-from kineme.similarity.describe import Described, describe_paths, even_paths
+from kineme.similarity.describe import Described, describe_paths, even_paths, smooth_evenly
 from kineme.similarity.specification import LOG_MEANS
 from kineme.validation import MIN_SAMPLES, Array
 
@@ -168,7 +168,7 @@ def partial_shares(comparison: Comparison, stored: Hypotheses, X: MovementsLike)
 def _shares(comparison: Comparison, stored: Hypotheses, demos: Demonstrations) -> Array:
     wholes = even_paths(demos, 0, len(demos), comparison.cutoff)
     demos = without_pauses(demos, 0, len(demos), ALLOWANCE) or demos
-    paths = even_paths(demos, 0, len(demos), comparison.cutoff, ALLOWANCE)
+    paths = smooth_evenly(demos, 0, len(demos), comparison.cutoff)
     starts = demos.positions[demos.offsets[:-1]]
     return stored.shares(log_evidence(stored, describe_begun(stored, paths, starts, demos.durations, wholes)))
 

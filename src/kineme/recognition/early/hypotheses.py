@@ -21,7 +21,7 @@ from kineme.movements.preparation.resample import arc_length_phase
 from kineme.movements.preparation.smooth import Smooth
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.similarity.comparison import Comparison, References
-from kineme.similarity.describe import N_POINTS, Described, Pairs, even_paths
+from kineme.similarity.describe import N_POINTS, Described, Pairs, smooth_evenly
 from kineme.similarity.similarity import SHARE, beginning_widths
 from kineme.similarity.specification import PAIR_QUANTITIES
 from kineme.validation import Array, check_count, check_number
@@ -272,8 +272,8 @@ class Prefixes(NamedTuple):
 
 
 def smooth_paths(movements: Demonstrations, cutoff: float | None) -> Array:
-    """Return movements as the recognizer smooths them, minus their start, at even times, shape (n, d, T)."""
-    paths = even_paths(movements, 0, len(movements), cutoff, ALLOWANCE)
+    """Return movements, whose pauses are cut, smoothed, minus their start, at even times: shape (n, d, T)."""
+    paths = smooth_evenly(movements, 0, len(movements), cutoff)
     return paths - paths[:, :, :1]
 
 
