@@ -163,7 +163,7 @@ def test_movements_of_people_are_recognized_as_in_python(name):
         ({"scale": "per-dimension"}, 3),
         ({"cutoff": None}, 2),
         ({"weights": "fitted"}, 2),
-        ({"weights": (0, 1, 1, 0, 2)}, 2),
+        ({"weights": (0, 1, 1, 0, 2, 0, 3)}, 2),
         ({"classifier": "nearest"}, 2),
         ({"classifier": "prototype"}, 2),
         ({}, 1),

@@ -164,11 +164,15 @@ class Shapes:
         }
 
 
-def shapes_of(paths: NDArray[Any], elastic: ElasticSpec | None = None, cloud: CloudSpec | None = None) -> Shapes:
+def shapes_of(
+    paths: NDArray[Any], elastic: ElasticSpec | None = None, cloud: CloudSpec | None = None, slopes: bool = False
+) -> Shapes:
     """Segments and points of paths (n, d, S), computed in double precision.
 
     `paths` (n, d, S): positions at even steps along arc length, centered, with a root mean square distance of 1 from
-    the mean; zeros for a movement without extent. At least two positions.
+    the mean; zeros for a movement without extent. At least two positions. With `slopes` they are signals (n, 1, S) at
+    even times: tangents are then the differences from end to end of the segments, with a root mean square of 1, and
+    turning angles 0, so that the elastic distance is dynamic time warping of values and of slopes.
     """
     n, d, n_positions = paths.shape
     shapes = _room(n, d, elastic or ElasticSpec(), cloud or CloudSpec())
@@ -180,6 +184,11 @@ def shapes_of(paths: NDArray[Any], elastic: ElasticSpec | None = None, cloud: Cl
         fill(np.ascontiguousarray(paths), _NO_LENGTH, (ends, even), segments, points)
     else:
         _fill_shapes(paths, shapes)
+    if slopes:
+        steps = np.diff(_even(paths, shapes.elastic.n_segments + 1), axis=1)
+        sizes = np.sqrt((steps**2).mean(axis=(1, 2), keepdims=True))
+        shapes.tangents[:] = steps / np.where(sizes > 0, sizes, 1.0)
+        shapes.turning[:] = 0
     return shapes
 
 

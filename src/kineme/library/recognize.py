@@ -126,16 +126,17 @@ def two_stages(store: Store, reduced: ReducedMovements, members: Members) -> Two
     """Return the recognizer of a large library."""
     comparison = sample_comparison(store, members)
     how = comparison.specification
-    columns = [store.specification.comparison.by_rows.index(representation) for representation in how.by_rows]
+    columns = [store.specification.comparison.stored_rows.index(representation) for representation in how.stored_rows]
     ends = np.cumsum(store.specification.widths(store.n_dims or 0))
 
     def features(rows: NDArray[np.intp]) -> tuple[NDArray[Any], ...]:
         blocks = np.split(read.features(store, reduced.ids[rows]), ends[:-1], axis=1)
         return tuple(blocks[r] for r in columns)
 
+    by_rows = columns[: len(how.by_rows)]
     stored = StoredReferences(
-        tuple(reduced.bases[r] for r in columns),
-        tuple(tuple(block[r] for r in columns) for block in reduced.blocks),
+        tuple(reduced.bases[r] for r in by_rows),
+        tuple(tuple(block[r] for r in by_rows) for block in reduced.blocks),
         reduced.rows(members.ids),
         members.first,
         how,

@@ -47,9 +47,9 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     Parameters
     ----------
     representations : tuple of Representation, optional
-        By default positions over arc length, forcing term over time, elastic path, turning angles, and point cloud;
-        with ``translation=False`` or ``scale="none"`` positions over arc length, and the forcing term over arc length
-        and over time.
+        By default positions over arc length, forcing term over time, elastic path, turning angles, and point cloud,
+        elastic path and point cloud once more in detail, see `Representation`; with ``translation=False`` or
+        ``scale="none"`` positions over arc length, and the forcing term over arc length and over time.
     max_angle : float, optional
         Largest rotation [rad] between movements of one class, instead of the `rotation_prior`; 0 for none. With pi, N
         and Z become equal; above a right angle, V and caret.
@@ -61,9 +61,10 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         Smooth below this many cycles per movement first, see `Smooth`; None for recordings without noise.
     mean : {"arithmetic", "geometric", "harmonic", "quadratic", "min"}, default "arithmetic"
         The A-average over representations.
-    weights : {"auto", "equal", "fitted"} or sequence of R numbers, default "auto"
-        Of the representations in the arithmetic mean. "auto": their own; "fitted": half their own, half fitted to the
-        training movements, see `kineme.similarity.similarity.fitted_weights`.
+    weights : {"auto", "own", "equal", "fitted"} or sequence of R numbers, default "auto"
+        Of the representations in the arithmetic mean. "own": their own; "fitted": half their own, half fitted to the
+        training movements, see `kineme.similarity.similarity.fitted_weights`; "auto": "fitted" where a class has two
+        movements and there are two classes, else "own".
     classifier : {"auto", "nearest", "nearest-each", "prototype", "svm"}, default "auto"
         "nearest" stored movement, "nearest-each", where each representation has its own nearest stored movement of a
         class, nearest class "prototype" (its medoid), or an "svm" on the averaged kernel. "auto" is "nearest-each".

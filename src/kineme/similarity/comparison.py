@@ -108,8 +108,8 @@ def fit_comparison(
     """Describe movements, and estimate widths and weights from them.
 
     - `labels` (m,): the class of each.
-    - `weights` ({"auto", "equal", "fitted"} or sequence of R numbers, default "auto"): "auto" takes the weights of the
-      representations; "fitted" estimates them, see `fitted_weights`.
+    - `weights` ({"auto", "own", "equal", "fitted"} or sequence of R numbers, default "auto"): "own" takes the weights
+      of the representations, "fitted" estimates them, see `fitted_weights`; "auto" does so where that can be.
 
     Returns `comparison`: with the representations that have a weight above 0, and with positions over arc length if any
     of them is compared pair by pair; `references`: the movements, ordered by class. Raises `SpecificationError`:

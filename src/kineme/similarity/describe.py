@@ -21,6 +21,8 @@ from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.runtime.parallel import for_tiles
 from kineme.similarity.specification import (
+    DETAILED_CLOUD,
+    DETAILED_ELASTIC,
     PAIR_QUANTITIES,
     POSITIONS,
     Compares,
@@ -64,7 +66,7 @@ def describe_rows(rows: NDArray[Any], n_dims: int, like: Compares | None = None)
     Parameters
     ----------
     rows : array_like of shape (n, sum_r d S_r)
-        As `feature_rows` gives them, concatenated: of the representations that are compared sample by sample.
+        As `feature_rows` gives them, concatenated: those of `ComparisonSpecification.stored_rows`.
     n_dims : int
         Dimensions d of the movements.
     like : Recognizer, Comparison or ComparisonSpecification, optional
@@ -77,7 +79,7 @@ def describe_rows(rows: NDArray[Any], n_dims: int, like: Compares | None = None)
     """
     how = specification_of(like)
     rows = np.asarray(rows)
-    widths = [n_dims * representation.n_points for representation in how.by_rows]
+    widths = [n_dims * representation.n_points for representation in how.stored_rows]
     if rows.ndim != 2 or rows.shape[1] != sum(widths) or not len(rows):
         raise TrajectoryError(
             f"expected feature rows of shape (n, {sum(widths)}) for {n_dims} dimensions and {len(widths)} "
@@ -87,31 +89,34 @@ def describe_rows(rows: NDArray[Any], n_dims: int, like: Compares | None = None)
 
 
 def prepare(rows: Iterable[NDArray[Any]], like: Compares, procrustes: Procrustes) -> Described:
-    """Return rows (n, d * S), one block per representation that is compared sample by sample, ready for comparison.
+    """Return rows (n, d * S), one block for each of `ComparisonSpecification.stored_rows`, ready for comparison.
 
     In single precision: comparing with many stored movements is bound by memory, and widths are far above its error.
     What is compared pair by pair is made from the positions over arc length.
     """
-    how, rows = like.specification, tuple(rows)
-    blocks = tuple(procrustes.prepare(np.ascontiguousarray(block, dtype=np.float32)) for block in rows)
-    own = tuple(representation.weight for representation in how.representations)
+    how = like.specification
+    singles: tuple[Any, ...] = tuple(np.ascontiguousarray(block, dtype=np.float32) for block in rows)
+    blocks = tuple(procrustes.prepare(block) for block in singles[: len(how.by_rows)])
+    own = tuple(representation.own_weight(procrustes.n_dims) for representation in how.representations)
     if not how.by_pairs:
         return Described(blocks, procrustes, how.mean, own_weights=own)
     r = rotating(how.representations)
-    single = np.ascontiguousarray(rows[r], dtype=np.float32)  # so that stored rows say the same
-    shapes = shapes_of(single.reshape(len(single), procrustes.n_dims, -1))
-    measures = tuple(PAIR_QUANTITIES.index(representation.quantity) for representation in how.by_pairs)
-    return Described(blocks, procrustes, how.mean, Pairs(blocks[r], shapes, measures), own)
+    paths = [block.reshape(len(block), procrustes.n_dims, -1) for block in (singles[r], *singles[len(how.by_rows) :])]
+    slopes = procrustes.n_dims == 1 and how.representations[r].signal
+    details = shapes_of(paths[1], DETAILED_ELASTIC, DETAILED_CLOUD, slopes=slopes) if len(paths) == 2 else None
+    measures = tuple(representation.measure for representation in how.by_pairs)
+    pairs = Pairs(blocks[r], shapes_of(paths[0], slopes=slopes), measures, details, how.upright)
+    return Described(blocks, procrustes, how.mean, pairs, own)
 
 
 def feature_rows(movements: MovementsLike, specification: ComparisonSpecification) -> tuple[Array, ...]:
     """Smooth movements and describe them, in double precision.
 
-    Rows (n, d * S) for each representation that is compared sample by sample.
+    Rows (n, d * S) for each of `ComparisonSpecification.stored_rows`.
     """
     demos = Demonstrations.of(movements)
     rows = tuple(
-        np.empty((len(demos), demos.n_dims * representation.n_points)) for representation in specification.by_rows
+        np.empty((len(demos), demos.n_dims * representation.n_points)) for representation in specification.stored_rows
     )
 
     def fill(start: int, stop: int) -> None:
@@ -158,10 +163,13 @@ def describe_tile(demos: Demonstrations, start: int, stop: int, like: Compares, 
     return Tile(start, stop, paths, prepare(rows, like, procrustes))
 
 
-def describe_paths(paths: Array, like: Compares, procrustes: Procrustes) -> Described:
-    """Describe smooth, evenly timed paths (n, d, T): relative ones, or recorded ones where position matters."""
+def describe_paths(paths: Array, details: Array, like: Compares, procrustes: Procrustes) -> Described:
+    """Describe smooth, evenly timed paths (n, d, T): relative ones, or recorded ones where position matters.
+
+    `details` are the same paths smoothed below `ComparisonSpecification.detailed_cutoff` cycles.
+    """
     how = like.specification
-    return prepare(_path_rows(paths, how, _precision(how)), how, procrustes)
+    return prepare(_path_rows(paths, details, how, _precision(how)), how, procrustes)
 
 
 def _precision(how: ComparisonSpecification) -> DTypeLike:
@@ -174,9 +182,13 @@ def even_paths(demos: Demonstrations, start: int, stop: int, cutoff: float | Non
 
     Pauses are cut short first, see `cut_pauses`.
     """
-    if (shorter := without_pauses(demos, start, stop)) is not None:
-        demos, start, stop = shorter, 0, stop - start
-    return smooth_evenly(demos, start, stop, cutoff)
+    return smooth_evenly(*_unpaused(demos, start, stop), cutoff)
+
+
+def _unpaused(demos: Demonstrations, start: int, stop: int) -> tuple[Demonstrations, int, int]:
+    """Return movements start:stop with their pauses cut short, and where they are."""
+    shorter = without_pauses(demos, start, stop)
+    return (demos, start, stop) if shorter is None else (shorter, 0, stop - start)
 
 
 def smooth_evenly(demos: Demonstrations, start: int, stop: int, cutoff: float | None) -> Array:
@@ -195,13 +207,20 @@ def _tile_rows(
     demos: Demonstrations, start: int, stop: int, how: ComparisonSpecification, dtype: DTypeLike
 ) -> tuple[Array, tuple[NDArray[Any], ...]]:
     """Return paths of movements start:stop, as `even_paths` gives them, and their feature rows as `dtype`."""
-    relative = even_paths(demos, start, stop, how.cutoff)
-    paths = relative if how.normalization.translation else recorded_paths(demos, relative, start)
-    return relative, _path_rows(paths, how, dtype)
+    unpaused = _unpaused(demos, start, stop)
+    relative = smooth_evenly(*unpaused, how.cutoff)
+    detailed = len(how.stored_rows) > len(how.by_rows) and how.cutoff is not None
+    details = smooth_evenly(*unpaused, how.detailed_cutoff) if detailed else relative
+    if how.normalization.translation:
+        return relative, _path_rows(relative, details, how, dtype)
+    placed, placed_details = (recorded_paths(demos, paths, start) for paths in (relative, details))
+    return relative, _path_rows(placed, placed_details, how, dtype)
 
 
-def _path_rows(paths: Array, how: ComparisonSpecification, dtype: DTypeLike) -> tuple[NDArray[Any], ...]:
-    """Return feature rows of paths (n, d, T) as `dtype`."""
+def _path_rows(
+    paths: Array, details: Array, how: ComparisonSpecification, dtype: DTypeLike
+) -> tuple[NDArray[Any], ...]:
+    """Return feature rows of paths (n, d, T), and of the same paths in detail, as `dtype`."""
     normalized: dict[tuple[float, int], NDArray[Any]] = {}  # representations of equal phase share it
     rows = []
     for representation in how.by_rows:
@@ -209,6 +228,8 @@ def _path_rows(paths: Array, how: ComparisonSpecification, dtype: DTypeLike) -> 
         if phase not in normalized:
             normalized[phase] = how.normalization.apply(representation.along(paths), dtype)
         rows.append(representation.describe(normalized[phase], how.normalization.translation))
+    for representation in how.stored_rows[len(rows) :]:
+        rows.append(how.normalization.apply(representation.along(details), dtype).reshape(len(details), -1))
     return tuple(rows)
 
 
@@ -223,7 +244,16 @@ class Pairs:
 
     positions: Prepared  # positions over arc length, which give the rotation of a pair
     shapes: Shapes
-    measures: tuple[int, ...]  # which of the distances that `kineme.kernels.pair_distances` gives, in order
+    measures: tuple[
+        int, ...
+    ]  # which of the distances that `kineme.kernels.pair_distances` gives, those of details last
+    details: Shapes | None = None  # the shapes in detail
+    upright: bool = True  # whether these are not rotated
+
+    @property
+    def n_rotated(self) -> int:
+        """Measures that are not in detail; they come first."""
+        return sum(measure < len(PAIR_QUANTITIES) for measure in self.measures)
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,6 +295,8 @@ class Described:
             if not any(block is self.pairs.positions for block in self.blocks):
                 blocks.append((self.pairs.positions, others.pairs.positions))
             self.pairs.shapes.put(start, others.pairs.shapes)
+            if self.pairs.details is not None and others.pairs.details is not None:
+                self.pairs.details.put(start, others.pairs.details)
         for ours, theirs in blocks:
             ours.rows[rows], ours.squares[rows] = theirs
 
@@ -287,9 +319,21 @@ class Described:
         old = self.pairs.positions
         same = [new for block, new in zip(self.blocks, blocks, strict=True) if block is old]
         positions = same[0] if same else change(old)
+        details = None if self.pairs.details is None else change(self.pairs.details)
+        shapes = change(self.pairs.shapes)
         return replace(
-            self, blocks=blocks, pairs=replace(self.pairs, positions=positions, shapes=change(self.pairs.shapes))
+            self, blocks=blocks, pairs=replace(self.pairs, positions=positions, shapes=shapes, details=details)
         )
+
+    def twins(self) -> list[int]:
+        """Return for each representation, (R,), that of the same quantity which is not in detail, or itself."""
+        twins = list(range(self.n_representations))
+        if self.pairs is not None:
+            first = len(self.blocks)
+            number = {measure: first + k for k, measure in enumerate(self.pairs.measures)}
+            for measure, r in number.items():
+                twins[r] = number.get(measure - len(PAIR_QUANTITIES), r)
+        return twins
 
     def sizes(self) -> np.ndarray[Any, np.dtype[np.float64]]:
         """Return typical sizes in each representation, (R,): median norms of rows, or distances of opposite tangents.
@@ -319,8 +363,21 @@ def _fill(A: Described, B: Described, squares: Array) -> None:
     n_blocks = len(A.blocks)
     rotations = fill_by_rows(A, B, squares[:n_blocks])
     if A.pairs is not None and B.pairs is not None:
-        measured = pair_distances(A.pairs.shapes, B.pairs.shapes, rotations)
-        squares[n_blocks:] = measured[list(A.pairs.measures)]
+        squares[n_blocks:] = measure_pairs(A.pairs, B.pairs, rotations, pair_distances)
+
+
+def measure_pairs(
+    a: Pairs, b: Pairs, rotations: NDArray[Any] | None, measure: Callable[..., NDArray[Any]], *which: NDArray[np.intp]
+) -> NDArray[Any]:
+    """Return what `measure`, a function of `kineme.kernels.pair_distances`, gives for each of the measures of a."""
+    n_coarse, coarse = len(PAIR_QUANTITIES), a.measures[: a.n_rotated]
+    parts = []
+    if coarse:
+        parts.append(measure(a.shapes, b.shapes, *which, rotations)[list(coarse)])
+    if a.n_rotated < len(a.measures):
+        detailed = measure(a.details, b.details, *which, None if a.upright else rotations)
+        parts.append(detailed[[k - n_coarse for k in a.measures[a.n_rotated :]]])
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
 def fill_by_rows(A: Described, B: Described, squares: Array) -> NDArray[np.float32] | None:

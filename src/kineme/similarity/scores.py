@@ -21,7 +21,7 @@ from kineme.kernels.pair_distances import listed_distances, pair_bounds
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.runtime.parallel import for_tiles
 from kineme.similarity.comparison import Comparison, References
-from kineme.similarity.describe import Described, Pairs, Tile, fill_by_rows, for_described
+from kineme.similarity.describe import Described, Pairs, Tile, fill_by_rows, for_described, measure_pairs
 from kineme.similarity.similarity import AveragedSimilarity
 from kineme.similarity.specification import LOG_MEANS, PAIR_QUANTITIES, SHARES
 from kineme.validation import Array
@@ -164,7 +164,8 @@ def nearest_above(similarity: AveragedSimilarity, A: Described, B: Described, fi
     if not _can_skip(similarity, A, B):
         return _nearest(similarity, A, B, first)
     assert B.pairs is not None
-    clouds = np.array(B.pairs.measures) == PAIR_QUANTITIES.index("cloud")  # there is no bound of their kernel:
+    # There is no bound of the kernels of point clouds:
+    clouds = np.array(B.pairs.measures) % len(PAIR_QUANTITIES) == PAIR_QUANTITIES.index("cloud")
     if (bars <= float(_shares(similarity)[len(B.blocks) :][clouds].sum())).all():  # no K below it can be ruled out
         return _nearest(similarity, A, B, first)
     search, kernels = _by_rows(similarity, A, B)
@@ -243,12 +244,12 @@ class _Search:
 
     def upper_bounds(self) -> Single:
         """Return upper bounds (n, m) of the weighted sum of the others."""
-        bounds = pair_bounds(self._a.shapes, self._b.shapes, self._rotations)
-        return self.kernels(bounds[list(self._a.measures)], len(self._squares))
+        bounds = measure_pairs(self._a, self._b, self._rotations, pair_bounds)
+        return self.kernels(bounds, len(self._squares))
 
     def log_averages(self, i: Indices, j: Indices) -> Array:
         """Return the logarithms (k,) of the averaged kernels of some pairs."""
         rotations = None if self._rotations is None else self._rotations[i, j]
-        measured = listed_distances(self._a.shapes, self._b.shapes, i, j, rotations)[list(self._a.measures)]
+        measured = measure_pairs(self._a, self._b, rotations, listed_distances, i, j)
         squares: Array = np.concatenate((self._squares[:, i, j], measured))
         return np.asarray(LOG_MEANS["arithmetic"](self._similarity.logs_at(squares[:, None]))[0])

@@ -19,6 +19,7 @@ from kineme.validation import Array
 
 _LEAST_WEIGHT = 0.02  # smaller weights become 0, to save the time of their representation
 _OWN = 0.5  # of the fitted weight always belongs to the representations' own weights
+_MOST_SWEEPS, _SWEEP_CHANGE = 10_000, 1e-9  # of least squares, and the change of weights, relative, that ends them
 
 Representations = tuple[Representation, ...]
 
@@ -27,12 +28,19 @@ def own_weights(
     similarity: AveragedSimilarity, described: Described, labels: NDArray[Any], representations: Representations
 ) -> Array:
     """Return the weights of the representations themselves, in the arithmetic mean; equal ones in the others."""
-    own = (
-        np.array([representation.weight for representation in representations])
-        if similarity.mean == "arithmetic"
-        else None
-    )
-    return equal_weights(similarity, described, labels, representations) if own is None else own / own.sum()
+    own = np.array([representation.own_weight(described.n_dims) for representation in representations])
+    if similarity.mean != "arithmetic" or not own.any():
+        return equal_weights(similarity, described, labels, representations)
+    return own / own.sum()
+
+
+def auto_weights(
+    similarity: AveragedSimilarity, described: Described, labels: NDArray[Any], representations: Representations
+) -> Array:
+    """Return `fitted_weights` where that can be: two movements of some class, two classes, an arithmetic mean."""
+    n_classes = len(np.unique(labels))
+    fits = similarity.mean == "arithmetic" and 1 < n_classes < len(labels)
+    return (fitted_weights if fits else own_weights)(similarity, described, labels, representations)
 
 
 def equal_weights(
@@ -74,17 +82,33 @@ def aligned_weights(similarity: AveragedSimilarity, described: Described, labels
 
     Returns (R,): summing to 1; weights below 0.02 are 0.
     """
-    from scipy.optimize import nnls
-
     chosen = evenly_spaced(len(labels), _ROWS)
     some = described.take(chosen)
     same = (labels[chosen, None] == labels[None, chosen]).astype(float)
-    kernels = np.stack([_centered(kernel) for kernel in np.exp(similarity.logs(some, some))], axis=1)
-    weights, _ = nnls(kernels, _centered(same))
+    kernels = np.stack([_centered(kernel) for kernel in np.exp(similarity.logs(some, some))])
+    weights = _nonnegative_least_squares(kernels @ kernels.T, kernels @ _centered(same))
     weights = np.where(weights >= _LEAST_WEIGHT * weights.sum(), weights, 0.0)
     if not weights.any():  # no kernel is aligned with that of the labels
         return np.full(described.n_representations, 1.0 / described.n_representations)
     return np.asarray(weights / weights.sum())
+
+
+def _nonnegative_least_squares(gram: Array, target: Array) -> Array:
+    """Return w >= 0 that minimizes ``w^T gram w / 2 - target^T w``, one number after the other until none changes.
+
+    `scipy.optimize.nnls` finds the same; its import takes as long as recognizing hundreds of recordings. (V. Franc, V.
+    Hlavac, M. Navara, "Sequential coordinate-wise algorithm for the non-negative least squares problem", CAIP 2005.)
+    """
+    w, gradient = np.zeros(len(target)), -target
+    for _ in range(_MOST_SWEEPS):
+        before = w.copy()
+        for r in np.flatnonzero(gram.diagonal() > 0).tolist():
+            changed = max(0.0, float(w[r] - gradient[r] / gram[r, r]))
+            gradient = gradient + (changed - w[r]) * gram[r]
+            w[r] = changed
+        if np.abs(w - before).max() <= _SWEEP_CHANGE * w.max():
+            break
+    return w
 
 
 def given_weights(weights: ArrayLike, n: int) -> Array:
@@ -98,7 +122,7 @@ def given_weights(weights: ArrayLike, n: int) -> Array:
         array = np.empty(0)
     if array.shape != (n,) or not np.isfinite(array).all() or (array < 0).any() or not array.any():
         raise SpecificationError(
-            f"expected weights to be 'auto', 'equal', 'fitted' or {n} numbers from 0, not all 0, one for each "
+            f"expected weights to be 'auto', 'own', 'equal', 'fitted' or {n} numbers from 0, not all 0, one for each "
             f"representation, got {weights!r}"
         )
     array = array / array.max()  # so that the sum does not overflow
@@ -107,7 +131,8 @@ def given_weights(weights: ArrayLike, n: int) -> Array:
 
 #: Name -> what computes the weights (R,), summing to 1.
 WEIGHTS: dict[str, Callable[[AveragedSimilarity, Described, NDArray[Any], Representations], Array]] = {
-    "auto": own_weights,
+    "auto": auto_weights,
+    "own": own_weights,
     "equal": equal_weights,
     "fitted": fitted_weights,
 }
@@ -262,7 +287,16 @@ def impostor_widths(described: Described, labels: NDArray[np.generic]) -> Array:
             "expected training movements that differ, got one movement or all the same; add demonstrations"
         )
     # Movements that do not differ in one representation have a similarity of 1 there.
-    return np.maximum([np.inf if width is None else width for width in widths], _LEAST * sizes)
+    return _as_twins(some, np.maximum([np.inf if width is None else width for width in widths], _LEAST * sizes))
+
+
+def _as_twins(described: Described, widths: Array) -> Array:
+    """Return widths (R,), those in detail as of the same quantities that are rotated.
+
+    In detail movements of one class are farther apart than after a rotation; with wider kernels of their own they would
+    count where only the rotated ones tell.
+    """
+    return widths[described.twins()]
 
 
 def beginning_widths(beginnings: Described, labels: NDArray[np.generic]) -> Array:
@@ -312,7 +346,7 @@ def gap_widths(described: Described) -> Array:
         widths.append(_share_of_median(_beyond_the_gap(ordered, same), same, SHARE))
     if all(width is None for width in widths):
         raise SpecificationError("expected movements that differ, got copies of one movement; add other movements")
-    return np.array([np.inf if width is None else width for width in widths])
+    return _as_twins(described, np.array([np.inf if width is None else width for width in widths]))
 
 
 def median_distances(described: Described) -> Array:

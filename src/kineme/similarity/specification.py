@@ -23,6 +23,7 @@ from kineme.dmp.discrete.dmp import DMP
 from kineme.dmp.discrete.operators import encoder, forcing_matrix
 from kineme.dmp.discrete.specification import MOST_BASIS, MOST_POINTS
 from kineme.errors import SpecificationError, TrajectoryError
+from kineme.kernels.pair_distances import CloudSpec, ElasticSpec
 from kineme.kernels.procrustes import Procrustes
 from kineme.kernels.rotation import RotationPrior
 from kineme.movements.preparation.resample import resample_by_arc_length
@@ -43,6 +44,10 @@ QUANTITIES = ROW_QUANTITIES + PAIR_QUANTITIES
 
 #: Quantity -> name of the representation.
 PAIR_NAMES = {"elastic": "elastic path", "turning": "turning angles", "cloud": "point cloud"}
+
+#: Detailed representations are smoothed below so many times as many cycles as the others, and are finer.
+DETAIL = 4.0
+DETAILED_ELASTIC, DETAILED_CLOUD = ElasticSpec(n_segments=66), CloudSpec(n_points=32)
 
 
 @dataclass(frozen=True)
@@ -69,11 +74,21 @@ class Representation:
         Of the DMP; for "forcing" alone.
     weight : float, default 1.0
         Share in the average where no weights are given or fitted, relative to those of the others.
+    detailed : bool, default False
+        For what is compared pair by pair: in detail. The path is smoothed below four times as many cycles, and has
+        twice as many segments (66) and more points (32); long movements, such as words, have more detail than ten
+        cycles show. It is not rotated, since some movements differ by their direction alone, unless `max_angle` or a
+        prior of its own says how movements are rotated.
+    signal : bool, default True
+        Compare movements of one dimension, which are signals, over time whatever `arc_share` says, by slopes where
+        others have tangents; turning angles and point clouds, which tell nothing of them, then have no weight of their
+        own. False describes them as paths, as libraries of earlier versions do.
 
     Raises
     ------
     SpecificationError
-        A parameter out of its range, or another phase than arc length for what is compared pair by pair.
+        A parameter out of its range; another phase than arc length for what is compared pair by pair, or `detailed`
+        for what is not.
     """
 
     quantity: str
@@ -83,6 +98,8 @@ class Representation:
     stiffness: float = 100.0
     ridge: float = 1e-3
     weight: float = 1.0
+    detailed: bool = False
+    signal: bool = True
 
     def __post_init__(self) -> None:
         check_choice("quantity", self.quantity, QUANTITIES)
@@ -96,23 +113,38 @@ class Representation:
         check_number("weight", self.weight, above=0.0)
         if self.in_pairs and self.arc_share != 1:
             raise SpecificationError(f"expected arc_share=1 with quantity={self.quantity!r}, got {self.arc_share!r}")
+        check_switch("detailed", self.detailed)
+        check_switch("signal", self.signal)
+        if self.detailed and not self.in_pairs:
+            raise SpecificationError(
+                f"expected detailed=True with quantity elastic, turning or cloud, got it with {self.quantity!r}"
+            )
 
     @property
     def in_pairs(self) -> bool:
         """True if movements are compared pair by pair, and not sample by sample."""
         return self.quantity in PAIR_QUANTITIES
 
+    def own_weight(self, n_dims: int) -> float:
+        """Return the weight, which is 0 for what tells nothing of signals."""
+        return 0.0 if n_dims == 1 and self.signal and self.quantity in ("turning", "cloud") else self.weight
+
+    @property
+    def measure(self) -> int:
+        """Number of what is compared pair by pair among the distances of pairs, those in detail last."""
+        return PAIR_QUANTITIES.index(self.quantity) + len(PAIR_QUANTITIES) * self.detailed
+
     @property
     def name(self) -> str:
-        """Name such as "forcing over arc length", or "elastic path"."""
+        """Name such as "forcing over arc length", "elastic path" or "elastic path in detail"."""
         if self.in_pairs:
-            return PAIR_NAMES[self.quantity]
+            return PAIR_NAMES[self.quantity] + " in detail" * self.detailed
         phase = {0.0: "time", 1.0: "arc length"}.get(self.arc_share, f"{self.arc_share:g} arc length")
         return f"{self.quantity} over {phase}"
 
     def along(self, paths: Array) -> Array:
         """Return paths (n, d, T) at even values of the phase, (n, d, n_points)."""
-        if self.arc_share == 0:
+        if self.arc_share == 0 or (self.signal and paths.shape[1] == 1):
             every, remainder = divmod(paths.shape[2] - 1, self.n_points - 1)
             return paths[:, :, ::every] if remainder == 0 else paths @ spline_matrix(paths.shape[2], self.n_points).T
         return resample_by_arc_length(paths, self.n_points, self.arc_share)
@@ -134,14 +166,18 @@ class Representation:
 
 #: What gives the rotation of a pair, and the points of which elastic paths and point clouds consist.
 POSITIONS = Representation("positions", arc_share=1.0, weight=2.0)
+#: Of what those in detail consist: positions from end to end of each segment.
+DETAILED_POSITIONS = Representation("positions", arc_share=1.0, n_points=DETAILED_ELASTIC.n_segments + 1)
 #: Representations that fail on different movements; in an average of kernels one that succeeds suffices. Those of the
-#: whole shape count twice. `python -m bench --only default_representations` tells what each is worth.
+#: whole shape count twice, those in detail six times. `python -m bench --only defaults` tells what each is worth.
 DEFAULT_REPRESENTATIONS = (
     POSITIONS,
     Representation("forcing", arc_share=0.0),
     Representation("elastic", weight=2.0),
     Representation("turning"),
     Representation("cloud", weight=2.0),
+    Representation("elastic", weight=6.0, detailed=True),
+    Representation("cloud", weight=6.0, detailed=True),
 )
 #: Where position or size distinguishes movements: none of these takes it out by itself.
 ROW_REPRESENTATIONS = (
@@ -174,7 +210,7 @@ def check_representations(representations: Any) -> tuple[Representation, ...]:
             "expected Representation('positions', arc_share=1.0) beside those that are compared pair by pair, whose "
             "rotation it gives; add it"
         )
-    return tuple(sorted(given, key=lambda item: item.in_pairs))  # the order within each sort stays
+    return tuple(sorted(given, key=lambda item: (item.in_pairs, item.detailed)))  # the order within each sort stays
 
 
 def rotating(representations: tuple[Representation, ...]) -> int:
@@ -304,7 +340,7 @@ class ComparisonSpecification:
     Kernel widths and weights are estimated from movements, see `Comparison`.
 
     - `representations`: those compared sample by sample first. By default positions over arc length, forcing term over
-      time, elastic path, turning angles, and point cloud.
+      time, elastic path, turning angles, and point cloud; elastic path and point cloud once more, in detail.
     - `cutoff`: movements are smoothed below this many cycles each, see `Smooth`; None for recordings without noise.
     - `max_angle`: largest rotation [rad] between movements of one class, instead of the prior; 0 for none.
     - `prior`: how rare rotations are, in two and three dimensions, if there is no `max_angle`. None is a limit of pi/3.
@@ -346,6 +382,22 @@ class ComparisonSpecification:
     def by_pairs(self) -> tuple[Representation, ...]:
         """The representations that are compared pair by pair."""
         return self.representations[len(self.by_rows) :]
+
+    @cached_property
+    def stored_rows(self) -> tuple[Representation, ...]:
+        """What feature rows hold: representations compared sample by sample, then positions in detail, if needed."""
+        detailed = any(representation.detailed for representation in self.representations)
+        return (*self.by_rows, DETAILED_POSITIONS) if detailed else self.by_rows
+
+    @property
+    def upright(self) -> bool:
+        """True if what is compared in detail is not rotated: where nothing says how movements are rotated."""
+        return self.max_angle is None and self.prior == RotationPrior()
+
+    @property
+    def detailed_cutoff(self) -> float | None:
+        """Cycles below which what is compared in detail is smoothed; None for not at all."""
+        return None if self.cutoff is None else DETAIL * self.cutoff
 
     @property
     def specification(self) -> ComparisonSpecification:

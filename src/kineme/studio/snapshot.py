@@ -35,8 +35,14 @@ from kineme.recognition.early import hypotheses as beginnings
 from kineme.recognition.early.hypotheses import Early, hypotheses
 from kineme.sampling import evenly_spaced
 from kineme.similarity.comparison import Comparison
-from kineme.similarity.describe import N_POINTS, even_paths
-from kineme.similarity.specification import PAIR_QUANTITIES, Representation, forcing_operator, rotating
+from kineme.similarity.describe import N_POINTS, Pairs, even_paths, feature_rows
+from kineme.similarity.specification import (
+    DETAILED_POSITIONS,
+    ComparisonSpecification,
+    Representation,
+    forcing_operator,
+    rotating,
+)
 
 #: Numbers of the stored paths, those of early recognition included, at most: 1.3 MB in base64, so that a page with all
 #: else stays below 2 MB.
@@ -56,7 +62,7 @@ _AGAIN = (
     "then other.learn(library.movements(symbol.name)) for every symbol in library.symbols()"
 )
 
-FORMAT, VERSION = "kineme-snapshot", 4
+FORMAT, VERSION = "kineme-snapshot", 5
 _KINDS = ("float64", "float32", "int32")
 _ROUNDING = 1e-6  # of a path's size: some units in the last place of single precision
 _ALIGNMENT = 8  # bytes: arrays in JavaScript begin at multiples of the size of their numbers
@@ -107,10 +113,12 @@ def recognition_parts(classes: KnownClasses) -> Snapshot:
         **comparison_arrays,
         **calibration_arrays,
     }
+    if comparison["details"] is not None:
+        arrays["detailed rows"] = feature_rows(demos, classes.comparison.specification)[-1].astype(np.float32)
     return Snapshot(header, arrays)
 
 
-def _comparison(how: Comparison, pairs: Any) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+def _comparison(how: Comparison, pairs: Pairs | None) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
     representations, similarity = how.representations, how.similarity
     by_rows = [representation for representation in representations if not representation.in_pairs]
     rows = []
@@ -130,11 +138,10 @@ def _comparison(how: Comparison, pairs: Any) -> tuple[dict[str, Any], dict[str, 
         "mean": how.mean,
         "rule": rotation_rule(how.procrustes),
         "by_rows": rows,
-        "by_pairs": [
-            PAIR_QUANTITIES.index(representation.quantity) for representation in representations[len(by_rows) :]
-        ],
+        "by_pairs": [representation.measure for representation in representations[len(by_rows) :]],
         "rotating": rotating(representations) if pairs is not None else -1,
         "shapes": None if pairs is None else pair_rule(pairs.shapes),
+        "details": None if pairs is None or pairs.details is None else _detail_rule(how.specification, pairs.details),
         "widths": [float(width) if np.isfinite(width) else None for width in similarity.widths],
         "weights": weights.tolist(),
         "names": [representation.name for representation in representations],
@@ -148,6 +155,7 @@ def _row_representation(representation: Representation, r: int) -> tuple[dict[st
         "quantity": representation.quantity,
         "arc_share": representation.arc_share,
         "n_points": representation.n_points,
+        "signal": representation.signal,
     }
     arrays: dict[str, NDArray[Any]] = {}
     if representation.quantity == "forcing":
@@ -196,6 +204,12 @@ def pair_rule(shapes: Shapes) -> dict[str, Any]:
         "cloud_turning_weight": cloud.turning_weight,
         "line_weight": cloud.line_weight,
     }
+
+
+def _detail_rule(how: ComparisonSpecification, details: Shapes) -> dict[str, Any]:
+    """Write how movements are compared in detail."""
+    positions = {name: getattr(DETAILED_POSITIONS, name) for name in ("arc_share", "n_points", "signal")}
+    return pair_rule(details) | {"cutoff": how.detailed_cutoff, "upright": how.upright, "positions": positions}
 
 
 def _classifier(classifier: Classifier) -> dict[str, Any]:
@@ -327,18 +341,22 @@ def snapshot_of_library(library: ActionLibrary, most: int | None = None, early: 
     """The symbols of a library with their movements.
 
     Of symbols with many movements some are taken, evenly spaced, as many of each as add up to `most`; by default as
-    many as fit into 2 MB, 603 in the plane and 402 in space, or half of that if all of them pause. Widths and
+    many as fit into 2 MB, 451 in the plane and 300 in space, or half of that if all of them pause. Widths and
     calibration are those of the movements taken, as if a library held these alone. ``header["n_all"]`` says of how
     many. `early` is how movements are recognized under way; by default as `kineme.Recognizer.stream` does.
     """
     store = library.store
     members = members_of(store)
-    fitting = MOST_NUMBERS // (N_POINTS * (store.n_dims or 1))
+    rows = store.specification.comparison
+    of_each = N_POINTS + DETAILED_POSITIONS.n_points * (len(rows.stored_rows) - len(rows.by_rows))
+    fitting = MOST_NUMBERS // (of_each * (store.n_dims or 1))
     taken = some_members(members, fitting if most is None else most)
     prototypes = [prototype_of(store, symbol(store, str(name))) for name in members.names]
     primitives = read.primitives(store, np.array(prototypes, dtype=np.int64))
     snapshot = _snapshot(known_members(store, taken), primitives, early)
-    stored = sum(snapshot.arrays[name].size for name in ("paths", "early paths"))
+    stored = sum(
+        snapshot.arrays[name].size for name in ("paths", "early paths", "detailed rows") if name in snapshot.arrays
+    )
     if most is None and stored > MOST_NUMBERS:
         return snapshot_of_library(library, max(fitting * MOST_NUMBERS // stored, len(members.names)), early)
     snapshot.header["n_all"] = len(members.ids)

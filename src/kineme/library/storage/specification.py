@@ -87,8 +87,8 @@ class Specification:
         return self.comparison.representations
 
     def widths(self, n_dims: int) -> tuple[int, ...]:
-        """Return numbers per movement in the stored rows: of each representation that is compared sample by sample."""
-        return tuple(n_dims * representation.n_points for representation in self.comparison.by_rows)
+        """Return numbers per movement in each of the stored rows, see `ComparisonSpecification.stored_rows`."""
+        return tuple(n_dims * representation.n_points for representation in self.comparison.stored_rows)
 
     def recognizer(self) -> Recognizer:
         """Return a recognizer, not fitted, that compares and recognizes movements in this way."""
@@ -136,7 +136,9 @@ class Specification:
 @lru_cache(maxsize=16)  # a library is opened again and again
 def _of_texts(recognizer: str, dmp_text: str) -> Specification:
     parameters, dmp = parsed(recognizer), parsed(dmp_text)
-    parameters["representations"] = tuple(Representation(**fields) for fields in parameters["representations"])
+    parameters["representations"] = tuple(
+        Representation(**({"signal": False} | fields)) for fields in parameters["representations"]
+    )
     if parameters.get("rotation_prior") is not None:
         prior = parameters["rotation_prior"]
         vertical = prior["vertical"]

@@ -49,20 +49,22 @@ class Begun(NamedTuple):
     prefixes: Prefixes
     described: Described
     paths: Array
+    details: Array
     durations: Array
 
 
 def describe_begun(
-    stored: Hypotheses, paths: Array, starts: Array, durations: Array, wholes: Array | None = None
+    stored: Hypotheses, paths: Array, starts: Array, durations: Array, wholes: tuple[Array, Array]
 ) -> Begun:
     """Describe the smooth, evenly timed paths (n, d, T), relative to their first recorded positions (n, d).
 
-    `wholes` are the same paths with their pauses cut as those of whole movements are, if there are any.
+    `wholes` are the same paths with their pauses cut as those of whole movements are, and in detail, see
+    `ComparisonSpecification.detailed_cutoff`.
     """
-    wholes = paths if wholes is None else wholes
     prefixes = beginnings(paths, _WHOLE)
-    where = wholes if stored.comparison.normalization.translation else wholes + starts[:, :, None]
-    return Begun(prefixes, describe_prefixes(prefixes, stored.procrustes), where, durations)
+    shift = 0.0 if stored.comparison.normalization.translation else starts[:, :, None]
+    described = describe_prefixes(prefixes, stored.procrustes)
+    return Begun(prefixes, described, wholes[0] + shift, wholes[1] + shift, durations)
 
 
 def log_evidence(stored: Hypotheses, begun: Begun) -> Array:
@@ -86,7 +88,8 @@ def log_evidence(stored: Hypotheses, begun: Begun) -> Array:
         chosen = _choose(stored, rough[i])
         movement = begun.described.take(slice(i, i + 1))
         evidence[i, chosen] = _near(stored, movement, chosen) + priors[i, chosen] - np.logaddexp(0.0, odds[i])
-        _add_over(stored, begun.paths[i : i + 1], evidence[i], priors[i] - np.logaddexp(0.0, -odds[i]))
+        whole = begun.paths[i : i + 1], begun.details[i : i + 1]
+        _add_over(stored, whole, evidence[i], priors[i] - np.logaddexp(0.0, -odds[i]))
     return evidence
 
 
@@ -132,7 +135,7 @@ def _near(stored: Hypotheses, movement: Described, chosen: NDArray[np.intp]) -> 
     return np.asarray(average + ROTATION * (product - np.trace(F)))
 
 
-def _add_over(stored: Hypotheses, path: Array, evidence: Array, priors: Array) -> None:
+def _add_over(stored: Hypotheses, whole: tuple[Array, Array], evidence: Array, priors: Array) -> None:
     """Add the evidence that the movement is over, in place, given the other densities (m * G,) if it is.
 
     It is the recognizer's similarity, which is at most 1, to the power of 3, averaged over each class, and summed over
@@ -145,7 +148,7 @@ def _add_over(stored: Hypotheses, path: Array, evidence: Array, priors: Array) -
     if most.max() < evidence.max() - NEGLIGIBLE:
         return
     rotations = stored.comparison if stored.early.max_angle is None else stored
-    described = describe_paths(path, stored.comparison, rotations.procrustes)
+    described = describe_paths(*whole, stored.comparison, rotations.procrustes)
     similar = POWER * stored.comparison.similarity.log_average(described, stored.references.described)[0]
     log_counts = np.log(counts)
     over = np.logaddexp.reduce(most + similar - np.repeat(log_counts, counts))
@@ -166,9 +169,10 @@ def partial_shares(comparison: Comparison, stored: Hypotheses, X: MovementsLike)
 
 
 def _shares(comparison: Comparison, stored: Hypotheses, demos: Demonstrations) -> Array:
-    wholes = even_paths(demos, 0, len(demos), comparison.cutoff)
+    how = comparison.specification
+    wholes = even_paths(demos, 0, len(demos), how.cutoff), even_paths(demos, 0, len(demos), how.detailed_cutoff)
     demos = without_pauses(demos, 0, len(demos), ALLOWANCE) or demos
-    paths = smooth_evenly(demos, 0, len(demos), comparison.cutoff)
+    paths = smooth_evenly(demos, 0, len(demos), how.cutoff)
     starts = demos.positions[demos.offsets[:-1]]
     return stored.shares(log_evidence(stored, describe_begun(stored, paths, starts, demos.durations, wholes)))
 

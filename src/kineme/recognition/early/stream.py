@@ -126,7 +126,9 @@ class Live:
     def _estimate(self, samples: Array, status: LiveStatus) -> LiveState:
         elapsed = float(samples[-1, 0] - samples[0, 0])
         times, positions = _without_pauses(samples, ALLOWANCE)
-        even, whole = self._smooth(times, positions), self._smooth(*_without_pauses(samples))
+        how, unpaused = self._comparison.specification, _without_pauses(samples)
+        even = _smooth(times, positions, how.cutoff)
+        whole = _smooth(*unpaused, how.cutoff), _smooth(*unpaused, how.detailed_cutoff)
         so_far = describe_begun(self._hypotheses, even, samples[:1, 1:], times[-1:] - times[0], whole)
         evidence = log_evidence(self._hypotheses, so_far)
         shares = self._hypotheses.shares(evidence)[0]
@@ -150,12 +152,12 @@ class Live:
             status | (LiveStatus.UNDECIDED if decided is None else LiveStatus.DECIDED),
         )
 
-    def _smooth(self, times: Array, positions: Array) -> Array:
-        """Return the samples so far, at even times and smoothed like the stored movements: (1, d, T)."""
-        targets = np.linspace(times[0], times[-1], N_POINTS)
-        even = np.stack([np.interp(targets, times, column - column[0]) for column in positions.T])
-        cutoff = self._comparison.cutoff
-        return np.asarray(even if cutoff is None else even @ smoother(float(cutoff)).T)[None]
+
+def _smooth(times: Array, positions: Array, cutoff: float | None) -> Array:
+    """Return the samples so far, at even times and smoothed like the stored movements: (1, d, T)."""
+    targets = np.linspace(times[0], times[-1], N_POINTS)
+    even = np.stack([np.interp(targets, times, column - column[0]) for column in positions.T])
+    return np.asarray(even if cutoff is None else even @ smoother(float(cutoff)).T)[None]
 
 
 def _without_pauses(samples: Array, allowance: float = 1.0) -> tuple[Array, Array]:

@@ -8,7 +8,7 @@
 
 const KINDS = { float64: Float64Array, float32: Float32Array, int32: Int32Array };
 const FORMAT = "kineme-snapshot";
-const VERSION = 4;
+const VERSION = 5;
 const SMALLEST = 2.2250738585072014e-308; // number whose logarithm is taken
 
 /**

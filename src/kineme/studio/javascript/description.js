@@ -26,7 +26,7 @@ export const N_POINTS = 199; // even samples from which the phases are computed
  * A path at even values of a phase: d rows of n_points numbers.
  * @param {Float64Array|Float32Array} path d rows
  * @param {number} d
- * @param {Representation} representation
+ * @param {{arc_share: number, n_points: number, signal: boolean}} representation
  * @param {Float64Array} [matrix] (n_points, n) where time does not fall on samples
  */
 function along(path, d, representation, matrix) {
@@ -34,7 +34,8 @@ function along(path, d, representation, matrix) {
   const m = representation.n_points;
   const rows = new Float64Array(d * m);
   const every = (n - 1) / (m - 1);
-  const phase = representation.arc_share > 0 ? arcLengthPhase(path, d, representation.arc_share) : null;
+  const overTime = representation.arc_share === 0 || (representation.signal && d === 1);
+  const phase = overTime ? null : arcLengthPhase(path, d, representation.arc_share);
   for (let k = 0; k < d; k++) {
     const own = path.subarray(k * n, (k + 1) * n);
     if (phase) rows.set(interpolate(linspace(0, 1, m), phase, own), k * m);
@@ -105,8 +106,9 @@ export function featureRows(path, how, arrays) {
  * @param {Shapes} into
  * @param {number} i
  * @param {number} [factor] by which the path is multiplied
+ * @param {boolean} [signal] whether it is one, over time: tangents are slopes, and nothing turns
  */
-export function fillShapes(path, d, into, i, factor = 1) {
+export function fillShapes(path, d, into, i, factor = 1, signal = false) {
   const { n_segments: K, n_points: P } = into;
   const w = 2 * d + 1;
   const ends = evenly(path, d, K + 1, factor);
@@ -122,9 +124,10 @@ export function fillShapes(path, d, into, i, factor = 1) {
       into.segments[at + k] = tangents[p * d + k];
       into.segments[at + d + k] = 0.5 * (ends[(p + 1) * d + k] + ends[p * d + k]);
     }
-    const inner = p > 0 && p < K - 1 && directed(tangents, p, d);
+    const inner = !signal && p > 0 && p < K - 1 && directed(tangents, p, d);
     into.segments[at + 2 * d] = inner ? angle(tangents, p - 1, p + 1, d) : 0;
   }
+  if (signal) fillSlopes(ends, into, i);
   for (let p = 0, at = i * P * w; p < P; p++, at += w) {
     for (let k = 0; k < d; k++) {
       into.points[at + k] = points[p * d + k];
@@ -133,6 +136,16 @@ export function fillShapes(path, d, into, i, factor = 1) {
     into.points[at + d] = p > 0 && p < P - 1 ? angle(steps, p - 1, p, d) : 0;
   }
 }
+
+/** Differences from end to end of the segments of a signal, with a root mean square of 1, as its tangents. */
+function fillSlopes(ends, { segments, n_segments: K }, i) {
+  let squares = 0;
+  for (let p = 0; p < K; p++) squares += (ends[p + 1] - ends[p]) ** 2 / K;
+  for (let p = 0; p < K; p++) segments[(i * K + p) * 3] = (ends[p + 1] - ends[p]) / (Math.sqrt(squares) || 1);
+}
+
+/** Whether movements are compared as signals over time. */
+export const isSignal = (how) => how.n_dims === 1 && how.by_rows[how.rotating]?.signal === true;
 
 /** Room for the shapes of m movements. @returns {Shapes} */
 export function roomForShapes(m, d, { n_segments, n_points }) {
@@ -184,6 +197,12 @@ function angle(vectors, p, q, d) {
   return Math.acos(Math.min(Math.max(cosine, -1), 1)) / Math.PI;
 }
 
+/** Segments and points of a path in detail, (d, N_POINTS), as number i of the shapes. */
+function fillDetails(path, how, into, i) {
+  const row = normalized(along(path, how.n_dims, how.details.positions), how.n_dims, how);
+  fillShapes(Float32Array.from(row), how.n_dims, into, i, 1, isSignal(how));
+}
+
 /**
  * A movement as it is compared: its smooth path, rows with their squared norms, and shapes.
  * @param {import("./preparation.js").Movement} movement
@@ -191,21 +210,29 @@ function angle(vectors, p, q, d) {
  * @param {Object} arrays
  */
 export function describeMovement(movement, how, arrays) {
-  return describePath(
-    evenPath(withoutPauses(movement, how.pauses), how.cutoff, N_POINTS),
-    movement.positions,
-    how,
-    arrays,
-  );
+  const unpaused = withoutPauses(movement, how.pauses);
+  const smooth = (cutoff) => evenPath(unpaused, cutoff, N_POINTS);
+  return describePath(smoothly(how, smooth), movement.positions, how, arrays);
 }
 
-/** The same of a smooth path relative to a first position. */
-export function describePath(path, start, how, arrays) {
+/**
+ * A path smoothed as the comparison says: for what is compared in detail, if anything, it is smoothed less.
+ * @param {Object} how
+ * @param {(cutoff: number|null) => Float64Array} smooth
+ */
+export function smoothly(how, smooth) {
+  return { path: smooth(how.cutoff), details: how.details && smooth(how.details.cutoff) };
+}
+
+/** The same of a path, smoothed both ways, relative to a first position. */
+export function describePath({ path, details: detailed }, start, how, arrays) {
   const d = how.n_dims;
-  const placed = how.translation ? path : path.map((x, j) => x + start[Math.floor(j / N_POINTS)]);
-  const rows = featureRows(placed, how, arrays);
+  const place = (own) => (how.translation ? own : own.map((x, j) => x + start[Math.floor(j / N_POINTS)]));
+  const rows = featureRows(place(path), how, arrays);
   const squares = rows.map((row) => row.reduce((sum, x) => sum + x * x, 0));
   const shapes = how.shapes ? roomForShapes(1, d, how.shapes) : null;
-  if (shapes) fillShapes(rows[how.rotating], d, shapes, 0);
-  return { path, rows, squares, shapes };
+  if (shapes) fillShapes(rows[how.rotating], d, shapes, 0, 1, isSignal(how));
+  const details = how.details ? roomForShapes(1, d, how.details) : null;
+  if (details) fillDetails(place(detailed), how, details, 0);
+  return { path, rows, squares, shapes, details };
 }

@@ -10,6 +10,7 @@ const FAR = 1e300;
  * @property {Float32Array[]} rows of each block, one movement after the other
  * @property {Float64Array[]} squares their squared norms, (m,) of each block
  * @property {import("./description.js").Shapes|null} shapes
+ * @property {import("./description.js").Shapes|null} details
  *
  * @typedef {Object} PairRule how segments and points are compared
  * @property {number} n_segments
@@ -228,10 +229,30 @@ function sums(rows, columns, nearest, taken, P) {
   return (Math.min(forth, back) / P) ** 2;
 }
 
+const N_MEASURES = 3; // elastic, turning, cloud; the same in detail have the next numbers
+
+/**
+ * Compares pairs by some of the measures: writes those squares of the one movement and a stored one.
+ * @param {PairRule|null} rule
+ * @param {number} d
+ * @param {import("./description.js").Shapes} own
+ * @param {number[]} measures
+ */
+function comparing(rule, d, own, measures) {
+  if (!measures.length) return null;
+  return pairDistances(
+    rule,
+    d,
+    own,
+    measures.includes(2),
+    measures.some((k) => k < 2),
+  );
+}
+
 /**
  * Squared distances of a described movement to m stored ones: R rows of m numbers.
  * @param {Object} how the header's comparison
- * @param {{rows: Float32Array[], squares: number[], shapes: Object}} described
+ * @param {{rows: Float32Array[], squares: number[], shapes: Object, details: Object}} described
  * @param {Stored} stored
  * @returns {Float64Array}
  */
@@ -239,22 +260,18 @@ export function squaredDistances(how, described, stored) {
   const { rule, by_rows: blocks, by_pairs: measures, n_dims: d } = how;
   const m = stored.m;
   const distances = new Float64Array((blocks.length + measures.length) * m);
-  const compare = measures.length
-    ? pairDistances(
-        how.shapes,
-        d,
-        described.shapes,
-        measures.includes(2),
-        measures.some((k) => k < 2),
-      )
-    : null;
+  const coarse = measures.filter((k) => k < N_MEASURES);
+  const detailed = measures.filter((k) => k >= N_MEASURES).map((k) => k - N_MEASURES);
+  const compare = comparing(how.shapes, d, described.shapes, coarse);
+  const compareDetails = comparing(how.details, d, described.details, detailed);
+  const identity = Float64Array.from({ length: d * d }, (_, k) => (k % (d + 1) === 0 ? 1 : 0));
   const R = new Float64Array(d * d);
-  const squares = new Float64Array(3);
+  const squares = new Float64Array(2 * N_MEASURES);
   for (let j = 0; j < m; j++) {
     for (let r = 0; r < blocks.length; r++) {
       const n = blocks[r].n_points;
       const square = stored.squares[r][j];
-      const turns = compare !== null && r === how.rotating;
+      const turns = measures.length > 0 && r === how.rotating;
       const best = align(
         rule,
         described.rows[r],
@@ -267,9 +284,9 @@ export function squaredDistances(how, described, stored) {
       );
       distances[r * m + j] = Math.max(described.squares[r] + square - 2 * best, 0);
     }
-    if (compare === null) continue;
     for (let k = 0; k < d * d; k++) R[k] = Math.fround(R[k]);
-    compare(stored.shapes, j, R, squares);
+    compare?.(stored.shapes, j, R, squares);
+    compareDetails?.(stored.details, j, how.details.upright ? identity : R, squares.subarray(N_MEASURES));
     for (let k = 0; k < measures.length; k++) distances[(blocks.length + k) * m + j] = squares[measures[k]];
   }
   return distances;

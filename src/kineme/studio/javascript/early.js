@@ -2,7 +2,7 @@
 
 import { argmax, descending, interpolate, linspace, softmax } from "./arrays.js";
 import { certainty } from "./certainty.js";
-import { N_POINTS } from "./description.js";
+import { N_POINTS, smoothly } from "./description.js";
 import { logEvidence, shares } from "./evidence.js";
 import { beginnings } from "./hypotheses.js";
 import { withoutPauses } from "./pauses.js";
@@ -70,12 +70,8 @@ function decision(confidence, patience) {
  * @param {{confidence?: number, patience?: number}} [options]
  */
 export function follow(stored, { confidence = 0.9, patience = 0.05 } = {}) {
-  const {
-    classes,
-    certainty: least,
-    comparison: { n_dims: d, cutoff, pauses },
-    early,
-  } = stored.recognizer.header;
+  const { classes, certainty: least, comparison: how, early } = stored.recognizer.header;
+  const { n_dims: d, cutoff, pauses } = how;
   const decide = decision(confidence, patience);
   let [leader, furthest] = [-1, 0];
   /**
@@ -91,9 +87,10 @@ export function follow(stored, { confidence = 0.9, patience = 0.05 } = {}) {
     const active = withoutPauses(soFar, early.pauses);
     const duration = active.times[active.times.length - 1] - active.times[0];
     const begun = beginnings(smooth(active, cutoff), d, WHOLE, early);
-    const path = smooth(withoutPauses(soFar, pauses), cutoff);
+    const unpaused = withoutPauses(soFar, pauses);
+    const whole = smoothly(how, (cycles) => smooth(unpaused, cycles));
     const elapsed = times[n - 1] - times[0];
-    const evidence = logEvidence(stored, begun, path, positions[0], duration);
+    const evidence = logEvidence(stored, begun, whole, positions[0], duration);
     const share = shares(stored, evidence);
     const order = descending(share.subarray(0, classes.length));
     const decided = decide(elapsed, order[0], share[order[0]]);

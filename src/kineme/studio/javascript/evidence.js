@@ -71,7 +71,7 @@ function logOdds({ over, before, numbers }, speed) {
  * Logarithm of the evidence for each hypothesis; -Infinity where another is far more likely.
  * See kineme.recognition.early.evidence.
  */
-export function logEvidence(stored, begun, path, start, duration) {
+export function logEvidence(stored, begun, whole, start, duration) {
   const { header } = stored.recognizer;
   const {
     early,
@@ -102,7 +102,7 @@ export function logEvidence(stored, begun, path, start, duration) {
   }
   addOver(
     stored,
-    path,
+    whole,
     start,
     evidence,
     priors.map((prior) => prior - logSumExp([0, -odds])),
@@ -120,14 +120,14 @@ function logRotation({ rule: { n_dims: d, prior }, numbers }, R) {
 }
 
 /** Add the evidence that the movement is over. */
-function addOver(stored, path, start, evidence, priors) {
+function addOver(stored, whole, start, evidence, priors) {
   const { header, arrays, stored: references } = stored.recognizer;
   const { early, first, n_movements: m } = header;
   const { n_progress: G, numbers } = early;
   const most = Float64Array.from({ length: m }, (_, j) => priors[j * G + G - 1]);
   if (most[argmax(most)] < evidence[argmax(evidence)] - numbers.negligible) return;
   const how = early.own_rotations ? { ...header.comparison, rule: early.rule } : header.comparison;
-  const described = describePath(path, start, how, arrays);
+  const described = describePath(whole, start, how, arrays);
   const similar = logAverages(how, kernelLogs(how, squaredDistances(how, described, references))).map(
     (log) => numbers.power * log,
   );

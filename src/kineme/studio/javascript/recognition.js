@@ -2,7 +2,7 @@
 
 import { argmax, descending, logSumExp, softmax } from "./arrays.js";
 import { certainty } from "./certainty.js";
-import { describeMovement, fillShapes, featureRows, N_POINTS, roomForShapes } from "./description.js";
+import { describeMovement, fillShapes, featureRows, isSignal, N_POINTS, roomForShapes } from "./description.js";
 import { squaredDistances } from "./distances.js";
 
 const SCALE_OF_REACH = Math.sqrt(Math.PI / 4 / Math.log(20)); // by which the broad law is 0.05 at a reach of 1
@@ -68,6 +68,7 @@ export function knownClasses({ header, arrays }) {
   const rows = how.by_rows.map((representation) => new Float32Array(m * d * representation.n_points));
   const squares = how.by_rows.map(() => new Float64Array(m));
   const shapes = how.shapes ? roomForShapes(m, d, how.shapes) : null;
+  const details = how.details ? roomForShapes(m, d, how.details) : null;
   for (let i = 0; i < m; i++) {
     const path = Float64Array.from(arrays.paths.subarray(i * d * N_POINTS, (i + 1) * d * N_POINTS));
     const start = arrays.starts.subarray(i * d, (i + 1) * d);
@@ -78,10 +79,14 @@ export function knownClasses({ header, arrays }) {
     });
     if (shapes) {
       const size = d * how.by_rows[how.rotating].n_points;
-      fillShapes(rows[how.rotating].subarray(i * size, (i + 1) * size), d, shapes, i);
+      fillShapes(rows[how.rotating].subarray(i * size, (i + 1) * size), d, shapes, i, 1, isSignal(how));
+    }
+    if (details) {
+      const size = d * how.details.positions.n_points;
+      fillShapes(arrays["detailed rows"].subarray(i * size, (i + 1) * size), d, details, i, 1, isSignal(how));
     }
   }
-  return { header, arrays, stored: { m, rows, squares, shapes } };
+  return { header, arrays, stored: { m, rows, squares, shapes, details } };
 }
 
 /**
