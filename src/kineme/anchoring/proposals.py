@@ -361,7 +361,10 @@ def by_shape(described: Described) -> Described:
         return described
     n = len(described.blocks)
     positions = [r for r, block in enumerate(described.blocks) if block is described.pairs.positions]
-    return described.select([*positions, *range(n, described.n_representations)])
+    if described.own_weights is None:
+        return described.select([*positions, *range(n, described.n_representations)])
+    weighted = [r for r in range(n, described.n_representations) if described.own_weights[r] > 0]
+    return described.select([*positions, *weighted])
 
 
 def _by_distances(distances: Array, method: str, n_clusters: int | None, min_members: int) -> tuple[Clusters, Array]:
