@@ -9,7 +9,7 @@ import hashlib
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from itertools import pairwise
 from pathlib import PurePath
@@ -47,7 +47,7 @@ from kineme.movements.channels.column_match import columns_recorded, may_be
 from kineme.movements.tables.layout import listed
 from kineme.movements.trajectories.as_learned import as_recorded, by_names, of_columns
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.movements.trajectories.movements import Movements, in_coordinates
+from kineme.movements.trajectories.movements import in_coordinates
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.validation import describe as name_of
 
@@ -80,12 +80,8 @@ class LearnReport:
     added: int
     duplicates: int
     symbols: tuple[str, ...]
-    ids: NDArray[np.int64]
+    ids: NDArray[np.int64] = field(repr=False)
     version: int
-
-    def __repr__(self) -> str:
-        counts = f"added={self.added}, duplicates={self.duplicates}"
-        return f"LearnReport({counts}, symbols={self.symbols!r}, version={self.version})"
 
 
 def learn(  # noqa: PLR0913, PLR0917 - those of `ActionLibrary.learn`
@@ -119,7 +115,7 @@ def learn(  # noqa: PLR0913, PLR0917 - those of `ActionLibrary.learn`
 
         for start, stop in _ranges(demos):
             rows = slice(start, stop)
-            part = _part(demos, start, stop)
+            part = Demonstrations.of_movements(demos.movements.between(start, stop))
             even = evenly_sampled(part)
             batch = Batch(part, digests(part, even), names[rows], people[rows], sources[rows], where[rows])
             with store.reading() as connection:
@@ -149,24 +145,6 @@ def _ranges(demos: Demonstrations) -> Iterator[tuple[int, int]]:
         stop = min(max(limit, start + 1), start + most, n)
         yield start, stop
         start = stop
-
-
-def _part(demos: Demonstrations, start: int, stop: int) -> Demonstrations:
-    """Return consecutive movements, sharing the samples."""
-    movements, first, last = demos.movements, demos.offsets[start], demos.offsets[stop]
-    return Demonstrations.of_movements(
-        Movements(
-            movements.positions[first:last],
-            movements.offsets[start : stop + 1] - first,
-            movements.durations[start:stop],
-            None if movements.times is None else movements.times[first:last],
-            None,
-            None if movements.names is None else movements.names[start:stop],
-            movements.dimensions,
-            movements.channels,
-            None if movements.recorded is None else movements.recorded[first:last],
-        )
-    )
 
 
 def _in_columns_of(store: Store, demos: Demonstrations) -> Demonstrations:
