@@ -23,6 +23,8 @@ from scipy.spatial.distance import squareform
 
 from kineme.validation import Array
 
+Clusters = NDArray[np.intp]
+
 #: Neighbors in the graph of each representation; the fused similarities of both are added up.
 NEIGHBORS = (7, 15)
 _WIDTH = 0.4  # mu of the source, Eq. (2), which recommends 0.3 to 0.8; wider ones merge classes of a few movements
@@ -221,8 +223,6 @@ def _normalized(similar: Array) -> Array:
 _SLACK = 0.05  # of the adjusted Rand index: a number of clusters this close to the most stable is as stable
 _AT_ONCE = 60  # numbers of clusters tried at a time
 
-Whole = NDArray[np.intp]
-
 
 def count_clusters(distances: Array, repeats: int = 20, seed: int = 0) -> int:
     """The number of clusters c of an average-linkage tree.
@@ -252,7 +252,7 @@ def count_clusters(distances: Array, repeats: int = 20, seed: int = 0) -> int:
     return _best(distances, tree, np.unique(around), repeats, seed)
 
 
-def _best(distances: Array, tree: Array, counts: Whole, repeats: int, seed: int) -> int:
+def _best(distances: Array, tree: Array, counts: NDArray[np.intp], repeats: int, seed: int) -> int:
     fine_first = counts[::-1].tolist()
     clusterings = cuts(tree, fine_first)
     fits = mean_silhouettes(distances, clusterings)
@@ -301,14 +301,14 @@ def _mean_silhouette(sums: Array, cut: NDArray[np.intp]) -> float:
     return float(silhouette.mean())
 
 
-def _agreement(distances: Array, clusterings: list[Whole], counts: list[int], chosen: Whole) -> Array:
+def _agreement(distances: Array, clusterings: list[Clusters], counts: list[int], chosen: NDArray[np.intp]) -> Array:
     """Adjusted Rand index of each number of clusters between all movements and a chosen subset, (c,)."""
     tree = average_linkage(distances[np.ix_(chosen, chosen)])
     again = cuts(tree, [min(count, len(chosen)) for count in counts])
     return np.array([adjusted_rand(a[chosen], b) for a, b in zip(clusterings, again, strict=True)])
 
 
-def adjusted_rand(a: Whole, b: Whole) -> float:
+def adjusted_rand(a: Clusters, b: Clusters) -> float:
     """Agreement of two clusterings, 1 if the same and 0 on average by chance.
 
     Source: L. Hubert, P. Arabie, "Comparing partitions", Journal of Classification 2, 1985, Eq. (5). Called for every
@@ -321,7 +321,7 @@ def adjusted_rand(a: Whole, b: Whole) -> float:
     return 1.0 if most == by_chance else (both - by_chance) / (most - by_chance)
 
 
-def _pairs(counts: Whole) -> float:
+def _pairs(counts: NDArray[np.intp]) -> float:
     return float((counts * (counts - 1)).sum()) / 2.0
 
 
@@ -368,9 +368,6 @@ def overlaps(a: Clusters, b: Clusters, n_rows: int) -> NDArray[np.intp]:
     return table
 
 
-Clusters = NDArray[np.intp]
-
-
 def agglomerative(distances: Array, n_clusters: int, min_members: int) -> Clusters:
     """Average linkage cut into `n_clusters`; clusters of fewer than `min_members` are none, -1."""
     clusters = cuts(average_linkage(distances), [min(n_clusters, len(distances))])[0]
@@ -380,10 +377,8 @@ def agglomerative(distances: Array, n_clusters: int, min_members: int) -> Cluste
 def hdbscan(distances: Array, n_clusters: int | None, min_members: int) -> Clusters:
     """Clusters of density that persist longest, none (-1) in between; their number is found.
 
-    Density needs a metric: that of the kernel's space, ``sqrt(2 - 2 K)``, from ``1 - K``.
-
-    Sources: R. Campello, D. Moulavi, J. Sander, "Density-based clustering based on hierarchical density estimates",
-    PAKDD 2013; the implementation is scikit-learn's.
+    Density needs a metric: that of the kernel's space, ``sqrt(2 - 2 K)``, from ``1 - K``. Source: R. Campello, D.
+    Moulavi, J. Sander, "Density-based clustering based on hierarchical density estimates", PAKDD 2013.
     """
     from sklearn.cluster import HDBSCAN
 
@@ -406,11 +401,7 @@ def without_small(clusters: Clusters, min_members: int) -> Clusters:
 
 
 def average_linkage(distances: Array) -> Array:
-    """Merges (n - 1, 4) of the two clusters whose mean distance is smallest, as SciPy's `linkage` gives them.
-
-    scikit-learn's ``AgglomerativeClustering(metric="precomputed", linkage="average")`` finds the same clusters, but a
-    tree can be cut many times.
-    """
+    """Merges (n - 1, 4) of the two clusters whose mean distance is smallest, as SciPy's `linkage` gives them."""
     return np.asarray(linkage(squareform(distances, checks=False), "average"))
 
 
