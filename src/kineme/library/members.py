@@ -86,7 +86,7 @@ def described_references(store: Store, ids: Ids, labels: NDArray[Any]) -> Refere
     return References.of(OnDemand(ids, partial(read.movements, store)), described(store, ids), labels)
 
 
-def some_members(members: Members, most: int) -> Members:
+def some_of_each(members: Members, most: int) -> Members:
     """Choose at most so many members of each symbol, evenly spaced."""
     ends = np.append(members.first, len(members.ids))
     rows = [start + evenly_spaced(stop - start, most) for start, stop in pairwise(ends)]
