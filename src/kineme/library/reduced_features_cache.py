@@ -105,12 +105,8 @@ def _layout(store: Store, n: int) -> tuple[list[tuple[type[Any], tuple[int, ...]
     parts: list[tuple[type[Any], tuple[int, ...]]] = [(np.int64, (n,))]
     for representation in store.specification.comparison.by_rows:
         k = min(N_REDUCED, representation.n_points)
-        parts += [
-            (np.float64, (representation.n_points, k)),
-            (np.float32, (n, d * k)),
-            (np.float32, (n,)),
-            (np.float32, (n,)),
-        ]
+        single = [(np.float32, shape) for shape in ((n, d * k), (n,), (n,))]
+        parts += [(np.float64, (representation.n_points, k)), *single]
     return parts, sum(_size(*part) for part in parts)
 
 
@@ -163,16 +159,9 @@ def _validity_key(store: Store, version: int) -> dict[str, Any]:
     """Cache validity key: the library, its specification, and its history, since a copy may have changed."""
     with store.reading() as connection:
         row = connection.execute("SELECT at FROM version WHERE id = ?", (version,)).fetchone()
-    described = zlib.crc32(json.dumps(store.specification.to_json()).encode())
-    at = row[0] if row else None
-    return {
-        "format": _FORMAT,
-        "library": store.id,
-        "seen": described,
-        "dims": store.n_dims,
-        "version": version,
-        "at": at,
-    }
+    described, at = zlib.crc32(json.dumps(store.specification.to_json()).encode()), row[0] if row else None
+    library = {"format": _FORMAT, "library": store.id, "seen": described, "dims": store.n_dims}
+    return {**library, "version": version, "at": at}
 
 
 def _load(store: Store, path: Path) -> ReducedMovements | None:
@@ -192,12 +181,9 @@ def _load(store: Store, path: Path) -> ReducedMovements | None:
         return None
     reduced = _arrays_in(store, buffer, n)
     plausible = (  # anybody can write a file with the right checksum
-        bool((reduced.ids == np.arange(1, len(reduced.ids) + 1)).all())
-        and all(bool(np.isfinite(P).all()) and np.allclose(P.T @ P, np.eye(P.shape[1])) for P in reduced.bases)
-        and all(bool(np.isfinite(part).all()) for features in reduced.blocks[0] for part in features)
-        and all(
-            bool((features.squares >= 0).all() and (features.residual_norms >= 0).all())
-            for features in reduced.blocks[0]
-        )
+        (reduced.ids == np.arange(1, n + 1)).all()
+        and all(np.isfinite(P).all() and np.allclose(P.T @ P, np.eye(P.shape[1])) for P in reduced.bases)
+        and all(np.isfinite(part).all() for features in reduced.blocks[0] for part in features)
+        and all((part >= 0).all() for features in reduced.blocks[0] for part in features[1:])
     )
     return reduced if plausible else None

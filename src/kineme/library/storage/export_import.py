@@ -28,15 +28,9 @@ from kineme.library.storage.verify import verify
 
 
 def export(store: Store, path: str | Path) -> Path:
-    """Write the library, with all its versions, to one new file, atomically.
+    """Write the library, with all its versions, to one new file, atomically; equal rows give equal bytes.
 
-    Libraries with the same rows give the same bytes.
-
-    Raises
-    ------
-    DataError
-        The file exists; the disk is full; the library's structure is damaged. Rows with a wrong checksum are copied as
-        they are: `verify` finds them, and `import_` refuses them.
+    Rows with a wrong checksum are copied as they are: `verify` finds them, and `import_` refuses them.
     """
     target = Path(path)
     with _new(target) as beside:

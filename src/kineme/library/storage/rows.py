@@ -128,13 +128,6 @@ def listed(values: Iterable[Any]) -> str:
     return json.dumps([value if isinstance(value, str) else int(value) for value in values])
 
 
-def retire(connection: sqlite3.Connection, table: str, rows: Sequence[Row], version: int) -> None:
-    """Mark rows, whose last column is ``removed``, as removed from `version` on."""
-    gone = [(*row[:-1], version) for row in rows]
-    statement = f"UPDATE {table} SET removed = ?, crc = ? WHERE id = ?"
-    connection.executemany(statement, [(version, seal(table, row), row[0]) for row in gone])
-
-
 def next_key(connection: sqlite3.Connection, table: str) -> int:
     """Return the key of the next row of a table; keys are never reused."""
     largest = connection.execute(f"SELECT max({COLUMNS[table][0]}) FROM {table}").fetchone()[0]

@@ -10,6 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from kineme.library.storage.rows import parsed
 from kineme.library.storage.store import Store
 from kineme.movements.channels.channel import recorded_names
 from kineme.movements.tables.layout import Known
@@ -72,8 +73,8 @@ def known_sources(store: Store) -> Known:
 def _choice(text: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return topics and frames among the options of a source; none of what is no such option."""
     try:
-        options = json.loads(text)
-    except (ValueError, RecursionError):
+        options = parsed(text)
+    except ValueError:
         return (), ()
     topics, frames = (options.get(name) if isinstance(options, dict) else None for name in ("topic", "frame"))
     return _names(topics), _names(frames)

@@ -137,12 +137,9 @@ class Specification:
 def _of_texts(recognizer: str, dmp_text: str) -> Specification:
     parameters, dmp = parsed(recognizer), parsed(dmp_text)
     parameters["representations"] = tuple(Representation(**fields) for fields in parameters["representations"])
-    if parameters.get("rotation_prior") is not None:
-        prior = parameters["rotation_prior"]
-        vertical = prior["vertical"]
-        parameters["rotation_prior"] = RotationPrior(
-            prior["concentration"], None if vertical is None else tuple(vertical), prior["tilt"]
-        )
+    if (prior := parameters.get("rotation_prior")) is not None:
+        vertical = None if prior["vertical"] is None else tuple(prior["vertical"])
+        parameters["rotation_prior"] = RotationPrior(**prior | {"vertical": vertical})
     if not isinstance(weights := parameters.get("weights", "auto"), str):
         parameters["weights"] = tuple(map(float, weights))
     normalization = Normalization(parameters.pop("translation", True), parameters.pop("scale", "path"))

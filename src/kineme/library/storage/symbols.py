@@ -123,30 +123,17 @@ def state_of(connection: sqlite3.Connection, who: str, version: int) -> Row:
 
 
 def _with_members(connection: sqlite3.Connection, moment: Moment, states: Sequence[Row]) -> list[Symbol]:
-    records = [dict(zip(COLUMNS["symbol_state"], row, strict=True)) for row in states]
-    keys = [record["symbol"] for record in records]
-    about = {
-        key: (name, created)
-        for key, name, created in select(connection, "symbol", among("key"), {"keys": listed(keys)})
-    }
+    keys = [row[1] for row in states]
+    about = {row[0]: row[1:] for row in select(connection, "symbol", among("key"), {"keys": listed(keys)})}
     if lost := set(keys) - about.keys():
         raise damaged("symbol", (min(lost),))
-    members = _members(connection, keys, moment)
-    parents = [tuple(parsed_column("symbol_state", row, "parents", list)) for row in states]
-    return [
-        Symbol(
-            about[record["symbol"]][0],
-            record["name"],
-            record["description"],
-            members[record["symbol"]],
-            record["prototype"],
-            record["threshold"],
-            above,
-            about[record["symbol"]][1],
-            record["added"],
-        )
-        for record, above in zip(records, parents, strict=True)
-    ]
+    members, every = _members(connection, keys, moment), []
+    for row in states:
+        _, key, name, description, prototype, threshold, _, added, _ = row
+        parents = tuple(parsed_column("symbol_state", row, "parents", list))
+        id_, created = about[key]
+        every.append(Symbol(id_, name, description, members[key], prototype, threshold, parents, created, added))
+    return every
 
 
 def _members(connection: sqlite3.Connection, keys: list[int], moment: Moment) -> dict[int, NDArray[np.int64]]:
