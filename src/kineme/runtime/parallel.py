@@ -76,35 +76,27 @@ def single_threaded_blas() -> Iterator[None]:
 
 def _limit() -> Any:
     """Set BLAS to one thread; return the limiter that restores the former number."""
-    controller = _blas_controller()
-    with _control(controller):
+    with _control() as controller:
         return controller.limit(limits=1, user_api="blas")
 
 
 def _restore(limiter: Any) -> None:
-    with _control(_blas_controller()):
+    with _control():
         limiter.restore_original_limits()
 
 
 @contextmanager
-def _control(controller: Any) -> Iterator[None]:
+def _control() -> Iterator[Any]:
     """Let the calling thread set limits; from threadpoolctl 3.7 on, only the first thread that tries may."""
-    libraries = [
-        lib_controller
-        for lib_controller in controller.lib_controllers
-        if hasattr(lib_controller, "clear_controlling_thread")
-    ]
+    controller = _controller("scipy.linalg" in sys.modules)
+    libraries = [library for library in controller.lib_controllers if hasattr(library, "clear_controlling_thread")]
     for library in libraries:
         library.clear_controlling_thread(force=True)
     try:
-        yield
+        yield controller
     finally:
         for library in libraries:
             library.clear_controlling_thread(force=True)
-
-
-def _blas_controller() -> Any:
-    return _controller("scipy.linalg" in sys.modules)
 
 
 @cache

@@ -142,13 +142,7 @@ def channels_to_data(channels: Channels) -> list[dict[str, Any]]:
 
 
 def channels_from_data(data: Any, n_dims: int) -> Channels:
-    """The inverse, of movements of so many dimensions.
-
-    Raises
-    ------
-    ValueError, TypeError, KeyError, AttributeError
-        What is no list of channels of so many coordinates; callers name the file.
-    """
+    """The inverse, of movements of so many dimensions; callers name the file that holds anything else."""
     channels = tuple(_channel(fields) for fields in data)
     if sum(len(channel.coordinates) for channel in channels) != n_dims:
         raise ValueError(f"channels should have {n_dims} coordinates")

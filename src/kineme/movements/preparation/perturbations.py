@@ -120,12 +120,9 @@ def warped_phase(log_speeds: Array, n_samples: int) -> Array:
 
 def _rotations(n: int, d: int, angle: float, random: np.random.Generator) -> Array:
     """Rotation matrices (n, d, d) by angles uniform in +-angle."""
-    angles = random.uniform(-angle, angle, n)
-    if d == 2:
-        c, s = np.cos(angles), np.sin(angles)
-        return np.stack((np.stack((c, -s), -1), np.stack((s, c), -1)), -2)
     from scipy.spatial.transform import Rotation
 
-    axes = random.normal(size=(n, 3))
+    angles = random.uniform(-angle, angle, n)
+    axes = random.normal(size=(n, 3)) if d == 3 else np.tile([0.0, 0.0, 1.0], (n, 1))
     axes *= (angles / np.linalg.norm(axes, axis=1))[:, None]
-    return np.asarray(Rotation.from_rotvec(axes).as_matrix())
+    return np.asarray(Rotation.from_rotvec(axes).as_matrix()[:, :d, :d])

@@ -84,14 +84,9 @@ class Step(Protocol):
 
 def check_steps(steps: Iterable[Step]) -> tuple[Step, ...]:
     """Refuse anything but an iterable of steps; the class of a step, without parentheses, is not a step."""
-    try:
-        checked = tuple(steps)
-    except TypeError:
-        raise SpecificationError(
-            f"expected a tuple of steps such as (kineme.TrimRest(), kineme.Smooth()), got {steps!r}"
-        ) from None
+    checked = tuple(steps) if isinstance(steps, Iterable) else ()
     wrong = [step for step in checked if isinstance(step, type) or not callable(getattr(step, "apply", None))]
-    if wrong:
+    if wrong := wrong if isinstance(steps, Iterable) else [steps]:
         raise SpecificationError(
             f"expected a tuple of steps such as (kineme.TrimRest(), kineme.Smooth()), got {wrong[0]!r}"
         )
