@@ -25,7 +25,6 @@ from kineme.validation import Array, check_count, check_number
 _LARGEST = 5000  # movements compared at once
 _STABLE = 0.75  # a valid cluster to Hennig (2007)
 
-_REPEATS = 20
 _REACH = 0.6  # share of the typical distance to another symbol, where no two movements show one symbol
 
 
@@ -137,7 +136,7 @@ def _clustered(
     ordered = without_small(cut(distances), min_members)
     clusters = np.empty(len(described), dtype=np.intp)
     clusters[order] = ordered
-    stable = stabilities(distances, ordered, cut, _REPEATS)
+    stable = stabilities(distances, ordered, cut)
     return K, describe_clusters(K, clusters, stable, comparison.similarity.widths)
 
 
@@ -297,7 +296,7 @@ def _in_two(name: Any, described: Described, indices: NDArray[np.intp], widths: 
         return cuts(average_linkage(distances), [2])[0]
 
     halves = halve(1.0 - K)
-    stability = float(stabilities(1.0 - K, halves, halve, _REPEATS).min())
+    stability = float(stabilities(1.0 - K, halves, halve).min())
     a, b = K[halves == 0], K[halves == 1]
     between = float(a[:, halves == 1].mean())
     within = _mean_within(a[:, halves == 0]) * _mean_within(b[:, halves == 1])

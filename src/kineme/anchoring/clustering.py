@@ -45,9 +45,8 @@ def fuse(squares: Array, weights: ArrayLike | None = None) -> Array:
     representations. W is the mean of the P_r, added up over 7 and 15 neighbors: few for classes of a few movements, and
     many so that the movements of several people connect. Means are weighted.
 
-    - `squares` (R, n, n): squared distances, for at least three movements. Representations in which no two differ are
-      left out.
-    - `weights` (R,): of the representations in each mean, above 0; equal by default.
+    `squares` (R, n, n) are of at least three movements; representations in which no two differ are left out. `weights`
+    (R,) are above 0, and equal by default.
     """
     differ, weights = _differing(squares, weights)
     return np.asarray(sum(_fused(differ, weights, neighbors) for neighbors in NEIGHBORS))
@@ -158,9 +157,8 @@ def _diffused(sparse: csr_array, full: Array) -> Array:
 def count_by_eigengap(similar: Array) -> int:
     """The number of clusters c, from 2 to n / 2, with the largest gap between the c-th and the next eigenvalue.
 
-    Of the normalized similarities ``D^-1/2 W D^-1/2``. With c clusters that nothing connects, c eigenvalues are 1.
-
-    `similar` (n, n): symmetric similarities W of at least three movements, at least 0, and 0 on the diagonal.
+    Of the normalized similarities ``D^-1/2 W D^-1/2`` of at least three movements, with W as `fuse` gives it. With c
+    clusters that nothing connects, c eigenvalues are 1.
     """
     n = len(similar)
     values = eigh(_normalized(similar), eigvals_only=True)[::-1]
@@ -224,7 +222,7 @@ _SLACK = 0.05  # of the adjusted Rand index: a number of clusters this close to 
 _AT_ONCE = 60  # numbers of clusters tried at a time
 
 
-def count_clusters(distances: Array, repeats: int = 20, seed: int = 0) -> int:
+def count_clusters(distances: Array) -> int:
     """The number of clusters c of an average-linkage tree.
 
     The stability of c is the mean adjusted Rand index between the c clusters of all movements and those of random
@@ -243,20 +241,20 @@ def count_clusters(distances: Array, repeats: int = 20, seed: int = 0) -> int:
     most = max(2, n // 2)
     tried = np.geomspace(2, most, _AT_ONCE) if most > _AT_ONCE else np.arange(2.0, most + 1)
     counts = np.unique(tried.round().astype(np.intp))
-    best = _best(distances, tree, counts, repeats, seed)
+    best = _best(distances, tree, counts)
     k = int(np.searchsorted(counts, best))
     low, high = counts[max(k - 1, 0)], counts[min(k + 1, len(counts) - 1)]
     if high - low <= 2:
         return best
     around = np.append(np.linspace(low, high, _AT_ONCE).round().astype(np.intp), best)
-    return _best(distances, tree, np.unique(around), repeats, seed)
+    return _best(distances, tree, np.unique(around))
 
 
-def _best(distances: Array, tree: Array, counts: NDArray[np.intp], repeats: int, seed: int) -> int:
+def _best(distances: Array, tree: Array, counts: NDArray[np.intp]) -> int:
     fine_first = counts[::-1].tolist()
     clusterings = cuts(tree, fine_first)
     fits = mean_silhouettes(distances, clusterings)
-    parts = subsets(len(distances), repeats, seed)
+    parts = subsets(len(distances))
     agreement = np.mean([_agreement(distances, clusterings, fine_first, chosen) for chosen in parts], axis=0)
     fits[agreement < agreement.max() - _SLACK] = -np.inf
     return int(fine_first[int(np.argmax(fits))])
@@ -309,10 +307,9 @@ def _agreement(distances: Array, clusterings: list[Clusters], counts: list[int],
 
 
 def adjusted_rand(a: Clusters, b: Clusters) -> float:
-    """Agreement of two clusterings, 1 if the same and 0 on average by chance.
+    """Agreement of two clusterings, 1 if the same and 0 on average by chance, in one pass for it is often called.
 
-    Source: L. Hubert, P. Arabie, "Comparing partitions", Journal of Classification 2, 1985, Eq. (5). Called for every
-    number of clusters and every subset, so it is counted here in one pass.
+    Source: L. Hubert, P. Arabie, "Comparing partitions", Journal of Classification 2, 1985, Eq. (5).
     """
     table = np.bincount(a * (int(b.max()) + 1) + b)
     both, in_a, in_b = (_pairs(counts) for counts in (table, np.bincount(a), np.bincount(b)))
@@ -325,31 +322,25 @@ def _pairs(counts: NDArray[np.intp]) -> float:
     return float((counts * (counts - 1)).sum()) / 2.0
 
 
-_SHARE = 0.8  # of the movements in each subset
+_SHARE, _REPEATS = 0.8, 20  # of the movements in each subset, and the number of subsets
 
 
-def subsets(n: int, repeats: int, seed: int) -> Iterator[NDArray[np.intp]]:
+def subsets(n: int) -> Iterator[NDArray[np.intp]]:
     """Random subsets of four fifths of n movements, in rising order."""
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(0)
     size = max(2, round(_SHARE * n))
-    for _ in range(repeats):
+    for _ in range(_REPEATS):
         yield np.sort(random.choice(n, size, replace=False))
 
 
-def stabilities(
-    distances: Array, clusters: Clusters, again: Callable[[Array], Clusters], repeats: int, seed: int = 0
-) -> Array:
-    """Mean, over subsets, of each cluster's largest Jaccard coefficient with a cluster found there.
+def stabilities(distances: Array, clusters: Clusters, again: Callable[[Array], Clusters]) -> Array:
+    """Mean (c,), over subsets, of each cluster's largest Jaccard coefficient with one that `again` makes of a subset.
 
-    - `distances` (n, n).
-    - `clusters` (n,): 0, 1, ...; -1 is none.
-    - `again`: from distances (m, m) of a subset to its clusters.
-
-    Returns (c,): from 0 to 1; Hennig takes 0.75 for a valid, stable cluster, and below 0.5 for none.
+    Hennig takes 0.75 for a valid, stable cluster, and below 0.5 for none.
     """
     c = int(clusters.max(initial=-1)) + 1
-    coefficients = np.full((repeats, c), np.nan)
-    for b, chosen in enumerate(subsets(len(distances), repeats, seed)):
+    coefficients = np.full((_REPEATS, c), np.nan)
+    for b, chosen in enumerate(subsets(len(distances))):
         own, other = clusters[chosen], again(distances[np.ix_(chosen, chosen)])
         table = overlaps(own, other, c)
         sizes = np.bincount(own[own >= 0], minlength=c)
