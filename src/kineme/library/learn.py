@@ -31,8 +31,7 @@ from kineme.library.commit import (
     serialize_new,
     stored_times,
 )
-from kineme.library.storage.channels import other_columns
-from kineme.library.storage.read import count
+from kineme.library.storage.channels import columns_of_kinds
 from kineme.library.storage.source import Source
 from kineme.library.storage.store import Store
 from kineme.library.storage.symbols import check_name
@@ -190,7 +189,7 @@ def _check_channels(store: Store, demos: Demonstrations) -> None:
 
 def _others(store: Store) -> str:
     """Return the movements that new ones must be like; a library that is empty now keeps its earlier versions."""
-    return "all others" if count(store) else "those of earlier versions, which can be restored,"
+    return "all others" if store.counts.movements else "those of earlier versions, which can be restored,"
 
 
 def _as_names(demos: Demonstrations, what: str, given: Any) -> list[str | None]:
@@ -284,10 +283,8 @@ def _other_columns(demos: Demonstrations) -> list[bytes] | None:
     recorded, channels = demos.movements.recorded, demos.channels or ()
     if recorded is None:
         return None
-    others = other_columns(channels)
-    kinds = [channel.kind for channel in channels for _ in channel.columns]
-    steps = recorded[:, [k for k in others if kinds[k] == "discrete"]].astype(np.float32)
-    turned = recorded[demos.offsets[:-1]][:, [k for k in others if kinds[k] == "orientation"]].round(_DECIMALS) + 0.0
+    steps = recorded[:, columns_of_kinds(channels, "discrete")].astype(np.float32)
+    turned = recorded[demos.offsets[:-1]][:, columns_of_kinds(channels, "orientation")].round(_DECIMALS) + 0.0
     return [
         start.tobytes() + steps[a:b].tobytes() for start, (a, b) in zip(turned, pairwise(demos.offsets), strict=True)
     ]

@@ -48,7 +48,7 @@ def members_of(store: Store) -> Members:
             ) from error
         if not len(pairs):
             raise SpecificationError(
-                f"expected a library with movements that show a symbol, got none among its {read.count(store)}; "
+                f"expected a library with movements that show a symbol, got none among its {store.counts.movements}; "
                 "learn some with labels, or name a proposal"
             )
         keys, which = np.unique(pairs[:, 1], return_inverse=True)

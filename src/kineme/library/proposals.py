@@ -149,9 +149,8 @@ class Recognized:
 
 def some_members(store: Store) -> Members | None:
     """Choose at most 3000 members of symbols, equally many of each; None without any."""
-    with store.reading() as connection:
-        if not store.moment(connection).members:
-            return None
+    if not store.counts.members:
+        return None
     members = members_of(store)
     return some_of_each(members, max(1, _MOST // len(members.names)))
 

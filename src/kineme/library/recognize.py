@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from kineme.library.calibration_cache import calibrated, calibrated_once, sample_comparison
 from kineme.library.members import Members, described_references, members_of, some_of_each
-from kineme.library.reduced_features_cache import ReducedMovements, open_cache, updated
+from kineme.library.reduced_features_cache import ReducedMovements, open_cache
 from kineme.library.storage import read
 from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store
@@ -79,8 +79,7 @@ class LibraryRecognizer:
                     calibrate_by = partial(calibrated_once, self.store, members)
                     self._current = Current(version, members.ids, known_members(self.store, members, calibrate_by))
                 else:
-                    reduced = open_cache(self.store) if self._reduced is None else updated(self.store, self._reduced)
-                    self._reduced = reduced
+                    reduced = self._reduced = open_cache(self.store, self._reduced)
                     self._current = Current(version, reduced.ids, two_stages(self.store, reduced, members))
             return self._current
 

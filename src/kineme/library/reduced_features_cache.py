@@ -51,14 +51,16 @@ class ReducedMovements:
         return np.searchsorted(self.ids, ids)
 
 
-def open_cache(store: Store) -> ReducedMovements:
-    """Return reduced features of all movements ever stored: from the cache, and computed for those not in it."""
+def open_cache(store: Store, held: ReducedMovements | None = None) -> ReducedMovements:
+    """Return reduced features of all movements ever stored: held or in the cache, and computed for those not in it."""
     path = store.folder / FILE
-    reduced = _load(store, path)
+    reduced = held or _load(store, path)
     last = int(reduced.ids[-1]) if reduced is not None else -1
     later = _ids_after(store, last)
-    if reduced is not None and len(later) <= max(_FEW, _GROWN * len(reduced.ids)):
+    if reduced is not None and len(later) <= max(_FEW, _GROWN * len(reduced.blocks[0][0].values)):
         return reduced if not len(later) else extended(store, reduced, later)
+    if held is not None:
+        return open_cache(store)
     everything = _ids_after(store, -1)
     if not store.read_only:
         with suppress(OSError):  # disk full or no permission: kept in memory only
@@ -77,14 +79,6 @@ def extended(store: Store, reduced: ReducedMovements, later: Ids) -> ReducedMove
         pairs = zip(reduced.blocks[1], new, strict=True)
         new = tuple(ReducedFeatures(*map(np.concatenate, zip(*pair, strict=True))) for pair in pairs)
     return ReducedMovements(np.concatenate((reduced.ids, later)), reduced.bases, (reduced.blocks[0], new))
-
-
-def updated(store: Store, reduced: ReducedMovements) -> ReducedMovements:
-    """Return the same brought up to date with the library."""
-    later = _ids_after(store, int(reduced.ids[-1]))
-    if len(later) > max(_FEW, _GROWN * len(reduced.blocks[0][0].values)):
-        return open_cache(store)
-    return extended(store, reduced, later) if len(later) else reduced
 
 
 def _ids_after(store: Store, key: int) -> Ids:

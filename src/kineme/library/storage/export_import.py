@@ -108,11 +108,8 @@ def _check_structure(beside: Path, source: Path, wait: float) -> None:
 
 
 def _check(beside: Path, source: Path, wait: float) -> None:
-    store = Store(beside, read_only=True, wait=wait)
-    try:
+    with closing(Store(beside, read_only=True, wait=wait)) as store:
         problems = verify(store, pages=False)
-    finally:
-        store.close()
     if problems:
         raise _refusal(source, len(problems), str(problems[0]))
 

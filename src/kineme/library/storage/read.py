@@ -39,12 +39,6 @@ def unlabeled_ids(store: Store) -> Ids:
     return _ids(store, without, lambda moment: moment.movements - moment.members)
 
 
-def count(store: Store) -> int:
-    """Return the number of movements."""
-    with store.reading() as connection:
-        return store.moment(connection).movements
-
-
 def _ids(store: Store, where: str, count_at: Callable[[Moment], int]) -> Ids:
     """Return ids of movements, ascending; refused if their number is not that of the moment."""
     with store.reading() as connection:

@@ -118,9 +118,9 @@ def row_name(table: str, key: Any) -> str:
     return f"{of_movement[table]} of movement {key}" if table in of_movement else f"row {key} of table {table}"
 
 
-def among(column: str, name: str = "keys") -> str:
-    """Return SQL condition that `column` is in the list that is passed as parameter `name`, see `listed`."""
-    return f"{column} IN (SELECT value FROM json_each(:{name}))"
+def among(column: str) -> str:
+    """Return SQL condition that `column` is in the list that is passed as parameter ``keys``, see `listed`."""
+    return f"{column} IN (SELECT value FROM json_each(:keys))"
 
 
 def listed(values: Iterable[Any]) -> str:

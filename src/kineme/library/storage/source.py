@@ -75,11 +75,8 @@ def _choice(text: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
     try:
         options = parsed(text)
     except ValueError:
-        return (), ()
-    topics, frames = (options.get(name) if isinstance(options, dict) else None for name in ("topic", "frame"))
-    return _names(topics), _names(frames)
-
-
-def _names(value: object) -> tuple[str, ...]:
-    several = [value] if isinstance(value, str) else value if isinstance(value, list) else []
-    return tuple(name for name in several if isinstance(name, str))
+        options = None
+    chosen = [options.get(name) if isinstance(options, dict) else None for name in ("topic", "frame")]
+    several = ([value] if isinstance(value, str) else value if isinstance(value, list) else [] for value in chosen)
+    topics, frames = (tuple(name for name in names if isinstance(name, str)) for names in several)
+    return topics, frames

@@ -39,24 +39,12 @@ class Recognizes(Compares, Protocol):
 
 @dataclass(frozen=True)
 class Specification:
-    """Specification of how the movements of a library are compared and recognized, and how they move again.
-
-    Attributes
-    ----------
-    comparison : ComparisonSpecification
-        What features are, and how they are compared.
-    classifier : str
-        As of `kineme.Recognizer`.
-    weights : str or tuple of R float
-        Of the representations, as of `kineme.Recognizer`.
-    dmp : DMP
-        Of the primitives.
-    """
+    """Specification of how the movements of a library are compared and recognized, and how they move again."""
 
     comparison: ComparisonSpecification = field(default_factory=ComparisonSpecification)
-    classifier: str = "auto"
+    classifier: str = "auto"  # this and the weights of the representations as of `kineme.Recognizer`
     weights: str | tuple[float, ...] = "auto"
-    dmp: DMP = field(default_factory=DMP)
+    dmp: DMP = field(default_factory=DMP)  # of the primitives
 
     def __post_init__(self) -> None:
         from kineme.recognition.classifiers import CLASSIFIERS

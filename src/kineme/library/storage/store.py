@@ -196,6 +196,12 @@ class Store:
             raise damaged("version", (last,))
         return Moment(last, *rows[0][4:])
 
+    @property
+    def counts(self) -> Moment:
+        """The shown version, and its numbers of movements, members and symbols."""
+        with self.reading() as connection:
+            return self.moment(connection)
+
     @contextmanager
     def writing(self, action: str, detail: dict[str, Any] | None = None) -> Iterator[Change]:
         """Context manager: one transaction, which becomes one version; its `detail` is stored in the history."""

@@ -84,12 +84,6 @@ def symbols(store: Store) -> tuple[Symbol, ...]:
         return tuple(sorted(_with_members(connection, moment, states), key=lambda symbol: symbol.name))
 
 
-def count(store: Store) -> int:
-    """Return the number of symbols, whose members are not read."""
-    with store.reading() as connection:
-        return store.moment(connection).symbols
-
-
 def symbol(store: Store, who: str) -> Symbol:
     """Return the symbol of that name or id."""
     with store.reading() as connection:
@@ -203,7 +197,10 @@ def symbol_report(store: Store, who: str) -> dict[str, Any]:
     members = []
     if len(shown):
         about = records(store, shown.members)
-        files = _files(store, sorted({record["source"] for record in about if record["source"] is not None}))
+        keys = {record["source"] for record in about if record["source"] is not None}
+        with store.reading() as connection:
+            rows = select(connection, "source", among("id"), {"keys": listed(keys)})
+        files = {row[0]: row[COLUMNS["source"].index("path")] for row in rows}
         people = groups(store, shown.members).tolist()
         for record, movement, person in zip(about, movements(store, shown.members), people, strict=True):
             members.append(
@@ -227,11 +224,3 @@ def symbol_report(store: Store, who: str) -> dict[str, Any]:
         "parents": list(shown.parents),
         "members": members,
     }
-
-
-def _files(store: Store, keys: list[int]) -> dict[int, str]:
-    """Return the key of a source -> its path, as given."""
-    with store.reading() as connection:
-        rows = select(connection, "source", among("id"), {"keys": listed(keys)})
-    path = COLUMNS["source"].index("path")
-    return {row[0]: row[path] for row in rows}

@@ -67,14 +67,13 @@ def _are(kind: type, values: Any) -> bool:
 def _not_finite(rows: Sequence[Row], *kinds: Any) -> Strange:
     """Find rows with numbers that are not finite; `kinds` are the types of the columns behind the key."""
     for column, kind in enumerate(kinds, start=1):
+        if not _finite([row[column] for row in rows], kind):
+            yield from ((row[0], "numbers that are not finite") for row in rows if not _finite([row[column]], kind))
 
-        def finite(blobs: Sequence[bytes], kind: Any = kind) -> bool:
-            blob = b"".join(blobs)
-            return len(blob) % np.dtype(kind).itemsize == 0 and bool(np.isfinite(np.frombuffer(blob, kind)).all())
 
-        sizes_fit = all(len(row[column]) % np.dtype(kind).itemsize == 0 for row in rows)
-        if not (sizes_fit and finite([row[column] for row in rows])):
-            yield from ((row[0], "numbers that are not finite") for row in rows if not finite([row[column]]))
+def _finite(blobs: Sequence[bytes], kind: Any) -> bool:
+    fit = all(len(blob) % np.dtype(kind).itemsize == 0 for blob in blobs)
+    return fit and bool(np.isfinite(np.frombuffer(b"".join(blobs), kind)).all())
 
 
 #: Table -> the check of its contents.
