@@ -52,7 +52,15 @@ def collect_trajectories(trajectories: Sequence[Trajectory]) -> Movements:
     times = np.concatenate([trajectory.times for trajectory in trajectories])
     labels = [trajectory.label for trajectory in trajectories]
     labeled = any(label is not None for label in labels)
-    channels, recorded = _channels_of(trajectories)
+    channels, dimensions, recorded = trajectories[0].channels, None, None
+    if channels is None or any(trajectory.channels != channels for trajectory in trajectories):
+        channels = None
+    else:
+        dimensions = learned_names(channels)
+        if len(dimensions) != positions.shape[1]:  # of movements that are still as recorded
+            dimensions = recorded_names(channels)
+        if not is_plain(channels):
+            recorded = np.concatenate([trajectory.recorded for trajectory in trajectories])
     return Movements(
         positions,
         offsets,
@@ -60,7 +68,7 @@ def collect_trajectories(trajectories: Sequence[Trajectory]) -> Movements:
         times,
         label_array(labels, len(labels), names) if labeled else None,
         names if any(names) else None,
-        None if channels is None else _names_of(channels, positions.shape[1]),
+        dimensions,
         channels,
         recorded,
     )
@@ -91,22 +99,6 @@ def _as_first(trajectory: Trajectory, ours: Columns, channels: Channels, wanted:
     recorded = movement.positions if movement.recorded is None else movement.recorded
     changed = {"positions": movement.positions, "channels": channels, "recorded": recorded}
     return unchecked(**vars(trajectory) | changed)
-
-
-def _names_of(channels: Channels, n_dims: int) -> tuple[str, ...]:
-    """Names of the coordinates, or of the columns of movements that are still as recorded."""
-    names = learned_names(channels)
-    return names if len(names) == n_dims else recorded_names(channels)
-
-
-def _channels_of(trajectories: Sequence[Trajectory]) -> tuple[Channels | None, Array | None]:
-    """The channels that all share, and what was recorded; (None, None) if they differ."""
-    channels = trajectories[0].channels if trajectories else None
-    if channels is None or any(trajectory.channels != channels for trajectory in trajectories):
-        return None, None
-    return channels, None if is_plain(channels) else np.concatenate(
-        [trajectory.recorded for trajectory in trajectories]
-    )
 
 
 def collect_arrays(

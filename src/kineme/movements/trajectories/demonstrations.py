@@ -397,11 +397,9 @@ def _parse(frame: Any, i: int, layout: Layout) -> Parsed:
     if not is_data_frame(frame):
         raise TrajectoryError(f"expected data frames, got {type(frame).__name__} at index {i}; pass them one by one")
     try:
-        detected, block, left_out = parse_data_frame(frame, layout)
-        detected, block = in_one_unit(detected, block)
+        return Parsed(*in_one_unit(*parse_data_frame(frame, layout)[:2]))
     except DataError as error:
         raise TrajectoryError(f"data frame {i}: {error} (of Demonstrations.from_dataframe)") from error
-    return Parsed(detected, block, left_out)
 
 
 class MovementSequence(Presented):
