@@ -1,9 +1,7 @@
-"""Work over row tiles in a few threads.
+"""Work over row tiles in a few threads, in a short-lived pool that survives forks and concurrent callers.
 
-Compiled kernels are single-threaded and release the GIL; parallelism is a short-lived thread pool,
-which survives forks and concurrent callers, unlike Numba's own parallel layers. While the pool
-works, the BLAS library is held to one thread per caller: two tiles side by side beat one tile
-split in two, because a tile stays in one core's cache.
+While the pool works, the BLAS library is held to one thread per caller: two tiles side by side beat one tile split in
+two, because a tile stays in one core's cache.
 """
 
 from __future__ import annotations
