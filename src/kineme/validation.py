@@ -25,11 +25,8 @@ MOST_NUMBERS = 50_000_000  # samples times basis functions of one movement: matr
 #: Range of positions and extents, in the movement's unit: their squares, and accelerations, stay finite.
 LARGEST_POSITION, SMALLEST_EXTENT = LARGEST, 1 / LARGEST
 SHORTEST_STEP, LARGEST_STAMP = 1e-50, 1e50  # seconds
-_EPS = np.finfo(np.float64).eps
-_NEAR_ZERO = 1e4 * SHORTEST_STEP / _EPS  # beyond it, different stamps are always far enough apart
-_SMALL_POSITION = SMALLEST_EXTENT / _EPS  # beyond it, no extent can be too small
+_SMALL_POSITION = SMALLEST_EXTENT / np.finfo(np.float64).eps  # beyond it, no extent can be too small
 _FLOAT64 = np.dtype(np.float64)
-_STAMPS_AT_ONCE = 16_384  # temporaries stay in the cache
 
 
 def describe(index: int, names: Sequence[str | None] | None) -> str:
@@ -67,13 +64,7 @@ def too_long_integer(values: Any) -> int | None:
 
 
 def as_numbers(values: ArrayLike, who: str, expected: str = "an array of numbers") -> Array:
-    """Anything that NumPy converts to numbers, as float64; complex numbers are refused, also inside lists.
-
-    Raises
-    ------
-    TrajectoryError
-        Values that are not numbers, or complex numbers in an array, a list or an array of objects.
-    """
+    """Anything that NumPy converts to numbers, as float64; complex numbers are refused, also inside lists."""
     if _is_float64(values):
         return values
     refuse_lossy(values, who)
@@ -142,16 +133,11 @@ def check_finite(values: Array, offsets: NDArray[np.intp], names: Sequence[str |
 def check_times(times: Array, offsets: NDArray[np.intp], names: Sequence[str | None] | None) -> None:
     """Refuse concatenated time stamps (total,) that do not strictly increase within each movement."""
     check_finite(times, offsets, names, "times")
-    between = times[offsets[1:-1]] - times[offsets[1:-1] - 1]  # from one movement to the next
-    if _count_short_steps(times) == np.count_nonzero(between < SHORTEST_STEP):
+    short = np.diff(times) < SHORTEST_STEP
+    short[offsets[1:-1] - 1] = False  # from one movement to the next
+    if not short.any():
         return
-    increasing = times[1:] > times[:-1]  # a pass without a temporary as large as the stamps
-    near = np.flatnonzero((times[:-1] < _NEAR_ZERO) & (times[:-1] > -_NEAR_ZERO))
-    increasing[near] = times[near + 1] - times[near] >= SHORTEST_STEP
-    increasing[offsets[1:-1] - 1] = True  # from one movement to the next
-    if increasing.all():
-        return
-    row = int(np.argmin(increasing)) + 1
+    row = int(np.argmax(short)) + 1
     i = int(np.searchsorted(offsets, row, side="right")) - 1
     k = row - offsets[i]
     if times[row] > times[row - 1]:
@@ -164,12 +150,6 @@ def check_times(times: Array, offsets: NDArray[np.intp], names: Sequence[str | N
         f"{describe(i, names)}: expected strictly increasing times, got {problem} stamps "
         f"{times[row - 1]:.9g} and {times[row]:.9g} at samples {k - 1} and {k}; sort the samples and drop repeated ones"
     )
-
-
-def _count_short_steps(times: Array) -> int:
-    """Count the stamps (total,) that follow the one before by less than `SHORTEST_STEP`."""
-    blocks = (times[i : i + _STAMPS_AT_ONCE + 1] for i in range(0, len(times), _STAMPS_AT_ONCE))
-    return sum(int(np.count_nonzero(np.diff(block) < SHORTEST_STEP)) for block in blocks)
 
 
 def too_small(positions: Array, offsets: NDArray[np.intp]) -> list[tuple[int, float]]:

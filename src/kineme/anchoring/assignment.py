@@ -25,7 +25,6 @@ from kineme.validation import Array, check_count, check_number
 _LARGEST = 5000  # movements compared at once
 _STABLE = 0.75  # a valid cluster to Hennig (2007)
 
-_REPEATS = 20
 _REACH = 0.6  # share of the typical distance to another symbol, where no two movements show one symbol
 
 
@@ -137,7 +136,7 @@ def _clustered(
     ordered = without_small(cut(distances), min_members)
     clusters = np.empty(len(described), dtype=np.intp)
     clusters[order] = ordered
-    stable = stabilities(distances, ordered, cut, _REPEATS)
+    stable = stabilities(distances, ordered, cut)
     return K, describe_clusters(K, clusters, stable, comparison.similarity.widths)
 
 
@@ -151,11 +150,7 @@ def agreement(comparison: Comparison, references: References) -> float:
     some = evenly_spaced(len(references), 500)
     described, labels = references.described.take(some), references.labels[some]
     K = compare(comparison.similarity, described, described)
-    np.fill_diagonal(K, 0.0)
-    member = np.unique(labels, return_inverse=True)[1]
-    H = (member[:, None] == np.arange(member.max() + 1)).astype(float)
-    sums, counts = H.T @ K @ H, H.sum(axis=0)
-    means = sums / np.maximum(np.outer(counts, counts) - np.diag(counts), 1.0)
+    means, counts = _mean_similarities(K, np.unique(labels, return_inverse=True)[1])
     others = np.where(np.eye(len(counts), dtype=bool), -1.0, means).max(axis=1)
     apart = float(np.median(others)) if len(counts) > 1 else 0.0
     several = counts > 1
@@ -164,6 +159,14 @@ def agreement(comparison: Comparison, references: References) -> float:
     nearest = np.where(labels[:, None] == labels, 0.0, K).max(axis=1)
     reach = _REACH * in_widths(np.log(np.maximum(nearest, np.finfo(float).tiny)))
     return float(np.exp(-0.5 * np.median(reach) ** 2))
+
+
+def _mean_similarities(K: Array, member: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]]:
+    """Mean of different members of each two symbols (c, c), and the numbers of members; the diagonal of K becomes 0."""
+    np.fill_diagonal(K, 0.0)
+    counts = np.bincount(member)
+    H = (member[:, None] == np.arange(len(counts))).astype(float)
+    return H.T @ K @ H / np.maximum(np.outer(counts, counts) - np.diag(counts), 1), counts
 
 
 def _at(indices: NDArray[np.intp], proposals: Proposals, n: int) -> Proposals:
@@ -231,10 +234,7 @@ def suggest_merges(
     if len(names) < 2:
         return ()
     chosen = _some_of_each(member, max(3, _LARGEST // len(names)))
-    K, own = similarities(described.take(chosen), widths=widths), member[chosen]
-    counts = np.bincount(own)
-    H = (own[:, None] == np.arange(len(names))).astype(float)
-    means = (H.T @ K @ H - np.diag(counts)) / np.maximum(np.outer(counts, counts) - np.diag(counts), 1)
+    means, counts = _mean_similarities(similarities(described.take(chosen), widths=widths), member[chosen])
     several = counts > 1
     typical = float(np.median(np.diag(means)[several])) if several.any() else 1.0
     within = np.maximum(np.where(several, np.diag(means), typical), np.finfo(float).tiny)
@@ -296,7 +296,7 @@ def _in_two(name: Any, described: Described, indices: NDArray[np.intp], widths: 
         return cuts(average_linkage(distances), [2])[0]
 
     halves = halve(1.0 - K)
-    stability = float(stabilities(1.0 - K, halves, halve, _REPEATS).min())
+    stability = float(stabilities(1.0 - K, halves, halve).min())
     a, b = K[halves == 0], K[halves == 1]
     between = float(a[:, halves == 1].mean())
     within = _mean_within(a[:, halves == 0]) * _mean_within(b[:, halves == 1])
@@ -329,10 +329,5 @@ def _labeled(
 
 def _some_of_each(member: NDArray[np.intp], most: int) -> NDArray[np.intp]:
     """At most so many evenly spaced movements of each symbol."""
-    order = np.argsort(member, kind="stable")
-    counts = np.bincount(member)
-    rank = np.arange(len(member)) - np.repeat(np.cumsum(counts) - counts, counts)
-    total = np.repeat(counts, counts)
-    # The k-th of m is kept where floor(k most / m) steps up: exactly `most` of them, evenly spaced.
-    chosen = (total <= most) | (((rank + 1) * most) // total > (rank * most) // total)
-    return np.sort(order[chosen])
+    of_symbols = np.split(np.argsort(member, kind="stable"), np.cumsum(np.bincount(member))[:-1])
+    return np.sort(np.concatenate([own[evenly_spaced(len(own), most)] for own in of_symbols]))

@@ -23,6 +23,8 @@ from scipy.spatial.distance import squareform
 
 from kineme.validation import Array
 
+Clusters = NDArray[np.intp]
+
 #: Neighbors in the graph of each representation; the fused similarities of both are added up.
 NEIGHBORS = (7, 15)
 _WIDTH = 0.4  # mu of the source, Eq. (2), which recommends 0.3 to 0.8; wider ones merge classes of a few movements
@@ -44,9 +46,8 @@ def fuse(squares: Array, weights: ArrayLike | None = None) -> Array:
     representations. W is the mean of the P_r, added up over 7 and 15 neighbors: few for classes of a few movements, and
     many so that the movements of several people connect. Means are weighted.
 
-    - `squares` (R, n, n): squared distances, for at least three movements. Representations in which no two differ are
-      left out.
-    - `weights` (R,): of the representations in each mean, above 0; equal by default.
+    `squares` (R, n, n) are of at least three movements; representations in which no two differ are left out. `weights`
+    (R,) are above 0, and equal by default.
     """
     differ, weights = _differing(squares, weights)
     return np.asarray(sum(_fused(differ, weights, neighbors) for neighbors in NEIGHBORS))
@@ -161,9 +162,7 @@ def count_by_eigengap(similar: Array) -> int:
     largest gap is often that between a few groups of similar clusters, so the last one counts that is at least 0.3 of
     it. Or that one of at least 0.15 of it whose clusters have the best silhouette (P. Rousseeuw, "Silhouettes", Journal
     of Computational and Applied Mathematics 20, 1987) in ``-log W``, if these are more: two clusters of one kind are
-    merged by a person at a glance, and kinds that were never divided are not seen.
-
-    `similar` (n, n): symmetric similarities W of at least three movements, at least 0, and 0 on the diagonal.
+    merged by a person at a glance, and kinds that were never divided are not seen. W is as `fuse` gives it.
     """
     from sklearn.metrics import silhouette_score
 
@@ -243,10 +242,8 @@ def _normalized(similar: Array) -> Array:
 _SLACK = 0.05  # of the adjusted Rand index: a number of clusters this close to the most stable is as stable
 _AT_ONCE = 60  # numbers of clusters tried at a time
 
-Whole = NDArray[np.intp]
 
-
-def count_clusters(distances: Array, repeats: int = 20, seed: int = 0) -> int:
+def count_clusters(distances: Array) -> int:
     """The number of clusters c of an average-linkage tree.
 
     The stability of c is the mean adjusted Rand index between the c clusters of all movements and those of random
@@ -265,20 +262,20 @@ def count_clusters(distances: Array, repeats: int = 20, seed: int = 0) -> int:
     most = max(2, n // 2)
     tried = np.geomspace(2, most, _AT_ONCE) if most > _AT_ONCE else np.arange(2.0, most + 1)
     counts = np.unique(tried.round().astype(np.intp))
-    best = _best(distances, tree, counts, repeats, seed)
+    best = _best(distances, tree, counts)
     k = int(np.searchsorted(counts, best))
     low, high = counts[max(k - 1, 0)], counts[min(k + 1, len(counts) - 1)]
     if high - low <= 2:
         return best
     around = np.append(np.linspace(low, high, _AT_ONCE).round().astype(np.intp), best)
-    return _best(distances, tree, np.unique(around), repeats, seed)
+    return _best(distances, tree, np.unique(around))
 
 
-def _best(distances: Array, tree: Array, counts: Whole, repeats: int, seed: int) -> int:
+def _best(distances: Array, tree: Array, counts: NDArray[np.intp]) -> int:
     fine_first = counts[::-1].tolist()
     clusterings = cuts(tree, fine_first)
     fits = mean_silhouettes(distances, clusterings)
-    parts = subsets(len(distances), repeats, seed)
+    parts = subsets(len(distances))
     agreement = np.mean([_agreement(distances, clusterings, fine_first, chosen) for chosen in parts], axis=0)
     fits[agreement < agreement.max() - _SLACK] = -np.inf
     return int(fine_first[int(np.argmax(fits))])
@@ -323,18 +320,17 @@ def _mean_silhouette(sums: Array, cut: NDArray[np.intp]) -> float:
     return float(silhouette.mean())
 
 
-def _agreement(distances: Array, clusterings: list[Whole], counts: list[int], chosen: Whole) -> Array:
+def _agreement(distances: Array, clusterings: list[Clusters], counts: list[int], chosen: NDArray[np.intp]) -> Array:
     """Adjusted Rand index of each number of clusters between all movements and a chosen subset, (c,)."""
     tree = average_linkage(distances[np.ix_(chosen, chosen)])
     again = cuts(tree, [min(count, len(chosen)) for count in counts])
     return np.array([adjusted_rand(a[chosen], b) for a, b in zip(clusterings, again, strict=True)])
 
 
-def adjusted_rand(a: Whole, b: Whole) -> float:
-    """Agreement of two clusterings, 1 if the same and 0 on average by chance.
+def adjusted_rand(a: Clusters, b: Clusters) -> float:
+    """Agreement of two clusterings, 1 if the same and 0 on average by chance, in one pass for it is often called.
 
-    Source: L. Hubert, P. Arabie, "Comparing partitions", Journal of Classification 2, 1985, Eq. (5). Called for every
-    number of clusters and every subset, so it is counted here in one pass.
+    Source: L. Hubert, P. Arabie, "Comparing partitions", Journal of Classification 2, 1985, Eq. (5).
     """
     table = np.bincount(a * (int(b.max()) + 1) + b)
     both, in_a, in_b = (_pairs(counts) for counts in (table, np.bincount(a), np.bincount(b)))
@@ -343,35 +339,29 @@ def adjusted_rand(a: Whole, b: Whole) -> float:
     return 1.0 if most == by_chance else (both - by_chance) / (most - by_chance)
 
 
-def _pairs(counts: Whole) -> float:
+def _pairs(counts: NDArray[np.intp]) -> float:
     return float((counts * (counts - 1)).sum()) / 2.0
 
 
-_SHARE = 0.8  # of the movements in each subset
+_SHARE, _REPEATS = 0.8, 20  # of the movements in each subset, and the number of subsets
 
 
-def subsets(n: int, repeats: int, seed: int) -> Iterator[NDArray[np.intp]]:
+def subsets(n: int) -> Iterator[NDArray[np.intp]]:
     """Random subsets of four fifths of n movements, in rising order."""
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(0)
     size = max(2, round(_SHARE * n))
-    for _ in range(repeats):
+    for _ in range(_REPEATS):
         yield np.sort(random.choice(n, size, replace=False))
 
 
-def stabilities(
-    distances: Array, clusters: Clusters, again: Callable[[Array], Clusters], repeats: int, seed: int = 0
-) -> Array:
-    """Mean, over subsets, of each cluster's largest Jaccard coefficient with a cluster found there.
+def stabilities(distances: Array, clusters: Clusters, again: Callable[[Array], Clusters]) -> Array:
+    """Mean (c,), over subsets, of each cluster's largest Jaccard coefficient with one that `again` makes of a subset.
 
-    - `distances` (n, n).
-    - `clusters` (n,): 0, 1, ...; -1 is none.
-    - `again`: from distances (m, m) of a subset to its clusters.
-
-    Returns (c,): from 0 to 1; Hennig takes 0.75 for a valid, stable cluster, and below 0.5 for none.
+    Hennig takes 0.75 for a valid, stable cluster, and below 0.5 for none.
     """
     c = int(clusters.max(initial=-1)) + 1
-    coefficients = np.full((repeats, c), np.nan)
-    for b, chosen in enumerate(subsets(len(distances), repeats, seed)):
+    coefficients = np.full((_REPEATS, c), np.nan)
+    for b, chosen in enumerate(subsets(len(distances))):
         own, other = clusters[chosen], again(distances[np.ix_(chosen, chosen)])
         table = overlaps(own, other, c)
         sizes = np.bincount(own[own >= 0], minlength=c)
@@ -390,9 +380,6 @@ def overlaps(a: Clusters, b: Clusters, n_rows: int) -> NDArray[np.intp]:
     return table
 
 
-Clusters = NDArray[np.intp]
-
-
 def agglomerative(distances: Array, n_clusters: int, min_members: int) -> Clusters:
     """Average linkage cut into `n_clusters`; clusters of fewer than `min_members` are none, -1."""
     clusters = cuts(average_linkage(distances), [min(n_clusters, len(distances))])[0]
@@ -402,10 +389,8 @@ def agglomerative(distances: Array, n_clusters: int, min_members: int) -> Cluste
 def hdbscan(distances: Array, n_clusters: int | None, min_members: int) -> Clusters:
     """Clusters of density that persist longest, none (-1) in between; their number is found.
 
-    Density needs a metric: that of the kernel's space, ``sqrt(2 - 2 K)``, from ``1 - K``.
-
-    Sources: R. Campello, D. Moulavi, J. Sander, "Density-based clustering based on hierarchical density estimates",
-    PAKDD 2013; the implementation is scikit-learn's.
+    Density needs a metric: that of the kernel's space, ``sqrt(2 - 2 K)``, from ``1 - K``. Source: R. Campello, D.
+    Moulavi, J. Sander, "Density-based clustering based on hierarchical density estimates", PAKDD 2013.
     """
     from sklearn.cluster import HDBSCAN
 
@@ -428,11 +413,7 @@ def without_small(clusters: Clusters, min_members: int) -> Clusters:
 
 
 def average_linkage(distances: Array) -> Array:
-    """Merges (n - 1, 4) of the two clusters whose mean distance is smallest, as SciPy's `linkage` gives them.
-
-    scikit-learn's ``AgglomerativeClustering(metric="precomputed", linkage="average")`` finds the same clusters, but a
-    tree can be cut many times.
-    """
+    """Merges (n - 1, 4) of the two clusters whose mean distance is smallest, as SciPy's `linkage` gives them."""
     return np.asarray(linkage(squareform(distances, checks=False), "average"))
 
 

@@ -52,23 +52,17 @@ def flat(paths: Array, like: Array) -> Array:
     return paths if d == 2 else np.asarray(principal_axes(like) @ paths)
 
 
-def plot_paths(axes: Any, drawn: Array, color: str, **style: Any) -> None:
-    """Lines of paths (n, 2, T)."""
-    for x, y in drawn:
-        axes.plot(x, y, color=color, **style)
-
-
-def mark_start(axes: Any, drawn: Array, color: str, size: float = 4.0) -> None:
-    """A dot where each path (n, 2, T) starts."""
-    axes.plot(drawn[:, 0, 0], drawn[:, 1, 0], "o", color=color, markersize=size, linestyle="none", zorder=4)
+def plot_paths(axes: Any, drawn: Array, color: str, dot: float = 0.0, **style: Any) -> None:
+    """Lines of paths (n, 2, T), with a dot of that size where each starts."""
+    axes.plot(*drawn.transpose(1, 2, 0), color=color, **style)
+    if dot:
+        axes.plot(drawn[:, 0, 0], drawn[:, 1, 0], "o", color=ORANGE, markersize=dot, linestyle="none", zorder=4)
 
 
 def bare(axes: Any, n_dims: int) -> None:
     """No ticks, no frame, and one scale for both directions where both are lengths."""
-    axes.set_xticks([])
-    axes.set_yticks([])
-    for spine in axes.spines.values():
-        spine.set_visible(False)
+    axes.set(xticks=[], yticks=[])
+    axes.spines[:].set_visible(False)
     if n_dims > 1:
         axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.08)
@@ -102,9 +96,7 @@ def draw_proposal(
     overlay(axes, recorded, medoid, like)
     # Up to 60 members lie anywhere, so the inset lies beside the drawing.
     inset = axes.inset_axes((1.03, 0.66, 0.32, 0.32))
-    drawn = flat(recorded, medoid[0])
-    plot_paths(inset, drawn, GRAY, linewidth=0.6)
-    mark_start(inset, drawn, ORANGE, 2.0)
+    plot_paths(inset, flat(recorded, medoid[0]), GRAY, 2.0, linewidth=0.6)
     bare(inset, demos.n_dims)
     inset.set_title("as recorded", fontsize=7, color=GRAY)
     axes.set_title(drawable(title) or words(proposal))
@@ -126,10 +118,8 @@ def shown_paths(demos: Demonstrations, proposal: Proposal, like: Compares | None
 def overlay(axes: Any, recorded: Array, medoid: Array, like: Compares | None, thin: float = 0.9) -> None:
     """Members (m, d, T) laid onto the medoid (1, d, T)."""
     laid = flat(maps_onto(recorded, medoid[0], like).move(recorded), medoid[0])
-    typical = flat(medoid, medoid[0])
     plot_paths(axes, laid, BLUE, linewidth=thin, alpha=0.45)
-    plot_paths(axes, typical, "black", linewidth=2.4 * thin, zorder=3)
-    mark_start(axes, typical, ORANGE, 6.0 * thin)
+    plot_paths(axes, flat(medoid, medoid[0]), "black", 6.0 * thin, linewidth=2.4 * thin, zorder=3)
     bare(axes, medoid.shape[1])
 
 
@@ -190,8 +180,7 @@ def _side_by_side(axes: Any, paths: Array) -> None:
         size = np.ptp(drawn, axis=1, keepdims=True)
         drawn = (drawn - low) / (size.max() if len(path) > 1 else np.where(size > 0, size, 1.0))
         drawn = drawn * 0.8 + np.array([[k % columns], [-(k // columns)]])
-        plot_paths(axes, drawn[None], GRAY, linewidth=0.7)
-        mark_start(axes, drawn[None], ORANGE, 2.0)
+        plot_paths(axes, drawn[None], GRAY, 2.0, linewidth=0.7)
     bare(axes, 2)
 
 
@@ -241,8 +230,7 @@ def draw_map(space: ConceptualSpace, prototypes: Primitives | MovementsLike) -> 
     axes = figure.subplots()
     for name, position, path in zip(space.symbols, positions, paths_of(demos), strict=True):
         drawn = _fitted(flat(path[None], path)[0], half) + position[:, None]
-        plot_paths(axes, drawn[None], BLUE, linewidth=1.3)
-        mark_start(axes, drawn[None], ORANGE, 3.5)
+        plot_paths(axes, drawn[None], BLUE, 3.5, linewidth=1.3)
         axes.annotate(
             drawable(name), (position[0], drawn[1].min()), (0, -4), textcoords="offset points",
             ha="center", va="top", fontsize=6.5, color=GRAY, annotation_clip=False,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib.resources import files
 from typing import Any
 
@@ -26,6 +26,11 @@ from kineme.validation import check_choice
 FORMAT = "kineme-grounding"
 VERSION = 1
 _STYLED = 3  # demonstrations from which on styles are learned
+#: Name in a grounding -> field of `Primitives`; `primitive_from` reads the numbers back bit for bit.
+_NUMBERS = {
+    "scaled_weights": "scaled_weights", "start": "starts", "goal": "goals",
+    "velocity": "velocities", "duration": "durations", "extent": "extents",
+}  # fmt: skip
 _FLAT = 1e-9  # of the path: what members differ by when only rounding tells them apart
 
 
@@ -98,18 +103,13 @@ def ground(
     return {
         "format": FORMAT,
         "version": VERSION,
-        "symbol": {
-            "id": symbol.id,
-            "name": symbol.name,
-            "description": symbol.description,
-            "parents": list(symbol.parents),
-        },
+        "symbol": asdict(symbol) | {"parents": list(symbol.parents)},
         "n_dims": d,
         "units": {"position": named, "time": "s"},
         "n_demonstrations": len(primitives),
         "prototype": {"by": by, "medoid": typical.medoid},
         "dmp": specification_to_dict(primitive.dmp),
-        "primitive": _numbers(primitive),
+        "primitive": {name: getattr(primitive, field)[0].tolist() for name, field in _NUMBERS.items()},
         "demonstrated": {
             "start": _range(primitives.starts),
             "goal": _range(primitives.goals),
@@ -121,24 +121,8 @@ def ground(
     }
 
 
-def _numbers(primitive: Primitives) -> dict[str, Any]:
-    """A batch of one as lists; `primitive_from` reads them back bit for bit."""
-    return {
-        "scaled_weights": primitive.scaled_weights[0].tolist(),
-        "start": primitive.starts[0].tolist(),
-        "goal": primitive.goals[0].tolist(),
-        "velocity": primitive.velocities[0].tolist(),
-        "duration": float(primitive.durations[0]),
-        "extent": primitive.extents[0].tolist(),
-    }
-
-
 def _range(values: NDArray[np.float64]) -> dict[str, Any]:
-    return {
-        "min": values.min(axis=0).tolist(),
-        "median": np.median(values, axis=0).tolist(),
-        "max": values.max(axis=0).tolist(),
-    }
+    return {name: getattr(np, name)(values, axis=0).tolist() for name in ("min", "median", "max")}
 
 
 def _styles(primitives: Primitives, typical: Prototype) -> dict[str, Any] | None:
@@ -300,20 +284,12 @@ def primitive_from(grounding: Mapping[str, Any], style: ArrayLike | None = None)
 
 
 def _primitive(dmp: DMP, numbers: Mapping[str, Any], d: int, label: Any) -> Primitives:
-    shapes = {"scaled_weights": (d, dmp.n_basis), "start": (d,), "goal": (d,), "velocity": (d,), "extent": (d,)}
-    arrays = {}
-    for name, shape in {**shapes, "duration": ()}.items():
-        arrays[name] = np.array(numbers[name], dtype=np.float64)
-        check_array(name, arrays[name], shape)
-    if arrays["duration"] <= 0:
+    shapes: dict[str, tuple[int, ...]] = {"scaled_weights": (d, dmp.n_basis), "duration": ()}
+    arrays: dict[str, Any] = {}
+    for name, field in _NUMBERS.items():
+        values = np.array(numbers[name], dtype=np.float64)
+        check_array(name, values, shapes.get(name, (d,)))
+        arrays[field] = values[None]
+    if arrays["durations"][0] <= 0:
         raise ValueError(f"duration should be above 0, is {numbers['duration']!r}")
-    return Primitives(
-        dmp,
-        scaled_weights=arrays["scaled_weights"][None],
-        starts=arrays["start"][None],
-        goals=arrays["goal"][None],
-        velocities=arrays["velocity"][None],
-        durations=arrays["duration"][None],
-        extents=arrays["extent"][None],
-        labels=label,
-    )
+    return Primitives(dmp, **arrays, labels=label)

@@ -35,7 +35,6 @@ _SPECTRAL = "spectral"
 #: Of `propose` and of whatever clusters by it.
 DEFAULT_METHOD = _SPECTRAL
 _LARGEST = 2000  # movements whose similarities are fused at once
-_REPEATS = 20  # subsets that clusters must come again in
 
 _WITHIN = 0.95  # of the sampled members of all clusters are within the common radius of their nearest neighbor
 _TILE = 20_000  # movements at a time
@@ -351,7 +350,7 @@ def _by_neighbors(
     similar = set_apart(similar, component[large])
     wanted = count_by_eigengap(similar) if n_clusters is None else n_clusters
     clusters[large] = spectral(similar, wanted, min_members)
-    stable = stabilities(similar, clusters[large], lambda some: spectral(some, wanted), _REPEATS)
+    stable = stabilities(similar, clusters[large], lambda some: spectral(some, wanted))
     return clusters, stable
 
 
@@ -371,13 +370,13 @@ def _by_distances(distances: Array, method: str, n_clusters: int | None, min_mem
     """Clusters of all movements, and how stable each is."""
     share = n_clusters or 0
     if method == "agglomerative" and n_clusters is None:
-        share = count_clusters(distances, _REPEATS)
+        share = count_clusters(distances)
 
     def again(some: Array) -> Clusters:
         return METHODS[method](some, share, 1 if method == "agglomerative" else min_members)
 
     clusters = METHODS[method](distances, share, min_members)
-    return clusters, stabilities(distances, clusters, again, _REPEATS)
+    return clusters, stabilities(distances, clusters, again)
 
 
 def own_order(K: Array) -> NDArray[np.intp]:
@@ -395,11 +394,8 @@ def link_people(similar: Array, near: Array, people: NDArray[np.intp]) -> Array:
 
     Source: L. Haghverdi et al., "Batch effects in single-cell RNA-sequencing data are corrected by matching mutual
     nearest neighbors", Nature Biotechnology 36, 2018. A person's repetitions are each other's nearest neighbors; among
-    the nearest of all movements there may be none by another person, so neighbors are taken from each person in turn.
-
-    - `similar` (n, n): W, as `kineme.anchoring.clustering.fuse` gives it.
-    - `near` (n, n): by which the nearest are found; greater is nearer.
-    - `people` (n,): who made each movement, as numbers.
+    the nearest of all movements there may be none by another person, so neighbors are taken from each person in turn,
+    where `near` (n, n) is greatest.
     """
     n = len(similar)
     share = np.zeros((n, n))  # 1 / p

@@ -211,13 +211,13 @@ def _check_pair(a: Primitives, b: Primitives) -> None:
 
 def _part_rotation(R: Array, s: Array) -> Array:
     """Rotations by the share s (m,) of the angle of R, about the same axis."""
-    d = len(R)
-    if d == 2:
-        angle = s * np.arctan2(R[1, 0], R[0, 0])
-        c, sn = np.cos(angle), np.sin(angle)
-        return np.stack((np.stack((c, -sn), -1), np.stack((sn, c), -1)), -2)
-    if d == 3:
-        from scipy.spatial.transform import Rotation
+    from scipy.spatial.transform import Rotation
 
-        return np.asarray(Rotation.from_rotvec(s[:, None] * Rotation.from_matrix(np.array(R)).as_rotvec()).as_matrix())
-    return np.broadcast_to(np.eye(d), (len(s), d, d)).copy()
+    d = len(R)
+    if d not in (2, 3):
+        return np.broadcast_to(np.eye(d), (len(s), d, d)).copy()
+    in_space = np.eye(3)
+    in_space[:d, :d] = R
+    return np.asarray(
+        Rotation.from_rotvec(s[:, None] * Rotation.from_matrix(in_space).as_rotvec()).as_matrix()[:, :d, :d]
+    )

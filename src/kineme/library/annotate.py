@@ -6,35 +6,23 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from kineme.errors import KinemeError
-from kineme.io.reading.merge_files import Recordings, Source
+from kineme.io.reading.merge_files import Recordings
 from kineme.io.records import Problem
 from kineme.io.writing.annotations import Annotation
 from kineme.library.recognize import some_of_each_symbol
 from kineme.library.storage.store import Store
-from kineme.movements.trajectories.trajectory import Trajectory
-from kineme.recognition.answer import KnownClasses
 from kineme.recognition.compared_windows import Templates
-from kineme.recognition.spotting import Spotted, spot
+from kineme.recognition.spotting import spot
 
 _MAX_PIECES = 8  # most stretches between rests that a movement may consist of, as in `Recognizer.spot`
 
 
 class Annotated(NamedTuple):
-    """Annotations of recordings.
+    """Annotations of recordings."""
 
-    Attributes
-    ----------
-    annotations : list of Annotation
-        In the order of the recordings, and of time.
-    problems : list of Problem
-        Recordings in which nothing can be looked for, and why.
-    calibrated : bool
-        Whether the p-values of every symbol are calibrated at the error rate, as in `Answer`; else they are a guess.
-    """
-
-    annotations: list[Annotation]
-    problems: list[Problem]
-    calibrated: bool
+    annotations: list[Annotation]  # in the order of the recordings, and of time
+    problems: list[Problem]  # recordings in which nothing can be looked for, and why
+    calibrated: bool  # True if the p-values of every symbol are, at the error rate, as in `Answer`; else a guess
 
 
 def annotate(
@@ -47,6 +35,7 @@ def annotate(
     """
     classes = some_of_each_symbol(store)
     classes.comparison.checked(recordings.demonstrations[:1], "recordings")  # all of them have the same columns
+    templates = Templates(classes.comparison, classes.references, classes.calibration)
     annotations, problems, done = [], [], 0.0
     for recording, source in zip(recordings.demonstrations, recordings.sources, strict=True):
         before = done
@@ -56,38 +45,17 @@ def annotate(
                 progress(before + share * duration)
 
         try:
-            spotted = spot_known(classes, recording, error_rate, tell)
+            spotted = spot(templates, recording, error_rate, _MAX_PIECES, tell)
         except KinemeError as error:
             where = f"{source.place}: " if source.place else ""
             problems.append(Problem(source.path, None, f"{where}{error}", type(error)))
         else:
-            annotations += annotations_of(spotted, recording, source)
+            for movement in spotted:
+                label = None if movement.label is None else str(movement.label)
+                times = movement.start, movement.end
+                certainty = movement.p_known, movement.confidence
+                origin = float(recording.times[0])
+                annotations.append(Annotation(source.path, source.place, *times, label, *certainty, origin))
         done += recording.duration
         tell(1.0)
     return Annotated(annotations, problems, bool(classes.calibration.calibrated(error_rate).all()))
-
-
-def spot_known(
-    classes: KnownClasses, recording: Trajectory, error_rate: float, progress: Callable[[float], object] | None = None
-) -> list[Spotted]:
-    """Find movements of known classes in a recording, see `Recognizer.spot`."""
-    templates = Templates(classes.comparison, classes.references, classes.calibration)
-    return spot(templates, recording, error_rate, _MAX_PIECES, progress)
-
-
-def annotations_of(spotted: list[Spotted], recording: Trajectory, source: Source) -> list[Annotation]:
-    """Return what was spotted in a recording of that source as annotations."""
-    origin = float(recording.times[0])
-    return [
-        Annotation(
-            source.path,
-            source.place,
-            movement.start,
-            movement.end,
-            None if movement.label is None else str(movement.label),
-            movement.p_known,
-            movement.confidence,
-            origin,
-        )
-        for movement in spotted
-    ]

@@ -1,8 +1,7 @@
 """Serialize one batch of movements, and write it to the tables in one transaction.
 
-Positions are stored in single precision relative to the start of the movement, which is stored in double: the error of
-a position is at most 2^-24 (6e-8) of its distance from the start. Times are stored in the same way; even ones are not
-stored, but computed from the duration.
+Positions and times are stored in single precision relative to the start of the movement, which is stored in double.
+Even times are not stored, but computed from the duration.
 """
 
 from __future__ import annotations
@@ -30,6 +29,9 @@ from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.similarity.describe import feature_rows
 from kineme.validation import Array, describe
 
+#: Table -> its rows of a batch, without their keys.
+Tables = dict[str, list[Row]]
+
 _EVEN = 1e-9  # of a step: stamps closer to an even grid are not stored
 _SMALL, _LARGE = 1e-30, 1e30  # between which single precision keeps its relative error
 
@@ -47,7 +49,7 @@ class Committed:
 def serialize_new(store: Store, demos: Demonstrations, batch: Batch, new: list[int]) -> None:
     """Serialize the new movements of a batch."""
     chosen = demos if len(new) == len(demos) else demos[new]
-    batch.serialized = serialize(chosen, evenly_sampled(chosen), store.specification)
+    batch.tables = serialize(chosen, evenly_sampled(chosen), store.specification)
     batch.row_of = dict(zip(new, range(len(new)), strict=True))
 
 
@@ -58,8 +60,7 @@ def commit(store: Store, batch: Batch, continues: int | None = None) -> Committe
     """
     if not batch.row_of and (ids := _all_stored(store, batch)) is not None:
         return Committed(0, (), ids, None)
-    detail: dict[str, Any] = {}
-    with store.writing("learn", detail) as change:
+    with store.writing("learn") as change:
         stored = find_stored(change.connection, batch)  # again, since another process may have written meanwhile
         _insert_sources(change, batch, stored)
         keys, new = _keys(change, batch, stored)
@@ -70,12 +71,12 @@ def commit(store: Store, batch: Batch, continues: int | None = None) -> Committe
         labeled = _without_symbol(change.connection, batch, keys)  # movements that have a symbol keep it
         symbols, new_symbols = keys_by_name(change, dict.fromkeys(labeled.values()))
         add_members(change, [(movement, symbols[label]) for movement, label in labeled.items()], "label")
-        detail |= {"added": len(new), "known": len(keys) - len(new), "symbols": list(new_symbols)}
+        change.detail.update(added=len(new), known=len(keys) - len(new), symbols=list(new_symbols))
         if people := _without_person(change.connection, batch, keys):
             change.insert("shown_by", [(key, person, change.version) for key, person in people.items()])
-            detail["people"] = sorted(set(people.values()))
+            change.detail["people"] = sorted(set(people.values()))
         if continues is not None:
-            detail[CONTINUES] = continues
+            change.detail[CONTINUES] = continues
     return Committed(len(new), new_symbols, np.array(keys, dtype=np.int64), change.version)
 
 
@@ -120,8 +121,7 @@ def _insert_sources(change: Change, batch: Batch, stored: Stored) -> None:
 
 
 def _insert_movements(change: Change, batch: Batch, new: dict[int, int], stored: Stored) -> None:
-    demos, serialized = batch.demos, batch.serialized
-    assert serialized is not None
+    demos = batch.demos
     if change.connection.execute("SELECT 1 FROM meta WHERE key = 'n_dims'").fetchone() is None:
         change.insert("meta", [("n_dims", str(demos.n_dims))])
         if demos.channels is not None:
@@ -135,13 +135,9 @@ def _insert_movements(change: Change, batch: Batch, new: dict[int, int], stored:
         name = None if names[i] is None else as_text(names[i])
         about = (batch.digests[i], name, batch.labels[i], lengths[i], t0[i], durations[i])
         movements.append((key, source, place, *about, change.version, None))
-    rows = [(key, batch.row_of[i]) for key, i in new.items()]
     change.insert("movement", movements)
-    change.insert("raw", [(key, *serialized.raw[k]) for key, k in rows])
-    change.insert("primitive", [(key, *serialized.primitives[k]) for key, k in rows])
-    change.insert("feature", [(key, serialized.features[k]) for key, k in rows])
-    if serialized.recorded:
-        change.insert("recorded", [(key, serialized.recorded[k]) for key, k in rows])
+    for table, rows in batch.tables.items():
+        change.insert(table, [(key, *rows[batch.row_of[i]]) for key, i in new.items()])
 
 
 def _without_symbol(connection: Any, batch: Batch, keys: list[int]) -> dict[int, str]:
@@ -172,8 +168,8 @@ class Batch:
     groups: list[str | None]
     sources: list[Source | None]
     places: list[str | None]
-    serialized: SerializedRows | None = None
-    row_of: dict[int, int] = field(default_factory=dict)  # movement of the batch -> row of `serialized`
+    tables: Tables = field(default_factory=dict)
+    row_of: dict[int, int] = field(default_factory=dict)  # movement of the batch -> its row in these
 
 
 @dataclass(frozen=True)
@@ -217,16 +213,6 @@ def find_stored(connection: sqlite3.Connection, batch: Batch) -> Stored:
     return Stored(by_digest, sources, by_place)
 
 
-@dataclass(frozen=True)
-class SerializedRows:
-    """Rows of a batch, without their keys."""
-
-    raw: list[tuple[bytes, bytes, bytes | None]]  # start, positions, times
-    primitives: list[tuple[bytes, bytes]]  # boundary, weights
-    features: list[bytes]
-    recorded: list[bytes]  # columns that positions do not say; empty where they say all
-
-
 def check(demos: Demonstrations) -> None:
     """Refuse movements that cannot be stored, before any is stored."""
     first = demos.offsets[:-1]
@@ -259,10 +245,8 @@ def relative_times(demos: Demonstrations) -> Array:
     return demos.times - np.repeat(demos.times[demos.offsets[:-1]], demos.lengths)
 
 
-def serialize(demos: Demonstrations, even: NDArray[np.bool_], specification: Specification) -> SerializedRows:
+def serialize(demos: Demonstrations, even: NDArray[np.bool_], specification: Specification) -> Tables:
     """Return the rows of a batch that has been checked."""
-    recorded = demos.movements.recorded
-    others = [] if recorded is None else to_bytes(recorded, demos.offsets, demos.channels or ())
     starts = demos.positions[demos.offsets[:-1]]
     relative = (demos.positions - np.repeat(starts, demos.lengths, axis=0)).astype(np.float32)
     offsets = demos.offsets.tolist()
@@ -273,9 +257,15 @@ def serialize(demos: Demonstrations, even: NDArray[np.bool_], specification: Spe
             times[i] = stored_times(stamps[offsets[i] : offsets[i + 1]])
     blob, row = relative.tobytes(), 4 * demos.n_dims
     positions = [blob[row * a : row * b] for a, b in pairwise(offsets)]
-    raw = list(zip(_cut(starts), positions, times, strict=True))
-    rows = np.concatenate(feature_rows(demos, specification.comparison), axis=1, dtype=np.float32)
-    return SerializedRows(raw, _primitives(demos, specification), _cut(rows), others)
+    features = np.concatenate(feature_rows(demos, specification.comparison), axis=1, dtype=np.float32)
+    tables: Tables = {
+        "raw": list(zip(_cut(starts), positions, times, strict=True)),
+        "primitive": _primitives(demos, specification),
+        "feature": list(zip(_cut(features), strict=True)),
+    }
+    if (recorded := demos.movements.recorded) is not None:  # columns that positions do not say
+        tables["recorded"] = list(zip(to_bytes(recorded, demos.offsets, demos.channels or ()), strict=True))
+    return tables
 
 
 def stored_times(stamps: Array) -> bytes:
@@ -286,7 +276,7 @@ def stored_times(stamps: Array) -> bytes:
     return (short if (np.diff(short) > 0).all() else stamps).tobytes()
 
 
-def _primitives(demos: Demonstrations, specification: Specification) -> list[tuple[bytes, bytes]]:
+def _primitives(demos: Demonstrations, specification: Specification) -> list[Row]:
     learned = specification.dmp.learn(demos)
     boundary = np.stack([learned.starts, learned.goals, learned.velocities, learned.extents], axis=1)
     with np.errstate(over="ignore"):  # refused below

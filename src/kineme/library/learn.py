@@ -9,7 +9,7 @@ import hashlib
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from itertools import pairwise
 from pathlib import PurePath
@@ -31,8 +31,7 @@ from kineme.library.commit import (
     serialize_new,
     stored_times,
 )
-from kineme.library.storage.channels import other_columns
-from kineme.library.storage.read import count
+from kineme.library.storage.channels import columns_of_kinds
 from kineme.library.storage.source import Source
 from kineme.library.storage.store import Store
 from kineme.library.storage.symbols import check_name
@@ -47,7 +46,7 @@ from kineme.movements.channels.column_match import columns_recorded, may_be
 from kineme.movements.tables.layout import listed
 from kineme.movements.trajectories.as_learned import as_recorded, by_names, of_columns
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.movements.trajectories.movements import Movements, in_coordinates
+from kineme.movements.trajectories.movements import in_coordinates
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.validation import describe as name_of
 
@@ -80,12 +79,8 @@ class LearnReport:
     added: int
     duplicates: int
     symbols: tuple[str, ...]
-    ids: NDArray[np.int64]
+    ids: NDArray[np.int64] = field(repr=False)
     version: int
-
-    def __repr__(self) -> str:
-        counts = f"added={self.added}, duplicates={self.duplicates}"
-        return f"LearnReport({counts}, symbols={self.symbols!r}, version={self.version})"
 
 
 def learn(  # noqa: PLR0913, PLR0917 - those of `ActionLibrary.learn`
@@ -119,7 +114,7 @@ def learn(  # noqa: PLR0913, PLR0917 - those of `ActionLibrary.learn`
 
         for start, stop in _ranges(demos):
             rows = slice(start, stop)
-            part = _part(demos, start, stop)
+            part = Demonstrations.of_movements(demos.movements.between(start, stop))
             even = evenly_sampled(part)
             batch = Batch(part, digests(part, even), names[rows], people[rows], sources[rows], where[rows])
             with store.reading() as connection:
@@ -149,24 +144,6 @@ def _ranges(demos: Demonstrations) -> Iterator[tuple[int, int]]:
         stop = min(max(limit, start + 1), start + most, n)
         yield start, stop
         start = stop
-
-
-def _part(demos: Demonstrations, start: int, stop: int) -> Demonstrations:
-    """Return consecutive movements, sharing the samples."""
-    movements, first, last = demos.movements, demos.offsets[start], demos.offsets[stop]
-    return Demonstrations.of_movements(
-        Movements(
-            movements.positions[first:last],
-            movements.offsets[start : stop + 1] - first,
-            movements.durations[start:stop],
-            None if movements.times is None else movements.times[first:last],
-            None,
-            None if movements.names is None else movements.names[start:stop],
-            movements.dimensions,
-            movements.channels,
-            None if movements.recorded is None else movements.recorded[first:last],
-        )
-    )
 
 
 def _in_columns_of(store: Store, demos: Demonstrations) -> Demonstrations:
@@ -212,7 +189,7 @@ def _check_channels(store: Store, demos: Demonstrations) -> None:
 
 def _others(store: Store) -> str:
     """Return the movements that new ones must be like; a library that is empty now keeps its earlier versions."""
-    return "all others" if count(store) else "those of earlier versions, which can be restored,"
+    return "all others" if store.counts.movements else "those of earlier versions, which can be restored,"
 
 
 def _as_names(demos: Demonstrations, what: str, given: Any) -> list[str | None]:
@@ -306,10 +283,8 @@ def _other_columns(demos: Demonstrations) -> list[bytes] | None:
     recorded, channels = demos.movements.recorded, demos.channels or ()
     if recorded is None:
         return None
-    others = other_columns(channels)
-    kinds = [channel.kind for channel in channels for _ in channel.columns]
-    steps = recorded[:, [k for k in others if kinds[k] == "discrete"]].astype(np.float32)
-    turned = recorded[demos.offsets[:-1]][:, [k for k in others if kinds[k] == "orientation"]].round(_DECIMALS) + 0.0
+    steps = recorded[:, columns_of_kinds(channels, "discrete")].astype(np.float32)
+    turned = recorded[demos.offsets[:-1]][:, columns_of_kinds(channels, "orientation")].round(_DECIMALS) + 0.0
     return [
         start.tobytes() + steps[a:b].tobytes() for start, (a, b) in zip(turned, pairwise(demos.offsets), strict=True)
     ]

@@ -127,14 +127,14 @@ class ActionLibrary:
         self.store.close()
 
     def __len__(self) -> int:
-        return read.count(self.store)
+        return self.store.counts.movements
 
     __iter__ = None  # its length counts movements, its items are symbols: iterate `movements` or `symbols`
 
     def __repr__(self) -> str:
         dims = "" if self.n_dims is None else f"{self.n_dims} dims, "
         return (
-            f"ActionLibrary({str(self.folder)!r}: {len(self)} movements, {dims}{symbols.count(self.store)} symbols, "
+            f"ActionLibrary({str(self.folder)!r}: {len(self)} movements, {dims}{self.store.counts.symbols} symbols, "
             f"version {self.version})"
         )
 

@@ -48,7 +48,7 @@ def members_of(store: Store) -> Members:
             ) from error
         if not len(pairs):
             raise SpecificationError(
-                f"expected a library with movements that show a symbol, got none among its {read.count(store)}; "
+                f"expected a library with movements that show a symbol, got none among its {store.counts.movements}; "
                 "learn some with labels, or name a proposal"
             )
         keys, which = np.unique(pairs[:, 1], return_inverse=True)
@@ -86,7 +86,7 @@ def described_references(store: Store, ids: Ids, labels: NDArray[Any]) -> Refere
     return References.of(OnDemand(ids, partial(read.movements, store)), described(store, ids), labels)
 
 
-def some_members(members: Members, most: int) -> Members:
+def some_of_each(members: Members, most: int) -> Members:
     """Choose at most so many members of each symbol, evenly spaced."""
     ends = np.append(members.first, len(members.ids))
     rows = [start + evenly_spaced(stop - start, most) for start, stop in pairwise(ends)]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,14 +12,12 @@ from kineme.anchoring.assignment import Merge, Split, assign_described, suggest_
 from kineme.anchoring.proposals import DEFAULT_METHOD, Proposal, Proposals
 from kineme.anchoring.proposals import propose as propose_clusters
 from kineme.errors import SpecificationError
-from kineme.library.members import described, described_references, groups_of
+from kineme.library.members import Members, described, groups_of, members_of, some_of_each
+from kineme.library.recognize import known_members
 from kineme.library.storage import changes, read
 from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store, history
-from kineme.library.storage.symbols import symbols
-from kineme.movements.trajectories.labels import label_array
-from kineme.recognition.answer import KnownClasses, fit_known_classes, open_set_labels
-from kineme.sampling import evenly_spaced
+from kineme.recognition.answer import KnownClasses, open_set_labels
 
 _MOST = 3000  # movements that are compared at most, equally many of each symbol
 
@@ -140,33 +137,28 @@ def _without(proposed: Proposals, rejected: list[NDArray[np.intp]]) -> Proposals
 
 @dataclass(frozen=True, eq=False)
 class Recognized:
-    """Movements without a symbol that are recognized as one.
+    """Movements without a symbol that are recognized as one."""
 
-    Attributes
-    ----------
-    ids : dict
-        Name of a symbol -> ids of the movements.
-    classes : KnownClasses or None
-        The symbols that they were recognized by; None if there was nothing to recognize, or no symbol.
-    """
-
-    ids: dict[str, Ids] = field(default_factory=dict)
-    classes: KnownClasses | None = None
+    ids: dict[str, Ids] = field(default_factory=dict)  # name of a symbol -> ids of the movements
+    classes: KnownClasses | None = None  # what they were recognized by; None if there was nothing to recognize
 
     def all_ids(self) -> Ids:
         """Return ids of all recognized movements."""
         return np.concatenate([np.empty(0, dtype=np.int64), *self.ids.values()])
 
 
+def some_members(store: Store) -> Members | None:
+    """Choose at most 3000 members of symbols, equally many of each; None without any."""
+    if not store.counts.members:
+        return None
+    members = members_of(store)
+    return some_of_each(members, max(1, _MOST // len(members.names)))
+
+
 def known_symbols(store: Store) -> KnownClasses | None:
     """Fit the recognition of symbols to at most 3000 of their movements; None without any."""
-    if not any(map(len, symbols(store))):
-        return None
-    ids, labels = evenly_many_members(store)
-    how, references = store.specification, described_references(store, ids, labels)
-    return fit_known_classes(
-        how.comparison, references, how.weights, how.classifier, groups_of(store, ids), store.channels
-    )
+    members = some_members(store)
+    return None if members is None else known_members(store, members, in_memory=False)
 
 
 def recognized(store: Store, error_rate: float = 0.05) -> Recognized:
@@ -208,21 +200,13 @@ class Review:
 
 def review(store: Store) -> Review:
     """Compare at most 3000 members of symbols; see `ActionLibrary.review`."""
-    ids, labels = evenly_many_members(store)
-    if len(np.unique(labels)) < 2:
+    members = some_members(store)
+    if members is None or len(members.names) < 2:
         return Review((), ())
-    members, like = described(store, ids), store.specification.comparison
-    splits = suggest_splits(members, labels, like=like)
+    ids, labels, like = members.ids, members.labels, store.specification.comparison
+    movements = described(store, ids)
+    splits = suggest_splits(movements, labels, like=like)
     return Review(
-        suggest_merges(members, labels, like=like),
+        suggest_merges(movements, labels, like=like),
         tuple(split._replace(parts=(ids[split.parts[0]], ids[split.parts[1]])) for split in splits),
     )
-
-
-def evenly_many_members(store: Store) -> tuple[Ids, NDArray[Any]]:
-    """Choose at most 3000 members of symbols, equally many of each; return them and the names of their symbols."""
-    shown = [symbol for symbol in symbols(store) if len(symbol)]
-    share = max(1, _MOST // max(1, len(shown)))
-    some = [symbol.members[evenly_spaced(len(symbol), share)] for symbol in shown]
-    labels = np.repeat(label_array([symbol.name for symbol in shown]), [len(members) for members in some])
-    return np.concatenate([np.empty(0, dtype=np.int64), *some]), labels

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 from threading import Lock
@@ -12,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.library.calibration_cache import calibrated, calibrated_once, sample_comparison
-from kineme.library.members import Members, described_references, members_of, some_members
-from kineme.library.reduced_features_cache import ReducedMovements, open_cache, updated
+from kineme.library.members import Members, described_references, members_of, some_of_each
+from kineme.library.reduced_features_cache import ReducedMovements, open_cache
 from kineme.library.storage import read
 from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store
@@ -60,7 +59,11 @@ class LibraryRecognizer:
     def stream(self, confidence: float = 0.9, patience: float = 0.05, early: Early | None = None) -> Live:
         """Recognize a movement while it is under way; see `ActionLibrary.stream`."""
         now = self.current()
-        return live(self._beginnings(now, as_early(early)), confidence, patience, partial(self._answer, now))
+        shared = self._beginnings(now, as_early(early))
+        comparison, references = shared.classes.comparison, shared.classes.references
+        return Live(
+            comparison, references, shared.hypotheses, Decision(confidence, patience), partial(self._answer, now)
+        )
 
     def model(self) -> KnownClasses | TwoStageSearch:
         """Return the recognition of the symbols as they are now: by all of their movements, or in two stages."""
@@ -76,8 +79,7 @@ class LibraryRecognizer:
                     calibrate_by = partial(calibrated_once, self.store, members)
                     self._current = Current(version, members.ids, known_members(self.store, members, calibrate_by))
                 else:
-                    reduced = open_cache(self.store) if self._reduced is None else updated(self.store, self._reduced)
-                    self._reduced = reduced
+                    reduced = self._reduced = open_cache(self.store, self._reduced)
                     self._current = Current(version, reduced.ids, two_stages(self.store, reduced, members))
             return self._current
 
@@ -87,7 +89,8 @@ class LibraryRecognizer:
             shared = self._begun
             if shared is None or (shared.version, shared.early) != (now.version, early):
                 classes = now.model if isinstance(now.model, KnownClasses) else some_of_each_symbol(self.store)
-                shared = self._begun = begun(now.version, classes, early)
+                prepared = hypotheses(classes.comparison, classes.references, early)
+                shared = self._begun = Begun(now.version, early, classes, prepared)
             return shared
 
     def _answer(self, now: Current, movement: Trajectory) -> Answer:
@@ -109,14 +112,17 @@ class LibraryRecognizer:
 def some_of_each_symbol(store: Store) -> KnownClasses:
     """Recognize symbols by at most ten members each, and 1000 in all or one of each."""
     members = members_of(store)
-    return known_members(store, some_members(members, max(1, min(_OF_EACH, _MOST // len(members.names)))))
+    return known_members(store, some_of_each(members, max(1, min(_OF_EACH, _MOST // len(members.names)))))
 
 
-def known_members(store: Store, members: Members, calibrate_by: Calibrates = calibrate) -> KnownClasses:
-    """Recognize the symbols of a small library by all members, with their stored features."""
+def known_members(
+    store: Store, members: Members, calibrate_by: Calibrates = calibrate, in_memory: bool = True
+) -> KnownClasses:
+    """Recognize symbols by these members, with their stored features; samples are read when asked for, or now."""
     how = store.specification
     references = described_references(store, members.ids, members.labels)
-    references = replace(references, demonstrations=read.movements(store, members.ids))  # few: kept in memory
+    if in_memory:
+        references = replace(references, demonstrations=read.movements(store, members.ids))
     return fit_known_classes(
         how.comparison, references, how.weights, how.classifier, members.groups, store.channels, calibrate_by
     )
@@ -154,14 +160,3 @@ class Begun(NamedTuple):
     early: Early
     classes: KnownClasses
     hypotheses: Hypotheses
-
-
-def begun(version: int, classes: KnownClasses, early: Early) -> Begun:
-    """Prepare the beginnings of known movements."""
-    return Begun(version, early, classes, hypotheses(classes.comparison, classes.references, early))
-
-
-def live(shared: Begun, confidence: float, patience: float, recognize: Callable[[Trajectory], Answer]) -> Live:
-    """Return a stream; `recognize` answers to the whole movement at its end."""
-    classes = shared.classes
-    return Live(classes.comparison, classes.references, shared.hypotheses, Decision(confidence, patience), recognize)

@@ -51,14 +51,16 @@ class ReducedMovements:
         return np.searchsorted(self.ids, ids)
 
 
-def open_cache(store: Store) -> ReducedMovements:
-    """Return reduced features of all movements ever stored: from the cache, and computed for those not in it."""
+def open_cache(store: Store, held: ReducedMovements | None = None) -> ReducedMovements:
+    """Return reduced features of all movements ever stored: held or in the cache, and computed for those not in it."""
     path = store.folder / FILE
-    reduced = _load(store, path)
+    reduced = held or _load(store, path)
     last = int(reduced.ids[-1]) if reduced is not None else -1
     later = _ids_after(store, last)
-    if reduced is not None and len(later) <= max(_FEW, _GROWN * len(reduced.ids)):
+    if reduced is not None and len(later) <= max(_FEW, _GROWN * len(reduced.blocks[0][0].values)):
         return reduced if not len(later) else extended(store, reduced, later)
+    if held is not None:
+        return open_cache(store)
     everything = _ids_after(store, -1)
     if not store.read_only:
         with suppress(OSError):  # disk full or no permission: kept in memory only
@@ -77,14 +79,6 @@ def extended(store: Store, reduced: ReducedMovements, later: Ids) -> ReducedMove
         pairs = zip(reduced.blocks[1], new, strict=True)
         new = tuple(ReducedFeatures(*map(np.concatenate, zip(*pair, strict=True))) for pair in pairs)
     return ReducedMovements(np.concatenate((reduced.ids, later)), reduced.bases, (reduced.blocks[0], new))
-
-
-def updated(store: Store, reduced: ReducedMovements) -> ReducedMovements:
-    """Return the same brought up to date with the library."""
-    later = _ids_after(store, int(reduced.ids[-1]))
-    if len(later) > max(_FEW, _GROWN * len(reduced.blocks[0][0].values)):
-        return open_cache(store)
-    return extended(store, reduced, later) if len(later) else reduced
 
 
 def _ids_after(store: Store, key: int) -> Ids:
@@ -106,12 +100,8 @@ def _layout(store: Store, n: int) -> tuple[list[tuple[type[Any], tuple[int, ...]
     parts: list[tuple[type[Any], tuple[int, ...]]] = [(np.int64, (n,))]
     for representation in store.specification.comparison.by_rows:
         k = min(N_REDUCED, representation.n_points)
-        parts += [
-            (np.float64, (representation.n_points, k)),
-            (np.float32, (n, d * k)),
-            (np.float32, (n,)),
-            (np.float32, (n,)),
-        ]
+        single = [(np.float32, shape) for shape in ((n, d * k), (n,), (n,))]
+        parts += [(np.float64, (representation.n_points, k)), *single]
     return parts, sum(_size(*part) for part in parts)
 
 
@@ -164,16 +154,9 @@ def _validity_key(store: Store, version: int) -> dict[str, Any]:
     """Cache validity key: the library, its specification, and its history, since a copy may have changed."""
     with store.reading() as connection:
         row = connection.execute("SELECT at FROM version WHERE id = ?", (version,)).fetchone()
-    described = zlib.crc32(json.dumps(store.specification.to_json()).encode())
-    at = row[0] if row else None
-    return {
-        "format": _FORMAT,
-        "library": store.id,
-        "seen": described,
-        "dims": store.n_dims,
-        "version": version,
-        "at": at,
-    }
+    described, at = zlib.crc32(json.dumps(store.specification.to_json()).encode()), row[0] if row else None
+    library = {"format": _FORMAT, "library": store.id, "seen": described, "dims": store.n_dims}
+    return {**library, "version": version, "at": at}
 
 
 def _load(store: Store, path: Path) -> ReducedMovements | None:
@@ -193,12 +176,9 @@ def _load(store: Store, path: Path) -> ReducedMovements | None:
         return None
     reduced = _arrays_in(store, buffer, n)
     plausible = (  # anybody can write a file with the right checksum
-        bool((reduced.ids == np.arange(1, len(reduced.ids) + 1)).all())
-        and all(bool(np.isfinite(P).all()) and np.allclose(P.T @ P, np.eye(P.shape[1])) for P in reduced.bases)
-        and all(bool(np.isfinite(part).all()) for features in reduced.blocks[0] for part in features)
-        and all(
-            bool((features.squares >= 0).all() and (features.residual_norms >= 0).all())
-            for features in reduced.blocks[0]
-        )
+        (reduced.ids == np.arange(1, n + 1)).all()
+        and all(np.isfinite(P).all() and np.allclose(P.T @ P, np.eye(P.shape[1])) for P in reduced.bases)
+        and all(np.isfinite(part).all() for features in reduced.blocks[0] for part in features)
+        and all((part >= 0).all() for features in reduced.blocks[0] for part in features[1:])
     )
     return reduced if plausible else None

@@ -11,8 +11,9 @@ from matplotlib.figure import Figure
 
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.movements.trajectories.figure import Paths, draw_movements_beside
+from kineme.movements.trajectories.figure import draw_movements_beside
 from kineme.movements.trajectories.labels import Label
+from kineme.movements.trajectories.movements import Samples
 from kineme.movements.trajectories.trajectory import MovementLike, MovementsLike
 from kineme.reporting.figures import BLUE, GRAY, figure_to_show
 from kineme.reporting.text import drawable, shortened
@@ -74,7 +75,7 @@ def _draw_bars(axes: Any, names: list[str], values: list[float], color: Any) -> 
     axes.invert_yaxis()
 
 
-def _beside(example: Example, movement: Demonstrations, demonstrations: Demonstrations) -> Paths:
+def _beside(example: Example, movement: Demonstrations, demonstrations: Demonstrations) -> Samples:
     """Return the movement, and the nearest demonstration mapped onto it, begun with it."""
     i, shown, transform = example
     n_dims = len(transform.shift)
@@ -93,4 +94,5 @@ def _beside(example: Example, movement: Demonstrations, demonstrations: Demonstr
     positions = np.concatenate((movement.positions, transform.apply(nearest.positions)))
     offsets = np.array([0, len(movement.positions), len(positions)])
     names = np.array(["movement", f"{shortened(str(shown), _NAME)}, mapped onto it"], dtype=object)
-    return Paths(np.concatenate((movement.times, times)), positions, offsets, movement._samples.position_names, names)
+    times, axes = np.concatenate((movement.times, times)), movement._samples.axis_names
+    return Samples(times, offsets, positions, axes, positions, axes, names)

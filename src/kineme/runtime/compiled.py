@@ -130,10 +130,16 @@ def _import_numba(required: bool) -> None:
     global _failure  # noqa: PLW0603 - an import that failed is not tried again at every call
     for attempt in range(_ATTEMPTS):
         try:
-            _modules["numba"] = _import_completely()
-            return
+            numba = import_module("numba")
+            if hasattr(numba, "core") and hasattr(numba, "njit"):
+                _modules["numba"] = numba
+                return
+            failure = "ImportError: parts of it are missing, as after an import that failed"
         except Exception as error:  # a broken installation can raise anything
             failure = f"{type(error).__name__}: {error}"
+        except BaseException:  # Ctrl-C
+            _remove_parts()
+            raise
         _let_others_finish(attempt)
         _remove_parts()
     _failure = failure
@@ -144,19 +150,6 @@ def _import_numba(required: bool) -> None:
             RuntimeWarning,
             stacklevel=4,
         )
-
-
-def _import_completely() -> Any:
-    """Import Numba completely, or raise."""
-    try:
-        numba = import_module("numba")
-    except BaseException as error:
-        if not isinstance(error, Exception):  # Ctrl-C
-            _remove_parts()
-        raise
-    if not (hasattr(numba, "core") and hasattr(numba, "njit")):
-        raise ImportError("parts of it are missing, as after an import that failed")
-    return numba
 
 
 def _remove_parts() -> None:

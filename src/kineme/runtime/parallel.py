@@ -1,9 +1,7 @@
-"""Work over row tiles in a few threads.
+"""Work over row tiles in a few threads, in a short-lived pool that survives forks and concurrent callers.
 
-Compiled kernels are single-threaded and release the GIL; parallelism is a short-lived thread pool,
-which survives forks and concurrent callers, unlike Numba's own parallel layers. While the pool
-works, the BLAS library is held to one thread per caller: two tiles side by side beat one tile
-split in two, because a tile stays in one core's cache.
+While the pool works, the BLAS library is held to one thread per caller: two tiles side by side beat one tile split in
+two, because a tile stays in one core's cache.
 """
 
 from __future__ import annotations
@@ -76,35 +74,27 @@ def single_threaded_blas() -> Iterator[None]:
 
 def _limit() -> Any:
     """Set BLAS to one thread; return the limiter that restores the former number."""
-    controller = _blas_controller()
-    with _control(controller):
+    with _control() as controller:
         return controller.limit(limits=1, user_api="blas")
 
 
 def _restore(limiter: Any) -> None:
-    with _control(_blas_controller()):
+    with _control():
         limiter.restore_original_limits()
 
 
 @contextmanager
-def _control(controller: Any) -> Iterator[None]:
+def _control() -> Iterator[Any]:
     """Let the calling thread set limits; from threadpoolctl 3.7 on, only the first thread that tries may."""
-    libraries = [
-        lib_controller
-        for lib_controller in controller.lib_controllers
-        if hasattr(lib_controller, "clear_controlling_thread")
-    ]
+    controller = _controller("scipy.linalg" in sys.modules)
+    libraries = [library for library in controller.lib_controllers if hasattr(library, "clear_controlling_thread")]
     for library in libraries:
         library.clear_controlling_thread(force=True)
     try:
-        yield
+        yield controller
     finally:
         for library in libraries:
             library.clear_controlling_thread(force=True)
-
-
-def _blas_controller() -> Any:
-    return _controller("scipy.linalg" in sys.modules)
 
 
 @cache

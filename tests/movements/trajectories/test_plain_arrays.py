@@ -5,7 +5,6 @@ import pytest
 
 from kineme import Demonstrations
 from kineme.errors import TrajectoryError
-from kineme.movements.trajectories.collect import plain_block, plain_stamps
 
 
 def _ragged(n_dims=2):
@@ -16,40 +15,58 @@ def _ragged(n_dims=2):
 @pytest.mark.parametrize("n_dims", [1, 2, 3])
 def test_plain_arrays_are_joined_as_concatenate_does(n_dims):
     arrays = _ragged(n_dims)
-    positions, offsets = plain_block(arrays)
-    assert np.array_equal(positions, np.concatenate(arrays))
-    assert offsets.tolist() == [0, 5, 14, 18, 318]
     times = [np.arange(float(len(one))) for one in arrays]
-    assert np.array_equal(plain_stamps(times, np.diff(offsets)), np.concatenate(times))
+    demos = Demonstrations.from_arrays(arrays, times=times)
+    assert np.array_equal(demos.positions, np.concatenate(arrays))
+    assert demos.offsets.tolist() == [0, 5, 14, 18, 318]
+    assert np.array_equal(demos.times, np.concatenate(times))
 
 
 @pytest.mark.parametrize(
     "odd",
     [
-        np.zeros((6, 2), np.float32),
-        np.zeros((6, 2), ">f8"),
-        np.zeros((6, 4))[:, ::2],
-        np.zeros((6, 3))[:, :2],
-        np.asfortranarray(np.zeros((6, 2))),
-        np.zeros((6, 3)),
-        np.zeros((6, 0)),
-        np.zeros((3, 2)),
-        np.zeros(6),
-        np.ma.masked_array(np.zeros((6, 2))),
-        [[0.0, 0.0]] * 6,
+        np.zeros((6, 2), np.float32) + 0.1,
+        np.ones((6, 2), ">f8"),
+        np.arange(24.0).reshape(6, 4)[:, ::2],
+        np.arange(18.0).reshape(6, 3)[:, :2],
+        np.asfortranarray(np.arange(12.0).reshape(6, 2)),
+        np.ma.masked_array(np.arange(12.0).reshape(6, 2)),
+        [[0.0, 1.0]] * 6,
     ],
-    ids=["float32", "bytes", "strided", "sliced", "Fortran", "wider", "empty", "short", "flat", "masked", "list"],
+    ids=["float32", "bytes", "strided", "sliced", "Fortran", "masked", "list"],
 )
-def test_anything_else_is_not_taken_for_plain(odd):
-    assert plain_block([*_ragged(), odd]) is None
-    assert plain_block([odd]) is None or np.array_equal(plain_block([odd])[0], odd)
+def test_whatever_holds_numbers_is_joined_with_plain_arrays(odd):
+    for arrays in ([odd], [*_ragged(), odd], [odd, *_ragged()]):
+        positions = Demonstrations.from_arrays(arrays).positions
+        assert type(positions) is np.ndarray
+        assert positions.dtype == np.float64
+        assert np.array_equal(positions, np.concatenate([np.asarray(one, dtype=float) for one in arrays]))
 
 
-def test_stamps_are_plain_only_with_the_lengths_of_the_positions():
-    times = [np.arange(5.0), np.arange(9.0)]
-    assert plain_stamps(times, np.array([5, 9])) is not None
-    assert plain_stamps(times, np.array([9, 5])) is None
-    assert plain_stamps([times[0], np.arange(18.0)[::2]], np.array([5, 9])) is None
+@pytest.mark.parametrize(
+    ("odd", "problem"),
+    [
+        (np.zeros((6, 3)), "expected 2 dimensions as in trajectory 0, got 3"),
+        (np.zeros((6, 0)), r"expected positions of shape \(T, d\), samples by dimensions, got shape \(6, 0\)"),
+        (np.zeros((3, 2)), "expected at least 4 samples, got 3"),
+        (np.zeros(6), "expected 2 dimensions as in trajectory 0, got 1"),
+        (np.ma.masked_array(np.zeros((6, 2)), np.eye(6, 2)), "expected an array of numbers, got one with 2 masked"),
+        (np.zeros((6, 2), complex), "expected real numbers"),
+    ],
+    ids=["wider", "empty", "short", "flat", "masked", "complex"],
+)
+def test_what_does_not_fit_is_refused_by_its_number(odd, problem):
+    with pytest.raises(TrajectoryError, match=f"trajectory 4: {problem}"):
+        Demonstrations.from_arrays([*_ragged(), odd])
+
+
+def test_stamps_need_the_lengths_of_the_positions():
+    arrays, times = [np.ones((5, 1)), np.ones((9, 1))], [np.arange(5.0), np.arange(9.0)]
+    strided = Demonstrations.from_arrays(arrays, times=[times[0], np.arange(18.0)[::2]])
+    assert strided.times.tolist() == [*range(5), *range(0, 18, 2)]
+    for wrong in (times[::-1], [times[0], np.arange(9.0).reshape(9, 1)]):
+        with pytest.raises(TrajectoryError, match="expected one time stamp for each of the"):
+            Demonstrations.from_arrays(arrays, times=wrong)
 
 
 def test_arrays_that_are_not_plain_hold_the_same_numbers():

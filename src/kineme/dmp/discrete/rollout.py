@@ -21,8 +21,8 @@ from kineme.errors import DegenerateMovementError, SpecificationError
 from kineme.movements.channels.channel import Channels, recorded_names
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import as_indices
-from kineme.movements.trajectories.movements import axis_names
-from kineme.movements.trajectories.presented import Presented, Samples, with_units
+from kineme.movements.trajectories.movements import Samples, axis_names
+from kineme.movements.trajectories.presented import Presented, with_units
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.runtime.parallel import for_tiles
 from kineme.validation import Array, as_numbers, check_count, check_number, check_samples, describe

@@ -23,10 +23,9 @@ _SAID = ("description", "prototype", "threshold")  # the columns that `annotate`
 def rename(store: Store, old: str, new: str) -> int:
     """Rename a symbol; its id stays."""
     check_name(new)
-    detail = {"old": old, "new": new}
-    with store.writing("rename", detail) as change:
+    with store.writing("rename") as change:
         state = state_of(change.connection, old, NOW)
-        detail["old"] = state[_NAME]
+        change.detail.update(old=state[_NAME], new=new)
         _check_free(change.connection, new)
         _replace_state(change, state, name=new)
     return change.version
@@ -43,20 +42,18 @@ def annotate(store: Store, who: str, **values: Any) -> int:
         values["threshold"] = float(threshold)
     if "description" in values:
         _check_description(values["description"])
-    detail = {"symbol": who, **values}
-    with store.writing("annotate", detail) as change:
+    with store.writing("annotate") as change:
         state = state_of(change.connection, who, NOW)
-        detail["symbol"] = state[_NAME]
+        change.detail.update(symbol=state[_NAME], **values)
         _replace_state(change, state, **values)
     return change.version
 
 
 def delete_symbol(store: Store, who: str) -> int:
     """Delete a symbol; its movements stay, without a symbol."""
-    detail = {"symbol": who}
-    with store.writing("delete", detail) as change:
+    with store.writing("delete") as change:
         state = state_of(change.connection, who, NOW)
-        detail["symbol"] = state[_NAME]
+        change.detail["symbol"] = state[_NAME]
         _leave(change, "symbol = :key", {"key": state[1]})
         change.retire("symbol_state", [state])
     return change.version
@@ -65,8 +62,7 @@ def delete_symbol(store: Store, who: str) -> int:
 def delete_movements(store: Store, ids: Any) -> int:
     """Delete movements; a symbol whose prototype is among them loses it."""
     wanted = as_ids(store, ids)
-    detail = {"movements": len(wanted), "first": int(wanted[0])}
-    with store.writing("delete", detail) as change:
+    with store.writing("delete", {"movements": len(wanted), "first": int(wanted[0])}) as change:
         keys = {"keys": listed(wanted)}
         _leave(change, among("movement"), keys)
         for state in select(change.connection, "symbol_state", f"removed IS NULL AND {among('prototype')}", keys):
@@ -77,21 +73,14 @@ def delete_movements(store: Store, ids: Any) -> int:
 
 
 def merge(store: Store, names: Sequence[str], into: str) -> int:
-    """Merge several symbols into one.
-
-    If `into` is the name or id of a symbol, that one takes the members of the others; otherwise a new symbol is
-    created. The ids of the merged symbols become its parents.
-    """
+    """Merge several symbols into one, see `ActionLibrary.merge`; `into` is its name, or the id of one that exists."""
     if isinstance(names, str) or len(set(names)) < 1:
         raise SpecificationError(f"expected a list of symbols to merge, got {names!r}")
-    detail: dict[str, Any] = {"names": list(names), "into": into}
-    with store.writing("merge", detail) as change:
+    with store.writing("merge") as change:
         states = {state[1]: state for state in (state_of(change.connection, name, NOW) for name in names)}
         target = _find(change.connection, into)
-        detail |= {
-            "names": [state[_NAME] for state in states.values()],
-            "into": into if target is None else target[_NAME],
-        }
+        merged_names = [state[_NAME] for state in states.values()]
+        change.detail.update(names=merged_names, into=into if target is None else target[_NAME])
         merged = [state for key, state in states.items() if target is None or key != target[1]]
         if not merged:
             raise SpecificationError(f"expected symbols other than {into!r} to merge into it, got {list(names)}")
@@ -115,10 +104,9 @@ def split(store: Store, name: str, ids: Any, new: str) -> int:
     """Split a symbol: some of its members become a new symbol, and the old one becomes its parent."""
     check_name(new)
     wanted = as_ids(store, ids)
-    detail = {"symbol": name, "new": new, "movements": len(wanted)}
-    with store.writing("split", detail) as change:
+    with store.writing("split") as change:
         state = state_of(change.connection, name, NOW)
-        detail["symbol"] = state[_NAME]
+        change.detail.update(symbol=state[_NAME], new=new, movements=len(wanted))
         _check_free(change.connection, new)
         key = make(change, new, _ids_of(change.connection, [state]))
         where = f"symbol = :key AND {among('movement')}"
@@ -146,14 +134,13 @@ def assign(
     """
     check_choice("how", how, HOW)
     wanted = as_ids(store, ids)
-    detail: dict[str, Any] = {"symbol": who, "movements": len(wanted), "how": how}
     values: dict[str, Any] = {}
     if description is not None:
         _check_description(description)
-        values["description"] = detail["description"] = description
-    with store.writing("assign", detail) as change:
+        values["description"] = description
+    with store.writing("assign") as change:
         state = _find(change.connection, who)
-        detail["symbol"] = who if state is None else state[_NAME]
+        change.detail.update(symbol=who if state is None else state[_NAME], movements=len(wanted), how=how, **values)
         key = make(change, check_name(who)) if state is None else state[1]
         left = _leave(change, among("movement"), {"keys": listed(wanted)})
         _forget_prototypes(change, [row for row in left if row[2] != key])

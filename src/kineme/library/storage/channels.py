@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from kineme.errors import DataError
 from kineme.library.storage.rows import Row, strange
 from kineme.movements.channels.channel import Channels, channels_from_data, channels_to_data, is_plain, learned_names
-from kineme.movements.channels.coordinates import canonical, columns_of
+from kineme.movements.channels.coordinates import canonical
 from kineme.movements.trajectories.movements import Movements
 from kineme.validation import Array
 
@@ -35,14 +35,15 @@ def channels_of_text(text: str, n_dims: int, path: Path) -> Channels:
         ) from error
 
 
+def columns_of_kinds(channels: Channels, *kinds: str) -> list[int]:
+    """Return the columns of channels of these kinds."""
+    every = [channel.kind for channel in channels for _ in channel.columns]
+    return [k for k, kind in enumerate(every) if kind in kinds]
+
+
 def other_columns(channels: Channels) -> list[int]:
-    """Return the columns that are stored beside the positions: of orientations and discrete channels."""
-    return [
-        k
-        for channel, columns in zip(channels, columns_of(channels), strict=True)
-        if channel.kind in ("orientation", "discrete")
-        for k in range(columns.start, columns.stop)
-    ]
+    """Return the columns that are stored beside the positions."""
+    return columns_of_kinds(channels, "orientation", "discrete")
 
 
 def to_bytes(recorded: Array, offsets: NDArray[np.intp], channels: Channels) -> list[bytes]:
@@ -71,14 +72,12 @@ def _from_bytes(blobs: Sequence[bytes], positions: Array, offsets: NDArray[np.in
     others = other_columns(channels)
     recorded = np.empty((len(positions), sum(len(channel.columns) for channel in channels)))
     recorded[:, others] = np.frombuffer(b"".join(blobs), np.float32).reshape(-1, len(others))
-    kinds = [channel.kind for channel in channels for _ in channel.columns]
-    for k in (k for k in others if kinds[k] == "discrete"):
+    for k in columns_of_kinds(channels, "discrete"):
         # The shortest decimals that round to the stored single precision: 0.08, and not 0.0799999982.
         starts = np.flatnonzero(np.diff(recorded[:, k], prepend=np.nan))  # of the stretches in which a value holds
         values, which = np.unique(recorded[starts, k].astype(np.float32), return_inverse=True)
         exact = np.array([float(str(value)) for value in values])[which]
         recorded[:, k] = np.repeat(exact, np.diff(starts, append=len(recorded)))
-    plain = [k for k in range(recorded.shape[1]) if k not in others]
     learned = [channel.kind != "orientation" for channel in channels for _ in channel.coordinates]
-    recorded[:, plain] = positions[:, learned]
+    recorded[:, columns_of_kinds(channels, "position", "angle")] = positions[:, learned]
     return canonical(recorded, offsets, channels)

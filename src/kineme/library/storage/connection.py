@@ -1,9 +1,4 @@
-"""Open the database of a library: checks of the file, and settings that keep writes safe.
-
-The write-ahead log allows one writer and any number of readers, and makes transactions atomic. With ``synchronous =
-FULL`` a commit is on the disk when it returns, also after a power cut. It costs one fsync per commit, and learning
-commits thousands of movements at a time.
-"""
+"""Open the database of a library: checks of the file, and settings that keep writes safe, also over a power cut."""
 
 from __future__ import annotations
 
@@ -275,9 +270,7 @@ def in_plain_words(path: Path, wait: float) -> Iterator[None]:
     """Convert errors of the database to `DataError`; programming errors stay as they are."""
     try:
         yield
-    except KinemeError:
-        raise
-    except FileExistsError:  # handled by the caller
+    except (KinemeError, FileExistsError):  # the latter is handled by the caller
         raise
     except OSError as error:
         raise DataError(f"expected to read or write {path}, got an error of the system ({error})") from error

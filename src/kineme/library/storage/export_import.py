@@ -28,15 +28,9 @@ from kineme.library.storage.verify import verify
 
 
 def export(store: Store, path: str | Path) -> Path:
-    """Write the library, with all its versions, to one new file, atomically.
+    """Write the library, with all its versions, to one new file, atomically; equal rows give equal bytes.
 
-    Libraries with the same rows give the same bytes.
-
-    Raises
-    ------
-    DataError
-        The file exists; the disk is full; the library's structure is damaged. Rows with a wrong checksum are copied as
-        they are: `verify` finds them, and `import_` refuses them.
+    Rows with a wrong checksum are copied as they are: `verify` finds them, and `import_` refuses them.
     """
     target = Path(path)
     with _new(target) as beside:
@@ -114,11 +108,8 @@ def _check_structure(beside: Path, source: Path, wait: float) -> None:
 
 
 def _check(beside: Path, source: Path, wait: float) -> None:
-    store = Store(beside, read_only=True, wait=wait)
-    try:
+    with closing(Store(beside, read_only=True, wait=wait)) as store:
         problems = verify(store, pages=False)
-    finally:
-        store.close()
     if problems:
         raise _refusal(source, len(problems), str(problems[0]))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -16,7 +16,7 @@ from kineme.errors import SpecificationError
 from kineme.library.storage.channels import with_channels
 from kineme.library.storage.rows import ALIVE, Row, among, damage, damaged, has_table, listed, select, strange
 from kineme.library.storage.schema import COLUMNS
-from kineme.library.storage.store import Store
+from kineme.library.storage.store import Moment, Store
 from kineme.movements.channels.channel import is_plain
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import label_array
@@ -30,31 +30,22 @@ _ROWS = 4096  # rows fetched at a time
 
 def all_ids(store: Store) -> Ids:
     """Return ids of all movements, ascending."""
-    with store.reading() as connection:
-        moment = store.moment(connection)
-        query = f"SELECT id FROM movement WHERE {ALIVE} ORDER BY id"
-        return _column(connection, query, moment.version, moment.movements)
+    return _ids(store, "TRUE", lambda moment: moment.movements)
 
 
 def unlabeled_ids(store: Store) -> Ids:
     """Return ids of the movements without a symbol, ascending."""
-    members = f"SELECT movement FROM member WHERE {ALIVE}"
-    query = f"SELECT id FROM movement WHERE {ALIVE} AND id NOT IN ({members}) ORDER BY id"
+    without = f"id NOT IN (SELECT movement FROM member WHERE {ALIVE})"
+    return _ids(store, without, lambda moment: moment.movements - moment.members)
+
+
+def _ids(store: Store, where: str, count_at: Callable[[Moment], int]) -> Ids:
+    """Return ids of movements, ascending; refused if their number is not that of the moment."""
     with store.reading() as connection:
         moment = store.moment(connection)
-        return _column(connection, query, moment.version, moment.movements - moment.members)
-
-
-def count(store: Store) -> int:
-    """Return the number of movements."""
-    with store.reading() as connection:
-        return store.moment(connection).movements
-
-
-def _column(connection: sqlite3.Connection, query: str, version: int, expected: int) -> Ids:
-    """Return ids from a query; refused if their number is wrong."""
-    ids = np.array([key for (key,) in connection.execute(query, {"v": version})], dtype=np.int64)
-    last, n = connection.execute("SELECT coalesce(max(id), 0), count(*) FROM movement").fetchone()
+        expected, query = count_at(moment), f"SELECT id FROM movement WHERE {ALIVE} AND {where} ORDER BY id"
+        ids = np.array([key for (key,) in connection.execute(query, {"v": moment.version})], dtype=np.int64)
+        last, n = connection.execute("SELECT coalesce(max(id), 0), count(*) FROM movement").fetchone()
     if len(ids) != expected or last != n or (np.diff(ids) <= 0).any():
         raise damage(f"{expected} ids of {last} movements, each once", f"{len(ids)} of {n}: damaged bytes")
     return ids

@@ -118,21 +118,14 @@ def row_name(table: str, key: Any) -> str:
     return f"{of_movement[table]} of movement {key}" if table in of_movement else f"row {key} of table {table}"
 
 
-def among(column: str, name: str = "keys") -> str:
-    """Return SQL condition that `column` is in the list that is passed as parameter `name`, see `listed`."""
-    return f"{column} IN (SELECT value FROM json_each(:{name}))"
+def among(column: str) -> str:
+    """Return SQL condition that `column` is in the list that is passed as parameter ``keys``, see `listed`."""
+    return f"{column} IN (SELECT value FROM json_each(:keys))"
 
 
 def listed(values: Iterable[Any]) -> str:
     """Return numbers or texts as the parameter of `among`."""
     return json.dumps([value if isinstance(value, str) else int(value) for value in values])
-
-
-def retire(connection: sqlite3.Connection, table: str, rows: Sequence[Row], version: int) -> None:
-    """Mark rows, whose last column is ``removed``, as removed from `version` on."""
-    gone = [(*row[:-1], version) for row in rows]
-    statement = f"UPDATE {table} SET removed = ?, crc = ? WHERE id = ?"
-    connection.executemany(statement, [(version, seal(table, row), row[0]) for row in gone])
 
 
 def next_key(connection: sqlite3.Connection, table: str) -> int:

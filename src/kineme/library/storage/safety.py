@@ -26,7 +26,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from threading import Condition, get_ident
-from typing import Any, Protocol
+from typing import Any
 from weakref import WeakSet
 
 from kineme.errors import DataError
@@ -73,13 +73,42 @@ def _switch(connection: sqlite3.Connection, names: tuple[str, ...], on: bool) ->
             setconfig(getattr(sqlite3, name), on)
 
 
-class Watched(sqlite3.Connection):
+_PATIENCE = 10.0  # seconds
+
+_changed = Condition()
+_busy: dict[int, int] = {}  # thread -> number of its nested uses of a library
+_forking: int | None = None  # id of the thread that forks
+_lost: set[tuple[int, int]] = set()  # device and inode of files that are open in the parent
+_sleepers: WeakSet[Any] = WeakSet()
+
+
+def register(store: Any) -> None:
+    """Register a store: before every fork it closes its connections by ``sleep``, until they are needed again.
+
+    In a child its ``carried_over`` are the connections that are open, which must be neither used nor closed.
+    """
+    _sleepers.add(store)
+
+
+@contextmanager
+def awake() -> Iterator[None]:
+    """Hold off forks within the context, which a thread may enter several times."""
+    me = get_ident()
+    _enter(me)
+    try:
+        yield
+    finally:
+        _leave(me)
+
+
+class Connection(sqlite3.Connection):
     """A connection that interrupts statements that take more work than reading every byte of the file.
 
-    For one thread at a time.
+    For one thread at a time. It holds off forks until it is closed, or until its owner calls `allow_forks`.
     """
 
     _path: Path
+    _thread: int | None = None
 
     def __init__(self, *database: Any, **options: Any) -> None:
         self._checks = 0  # checks during the current statement
@@ -110,63 +139,6 @@ class Watched(sqlite3.Connection):
         finally:
             self._too_much = bool
 
-
-def limited(connection: Watched, path: Path) -> AbstractContextManager[None]:
-    """Interrupt, within the context, also once all statements together take too long for the size of the file."""
-    end = time.monotonic() + _SECONDS + size_of(path) / _BYTES_PER_SECOND
-    return connection.stopping(lambda: time.monotonic() > end)
-
-
-def limited_copy(connection: Watched, path: Path, copy: Path) -> AbstractContextManager[None]:
-    """Interrupt, within the context, also once the copy is far larger than the file."""
-    most = 2 * size_of(path) + _ROOM
-    return connection.stopping(lambda: size_of(copy) > most)
-
-
-_PATIENCE = 10.0  # seconds
-
-_changed = Condition()
-_busy: dict[int, int] = {}  # thread -> number of its nested uses of a library
-_forking: int | None = None  # id of the thread that forks
-_lost: set[tuple[int, int]] = set()  # device and inode of files that are open in the parent
-
-
-class Sleeper(Protocol):
-    """An object that keeps connections open between calls."""
-
-    path: Path
-
-    def sleep(self) -> None:
-        """Close the connections; they are opened again when needed."""
-
-    def carried_over(self) -> list[sqlite3.Connection]:
-        """Called in a child: the connections that are open, which must be neither used nor closed."""
-
-
-_sleepers: WeakSet[Any] = WeakSet()
-
-
-def register(sleeper: Sleeper) -> None:
-    """Register an object whose connections are closed before every fork."""
-    _sleepers.add(sleeper)
-
-
-@contextmanager
-def awake() -> Iterator[None]:
-    """Hold off forks within the context, which a thread may enter several times."""
-    me = get_ident()
-    _enter(me)
-    try:
-        yield
-    finally:
-        _leave(me)
-
-
-class Connection(Watched):
-    """A connection that holds off forks until it is closed, or until its owner calls `allow_forks`."""
-
-    _thread: int | None = None
-
     def allow_forks(self) -> Connection:
         """Hold off forks no more; the owner is registered, and closes the connection before a fork."""
         if self._thread is not None:
@@ -191,6 +163,18 @@ def open_connection(address: str | Path, **options: Any) -> Connection:
         raise
     connection._thread = me
     return connection
+
+
+def limited(connection: Connection, path: Path) -> AbstractContextManager[None]:
+    """Interrupt, within the context, also once all statements together take too long for the size of the file."""
+    end = time.monotonic() + _SECONDS + size_of(path) / _BYTES_PER_SECOND
+    return connection.stopping(lambda: time.monotonic() > end)
+
+
+def limited_copy(connection: Connection, path: Path, copy: Path) -> AbstractContextManager[None]:
+    """Interrupt, within the context, also once the copy is far larger than the file."""
+    most = 2 * size_of(path) + _ROOM
+    return connection.stopping(lambda: size_of(copy) > most)
 
 
 def is_lost(path: Path) -> bool:

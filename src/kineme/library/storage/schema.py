@@ -24,26 +24,6 @@ RETURNS = (UNDO, RESTORE)  # actions of versions with the state of an earlier on
 CONTINUES = "continues"  # in the detail of a version: the one before it, which was learned in the same call
 PAGE_SIZE = 32768  # a row of features fills at most a seventh of it, so that little of a page is unused
 
-#: Table -> its columns, the key first. Every table ends with a checksum of all of them, see `rows.seal`.
-COLUMNS: dict[str, tuple[str, ...]] = {
-    "meta": ("key", "value"),
-    "version": ("id", "at", "action", "detail", "movements", "members", "symbols"),
-    "source": ("id", "path", "sha256", "size", "read_at", "kind", "options", "added"),
-    "movement": (
-        "id", "source", "place", "digest", "name", "label", "n_samples", "t0", "duration", "added", "removed",
-    ),
-    "raw": ("movement", "start", "positions", "times"),
-    "primitive": ("movement", "boundary", "weights"),
-    "feature": ("movement", "rows"),
-    "symbol": ("key", "id", "created"),
-    "symbol_state": (
-        "id", "symbol", "name", "description", "prototype", "threshold", "parents", "added", "removed",
-    ),
-    "member": ("id", "movement", "symbol", "how", "added", "removed"),
-    "shown_by": ("movement", "person", "added"),
-    "recorded": ("movement", "columns"),
-}  # fmt: skip
-
 #: Keys of the table `meta`; those of the second are written with the first movement, "channels" if they are known.
 META = frozenset({"id", "recognizer", "dmp", "schema"})
 LATER_META = frozenset({"n_dims", "channels"})
@@ -60,7 +40,7 @@ OPTIONAL_BLOBS = ("recorded",)
 #: Tables whose rows are alive or removed; each version stores the number of alive rows, in columns of these names.
 COUNTED = {"movement": "movements", "member": "members", "symbol_state": "symbols"}
 
-#: Statements that create a library of version 1, with the columns of `COLUMNS`. No character may change, blanks
+#: Statements that create a library of version 1, with the columns of `CHECKS`. No character may change, blanks
 #: included: SQLite stores these texts, and a library with other texts is refused.
 CREATE = (
     "CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL, crc INTEGER NOT NULL)",
@@ -161,7 +141,7 @@ _ALIVE = _ADDED | {
     )
 }
 
-#: Table -> column -> the condition on its values.
+#: Table -> column, in the order of the table -> the condition on its values.
 CHECKS: dict[str, dict[str, Check]] = {
     "meta": {"key": _text("key", 1), "value": _text("value", 1, MAX_DOCUMENT)},
     "version": {
@@ -232,9 +212,12 @@ CHECKS: dict[str, dict[str, Check]] = {
         "how": Check("how IN ('label', 'anchored', 'recognized')", "how a movement came to its symbol"),
         **_ALIVE,
     },
-    "recorded": {"movement": _integer("movement"), "columns": _bytes("columns")},
     "shown_by": {"movement": _integer("movement"), "person": _name("person"), **_ADDED},
+    "recorded": {"movement": _integer("movement"), "columns": _bytes("columns")},
 }
+
+#: Table -> its columns, the key first. Every table ends with a checksum of all of them, see `rows.seal`.
+COLUMNS = {table: tuple(checks) for table, checks in CHECKS.items()}
 
 #: Table -> the condition that is checked whenever a row is read, and the one of import and `verify`.
 GOOD = {

@@ -10,6 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from kineme.library.storage.rows import parsed
 from kineme.library.storage.store import Store
 from kineme.movements.channels.channel import recorded_names
 from kineme.movements.tables.layout import Known
@@ -72,13 +73,10 @@ def known_sources(store: Store) -> Known:
 def _choice(text: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return topics and frames among the options of a source; none of what is no such option."""
     try:
-        options = json.loads(text)
-    except (ValueError, RecursionError):
-        return (), ()
-    topics, frames = (options.get(name) if isinstance(options, dict) else None for name in ("topic", "frame"))
-    return _names(topics), _names(frames)
-
-
-def _names(value: object) -> tuple[str, ...]:
-    several = [value] if isinstance(value, str) else value if isinstance(value, list) else []
-    return tuple(name for name in several if isinstance(name, str))
+        options = parsed(text)
+    except ValueError:
+        options = None
+    chosen = [options.get(name) if isinstance(options, dict) else None for name in ("topic", "frame")]
+    several = ([value] if isinstance(value, str) else value if isinstance(value, list) else [] for value in chosen)
+    topics, frames = (tuple(name for name in names if isinstance(name, str)) for names in several)
+    return topics, frames

@@ -39,24 +39,12 @@ class Recognizes(Compares, Protocol):
 
 @dataclass(frozen=True)
 class Specification:
-    """Specification of how the movements of a library are compared and recognized, and how they move again.
-
-    Attributes
-    ----------
-    comparison : ComparisonSpecification
-        What features are, and how they are compared.
-    classifier : str
-        As of `kineme.Recognizer`.
-    weights : str or tuple of R float
-        Of the representations, as of `kineme.Recognizer`.
-    dmp : DMP
-        Of the primitives.
-    """
+    """Specification of how the movements of a library are compared and recognized, and how they move again."""
 
     comparison: ComparisonSpecification = field(default_factory=ComparisonSpecification)
-    classifier: str = "auto"
+    classifier: str = "auto"  # this and the weights of the representations as of `kineme.Recognizer`
     weights: str | tuple[float, ...] = "auto"
-    dmp: DMP = field(default_factory=DMP)
+    dmp: DMP = field(default_factory=DMP)  # of the primitives
 
     def __post_init__(self) -> None:
         from kineme.recognition.classifiers import CLASSIFIERS
@@ -136,15 +124,12 @@ class Specification:
 @lru_cache(maxsize=16)  # a library is opened again and again
 def _of_texts(recognizer: str, dmp_text: str) -> Specification:
     parameters, dmp = parsed(recognizer), parsed(dmp_text)
-    parameters["representations"] = tuple(
-        Representation(**({"signal": False} | fields)) for fields in parameters["representations"]
-    )
-    if parameters.get("rotation_prior") is not None:
-        prior = parameters["rotation_prior"]
-        vertical = prior["vertical"]
-        parameters["rotation_prior"] = RotationPrior(
-            prior["concentration"], None if vertical is None else tuple(vertical), prior["tilt"]
-        )
+    # Where it is not said, signals are described as they were when it could not be said.
+    own = (Representation(**{"signal": False} | fields) for fields in parameters["representations"])
+    parameters["representations"] = tuple(own)
+    if (prior := parameters.get("rotation_prior")) is not None:
+        vertical = None if prior["vertical"] is None else tuple(prior["vertical"])
+        parameters["rotation_prior"] = RotationPrior(**prior | {"vertical": vertical})
     if not isinstance(weights := parameters.get("weights", "auto"), str):
         parameters["weights"] = tuple(map(float, weights))
     normalization = Normalization(parameters.pop("translation", True), parameters.pop("scale", "path"))

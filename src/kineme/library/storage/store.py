@@ -12,7 +12,7 @@ from datetime import UTC, datetime
 from numbers import Integral
 from pathlib import Path
 from threading import Lock, RLock
-from typing import Any
+from typing import Any, NamedTuple
 
 from kineme.errors import DataError, SpecificationError
 from kineme.library.storage import safety
@@ -26,7 +26,7 @@ from kineme.library.storage.connection import (
     migrate,
     transaction,
 )
-from kineme.library.storage.rows import Row, damaged, insert, parsed_column, retire, select
+from kineme.library.storage.rows import Row, damaged, insert, parsed_column, seal, select
 from kineme.library.storage.safety import size_of
 from kineme.library.storage.schema import COUNTED, LARGEST_ID, READABLE, SCHEMA_VERSION
 from kineme.library.storage.specification import Specification, as_n_dims
@@ -151,20 +151,21 @@ class Store:
     @property
     def n_dims(self) -> int | None:
         """Dimensions that all movements share; None before the first one."""
-        if self._n_dims is None:
-            with self.reading() as connection:
-                rows = select(connection, "meta", "key = 'n_dims'")
-            self._n_dims = as_n_dims(rows[0][1], self.path) if rows else None
+        if self._n_dims is None and (text := self._meta("n_dims")) is not None:
+            self._n_dims = as_n_dims(text, self.path)
         return self._n_dims
 
     @property
     def channels(self) -> Channels | None:
         """Channels that the movements were recorded as; None before the first one, and where that is not known."""
-        if self._channels is None:
-            with self.reading() as connection:
-                rows = select(connection, "meta", "key = 'channels'")
-            self._channels = channels_of_text(rows[0][1], self.n_dims or 0, self.path) if rows else None
+        if self._channels is None and (text := self._meta("channels")) is not None:
+            self._channels = channels_of_text(text, self.n_dims or 0, self.path)
         return self._channels
+
+    def _meta(self, key: str) -> str | None:
+        with self.reading() as connection:
+            rows = select(connection, "meta", "key = :key", {"key": key})
+        return rows[0][1] if rows else None
 
     @contextmanager
     def reading(self) -> Iterator[sqlite3.Connection]:
@@ -186,13 +187,24 @@ class Store:
                     self._n_reading -= 1
 
     def moment(self, connection: sqlite3.Connection) -> Moment:
-        """Context manager: the shown version, which stays the same while new ones are added."""
-        return moment_at(connection, self.as_of)
+        """Return the shown version, which stays the same while new ones are added."""
+        last = connection.execute("SELECT max(id) FROM version WHERE id <= :v", {"v": self.as_of}).fetchone()[0]
+        if last is None:
+            return Moment(0)
+        rows = select(connection, "version", "id = :last", {"last": last})
+        if not rows:
+            raise damaged("version", (last,))
+        return Moment(last, *rows[0][4:])
+
+    @property
+    def counts(self) -> Moment:
+        """The shown version, and its numbers of movements, members and symbols."""
+        with self.reading() as connection:
+            return self.moment(connection)
 
     @contextmanager
     def writing(self, action: str, detail: dict[str, Any] | None = None) -> Iterator[Change]:
-        """Context manager: one transaction, which becomes one version; `detail` is stored in the history."""
-        detail = {} if detail is None else detail
+        """Context manager: one transaction, which becomes one version; its `detail` is stored in the history."""
         with safety.awake(), in_plain_words(self.path, self.wait):
             # Before the lock: in a forked child, a thread that does not exist may hold it.
             safety.refuse_if_lost(self.path)
@@ -206,10 +218,10 @@ class Store:
                     self.check_writable()  # again: waiting for the turn may have taken long
                     last = self.moment(self._writer)
                     counts = {name: getattr(last, name) for name in COUNTED.values()}
-                    change = Change(self._writer, last.version + 1, counts)
+                    change = Change(self._writer, last.version + 1, counts, detail or {})
                     yield change
                     at = datetime.now(UTC).isoformat(timespec="milliseconds")
-                    text = json.dumps(detail, ensure_ascii=False)
+                    text = json.dumps(change.detail, ensure_ascii=False)
                     insert(self._writer, "version", [(change.version, at, action, text, *change.counts.values())])
 
     def check_writable(self) -> None:
@@ -284,25 +296,13 @@ class Version:
     detail: Mapping[str, Any]
 
 
-@dataclass(frozen=True)
-class Moment:
+class Moment(NamedTuple):
     """A version and its numbers of alive rows, by which rows that damage has hidden are noticed."""
 
     version: int
     movements: int = 0
     members: int = 0
     symbols: int = 0
-
-
-def moment_at(connection: sqlite3.Connection, version: int) -> Moment:
-    """Return the last version up to the given one."""
-    last = connection.execute("SELECT max(id) FROM version WHERE id <= :v", {"v": version}).fetchone()[0]
-    if last is None:
-        return Moment(0)
-    rows = select(connection, "version", "id = :last", {"last": last})
-    if not rows:
-        raise damaged("version", (last,))
-    return Moment(last, *rows[0][4:])
 
 
 @dataclass(frozen=True)
@@ -312,6 +312,7 @@ class Change:
     connection: sqlite3.Connection
     version: int
     counts: dict[str, int]
+    detail: dict[str, Any]  # of the version, for the history
 
     def insert(self, table: str, rows: Sequence[Row]) -> None:
         """Add rows to a table."""
@@ -319,8 +320,10 @@ class Change:
         self._count(table, len(rows))
 
     def retire(self, table: str, rows: Sequence[Row]) -> None:
-        """Mark selected rows as removed from this version on."""
-        retire(self.connection, table, rows, self.version)
+        """Mark selected rows, whose last column is ``removed``, as removed from this version on."""
+        gone = [(*row[:-1], self.version) for row in rows]
+        statement = f"UPDATE {table} SET removed = ?, crc = ? WHERE id = ?"
+        self.connection.executemany(statement, [(self.version, seal(table, row), row[0]) for row in gone])
         self._count(table, -len(rows))
 
     def _count(self, table: str, more: int) -> None:

@@ -84,12 +84,6 @@ def symbols(store: Store) -> tuple[Symbol, ...]:
         return tuple(sorted(_with_members(connection, moment, states), key=lambda symbol: symbol.name))
 
 
-def count(store: Store) -> int:
-    """Return the number of symbols, whose members are not read."""
-    with store.reading() as connection:
-        return store.moment(connection).symbols
-
-
 def symbol(store: Store, who: str) -> Symbol:
     """Return the symbol of that name or id."""
     with store.reading() as connection:
@@ -123,30 +117,17 @@ def state_of(connection: sqlite3.Connection, who: str, version: int) -> Row:
 
 
 def _with_members(connection: sqlite3.Connection, moment: Moment, states: Sequence[Row]) -> list[Symbol]:
-    records = [dict(zip(COLUMNS["symbol_state"], row, strict=True)) for row in states]
-    keys = [record["symbol"] for record in records]
-    about = {
-        key: (name, created)
-        for key, name, created in select(connection, "symbol", among("key"), {"keys": listed(keys)})
-    }
+    keys = [row[1] for row in states]
+    about = {row[0]: row[1:] for row in select(connection, "symbol", among("key"), {"keys": listed(keys)})}
     if lost := set(keys) - about.keys():
         raise damaged("symbol", (min(lost),))
-    members = _members(connection, keys, moment)
-    parents = [tuple(parsed_column("symbol_state", row, "parents", list)) for row in states]
-    return [
-        Symbol(
-            about[record["symbol"]][0],
-            record["name"],
-            record["description"],
-            members[record["symbol"]],
-            record["prototype"],
-            record["threshold"],
-            above,
-            about[record["symbol"]][1],
-            record["added"],
-        )
-        for record, above in zip(records, parents, strict=True)
-    ]
+    members, every = _members(connection, keys, moment), []
+    for row in states:
+        _, key, name, description, prototype, threshold, _, added, _ = row
+        parents = tuple(parsed_column("symbol_state", row, "parents", list))
+        id_, created = about[key]
+        every.append(Symbol(id_, name, description, members[key], prototype, threshold, parents, created, added))
+    return every
 
 
 def _members(connection: sqlite3.Connection, keys: list[int], moment: Moment) -> dict[int, NDArray[np.int64]]:
@@ -216,7 +197,10 @@ def symbol_report(store: Store, who: str) -> dict[str, Any]:
     members = []
     if len(shown):
         about = records(store, shown.members)
-        files = _files(store, sorted({record["source"] for record in about if record["source"] is not None}))
+        keys = {record["source"] for record in about if record["source"] is not None}
+        with store.reading() as connection:
+            rows = select(connection, "source", among("id"), {"keys": listed(keys)})
+        files = {row[0]: row[COLUMNS["source"].index("path")] for row in rows}
         people = groups(store, shown.members).tolist()
         for record, movement, person in zip(about, movements(store, shown.members), people, strict=True):
             members.append(
@@ -240,11 +224,3 @@ def symbol_report(store: Store, who: str) -> dict[str, Any]:
         "parents": list(shown.parents),
         "members": members,
     }
-
-
-def _files(store: Store, keys: list[int]) -> dict[int, str]:
-    """Return the key of a source -> its path, as given."""
-    with store.reading() as connection:
-        rows = select(connection, "source", among("id"), {"keys": listed(keys)})
-    path = COLUMNS["source"].index("path")
-    return {row[0]: row[path] for row in rows}

@@ -28,8 +28,7 @@ class Undone(NamedTuple):
 
 def undo(store: Store, expected: int | None = None, to: int | None = None) -> Undone:
     """Take back the last change that was not taken back yet, or restore a version; see `ActionLibrary.undo`."""
-    detail: dict[str, int] = {}
-    with store.writing(UNDO if to is None else RESTORE, detail) as change:
+    with store.writing(UNDO if to is None else RESTORE) as change:
         last = change.version - 1
         if expected is not None and expected != last:
             what = "take back" if to is None else "replace"
@@ -52,7 +51,7 @@ def undo(store: Store, expected: int | None = None, to: int | None = None) -> Un
                 raise SpecificationError(
                     f"expected a version to restore, the library is as at version {to}; nothing was changed"
                 )
-        detail |= {"to": back}
+        change.detail["to"] = back
         _return_to(change, back)
     return Undone(change.version, back, action)
 

@@ -7,9 +7,10 @@ They yield the keys of invalid rows with a description of what is wrong.
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
+from itertools import islice
 from types import TracebackType
 from typing import Any, NamedTuple
 
@@ -66,14 +67,13 @@ def _are(kind: type, values: Any) -> bool:
 def _not_finite(rows: Sequence[Row], *kinds: Any) -> Strange:
     """Find rows with numbers that are not finite; `kinds` are the types of the columns behind the key."""
     for column, kind in enumerate(kinds, start=1):
+        if not _finite([row[column] for row in rows], kind):
+            yield from ((row[0], "numbers that are not finite") for row in rows if not _finite([row[column]], kind))
 
-        def finite(blobs: Sequence[bytes], kind: Any = kind) -> bool:
-            blob = b"".join(blobs)
-            return len(blob) % np.dtype(kind).itemsize == 0 and bool(np.isfinite(np.frombuffer(blob, kind)).all())
 
-        sizes_fit = all(len(row[column]) % np.dtype(kind).itemsize == 0 for row in rows)
-        if not (sizes_fit and finite([row[column] for row in rows])):
-            yield from ((row[0], "numbers that are not finite") for row in rows if not finite([row[column]]))
+def _finite(blobs: Sequence[bytes], kind: Any) -> bool:
+    fit = all(len(blob) % np.dtype(kind).itemsize == 0 for blob in blobs)
+    return fit and bool(np.isfinite(np.frombuffer(b"".join(blobs), kind)).all())
 
 
 #: Table -> the check of its contents.
@@ -160,9 +160,6 @@ def _problem(table: str, key: Any, words: str) -> Problem:
     return Problem(table, key, f"{row_name(table, key)}: {words}")
 
 
-Check = Callable[[sqlite3.Connection], Iterator[Problem]]
-
-
 def verify(store: Store, *, pages: bool = True) -> list[Problem]:
     """Return all problems of the library at one moment; an empty list if there are none.
 
@@ -170,16 +167,16 @@ def verify(store: Store, *, pages: bool = True) -> list[Problem]:
     """
     with closing(connect(store.path, "ro", store.wait)) as connection, limited(connection, store.path):
         connection.execute("BEGIN")
-        checks: list[Check] = [
-            *((_structure,) if pages else ()),
-            *(_rows(table, store) for table in COLUMNS if has_table(connection, table)),
-            _references,
-            _without(*_COMPLETE),
-            _completeness,
-            _without(*_sizes(store)),
+        checks = [
+            *((_structure(connection),) if pages else ()),
+            *(_rows(connection, table, store) for table in COLUMNS if has_table(connection, table)),
+            _references(connection),
+            _without(connection, _COMPLETE),
+            _completeness(connection),
+            _without(connection, _sizes(store)),
         ]
-        problems = [problem for check in checks for problem in _all_of(check, connection)]
-        return problems or _all_of(_without(*LIVES), connection)  # of rows that are valid one by one
+        problems = [problem for check in checks for problem in _all_of(check)]
+        return problems or _all_of(_without(connection, LIVES))  # of rows that are valid one by one
 
 
 def blame(store: Store, error: BaseException) -> None:
@@ -202,14 +199,11 @@ def _is_ours(trace: TracebackType | None) -> bool:
     return sum(name.startswith(_CHAPTER) for name in modules) > 1  # one is the call, whose arguments may be wrong
 
 
-def _all_of(check: Check, connection: sqlite3.Connection) -> list[Problem]:
-    """Return all problems that a check finds; an error that stops it is one too."""
+def _all_of(check: Iterator[Problem]) -> list[Problem]:
+    """Return the first problems that a check finds; an error that stops it is one too."""
     problems: list[Problem] = []
     try:
-        for problem in check(connection):
-            problems.append(problem)
-            if len(problems) >= _SHOWN:
-                break
+        problems.extend(islice(check, _SHOWN))
     except (sqlite3.Error, UnicodeDecodeError) as error:
         problems.append(Problem("", None, f"the file cannot be read to the end ({error})"))
     return problems
@@ -221,28 +215,24 @@ def _structure(connection: sqlite3.Connection) -> Iterator[Problem]:
             yield Problem("", None, f"the file: {' '.join(text.split())}")
 
 
-def _rows(table: str, store: Store) -> Check:
+def _rows(connection: sqlite3.Connection, table: str, store: Store) -> Iterator[Problem]:
     """Check the seal of every row, its values, and their contents; contents only of rows without other problems."""
-
-    def check(connection: sqlite3.Connection) -> Iterator[Problem]:
-        try:
-            good: list[Row] = []
-            size = 0
-            for row in connection.execute(f"SELECT {', '.join(COLUMNS[table])}, crc, {ALL_GOOD[table]} FROM {table}"):
-                if not row[-1] or not sealed(table, row[:-1]):
-                    yield from _broken(table, row[:-1]) or _strange(connection, table, row[0])
-                    continue
-                good.append(row[:-2])
-                size += _ROW_BYTES + sum(len(value) for value in good[-1] if isinstance(value, bytes))
-                if size > _BATCH_BYTES:
-                    yield from _contents(connection, table, good, store)
-                    good, size = [], 0
-            yield from _contents(connection, table, good, store)
-        except (sqlite3.Error, UnicodeDecodeError) as error:
-            yield Problem(table, None, f"table {table} cannot be read as a whole ({error})")
-            yield from _one_by_one(connection, table)
-
-    return check
+    try:
+        good: list[Row] = []
+        size = 0
+        for row in connection.execute(f"SELECT {', '.join(COLUMNS[table])}, crc, {ALL_GOOD[table]} FROM {table}"):
+            if not row[-1] or not sealed(table, row[:-1]):
+                yield from _broken(table, row[:-1]) or _strange(connection, table, row[0])
+                continue
+            good.append(row[:-2])
+            size += _ROW_BYTES + sum(len(value) for value in good[-1] if isinstance(value, bytes))
+            if size > _BATCH_BYTES:
+                yield from _contents(connection, table, good, store)
+                good, size = [], 0
+        yield from _contents(connection, table, good, store)
+    except (sqlite3.Error, UnicodeDecodeError) as error:
+        yield Problem(table, None, f"table {table} cannot be read as a whole ({error})")
+        yield from _one_by_one(connection, table)
 
 
 def _broken(table: str, row: Row) -> list[Problem]:
@@ -310,15 +300,11 @@ class Constraint(NamedTuple):
     words: str
 
 
-def _without(*constraints: Constraint) -> Check:
+def _without(connection: sqlite3.Connection, constraints: Iterable[Constraint]) -> Iterator[Problem]:
     """Check that no row breaks one of these constraints."""
-
-    def check(connection: sqlite3.Connection) -> Iterator[Problem]:
-        for table, query, words in constraints:
-            if has_table(connection, table):
-                yield from (_problem(table, key, words) for (key,) in connection.execute(f"{query} LIMIT {_SHOWN}"))
-
-    return check
+    for table, query, words in constraints:
+        if has_table(connection, table):
+            yield from (_problem(table, key, words) for (key,) in connection.execute(f"{query} LIMIT {_SHOWN}"))
 
 
 #: Each movement has its samples, primitive and features.

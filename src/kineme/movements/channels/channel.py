@@ -104,8 +104,7 @@ def check_alike(several: Sequence[Channels | None], what: str = "part") -> None:
     """Refuse channels whose columns do not mean the same, where that is known; `what` messages call each of `several`.
 
     Columns of equal names are the same, whatever their kinds were guessed to be. Those of other names may be the other
-    hand's: they need the same kinds, and not the same names in another order. Units that are known are equal. Of each
-    part the channels are those that are learned, in the order of its columns; None where they are not known.
+    hand's: they need the same kinds, and not the same names in another order. Units that are known are equal.
     """
     detected = [(i, channels) for i, channels in enumerate(several) if channels is not None]
     for i, channels in detected[1:]:
@@ -142,13 +141,7 @@ def channels_to_data(channels: Channels) -> list[dict[str, Any]]:
 
 
 def channels_from_data(data: Any, n_dims: int) -> Channels:
-    """The inverse, of movements of so many dimensions.
-
-    Raises
-    ------
-    ValueError, TypeError, KeyError, AttributeError
-        What is no list of channels of so many coordinates; callers name the file.
-    """
+    """The inverse, of movements of so many dimensions; callers name the file that holds anything else."""
     channels = tuple(_channel(fields) for fields in data)
     if sum(len(channel.coordinates) for channel in channels) != n_dims:
         raise ValueError(f"channels should have {n_dims} coordinates")

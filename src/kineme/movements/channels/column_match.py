@@ -17,6 +17,7 @@ import numpy as np
 from kineme.errors import DataError, TrajectoryError
 from kineme.movements.channels.channel import Channels, recorded_names
 from kineme.movements.channels.detect import name_of, unit_of
+from kineme.movements.tables.columns import places_of
 from kineme.movements.tables.layout import Block, Detected, listed
 from kineme.movements.tables.time_stamps import words_of
 from kineme.units import Unit, converted, unit_named
@@ -113,11 +114,7 @@ def columns_like(positions: Array, ours: Columns, wanted: Columns, known_units: 
 
 def numbers_by_name(heads: Sequence[str], names: Sequence[str]) -> list[int | None]:
     """The column of each name, with or without its unit, whatever that is; None where none or several have it."""
-    exact: dict[str, list[int]] = {}
-    bare: dict[str, list[int]] = {}
-    for k, head in enumerate(heads):
-        exact.setdefault(head, []).append(k)
-        bare.setdefault(name_of(head).lower(), []).append(k)
+    exact, bare = places_of(heads), places_of(name_of(head).lower() for head in heads)
     same = [exact.get(name) or bare.get(name_of(name).lower(), []) for name in names]
     return [several[0] if len(several) == 1 else None for several in same]
 

@@ -78,32 +78,13 @@ def find_channels(
 ) -> Channels:
     """The channels of movements that have the same columns.
 
-    The columns of a quaternion need not be side by side in the file; those of a channel are, see `in_order`.
-
-    Parameters
-    ----------
-    columns : ndarray of shape (total, m)
-        All movements, one after the other.
-    offsets : ndarray of shape (n + 1,)
-        Where each movement begins.
-    given : mapping
-        Heads, separated by commas, -> their kind, or of four the order of a quaternion. What several begin with before
-        a dot stands for all of them.
-    units : sequence of m str, optional
-        Units of the columns, empty where the file does not say; by default those in the heads.
-
-    Raises
-    ------
-    SpecificationError
-        A head that is not there, a kind that is none, or a quaternion whose heads are numbers, which do not say which
-        one is its scalar.
+    The columns of a quaternion need not be side by side in the file; those of a channel are, see `in_order`. What
+    several heads in `given` begin with before a dot stands for all of them. `units` of the columns, empty where the
+    file does not say, are by default those in the heads.
     """
     kinds, orientations = _given(heads, given)
-    free = [
-        k
-        for k in range(len(heads))
-        if k not in kinds and not any(k in orientation.columns for orientation in orientations)
-    ]
+    taken = {*kinds, *(k for orientation in orientations for k in orientation.columns)}
+    free = [k for k in range(len(heads)) if k not in taken]
     orientations += find_quaternions(heads, free, columns, offsets)
     first = {min(orientation.columns): orientation for orientation in orientations}
     inside = {k for orientation in orientations for k in orientation.columns}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -46,21 +48,7 @@ class IncrementalCoordinates:
     def take(self, columns: Array) -> Array:
         """The coordinates (k, d) of the next k recorded samples (k, m)."""
         parts = zip(self._parts, columns_of(self._channels), strict=True)
-        return np.concatenate([part.take(columns[:, rows]) for part, rows in parts], axis=1)
-
-
-class _Position:
-    """A column as it is."""
-
-    def take(self, column: Array) -> Array:
-        return column
-
-
-class _Discrete:
-    """No coordinate."""
-
-    def take(self, column: Array) -> Array:
-        return column[:, :0]
+        return np.concatenate([take(columns[:, rows]) for take, rows in parts], axis=1)
 
 
 class _Angle:
@@ -72,7 +60,7 @@ class _Angle:
         self._turns = np.zeros((1, 1))
 
     def take(self, column: Array) -> Array:
-        if not np.isfinite(self._period) or not len(column):
+        if not len(column):
             return column
         before = self._before if len(self._before) else column[:1]
         steps = np.diff(column, axis=0, prepend=before)
@@ -100,9 +88,13 @@ class _Orientation:
         return np.asarray(self._lever * turned[n_before:])
 
 
-def _part_of(channel: Channel, lever: float) -> _Position | _Discrete | _Angle | _Orientation:
+def _part_of(channel: Channel, lever: float) -> Callable[[Array], Array]:
+    """Return what turns the next columns of a channel into its coordinates."""
     if channel.kind == "orientation":
-        return _Orientation(channel, lever)
+        return _Orientation(channel, lever).take
     if channel.kind == "angle":
-        return _Angle(period_of_channel(channel, np.full(1, np.inf)))  # of one that says no period nothing is unwrapped
-    return _Discrete() if channel.kind == "discrete" else _Position()
+        period = period_of_channel(channel, np.full(1, np.inf))  # of one that says no period nothing is unwrapped
+        if np.isfinite(period):
+            return _Angle(period).take
+    n_coordinates = len(channel.coordinates)  # none of a discrete one
+    return lambda column: column[:, :n_coordinates]

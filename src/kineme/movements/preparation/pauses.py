@@ -59,19 +59,8 @@ def cut_pauses(times: Array, positions: Array, offsets: NDArray[np.intp], allowa
     reach takes at the mean speed, too, and at the end as at most a quarter of the time in motion. It keeps as many
     samples as fit into that, evenly spaced, at least three.
 
-    Parameters
-    ----------
-    times, positions : ndarray of shape (total,) and (total, d)
-        Samples of all movements.
-    offsets : ndarray of shape (n + 1,)
-        Where each movement begins.
-    allowance : float
-        So many times the shares below of the time in motion, and of the reach, are left of pauses.
-
-    Returns
-    -------
-    times, positions, offsets
-        Times from 0 in each movement; first and last samples stay. None if there is no pause.
+    `allowance` times these shares of the time in motion, and of the reach, are left of pauses. Times are returned from
+    0 in each movement; first and last samples stay. None if there is no pause.
     """
     if use_compiled(_OPERATIONS + _PER_NUMBER * positions.size):
         cut_times, cut_positions, ends = np.empty(len(times)), np.empty(positions.shape), np.empty_like(offsets)

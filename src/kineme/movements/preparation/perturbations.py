@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kineme.errors import SpecificationError
-from kineme.movements.preparation.resample import relative_rows, resample_by_phase
+from kineme.movements.preparation.resample import along, relative_rows, resample_by_phase
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.validation import Array, check_number, check_seed
@@ -89,14 +89,7 @@ class Perturbation:
         extents = np.linalg.norm(np.ptp(paths, axis=2), axis=1)[:, None, None]
         paths += self.shift * extents * random["shift"].uniform(-1, 1, (n, d, 1))
         paths += self.noise * extents * random["noise"].normal(size=paths.shape)
-        paths += demos.positions[demos.offsets[:-1]][:, :, None]
-        # The same movements along other, evenly sampled paths (n, d, T).
-        n, d, n_samples = paths.shape
-        old = demos.movements.positions_only
-        positions = np.ascontiguousarray(paths.transpose(0, 2, 1)).reshape(-1, d)
-        offsets = np.arange(n + 1) * n_samples
-        new = replace(old, positions=positions, offsets=offsets, times=None)
-        return Demonstrations.of_movements(new, demos.steps)
+        return Demonstrations.of_movements(along(demos, paths), demos.steps)
 
     def _warped(self, demonstrations: Demonstrations, random: np.random.Generator) -> Array:
         """Paths (n, d, 200) relative to their start, at even values of the warped time."""
@@ -120,12 +113,9 @@ def warped_phase(log_speeds: Array, n_samples: int) -> Array:
 
 def _rotations(n: int, d: int, angle: float, random: np.random.Generator) -> Array:
     """Rotation matrices (n, d, d) by angles uniform in +-angle."""
-    angles = random.uniform(-angle, angle, n)
-    if d == 2:
-        c, s = np.cos(angles), np.sin(angles)
-        return np.stack((np.stack((c, -s), -1), np.stack((s, c), -1)), -2)
     from scipy.spatial.transform import Rotation
 
-    axes = random.normal(size=(n, 3))
+    angles = random.uniform(-angle, angle, n)
+    axes = random.normal(size=(n, 3)) if d == 3 else np.tile([0.0, 0.0, 1.0], (n, 1))
     axes *= (angles / np.linalg.norm(axes, axis=1))[:, None]
-    return np.asarray(Rotation.from_rotvec(axes).as_matrix())
+    return np.asarray(Rotation.from_rotvec(axes).as_matrix()[:, :d, :d])

@@ -45,15 +45,19 @@ class Resample:
 
     def apply(self, demonstrations: Demonstrations) -> Movements:
         """The movements, evenly sampled."""
-        n = len(demonstrations)
-        starts = demonstrations.positions[demonstrations.offsets[:-1]]
-        rows = relative_rows(demonstrations, 0, n, self.n_points)
-        return replace(
-            demonstrations.movements.positions_only,
-            positions=(rows.transpose(0, 2, 1) + starts[:, None]).reshape(-1, demonstrations.n_dims),
-            offsets=np.arange(n + 1) * self.n_points,
-            times=None,
-        )
+        return along(demonstrations, relative_rows(demonstrations, 0, len(demonstrations), self.n_points))
+
+
+def along(demonstrations: Demonstrations, rows: Array) -> Movements:
+    """The same movements along other, evenly sampled paths (n, d, T) relative to their starts."""
+    n, d, n_samples = rows.shape
+    starts = demonstrations.positions[demonstrations.offsets[:-1]]
+    return replace(
+        demonstrations.movements.positions_only,
+        positions=(rows.transpose(0, 2, 1) + starts[:, None]).reshape(-1, d),
+        offsets=np.arange(n + 1) * n_samples,
+        times=None,
+    )
 
 
 def relative_rows(demonstrations: Demonstrations, start: int, stop: int, n_points: int) -> Array:

@@ -117,21 +117,8 @@ def smoothing_spline(times: Array, positions: Array, offsets: NDArray[np.intp], 
     of hat functions, both banded, the second derivatives m of the spline solve ``(R + Q'Q) m = Q'x``, and the smoothed
     positions are ``x - Q m``.
 
-    Parameters
-    ----------
-    times, positions : ndarray of shape (total,) and (total, d)
-        Samples of all movements, at least three each.
-    offsets : ndarray of shape (n + 1,)
-    scales : ndarray of shape (n,)
-        ``penalty ** (-1/3)``, with the penalty in the unit of the times.
-
-    Returns
-    -------
-    smoothed, m : ndarray of shape (total, d)
-
-    References
-    ----------
-    C. H. Reinsch, "Smoothing by spline functions", Numerische Mathematik 10, 1967.
+    Of samples (total,) and (total, d) of all movements, at least three each; `scales` (n,) are ``penalty ** (-1/3)``,
+    with the penalty in the unit of the times. Source: Reinsch, see `Smooth`.
     """
     from scipy.linalg import solve_banded
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -84,13 +85,11 @@ class Step(Protocol):
 
 def check_steps(steps: Iterable[Step]) -> tuple[Step, ...]:
     """Refuse anything but an iterable of steps; the class of a step, without parentheses, is not a step."""
-    try:
+    checked: tuple[Step, ...] = ()
+    wrong: list[Any] = [steps]
+    with suppress(TypeError):  # of what is not iterable
         checked = tuple(steps)
-    except TypeError:
-        raise SpecificationError(
-            f"expected a tuple of steps such as (kineme.TrimRest(), kineme.Smooth()), got {steps!r}"
-        ) from None
-    wrong = [step for step in checked if isinstance(step, type) or not callable(getattr(step, "apply", None))]
+        wrong = [step for step in checked if isinstance(step, type) or not callable(getattr(step, "apply", None))]
     if wrong:
         raise SpecificationError(
             f"expected a tuple of steps such as (kineme.TrimRest(), kineme.Smooth()), got {wrong[0]!r}"

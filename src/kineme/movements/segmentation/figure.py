@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from kineme.movements.channels.channel import recorded_names
 from kineme.movements.segmentation.segment import Segmentation
 from kineme.movements.segmentation.table import observe
 from kineme.movements.trajectories.movements import axis_names
@@ -25,33 +26,24 @@ _NAME = 24
 
 def draw_segmentations(segmentations: Sequence[Segmentation]) -> Figure:
     """Draw the channels and the speed of one recording over time, or the speed of each of several; shade the pieces."""
-    shown = segmentations[:_RECORDINGS]
-    if len(segmentations) == 1:
+    shown, alone = segmentations[:_RECORDINGS], len(segmentations) == 1
+    n_all, most, what = len(segmentations), _RECORDINGS, "recordings"
+    if alone:
         panels = [*_channels(shown[0]), _speed(shown[0], "speed")]
-        figure = new_figure(7.2, 0.7 + 0.85 * len(panels))
-        axes = figure.subplots(len(panels), 1, squeeze=False, sharex=True).ravel()
-        owners = [shown[0]] * len(panels)
+        n_all, most, what = np.shape(shown[0].recording.recorded)[1], _CHANNELS, "channels"
     else:
-        panels = [
-            _speed(segmentation, drawable(shortened(segmentation.recording.name or "recording", _NAME)))
-            for segmentation in shown
-        ]
-        figure = new_figure(7.2, 0.7 + 1.1 * len(panels))
-        axes = figure.subplots(len(panels), 1, squeeze=False).ravel()
-        owners = list(shown)
+        names = [drawable(shortened(segmentation.recording.name or "recording", _NAME)) for segmentation in shown]
+        panels = list(map(_speed, shown, names))
+    figure = new_figure(7.2, 0.7 + (0.85 if alone else 1.1) * len(panels))
+    axes = figure.subplots(len(panels), 1, squeeze=False, sharex=alone).ravel()
+    owners = [shown[0]] * len(panels) if alone else list(shown)
     for panel, owner, (name, values) in zip(axes, owners, panels, strict=True):
         _draw(panel, owner, name, values)
-    for panel, owner in zip(axes[:1] if len(segmentations) == 1 else axes, owners, strict=False):
+    for panel, owner in zip(axes[:1] if alone else axes, owners, strict=False):
         _number(panel, owner)
-    n_shown = len(shown)
     parts = ["time since the first sample [s]; speeds in shares of the peak speed"]
-    if len(segmentations) == 1:
-        recording = segmentations[0].recording
-        n = recording.n_dims if recording.channels is None else np.shape(recording.recorded)[1]
-        if n > _CHANNELS:
-            parts.append(f"the first {_CHANNELS} of {n} channels")
-    elif n_shown < len(segmentations):
-        parts.append(f"the first {n_shown} of {len(segmentations)} recordings")
+    if n_all > most:
+        parts.append(f"the first {most} of {n_all} {what}")
     axes[-1].set_xlabel("; ".join(parts))
     return figure
 
@@ -59,9 +51,8 @@ def draw_segmentations(segmentations: Sequence[Segmentation]) -> Figure:
 def _channels(segmentation: Segmentation) -> list[tuple[str, Array]]:
     """Names and values of the columns that are drawn."""
     recording = segmentation.recording
-    named = recording.channels
-    names = axis_names(recording.n_dims) if named is None else [c for channel in named for c in channel.columns]
-    values = recording.positions if named is None else recording.recorded
+    named, values = recording.channels, recording.recorded  # without channels the positions
+    names = axis_names(recording.n_dims) if named is None else recorded_names(named)
     return [(drawable(shortened(name, _NAME)), values[:, k]) for k, name in enumerate(names[:_CHANNELS])]
 
 

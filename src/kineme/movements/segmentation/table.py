@@ -7,7 +7,7 @@ samples in motion, found with hysteresis; onset and end of a movement lie within
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -148,6 +148,7 @@ class SpeedMinima:
     turn: float | None = None
     span: float = 0.02
     min_movement: float | None = None
+    resolution: ClassVar[float] = 2.0 * _FLOOR
 
     def __post_init__(self) -> None:
         for name in ("depth", "span"):
@@ -160,11 +161,6 @@ class SpeedMinima:
                 raise SpecificationError(f"expected turn below pi, got {self.turn!r}; angles are in radians")
         if self.min_movement is not None:
             check_number("min_movement", self.min_movement, least=0.0)
-
-    @property
-    def resolution(self) -> float:
-        """Share of the peak speed that must be distinguished from rest."""
-        return 2.0 * _FLOOR
 
     def inner_cuts(self, motion: Motion) -> Rows:
         """Rows at which one movement ends and the next begins, increasing, without the ends of the recording."""
@@ -249,6 +245,7 @@ class ChangePoints:
     penalty: float = 0.1
     n_pieces: int | None = None
     n_points: int = 1000
+    resolution: ClassVar[float] = 0.05
 
     def __post_init__(self) -> None:
         check_number("penalty", self.penalty, above=0.0)
@@ -260,11 +257,6 @@ class ChangePoints:
                     f"expected n_points of at least {_MIN_POINTS} per piece, got {self.n_points} for "
                     f"{self.n_pieces} pieces"
                 )
-
-    @property
-    def resolution(self) -> float:
-        """Share of the peak speed that must be distinguished from rest."""
-        return 0.05
 
     def inner_cuts(self, motion: Motion) -> Rows:
         """Rows at which one movement ends and the next begins, increasing, without the ends of the recording."""
@@ -355,7 +347,7 @@ def observe(recording: Trajectory, resolution: float) -> Motion:
     for _ in range(_SMOOTHINGS):
         smooth = Smooth(cutoff * recording.duration).apply(demos).positions
         speed = np.linalg.norm(np.gradient(smooth, t, axis=0), axis=1)
-        peak = peak_speed(speed, t)
+        peak = weighted_quantile(speed, speed * np.gradient(t), _PEAK_PATH)  # of the path
         noise = float(np.sqrt(passed * cutoff**3))
         aim = resolution * peak / 4.0
         if noise <= 1.05 * aim or cutoff <= slowest:
@@ -399,13 +391,6 @@ def noise_variance(positions: Array) -> float:
     return float(((sizes / (0.6745 * np.sqrt(20.0))) ** 2).sum())
 
 
-def peak_speed(speed: Array, times: Array) -> float:
-    """The speed (T,) below which nine tenths of the path are covered."""
-    order = np.argsort(speed)
-    path = np.cumsum((speed * np.gradient(times))[order])
-    return float(speed[order[np.searchsorted(path, _PEAK_PATH * path[-1])]])
-
-
 def moving_bouts(speed: Array, low: float, high: float) -> Rows:
     """Runs of samples faster than `low` that exceed `high` somewhere: rows (n, 2), first and one past the last."""
     edges = np.diff(np.concatenate(([False], speed > low, [False])).astype(np.int8))
@@ -418,8 +403,14 @@ def moving_bouts(speed: Array, low: float, high: float) -> Rows:
 
 def typical_duration(durations: Array) -> float:
     """The duration such that half of the moving time lies in bouts at least as long; twitches hardly change it."""
-    ordered = np.sort(durations)
-    return float(ordered[np.searchsorted(np.cumsum(ordered), 0.5 * ordered.sum())])
+    return weighted_quantile(durations, durations, 0.5)
+
+
+def weighted_quantile(values: Array, weights: Array, share: float) -> float:
+    """The value up to which values have that share of all weights."""
+    order = np.argsort(values)
+    total = np.cumsum(weights[order])
+    return float(values[order[np.searchsorted(total, share * total[-1])]])
 
 
 def merge_across(bouts: Rows, times: Array, gap: float) -> Rows:

@@ -50,20 +50,16 @@ _AXES = frozenset("xyz")
 
 
 class Roles(NamedTuple):
-    """Column numbers by role, and the columns that are ignored.
-
-    `nanoseconds` is the column that is added to whole seconds in `time`, as ``stamp.nanosec`` to ``stamp.sec``.
-    `person` is one of those in `movement`. `clocks` are other columns of times, which have to show the same clock.
-    """
+    """Column numbers by role, and the columns that are ignored."""
 
     time: int | None
     positions: tuple[int, ...]
     movement: tuple[int, ...]
     label: int | None
     ignored: tuple[int, ...]
-    nanoseconds: int | None = None
-    person: int | None = None
-    clocks: tuple[int, ...] = ()
+    nanoseconds: int | None = None  # added to whole seconds in `time`, as ``stamp.nanosec`` to ``stamp.sec``
+    person: int | None = None  # one of those in `movement`
+    clocks: tuple[int, ...] = ()  # other columns of times, which have to show the same clock
 
 
 def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, named: bool = True) -> Roles:
@@ -115,7 +111,7 @@ def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, nam
 
 
 def _number(heads: Sequence[str], column: Column) -> int:
-    return _place(heads, column, _places(heads), _places(map(_plain, heads)))
+    return _place(heads, column, places_of(heads), places_of(map(_plain, heads)))
 
 
 def column_numbers(
@@ -127,7 +123,7 @@ def column_numbers(
     no head has the name, ``*`` in it stands for any text and ``?`` for any character: ``LASI*``, ``*_x``. Of patterns
     only columns `among` these are taken, by default all but times, and none twice.
     """
-    exact, plain = _places(heads), _places(map(_plain, heads))
+    exact, plain = places_of(heads), places_of(map(_plain, heads))
     numbers: list[int] = []
     for column in columns:
         is_pattern = isinstance(column, str) and bool({"*", "?"} & {*column})
@@ -165,7 +161,8 @@ def excluded_numbers(heads: Sequence[str], columns: Sequence[Column]) -> set[int
     return numbers
 
 
-def _places(heads: Iterable[str]) -> dict[str, list[int]]:
+def places_of(heads: Iterable[str]) -> dict[str, list[int]]:
+    """Head -> the numbers of its columns."""
     places: dict[str, list[int]] = {}
     for k, head in enumerate(heads):
         places.setdefault(head, []).append(k)

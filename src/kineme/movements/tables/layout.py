@@ -132,52 +132,22 @@ def _texts(names: str | Sequence[str] | None) -> tuple[str, ...]:
 
 
 class Detected(NamedTuple):
-    """The interpretation of a file.
+    """The interpretation of a file: which columns have a role, and what is known of their values."""
 
-    Attributes
-    ----------
-    format : str
-        Such as ``"CSV"``.
-    layout : str
-        ``"wide"``, one movement; ``"long"``, told apart by columns; or the layout of arrays.
-    columns : tuple of str
-        The coordinates; of several columns of one name the later ones are numbered, x, x.1, x.2.
-    time : str or None
-        The column of the time stamps.
-    units : str or float
-        Their unit.
-    units_from : str
-        Source of the unit: ``"given"``, ``"head"``, ``"dates"``; or a guess: ``"since 1970"``, ``"since 1601"``,
-        ``"since the year 1"``, ``"by its steps"`` or ``"assumed"``, see
-        `kineme.movements.tables.time_stamps.unit_by_size`.
-    movement, label, ignored : tuple of str
-        Columns that tell movements apart, that name the action, and that are ignored.
-    measured_in : tuple of str
-        The unit of each coordinate where the file says it, else empty; nothing at all if it says none.
-    person : tuple of str
-        The column that names who showed a movement.
-    named : bool
-        Whether the file names the coordinates.
-    sentinels : tuple of str
-        Numbers that stand for no value, each with its column: ``-9999 in x``.
-    converted : tuple of str
-        Columns that are in another unit than in the file: ``y_m as y [mm]``.
-    """
-
-    format: str
-    layout: str
-    columns: tuple[str, ...]
-    time: str | None
-    units: str | float
-    units_from: str
-    movement: tuple[str, ...] = ()
-    label: tuple[str, ...] = ()
+    format: str  # such as "CSV"
+    layout: str  # "wide", one movement; "long", told apart by columns; or the layout of arrays
+    columns: tuple[str, ...]  # the coordinates; of several columns of one name the later ones are numbered: x, x.1
+    time: str | None  # the column of the time stamps
+    units: str | float  # of the time stamps
+    units_from: str  # source of that unit: "given", "head", "dates"; or a guess of `time_stamps.unit_by_size`
+    movement: tuple[str, ...] = ()  # the columns that tell movements apart
+    label: tuple[str, ...] = ()  # the column that names the action
     ignored: tuple[str, ...] = ()
-    measured_in: tuple[str, ...] = ()
-    person: tuple[str, ...] = ()
-    named: bool = True
-    sentinels: tuple[str, ...] = ()
-    converted: tuple[str, ...] = ()
+    measured_in: tuple[str, ...] = ()  # unit of each coordinate, empty where the file does not say it; or nothing
+    person: tuple[str, ...] = ()  # the column that names who showed a movement
+    named: bool = True  # False if the file does not name the coordinates
+    sentinels: tuple[str, ...] = ()  # numbers that stand for no value, each with its column: "-9999 in x"
+    converted: tuple[str, ...] = ()  # columns that are in another unit than in the file: "y_m as y [mm]"
 
 
 class Repair(NamedTuple):

@@ -80,12 +80,9 @@ def unit_by_size(stamps: Array, head: str = "") -> tuple[str, str]:
     step longer than 5 s: then they count from elsewhere, as a machine that was switched on weeks ago counts. So are
     those that are such years in 100 ns since 1601 or since the year 1, as Windows and .NET count.
 
-    Raises
-    ------
-    DataError
-        Such stamps with a step of 1 to 5 s, which may as well be 1 to 5 thousandths of it; a head with a word as unix
-        decides. Ticks that count from elsewhere: of what, nothing says. Steps of 200,000 to a million, or relative
-        times in thousands: microseconds of a slow clock, or 100 ns of a fast one.
+    Refused are such stamps with a step of 1 to 5 s, which may as well be 1 to 5 thousandths of it (a head with a word
+    as unix decides); ticks that count from elsewhere; and steps of 200,000 to a million, or relative times in
+    thousands: microseconds of a slow clock, or 100 ns of a fast one.
     """
     finite = stamps[np.isfinite(stamps)]
     if len(finite) == 0:
@@ -182,15 +179,9 @@ def _duration(cell: str) -> float | None:
 
 
 def nanoseconds(stamps: NDArray[Any]) -> Array:
-    """Dates or durations (datetime64 or timedelta64 of any unit) as nanoseconds, NaN for missing ones.
-
-    Raises
-    ------
-    DataError
-        Dates out of the range of nanoseconds; NumPy before 2.5 would wrap them around silently.
-    """
+    """Dates or durations (datetime64 or timedelta64 of any unit) as nanoseconds, NaN for missing ones."""
     missing = np.isnat(stamps)
-    try:
+    try:  # NumPy before 2.5 would wrap dates out of the range around silently
         counts = stamps.astype(f"{stamps.dtype.kind}8[ns]")
         counted = bool(((counts.astype(stamps.dtype) == stamps) | missing).all())
     except OverflowError:

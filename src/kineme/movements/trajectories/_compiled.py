@@ -102,18 +102,6 @@ def fill_usual_steps(times, offsets, share, quantile, steps):  # type: ignore[no
 
 
 @jit
-def any_closer(times, offsets, share):  # type: ignore[no-untyped-def]
-    """Tell whether two stamps of any movement are closer than a share of its mean step; see `spread_close`."""
-    n_close = 0
-    for i in range(len(offsets) - 1):
-        first, last = offsets[i], offsets[i + 1] - 1
-        least = share * (times[last] - times[first]) / (last - first)
-        for j in range(first, last):
-            n_close += times[j + 1] - times[j] < least  # a sum has no branch and becomes vector instructions
-    return n_close > 0
-
-
-@jit
 def fill_arc_rows(paths, a, rows):  # type: ignore[no-untyped-def]
     """Paths (n, d, T) at even values of their phase, (n, d, S); see `arc_length.resample_by_arc_length`."""
     n, n_dims, n_samples = paths.shape

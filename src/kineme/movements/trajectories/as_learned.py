@@ -20,9 +20,9 @@ from kineme.movements.channels.channel import (
 from kineme.movements.channels.column_match import columns_like, columns_recorded, conversion, may_be
 from kineme.movements.channels.coordinates import lever_of
 from kineme.movements.tables.layout import listed
-from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.demonstrations import Demonstrations, one_by_one
 from kineme.movements.trajectories.movements import in_coordinates, of_channels
-from kineme.movements.trajectories.trajectory import MovementsLike, Trajectory
+from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.units import converted
 
 _SELECT = "select the dimensions by columns= of read_recordings, in the shell --columns"
@@ -49,7 +49,11 @@ def as_learned(
     `what` they are called in messages.
     """
     if isinstance(movements, (list, tuple)) and _of_several_channels(movements):
-        return _one_by_one(movements, learned, n_dims, what)
+
+        def convert(movement: Any) -> Demonstrations:
+            return as_learned(movement if hasattr(movement, "demonstrations") else [movement], learned, n_dims, what)
+
+        return Demonstrations(one_by_one(movements, convert))
     demos = Demonstrations.of(movements)
     if demos.channels is not None:
         return _of_kinds(demos, learned, n_dims, what)
@@ -64,18 +68,6 @@ def _of_several_channels(movements: Sequence[Any]) -> bool:
     """Tell whether channels differ in a list: of all its movements together nothing would be known."""
     every = {id(channels): channels for channels in (getattr(movement, "channels", None) for movement in movements)}
     return len(every) > 1 and len({*every.values()}) > 1
-
-
-def _one_by_one(movements: Sequence[Any], learned: Channels | None, n_dims: int, what: str) -> Demonstrations:
-    trajectories: list[Trajectory] = []
-    for i, movement in enumerate(movements):
-        try:
-            trajectories += as_learned(
-                movement if hasattr(movement, "demonstrations") else [movement], learned, n_dims, what
-            )
-        except TrajectoryError as error:
-            raise TrajectoryError(f"index {i} of the list: {error}") from error
-    return Demonstrations(trajectories)
 
 
 def _of_kinds(demos: Demonstrations, learned: Channels | None, n_dims: int, what: str) -> Demonstrations:
@@ -168,23 +160,13 @@ def _in_units(demos: Demonstrations, learned: Channels) -> Demonstrations:
     """
     channels = demos.channels or ()
     moving = [[channel for channel in some if channel.coordinates] for some in (channels, learned)]
-    positions, k = demos.positions, 0
-    ours = next((channel.unit for channel in channels if channel.kind == "position"), None)
-    theirs = next((channel.unit for channel in learned if channel.kind == "position"), None)
+    ours, theirs = (next((channel.unit for channel in some if channel.kind == "position"), None) for some in moving)
     ratio = 1.0 if ours is not None and theirs is None else lever_of(learned) / lever_of(channels)
+    positions, k = np.array(demos.positions), 0
     for channel, other in zip(*moving, strict=True):
         columns = slice(k, k := k + len(channel.coordinates))
-        sizes = (
-            None
-            if channel.kind == "orientation"
-            else conversion(channel.name, channel.unit, other.unit, known_units=False)
-        )
-        if sizes is None and (channel.kind != "orientation" or ratio == 1.0):
-            continue
-        positions = np.array(positions) if positions is demos.positions else positions
-        positions[:, columns] = (
-            positions[:, columns] * ratio if sizes is None else converted(positions[:, columns], *sizes)
-        )
-    if positions is demos.positions:
-        return demos
+        if channel.kind == "orientation":
+            positions[:, columns] *= ratio
+        elif (sizes := conversion(channel.name, channel.unit, other.unit, known_units=False)) is not None:
+            positions[:, columns] = converted(positions[:, columns], *sizes)
     return Demonstrations.of_movements(replace(demos.movements, positions=positions), demos.steps)

@@ -15,7 +15,7 @@ from kineme.movements.channels.channel import Channels, is_plain, learned_names,
 from kineme.movements.channels.column_match import Columns, columns_like, columns_recorded
 from kineme.movements.trajectories.labels import label_array
 from kineme.movements.trajectories.movements import Movements, Names, of_channels
-from kineme.movements.trajectories.trajectory import Trajectory
+from kineme.movements.trajectories.trajectory import Trajectory, unchecked
 from kineme.validation import (
     MIN_SAMPLES,
     ROUNDED,
@@ -30,7 +30,6 @@ from kineme.validation import (
     too_long_integer,
 )
 
-_NUMBERS_AT_ONCE = 32_768  # a quarter of a megabyte stays in the cache
 _FLOAT64 = np.dtype(np.float64)
 
 #: What to do with a block (n, d, T), as libraries for time series have it, and with a list of arrays (d, T).
@@ -53,7 +52,15 @@ def collect_trajectories(trajectories: Sequence[Trajectory]) -> Movements:
     times = np.concatenate([trajectory.times for trajectory in trajectories])
     labels = [trajectory.label for trajectory in trajectories]
     labeled = any(label is not None for label in labels)
-    channels, recorded = _channels_of(trajectories)
+    channels, dimensions, recorded = trajectories[0].channels, None, None
+    if channels is None or any(trajectory.channels != channels for trajectory in trajectories):
+        channels = None
+    else:
+        dimensions = learned_names(channels)
+        if len(dimensions) != positions.shape[1]:  # of movements that are still as recorded
+            dimensions = recorded_names(channels)
+        if not is_plain(channels):
+            recorded = np.concatenate([trajectory.recorded for trajectory in trajectories])
     return Movements(
         positions,
         offsets,
@@ -61,7 +68,7 @@ def collect_trajectories(trajectories: Sequence[Trajectory]) -> Movements:
         times,
         label_array(labels, len(labels), names) if labeled else None,
         names if any(names) else None,
-        None if channels is None else _names_of(channels, positions.shape[1]),
+        dimensions,
         channels,
         recorded,
     )
@@ -89,33 +96,9 @@ def _as_first(trajectory: Trajectory, ours: Columns, channels: Channels, wanted:
     movement = of_channels(
         Movements(columns, np.array([0, len(columns)]), np.array([trajectory.duration]), trajectory.times), channels
     )
-    new = object.__new__(Trajectory)
-    values = {
-        "times": trajectory.times,
-        "positions": movement.positions,
-        "label": trajectory.label,
-        "name": trajectory.name,
-    }
     recorded = movement.positions if movement.recorded is None else movement.recorded
-    for name, value in (values | {"channels": channels, "recorded": recorded}).items():
-        object.__setattr__(new, name, value)
-    return new
-
-
-def _names_of(channels: Channels, n_dims: int) -> tuple[str, ...]:
-    """Names of the coordinates, or of the columns of movements that are still as recorded."""
-    names = learned_names(channels)
-    return names if len(names) == n_dims else recorded_names(channels)
-
-
-def _channels_of(trajectories: Sequence[Trajectory]) -> tuple[Channels | None, Array | None]:
-    """The channels that all share, and what was recorded; (None, None) if they differ."""
-    channels = trajectories[0].channels if trajectories else None
-    if channels is None or any(trajectory.channels != channels for trajectory in trajectories):
-        return None, None
-    return channels, None if is_plain(channels) else np.concatenate(
-        [trajectory.recorded for trajectory in trajectories]
-    )
+    changed = {"positions": movement.positions, "channels": channels, "recorded": recorded}
+    return unchecked(**vars(trajectory) | changed)
 
 
 def collect_arrays(
@@ -187,13 +170,12 @@ def _from_block(block: NDArray[Any], copy: bool) -> tuple[Array, NDArray[np.intp
     return flat.reshape(-1, n_dims), np.arange(n + 1) * n_samples
 
 
-def _from_list(arrays: Sequence[ArrayLike], names: Sequence[str | None] | None) -> tuple[Array, NDArray[np.intp]]:
-    arrays = list(arrays)
-    plain = plain_block(arrays)
-    if plain is not None:
-        return plain
+def _from_list(given: Sequence[ArrayLike], names: Sequence[str | None] | None) -> tuple[Array, NDArray[np.intp]]:
+    arrays: list[Any] = list(given)
     names_of_arrays = tuple(names) if names is not None and len(names) == len(arrays) else None
-    return _concatenate(_check_each(as_positions, (arrays,), names_of_arrays), names_of_arrays)
+    if not _are_plain(arrays, 2) or min(map(len, arrays)) < MIN_SAMPLES or not min(map(attrgetter("size"), arrays)):
+        arrays = _check_each(as_positions, (arrays,), names_of_arrays)
+    return _concatenate(arrays, names_of_arrays)
 
 
 def _check_sized(value: Any, expected: str) -> None:
@@ -252,66 +234,18 @@ def _concatenate_times(
     _check_sized(times, "times as a list of (T,) arrays or one (T,) array")
     if len(times) != n:
         raise TrajectoryError(f"expected times for each of the {n} movements, got {len(times)}")
-    times = list(times)
-    stamps = plain_stamps(times, lengths)
-    if stamps is None:
-        stamps = np.concatenate(_check_each(as_times, (times, lengths.tolist()), tuple(names) if names else None))
+    own: list[Any] = list(times)
+    if not _are_plain(own, 1) or list(map(len, own)) != lengths.tolist():
+        own = _check_each(as_times, (own, lengths.tolist()), tuple(names) if names else None)
+    stamps = np.concatenate(own)
     check_times(stamps, offsets, names)
     return stamps
 
 
-def plain_block(arrays: list[Any]) -> tuple[Array, NDArray[np.intp]] | None:
-    """Positions (total, d) and offsets (n + 1,), of contiguous float64 arrays (T_i, d).
-
-    None if any is something else, or too short, or of another d: then each has to be checked. `bytes.join` copies ten
-    thousand arrays of 160 samples in half the time of `numpy.concatenate`, which takes longer to prepare the copy of
-    such an array than to copy it.
-    """
-    strides = set(map(attrgetter("strides"), arrays)) if _are_plain(arrays, 2) else set()
-    if len(strides) != 1:
-        return None
-    lengths = _lengths(arrays)
-    n_dims = (
-        strides.pop()[0] // _FLOAT64.itemsize
-    )  # contiguous arrays of several rows with equal strides: of equal rows
-    if lengths.min() < MIN_SAMPLES or n_dims < 1:  # reversed arrays have negative strides
-        return None
-    offsets = np.concatenate(([0], np.cumsum(lengths)))
-    joined = _joined(arrays, offsets * n_dims)
-    return None if joined is None else (joined.reshape(-1, n_dims), offsets)
-
-
-def plain_stamps(times: list[Any], lengths: NDArray[np.intp]) -> Array | None:
-    """Time stamps (total,) of contiguous float64 arrays of those lengths; None of anything else."""
-    if not _are_plain(times, 1) or (_lengths(times) != lengths).any():
-        return None
-    return _joined(times, np.concatenate(([0], np.cumsum(lengths))))
-
-
 def _are_plain(arrays: list[Any], n_axes: int) -> bool:
-    """Tell whether there are arrays, and all are float64 with that many axes."""
+    """Tell whether there are arrays, and all are float64 with that many axes: a quick check of the usual case."""
     return (
         set(map(type, arrays)) == {np.ndarray}
         and set(map(attrgetter("dtype"), arrays)) == {_FLOAT64}
         and set(map(attrgetter("ndim"), arrays)) == {n_axes}
     )
-
-
-def _lengths(arrays: list[Any]) -> NDArray[np.intp]:
-    return np.fromiter(map(len, arrays), np.intp, len(arrays))
-
-
-def _joined(arrays: list[Any], ends: NDArray[np.intp]) -> Array | None:
-    """The numbers of all arrays, one array after the other, n of them up to ``ends[n]``; None if one is not contiguous.
-
-    A few at a time, since a block of bytes as large as the whole would be slow to get from the system.
-    """
-    n, joined = len(arrays), np.empty(ends[-1])
-    step = max(1, int(n * _NUMBERS_AT_ONCE // max(1, ends[-1])))
-    try:
-        for first in range(0, n, step):
-            some = b"".join(arrays[first : first + step])
-            joined[ends[first] : ends[min(first + step, n)]] = np.frombuffer(some, _FLOAT64)
-    except (TypeError, ValueError, BufferError):
-        return None
-    return joined

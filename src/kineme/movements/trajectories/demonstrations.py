@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, overload
 
@@ -17,9 +17,9 @@ from kineme.movements.channels.detect import find_channels
 from kineme.movements.tables.layout import Parsed
 from kineme.movements.trajectories.collect import collect_arrays, collect_trajectories
 from kineme.movements.trajectories.labels import as_indices, label_array
-from kineme.movements.trajectories.movements import Movements, axis_names, of_channels
-from kineme.movements.trajectories.presented import Presented, Samples, with_units
-from kineme.movements.trajectories.trajectory import MovementsLike, Trajectory
+from kineme.movements.trajectories.movements import Movements, Samples, axis_names, of_channels
+from kineme.movements.trajectories.presented import Presented, with_units
+from kineme.movements.trajectories.trajectory import MovementsLike, Trajectory, unchecked
 from kineme.validation import Array, describe
 
 if TYPE_CHECKING:
@@ -168,8 +168,8 @@ class Demonstrations(Presented, Sequence[Trajectory]):
         if isinstance(several, Sequence) and not set(map(type, several)) <= _ARRAYS:
             if any(map(is_data_frame, several)):
                 return cls.from_dataframe(several)
-            if (each := _held_by_each(several)) is not None:
-                return cls(each)
+            if any(isinstance(movement, Trajectory) or hasattr(movement, "demonstrations") for movement in several):
+                return cls(one_by_one(several, lambda held: [held] if isinstance(held, Trajectory) else cls.of(held)))
         return cls.from_arrays(several, copy=False)
 
     @classmethod
@@ -269,14 +269,14 @@ class Demonstrations(Presented, Sequence[Trajectory]):
     def _trajectory(self, i: int) -> Trajectory:
         """Movement i; built without checking again, and sharing this block's memory."""
         rows = slice(self.offsets[i], self.offsets[i + 1])
-        trajectory = object.__new__(Trajectory)
-        object.__setattr__(trajectory, "times", self.times[rows])
-        object.__setattr__(trajectory, "positions", self.positions[rows])
-        object.__setattr__(trajectory, "label", None if self.labels is None else self.labels[i : i + 1].tolist()[0])
-        object.__setattr__(trajectory, "name", None if self.names is None else self.names[i])
-        object.__setattr__(trajectory, "channels", self.channels)
-        object.__setattr__(trajectory, "recorded", self.recorded[rows])
-        return trajectory
+        return unchecked(
+            times=self.times[rows],
+            positions=self.positions[rows],
+            label=None if self.labels is None else self.labels[i : i + 1].tolist()[0],
+            name=None if self.names is None else self.names[i],
+            channels=self.channels,
+            recorded=self.recorded[rows],
+        )
 
     def __repr__(self) -> str:
         n_labels = "" if self.labels is None else f", {len(np.unique(self.labels))} labels"
@@ -305,17 +305,15 @@ def _held_by(movements: Any) -> Any:
     )
 
 
-def _held_by_each(several: Sequence[Any]) -> list[Any] | None:
-    """The movements of a list with trajectories or what holds them, one by one; None of a list of arrays."""
-    if not any(isinstance(movement, Trajectory) or hasattr(movement, "demonstrations") for movement in several):
-        return None
-    held: list[Any] = []
+def one_by_one(several: Sequence[Any], convert: Callable[[Any], Iterable[Trajectory]]) -> list[Trajectory]:
+    """The movements that each item of a list is converted to; errors name its index."""
+    trajectories: list[Trajectory] = []
     for i, movement in enumerate(several):
         try:
-            held += [movement] if isinstance(movement, Trajectory) else Demonstrations.of(movement)
+            trajectories += convert(movement)
         except TrajectoryError as error:
             raise TrajectoryError(f"index {i} of the list: {error}") from error
-    return held
+    return trajectories
 
 
 def require_labels(demonstrations: Demonstrations) -> NDArray[Any]:
@@ -399,11 +397,9 @@ def _parse(frame: Any, i: int, layout: Layout) -> Parsed:
     if not is_data_frame(frame):
         raise TrajectoryError(f"expected data frames, got {type(frame).__name__} at index {i}; pass them one by one")
     try:
-        detected, block, left_out = parse_data_frame(frame, layout)
-        detected, block = in_one_unit(detected, block)
+        return Parsed(*in_one_unit(*parse_data_frame(frame, layout)[:2]))
     except DataError as error:
         raise TrajectoryError(f"data frame {i}: {error} (of Demonstrations.from_dataframe)") from error
-    return Parsed(detected, block, left_out)
 
 
 class MovementSequence(Presented):

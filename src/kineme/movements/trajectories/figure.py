@@ -11,9 +11,9 @@ import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
-from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
+from kineme.movements.trajectories.movements import Samples
 from kineme.reporting.figures import BLUE, GRAY, GREEN, ORANGE, PURPLE, figure_to_show
 from kineme.reporting.text import drawable
 from kineme.validation import Array
@@ -38,37 +38,19 @@ class _Drawn(NamedTuple):
     title: str  # empty if all are drawn
 
 
-class Paths(NamedTuple):
-    """Movements to draw, one after the other: times (total,), positions (total, d), offsets (n + 1,), names, labels."""
-
-    times: Array
-    positions: Array
-    offsets: NDArray[np.intp]
-    axis_names: Sequence[str]
-    labels: NDArray[Any] | None
-
-    @property
-    def n_dims(self) -> int:
-        """Number of dimensions d."""
-        return int(self.positions.shape[1])
-
-
-def draw_movements(paths: Paths) -> Figure:
-    """Each dimension over time, and the path where it has two or three dimensions.
-
-    Each label has its color, named in a legend; with more than 30 labels all movements have one color.
-    """
+def draw_movements(samples: Samples) -> Figure:
+    """Each dimension over time, and the path where it has two or three dimensions; each label has its color."""
     with matplotlib.rc_context():  # the style is this figure's, and none of what the caller draws next
-        drawn = _choose(paths)
-        n_rows, n_entries = min(paths.n_dims, _ROWS), len(_key(drawn))
+        drawn = _choose(samples)
+        n_rows, n_entries = min(len(drawn.axis_names), _ROWS), len(_key(drawn))
         figure = figure_to_show(7.2, max(3.2, 1.0 + 0.95 * n_rows) + 0.2 * (n_entries // _IN_A_ROW))
         _draw(figure, drawn)
     return figure
 
 
-def draw_movements_beside(figure: SubFigure, paths: Paths) -> None:
+def draw_movements_beside(figure: SubFigure, samples: Samples) -> None:
     """The same as a part of a figure."""
-    _draw(figure, _choose(paths))
+    _draw(figure, _choose(samples))
 
 
 def _draw(figure: Figure | SubFigure, drawn: _Drawn) -> None:
@@ -86,19 +68,15 @@ def _draw(figure: Figure | SubFigure, drawn: _Drawn) -> None:
 
 def _key(drawn: _Drawn) -> list[Any]:
     """Entries of the legend."""
-    return drawn.key + (
-        [
-            _entry(name, GRAY, marker=marker, markersize=size, linestyle="none")
-            for name, (marker, size) in (("start", _START), ("end", _END))
-        ]
-        if len(drawn.axis_names) in (2, 3)
-        else []
-    )
+    ends = (("start", _START), ("end", _END)) if len(drawn.axis_names) in (2, 3) else ()
+    return drawn.key + [
+        _entry(name, GRAY, marker=marker, markersize=size, linestyle="none") for name, (marker, size) in ends
+    ]
 
 
-def draw_movements_into(axes: Axes, paths: Paths) -> None:
+def draw_movements_into(axes: Axes, samples: Samples) -> None:
     """The path, or the only dimension over time, in axes of the caller's."""
-    d = paths.n_dims
+    d = samples.positions.shape[1]
     if not isinstance(axes, Axes):
         raise SpecificationError(f"expected ax to be an Axes of matplotlib, got {type(axes).__name__}; write plt.gca()")
     if d > 3:
@@ -106,7 +84,7 @@ def draw_movements_into(axes: Axes, paths: Paths) -> None:
     if (axes.name == "3d") != (d == 3):
         projection = 'subplot_kw={"projection": "3d"}' if d == 3 else "no projection"
         raise SpecificationError(f"expected ax with {projection} for {d} dimensions, got projection {axes.name!r}")
-    drawn = _choose(paths)
+    drawn = _choose(samples)
     if d == 1:
         _draw_dimension(axes, drawn, 0)
         axes.set_xlabel("time [s]")
@@ -118,18 +96,18 @@ def draw_movements_into(axes: Axes, paths: Paths) -> None:
         axes.legend(handles=key)
 
 
-def _choose(paths: Paths) -> _Drawn:
-    n, labels = len(paths.offsets) - 1, paths.labels
+def _choose(samples: Samples) -> _Drawn:
+    n, labels = len(samples.offsets) - 1, samples.labels
     chosen = np.arange(0, n, math.ceil(n / _MOST))
-    rows = [slice(paths.offsets[i], paths.offsets[i + 1]) for i in chosen]
+    movements = [slice(samples.offsets[i], samples.offsets[i + 1]) for i in chosen]
     distinct = [] if labels is None else list(dict.fromkeys(labels[chosen].tolist()))
     palette = _palette(len(distinct))
     of_label = dict(zip(distinct, palette, strict=False))
     colors = [palette[0]] * len(chosen) if labels is None else [of_label[label] for label in labels[chosen].tolist()]
     return _Drawn(
-        [paths.times[samples] for samples in rows],
-        [paths.positions[samples] for samples in rows],
-        list(map(drawable, paths.axis_names)),
+        [samples.times[rows] for rows in movements],
+        [samples.positions[rows] for rows in movements],
+        list(map(drawable, samples.axis_names)),
         colors,
         1.0 if len(chosen) < 10 else 0.5,
         [_entry(drawable(str(label)), color) for label, color in of_label.items() if 1 < len(distinct) <= _NAMED],

@@ -79,8 +79,7 @@ def _kind(label: Any) -> str:
 def as_indices(index: Any, n: int) -> NDArray[np.intp]:
     """Return a choice among n movements as indices from 0: of shape () for an integer, else (k,).
 
-    It is an integer, a slice, a list of integers or a mask; negative integers count from the end. An `IndexError` says
-    what was expected where it is anything else.
+    It is an integer, a slice, a list of integers or a mask; negative integers count from the end.
     """
     if isinstance(index, (bool, np.bool_)):  # as ("a", "b") == "a" is
         raise IndexError(f"expected {_WAYS}, got {index}; compare an array, numpy.array(labels) == label")

@@ -2,36 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kineme.movements.channels.channel import Channels
 from kineme.movements.channels.detect import unit_of
+from kineme.movements.trajectories.movements import Samples
 from kineme.reporting.table import Table, data_frame, to_html
-from kineme.validation import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _LISTED = 20  # labels that a notebook shows
-
-
-class Samples(NamedTuple):
-    """All samples of n movements, one movement after the other.
-
-    `positions` (total, d) are what is drawn, with their names; `columns` (total, c) are what a table holds.
-    """
-
-    times: Array  # (total,) [s]
-    offsets: NDArray[np.intp]  # (n + 1,)
-    positions: Array
-    position_names: tuple[str, ...]
-    columns: Array
-    column_names: tuple[str, ...]
-    labels: NDArray[Any] | None  # (n,)
 
 
 class Presented:
@@ -95,13 +80,11 @@ class Presented:
             Something else than axes, axes in the plane for movements in space or the reverse, or axes for movements
             of more than three dimensions.
         """
-        from kineme.movements.trajectories.figure import Paths, draw_movements, draw_movements_into
+        from kineme.movements.trajectories.figure import draw_movements, draw_movements_into
 
-        samples = self._samples
-        paths = Paths(samples.times, samples.positions, samples.offsets, samples.position_names, samples.labels)
         if ax is None:
-            return draw_movements(paths)
-        draw_movements_into(ax, paths)
+            return draw_movements(self._samples)
+        draw_movements_into(ax, self._samples)
         return ax
 
     def _repr_html_(self) -> str:

@@ -91,6 +91,13 @@ class Trajectory:
         return f"Trajectory({len(self)} samples, {self.n_dims} dims, {self.duration:.3g} s{label}{name})"
 
 
+def unchecked(**fields: Any) -> Trajectory:
+    """A `Trajectory` of fields that have been checked already, which shares their memory."""
+    trajectory = object.__new__(Trajectory)
+    vars(trajectory).update(fields)
+    return trajectory
+
+
 @runtime_checkable
 class HasDemonstrations(Protocol):
     """Whatever holds movements and hands them out: recordings that were read, a segmentation, a rollout."""
