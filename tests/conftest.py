@@ -34,9 +34,10 @@ def pytest_collection_modifyitems(config, items):
 
 
 def pytest_collection_finish():
-    """Leave what was collected to no search for garbage: ten thousand tests are no garbage."""
+    """Leave what was collected to no search for garbage, and search seldom: ten thousand tests are no garbage."""
     gc.collect()
     gc.freeze()
+    gc.set_threshold(10_000, 10, 10)
 
 
 def _make_movement(seed, n_dims=2, n_samples=None, even=True):

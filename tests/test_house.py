@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import ast
-import io
 import re
 import subprocess
-import tokenize
 from collections import Counter
 from functools import cache
 from itertools import pairwise
@@ -20,30 +18,30 @@ MAX_FILE, MAX_FUNCTION = 400, 60
 
 
 @cache  # the sources do not change while they are read here
-def _tree(path):
-    return ast.parse(path.read_text())
+def _nodes(path):
+    """All nodes of a file's syntax tree, the module first."""
+    return tuple(ast.walk(ast.parse(path.read_text())))
 
 
+@cache
 def _code_lines(path):
-    """Numbers of the lines that hold code: no blank lines, comments or docstrings."""
-    text = path.read_text()
+    """Numbers of the lines that hold code: no blank lines, comments or docstrings; all lines of other long texts."""
+    texts = [node for node in _nodes(path) if isinstance(node, ast.Constant) and isinstance(node.value, str)]
     docstrings = {
         line
-        for node in ast.walk(_tree(path))
+        for node in _nodes(path)
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
         for line in range(node.lineno, node.end_lineno + 1)
     }
-    empty = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER}
-    code = set()
-    for token in tokenize.generate_tokens(io.StringIO(text).readline):
-        if token.type not in empty:
-            code |= set(range(token.start[0], token.end[0] + 1))
+    lines = enumerate(path.read_text().splitlines(), start=1)
+    code = {number for number, line in lines if line.strip() and not line.lstrip().startswith("#")}
+    code.update(line for text in texts for line in range(text.lineno, text.end_lineno + 1))
     return code - docstrings
 
 
+@cache
 def _functions_of(path):
-    nodes = ast.walk(_tree(path))
-    return [node for node in nodes if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))]
+    return [node for node in _nodes(path) if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))]
 
 
 def test_files_and_functions_are_short():
@@ -79,7 +77,7 @@ _CLAUSES = {"what", "whether", "how", "which", "where", "that", "who", "why", "a
 def test_the_package_stays_within_its_budget():
     """Limits of the whole: where one is reached, something is to be said in less."""
     paths = sorted((ROOT / "src" / "kineme").rglob("*.py"))
-    nodes = [node for path in paths for node in ast.walk(_tree(path))]
+    nodes = [node for path in paths for node in _nodes(path)]
     lines = sum(path.read_text().count("\n") for path in paths)
     imports = [node for node in nodes if isinstance(node, (ast.Import, ast.ImportFrom))]
     functions = [node.name for node in nodes if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))]
@@ -107,7 +105,7 @@ _CHANGE = {"LibraryRecognizer", "Batch", "Decision"}  # what is remembered betwe
 
 
 def _classes():
-    return [node for path in SOURCES for node in _tree(path).body if isinstance(node, ast.ClassDef)]
+    return [node for path in SOURCES for node in _nodes(path)[0].body if isinstance(node, ast.ClassDef)]
 
 
 def test_named_tuples_check_nothing_and_are_sequences_of_their_fields():
@@ -204,7 +202,7 @@ _PRIVATE = {
 
 def _names(path):
     """What a file names: functions, classes, arguments and variables."""
-    for node in ast.walk(_tree(path)):
+    for node in _nodes(path):
         if isinstance(node, (ast.FunctionDef, ast.ClassDef)):
             yield node.name
         elif isinstance(node, ast.arg):

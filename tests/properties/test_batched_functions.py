@@ -62,7 +62,7 @@ def test_a_batch_equals_its_members_one_by_one(row, drawn, seed):
     results = {}
     with pytest.MonkeyPatch.context() as patch, warnings.catch_warnings():
         warnings.simplefilter("ignore", DegenerateMovementWarning)
-        for choice in ("never", "always"):
+        for choice in ("always", "never"):  # what is calibrated on first use takes seconds plain
             patch.setenv("KINEME_COMPILED", choice)
             results[choice] = row.call(batch)
             with pytest.MonkeyPatch.context() as tiles:
