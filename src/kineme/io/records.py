@@ -69,6 +69,17 @@ class Contents(NamedTuple):
 
 
 @contextmanager
+def damaged_as(said: str, *errors: type[Exception]) -> Iterator[None]:
+    """Raise what a package raises on damaged bytes as a `DataError` that begins so."""
+    try:
+        yield
+    except KinemeError:
+        raise
+    except errors as error:
+        raise DataError(f"{said} ({error})") from error
+
+
+@contextmanager
 def needs(package: str, purpose: str, extra: str) -> Iterator[None]:
     """Raise a `DataError` that names the extra to install, where an import of a package fails."""
     try:

@@ -18,10 +18,7 @@ _IDLE = 3600.0  # seconds since the last write after which the file of a process
 
 
 def write_atomically(path: Path, data: bytes) -> Path:
-    """Write `data` to a hidden file beside `path`, flush it to the disk, and rename it to `path`.
-
-    Raises OSError: the folder is missing, read-only or full; an existing file at `path` is unchanged.
-    """
+    """Write `data` to a hidden file beside `path`, flush it to the disk, and rename it to `path`; see `whole_file`."""
     with whole_file(path) as beside:
         beside.write_bytes(data)
     return path
@@ -32,10 +29,8 @@ def whole_file(path: Path, *, replace: bool = True, companions: Sequence[str] = 
     """Context manager: a hidden name beside `path` to write to; on success that file is flushed and named `path`.
 
     Leftovers of killed processes are removed, and so are the `companions`: ends of the names of other files that may be
-    made beside the new one, as "-wal" by SQLite.
-
-    Raises FileExistsError: `replace` is False and there is a file of that name, or another process was faster; it stays
-    as it is; OSError: the folder is missing, read-only or full; what was at `path` is as it was.
+    made beside the new one, as "-wal" by SQLite. Without `replace` a file of that name, even one that another process
+    made meanwhile, stays as it is.
     """
     if len(os.fsencode(path.name)) > _LONGEST_NAME:
         raise OSError(
@@ -104,7 +99,7 @@ def remove_leftovers(path: Path) -> None:
     """Remove files of `name_beside` that killed processes left beside `path`, with SQLite's files beside them.
 
     A file is removed if it belongs to this user, its process does not run, and nobody wrote to it for an hour: in a
-    folder that several machines share, the process may run on another one. Files that cannot be removed stay.
+    folder that several machines share, the process may run on another one.
     """
     pattern = re.compile(rf"\.{re.escape(path.name)}\.(\d+)(?:\.[0-9a-f]{{8}})?(?:-wal|-shm|-journal)?")
     with suppress(OSError):
@@ -154,11 +149,7 @@ def _named(path: Path, beside: Path) -> Iterator[None]:
 
 @contextmanager
 def whole_folder(path: Path) -> Iterator[Path]:
-    """Context manager: a new hidden folder beside `path` to write into; on success it is named `path`.
-
-    Raises FileExistsError: there is something at `path`, and not an empty folder; OSError: the folder around it is
-    missing, read-only or full.
-    """
+    """Context manager: a new hidden folder beside `path` to write into; on success it is named `path`."""
     empty = path.is_dir() and not any(path.iterdir())
     if path.exists() and not empty:
         raise FileExistsError(f"expected a new folder to write, {path} is there")

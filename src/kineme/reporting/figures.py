@@ -76,11 +76,7 @@ FORMATS: dict[str, dict[str, Any]] = {
 
 
 def encode_figure(figure: Figure, kind: str, dpi: int = 150) -> bytes:
-    """The figure as the bytes of a file of that kind, see `FORMATS`.
-
-    Control characters in names from files are escaped here if `drawable` has not done it: SVG repeats the names in
-    comments, where XML allows no control characters.
-    """
+    """The figure as the bytes of a file of `FORMATS`, without control characters, which XML allows nowhere."""
     from matplotlib.text import Text
 
     for text in figure.findobj(Text):

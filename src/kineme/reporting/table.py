@@ -35,12 +35,11 @@ def mean_and_range(values: Sequence[float]) -> str:
 
 
 def to_text(table: Table, width: int | None = None) -> str:
-    """Columns aligned for a terminal.
+    """Columns aligned for a terminal, by default of its width.
 
-    What does not fit into the width is wrapped, widest columns first; words that are wider than their column lose their
-    middle. Where not even that leaves a few letters to each, every row becomes a list. `width` is that of the terminal
-    by default. Where the output goes elsewhere, nothing is cut but names of more than 120 letters, and only the last
-    column is wrapped.
+    What does not fit is wrapped, widest columns first; words that are wider than their column lose their middle. Where
+    not even that leaves a few letters to each, every row becomes a list. Where the output goes elsewhere, only names of
+    more than 120 letters are cut, and only the last column is wrapped.
     """
     lines = [(*(_cell(cell) for cell in row[:-1]), printable(row[-1])) for row in (table.columns, *table.rows)]
     natural = [max(width_of(row[k]) for row in lines) for k in range(len(table.columns))]
@@ -71,10 +70,7 @@ def _cell(text: str) -> str:
 
 
 def _narrowed(lines: Sequence[tuple[str, ...]], natural: list[int], width: int) -> list[int] | None:
-    """Widths that sum up to `width` at most; None where columns would get too narrow.
-
-    The widest columns are narrowed first, at first down to their widest words, then further.
-    """
+    """Widths that sum up to `width` at most, widest columns narrowed first; None where columns would get too narrow."""
     words = [max(widest_word(row[k]) for row in lines) for k in range(len(natural))]
     for least in (words, [min(word, _NARROW) for word in words]):
         if sum(least) <= width:

@@ -1,7 +1,4 @@
-"""JSON and JSON lines as trees of arrays: samples with names become columns, lists of numbers become arrays.
-
-So do messages in JSON of an MCAP file, as Foxglove and others record them: each message of a topic is a sample.
-"""
+"""JSON, JSON lines and messages in JSON of an MCAP file as trees of arrays: samples become columns, lists arrays."""
 
 from __future__ import annotations
 
@@ -71,10 +68,7 @@ def json_lines_movements(data: bytes, layout: Layout) -> Parsed:
 
 
 def _frame(entries: Mapping[str, Any]) -> dict[str, list[Any]] | None:
-    """Give the columns of a data frame as pandas writes it by columns, by its index, or split; None of something else.
-
-    Its index is a column too: the times if it holds dates.
-    """
+    """Give the columns, and the index as one, of a data frame as pandas writes it; None of something else."""
     if {*entries} == {"columns", "index", "data"}:
         if any(not isinstance(row, list) or len(row) != len(entries["columns"]) for row in entries["data"]):
             raise DataError("expected a row of data with a number for each of the columns, got another one")
@@ -258,10 +252,7 @@ def _flat(sample: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _array(values: list[Any]) -> Any:
-    """Return numbers as an array, NaN for null; texts as objects; a `DataError` for rows that differ in length.
-
-    Nulls alone say nothing of numbers: they are empty texts, which are left aside.
-    """
+    """Return numbers as an array, NaN for null; texts as objects; nulls alone are empty texts, which are left aside."""
     nothing = all(
         value is None or (isinstance(value, list) and all(cell is None for cell in value)) for value in values
     )

@@ -1,8 +1,7 @@
 """MATLAB files: LASA's, a list ``demos`` of structures with ``pos`` (d, T) and ``t`` (1, T), and any other layout.
 
-Source: The MathWorks, "MAT-File Format", version 5. A file is a header of 128 bytes and elements, each a tag (type,
-number of bytes) and its data; a matrix is an element of elements: flags, dimensions, name, and the content of its
-class. Only the requested variables are read, and no size in the file is trusted: each is checked before use.
+Source: The MathWorks, "MAT-File Format", version 5. A file is a header and elements, each a tag (type, number of bytes)
+and its data; a matrix is an element of elements: flags, dimensions, name, content. No size in the file is trusted.
 """
 
 from __future__ import annotations
@@ -49,10 +48,7 @@ class Demos(NamedTuple):
 
 
 def read_demos(data: bytes) -> Demos:
-    """Read all demonstrations of a MATLAB file of version 5 to 7.2.
-
-    ``demos`` is a structure, an array of structures or a cell array of them. Other variables are ignored.
-    """
+    """Read ``demos`` of a MATLAB file of version 5 to 7.2: a structure, or an array or a cell array of them."""
     if data[:8] == b"\x89HDF\r\n\x1a\n" or data[:10] == b"MATLAB 7.3":
         raise DataError("expected a MATLAB file of version 7.2 or earlier, got 7.3; save it with -v7")
     try:
@@ -88,11 +84,7 @@ def _of_structure(record: Any) -> tuple[Array, Array]:
 
 
 def mat_movements(data: bytes, layout: Layout) -> Parsed:
-    """Return the movements in a MATLAB file: those of ``demos``, see `read_demos`, else of all its variables.
-
-    Structures with times hold one movement; cells and arrays of structures hold many. Matrices among the variables
-    count only beside times or a rate, or where the caller gives the step between samples.
-    """
+    """Return the movements in a MATLAB file: those of ``demos``, see `read_demos`, else of all its variables."""
     try:
         variables = matrices(data, byte_order(data))
     except (ValueError, struct.error, zlib.error):

@@ -36,7 +36,7 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: Style = NAMES, m
     """Return the movements of a tree, see `kineme.io.arrays.trees`.
 
     Several arrays of more than one column, of which `layout` chooses none, are refused unless `many` is "take": they
-    may mean different things, such as states and commands, or be parts of one state.
+    may mean different things, such as states and commands.
     """
     movements = [movement for movement in movements_in(tree, style) if movement.entries]
     if not movements:
@@ -71,10 +71,7 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: Style = NAMES, m
 
 
 def _of_one_array(movements: list[TreeMovement], layout: Layout) -> list[TreeMovement]:
-    """Return movements that may be the points of one, as `sets_or_points` tells them; others as they are.
-
-    They are one array (n, T, d), or n lists of points with names for their coordinates, and have no times.
-    """
+    """Return movements that may be the points of one, without times, as `sets_or_points` tells; others as they are."""
     names = [*movements[0].entries]
     if any([*movement.entries] != names for movement in movements) or any(map(is_time, names)):
         return movements
@@ -182,10 +179,7 @@ def _table(
     columns: tuple[Sequence[str], Sequence[str]],
     needed: Mapping[str, bool],
 ) -> Table:
-    """Give the arrays that are needed, one movement after the other; what a movement lacks is a fault of its first row.
-
-    `needed` says of each whether it holds coordinates, which are not rounded.
-    """
+    """Give the needed arrays, coordinates unrounded; what a movement lacks is a fault of its first row."""
     heads, owners = columns
     lengths = [movement.length for movement in movements]
     widths = Counter(owners)

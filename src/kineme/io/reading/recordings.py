@@ -16,7 +16,6 @@ from kineme.io.reading.formats import as_text, data_set_of, entries_of, in_words
 from kineme.io.reading.join_files import Placed, join_files, notes_on_clocks
 from kineme.io.reading.merge_files import Recordings, merge_files, notes_on_gaps
 from kineme.io.reading.read_file import FileRead, format_of, read_bytes, read_file
-from kineme.io.records import Problem
 from kineme.movements.preparation.trim import TrimRest
 from kineme.movements.tables.columns import excluded_numbers
 from kineme.movements.tables.layout import FILL_GAPS, Column, Layout, listed
@@ -303,7 +302,7 @@ class NameRule:
 
     def apply(self, read: FileRead, path: Path) -> FileRead:
         """Return a file with the labels that its path says; one that the pattern does not match is a problem."""
-        if read.block is None:
+        if not read.block.labels:
             return read
         label = _folder(path, 1 if self.label_by == FOLDER else self.label_by) if self._by_folder else None
         person = None
@@ -312,8 +311,9 @@ class NameRule:
             name = "/".join(_parts(path, depth)[-depth:])
             fields = match(self.parts, name)
             if fields is None:
-                reason = f"expected a name like {self.label_pattern}, as the label pattern says, got {name}"
-                return read._replace(block=None, problems=[*read.problems, Problem(read.path, None, reason)])
+                return read.without_movements(
+                    f"expected a name like {self.label_pattern}, as the label pattern says, got {name}"
+                )
             label, person = fields.get(LABEL, label), fields.get(PERSON)
         if label is None and not self._by_folder:
             return read._replace(person=person)

@@ -31,15 +31,12 @@ FRAMES_LOOKED_AT = 50_000  # transforms that are read to list the frames
 
 
 class Choice(NamedTuple):
-    """Topics in the order that was asked for, and pairs of frames, which come first, with the topics they are from.
+    """What is read of a bag."""
 
-    `as_known`: nobody asked for them; they are what the movements to compare with were read from.
-    """
-
-    topics: tuple[Topic, ...]
-    frames: tuple[Edge, ...] = ()
-    transforms: tuple[Topic, ...] = ()
-    as_known: bool = False
+    topics: tuple[Topic, ...]  # in the order that was asked for
+    frames: tuple[Edge, ...] = ()  # pairs, which come before the topics
+    transforms: tuple[Topic, ...] = ()  # the topics that the frames are from
+    as_known: bool = False  # nobody asked for it, but the movements to compare with were read from it
 
 
 def choose(bag: Bag, layout: Layout) -> Choice:
@@ -222,10 +219,7 @@ def edge_of(transform: Any) -> Edge:
 
 
 def connected_graph(bag: Bag, topics: Sequence[Topic], wanted: Sequence[Edge], most: int | None = None) -> list[Edge]:
-    """Return the frames, read until all wanted pairs are connected, or `most` transforms, or to the end.
-
-    Each is a child with the parent that it has most transforms of, in alphabetic order.
-    """
+    """Return the frames, each with its usual parent, of `most` transforms, or until all wanted pairs are connected."""
     parents: dict[str, Counter[str]] = {}
 
     def ordered() -> list[Edge]:

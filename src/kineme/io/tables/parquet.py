@@ -1,7 +1,4 @@
-"""Parquet tables; the roles of the columns are found as in text tables.
-
-Cells may hold lists of numbers: a vector in each row, as robots' data sets store their states.
-"""
+"""Parquet tables; the roles of the columns are found as in text tables, and cells may hold lists of numbers."""
 
 from __future__ import annotations
 
@@ -14,7 +11,7 @@ import numpy as np
 
 from kineme.errors import DataError
 from kineme.io.limits import check_expanded
-from kineme.io.records import needs
+from kineme.io.records import damaged_as, needs
 from kineme.movements.tables.columns import Roles, choose_roles
 from kineme.movements.tables.layout import Layout, no_lines
 from kineme.movements.tables.table import Table
@@ -39,7 +36,8 @@ def read_parquet_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
     with needs("pyarrow", "read Parquet", "parquet"):
         import pyarrow as pa
         from pyarrow import parquet
-    try:
+    damaged = "expected a Parquet file, got something foreign, truncated or damaged"
+    with damaged_as(damaged, pa.ArrowException, OSError):
         file = parquet.ParquetFile(io.BytesIO(data))
         names, types = tuple(file.schema_arrow.names), file.schema_arrow.types
         heads, kinds, owners = _expanded(names, types, _lists_to_read(file, layout), file)
@@ -66,17 +64,17 @@ def read_parquet_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
             n_bytes += batch.nbytes
             check_expanded(n_bytes)
             batches.append(batch)
-        if not batches:
+        if not any(batch.num_rows for batch in batches):
             raise DataError("expected samples, got a table without rows")
         table = pa.Table.from_batches(batches)
-        faults: dict[int, str] = {}
-        read = {k: _read(table.column(names[k]), names[k], k in texts, (owners.count(k), faults)) for k in needed}
-    except (pa.ArrowException, OSError) as error:
-        if isinstance(error, DataError):
-            raise
-        raise DataError(f"expected a Parquet file, got something foreign, truncated or damaged ({error})") from error
-    if table.num_rows == 0:
-        raise DataError("expected samples, got a table without rows")
+        faults, read = dict[int, str](), dict[int, Any]()
+        for k in needed:
+            column = table.column(names[k])
+            if k in texts or not is_list(column.type):
+                read[k] = _texts(column, names[k]) if k in texts else _numbers(column, names[k])
+            else:
+                read[k], wrong = rows_of_lists(column, owners.count(k), names[k])
+                faults |= wrong
     for k in {owners[k] for k in roles.positions if not is_list(types[owners[k]])}:
         if (integer := too_long_integer(table.column(names[k]).to_numpy())) is not None:
             raise DataError(f"expected numbers in {names[k]!r} that floats can hold, got {integer}{ROUNDED}")
@@ -135,18 +133,6 @@ def _expanded(
             kinds.append(_kind(pa, kind))
         owners += [k] * max(1, width if width <= _WIDEST else 1)
     return tuple(heads), tuple(kinds), owners
-
-
-def _read(column: Any, head: str, is_text: bool, listed: tuple[int, dict[int, str]]) -> Any:
-    """Read a column as texts, as numbers, or as the numbers in its lists, whose faults are added to those known."""
-    width, faults = listed
-    if is_text:
-        return _texts(column, head)
-    if not is_list(column.type):
-        return _numbers(column, head)
-    rows, wrong = rows_of_lists(column, width, head)
-    faults |= wrong
-    return rows
 
 
 def _kind(pa: Any, kind: Any) -> str:
@@ -233,10 +219,8 @@ def _rows(array: Any, width: int, head: str) -> tuple[Array, dict[int, str]]:
     import pyarrow as pa
     from pyarrow import compute
 
-    try:
+    with damaged_as(f"expected lists of numbers in {head!r}, got damaged bytes", pa.ArrowException):
         array.validate(full=True)  # pyarrow itself trusts the offsets of damaged files
-    except pa.ArrowException as error:
-        raise DataError(f"expected lists of numbers in {head!r}, got damaged bytes ({error})") from error
     lengths = compute.list_value_length(array).fill_null(0).to_numpy(zero_copy_only=False)
     valid = array.is_valid().to_numpy(zero_copy_only=False)
     flat = array

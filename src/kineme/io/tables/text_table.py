@@ -1,7 +1,4 @@
-"""CSV and similar text tables, read by NumPy's C parser; irregular lines are read one by one.
-
-Text exports of motion capture systems have heads of their own, and zeros for markers that were not found.
-"""
+"""CSV and similar text tables, and exports of motion capture, read by NumPy's C parser; irregular lines one by one."""
 
 from __future__ import annotations
 
@@ -63,12 +60,7 @@ _ROUNDED = 1e-5  # s by which written times may differ from those of frames at t
 
 
 def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:  # noqa: PLR0912 - one check after the other
-    """Read a table of samples by lines.
-
-    Separated by comma, semicolon, tab or blanks; with a head line or without; quoted or not; with decimal commas
-    where the separator is another mark. Empty lines and comments are skipped, see `Dialect.is_sample`. A head may stand
-    in the last comment, as `numpy.savetxt` writes it.
-    """
+    """Read a table of samples by lines, whatever their separator, heads, quotes and decimal mark, see `Dialect`."""
     _check_lines(data)
     encoding = _encoding(data)
     if (export := export_head(_lines(data, encoding), len(data))) is not None:
@@ -297,14 +289,8 @@ def _rows(data: bytes, encoding: str, dialect: Dialect, texts: set[int]) -> tupl
 
 
 def _line_numbers(data: bytes, encoding: str, dialect: Dialect) -> Callable[[int], int | None]:
-    @cache
-    def lines() -> Any:
-        return np.fromiter((line for line, _ in _samples(data, encoding, dialect)), np.intp)
-
-    def line_of(row: int) -> int | None:
-        return int(lines()[row])
-
-    return line_of
+    lines = cache(lambda: np.fromiter((line for line, _ in _samples(data, encoding, dialect)), np.intp))
+    return lambda row: int(lines()[row])
 
 
 def _check_lines(data: bytes) -> None:
