@@ -106,14 +106,10 @@ def remove_leftovers(path: Path) -> None:
         for entry in os.scandir(path.parent):
             if (match := pattern.fullmatch(entry.name)) and not _is_at_work(int(match[1])):
                 with suppress(OSError):
-                    _remove_if_idle(Path(entry.path))
-
-
-def _remove_if_idle(path: Path) -> None:
-    status = path.lstat()
-    own = not hasattr(os, "getuid") or status.st_uid == os.getuid()
-    if own and stat.S_ISREG(status.st_mode) and time.time() - status.st_mtime > _IDLE:
-        path.unlink()
+                    status = entry.stat(follow_symlinks=False)
+                    own = not hasattr(os, "getuid") or status.st_uid == os.getuid()
+                    if own and stat.S_ISREG(status.st_mode) and time.time() - status.st_mtime > _IDLE:
+                        os.unlink(entry.path)
 
 
 def _is_at_work(process: int) -> bool:
@@ -122,10 +118,8 @@ def _is_at_work(process: int) -> bool:
         return True
     try:
         os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except (OSError, OverflowError):  # another user's process, or a number too large for a process id
-        return True
+    except (OSError, OverflowError) as error:  # else another user's process, or a number too large for an id
+        return not isinstance(error, ProcessLookupError)
     return True
 
 

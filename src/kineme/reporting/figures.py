@@ -5,6 +5,8 @@ from __future__ import annotations
 import io
 import sys
 import warnings
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -37,12 +39,12 @@ _RC: dict[str, Any] = {
 }
 
 
-def new_figure(width: float, height: float) -> Figure:
-    """An empty figure of the given size in inches, without any window system."""
+def new_figure(width: float, height: float, make: Callable[..., Figure] = Figure) -> Figure:
+    """An empty figure of the given size in inches, by default without any window system."""
     import matplotlib
 
     matplotlib.rcParams.update(_RC)  # type: ignore[arg-type]
-    return Figure(figsize=(width, height), layout="constrained")
+    return make(figsize=(width, height), layout="constrained")
 
 
 class _PyplotFigure(Figure):
@@ -58,13 +60,8 @@ class _PyplotFigure(Figure):
 
 def figure_to_show(width: float, height: float) -> Figure:
     """Make a figure as `new_figure` does, but of `matplotlib.pyplot` where the caller has imported it, to be shown."""
-    if (pyplot := sys.modules.get("matplotlib.pyplot")) is None:
-        return new_figure(width, height)
-    import matplotlib
-
-    matplotlib.rcParams.update(_RC)  # type: ignore[arg-type]
-    figure: Figure = pyplot.figure(figsize=(width, height), layout="constrained", FigureClass=_PyplotFigure)
-    return figure
+    pyplot = sys.modules.get("matplotlib.pyplot")
+    return new_figure(width, height, partial(pyplot.figure, FigureClass=_PyplotFigure) if pyplot else Figure)
 
 
 #: What each file format needs to come out the same at every run.

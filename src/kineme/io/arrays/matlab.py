@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 import struct
 import zlib
-from collections.abc import Container, Iterator, Mapping
+from collections.abc import Container, Iterator
+from contextlib import suppress
 from itertools import cycle
 from typing import Any, NamedTuple
 
@@ -85,16 +86,16 @@ def _of_structure(record: Any) -> tuple[Array, Array]:
 
 def mat_movements(data: bytes, layout: Layout) -> Parsed:
     """Return the movements in a MATLAB file: those of ``demos``, see `read_demos`, else of all its variables."""
-    try:
+    variables: dict[str, Matrix] = {}
+    with suppress(ValueError, struct.error, zlib.error):  # no file of version 5 to 7.2, which `read_demos` says
         variables = matrices(data, byte_order(data))
-    except (ValueError, struct.error, zlib.error):
-        variables = {}  # no file of version 5 to 7.2, which `read_demos` says
     if "demos" in variables or not variables:
         demos = read_demos(data)
         named = Named([demos.name] * len(demos.times), "t")
         return parsed_arrays(demos.positions, demos.times, named, layout, ("MATLAB", "demos"))
     try:
-        tree = as_tree(variables, byte_order(data))
+        order = byte_order(data)
+        tree = _upright({name: _node(matrix, order, [0]) for name, matrix in variables.items()})
     except (ValueError, struct.error) as error:
         raise DataError(f"expected a MATLAB file of arrays, got {error}") from error
     if not has_times(tree) and not isinstance(layout.units, float | int):  # matrices on their own may be anything
@@ -106,11 +107,6 @@ def mat_movements(data: bytes, layout: Layout) -> Parsed:
             "seconds between two samples with units=, in the shell --units"
         )
     return tree_movements(tree, layout, "MATLAB")
-
-
-def as_tree(variables: Mapping[str, Matrix], order: str) -> dict[str, Any]:
-    """Return variables as a tree, in which every array has its samples along the first axis."""
-    return _upright({name: _node(matrix, order, [0]) for name, matrix in variables.items()})
 
 
 def _node(matrix: Matrix, order: str, taken: list[int], depth: int = 0, wanted: Container[str] | None = None) -> Any:

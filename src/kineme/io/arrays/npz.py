@@ -12,6 +12,7 @@ import math
 import sys
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -50,7 +51,13 @@ class Npz(Mapping[str, NDArray[Any]]):
     def __getitem__(self, name: str) -> NDArray[Any]:
         member = self._members[name]
         try:
-            content = self._content(member)
+            self._take(member.file_size)
+            if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+                raise ValueError(f"an entry {member.filename!r} that is packed in an unusual way")
+            with self._archive.open(member) as file:
+                content = file.read(member.file_size)  # read() without a size decompresses before it checks
+            if len(content) != member.file_size:
+                raise ValueError(f"a truncated entry {member.filename!r}")
             return _decoded(content, repr(name), self._path, self._take)
         except DataError:
             raise
@@ -65,16 +72,6 @@ class Npz(Mapping[str, NDArray[Any]]):
 
     def __len__(self) -> int:
         return len(self._members)
-
-    def _content(self, member: zipfile.ZipInfo) -> bytes:
-        self._take(member.file_size)
-        if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-            raise ValueError(f"an entry {member.filename!r} that is packed in an unusual way")
-        with self._archive.open(member) as file:
-            content = file.read(member.file_size)  # read() without a size decompresses before it checks
-        if len(content) != member.file_size:
-            raise ValueError(f"a truncated entry {member.filename!r}")
-        return content
 
     def _take(self, n_bytes: int) -> None:
         self._taken += n_bytes
@@ -143,10 +140,9 @@ def read_container(path: Path, kind: str) -> tuple[dict[str, Any], Mapping[str, 
 def _read(path: Path) -> tuple[dict[str, Any], Mapping[str, NDArray[Any]]]:
     check_expanded(path.stat().st_size)
     arrays = Npz(path.read_bytes(), path)
-    try:
+    header = None
+    with suppress(ValueError, KeyError, RecursionError):
         header = json.loads(arrays[_HEADER].tobytes())
-    except (ValueError, KeyError, RecursionError) as error:
-        raise DataError(f"expected {path} to be a file saved by kineme, got another program's archive") from error
     if not isinstance(header, dict) or header.get("format") != FORMAT:
         raise DataError(f"expected {path} to be a file saved by kineme, got another program's archive")
     if not isinstance(header.get("version"), int) or header["version"] > VERSION:

@@ -21,7 +21,7 @@ from kineme.io.arrays.arrays import (
     point_names,
     sets_or_points,
 )
-from kineme.io.arrays.trees import NAMES, STAMP, Style, TreeMovement, listed_shapes, movements_in
+from kineme.io.arrays.trees import NAMES, STAMP, Style, TreeMovement, movements_in
 from kineme.io.limits import check_expanded
 from kineme.movements.tables.columns import choose_roles, is_time
 from kineme.movements.tables.layout import Layout, Parsed, listed, no_lines
@@ -58,9 +58,9 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: Style = NAMES, m
     kinds = ["text" if owner != STAMP and _is_text(first.entries[owner]) else "number" for owner in owners]
     wide = [name for name in names if owners.count(name) > 1]
     if many == "refuse" and layout.coordinates is None and len(wide) > 1:
+        shapes = ", ".join(f"{name} ({owners.count(name)})" for name in wide)
         raise DataError(
-            f"expected one array of coordinates, got {listed_shapes(first.entries, wide)}; say which with columns=, "
-            "in the shell --columns"
+            f"expected one array of coordinates, got {shapes}; say which with columns=, in the shell --columns"
         )
     roles = choose_roles(heads, kinds, layout)
     others = [roles.time, roles.nanoseconds, roles.label, *roles.clocks]

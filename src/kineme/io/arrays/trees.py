@@ -282,8 +282,3 @@ def label_of(name: str) -> str | None:
     words = words_of(name)
     structural = set(words) <= MOVEMENT_WORDS | _STRUCTURAL or (words[:1] == ("x",) and set(words[1:]) <= _STRUCTURAL)
     return None if not words or words[-1].isdecimal() or (structural and words != ("x",)) else name
-
-
-def listed_shapes(entries: Mapping[str, Any], names: Sequence[str]) -> str:
-    """Return names of arrays with the width of each, for a message."""
-    return ", ".join(f"{name} ({int(np.prod(entries[name].shape[1:]))})" for name in names)

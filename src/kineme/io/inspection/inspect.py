@@ -261,10 +261,7 @@ def _group(channel: Channel) -> str:
 
 def as_data(inspection: Inspection) -> dict[str, Any]:
     """Return nested lists and dictionaries; units as the fields of `Inspection` and `LabelSummary` say."""
-    return {
-        "movements": inspection.movements,
-        "files": inspection.files,
-        "dimensions": inspection.dimensions,
+    return inspection._asdict() | {
         "labels": [
             {name: value._asdict() if isinstance(value, Range) else value for name, value in summary._asdict().items()}
             for summary in inspection.labels

@@ -47,11 +47,6 @@ class Info(NamedTuple):
     episodes: int | None  # how many it says that there are
     chunk: int  # episodes in a chunk, for version 2
 
-    @property
-    def vectors(self) -> dict[str, int]:
-        """The features that are vectors, with their widths."""
-        return {name: len(entries) for name, entries in self.heads.items() if entries != ("",)}
-
 
 def read_json(path: Path, what: str) -> Any:
     """Read the content of a JSON file of a data set; a `DataError` that names it if that is damaged or not there."""
@@ -94,10 +89,9 @@ def _entries(name: str, feature: Any) -> tuple[str, ...]:
     shape = feature.get("shape")
     if not isinstance(shape, list) or not all(isinstance(size, int) and size > 0 for size in shape):
         return ()
-    width = math.prod(shape)
-    names, units = _names(feature.get("names")), feature.get("units")
-    if width > _WIDEST:
+    if (width := math.prod(shape)) > _WIDEST:
         return ()
+    names, units = _names(feature.get("names")), feature.get("units")
     if len(names) == width and len(set(names)) == width and (width > 1 or isinstance(units, list)):
         if isinstance(units, list) and len(units) == width:
             return tuple(

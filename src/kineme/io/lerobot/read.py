@@ -74,7 +74,7 @@ def _chosen(info: Info, layout: Layout) -> tuple[dict[str, int], tuple[str, ...]
     owners = [name for name, entries in info.heads.items() for _ in entries]
     entries = [entry for entries_of_head in info.heads.values() for entry in entries_of_head]
     full = [f"{name}.{entry}" if entry else name for name, entry in zip(owners, entries, strict=True)]
-    vectors = info.vectors
+    vectors = {name: len(entries) for name, entries in info.heads.items() if entries != ("",)}
     name = STATE if STATE in info.heads else next(iter(vectors)) if len(vectors) == 1 else None
     if layout.coordinates is not None:
         short = [entry if owner == name else head for owner, entry, head in zip(owners, entries, full, strict=True)]

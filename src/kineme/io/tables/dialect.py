@@ -205,12 +205,13 @@ def _with_names_like_comments(lines: Sequence[str], numbers: list[int]) -> list[
     if any(is_number(row[0], separator != ",") for row in rows):
         return numbers
     below = (k for k in range(numbers[0] + 1, len(lines)) if lines[k].strip() and is_skipped(lines[k]))
-    marked = (k for k in below if _is_row(split(lines[k], separator), len(rows[0]), separator))
-    return sorted({*numbers, *islice(marked, _PEEK)})[:_PEEK]
-
-
-def _is_row(cells: Sequence[str], n_columns: int, separator: str) -> bool:
-    return len(cells) == n_columns and any(is_number(cell, separator != ",") for cell in cells[1:])
+    marked = ((k, split(lines[k], separator)) for k in below)
+    own = (
+        k
+        for k, row in marked
+        if len(row) == len(rows[0]) and any(is_number(cell, separator != ",") for cell in row[1:])
+    )
+    return sorted({*numbers, *islice(own, _PEEK)})[:_PEEK]
 
 
 def separator_of(lines: Sequence[str]) -> str | None:

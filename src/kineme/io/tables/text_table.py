@@ -47,13 +47,10 @@ _NUMBER, _TEXT, _COLUMN = 8, 64, 1000  # bytes of a number, a text and a column
 
 _HEAD_LINES = 400  # of an export with a head of its own, at most
 _FIRST = 3  # lines among which the first line of an export is
-_MAKERS = {
-    "OptiTrack": export_heads.optitrack_head,
-    "Vicon": export_heads.vicon_head,
-    "Qualisys": export_heads.qualisys_head,
-    "TRC": export_heads.trc_head,
-    "OpenSim": export_heads.opensim_head,
-}
+_MAKERS = (
+    export_heads.optitrack_head, export_heads.vicon_head, export_heads.qualisys_head, export_heads.trc_head,
+    export_heads.opensim_head,
+)  # fmt: skip
 _LINE = 100  # bytes of a line in Python, beside its characters
 _SAMPLES = 5  # in which decimal commas are looked for
 _ROUNDED = 1e-5  # s by which written times may differ from those of frames at the rate
@@ -203,15 +200,22 @@ def export_head(lines: Iterable[str], n_bytes: int) -> tuple[ExportHead, Dialect
     some = list(islice(lines, _FIRST))
     for line in some:
         check_line(line)
-    if (maker := _head(some, probe=True)) is None:
-        return None
-    if maker == "Vicon":  # the section that is read may stand anywhere
-        check_expanded(2 * n_bytes + _LINE)
-        some += list(lines)
+    for find in _MAKERS:
+        try:
+            is_made = find(some, split) is not None
+        except DataError:  # the head is longer than the first lines
+            is_made = True
+        if is_made:
+            break
     else:
-        some += list(islice(lines, _HEAD_LINES))
-    head = _head(some)
-    assert isinstance(head, ExportHead)
+        return None
+    most: int | None = _HEAD_LINES
+    if find is export_heads.vicon_head:  # the section that is read may stand anywhere
+        check_expanded(2 * n_bytes + _LINE)
+        most = None
+    some += list(islice(lines, most))
+    head = find(some, split)
+    assert head is not None
     rows = [split(line, head.separator) for line in some[head.first : head.end][:_SAMPLES] if line.strip()]
     if not rows:
         raise DataError(f"expected samples below the heads of a {head.maker} export, got none")
@@ -222,20 +226,6 @@ def export_head(lines: Iterable[str], n_bytes: int) -> tuple[ExportHead, Dialect
     )
     kinds = ("number",) * len(heads)
     return head, Dialect(head.separator, comma, heads, True, head.first, kinds, units, head.end)
-
-
-def _head(lines: Sequence[str], probe: bool = False) -> Any:
-    """Return the head of an export, or None; with `probe` the name of its maker from the first lines alone."""
-    for maker, find in _MAKERS.items():
-        try:
-            head = find(lines, split)
-        except DataError:
-            if not probe:
-                raise
-            return maker  # the head is longer than the first lines
-        if head is not None:
-            return maker if probe else head
-    return None
 
 
 def _read_export(data: bytes, encoding: str, export: tuple[ExportHead, Dialect], layout: Layout) -> tuple[Table, Roles]:

@@ -164,8 +164,7 @@ def write_bag(path: Path, annotations: Sequence[Annotation], source: Path | None
     A message is stamped with the end of its movement. Ends by a clock that the time of recording does not know, such as
     that of a simulation, count from the first sample as the time of recording counts from the first message.
     """
-    source = _of_one(path, source)
-    check_bag(path, source)
+    assert source is not None  # see `writer_of`
 
     def texts(first: int, last: int) -> list[tuple[int, str]]:
         inside = all(first - _SECOND <= note.end * _SECOND <= last + _SECOND for note in annotations)
@@ -180,8 +179,7 @@ def write_bag(path: Path, annotations: Sequence[Annotation], source: Path | None
 
 def write_lerobot(path: Path, annotations: Sequence[Annotation], source: Path | None) -> Path:
     """Write a copy of a data set of LeRobot whose frames carry the annotations of their episode as JSON."""
-    source = _of_one(path, source)
-    check_lerobot(path, source)
+    assert source is not None  # see `writer_of`
     motions: dict[int, list[Motion]] = {}
     for annotation in annotations:
         number = annotation.place.removeprefix(_EPISODE)
@@ -210,12 +208,6 @@ def check_lerobot(path: Path, source: Path) -> None:
     _check_apart(path, source)
     _check_new_folder(path, source)
     read_info(source)
-
-
-def _of_one(path: Path, source: Path | None) -> Path:
-    if source is None:
-        raise DataError(f"expected one recording to copy with its annotations to {path.name}, got several")
-    return source
 
 
 def _check_apart(path: Path, source: Path) -> None:
