@@ -61,7 +61,6 @@ def whole_file(path: Path, *, replace: bool = True, companions: Sequence[str] = 
 
 
 def _name_new(beside: Path, path: Path) -> None:
-    """Give a file its name, which no other file may have."""
     try:
         os.link(beside, path)  # unlike a rename, it refuses to replace
     except FileExistsError:
@@ -73,7 +72,6 @@ def _name_new(beside: Path, path: Path) -> None:
 
 
 def _bring_folder_to_disk(folder: Path) -> None:
-    """Bring a new name to the disk, where folders can be opened."""
     try:
         handle = os.open(folder, os.O_RDONLY)
     except OSError:

@@ -86,7 +86,6 @@ def _narrowed(lines: Sequence[tuple[str, ...]], natural: list[int], width: int) 
 
 
 def _aligned(row: tuple[str, ...], widths: list[int]) -> list[str]:
-    """The lines of a row."""
     cells = [
         [cell] if width_of(cell) <= width else wrapped(cell, width) for cell, width in zip(row, widths, strict=True)
     ]
@@ -96,7 +95,6 @@ def _aligned(row: tuple[str, ...], widths: list[int]) -> list[str]:
 
 
 def _as_lists(lines: Sequence[tuple[str, ...]], width: int) -> list[str]:
-    """Each row as a list of heads and cells."""
     heads, *rows = lines
     listed: list[str] = []
     for row in rows:

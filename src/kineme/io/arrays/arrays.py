@@ -183,7 +183,6 @@ def numbers_of(values: Any, of_time: bool = False) -> Array:
 
 
 def _no_number(array: NDArray[Any]) -> Any:
-    """Return the first entry that is not a number."""
     for number in array.ravel().tolist():
         try:
             float(np.float64(number))
@@ -265,7 +264,6 @@ def _labels(arrays: Mapping[str, Any], n: int) -> list[str | None]:
 
 
 def _label(value: Any) -> str | None:
-    """Return a label as text; None where there is none."""
     if isinstance(value, (list, dict, tuple)) or value != value:  # noqa: PLR0124 - only NaN differs from itself
         raise DataError(f"expected labels that are texts or numbers, got {value!r}")
     text = value.decode("utf-8", "replace") if isinstance(value, bytes) else "" if value is None else str(value)

@@ -93,7 +93,6 @@ def body_movements(arrays: Mapping[str, Any], layout: Layout, kind: str) -> Pars
 
 
 def _clock(arrays: Mapping[str, Any], body: Body, layout: Layout) -> tuple[dict[str, Array], Rate | None]:
-    """Return the columns of times, and the rate that they follow from."""
     stamps = {name: _values(arrays, name, body.n_samples) for name in arrays if is_time(name)}
     timed = {name: x[:, 0] for name, x in stamps.items() if x is not None and x.shape[1] == 1}
     if timed or isinstance(layout.units, float | int):  # the caller knows better than the file
@@ -189,7 +188,6 @@ def _points_of(arrays: Mapping[str, Any], names: Sequence[str], n: int) -> tuple
 
 
 def _others(arrays: Mapping[str, Any], body: Body) -> dict[str, Array]:
-    """Return all other columns over time, which a caller may choose."""
     columns: dict[str, Array] = {}
     for name in arrays:
         x = None if name in body.arrays else _values(arrays, name, body.n_samples)
@@ -211,7 +209,6 @@ def _values(arrays: Mapping[str, Any], name: str, n: int | None = None) -> Array
 
 
 def _texts(arrays: Mapping[str, Any], names: Sequence[str]) -> list[str]:
-    """Return the first array of texts of one of these names, or none."""
     for name in names:
         with suppress(DataError):  # of Python objects
             texts = np.asarray(arrays.get(name))
@@ -221,7 +218,6 @@ def _texts(arrays: Mapping[str, Any], names: Sequence[str]) -> list[str]:
 
 
 def _segments(arrays: Mapping[str, Any], body: Body) -> Segments | None:
-    """Return the movements between the split points, where there are several."""
     cuts = _values(arrays, "split_points") if "split_points" in arrays else None
     if cuts is None or len(cuts) < 3:
         return None

@@ -81,7 +81,6 @@ def _labels(stored: Any) -> list[str | float | None]:
 
 
 def _label_and_rate(stored: Any, names: Iterable[str]) -> dict[str, Any]:
-    """Return the label and the rate among the attributes of a group or of a data set."""
     named = [name for name in names if name.lower() in _NAMES or seconds_named(name) is not None]
     return {name: value for name in named if (value := _single(stored.attrs[name])) is not None}
 
@@ -132,7 +131,6 @@ class _Stored:
 
 
 def _single(value: Any) -> str | float | None:
-    """Return a text or a number; None for anything else."""
     if isinstance(value, bytes):
         return value.decode("utf-8", "replace")
     if isinstance(value, str):

@@ -70,7 +70,6 @@ def read_demos(data: bytes) -> Demos:
 
 
 def _of_structure(record: Any) -> tuple[Array, Array]:
-    """Return times (T,) and positions (T, d) of a structure with ``t`` (T,) and ``pos`` (d, T)."""
     if not isinstance(record, dict):
         raise ValueError("something else than structures in it")
     if missing := [field for field in _FIELDS if field not in record]:
@@ -135,7 +134,6 @@ def _node(matrix: Matrix, order: str, taken: list[int], depth: int = 0, wanted: 
 
 
 def _children(matrix: Matrix, order: str, count: int, skipped: int) -> Iterator[Matrix]:
-    """Yield the matrices in a cell array or a structure, behind what describes its fields."""
     parts = elements(matrix.content, order)
     for _ in range(skipped):
         next(parts, None)

@@ -37,8 +37,6 @@ class _Line(NamedTuple):
 
 
 class _Row(NamedTuple):
-    """The movement of a line."""
-
     label: str | None
     positions: Array
     times: Array
@@ -87,7 +85,6 @@ def _table(data: bytes) -> tuple[list[_Line], list[str]]:
 
 
 def _names(layout: Layout, heads: Sequence[str]) -> list[str]:
-    """Return the names of the coordinates of a sample."""
     if layout.coordinates is not None:
         return [str(name) for name in layout.coordinates]
     stems = [match[1] for head in heads if (match := _COUNTED.fullmatch(head))]
@@ -101,7 +98,6 @@ def _names(layout: Layout, heads: Sequence[str]) -> list[str]:
 
 
 def _label_column(lines: Sequence[_Line], heads: Sequence[str], width: int, layout: Layout) -> int | None:
-    """Return the column of the labels, or None where there is none."""
     first = lines[0].cells
     if layout.label is not None:
         return column_numbers(heads or [f"column {k}" for k in range(len(first))], [layout.label])[0]

@@ -102,7 +102,6 @@ def _of_one_array(movements: list[TreeMovement], layout: Layout) -> list[TreeMov
 
 
 def _bare(movements: Sequence[TreeMovement], layout: Layout, kind: str) -> Parsed:
-    """Return movements that are arrays alone, without times."""
     if len(movements) == 1 and not isinstance(layout.units, float | int):
         raise DataError(
             "expected times beside the positions, got one array alone; say the seconds between two samples with "

@@ -247,7 +247,6 @@ def rate_of(tree: Mapping[str, Any]) -> Rate | None:
 
 
 def _number(value: Any) -> float | None:
-    """Return a number alone, also as a text."""
     try:
         return float(np.asarray(value).item())
     except (TypeError, ValueError):
@@ -255,7 +254,6 @@ def _number(value: Any) -> float | None:
 
 
 def _is_rate(name: str, tree: Mapping[str, Any]) -> bool:
-    """Tell whether an entry is one number with the name of a rate."""
     return seconds_named(name) is not None and np.shape(tree[name]) in ((), (1,), (1, 1))
 
 

@@ -299,7 +299,6 @@ def as_words(inspection: Inspection) -> str:
 
 
 def _by_reason(problems: Sequence[Problem]) -> list[str]:
-    """Return a line for each reason, with the files that share it."""
     files: dict[str, dict[str, None]] = {}
     for problem in problems:
         files.setdefault(problem.what, {})[problem.file] = None
@@ -360,7 +359,6 @@ def _understood(how: Detected) -> str:
 
 
 def _coordinates(how: Detected) -> str:
-    """Return the coordinates with their units, once if they have the same."""
     units = set(how.measured_in)
     if len(units) == 1:
         return f"{first_names(how.columns, _COLUMNS)} in {units.pop()}"

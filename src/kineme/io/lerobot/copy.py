@@ -81,7 +81,6 @@ def copy_with_motions(source: Path, target: Path, motions: Mapping[int, Sequence
 
 
 def _take(source: Path, old: Path, new: Path, changed: set[Path]) -> None:
-    """Copy or link a file, unless it will be written."""
     if old in changed:
         return
     if old.relative_to(source).parts[0] not in _OWN:
@@ -142,7 +141,6 @@ def _compression(metadata: Any, leaves: Sequence[str]) -> str | dict[str, str]:
 
 
 def _extended(table: Any, motions: Mapping[int, list[Motion]], column: Column, kind: Any, schema: Any) -> Any:
-    """Return rows of a shard with the column, new or longer."""
     import pyarrow as pa
 
     numbers, episode_of = np.unique(table.column("episode_index").to_numpy(), return_inverse=True)
@@ -257,7 +255,6 @@ def with_texts(old: Any, motions: Sequence[Sequence[Motion]], episode_of: NDArra
 
 
 def _texts_of_others(text: str) -> list[Any]:
-    """Return the rows of a text that are not of this package."""
     rows = None
     with suppress(ValueError, RecursionError):
         rows = json.loads(text or "[]")

@@ -189,7 +189,6 @@ def _lines(path: Path, integers: Sequence[str], problems: list[str], text: str =
 
 
 def _table(folder: Path, names: Sequence[str], problems: list[str]) -> list[NDArray[np.int64]]:
-    """Return columns of all files of meta/episodes that can be read, in the order of the files."""
     import pyarrow as pa
 
     files = sorted(folder.glob(_V3))

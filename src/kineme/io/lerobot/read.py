@@ -189,7 +189,6 @@ def episode_names(numbers: Sequence[int]) -> str:
 
 
 def _divided(numbers: NDArray[np.int64]) -> dict[int, str]:
-    """Return episodes whose frames stand in several places."""
     episodes, counts = np.unique(numbers, return_counts=True)
     pairs = zip(episodes.tolist(), counts.tolist(), strict=True)
     return {k: f"expected its frames in one place, got them in {count} places" for k, count in pairs if count > 1}
@@ -207,7 +206,6 @@ def _disordered(frames: Frames, offsets: NDArray[np.intp], numbers: NDArray[np.i
 
 
 def _miscounted(numbers: NDArray[np.int64], lengths: NDArray[np.intp], declared: Episodes) -> dict[int, str]:
-    """Return episodes that are not declared, or with another length."""
     where = np.searchsorted(declared.numbers, numbers).clip(max=len(declared.numbers) - 1)
     is_declared = declared.numbers[where] == numbers
     wrong = dict.fromkeys(numbers[~is_declared].tolist(), "expected an episode that the meta folder declares")

@@ -59,7 +59,6 @@ def write_episode(
 
 
 def _check(info: Any, entry: Mapping[str, Any], fps: float) -> None:
-    """Refuse a data set that the episode does not fit into."""
     version, declared = info.get("codebase_version"), info.get("features")
     if not str(version).startswith("v3."):
         raise DataError(f"expected a LeRobot data set of version 3 to append to, got {version}")
@@ -131,7 +130,6 @@ def _append(folder: Path, info: dict[str, Any], features: Features, task: str) -
 
 
 def _tasks(folder: Path) -> list[str]:
-    """Return texts of the tasks in the order of their numbers."""
     from pyarrow import parquet
 
     if not (folder / _TASKS).is_file():

@@ -41,8 +41,6 @@ _QUANTITIES = {
 
 
 class _Content:
-    """The content that is gathered while the XML is parsed."""
-
     def __init__(self) -> None:
         self.rate = ""
         self.names: dict[str, list[str]] = {"segment": [], "joint": []}
@@ -330,7 +328,6 @@ def read_bvh_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
 
 
 def _channels(lines: Sequence[str]) -> list[str]:
-    """Return the channels of all joints in their order."""
     joint, names = "", []
     for k, line in enumerate(lines, 1):
         words = line.split()
@@ -361,7 +358,6 @@ def _step(lines: Sequence[str], at: int) -> tuple[float, int]:
 
 
 def _values(lines: Sequence[str], first: int, width: int) -> tuple[Any, dict[int, str]]:
-    """Return the numbers of all frames, see `_numbers`."""
     rows = [line for line in lines[first:] if line.strip()]
     if not rows:
         raise DataError("expected frames below the time of a frame, got none")

@@ -153,7 +153,6 @@ def _reason(block: Block, i: int, k: int) -> str:
 
 
 def _keep(block: Block, mask: Flags) -> Block:
-    """Return the kept samples of every movement."""
     offsets = np.concatenate(([0], np.cumsum(mask)))[block.offsets].astype(np.intp)
     rows = np.flatnonzero(mask) if block.rows is None else block.rows[mask]
     times = None if block.times is None else block.times[mask]

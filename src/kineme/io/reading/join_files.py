@@ -83,8 +83,6 @@ def _heads(read: FileRead) -> list[str]:
 
 
 def _selected(read: FileRead, layout: Layout) -> FileRead:
-    """Return a recording with the columns that are chosen, in their order."""
-
     def in_order(layout: Layout) -> Parsed:
         if layout.coordinates is None:
             return parsed
@@ -116,7 +114,6 @@ def notes_on_clocks(files: Sequence[Placed]) -> tuple[str, ...]:
 
 
 def _folders(files: Sequence[Placed]) -> Mapping[Path, list[Placed]]:
-    """Return the files of each folder."""
     folders: dict[Path, list[Placed]] = {}
     for read, entry in files:
         folders.setdefault(entry.path.parent, []).append((read, entry))
@@ -124,7 +121,6 @@ def _folders(files: Sequence[Placed]) -> Mapping[Path, list[Placed]]:
 
 
 def _is_timed(read: FileRead) -> bool:
-    """Tell whether a file holds one movement with time stamps."""
     return read.block.times is not None and len(read.block.labels) == 1
 
 

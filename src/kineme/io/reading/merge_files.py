@@ -244,7 +244,6 @@ def with_channels(
 
 
 def _channels_of(files: Sequence[FileRead], given: Given) -> Channels:
-    """Return the channels of files that all have the same heads."""
     blocks, detected = [file.block for file in files], files[0].detected
     return find_channels(
         detected.columns,
@@ -312,7 +311,6 @@ def _person(source: Source, listed: list[str] | None) -> str | None:
 
 
 def _people_in(file: Path) -> list[str] | None:
-    """Return the people named in a file, or None."""
     if file.suffix.lower() != ".npz":
         return None
     arrays = Npz(file.read_bytes(), file)

@@ -120,7 +120,6 @@ def _parsed(parse: Callable[[Layout], Parsed], form: Format, relative: Path, lay
 
 
 def _parts(path: Path, relative: Path, follow_links: bool) -> tuple[list[Path], Format]:
-    """Return the files that hold a source, and its format."""
     data_set = data_set_of(path)
     if data_set is None:
         return [path], format_of(relative)
@@ -159,7 +158,6 @@ def _storable(label: str) -> str:
 
 
 def _plainly(error: BaseException) -> str:
-    """Return the message of an exception on one line."""
     got = f"no entry {error}" if isinstance(error, KeyError) else str(error) or type(error).__name__
     reason = f"expected times and positions, got {got}"
     if isinstance(error, KinemeError):

@@ -299,7 +299,6 @@ def labeled_pieces(recordings: Recordings, table: LabelTable) -> Recordings:
 
 
 def _of_none(table: LabelTable, sources: Sequence[Source], meant: Mapping[str, Sequence[str]]) -> list[Problem]:
-    """Return the rows of recordings that are not there, as one problem."""
     lost = [row for row in table.rows if not any(_is_of(row, source, meant) for source in sources)]
     if not lost:
         return []

@@ -73,7 +73,6 @@ def _copy_folder(bag: bags.Bag, source: Path, target: Path, added: AddedTopic) -
 
 
 def _copy_file(source: Path, target: Path, added: AddedTopic, storage: Any) -> None:
-    """Write a copy of a file of ROS 2, which rosbags reads with that storage."""
     ending = source.suffix.lower()
     if ending == ".db3":
         copy_sqlite(source, target, added)

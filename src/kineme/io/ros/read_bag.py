@@ -212,7 +212,6 @@ def _is_fixed(stream: Stream) -> bool:
 
 
 def _at(seconds: Array, start: int, stream: Stream, of_headers: bool) -> Array:
-    """Return a transform at the common stamps, (n, 7)."""
     if _is_fixed(stream):
         return np.repeat(stream.values[:1], len(seconds), axis=0)
     stamps, values = in_order(stream, of_headers)

@@ -61,15 +61,8 @@ class Samples(NamedTuple):
         """Begin without samples."""
         return cls(array("d"), array("q"), array("q"))
 
-    @property
-    def n_bytes(self) -> int:
-        """Memory of the numbers."""
-        return 8 * (len(self.values) + len(self.recorded) + len(self.stamped))
-
 
 class _Open(NamedTuple):
-    """The samples collected of one topic."""
-
     decode: Any
     row: Any
     stamp: Any  # message -> [ns]; None if messages do not tell their own time
@@ -158,9 +151,8 @@ def _collect(bag: Bag, topics: Sequence[Topic], opened: Sequence[_Open]) -> None
 
 def check_samples(some: Sequence[Samples]) -> None:
     """Refuse to keep more numbers than the limit of memory allows; samples may occur several times."""
-    check_expanded(
-        _COPIES * sum(samples.n_bytes for samples in {id(samples): samples for samples in some}.values()), "a topic"
-    )
+    each = {id(samples): samples for samples in some}.values()
+    check_expanded(8 * _COPIES * sum(len(numbers) for samples in each for numbers in samples), "a topic")
 
 
 def _group(reading: _Open, heads: Heads) -> tuple[Samples, list[int] | None]:
@@ -235,7 +227,6 @@ def with_rotations(
 
 
 def _without(stream: Stream, rotations: Sequence[int]) -> Stream:
-    """Return the stream without the quaternions that begin at these columns."""
     if not rotations:
         return stream
     dropped = {k + i for k in rotations for i in range(4)}

@@ -143,7 +143,6 @@ def _kind(pa: Any, kind: Any) -> str:
 
 
 def _texts(column: Any, head: str) -> Any:
-    """Return names as texts, empty for missing ones."""
     import pyarrow as pa
 
     if not pa.types.is_dictionary(column.type):

@@ -272,7 +272,6 @@ def _with_times_and_gaps(head: ExportHead, names: Sequence[str], columns: list[A
 
 
 def _rows(data: bytes, encoding: str, dialect: Dialect, texts: set[int]) -> tuple[Any, dict[int, str]]:
-    """Return the samples as a structured array, and row -> what is wrong there."""
     dtype = np.dtype([(f"c{k}", "O" if k in texts else "f8") for k in range(len(dialect.heads))])
     rows = _read_fast(data, encoding, dialect, dtype)
     return read_slowly(_samples(data, encoding, dialect), dialect, dtype) if rows is None else (rows, {})

@@ -80,7 +80,6 @@ def write_movement(path: str | Path, movement: MovementsLike | Columns, names: C
 
 
 def _checked(columns: Mapping[str, ArrayLike], names: ColumnNames | None) -> Columns:
-    """Return a dict of columns as arrays, refused unless all belong to one movement."""
     if not set(_NAMES[:2]) <= set(columns) <= set(_NAMES):
         raise TrajectoryError(
             f"expected a dict of {', '.join(_NAMES[:2])} and, if you like, {', '.join(_DERIVATIVES)}, got "
@@ -127,7 +126,6 @@ def _heads(columns: Columns, names: ColumnNames | None) -> list[str]:
 
 
 def _table(columns: Columns) -> Array:
-    """Return times and all else side by side, in the order of `_heads`."""
     return np.column_stack([columns["times"], *(columns[name] for name in columns if name != "times")])
 
 
