@@ -113,12 +113,10 @@ def _bare(movements: Sequence[TreeMovement], layout: Layout, kind: str) -> Parse
     xs = [numbers_of(np.asarray(next(iter(movement.entries.values())))) for movement in movements]
     xs = [x[:, None] if x.ndim == 1 else x for x in xs]
     width = Counter(x.shape[1] for x in xs).most_common(1)[0][0]
-    odd = tuple(
-        f"movement {movement.place}: {x.shape[1]} dimensions where most have {width}"
-        for movement, x in zip(movements, xs, strict=True)
-        if x.shape[1] != width
-    )
-    movements = [movement for movement, x in zip(movements, xs, strict=True) if x.shape[1] == width]
+    pairs = [*zip(movements, xs, strict=True)]
+    said = f"dimensions where most have {width}"
+    odd = tuple(f"movement {movement.place}: {x.shape[1]} {said}" for movement, x in pairs if x.shape[1] != width)
+    movements = [movement for movement, x in pairs if x.shape[1] == width]
     xs = [x for x in xs if x.shape[1] == width]
     labels = [movement.label for movement in movements]
     units = {tuple(_units_of(next(iter(movement.entries.values())), width)) for movement in movements}
@@ -187,22 +185,19 @@ def _table(
     faults: dict[int, str] = {}
     arrays: dict[str, Any] = {}
     for name, is_coordinate in needed.items():
-        parts = []
+        several = []
         of_texts = name in first.entries and _is_text(first.entries[name])
         for movement, length, start in zip(movements, lengths, offsets, strict=False):
             part, fault = _part(movement, name, length, (widths[name], of_texts, not is_coordinate))
             here, there = (_units_of(each.entries.get(name), widths[name]) for each in (movement, first))
             if here != there and not fault:
                 fault = f"expected {name!r} in {', '.join(there)}, as in the first movement, got {', '.join(here)}"
-            parts.append(part)
+            several.append(part)
             if fault:
                 faults[int(start)] = fault
-        arrays[name] = np.concatenate(parts)
-    numbers = dict.fromkeys(widths, 0)
-    filled: list[Any] = []
-    for owner in owners:
-        filled.append(arrays[owner][:, numbers[owner]] if owner in arrays else None)
-        numbers[owner] += 1
+        arrays[name] = np.concatenate(several)
+    parts = {owner: iter(arrays[owner].T) for owner in arrays}
+    filled = [next(parts[owner]) if owner in parts else None for owner in owners]
     segments = Segments(offsets, [movement.place for movement in movements], [movement.label for movement in movements])
     units = [unit for name in dict.fromkeys(owners) for unit in _units_of(first.entries.get(name), widths[name])]
     movement_parts = None if len(movements) == 1 and not movements[0].place and movements[0].label is None else segments

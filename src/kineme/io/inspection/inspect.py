@@ -236,10 +236,8 @@ def notes_on_sizes(demos: Demonstrations) -> list[str]:
     """Say that movements of one label differ in size as millimeters and meters do, if no file says their unit."""
     extents = extents_of(demos).max(axis=1, initial=0.0)
     labels = np.full(len(demos), None) if demos.labels is None else demos.labels
-    for label in dict.fromkeys(labels.tolist()):
+    for label in dict.fromkeys(labels[extents > 0.0].tolist()):
         chosen = np.flatnonzero((labels == label) & (extents > 0.0))
-        if not len(chosen):
-            continue
         small, large = (int(chosen[k]) for k in (extents[chosen].argmin(), extents[chosen].argmax()))
         if extents[large] >= _LARGER * extents[small]:
             of_label = "" if label is None else f" of {label}"

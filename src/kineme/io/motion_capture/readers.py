@@ -28,7 +28,10 @@ from kineme.movements.tables.layout import Layout, no_lines
 from kineme.movements.tables.table import Table
 
 _DEEPEST = 32
-_MOST = 10_000  # segments and joints
+_MOST = 10_000  # segments and joints, or channels
+_MOST_LABELS = 260  # parameters of labels, of 255 each
+_COMPUTED = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")  # parameters that list such points
+_OFF = 1e-2  # of a matrix that counts as a rotation, from orthonormal
 
 
 #: Element of a frame -> whose numbers it holds, what columns are called, and their unit. Those of segments are learned
@@ -159,13 +162,6 @@ def _numbers(texts: Sequence[str], width: int, where: str) -> tuple[Any, dict[in
         except ValueError:
             faults[row] = f"expected {width} numbers{where}, got {text.strip()[:40]!r}"
     return values, faults
-
-
-_MOST_CHANNELS = 10_000
-
-_MOST_LABELS = 260  # parameters of labels, of 255 each
-_COMPUTED = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")  # parameters that list such points
-_OFF = 1e-2  # of a matrix that counts as a rotation, from orthonormal
 
 
 def read_c3d_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
@@ -341,7 +337,7 @@ def _channels(lines: Sequence[str]) -> list[str]:
                     f"expected a joint's number of channels and their names in line {k}, got {line.strip()!r}"
                 )
             names += [f"{joint}.{channel}" for channel in words[2:]]
-    if not 0 < len(names) <= _MOST_CHANNELS:
+    if not 0 < len(names) <= _MOST:
         raise DataError(f"expected joints with channels in the hierarchy of a BVH file, got {len(names)} channels")
     return names
 

@@ -339,6 +339,5 @@ def lacking_values(block: Block, columns: Sequence[str], i: int, skip: str) -> t
     options |= {"skip=": "--skip sample"} if skip == "movement" else {}
     said = f"; say {' or '.join(options.values())}, in Python {' or '.join(options)}" if options else ""
     share = f"{shares[first]} % of the samples"
-    return tuple(
-        names
-    ), f"expected a number in {first!r}, got nothing in {share}{also if others else ''}{lasting}{said}"
+    words = f"expected a number in {first!r}, got nothing in {share}{also if others else ''}{lasting}{said}"
+    return tuple(names), words

@@ -253,21 +253,19 @@ def labeled_pieces(recordings: Recordings, table: LabelTable) -> Recordings:
     stretches: list[tuple[int, int]] = []
     sources: list[Source] = []
     paths = {source.path for source in recordings.sources}
-    meant = {name: _paths_of(name, paths) for name in dict.fromkeys(row.recording for row in rows)}
+    meant = {name: _paths_of(name, paths) if name else [] for name in dict.fromkeys(row.recording for row in rows)}
     # The rows of which several recordings may be meant, one problem for each name.
     lines_of_names = {row.recording: row.line for row in reversed(table.rows)}
     problems = [*recordings.problems, *_of_none(table, recordings.sources, meant)]
     for name, several in meant.items():
-        if name and len(several) > 1:
+        if len(several) > 1:
             said = (
                 f"expected one recording {name}, got {', '.join(several)}; write its folder in the column recording too"
             )
             problems.append(Problem(table.name, lines_of_names[name], said))
     for i, source in enumerate(recordings.sources):
         first, last = demos.offsets[i : i + 2]
-        own = [
-            row for row in rows if (not row.recording or len(meant[row.recording]) == 1) and _is_of(row, source, meant)
-        ]
+        own = [row for row in rows if len(meant[row.recording]) < 2 and _is_of(row, source, meant)]
         times = demos.movements.stamps[first:last]
         since = table.since_start or _counts_from_start(own, times)
         lines: dict[tuple[int, int], int] = {}  # stretch -> line that labels it
@@ -282,9 +280,8 @@ def labeled_pieces(recordings: Recordings, table: LabelTable) -> Recordings:
                 )
                 problems.append(Problem(table.name, row.line, reason))
             elif (line := lines.setdefault((start, stop), row.line)) != row.line:
-                problems.append(
-                    Problem(table.name, row.line, f"expected one label for a stretch, line {line} has it too")
-                )
+                reason = f"expected one label for a stretch, line {line} has it too"
+                problems.append(Problem(table.name, row.line, reason))
             else:
                 stretches.append((int(first) + start, int(first) + stop))
                 sources.append(source._replace(place=_place(source, times, start, stop), label=row.label))
@@ -304,9 +301,8 @@ def _of_none(table: LabelTable, sources: Sequence[Source], meant: Mapping[str, S
         return []
     wanted = f"{lost[0].recording} {lost[0].place}".strip()
     more = f", and {counted(len(lost) - 1, 'row')} more" if len(lost) > 1 else ""
-    return [
-        Problem(table.name, lost[0].line, f"expected a recording {wanted} among those that are read, found none{more}")
-    ]
+    reason = f"expected a recording {wanted} among those that are read, found none{more}"
+    return [Problem(table.name, lost[0].line, reason)]
 
 
 def _paths_of(recording: str, paths: Collection[str]) -> list[str]:
