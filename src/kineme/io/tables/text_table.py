@@ -58,7 +58,6 @@ _ROUNDED = 1e-5  # s by which written times may differ from those of frames at t
 
 def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:  # noqa: PLR0912 - one check after the other
     """Read a table of samples by lines, whatever their separator, heads, quotes and decimal mark, see `Dialect`."""
-    _check_lines(data)
     encoding = _encoding(data)
     if (export := export_head(_lines(data, encoding), len(data))) is not None:
         return _read_export(data, encoding, export, layout)
@@ -97,12 +96,8 @@ def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:  # noqa
                 _check_grouped((row[k] for row in split_lines if k < len(row)), dialect.heads[k])
     if dated and roles.time is not None:
         columns[roles.time], others = seconds_of_dates(columns[roles.time].tolist())
-        head = dialect.heads[roles.time]
-        faults = {
-            row: f"expected a date in {head!r}, got {cell or 'nothing'!r}" for row, cell in others.items()
-        } | faults
-    line_of = _line_numbers(data, encoding, dialect)
-    dates_in = "s" if dated else None
+        said = f"expected a date in {dialect.heads[roles.time]!r}"
+        faults = {row: f"{said}, got {cell or 'nothing'!r}" for row, cell in others.items()} | faults
     # Heads with the names of joints in place of ``field.position0`` where the column ``field.name0`` says one name.
     renamed = list(dialect.heads)
     place = {head: k for k, head in enumerate(dialect.heads)}
@@ -112,7 +107,8 @@ def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:  # noqa
         if beside is not None and columns[beside].dtype.kind == "O" and len(names := {*columns[beside].tolist()}) == 1:
             renamed[k] = next(iter(names)) or head
     heads = tuple(renamed) if len({*renamed}) == len(renamed) else dialect.heads
-    return Table(heads, columns, len(rows), line_of, faults, dates_in, dialect.measured_in), roles
+    line_of = _line_numbers(data, encoding, dialect)
+    return Table(heads, columns, len(rows), line_of, faults, "s" if dated else None, dialect.measured_in), roles
 
 
 def _check_written(samples: Iterator[tuple[int, str]], dialect: Dialect, columns: Sequence[int]) -> None:
@@ -140,11 +136,7 @@ def _check_marks(samples: Iterator[tuple[int, str]], dialect: Dialect, columns: 
     for _, line in samples:
         cells = split(line, dialect.separator)
         if len(cells) == len(dialect.heads):
-            columns = [
-                k
-                for k in columns
-                if is_missing(cells[k]) or cells[k].lstrip("+-").isdecimal() or _GROUPED.fullmatch(cells[k])
-            ]
+            columns = [k for k in columns if is_missing(cells[k]) or _may_be_grouped(cells[k])]
             if not columns:
                 return
             for k in numbers:
@@ -159,11 +151,15 @@ def _check_marks(samples: Iterator[tuple[int, str]], dialect: Dialect, columns: 
             )
 
 
+def _may_be_grouped(cell: str) -> bool:
+    return cell.lstrip("+-").isdecimal() or _GROUPED.fullmatch(cell) is not None
+
+
 def _check_grouped(column: Iterable[str], head: str) -> None:
     """Refuse cells in which a mark is between thousands: 999, 1.002, which are one step apart and not one thousand."""
     cells: list[str] = []
     for cell in column:
-        if not (cell.lstrip("+-").isdecimal() or _GROUPED.fullmatch(cell)):
+        if not _may_be_grouped(cell):
             return
         cells.append(cell)
     marked = np.array([_GROUPED.fullmatch(cell) is not None for cell in cells])
@@ -282,20 +278,16 @@ def _line_numbers(data: bytes, encoding: str, dialect: Dialect) -> Callable[[int
     return lambda row: int(lines()[row])
 
 
-def _check_lines(data: bytes) -> None:
-    """Refuse bytes with a stretch so long that no table has such lines, before anything is made of them."""
-    for at in range(0, len(data) - LONGEST, LONGEST):
-        if data.find(b"\n", at, at + LONGEST) < 0 and data.find(b"\r", at, at + LONGEST) < 0:
-            raise DataError(f"expected lines of at most {LONGEST:,} characters, got a longer one")
-
-
 def lines_of(data: bytes) -> Iterator[str]:
     """Return the lines of a text of any encoding that `read_text_table` takes; a `DataError` if it is none."""
-    _check_lines(data)
     return _lines(data, _encoding(data))
 
 
 def _encoding(data: bytes) -> str:
+    """Tell the encoding of a text, of which no stretch is longer than the lines of a table ever are."""
+    for at in range(0, len(data) - LONGEST, LONGEST):
+        if data.find(b"\n", at, at + LONGEST) < 0 and data.find(b"\r", at, at + LONGEST) < 0:
+            raise DataError(f"expected lines of at most {LONGEST:,} characters, got a longer one")
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return "utf-16"
     if b"\0" in data:
@@ -308,15 +300,14 @@ def _encoding(data: bytes) -> str:
 
 
 def _lines(data: bytes, encoding: str) -> Iterator[str]:
-    """Return the lines, decoded; `_encoding` has checked that all bytes are valid."""
-    if encoding != "utf-16":
-        return iter(io.TextIOWrapper(io.BytesIO(data), encoding=encoding))
-    return _checked_lines(data, encoding)
+    """Return the lines, decoded; `_encoding` has checked that all bytes of 8 bits are valid."""
+    lines = io.TextIOWrapper(io.BytesIO(data), encoding=encoding)
+    return _checked(lines) if encoding == "utf-16" else iter(lines)
 
 
-def _checked_lines(data: bytes, encoding: str) -> Iterator[str]:
+def _checked(lines: Iterable[str]) -> Iterator[str]:
     try:
-        for line in io.TextIOWrapper(io.BytesIO(data), encoding=encoding):
+        for line in lines:
             if "\0" in line:
                 raise DataError("expected text, got bytes that are none")
             yield line
