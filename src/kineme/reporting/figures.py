@@ -10,7 +10,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import matplotlib
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from kineme.errors import DataError
 from kineme.reporting.atomic import write_atomically
@@ -41,8 +43,6 @@ _RC: dict[str, Any] = {
 
 def new_figure(width: float, height: float, make: Callable[..., Figure] = Figure) -> Figure:
     """An empty figure of the given size in inches, by default without any window system."""
-    import matplotlib
-
     matplotlib.rcParams.update(_RC)  # type: ignore[arg-type]
     return make(figsize=(width, height), layout="constrained")
 
@@ -51,8 +51,6 @@ class _PyplotFigure(Figure):
     """A figure of pyplot that notebooks show once: not as the value of a cell and at the end of the cell, too."""
 
     def _ipython_display_(self) -> None:
-        import matplotlib
-
         if "inline" in matplotlib.get_backend():
             sys.modules["matplotlib.pyplot"].close(self)
         raise NotImplementedError  # IPython goes on as without this method
@@ -74,8 +72,6 @@ FORMATS: dict[str, dict[str, Any]] = {
 
 def encode_figure(figure: Figure, kind: str, dpi: int = 150) -> bytes:
     """The figure as the bytes of a file of `FORMATS`, without control characters, which XML allows nowhere."""
-    from matplotlib.text import Text
-
     for text in figure.findobj(Text):
         if (shown := printable_lines(text.get_text())) != text.get_text():
             text.set_text(shown)

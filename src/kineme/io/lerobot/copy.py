@@ -16,7 +16,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
 from numpy.typing import NDArray
+from pyarrow import parquet
 
 from kineme.errors import DataError
 from kineme.io.lerobot.info import MARKER, read_episodes, read_info, read_json
@@ -92,9 +95,6 @@ def _take(source: Path, old: Path, new: Path, changed: set[Path]) -> None:
 
 def write_shard(source: Path, target: Path, motions: Mapping[int, Sequence[Motion]], column: Column) -> None:
     """Copy a shard with the texts of its episodes on each of their frames, behind those of others."""
-    import pyarrow as pa
-    from pyarrow import parquet
-
     # What is wrong with the disk when writing stays an error of the system.
     reading = partial(damaged_as, "expected a Parquet file, got a damaged one", OSError)
     try:
@@ -141,8 +141,6 @@ def _compression(metadata: Any, leaves: Sequence[str]) -> str | dict[str, str]:
 
 
 def _extended(table: Any, motions: Mapping[int, list[Motion]], column: Column, kind: Any, schema: Any) -> Any:
-    import pyarrow as pa
-
     numbers, episode_of = np.unique(table.column("episode_index").to_numpy(), return_inverse=True)
     old = table.column(column.name) if column.name in table.column_names else None
     if old is not None:
@@ -154,8 +152,6 @@ def _extended(table: Any, motions: Mapping[int, list[Motion]], column: Column, k
 
 def language_type(schema: Any) -> Any:
     """Return the type of the column: that which the shard has, else LeRobot's, with calls of tools as texts in JSON."""
-    import pyarrow as pa
-
     if LANGUAGE in schema.names:
         kind = schema.field(LANGUAGE).type
         is_list_of_rows = pa.types.is_list(kind) and pa.types.is_struct(kind.value_type)
@@ -180,8 +176,6 @@ def with_language(old: Any, motions: Sequence[Sequence[Motion]], episode_of: NDA
 
     `old` is the column so far or None; `episode_of` (T,) says which of the `motions` a row belongs to.
     """
-    import pyarrow as pa
-
     added = _language_rows([motion for some in motions for motion in some], kind.value_type)
     counts = np.array([len(some) for some in motions], dtype=np.int64)
     flat, before = _lists_of_others(pa.nulls(len(episode_of), kind) if old is None else old)
@@ -200,9 +194,6 @@ def with_language(old: Any, motions: Sequence[Sequence[Motion]], episode_of: NDA
 
 def _lists_of_others(old: Any) -> tuple[Any, NDArray[np.int64]]:
     """Return the rows in all lists that are not of this package, and how many each list has."""
-    import pyarrow as pa
-    import pyarrow.compute as pc
-
     flat = old.flatten()
     counts = pc.fill_null(pc.list_value_length(old), 0).to_numpy(zero_copy_only=False).astype(np.int64)
     style, content = (pc.cast(pc.struct_field(flat, name), pa.string()) for name in ("style", "content"))
@@ -213,8 +204,6 @@ def _lists_of_others(old: Any) -> tuple[Any, NDArray[np.int64]]:
 
 
 def _language_rows(motions: Sequence[Motion], kind: Any) -> Any:
-    import pyarrow as pa
-
     values: dict[str, list[Any]] = {
         "role": [ROLE] * len(motions),
         "content": [motion.content for motion in motions],
@@ -230,8 +219,6 @@ def _language_rows(motions: Sequence[Motion], kind: Any) -> Any:
 
 def text_type(schema: Any) -> Any:
     """Return the type of the column; a `DataError` if the shard has another of that name."""
-    import pyarrow as pa
-
     kind = schema.field(MOTION_TEXTS).type if MOTION_TEXTS in schema.names else pa.string()
     if kind not in (pa.string(), pa.large_string()):
         raise DataError(f"expected texts in {MOTION_TEXTS}, got {kind}")
@@ -240,8 +227,6 @@ def text_type(schema: Any) -> Any:
 
 def with_texts(old: Any, motions: Sequence[Sequence[Motion]], episode_of: NDArray[np.intp], kind: Any) -> Any:
     """Return the column of some rows, see `with_language`."""
-    import pyarrow as pa
-
     plain = {"role": ROLE, "style": STYLE, "camera": None, "tool_calls": None}
     added = [[{**plain, "content": motion.content, "timestamp": motion.start} for motion in some] for some in motions]
     contents, text_of = [""], np.zeros(len(episode_of), dtype=np.intp)

@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import pyarrow as pa
 from numpy.typing import NDArray
+from pyarrow import parquet
 
 from kineme.errors import DataError
 from kineme.io.lerobot.info import Episodes, Info, read_episodes, read_info, read_tasks
 from kineme.io.limits import check_expanded
-from kineme.io.records import needs
 from kineme.io.tables.parquet import is_list, rows_of_lists
 from kineme.movements.tables.columns import choose_roles, column_numbers
 from kineme.movements.tables.layout import Column, Layout, Parsed, listed, no_lines
@@ -34,8 +35,6 @@ _TOLERANCE = 1e-4  # s between the stored stamps and the frames at the declared 
 
 def lerobot_movements(folder: Path, layout: Layout) -> Parsed:
     """Read a data set of LeRobot, version 2 or 3: ``observation.state``, or what ``columns`` names, of each episode."""
-    with needs("pyarrow", "read Parquet", "parquet"):
-        import pyarrow  # noqa: F401
     # Refuse a choice of times, movements or labels that the data set has already made otherwise.
     named = {"label": (layout.label, ("task", "task_index")), "time": (layout.time, ("timestamp",))}
     for what, (given, names) in named.items():
@@ -236,9 +235,6 @@ class Frames(NamedTuple):
 
 def read_shard(folder: Path, shard: str, features: Mapping[str, int], taken: int) -> list[Frames]:
     """Read the frames of a shard, in parts, with features by their widths; earlier shards have taken so many bytes."""
-    import pyarrow as pa
-    from pyarrow import parquet
-
     path = folder / shard
     if not path.is_file():
         raise DataError(f"expected the shard {shard}, found none")

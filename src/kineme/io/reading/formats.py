@@ -20,13 +20,11 @@ from kineme.io.arrays.npz import Npz, array_of_npy
 from kineme.io.arrays.rows import row_movements, series_movements
 from kineme.io.arrays.tree_movements import nested, tree_movements
 from kineme.io.lerobot.info import MARKER
-from kineme.io.lerobot.read import lerobot_movements
 from kineme.io.motion_capture.readers import read_bvh_table, read_c3d_table, read_mvnx_table
-from kineme.io.records import Contents, Problem
+from kineme.io.records import Contents, Problem, needs
 from kineme.io.ros.bags import check_records
 from kineme.io.ros.choose import bag_contents
 from kineme.io.ros.read_bag import read_bag
-from kineme.io.tables.parquet import read_parquet_table
 from kineme.io.tables.text_table import read_text_table
 from kineme.movements.tables.columns import Roles
 from kineme.movements.tables.layout import Layout, Parsed
@@ -77,6 +75,18 @@ def _of_tables(read: Callable[[bytes, Layout], tuple[Table, Roles]], kind: str) 
     return lambda data, layout: table_movements(*read(data, layout), layout, kind)
 
 
+def _read_parquet(data: bytes, layout: Layout) -> Parsed:
+    with needs("pyarrow", "read Parquet", "parquet"):
+        from kineme.io.tables.parquet import read_parquet_table
+    return table_movements(*read_parquet_table(data, layout), layout, "Parquet")
+
+
+def _read_lerobot(folder: Path, layout: Layout) -> Parsed:
+    with needs("pyarrow", "read Parquet", "parquet"):
+        from kineme.io.lerobot.read import lerobot_movements
+    return lerobot_movements(folder, layout)
+
+
 def _read_npz(data: bytes, layout: Layout) -> Parsed:
     arrays = Npz(data, Path("it"))
     if (parsed := body_movements(arrays, layout, "NPZ")) is not None:
@@ -109,7 +119,7 @@ FORMATS: dict[str, Format] = {
     ".jsonl": Format(json_lines_movements),
     ".ndjson": Format(json_lines_movements),
     ".npy": Format(_read_npy),
-    ".parquet": Format(_of_tables(read_parquet_table, "Parquet")),
+    ".parquet": Format(_read_parquet),
     ".mat": Format(mat_movements, label_is_stem=True),
     ".h5": Format(read_path=hdf5_movements),
     ".hdf5": Format(read_path=hdf5_movements),
@@ -133,7 +143,7 @@ DATA_SETS: tuple[DataSet, ...] = (
         MARKER,
         ("data",),
         ("meta/*.jsonl", "meta/*.parquet", "meta/episodes/*/*.parquet", "data/*/*.parquet"),
-        Format(read_path=lerobot_movements),
+        Format(read_path=_read_lerobot),
     ),
     DataSet("metadata.yaml", ("*.db3*", "*.mcap*"), ("*.db3*", "*.mcap*"), _BAG, b"rosbag2_bagfile_information"),
 )

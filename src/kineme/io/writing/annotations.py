@@ -14,10 +14,9 @@ from typing import Any, NamedTuple
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from kineme.errors import DataError
-from kineme.io.lerobot.copy import OWN, Motion, copy_with_motions
 from kineme.io.lerobot.info import MARKER, read_info
 from kineme.io.reading.formats import FORMATS, data_set_of, format_at
-from kineme.io.records import UNKNOWN
+from kineme.io.records import UNKNOWN, needs
 from kineme.io.ros.add_topic import copy_with_topic
 from kineme.io.ros.choose import bag_contents
 from kineme.io.writing.write_movement import Movement, distinct_stems
@@ -179,6 +178,8 @@ def write_bag(path: Path, annotations: Sequence[Annotation], source: Path | None
 
 def write_lerobot(path: Path, annotations: Sequence[Annotation], source: Path | None) -> Path:
     """Write a copy of a data set of LeRobot whose frames carry the annotations of their episode as JSON."""
+    with needs("pyarrow", "write Parquet", "parquet"):
+        from kineme.io.lerobot.copy import OWN, Motion, copy_with_motions
     assert source is not None  # see `writer_of`
     motions: dict[int, list[Motion]] = {}
     for annotation in annotations:
