@@ -208,9 +208,13 @@ def _side_by_side(columns: Sequence[tuple[Array, Array]], timed: bool) -> tuple[
 
 
 def _parsed(
-    lines: Iterable[tuple[int, Any]], read: Callable[[Any], _Row], layout: Layout, kind: str,
-    names: Sequence[str] = (), timed: bool = False,
-) -> Parsed:  # fmt: skip
+    lines: Iterable[tuple[int, Any]],
+    read: Callable[[Any], _Row],
+    layout: Layout,
+    kind: str,
+    names: Sequence[str] = (),
+    timed: bool = False,
+) -> Parsed:
     """Read numbered lines as movements of the named coordinates, by default of the widest, and say what others lack."""
     rows, left_out = dict[str, _Row](), list[str]()
     for number, line in lines:

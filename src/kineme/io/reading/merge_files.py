@@ -184,17 +184,20 @@ def merge_files(
     )
     detected = Counter(understood[file.path] for file in full)
     blocks = [file.block for file in full]
-    demonstrations = demonstrations_of(
-        _concatenated([block.positions for block in blocks]), _concatenated([_stamps(block) for block in blocks]),
-        _offsets_of(blocks), sources, channels,
-    )  # fmt: skip
+    positions = _concatenated([block.positions for block in blocks])
+    times = _concatenated([_stamps(block) for block in blocks])
+    demonstrations = demonstrations_of(positions, times, _offsets_of(blocks), sources, channels)
     return Recordings(demonstrations, sources, tuple(reported), tuple(detected.most_common()))
 
 
 def demonstrations_of(
-    positions: Array, times: Array, offsets: NDArray[np.intp], sources: Sequence[Source], channels: Channels | None,
+    positions: Array,
+    times: Array,
+    offsets: NDArray[np.intp],
+    sources: Sequence[Source],
+    channels: Channels | None,
     dimensions: tuple[str, ...] | None = None,
-) -> Demonstrations:  # fmt: skip
+) -> Demonstrations:
     """Return movements with their names, and with labels if every one of them has one."""
     labels, names = [source.label for source in sources], tuple(source.name for source in sources)
     labeled = None if None in labels else label_array(labels, len(labels), names)
