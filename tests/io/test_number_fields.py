@@ -140,13 +140,13 @@ def test_bytes_in_the_other_order(tmp_path):
 
 def test_a_sequence_of_none_is_not_aligned_and_one_that_is_cut_off_is_damaged():
     doubles, number = Step(element=(Step("d", ("x",)),)), Step("I", ("n",))
-    first = NumberFields("my_msgs/msg/A", 2, (doubles, number))
+    first = NumberFields.of("my_msgs/msg/A", 2, (doubles, number))
     for count in (0, 1, 3):
         raw = (
             struct.pack("<4xI4x", count) + struct.pack(f"<{count}d", *range(count)) if count else struct.pack("<4xI", 0)
         )
         assert first.decode(b"\0\1\0\0" + raw[4:] + struct.pack("<I", 7)).row == [7]
-    last = NumberFields("my_msgs/msg/B", 2, (number, doubles))
+    last = NumberFields.of("my_msgs/msg/B", 2, (number, doubles))
     raw = struct.pack("<II2d", 7, 2, 0.0, 0.0)
     assert last.decode(b"\0\1\0\0" + raw).row == [7]
     with pytest.raises(ValueError, match="expected 28 bytes, got 27"):

@@ -75,6 +75,7 @@ def test_columns_of_something_else_are_refused_by_name():
 
 def test_without_the_package_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "pyarrow", None)
+    monkeypatch.delitem(sys.modules, "kineme.io.tables.parquet")  # the reader, which is imported with the package
     with pytest.raises(kineme.errors.DataError, match=r"pip install 'kineme\[parquet\]'"):
         read_recordings_from_bytes(b"PAR1", "a.parquet", Layout())
 

@@ -1,8 +1,7 @@
 """The limit on the memory that one file may take once it is read, for all formats.
 
-A small file can need more memory than there is: by compression, by the sizes in its header, or by numbers of two
-characters each. Readers therefore check here before they allocate. The limit is the environment variable
-``KINEME_MAX_FILE_BYTES``; by default 4 GiB, or half of the memory if that is less.
+A small file can need more memory than there is: readers check before they allocate. The limit is the environment
+variable ``KINEME_MAX_FILE_BYTES``; by default 4 GiB, or half of the memory if that is less.
 """
 
 from __future__ import annotations

@@ -17,19 +17,14 @@ UNKNOWN = "unknown"  # the label of unknown motion, in files that have but one t
 
 
 class Problem(NamedTuple):
-    """Something that could not be read.
-
-    `line` counts from 1; None if the file has no lines. `error` is the class that is raised if only this file is read.
-    `samples` is how many samples were left out of a movement that was read, 0 if the movement or the file was not.
-    `missing` names columns without values, whatever begins so; without them the movement could be read.
-    """
+    """Something that could not be read."""
 
     file: str
-    line: int | None
+    line: int | None  # counted from 1; None if the file has no lines
     reason: str
-    error: type[KinemeError] = DataError
-    samples: int = 0
-    missing: tuple[str, ...] = ()
+    error: type[KinemeError] = DataError  # what is raised if only this file is read
+    samples: int = 0  # left out of a movement that was read; 0 if the movement or the file was not
+    missing: tuple[str, ...] = ()  # columns without values, whatever begins so; without them it could be read
 
     @property
     def what(self) -> str:
@@ -66,6 +61,17 @@ class Contents(NamedTuple):
     heads: tuple[str, ...]
     rows: tuple[tuple[str | int, ...], ...]
     note: str = ""  # what should be known about the list
+
+
+@contextmanager
+def damaged_as(said: str, *errors: type[Exception]) -> Iterator[None]:
+    """Raise what a package raises on damaged bytes as a `DataError` that begins so."""
+    try:
+        yield
+    except KinemeError:
+        raise
+    except errors as error:
+        raise DataError(f"{said} ({error})") from error
 
 
 @contextmanager

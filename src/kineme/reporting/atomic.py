@@ -18,10 +18,7 @@ _IDLE = 3600.0  # seconds since the last write after which the file of a process
 
 
 def write_atomically(path: Path, data: bytes) -> Path:
-    """Write `data` to a hidden file beside `path`, flush it to the disk, and rename it to `path`.
-
-    Raises OSError: the folder is missing, read-only or full; an existing file at `path` is unchanged.
-    """
+    """Write `data` to a hidden file beside `path`, flush it to the disk, and rename it to `path`; see `whole_file`."""
     with whole_file(path) as beside:
         beside.write_bytes(data)
     return path
@@ -32,10 +29,8 @@ def whole_file(path: Path, *, replace: bool = True, companions: Sequence[str] = 
     """Context manager: a hidden name beside `path` to write to; on success that file is flushed and named `path`.
 
     Leftovers of killed processes are removed, and so are the `companions`: ends of the names of other files that may be
-    made beside the new one, as "-wal" by SQLite.
-
-    Raises FileExistsError: `replace` is False and there is a file of that name, or another process was faster; it stays
-    as it is; OSError: the folder is missing, read-only or full; what was at `path` is as it was.
+    made beside the new one, as "-wal" by SQLite. Without `replace` a file of that name, even one that another process
+    made meanwhile, stays as it is.
     """
     if len(os.fsencode(path.name)) > _LONGEST_NAME:
         raise OSError(
@@ -66,7 +61,6 @@ def whole_file(path: Path, *, replace: bool = True, companions: Sequence[str] = 
 
 
 def _name_new(beside: Path, path: Path) -> None:
-    """Give a file its name, which no other file may have."""
     try:
         os.link(beside, path)  # unlike a rename, it refuses to replace
     except FileExistsError:
@@ -78,7 +72,6 @@ def _name_new(beside: Path, path: Path) -> None:
 
 
 def _bring_folder_to_disk(folder: Path) -> None:
-    """Bring a new name to the disk, where folders can be opened."""
     try:
         handle = os.open(folder, os.O_RDONLY)
     except OSError:
@@ -104,21 +97,17 @@ def remove_leftovers(path: Path) -> None:
     """Remove files of `name_beside` that killed processes left beside `path`, with SQLite's files beside them.
 
     A file is removed if it belongs to this user, its process does not run, and nobody wrote to it for an hour: in a
-    folder that several machines share, the process may run on another one. Files that cannot be removed stay.
+    folder that several machines share, the process may run on another one.
     """
     pattern = re.compile(rf"\.{re.escape(path.name)}\.(\d+)(?:\.[0-9a-f]{{8}})?(?:-wal|-shm|-journal)?")
     with suppress(OSError):
         for entry in os.scandir(path.parent):
             if (match := pattern.fullmatch(entry.name)) and not _is_at_work(int(match[1])):
                 with suppress(OSError):
-                    _remove_if_idle(Path(entry.path))
-
-
-def _remove_if_idle(path: Path) -> None:
-    status = path.lstat()
-    own = not hasattr(os, "getuid") or status.st_uid == os.getuid()
-    if own and stat.S_ISREG(status.st_mode) and time.time() - status.st_mtime > _IDLE:
-        path.unlink()
+                    status = entry.stat(follow_symlinks=False)
+                    own = not hasattr(os, "getuid") or status.st_uid == os.getuid()
+                    if own and stat.S_ISREG(status.st_mode) and time.time() - status.st_mtime > _IDLE:
+                        os.unlink(entry.path)
 
 
 def _is_at_work(process: int) -> bool:
@@ -127,10 +116,8 @@ def _is_at_work(process: int) -> bool:
         return True
     try:
         os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except (OSError, OverflowError):  # another user's process, or a number too large for a process id
-        return True
+    except (OSError, OverflowError) as error:  # else another user's process, or a number too large for an id
+        return not isinstance(error, ProcessLookupError)
     return True
 
 
@@ -154,11 +141,7 @@ def _named(path: Path, beside: Path) -> Iterator[None]:
 
 @contextmanager
 def whole_folder(path: Path) -> Iterator[Path]:
-    """Context manager: a new hidden folder beside `path` to write into; on success it is named `path`.
-
-    Raises FileExistsError: there is something at `path`, and not an empty folder; OSError: the folder around it is
-    missing, read-only or full.
-    """
+    """Context manager: a new hidden folder beside `path` to write into; on success it is named `path`."""
     empty = path.is_dir() and not any(path.iterdir())
     if path.exists() and not empty:
         raise FileExistsError(f"expected a new folder to write, {path} is there")

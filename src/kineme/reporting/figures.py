@@ -5,10 +5,14 @@ from __future__ import annotations
 import io
 import sys
 import warnings
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import matplotlib
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from kineme.errors import DataError
 from kineme.reporting.atomic import write_atomically
@@ -37,20 +41,16 @@ _RC: dict[str, Any] = {
 }
 
 
-def new_figure(width: float, height: float) -> Figure:
-    """An empty figure of the given size in inches, without any window system."""
-    import matplotlib
-
+def new_figure(width: float, height: float, make: Callable[..., Figure] = Figure) -> Figure:
+    """An empty figure of the given size in inches, by default without any window system."""
     matplotlib.rcParams.update(_RC)  # type: ignore[arg-type]
-    return Figure(figsize=(width, height), layout="constrained")
+    return make(figsize=(width, height), layout="constrained")
 
 
 class _PyplotFigure(Figure):
     """A figure of pyplot that notebooks show once: not as the value of a cell and at the end of the cell, too."""
 
     def _ipython_display_(self) -> None:
-        import matplotlib
-
         if "inline" in matplotlib.get_backend():
             sys.modules["matplotlib.pyplot"].close(self)
         raise NotImplementedError  # IPython goes on as without this method
@@ -58,13 +58,8 @@ class _PyplotFigure(Figure):
 
 def figure_to_show(width: float, height: float) -> Figure:
     """Make a figure as `new_figure` does, but of `matplotlib.pyplot` where the caller has imported it, to be shown."""
-    if (pyplot := sys.modules.get("matplotlib.pyplot")) is None:
-        return new_figure(width, height)
-    import matplotlib
-
-    matplotlib.rcParams.update(_RC)  # type: ignore[arg-type]
-    figure: Figure = pyplot.figure(figsize=(width, height), layout="constrained", FigureClass=_PyplotFigure)
-    return figure
+    pyplot = sys.modules.get("matplotlib.pyplot")
+    return new_figure(width, height, partial(pyplot.figure, FigureClass=_PyplotFigure) if pyplot else Figure)
 
 
 #: What each file format needs to come out the same at every run.
@@ -76,13 +71,7 @@ FORMATS: dict[str, dict[str, Any]] = {
 
 
 def encode_figure(figure: Figure, kind: str, dpi: int = 150) -> bytes:
-    """The figure as the bytes of a file of that kind, see `FORMATS`.
-
-    Control characters in names from files are escaped here if `drawable` has not done it: SVG repeats the names in
-    comments, where XML allows no control characters.
-    """
-    from matplotlib.text import Text
-
+    """The figure as the bytes of a file of `FORMATS`, without control characters, which XML allows nowhere."""
     for text in figure.findobj(Text):
         if (shown := printable_lines(text.get_text())) != text.get_text():
             text.set_text(shown)

@@ -35,14 +35,17 @@ def mean_and_range(values: Sequence[float]) -> str:
 
 
 def to_text(table: Table, width: int | None = None) -> str:
-    """Columns aligned for a terminal.
+    """Columns aligned for a terminal, by default of its width.
 
-    What does not fit into the width is wrapped, widest columns first; words that are wider than their column lose their
-    middle. Where not even that leaves a few letters to each, every row becomes a list. `width` is that of the terminal
-    by default. Where the output goes elsewhere, nothing is cut but names of more than 120 letters, and only the last
-    column is wrapped.
+    What does not fit is wrapped, widest columns first; words that are wider than their column lose their middle. Where
+    not even that leaves a few letters to each, every row becomes a list. Where the output goes elsewhere, only names of
+    more than 120 letters are cut, and only the last column is wrapped.
     """
-    lines = [(*(_cell(cell) for cell in row[:-1]), printable(row[-1])) for row in (table.columns, *table.rows)]
+    # A column is as wide as its widest cell: one long name would hide the other columns.
+    lines = [
+        (*(shortened(printable(cell), LONGEST_CELL) for cell in row[:-1]), printable(row[-1]))
+        for row in (table.columns, *table.rows)
+    ]
     natural = [max(width_of(row[k]) for row in lines) for k in range(len(table.columns))]
     columns = (get_terminal_size().columns if sys.stdout.isatty() else None) if width is None else width
     title = printable_lines(table.title)
@@ -65,16 +68,8 @@ def to_text(table: Table, width: int | None = None) -> str:
     return "\n".join(filter(None, [title, rule, *rendered[0], rule, *body, reading]))
 
 
-def _cell(text: str) -> str:
-    """A cell, shortened: a column is as wide as its widest cell, and one long name would hide the other columns."""
-    return shortened(printable(text), LONGEST_CELL)
-
-
 def _narrowed(lines: Sequence[tuple[str, ...]], natural: list[int], width: int) -> list[int] | None:
-    """Widths that sum up to `width` at most; None where columns would get too narrow.
-
-    The widest columns are narrowed first, at first down to their widest words, then further.
-    """
+    """Widths that sum up to `width` at most, widest columns narrowed first; None where columns would get too narrow."""
     words = [max(widest_word(row[k]) for row in lines) for k in range(len(natural))]
     for least in (words, [min(word, _NARROW) for word in words]):
         if sum(least) <= width:
@@ -91,7 +86,6 @@ def _narrowed(lines: Sequence[tuple[str, ...]], natural: list[int], width: int) 
 
 
 def _aligned(row: tuple[str, ...], widths: list[int]) -> list[str]:
-    """The lines of a row."""
     cells = [
         [cell] if width_of(cell) <= width else wrapped(cell, width) for cell, width in zip(row, widths, strict=True)
     ]
@@ -101,28 +95,21 @@ def _aligned(row: tuple[str, ...], widths: list[int]) -> list[str]:
 
 
 def _as_lists(lines: Sequence[tuple[str, ...]], width: int) -> list[str]:
-    """Each row as a list of heads and cells."""
     heads, *rows = lines
-    return [
-        line
-        for row in rows
-        for line in ("-" * width, *(each for pair in zip(heads, row, strict=True) for each in _entry(*pair, width)))
-    ]
-
-
-def _entry(head: str, cell: str, width: int) -> list[str]:
-    return wrapped(f"{head}: {cell}", width) if head else wrapped(cell, width)
+    listed: list[str] = []
+    for row in rows:
+        listed.append("-" * width)
+        for head, cell in zip(heads, row, strict=True):
+            listed += wrapped(f"{head}: {cell}" if head else cell, width)
+    return listed
 
 
 def to_html(table: Table) -> str:
     """A table element with caption."""
     head = "".join(f'<th scope="col">{in_markup(cell)}</th>' for cell in table.columns)
-    body = "".join(
-        f'<tr><th scope="row">{in_markup(row[0])}</th>'
-        + "".join(f"<td>{in_markup(cell)}</td>" for cell in row[1:])
-        + "</tr>"
-        for row in table.rows
-    )
+    cells = ["".join(f"<td>{in_markup(cell)}</td>" for cell in row[1:]) for row in table.rows]
+    rows = zip(table.rows, cells, strict=True)
+    body = "".join(f'<tr><th scope="row">{in_markup(row[0])}</th>{others}</tr>' for row, others in rows)
     reading = f"<p>{in_markup(table.reading)}</p>" if table.reading else ""
     return (
         f"<figure><table><caption>{in_markup(table.title)}</caption><thead><tr>{head}</tr></thead>"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -24,6 +24,7 @@ ROWS = "rows"
 COLUMNS, RATES = "columns", "rates"
 POSITIONS, TIMES, LABELS = ("positions", "x", "pos"), ("times", "t", "time"), ("labels", "label", "y")
 
+_BESIDE = {*TIMES, *LABELS, COLUMNS, "offsets"}  # arrays that say something of positions
 _COMPARED = 1000  # movements of an array whose steps are compared
 _RAGGED = (
     "expected times and positions with rows of one length, got rows that differ in length or depth; "
@@ -47,7 +48,9 @@ def arrays_movements(arrays: Mapping[str, Any], layout: Layout, kind: str) -> Pa
     """
     axes = [name for name in "xyz" if name in arrays]
     if axes[:2] == ["x", "y"] and len({np.shape(arrays[name]) for name in axes}) == 1 and np.ndim(arrays["x"]) == 1:
-        arrays = _Joined(arrays, axes, np.column_stack([numbers_of(arrays[name]) for name in axes]))
+        x = np.column_stack([numbers_of(arrays[name]) for name in axes])
+        others = [name for name in arrays if name not in axes and (name in _BESIDE or seconds_named(name) is not None)]
+        arrays = {name: arrays[name] for name in others} | {POSITIONS[0]: x}
     key = first_named(arrays, POSITIONS)
     if key is not None:
         xs, ts, how = _of_one(arrays, numbers_of(arrays[key]), layout)
@@ -129,8 +132,7 @@ def sets_or_points(xs: list[Array], every: int | None) -> list[Array]:
     """Tell n movements (T, d) that are one array (n, T, d) from the T points of one movement, (n, T d).
 
     Nobody says which axis is time, but places change less from sample to sample than from point to point, and less than
-    between movements that are not all but equal. As many samples as `every` says are a movement. Points have several
-    coordinates: of one there are movements.
+    between movements that are not all but equal. As many samples as `every` says are a movement.
     """
     if len(xs) < MIN_SAMPLES or len({x.shape for x in xs}) > 1 or not 1 < math.prod(xs[0].shape[1:]) <= len(xs[0]):
         return xs
@@ -155,41 +157,11 @@ def point_names(n_points: int, width: int) -> list[str]:
 
 
 def has_known_names(names: Collection[str]) -> bool:
-    """Tell whether arrays have the names of `arrays_movements`, or none that could be other movements.
-
-    They have not where their times go by another name, such as ``stamp``.
-    """
-    has_positions = any(name in names or f"{name}_0" in names for name in POSITIONS)
-    if (
-        has_positions
-        and not {*TIMES, "offsets"} & set(names)
-        and any(is_time(name) or is_header_stamp(name) for name in names)
-    ):
-        return False
-    others = set(names) - {*TIMES, *LABELS, "offsets"}
-    return has_positions or all(seconds_named(name) is not None for name in others)
-
-
-class _Joined(Mapping[str, Any]):
-    """Named arrays with positions in place of their coordinates; the others are still read on first use."""
-
-    def __init__(self, arrays: Mapping[str, Any], axes: Sequence[str], positions: Array) -> None:
-        self._arrays, self._positions = arrays, positions
-        self._names = {name: None for name in arrays if name not in axes} | {"positions": None}
-
-    def __getitem__(self, name: str) -> Any:
-        if name not in self._names:
-            raise KeyError(name)
-        return self._positions if name == "positions" else self._arrays[name]
-
-    def __contains__(self, name: object) -> bool:
-        return name in self._names
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._names)
-
-    def __len__(self) -> int:
-        return len(self._names)
+    """Tell whether arrays have the names of `arrays_movements`, with no times of another name, or none of movements."""
+    if not any(name in names or f"{name}_0" in names for name in POSITIONS):
+        return all(seconds_named(name) is not None for name in {*names} - {*TIMES, *LABELS, "offsets"})
+    has_times = not {*TIMES, "offsets"}.isdisjoint(names)
+    return has_times or not any(is_time(name) or is_header_stamp(name) for name in names)
 
 
 def numbers_of(values: Any, of_time: bool = False) -> Array:
@@ -211,7 +183,6 @@ def numbers_of(values: Any, of_time: bool = False) -> Array:
 
 
 def _no_number(array: NDArray[Any]) -> Any:
-    """Return the first entry that is not a number."""
     for number in array.ravel().tolist():
         try:
             float(np.float64(number))
@@ -282,20 +253,18 @@ def _labels(arrays: Mapping[str, Any], n: int) -> list[str | None]:
     if key is None:
         return [None] * n
     given = arrays[key]
-    if isinstance(given, np.ndarray):
-        shape, labels = np.atleast_1d(given).shape, np.atleast_1d(given).tolist()
-    else:  # from JSON: converted one by one, since NumPy would convert numbers beside texts to texts
+    if not isinstance(given, np.ndarray):  # from JSON: NumPy would convert numbers beside texts to texts
         labels = given if isinstance(given, list) else [given]
-        shape = (len(labels),)
-    if shape != (n,):
+        given = np.empty(len(labels), dtype=object)
+        given[:] = labels
+    if np.atleast_1d(given).shape != (n,):
+        shape = np.atleast_1d(given).shape
         raise DataError(f"expected one label for each of the {n} movements, got labels of shape {shape}")
-    return [_label(label) for label in labels]
+    return [_label(label) for label in np.atleast_1d(given).tolist()]
 
 
 def _label(value: Any) -> str | None:
-    """Return a label as text; None where there is none."""
     if isinstance(value, (list, dict, tuple)) or value != value:  # noqa: PLR0124 - only NaN differs from itself
         raise DataError(f"expected labels that are texts or numbers, got {value!r}")
-    if isinstance(value, bytes):
-        return value.decode("utf-8", "replace") or None
-    return None if value is None else str(value) or None
+    text = value.decode("utf-8", "replace") if isinstance(value, bytes) else "" if value is None else str(value)
+    return text or None

@@ -1,14 +1,14 @@
 """Bodies and robots over time in named arrays: parameters of SMPL models, joints with the pose of their root, points.
 
-AMASS (Mahmood et al. 2019) keeps ``poses`` (T, 3 J), rotation vectors [rad] of the J joints, beside ``trans`` (T, 3)
-[m] and ``mocap_framerate``. Programs that retarget movements to robots keep ``joint_pos`` or ``dof_pos`` (T, J) beside
-the pose of the root, or ``qpos`` of MuJoCo, and ``fps``. What does not change over time, as the shape ``betas``, and
-what follows from the joints, as velocities, is left aside.
+AMASS (Mahmood et al. 2019) keeps ``poses`` (T, 3 J), rotation vectors [rad] of J joints, beside ``trans`` (T, 3) [m]
+and ``mocap_framerate``. Programs that retarget movements keep ``joint_pos`` or ``dof_pos`` (T, J) beside the pose of
+the root, or ``qpos`` of MuJoCo, and ``fps``. What does not change over time, and velocities, are left aside.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -75,47 +75,35 @@ class Body(NamedTuple):
 
 
 def body_movements(arrays: Mapping[str, Any], layout: Layout, kind: str) -> Parsed | None:
-    """Return the movements of a body or a robot; None where arrays are of no such.
-
-    Rotation vectors become quaternions, so that turns beyond pi do not jump. ``split_points`` (n + 1,) of LocoMuJoCo
-    divides them into n movements.
-    """
+    """Return the movements of a body or a robot, cut at ``split_points``; None where arrays are of no such."""
     body = next((body for find in _KINDS if (body := find(arrays)) is not None), None)
     if body is None:
         return None
-    columns, rate, named = _clock(arrays, body, layout)
-    layout = layout if named is None else replace(layout, units=None)
-    if layout.coordinates is None:
-        columns |= body.columns
-    else:
-        columns |= body.columns | _others(arrays, body)
+    columns, rate = _clock(arrays, body, layout)
+    layout = layout if rate is None else replace(layout, units=None)
+    columns |= body.columns if layout.coordinates is None else body.columns | _others(arrays, body)
     heads = tuple(columns)
     table = Table(heads, list(columns.values()), body.n_samples, no_lines, segments=_segments(arrays, body))
     roles = choose_roles(heads, ["number"] * len(heads), layout)
     parsed = table_movements(table, roles, layout, kind)
     of_rate = "" if rate is None else f", {rate.hertz:g} Hz by {rate.name}"
     aside = [name for name in arrays if name not in (*body.arrays, *columns, *([rate.name] if rate else []))]
-    detected = parsed.detected
-    if layout.coordinates is None:
-        detected = detected._replace(ignored=tuple(aside))
-    return parsed._replace(detected=detected._replace(layout=f"{body.model}{of_rate}"))
+    ignored = tuple(aside) if layout.coordinates is None else parsed.detected.ignored
+    return parsed._replace(detected=parsed.detected._replace(ignored=ignored, layout=f"{body.model}{of_rate}"))
 
 
-def _clock(arrays: Mapping[str, Any], body: Body, layout: Layout) -> tuple[dict[str, Array], Rate | None, str | None]:
-    """Return the columns of times, the rate, and the head of the times that follow from it."""
+def _clock(arrays: Mapping[str, Any], body: Body, layout: Layout) -> tuple[dict[str, Array], Rate | None]:
     stamps = {name: _values(arrays, name, body.n_samples) for name in arrays if is_time(name)}
     timed = {name: x[:, 0] for name, x in stamps.items() if x is not None and x.shape[1] == 1}
-    if timed:
-        return timed, None, None
-    if isinstance(layout.units, float | int):  # the caller knows better than the file
-        return {}, None, None
+    if timed or isinstance(layout.units, float | int):  # the caller knows better than the file
+        return timed, None
     rate = rate_of(arrays)
     if rate is None:
         raise DataError(
             f"expected the rate of {body.arrays[-1]} beside it, as mocap_framerate, fps or dt, got none; say the "
             "seconds between two samples with units=, in the shell --units"
         )
-    return {STAMP: rate.stamps(body.n_samples)}, rate, STAMP
+    return {STAMP: rate.stamps(body.n_samples)}, rate
 
 
 def _smpl(arrays: Mapping[str, Any]) -> Body | None:
@@ -200,7 +188,6 @@ def _points_of(arrays: Mapping[str, Any], names: Sequence[str], n: int) -> tuple
 
 
 def _others(arrays: Mapping[str, Any], body: Body) -> dict[str, Array]:
-    """Return all other columns over time, which a caller may choose."""
     columns: dict[str, Array] = {}
     for name in arrays:
         x = None if name in body.arrays else _values(arrays, name, body.n_samples)
@@ -222,20 +209,15 @@ def _values(arrays: Mapping[str, Any], name: str, n: int | None = None) -> Array
 
 
 def _texts(arrays: Mapping[str, Any], names: Sequence[str]) -> list[str]:
-    """Return the first array of texts of one of these names, or none."""
     for name in names:
-        if name in arrays:
-            try:
-                texts = np.asarray(arrays[name])
-            except DataError:  # of Python objects
-                continue
+        with suppress(DataError):  # of Python objects
+            texts = np.asarray(arrays.get(name))
             if texts.ndim == 1 and texts.dtype.kind in "US":
                 return [text.decode("utf-8", "replace") if isinstance(text, bytes) else text for text in texts.tolist()]
     return []
 
 
 def _segments(arrays: Mapping[str, Any], body: Body) -> Segments | None:
-    """Return the movements between the split points, where there are several."""
     cuts = _values(arrays, "split_points") if "split_points" in arrays else None
     if cuts is None or len(cuts) < 3:
         return None

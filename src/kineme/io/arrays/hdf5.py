@@ -14,7 +14,7 @@ from kineme.errors import DataError
 from kineme.io.arrays.tree_movements import tree_movements
 from kineme.io.arrays.trees import GROUPS, Rate, is_label, rate_of, seconds_named
 from kineme.io.limits import check_expanded
-from kineme.io.records import needs
+from kineme.io.records import damaged_as, needs
 from kineme.movements.tables.layout import Layout, Parsed
 
 _SMALL, _CHUNKS = 2**20, 1000  # bytes and chunks that need not be written
@@ -28,26 +28,16 @@ _NAMES = frozenset({"label", "task"})  # attributes
 
 
 def hdf5_movements(path: Path, layout: Layout) -> Parsed:
-    """Return the movements in an HDF5 file: groups of data sets of one length; only those that are needed are read.
-
-    Data sets that lie in other files are passed over: a file from elsewhere must not make the program read others.
-    """
+    """Return the movements in an HDF5 file: groups of data sets of one length; only those that are needed are read."""
     with needs("h5py", "read HDF5", "hdf5"):
         import h5py
-    try:
-        with h5py.File(os.fspath(path), "r") as file:
-            return tree_movements(_tree(file, h5py, [0]), layout, "HDF5", GROUPS)
-    except DataError:
-        raise
-    except (OSError, RuntimeError, KeyError) as error:  # as which h5py raises what the HDF5 library finds
-        raise DataError(f"expected an HDF5 file, got something foreign, truncated or damaged ({error})") from error
+    damaged = "expected an HDF5 file, got something foreign, truncated or damaged"
+    with damaged_as(damaged, OSError, RuntimeError, KeyError), h5py.File(os.fspath(path), "r") as file:
+        return tree_movements(_tree(file, h5py, [0]), layout, "HDF5", GROUPS)
 
 
 def _tree(group: Any, h5py: Any, counted: list[int], depth: int = 0, unit: Any = None) -> dict[str, Any]:
-    """Return a group as a mapping: data sets that are not read yet, single numbers and texts, groups.
-
-    `unit` is that of the group around it, for data sets that have none.
-    """
+    """Return a group, in the unit of that around it, as a mapping of data sets not read yet, single values, groups."""
     tree: dict[str, Any] = {}
     unit = _unit_in(group, group.attrs) or unit
     tree |= _label_and_rate(group, group.attrs)
@@ -61,6 +51,7 @@ def _tree(group: Any, h5py: Any, counted: list[int], depth: int = 0, unit: Any =
         if isinstance(member, Mapping):
             if depth < _DEEPEST:
                 tree[name] = _tree(member, h5py, counted, depth + 1, unit)
+        # What lies in other files is passed over: a file from elsewhere must not make the program read others.
         elif isinstance(member, h5py.Dataset) and not member.external and not member.is_virtual:
             names = tuple(member.attrs)
             rate = rate_of(_label_and_rate(member, names)) if names else None
@@ -90,11 +81,8 @@ def _labels(stored: Any) -> list[str | float | None]:
 
 
 def _label_and_rate(stored: Any, names: Iterable[str]) -> dict[str, Any]:
-    """Return the label and the rate among the attributes of a group or of a data set."""
-    values = {
-        name: _single(stored.attrs[name]) for name in names if name.lower() in _NAMES or seconds_named(name) is not None
-    }
-    return {name: value for name, value in values.items() if value is not None}
+    named = [name for name in names if name.lower() in _NAMES or seconds_named(name) is not None]
+    return {name: value for name in named if (value := _single(stored.attrs[name])) is not None}
 
 
 def _unit_in(stored: Any, names: Iterable[str]) -> Any:
@@ -109,15 +97,7 @@ def _unit_in(stored: Any, names: Iterable[str]) -> Any:
 
 
 class _Stored:
-    """A data set that is read when it is needed, if its samples are in the file.
-
-    What was never written takes no room there, however much it is said to be, and takes minutes to fill.
-
-    Raises
-    ------
-    DataError
-        On reading: samples that were never written, or that expand by more than gzip can, or than movements do.
-    """
+    """A data set that is read, or refused, when it is needed: what was never written takes no room, but minutes."""
 
     def __init__(self, stored: Any, unit: Any, rate: Rate | None, names: Iterable[str] = ()) -> None:
         self._stored, self.shape, self.dtype, self.unit, self.rate = stored, stored.shape, stored.dtype, unit, rate
@@ -151,7 +131,6 @@ class _Stored:
 
 
 def _single(value: Any) -> str | float | None:
-    """Return a text or a number; None for anything else."""
     if isinstance(value, bytes):
         return value.decode("utf-8", "replace")
     if isinstance(value, str):

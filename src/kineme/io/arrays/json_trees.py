@@ -1,7 +1,4 @@
-"""JSON and JSON lines as trees of arrays: samples with names become columns, lists of numbers become arrays.
-
-So do messages in JSON of an MCAP file, as Foxglove and others record them: each message of a topic is a sample.
-"""
+"""JSON, JSON lines and messages in JSON of an MCAP file as trees of arrays: samples become columns, lists arrays."""
 
 from __future__ import annotations
 
@@ -39,7 +36,7 @@ _NUMBER, _LIST = 32, 88  # bytes of a Python object
 
 def json_movements(data: bytes, layout: Layout) -> Parsed:
     """Read movements in JSON: named arrays, samples ``[{"t": 0, "x": 1}, ...]``, lists of either, or these by name."""
-    check_objects(data)
+    check_expanded(size_of_objects(data))
     try:
         entries = json.loads(data, object_pairs_hook=_each_once)
     except json.JSONDecodeError as error:
@@ -56,7 +53,7 @@ def json_movements(data: bytes, layout: Layout) -> Parsed:
 
 def json_lines_movements(data: bytes, layout: Layout) -> Parsed:
     """Return the movements in JSON lines: a sample in each line, or a movement in each line."""
-    check_objects(data)
+    check_expanded(size_of_objects(data))
     entries = []
     for k, line in enumerate(data.decode("utf-8-sig").splitlines(), 1):
         if not line.strip():
@@ -71,17 +68,13 @@ def json_lines_movements(data: bytes, layout: Layout) -> Parsed:
 
 
 def _frame(entries: Mapping[str, Any]) -> dict[str, list[Any]] | None:
-    """Give the columns of a data frame as pandas writes it by columns, by its index, or split; None of something else.
-
-    Its index is a column too: the times if it holds dates.
-    """
+    """Give the columns, and the index as one, of a data frame as pandas writes it; None of something else."""
     if {*entries} == {"columns", "index", "data"}:
         if any(not isinstance(row, list) or len(row) != len(entries["columns"]) for row in entries["data"]):
             raise DataError("expected a row of data with a number for each of the columns, got another one")
         heads = ["_".join(map(str, head)) if isinstance(head, list) else str(head) for head in entries["columns"]]
-        return _with_index(
-            entries["index"], dict(zip(heads, map(list, zip(*entries["data"], strict=True)), strict=True))
-        )
+        columns = map(list, zip(*entries["data"], strict=True))
+        return _with_index(entries["index"], dict(zip(heads, columns, strict=True)))
     rows = list(entries.values())
     if not rows or not all(isinstance(row, Mapping) and row and row.keys() == rows[0].keys() for row in rows):
         return None
@@ -101,12 +94,9 @@ def _counts(names: Iterable[str]) -> bool:
 
 def _with_index(index: list[Any], columns: dict[str, list[Any]]) -> dict[str, list[Any]]:
     texts = [str(entry) for entry in index]
-    head = "time" if all(map(is_date, texts)) else "index"
-    if head in columns:
-        return columns
-    return {
-        head: texts if head == "time" else [float(text) if is_number(text, False) else text for text in texts]
-    } | columns
+    if all(map(is_date, texts)):
+        return {"time": texts} | columns
+    return {"index": [float(text) if is_number(text, False) else text for text in texts]} | columns
 
 
 def _columns_of(frame: Mapping[str, list[Any]]) -> dict[str, Any]:
@@ -121,11 +111,6 @@ def _columns_of(frame: Mapping[str, list[Any]]) -> dict[str, Any]:
         else:
             tree[head] = _array(cells)
     return tree
-
-
-def check_objects(data: bytes) -> None:
-    """Refuse JSON that would take more memory than the limit once it is Python objects."""
-    check_expanded(size_of_objects(data))
 
 
 def size_of_objects(data: bytes) -> int:
@@ -152,13 +137,9 @@ def as_tree(value: Any) -> Any:
             )
         if any(name.lower() == "name" for name in value):
             # The points of several strokes of what has one name are one after the other, as of the $N recognizer.
-            drawn = {name for name in value if name.lower() == "strokes" and isinstance(value[name], list)}
-            value = {
-                name: [point for stroke in entry for point in stroke]
-                if name in drawn and all(map(_are_objects, entry))
-                else entry
-                for name, entry in value.items()
-            }
+            for name, entry in value.items():
+                if name.lower() == "strokes" and isinstance(entry, list) and all(map(_are_objects, entry)):
+                    value = {**value, name: [point for stroke in entry for point in stroke]}
         stamped = {len(entry) for name, entry in value.items() if is_time(name) and isinstance(entry, list)}
         tree = {name: as_tree(entry) for name, entry in value.items()}
         return {
@@ -258,10 +239,7 @@ def _flat(sample: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _array(values: list[Any]) -> Any:
-    """Return numbers as an array, NaN for null; texts as objects; a `DataError` for rows that differ in length.
-
-    Nulls alone say nothing of numbers: they are empty texts, which are left aside.
-    """
+    """Return numbers as an array, NaN for null; texts as objects; nulls alone are empty texts, which are left aside."""
     nothing = all(
         value is None or (isinstance(value, list) and all(cell is None for cell in value)) for value in values
     )

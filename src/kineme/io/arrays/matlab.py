@@ -1,8 +1,7 @@
 """MATLAB files: LASA's, a list ``demos`` of structures with ``pos`` (d, T) and ``t`` (1, T), and any other layout.
 
-Source: The MathWorks, "MAT-File Format", version 5. A file is a header of 128 bytes and elements, each a tag (type,
-number of bytes) and its data; a matrix is an element of elements: flags, dimensions, name, and the content of its
-class. Only the requested variables are read, and no size in the file is trusted: each is checked before use.
+Source: The MathWorks, "MAT-File Format", version 5. A file is a header and elements, each a tag (type, number of bytes)
+and its data; a matrix is an element of elements: flags, dimensions, name, content. No size in the file is trusted.
 """
 
 from __future__ import annotations
@@ -10,7 +9,8 @@ from __future__ import annotations
 import math
 import struct
 import zlib
-from collections.abc import Container, Iterator, Mapping
+from collections.abc import Container, Iterator
+from contextlib import suppress
 from itertools import cycle
 from typing import Any, NamedTuple
 
@@ -49,10 +49,7 @@ class Demos(NamedTuple):
 
 
 def read_demos(data: bytes) -> Demos:
-    """Read all demonstrations of a MATLAB file of version 5 to 7.2.
-
-    ``demos`` is a structure, an array of structures or a cell array of them. Other variables are ignored.
-    """
+    """Read ``demos`` of a MATLAB file of version 5 to 7.2: a structure, or an array or a cell array of them."""
     if data[:8] == b"\x89HDF\r\n\x1a\n" or data[:10] == b"MATLAB 7.3":
         raise DataError("expected a MATLAB file of version 7.2 or earlier, got 7.3; save it with -v7")
     try:
@@ -73,7 +70,6 @@ def read_demos(data: bytes) -> Demos:
 
 
 def _of_structure(record: Any) -> tuple[Array, Array]:
-    """Return times (T,) and positions (T, d) of a structure with ``t`` (T,) and ``pos`` (d, T)."""
     if not isinstance(record, dict):
         raise ValueError("something else than structures in it")
     if missing := [field for field in _FIELDS if field not in record]:
@@ -88,21 +84,17 @@ def _of_structure(record: Any) -> tuple[Array, Array]:
 
 
 def mat_movements(data: bytes, layout: Layout) -> Parsed:
-    """Return the movements in a MATLAB file: those of ``demos``, see `read_demos`, else of all its variables.
-
-    Structures with times hold one movement; cells and arrays of structures hold many. Matrices among the variables
-    count only beside times or a rate, or where the caller gives the step between samples.
-    """
-    try:
+    """Return the movements in a MATLAB file: those of ``demos``, see `read_demos`, else of all its variables."""
+    variables: dict[str, Matrix] = {}
+    with suppress(ValueError, struct.error, zlib.error):  # no file of version 5 to 7.2, which `read_demos` says
         variables = matrices(data, byte_order(data))
-    except (ValueError, struct.error, zlib.error):
-        variables = {}  # no file of version 5 to 7.2, which `read_demos` says
     if "demos" in variables or not variables:
         demos = read_demos(data)
         named = Named([demos.name] * len(demos.times), "t")
         return parsed_arrays(demos.positions, demos.times, named, layout, ("MATLAB", "demos"))
     try:
-        tree = as_tree(variables, byte_order(data))
+        order = byte_order(data)
+        tree = _upright({name: _node(matrix, order, [0]) for name, matrix in variables.items()})
     except (ValueError, struct.error) as error:
         raise DataError(f"expected a MATLAB file of arrays, got {error}") from error
     if not has_times(tree) and not isinstance(layout.units, float | int):  # matrices on their own may be anything
@@ -114,11 +106,6 @@ def mat_movements(data: bytes, layout: Layout) -> Parsed:
             "seconds between two samples with units=, in the shell --units"
         )
     return tree_movements(tree, layout, "MATLAB")
-
-
-def as_tree(variables: Mapping[str, Matrix], order: str) -> dict[str, Any]:
-    """Return variables as a tree, in which every array has its samples along the first axis."""
-    return _upright({name: _node(matrix, order, [0]) for name, matrix in variables.items()})
 
 
 def _node(matrix: Matrix, order: str, taken: list[int], depth: int = 0, wanted: Container[str] | None = None) -> Any:
@@ -147,7 +134,6 @@ def _node(matrix: Matrix, order: str, taken: list[int], depth: int = 0, wanted: 
 
 
 def _children(matrix: Matrix, order: str, count: int, skipped: int) -> Iterator[Matrix]:
-    """Yield the matrices in a cell array or a structure, behind what describes its fields."""
     parts = elements(matrix.content, order)
     for _ in range(skipped):
         next(parts, None)

@@ -1,8 +1,7 @@
 """NumPy archives, and learned models: a JSON header and plain arrays in a zip archive like NumPy's npz.
 
 An array is read on first use, checked before it is decompressed, and never unpickled. Nothing in a learned model is
-executed or looked up as a class: the header is data, arrays of objects are refused, and the meaning of a header is
-defined by tables in this library. The checksums of the archive detect truncation and damage.
+executed or looked up as a class: the meaning of a header is defined by tables in this library.
 """
 
 from __future__ import annotations
@@ -13,6 +12,7 @@ import math
 import sys
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from kineme.errors import DataError
 from kineme.io.limits import check_expanded
+from kineme.io.records import damaged_as
 from kineme.reporting.atomic import write_atomically
 
 FORMAT = "kineme"
@@ -34,11 +35,7 @@ _HEADS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
 
 
 class Npz(Mapping[str, NDArray[Any]]):
-    """The arrays in the bytes of an npz archive by name; `path` is for messages.
-
-    A `DataError` on construction: not an archive, or two entries of one name. On access to an array: it is damaged,
-    takes more memory than `kineme.io.limits` allows (all arrays together), or holds Python objects.
-    """
+    """The arrays in the bytes of an npz archive by name, each decoded on access; `path` is for messages."""
 
     def __init__(self, data: bytes, path: Path) -> None:
         self._path, self._taken = path, 0
@@ -54,7 +51,13 @@ class Npz(Mapping[str, NDArray[Any]]):
     def __getitem__(self, name: str) -> NDArray[Any]:
         member = self._members[name]
         try:
-            content = self._content(member)
+            self._take(member.file_size)
+            if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+                raise ValueError(f"an entry {member.filename!r} that is packed in an unusual way")
+            with self._archive.open(member) as file:
+                content = file.read(member.file_size)  # read() without a size decompresses before it checks
+            if len(content) != member.file_size:
+                raise ValueError(f"a truncated entry {member.filename!r}")
             return _decoded(content, repr(name), self._path, self._take)
         except DataError:
             raise
@@ -70,16 +73,6 @@ class Npz(Mapping[str, NDArray[Any]]):
     def __len__(self) -> int:
         return len(self._members)
 
-    def _content(self, member: zipfile.ZipInfo) -> bytes:
-        self._take(member.file_size)
-        if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-            raise ValueError(f"an entry {member.filename!r} that is packed in an unusual way")
-        with self._archive.open(member) as file:
-            content = file.read(member.file_size)  # read() without a size decompresses before it checks
-        if len(content) != member.file_size:
-            raise ValueError(f"a truncated entry {member.filename!r}")
-        return content
-
     def _take(self, n_bytes: int) -> None:
         self._taken += n_bytes
         check_expanded(self._taken)
@@ -93,14 +86,9 @@ class Npz(Mapping[str, NDArray[Any]]):
 
 def array_of_npy(data: bytes, path: Path) -> NDArray[Any]:
     """Return the array in the bytes of an npy file."""
-    try:
+    damaged = "expected an array saved by numpy.save, got something foreign, truncated or damaged"
+    with damaged_as(damaged, Exception):  # headers are Python literals, which can raise much
         return _decoded(data, "it", path, check_expanded)
-    except DataError:
-        raise
-    except Exception as error:  # headers are Python literals, which can raise much
-        raise DataError(
-            f"expected an array saved by numpy.save, got something foreign, truncated or damaged ({error})"
-        ) from error
 
 
 def _decoded(content: bytes, name: str, path: Path, take: Callable[[int], None]) -> NDArray[Any]:
@@ -128,10 +116,7 @@ def _decoded(content: bytes, name: str, path: Path, take: Callable[[int], None])
 
 
 def write_container(path: Path, kind: str, header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Path:
-    """Write a header, of what JSON can hold, and named arrays of numbers to one file, atomically.
-
-    `read_container` refuses a file of another `kind`.
-    """
+    """Write a header, of what JSON can hold, and named arrays of numbers of some kind to one file, atomically."""
     full = {"format": FORMAT, "version": VERSION, "kind": kind, **header}
     encoded = np.frombuffer(json.dumps(full, allow_nan=False).encode(), dtype=np.uint8)
     buffer = io.BytesIO()
@@ -145,11 +130,7 @@ def kind_of(path: Path) -> str:
 
 
 def read_container(path: Path, kind: str) -> tuple[dict[str, Any], Mapping[str, NDArray[Any]]]:
-    """Read a file of `write_container`; each array is read on first use.
-
-    A `DataError` says whether the file is foreign, truncated or damaged, of another kind, of a later version, or larger
-    than `kineme.io.limits` allows.
-    """
+    """Read a file of `write_container` of that kind; each array is read on first use."""
     header, arrays = _read(path)
     if header.get("kind") != kind:
         raise DataError(f"expected {path} to hold {kind}, got {header.get('kind')!r}")
@@ -159,10 +140,9 @@ def read_container(path: Path, kind: str) -> tuple[dict[str, Any], Mapping[str, 
 def _read(path: Path) -> tuple[dict[str, Any], Mapping[str, NDArray[Any]]]:
     check_expanded(path.stat().st_size)
     arrays = Npz(path.read_bytes(), path)
-    try:
+    header = None
+    with suppress(ValueError, KeyError, RecursionError):
         header = json.loads(arrays[_HEADER].tobytes())
-    except (ValueError, KeyError, RecursionError) as error:
-        raise DataError(f"expected {path} to be a file saved by kineme, got another program's archive") from error
     if not isinstance(header, dict) or header.get("format") != FORMAT:
         raise DataError(f"expected {path} to be a file saved by kineme, got another program's archive")
     if not isinstance(header.get("version"), int) or header["version"] > VERSION:

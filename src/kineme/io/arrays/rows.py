@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -36,47 +36,36 @@ class _Line(NamedTuple):
     cells: list[str]
 
 
-class _Series(NamedTuple):
-    """The movements of lines, with the number of each and its label; and why others could not be read."""
-
-    lines: list[int]
-    labels: list[str | None]
-    positions: list[Array]
-    times: list[Array]
-    left_out: list[str]
+class _Row(NamedTuple):
+    label: str | None
+    positions: Array
+    times: Array
 
 
 def row_movements(data: bytes, layout: Layout) -> Parsed:
     """Return the movements of a table, one in each line: its label, then the coordinates of sample after sample.
 
-    The coordinates of a sample are named by `layout.columns`, or by heads such as x0, y0, x1, y1. The label is in the
-    column `layout.label`; by default in the first or the last one if it holds words, or a whole number beside a whole
-    number of samples.
-    Cells that are empty or NaN at the end of a line pad it.
+    They are named by `layout.columns`, or by heads such as x0, y0, x1, y1. Cells that are empty or NaN at the end pad.
     """
     lines, heads = _table(data)
     names = _names(layout, heads)
     label = _label_column(lines, heads, len(names), layout)
-    series = _Series([], [], [], [], [])
-    for line in lines:
-        cells = list(line.cells)
+
+    def read(given: Sequence[str]) -> _Row:
+        cells = list(given)
         text = cells.pop(label) if label is not None and label < len(cells) else None
         try:
             values = np.array([cell or "nan" for cell in cells], dtype=np.float64)
         except ValueError:
             odd = next(cell for cell in cells if not is_number(cell or "nan", False))
-            series.left_out.append(f"line {line.number}: expected numbers, got {odd!r:.40}")
-            continue
-        values = values[: 1 + np.flatnonzero(~np.isnan(values))[-1]] if not np.isnan(values).all() else values[:0]
+            raise ValueError(f"expected numbers, got {odd!r:.40}") from None
+        values = values[: np.flatnonzero(np.append(True, ~np.isnan(values)))[-1]]
         if len(values) % len(names):
-            series.left_out.append(
-                f"line {line.number}: expected samples of {len(names)} coordinates, got {len(values)} numbers"
-            )
-            continue
-        series.lines.append(line.number)
-        series.labels.append((_FRACTION.sub("", text) if _WHOLE.fullmatch(text) else text) if text else None)
-        series.positions.append(values.reshape(-1, len(names)))
-    parsed = _parsed(series, names, layout, "CSV")
+            raise ValueError(f"expected samples of {len(names)} coordinates, got {len(values)} numbers")
+        text = _FRACTION.sub("", text) if text and _WHOLE.fullmatch(text) else text
+        return _Row(text or None, values.reshape(-1, len(names)), values[:0])
+
+    parsed = _parsed(lines, read, layout, "CSV", names)
     head = () if label is None else (heads[label] if heads else f"column {label}",)
     return parsed._replace(detected=parsed.detected._replace(label=head))
 
@@ -96,7 +85,6 @@ def _table(data: bytes) -> tuple[list[_Line], list[str]]:
 
 
 def _names(layout: Layout, heads: Sequence[str]) -> list[str]:
-    """Return the names of the coordinates of a sample."""
     if layout.coordinates is not None:
         return [str(name) for name in layout.coordinates]
     stems = [match[1] for head in heads if (match := _COUNTED.fullmatch(head))]
@@ -110,7 +98,6 @@ def _names(layout: Layout, heads: Sequence[str]) -> list[str]:
 
 
 def _label_column(lines: Sequence[_Line], heads: Sequence[str], width: int, layout: Layout) -> int | None:
-    """Return the column of the labels, or None where there is none."""
     first = lines[0].cells
     if layout.label is not None:
         return column_numbers(heads or [f"column {k}" for k in range(len(first))], [layout.label])[0]
@@ -145,31 +132,22 @@ def _class_column(lines: Sequence[_Line], width: int) -> int | None:
 def series_movements(data: bytes, layout: Layout) -> Parsed:
     """Return the movements of a ``.ts`` file, as sktime and aeon write them: one in each line below ``@data``.
 
-    The columns of a movement are separated by colons, its values by commas, each alone or as ``(time,value)``; the
-    label is last where ``@classLabel`` says so. A value of ``@targetLabel`` is no label.
+    The columns of a movement are separated by colons, its values by commas, each alone or as ``(time,value)``.
     """
     check_expanded(len(data) + _CELL * data.count(b","))
     flags, body = _head(data)
     timed, labeled = _says(flags, "timestamps"), _says(flags, "classlabel")
     targeted = _says(flags, "targetlabel")
-    series = _Series([], [], [], [], [])
-    for number, text in body:
+
+    def read(text: str) -> _Row:
         parts = _COLON.split(text)
         label = parts.pop().strip() if labeled or targeted else None
-        try:
-            columns = [_timed(part) if timed else _values(part) for part in parts]
-            times, x = _side_by_side(columns, timed)
-        except ValueError as error:
-            series.left_out.append(f"line {number}: {error}")
-            continue
-        series.lines.append(number)
-        series.labels.append(label if labeled else None)
-        series.positions.append(x)
-        series.times.append(times)
+        times, x = _side_by_side([_timed(part) if timed else _values(part) for part in parts], timed)
+        return _Row(label if labeled else None, x, times)
+
     if timed and any(is_date(stamp.strip()) for stamp, _ in _PAIR.findall(body[0][1])):
         layout = replace(layout, units="s")  # dates were counted in seconds
-    width = max((x.shape[1] for x in series.positions), default=1)
-    parsed = _parsed(series, axis_names(width), layout, "TS", timed)
+    parsed = _parsed(body, read, layout, "TS", timed=timed)
     ignored = ("the target",) if targeted else ()
     return parsed._replace(detected=parsed.detected._replace(ignored=ignored, label=("the class",) if labeled else ()))
 
@@ -229,20 +207,30 @@ def _side_by_side(columns: Sequence[tuple[Array, Array]], timed: bool) -> tuple[
     return times[:end], x[:end]
 
 
-def _parsed(series: _Series, names: Sequence[str], layout: Layout, kind: str, timed: bool = False) -> Parsed:
-    """Return movements of the width of the first, with what the others lack."""
-    if not series.positions:
-        reason = f"; {series.left_out[0]}" if series.left_out else ""
+def _parsed(
+    lines: Iterable[tuple[int, Any]],
+    read: Callable[[Any], _Row],
+    layout: Layout,
+    kind: str,
+    names: Sequence[str] = (),
+    timed: bool = False,
+) -> Parsed:
+    """Read numbered lines as movements of the named coordinates, by default of the widest, and say what others lack."""
+    rows, left_out = dict[str, _Row](), list[str]()
+    for number, line in lines:
+        try:
+            rows[f"line {number}"] = read(line)
+        except ValueError as error:
+            left_out.append(f"line {number}: {error}")
+    if not rows:
+        reason = f"; {left_out[0]}" if left_out else ""
         raise DataError(f"expected a movement in each line, got none{reason}")
-    fits = [x.shape[1] == len(names) for x in series.positions]
-    numbers = [k for k, fit in enumerate(fits) if fit]
-    left_out = [
-        f"line {series.lines[k]}: expected {len(names)} columns, got {series.positions[k].shape[1]}"
-        for k, fit in enumerate(fits)
-        if not fit
-    ]
-    xs = [series.positions[k] for k in numbers]
-    places = [f"line {series.lines[k]}" for k in numbers]
-    named = Named([series.labels[k] for k in numbers], "times", places, names)
-    parsed = parsed_arrays(xs, [series.times[k] for k in numbers] if timed else None, named, layout, (kind, ROWS))
-    return parsed._replace(left_out=(*series.left_out, *left_out))
+    widths = {place: row.positions.shape[1] for place, row in rows.items()}
+    names = names or axis_names(max(widths.values()))
+    for place, width in widths.items():
+        if width != len(names):
+            left_out.append(f"{place}: expected {len(names)} columns, got {width}")
+            del rows[place]
+    labels, xs, ts = zip(*rows.values(), strict=True)
+    parsed = parsed_arrays(xs, ts if timed else None, Named(labels, "times", [*rows], names), layout, (kind, ROWS))
+    return parsed._replace(left_out=tuple(left_out))

@@ -21,7 +21,7 @@ from kineme.io.arrays.arrays import (
     point_names,
     sets_or_points,
 )
-from kineme.io.arrays.trees import NAMES, STAMP, Style, TreeMovement, listed_shapes, movements_in
+from kineme.io.arrays.trees import NAMES, STAMP, Style, TreeMovement, movements_in
 from kineme.io.limits import check_expanded
 from kineme.movements.tables.columns import choose_roles, is_time
 from kineme.movements.tables.layout import Layout, Parsed, listed, no_lines
@@ -36,7 +36,7 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: Style = NAMES, m
     """Return the movements of a tree, see `kineme.io.arrays.trees`.
 
     Several arrays of more than one column, of which `layout` chooses none, are refused unless `many` is "take": they
-    may mean different things, such as states and commands, or be parts of one state.
+    may mean different things, such as states and commands.
     """
     movements = [movement for movement in movements_in(tree, style) if movement.entries]
     if not movements:
@@ -58,9 +58,9 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: Style = NAMES, m
     kinds = ["text" if owner != STAMP and _is_text(first.entries[owner]) else "number" for owner in owners]
     wide = [name for name in names if owners.count(name) > 1]
     if many == "refuse" and layout.coordinates is None and len(wide) > 1:
+        shapes = ", ".join(f"{name} ({owners.count(name)})" for name in wide)
         raise DataError(
-            f"expected one array of coordinates, got {listed_shapes(first.entries, wide)}; say which with columns=, "
-            "in the shell --columns"
+            f"expected one array of coordinates, got {shapes}; say which with columns=, in the shell --columns"
         )
     roles = choose_roles(heads, kinds, layout)
     others = [roles.time, roles.nanoseconds, roles.label, *roles.clocks]
@@ -71,10 +71,7 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: Style = NAMES, m
 
 
 def _of_one_array(movements: list[TreeMovement], layout: Layout) -> list[TreeMovement]:
-    """Return movements that may be the points of one, as `sets_or_points` tells them; others as they are.
-
-    They are one array (n, T, d), or n lists of points with names for their coordinates, and have no times.
-    """
+    """Return movements that may be the points of one, without times, as `sets_or_points` tells; others as they are."""
     names = [*movements[0].entries]
     if any([*movement.entries] != names for movement in movements) or any(map(is_time, names)):
         return movements
@@ -105,7 +102,6 @@ def _of_one_array(movements: list[TreeMovement], layout: Layout) -> list[TreeMov
 
 
 def _bare(movements: Sequence[TreeMovement], layout: Layout, kind: str) -> Parsed:
-    """Return movements that are arrays alone, without times."""
     if len(movements) == 1 and not isinstance(layout.units, float | int):
         raise DataError(
             "expected times beside the positions, got one array alone; say the seconds between two samples with "
@@ -117,12 +113,10 @@ def _bare(movements: Sequence[TreeMovement], layout: Layout, kind: str) -> Parse
     xs = [numbers_of(np.asarray(next(iter(movement.entries.values())))) for movement in movements]
     xs = [x[:, None] if x.ndim == 1 else x for x in xs]
     width = Counter(x.shape[1] for x in xs).most_common(1)[0][0]
-    odd = tuple(
-        f"movement {movement.place}: {x.shape[1]} dimensions where most have {width}"
-        for movement, x in zip(movements, xs, strict=True)
-        if x.shape[1] != width
-    )
-    movements = [movement for movement, x in zip(movements, xs, strict=True) if x.shape[1] == width]
+    pairs = [*zip(movements, xs, strict=True)]
+    said = f"dimensions where most have {width}"
+    odd = tuple(f"movement {movement.place}: {x.shape[1]} {said}" for movement, x in pairs if x.shape[1] != width)
+    movements = [movement for movement, x in pairs if x.shape[1] == width]
     xs = [x for x in xs if x.shape[1] == width]
     labels = [movement.label for movement in movements]
     units = {tuple(_units_of(next(iter(movement.entries.values())), width)) for movement in movements}
@@ -182,10 +176,7 @@ def _table(
     columns: tuple[Sequence[str], Sequence[str]],
     needed: Mapping[str, bool],
 ) -> Table:
-    """Give the arrays that are needed, one movement after the other; what a movement lacks is a fault of its first row.
-
-    `needed` says of each whether it holds coordinates, which are not rounded.
-    """
+    """Give the needed arrays, coordinates unrounded; what a movement lacks is a fault of its first row."""
     heads, owners = columns
     lengths = [movement.length for movement in movements]
     widths = Counter(owners)
@@ -194,22 +185,19 @@ def _table(
     faults: dict[int, str] = {}
     arrays: dict[str, Any] = {}
     for name, is_coordinate in needed.items():
-        parts = []
+        several = []
         of_texts = name in first.entries and _is_text(first.entries[name])
         for movement, length, start in zip(movements, lengths, offsets, strict=False):
             part, fault = _part(movement, name, length, (widths[name], of_texts, not is_coordinate))
             here, there = (_units_of(each.entries.get(name), widths[name]) for each in (movement, first))
             if here != there and not fault:
                 fault = f"expected {name!r} in {', '.join(there)}, as in the first movement, got {', '.join(here)}"
-            parts.append(part)
+            several.append(part)
             if fault:
                 faults[int(start)] = fault
-        arrays[name] = np.concatenate(parts)
-    numbers = dict.fromkeys(widths, 0)
-    filled: list[Any] = []
-    for owner in owners:
-        filled.append(arrays[owner][:, numbers[owner]] if owner in arrays else None)
-        numbers[owner] += 1
+        arrays[name] = np.concatenate(several)
+    parts = {owner: iter(arrays[owner].T) for owner in arrays}
+    filled = [next(parts[owner]) if owner in parts else None for owner in owners]
     segments = Segments(offsets, [movement.place for movement in movements], [movement.label for movement in movements])
     units = [unit for name in dict.fromkeys(owners) for unit in _units_of(first.entries.get(name), widths[name])]
     movement_parts = None if len(movements) == 1 and not movements[0].place and movements[0].label is None else segments

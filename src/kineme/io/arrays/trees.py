@@ -102,11 +102,7 @@ class TreeMovement(NamedTuple):
 def movements_in(
     tree: Any, style: Style = NAMES, place: str = "", label: str | None = None, rate: Rate | None = None
 ) -> Iterator[TreeMovement]:
-    """Yield the movements in a tree, in its order, at the rate of the group around them where they say none.
-
-    An array has ``shape`` and ``dtype``, and is converted to one of NumPy only when it is needed. The style is `NAMES`
-    where arrays are named, `GROUPS` where they lie in groups.
-    """
+    """Yield the movements in a tree, at the rate of the group around them where they say none."""
     if place.count("/") > _DEEPEST:
         return
     if is_array(tree):
@@ -148,19 +144,21 @@ def _of_group(
     }
     said = {array.rate for array in arrays.values() if getattr(array, "rate", None) is not None}
     rate = rate_of(tree) or (said.pop() if len(said) == 1 else rate)
-    times = {match[1] or match[2]: array for name, array in arrays.items() if (match := _TIMES_OF.fullmatch(name))}
-    own_times = all(name in times or _is_stamp_of(name, arrays) for name in arrays)
+    owners = {name: match[1] or match[2] for name in arrays if (match := _TIMES_OF.fullmatch(name))}
+    times = {owner: arrays[name] for name, owner in owners.items()}  # ``wave_t`` of ``wave``
+    stamps = {name for name, owner in owners.items() if owner in arrays}
+    own_times = all(name in times or name in stamps for name in arrays)
     if arrays and not own_times and not labels and (_are_columns(arrays, style, rate) or _continues(arrays, groups)):
         entries = {inner: entry for inner, entry in _flat(tree, style.separator) if _fits(entry)}
         yield TreeMovement(place, label, {k: entry for k, entry in entries.items() if not _is_rate(k, entries)}, rate)
         return
     for name, array in arrays.items():
-        if _is_stamp_of(name, arrays):
+        if name in stamps:
             continue
         own = f"{place}/{name}" if place else name
         for movement in _of_array(array, own, label or label_of(name), labels.get(name, ("", ()))[1]):
-            stamps = {"time": times[name]} if name in times else {}
-            yield movement._replace(entries=stamps | movement.entries, rate=getattr(array, "rate", None) or rate)
+            timed = {"time": times[name]} if name in times else {}
+            yield movement._replace(entries=timed | movement.entries, rate=getattr(array, "rate", None) or rate)
     for name, array in groups.items():
         yield from movements_in(array, style, f"{place}/{name}" if place else name, label or label_of(name), rate)
 
@@ -196,17 +194,8 @@ def as_label(value: Any) -> str | None:
     return None if value is None else str(value) or None
 
 
-def _is_stamp_of(name: str, arrays: Mapping[str, Any]) -> bool:
-    """Tell whether an array is the times of another one: ``wave_t`` of ``wave``."""
-    match = _TIMES_OF.fullmatch(name)
-    return match is not None and (match[1] or match[2]) in arrays
-
-
 def _are_columns(arrays: Mapping[str, Any], style: Style, rate: Rate | None) -> bool:
-    """Tell whether arrays are the columns of one movement: with times, or of one length but not of one width.
-
-    Where a rate is given, most of them need to be so: the others do not change over time.
-    """
+    """Tell whether arrays, or most of them beside a rate, are columns of one movement."""
     if any(is_time(name) and len(array.shape) == 1 for name, array in arrays.items()):
         return True
     flat = [array.shape for array in arrays.values()]
@@ -258,7 +247,6 @@ def rate_of(tree: Mapping[str, Any]) -> Rate | None:
 
 
 def _number(value: Any) -> float | None:
-    """Return a number alone, also as a text."""
     try:
         return float(np.asarray(value).item())
     except (TypeError, ValueError):
@@ -266,7 +254,6 @@ def _number(value: Any) -> float | None:
 
 
 def _is_rate(name: str, tree: Mapping[str, Any]) -> bool:
-    """Tell whether an entry is one number with the name of a rate."""
     return seconds_named(name) is not None and np.shape(tree[name]) in ((), (1,), (1, 1))
 
 
@@ -293,8 +280,3 @@ def label_of(name: str) -> str | None:
     words = words_of(name)
     structural = set(words) <= MOVEMENT_WORDS | _STRUCTURAL or (words[:1] == ("x",) and set(words[1:]) <= _STRUCTURAL)
     return None if not words or words[-1].isdecimal() or (structural and words != ("x",)) else name
-
-
-def listed_shapes(entries: Mapping[str, Any], names: Sequence[str]) -> str:
-    """Return names of arrays with the width of each, for a message."""
-    return ", ".join(f"{name} ({int(np.prod(entries[name].shape[1:]))})" for name in names)

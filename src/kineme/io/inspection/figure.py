@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.ticker import NullFormatter
 
 from kineme.io.inspection.inspect import labels_in_order
@@ -100,8 +101,6 @@ def _path(movement: Trajectory) -> Any:
 
 
 def _key(across: str, unlike: bool) -> list[Any]:
-    from matplotlib.lines import Line2D
-
     odd = [Line2D([], [], color=ORANGE, linewidth=0.9, label="unlike the others")] if unlike else []
     return [
         *odd,

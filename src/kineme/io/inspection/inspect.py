@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from kineme.errors import DataError
 from kineme.io.reading.column_order import notes_on_aside, notes_on_order
-from kineme.io.reading.formats import FORMATS, data_set_of, entries_of
+from kineme.io.reading.formats import entries_of, format_at
 from kineme.io.reading.merge_files import Recordings, Sampling, notes_on_gaps, notes_on_sampling, sampling_of
 from kineme.io.records import Contents, Problem
 from kineme.movements.channels.channel import Channel, Channels
@@ -50,21 +50,17 @@ class Range(NamedTuple):
 
 
 class LabelSummary(NamedTuple):
-    """Summary of the movements of one label, or of those without a label.
-
-    `samples`, `duration` [s], `rate` [Hz] and `extent` (the longest side of the box around a movement) range over
-    movements; `jitter` is their median, see `Sampling`; `gaps` counts all, `longest_gap` [s] is 0 without any.
-    """
+    """Summary of the movements of one label, or of those without a label."""
 
     label: str | None
     movements: int
     samples: Range
-    duration: Range
-    rate: Range
-    extent: Range
-    jitter: float
-    gaps: int
-    longest_gap: float
+    duration: Range  # [s]
+    rate: Range  # [Hz]
+    extent: Range  # of the longest side of the box around a movement
+    jitter: float  # the median of movements, see `Sampling`
+    gaps: int  # in all
+    longest_gap: float  # [s]; 0 without any
 
 
 class Inspection(NamedTuple):
@@ -163,16 +159,14 @@ def _notes(recordings: Recordings, labels: tuple[LabelSummary, ...]) -> list[str
 
 def _notes_on_channels(demos: Demonstrations) -> list[str]:
     """Return columns whose values do not fit their kind, and those that never change."""
-    channels, x, starts, notes = demos.channels or (), demos.recorded, demos.offsets[:-1], list[str]()
-    columns_of_channels = columns_of(channels)
+    channels, x, notes = demos.channels or (), demos.recorded, list[str]()
+    named = [*zip(channels, columns_of(channels), strict=True)]
     if len(columns_recorded(channels).heads) >= _MANY:
-        # Columns that have one value throughout every movement tell nothing of what moves.
-        still = (np.maximum.reduceat(x, starts, axis=0) == np.minimum.reduceat(x, starts, axis=0)).all(axis=0)
-        named = zip(channels, columns_of_channels, strict=True)
+        still = (_sides(x, demos.offsets) == 0).all(axis=0)  # one value throughout every movement
         if quiet := [channel.name for channel, columns in named if still[columns].all()]:
             names = first_names(quiet, _NAMED)
             notes.append(f"{len(quiet)} of {len(channels)} channels never move: {names}; --exclude leaves them out")
-    for channel, columns in zip(channels, columns_of_channels, strict=True):
+    for channel, columns in named:
         values = x[:, columns.start]
         if channel.kind == "position" and values.min() < values.max() and ((values == 0) | (values == 1)).all():
             notes.append(f"{channel.name} is 0 or 1 throughout; if it is a switch, say --kind {channel.name}=discrete")
@@ -180,10 +174,7 @@ def _notes_on_channels(demos: Demonstrations) -> list[str]:
 
 
 def duplicates_among(demonstrations: Demonstrations) -> list[list[int]]:
-    """Return groups of indices of equal movements, each group in order.
-
-    Candidates have equal lengths, ends and sums, computed for all movements at once; they are compared by sample.
-    """
+    """Return groups of indices of equal movements. Those of equal lengths, ends and sums are compared by sample."""
     x, offsets = demonstrations.positions, demonstrations.offsets
     key = np.column_stack(
         (demonstrations.lengths, x[offsets[:-1]], x[offsets[1:] - 1], np.add.reduceat(x, offsets[:-1], axis=0))
@@ -211,16 +202,15 @@ def duplicates_among(demonstrations: Demonstrations) -> list[list[int]]:
 
 def extents_of(demos: Demonstrations) -> Array:
     """Return the sides (n, d) of the box around each movement."""
-    x, starts = demos.positions, demos.offsets[:-1]
-    return np.asarray(np.maximum.reduceat(x, starts, axis=0) - np.minimum.reduceat(x, starts, axis=0))
+    return _sides(demos.positions, demos.offsets)
+
+
+def _sides(x: Array, offsets: NDArray[np.intp]) -> Array:
+    return np.asarray(np.maximum.reduceat(x, offsets[:-1], axis=0) - np.minimum.reduceat(x, offsets[:-1], axis=0))
 
 
 def notes_on_extents(demos: Demonstrations) -> list[str]:
-    """Give a sentence if some columns reach much further than all others, as a gripper in mm beside joints in radians.
-
-    Columns that belong together are one group: one axis or one joint may move alone. Rotations are left aside, they
-    are brought to the size of positions.
-    """
+    """Say that a group of columns reaches much further than all others, as a gripper in mm beside joints in radians."""
     greatest = extents_of(demos).max(axis=0, initial=0.0)
     groups: dict[str, dict[str, float]] = {}
     at = 0
@@ -246,10 +236,8 @@ def notes_on_sizes(demos: Demonstrations) -> list[str]:
     """Say that movements of one label differ in size as millimeters and meters do, if no file says their unit."""
     extents = extents_of(demos).max(axis=1, initial=0.0)
     labels = np.full(len(demos), None) if demos.labels is None else demos.labels
-    for label in dict.fromkeys(labels.tolist()):
+    for label in dict.fromkeys(labels[extents > 0.0].tolist()):
         chosen = np.flatnonzero((labels == label) & (extents > 0.0))
-        if not len(chosen):
-            continue
         small, large = (int(chosen[k]) for k in (extents[chosen].argmin(), extents[chosen].argmax()))
         if extents[large] >= _LARGER * extents[small]:
             of_label = "" if label is None else f" of {label}"
@@ -271,10 +259,7 @@ def _group(channel: Channel) -> str:
 
 def as_data(inspection: Inspection) -> dict[str, Any]:
     """Return nested lists and dictionaries; units as the fields of `Inspection` and `LabelSummary` say."""
-    return {
-        "movements": inspection.movements,
-        "files": inspection.files,
-        "dimensions": inspection.dimensions,
+    return inspection._asdict() | {
         "labels": [
             {name: value._asdict() if isinstance(value, Range) else value for name, value in summary._asdict().items()}
             for summary in inspection.labels
@@ -292,33 +277,26 @@ def as_data(inspection: Inspection) -> dict[str, Any]:
 def as_words(inspection: Inspection) -> str:
     """Write a table of labels, how files were read, duplicates, and what could not be read."""
     rows = [_row(summary) for summary in inspection.labels]
-    title = (
-        f"{counted(inspection.movements, 'movement')} of {counted(inspection.dimensions, 'dimension')} "
-        f"in {counted(inspection.files, 'file')}"
-    )
+    movements, dimensions = counted(inspection.movements, "movement"), counted(inspection.dimensions, "dimension")
+    title = f"{movements} of {dimensions} in {counted(inspection.files, 'file')}"
     heads = ("label", "movements", "samples", "duration [s]", "rate [Hz]", "jitter", "gaps", "extent")
     parts = [to_text(Table(title, heads, rows))]
-    parts += _listed("read as", [f"{_understood(how)} ({counted(n, 'file')})" for how, n in inspection.detected])
-    channels = inspection.channels or ()
-    parts += _listed("kinds", _kinds(channels))
-    parts += _listed("the same movement more than once", [" = ".join(group) for group in inspection.duplicates])
-    parts += _listed("not read", _by_reason([problem for problem in inspection.problems if not problem.samples]))
-    parts += _listed(
-        "read but for samples", _by_reason([problem for problem in inspection.problems if problem.samples])
-    )
-    parts += _listed("note", list(inspection.notes))
+    lists = {
+        "read as": [f"{_understood(how)} ({counted(n, 'file')})" for how, n in inspection.detected],
+        "kinds": _kinds(inspection.channels or ()),
+        "the same movement more than once": [" = ".join(group) for group in inspection.duplicates],
+        "not read": _by_reason([problem for problem in inspection.problems if not problem.samples]),
+        "read but for samples": _by_reason([problem for problem in inspection.problems if problem.samples]),
+        "note": inspection.notes,
+    }
+    for head, lines in lists.items():
+        more = [f"  and {len(lines) - _SHOWN} more"] if len(lines) > _SHOWN else []
+        if lines:
+            parts.append("\n".join([f"{head}:", *(f"  {printable(line)}" for line in lines[:_SHOWN]), *more]))
     return "\n\n".join(parts)
 
 
-def _listed(head: str, lines: list[str]) -> list[str]:
-    if not lines:
-        return []
-    more = [f"  and {len(lines) - _SHOWN} more"] if len(lines) > _SHOWN else []
-    return ["\n".join([f"{head}:", *(f"  {printable(line)}" for line in lines[:_SHOWN]), *more])]
-
-
 def _by_reason(problems: Sequence[Problem]) -> list[str]:
-    """Return a line for each reason, with the files that share it."""
     files: dict[str, dict[str, None]] = {}
     for problem in problems:
         files.setdefault(problem.what, {})[problem.file] = None
@@ -379,7 +357,6 @@ def _understood(how: Detected) -> str:
 
 
 def _coordinates(how: Detected) -> str:
-    """Return the coordinates with their units, once if they have the same."""
     units = set(how.measured_in)
     if len(units) == 1:
         return f"{first_names(how.columns, _COLUMNS)} in {units.pop()}"
@@ -399,25 +376,16 @@ def contents_of_all(paths: Sequence[Path], follow_links: bool = False) -> list[C
     merged: dict[tuple[str, tuple[str, ...]], Contents] = {}
     for name, several in listed.items():
         for content in several:
-            before = merged.get(
-                (content.name, content.heads), Contents(content.name, (_FILE, *content.heads), (), content.note)
-            )
-            rows = tuple((name, *row) for row in content.rows)
-            merged[content.name, content.heads] = before._replace(
-                rows=before.rows + rows, note=before.note or content.note
-            )
+            key, rows = (content.name, content.heads), tuple((name, *row) for row in content.rows)
+            before = merged.get(key, Contents(content.name, (_FILE, *content.heads), ()))
+            merged[key] = before._replace(rows=before.rows + rows, note=before.note or content.note)
     return list(merged.values())
 
 
 def contents_of(path: Path) -> list[Contents]:
-    """Return the contents of one recording.
-
-    There are none of a folder of files, of formats that hold movements alone, and of what cannot be opened: reading it
-    gives the reason.
-    """
-    data_set = data_set_of(path)
-    form = FORMATS.get(path.suffix.lower()) if data_set is None else data_set.format
-    if form is None or form.contents is None or (data_set is None and not path.is_file()):
+    """Return the contents of one recording; none of what cannot be opened, of which reading gives the reason."""
+    form = format_at(path)
+    if form is None or form.contents is None or not (path.is_dir() or path.is_file()):
         return []
     try:
         return form.contents(path)
@@ -432,18 +400,16 @@ def contents_as_data(contents: list[Contents]) -> dict[str, Any]:
 
 def contents_as_words(contents: list[Contents]) -> list[str]:
     """Return a table of each: what several files have alike once, and of a long list only what holds movements."""
-    return [_in_words(_alike_once(content)) for content in contents]
-
-
-def _in_words(content: Contents) -> str:
-    title = f"{content.name}{f' {content.note}' if content.note else ''}"
-    rows = content.rows
-    if len(rows) > _SHOWN:
-        rows = tuple(row for row in rows if not any(str(cell).startswith(_IDLE) for cell in row[-2:]))
-    n_idle = len(content.rows) - len(rows)
-    more = f"\nand {n_idle} {content.name} that hold no movement; --json lists them" if n_idle else ""
-    cells = [tuple(f"{cell:,}" if isinstance(cell, int) else printable(cell) for cell in row) for row in rows]
-    return to_text(Table(title, content.heads, cells)) + more
+    texts = []
+    for name, heads, all_rows, note in map(_alike_once, contents):
+        rows = all_rows
+        if len(rows) > _SHOWN:
+            rows = tuple(row for row in rows if not any(str(cell).startswith(_IDLE) for cell in row[-2:]))
+        n_idle = len(all_rows) - len(rows)
+        more = f"\nand {n_idle} {name} that hold no movement; --json lists them" if n_idle else ""
+        cells = [tuple(f"{cell:,}" if isinstance(cell, int) else printable(cell) for cell in row) for row in rows]
+        texts.append(to_text(Table(f"{name} {note}".strip(), heads, cells)) + more)
+    return texts
 
 
 def _alike_once(content: Contents) -> Contents:
@@ -455,16 +421,12 @@ def _alike_once(content: Contents) -> Contents:
     for _, *cells in content.rows:
         groups.setdefault(tuple(cell for cell in cells if isinstance(cell, str)), []).append(cells)
     rows = tuple(
-        (
-            *(_range_of_counts([row[k] for row in alike]) for k in range(len(content.heads) - 1)),
-            f"{len(alike)} of {n_files}",
-        )
-        for alike in groups.values()
+        (*map(_range_of_counts, zip(*alike, strict=True)), f"{len(alike)} of {n_files}") for alike in groups.values()
     )
     return content._replace(heads=(*content.heads[1:], "files"), rows=rows)
 
 
-def _range_of_counts(cells: list[str | int]) -> str:
+def _range_of_counts(cells: Sequence[str | int]) -> str:
     """Return a text that all rows have, or the least and the greatest of their numbers."""
     numbers = [cell for cell in cells if isinstance(cell, int)]
     if not numbers:

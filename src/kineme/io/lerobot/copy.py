@@ -1,8 +1,7 @@
 """Copy a data set of LeRobot with texts about the movements of its episodes.
 
 Version 3 has a column for them, `language_persistent`, of rows that hold from a time of an episode on. Programs for
-version 2 read texts but no lists of rows: in its column `annotation.motion` each frame holds the rows of its episode as
-one text, a list in JSON with the fields of the rows of version 3.
+version 2 read texts but no lists: in `annotation.motion` each frame holds the same rows of its episode as JSON.
 """
 
 from __future__ import annotations
@@ -10,16 +9,21 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
 from numpy.typing import NDArray
+from pyarrow import parquet
 
 from kineme.errors import DataError
 from kineme.io.lerobot.info import MARKER, read_episodes, read_info, read_json
+from kineme.io.records import damaged_as
 
 #: Of a movement, in coordinates of the robot: not of a camera, which stays null.
 ROLE, STYLE = "assistant", "motion"
@@ -52,19 +56,10 @@ class Column(NamedTuple):
 
 
 def copy_with_motions(source: Path, target: Path, motions: Mapping[int, Sequence[Motion]]) -> None:
-    """Copy a data set into a folder, with texts about the movements of its episodes on each of their frames.
+    """Copy a data set into an empty folder, with texts about the movements of its episodes, by their numbers.
 
-    They stand in the column that `COLUMNS` has for the version: `language_persistent` of version 3, whose programs know
-    it, and `annotation.motion` of version 2, whose programs read texts but fail on lists of rows. Shards are written
-    anew, each with the column; meta/info.json gets an entry for it if it has none. All else is copied; videos and
-    pictures are hard links where the file system has them.
-
-    Parameters
-    ----------
-    source, target : Path
-        Folders; the second exists and is empty.
-    motions : mapping of int to sequence of Motion
-        Number of an episode -> its texts.
+    They stand on each of the frames, in the column that `COLUMNS` has for the version and meta/info.json names. Shards
+    are written anew. All else is copied; videos and pictures are hard links where the file system has them.
     """
     info = read_info(source)
     column = COLUMNS[info.version]
@@ -89,68 +84,49 @@ def copy_with_motions(source: Path, target: Path, motions: Mapping[int, Sequence
 
 
 def _take(source: Path, old: Path, new: Path, changed: set[Path]) -> None:
-    """Copy or link a file, unless it will be written."""
     if old in changed:
         return
     if old.relative_to(source).parts[0] not in _OWN:
-        try:
+        with suppress(OSError):
             os.link(old.resolve(), new)
-        except OSError:
-            pass
-        else:
             return
     shutil.copy2(old, new)
 
 
 def write_shard(source: Path, target: Path, motions: Mapping[int, Sequence[Motion]], column: Column) -> None:
-    """Copy a shard, group of rows after group of rows, with the texts of its episodes on each of their frames.
-
-    Texts of others stay, before those that are added; those of this package are replaced. All other columns, what the
-    file says of itself, its groups of rows and its compression are those of the source.
-    """
-    import pyarrow as pa
-    from pyarrow import parquet
-
+    """Copy a shard with the texts of its episodes on each of their frames, behind those of others."""
+    # What is wrong with the disk when writing stays an error of the system.
+    reading = partial(damaged_as, "expected a Parquet file, got a damaged one", OSError)
     try:
-        with _reading():
+        with reading():
             file = parquet.ParquetFile(source)
         with file:
             schema = file.schema_arrow
             kind = column.type_in(schema)
-            with _reading():
+            with reading():
                 # The texts of the episodes of a shard, each at the stamp of a frame, in the order of time.
                 columns = file.read(columns=["episode_index", "timestamp"], use_threads=False)
                 episodes, stamps = (columns.column(name).to_numpy() for name in ("episode_index", "timestamp"))
-                snapped: dict[int, list[Motion]] = {}
-                for episode in np.unique(episodes).tolist():
-                    own = stamps[episodes == episode] if episode in motions else stamps[:0]
-                    nearest = [float(own[np.abs(own - motion.start).argmin()]) for motion in motions.get(episode, ())]
-                    some = zip(nearest, motions.get(episode, ()), strict=True)
-                    snapped[episode] = sorted(motion._replace(start=stamp) for stamp, motion in some)
-                rows = snapped
+                rows: dict[int, list[Motion]] = {}
+                for episode in {*np.unique(episodes).tolist()} & {*motions}:
+                    own = stamps[episodes == episode]
+                    rows[episode] = sorted(
+                        motion._replace(start=float(own[np.abs(own - motion.start).argmin()]))
+                        for motion in motions[episode]
+                    )
             if column.name not in schema.names:
                 schema = schema.append(pa.field(column.name, kind))
             packed = _compression(file.metadata, column.leaves(kind))
             with parquet.ParquetWriter(target, schema, compression=packed) as writer:
                 for k in range(file.num_row_groups):
-                    with _reading():
+                    with reading():
                         table = file.read_row_group(k, use_threads=False)
-                    writer.write_table(
-                        _extended(table, rows, column, kind, schema), row_group_size=max(table.num_rows, 1)
-                    )
+                    table = _extended(table, rows, column, kind, schema)
+                    writer.write_table(table, row_group_size=max(table.num_rows, 1))
     except DataError as error:
         raise DataError(f"{source.name}: {error}") from error
     except (pa.ArrowException, ValueError, KeyError) as error:
         raise DataError(f"expected the shard {source.name} to take the column {column.name}, got: {error}") from error
-
-
-@contextmanager
-def _reading() -> Iterator[None]:
-    """Raise damage as an error of the data; what is wrong with the disk when writing stays one of the system."""
-    try:
-        yield
-    except OSError as error:
-        raise DataError(f"expected a Parquet file, got a damaged one ({error})") from error
 
 
 def _compression(metadata: Any, leaves: Sequence[str]) -> str | dict[str, str]:
@@ -165,9 +141,6 @@ def _compression(metadata: Any, leaves: Sequence[str]) -> str | dict[str, str]:
 
 
 def _extended(table: Any, motions: Mapping[int, list[Motion]], column: Column, kind: Any, schema: Any) -> Any:
-    """Return rows of a shard with the column, new or longer."""
-    import pyarrow as pa
-
     numbers, episode_of = np.unique(table.column("episode_index").to_numpy(), return_inverse=True)
     old = table.column(column.name) if column.name in table.column_names else None
     if old is not None:
@@ -179,8 +152,6 @@ def _extended(table: Any, motions: Mapping[int, list[Motion]], column: Column, k
 
 def language_type(schema: Any) -> Any:
     """Return the type of the column: that which the shard has, else LeRobot's, with calls of tools as texts in JSON."""
-    import pyarrow as pa
-
     if LANGUAGE in schema.names:
         kind = schema.field(LANGUAGE).type
         is_list_of_rows = pa.types.is_list(kind) and pa.types.is_struct(kind.value_type)
@@ -188,15 +159,10 @@ def language_type(schema: Any) -> Any:
         if not {"role", "content", "style", "timestamp"} <= names:
             raise DataError(f"expected rows with role, content, style, timestamp in {LANGUAGE}, got {kind}")
         return kind
-    fields = [
-        pa.field("role", pa.string(), nullable=False),
-        pa.field("content", pa.string()),
-        pa.field("style", pa.string()),
-        pa.field("timestamp", pa.float32(), nullable=False),
-        pa.field("camera", pa.string()),
-        pa.field("tool_calls", pa.list_(pa.string())),
-    ]
-    return pa.list_(pa.struct(fields))
+    text = pa.string()
+    role, stamp = pa.field("role", text, nullable=False), pa.field("timestamp", pa.float32(), nullable=False)
+    others = [("camera", text), ("tool_calls", pa.list_(text))]
+    return pa.list_(pa.struct([role, ("content", text), ("style", text), stamp, *others]))
 
 
 def language_leaves(kind: Any) -> list[str]:
@@ -208,25 +174,11 @@ def language_leaves(kind: Any) -> list[str]:
 def with_language(old: Any, motions: Sequence[Sequence[Motion]], episode_of: NDArray[np.intp], kind: Any) -> Any:
     """Return the column of some rows: those of others that are there, behind them the texts of each row's episode.
 
-    `old` is the column so far, an array of Arrow or None; `motions` are those of some episodes, `episode_of` (T,) says
-    which of these a row belongs to, and `kind` is a `language_type`.
+    `old` is the column so far or None; `episode_of` (T,) says which of the `motions` a row belongs to.
     """
-    import pyarrow as pa
-
     added = _language_rows([motion for some in motions for motion in some], kind.value_type)
     counts = np.array([len(some) for some in motions], dtype=np.int64)
-    if old is None:
-        return _lengthened(pa.nulls(len(episode_of), kind), added, counts, episode_of, kind, False)
-    return _lengthened(old, added, counts, episode_of, kind, True)
-
-
-def _lengthened(
-    old: Any, added: Any, counts: NDArray[np.int64], episode_of: NDArray[np.intp], kind: Any, keep_nulls: bool
-) -> Any:
-    """Return lists with those of the episode behind: what is added stands episode after episode, `counts` of each."""
-    import pyarrow as pa
-
-    flat, before = _lists_of_others(old)
+    flat, before = _lists_of_others(pa.nulls(len(episode_of), kind) if old is None else old)
     own = counts[episode_of]
     lengths = before + own
     offsets = np.concatenate(([0], np.cumsum(lengths)))
@@ -236,15 +188,12 @@ def _lengthened(
     is_old = within < np.repeat(before, lengths)
     where = within + np.where(is_old, np.repeat(first_old, lengths), np.repeat(first_added, lengths))
     values = pa.concat_arrays([flat, added]).take(pa.array(where))
-    absent = pa.array(np.asarray(old.is_null()) & (own == 0)) if keep_nulls else None
+    absent = None if old is None else pa.array(np.asarray(old.is_null()) & (own == 0))
     return pa.ListArray.from_arrays(pa.array(offsets, pa.int32()), values, type=kind, mask=absent)
 
 
 def _lists_of_others(old: Any) -> tuple[Any, NDArray[np.int64]]:
     """Return the rows in all lists that are not of this package, and how many each list has."""
-    import pyarrow as pa
-    import pyarrow.compute as pc
-
     flat = old.flatten()
     counts = pc.fill_null(pc.list_value_length(old), 0).to_numpy(zero_copy_only=False).astype(np.int64)
     style, content = (pc.cast(pc.struct_field(flat, name), pa.string()) for name in ("style", "content"))
@@ -255,41 +204,29 @@ def _lists_of_others(old: Any) -> tuple[Any, NDArray[np.int64]]:
 
 
 def _language_rows(motions: Sequence[Motion], kind: Any) -> Any:
-    import pyarrow as pa
-
     values: dict[str, list[Any]] = {
         "role": [ROLE] * len(motions),
         "content": [motion.content for motion in motions],
         "style": [STYLE] * len(motions),
         "timestamp": [motion.start for motion in motions],
     }
-    fields = list(kind)
     arrays = [
         pa.array(values[field.name], type=field.type) if field.name in values else pa.nulls(len(motions), field.type)
-        for field in fields
+        for field in kind
     ]
-    return pa.StructArray.from_arrays(arrays, fields=fields)
+    return pa.StructArray.from_arrays(arrays, fields=list(kind))
 
 
 def text_type(schema: Any) -> Any:
     """Return the type of the column; a `DataError` if the shard has another of that name."""
-    import pyarrow as pa
-
     kind = schema.field(MOTION_TEXTS).type if MOTION_TEXTS in schema.names else pa.string()
     if kind not in (pa.string(), pa.large_string()):
         raise DataError(f"expected texts in {MOTION_TEXTS}, got {kind}")
     return kind
 
 
-def text_leaves(kind: Any) -> list[str]:
-    """Return paths of the parts of the column in a Parquet file."""
-    return [MOTION_TEXTS]
-
-
 def with_texts(old: Any, motions: Sequence[Sequence[Motion]], episode_of: NDArray[np.intp], kind: Any) -> Any:
     """Return the column of some rows, see `with_language`."""
-    import pyarrow as pa
-
     plain = {"role": ROLE, "style": STYLE, "camera": None, "tool_calls": None}
     added = [[{**plain, "content": motion.content, "timestamp": motion.start} for motion in some] for some in motions]
     contents, text_of = [""], np.zeros(len(episode_of), dtype=np.intp)
@@ -303,13 +240,9 @@ def with_texts(old: Any, motions: Sequence[Sequence[Motion]], episode_of: NDArra
 
 
 def _texts_of_others(text: str) -> list[Any]:
-    """Return the rows of a text that are not of this package."""
-    if not text:
-        return []
-    try:
-        rows = json.loads(text)
-    except (ValueError, RecursionError):
-        rows = None
+    rows = None
+    with suppress(ValueError, RecursionError):
+        rows = json.loads(text or "[]")
     if not isinstance(rows, list):
         raise DataError(f"expected lists in JSON in {MOTION_TEXTS}, got {text[:40]!r}")
     return [row for row in rows if not (isinstance(row, dict) and str(row.get("content")).startswith(OWN))]
@@ -317,6 +250,6 @@ def _texts_of_others(text: str) -> list[Any]:
 
 #: Version -> its column.
 COLUMNS = {
-    2: Column(MOTION_TEXTS, TEXT_FEATURE, text_type, text_leaves, with_texts),
+    2: Column(MOTION_TEXTS, TEXT_FEATURE, text_type, lambda kind: [MOTION_TEXTS], with_texts),
     3: Column(LANGUAGE, LANGUAGE_FEATURE, language_type, language_leaves, with_language),
 }

@@ -6,7 +6,7 @@ import json
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from kineme.errors import DataError
 from kineme.io.limits import check_expanded
+from kineme.io.records import damaged_as
 
 _V2 = "meta/episodes.jsonl"
 _V3 = "meta/episodes/*/*.parquet"
@@ -23,6 +24,7 @@ _SHARD = ("data/chunk_index", "data/file_index")
 _LARGEST = 2**62
 _AN_EPISODE, _A_TASK = 200, 100  # bytes that one takes once it is read
 _AT_ONCE = 2**16  # rows
+_DAMAGED = "expected {} in the meta folder of a LeRobot data set, got a damaged file"
 
 MARKER = "meta/info.json"
 COUNTERS = ("timestamp", "frame_index", "episode_index", "index", "task_index")  # features of every data set
@@ -45,19 +47,13 @@ class Info(NamedTuple):
     episodes: int | None  # how many it says that there are
     chunk: int  # episodes in a chunk, for version 2
 
-    @property
-    def vectors(self) -> dict[str, int]:
-        """The features that are vectors, with their widths."""
-        return {name: len(entries) for name, entries in self.heads.items() if entries != ("",)}
-
 
 def read_json(path: Path, what: str) -> Any:
     """Read the content of a JSON file of a data set; a `DataError` that names it if that is damaged or not there."""
-    try:
+    said = f"expected {what} of a LeRobot data set, got none that can be read"
+    with damaged_as(said, OSError, ValueError, RecursionError):
         check_expanded(min(path.stat().st_size, _MOST_BYTES) * 10)
         return json.loads(path.read_bytes())
-    except (OSError, ValueError, RecursionError) as error:
-        raise DataError(f"expected {what} of a LeRobot data set, got none that can be read ({error})") from error
 
 
 def read_info(folder: Path) -> Info:
@@ -93,10 +89,9 @@ def _entries(name: str, feature: Any) -> tuple[str, ...]:
     shape = feature.get("shape")
     if not isinstance(shape, list) or not all(isinstance(size, int) and size > 0 for size in shape):
         return ()
-    width = math.prod(shape)
-    names, units = _names(feature.get("names")), feature.get("units")
-    if width > _WIDEST:
+    if (width := math.prod(shape)) > _WIDEST:
         return ()
+    names, units = _names(feature.get("names")), feature.get("units")
     if len(names) == width and len(set(names)) == width and (width > 1 or isinstance(units, list)):
         if isinstance(units, list) and len(units) == width:
             return tuple(
@@ -116,9 +111,8 @@ def _names(names: Any) -> list[str]:
 class Episodes(NamedTuple):
     """The declarations of the episodes, in their order."""
 
-    # numbers and lengths: shape (n,)
-    numbers: NDArray[np.int64]
-    lengths: NDArray[np.int64]
+    numbers: NDArray[np.int64]  # shape (n,)
+    lengths: NDArray[np.int64]  # shape (n,)
     shards: list[str]  # the file that holds each, relative to the data set
     problems: list[str]  # what of meta/episodes could not be read
 
@@ -176,20 +170,16 @@ def read_tasks(folder: Path) -> tuple[dict[int, str], list[str]]:
 
 def _lines(path: Path, integers: Sequence[str], problems: list[str], text: str = "") -> Iterator[dict[str, Any]]:
     """Yield objects that have whole numbers, and the text if one is named; other lines are problems."""
-    try:
+    said = f"expected meta/{path.name} of a LeRobot data set, got none that can be read"
+    with damaged_as(said, OSError, ValueError):
         check_expanded(10 * path.stat().st_size)
         lines = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, ValueError) as error:
-        raise DataError(
-            f"expected meta/{path.name} of a LeRobot data set, got none that can be read ({error})"
-        ) from error
     for k, line in enumerate(lines, 1):
         if not line.strip():
             continue
-        try:
+        row: Any = None
+        with suppress(ValueError, RecursionError):
             row = json.loads(line)
-        except (ValueError, RecursionError):
-            row = None
         numbers = [row.get(name) for name in integers] if isinstance(row, dict) else [None]
         if all(type(number) is int and abs(number) < _LARGEST for number in numbers) and (not text or row.get(text)):
             yield row
@@ -199,7 +189,6 @@ def _lines(path: Path, integers: Sequence[str], problems: list[str], text: str =
 
 
 def _table(folder: Path, names: Sequence[str], problems: list[str]) -> list[NDArray[np.int64]]:
-    """Return columns of all files of meta/episodes that can be read, in the order of the files."""
     import pyarrow as pa
 
     files = sorted(folder.glob(_V3))
@@ -228,7 +217,7 @@ def _texts_of_tasks(path: Path) -> dict[int, str]:
     import pyarrow as pa
     from pyarrow import parquet
 
-    with _damage_named(path):
+    with damaged_as(_DAMAGED.format(path.name), pa.ArrowException, OSError):
         schema = parquet.read_schema(path)
     values = [
         (field.name, field.type.value_type if pa.types.is_dictionary(field.type) else field.type) for field in schema
@@ -251,7 +240,8 @@ def _rows(path: Path, names: Sequence[str], a_row: int, before: int = 0, texts: 
     import pyarrow as pa
     from pyarrow import parquet
 
-    with _damage_named(path), parquet.ParquetFile(path, read_dictionary=list(texts)) as file:
+    damaged = damaged_as(_DAMAGED.format(path.name), pa.ArrowException, OSError)
+    with damaged, parquet.ParquetFile(path, read_dictionary=list(texts)) as file:
         missing = {*names} - {*file.schema_arrow.names}
         if missing:
             raise DataError(f"expected the columns {sorted(names)} in {path.name}, got no {sorted(missing)[0]!r}")
@@ -261,17 +251,3 @@ def _rows(path: Path, names: Sequence[str], a_row: int, before: int = 0, texts: 
             check_expanded(max(a_row * n_rows, n_bytes), path.name)
             batches.append(batch)
         return pa.Table.from_batches(batches) if batches else file.read(columns=list(names))
-
-
-@contextmanager
-def _damage_named(path: Path) -> Iterator[None]:
-    import pyarrow as pa
-
-    try:
-        yield
-    except DataError:
-        raise
-    except (pa.ArrowException, OSError) as error:
-        raise DataError(
-            f"expected {path.name} in the meta folder of a LeRobot data set, got a damaged file ({error})"
-        ) from error

@@ -1,22 +1,21 @@
-"""A data set of LeRobot as movements: one for each episode, named by its task.
-
-The frames are read shard after shard, the columns that are needed, some rows at a time.
-"""
+"""A data set of LeRobot as movements: one for each episode, named by its task. Frames are read some rows at a time."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import pyarrow as pa
 from numpy.typing import NDArray
+from pyarrow import parquet
 
 from kineme.errors import DataError
 from kineme.io.lerobot.info import Episodes, Info, read_episodes, read_info, read_tasks
 from kineme.io.limits import check_expanded
-from kineme.io.records import needs
 from kineme.io.tables.parquet import is_list, rows_of_lists
 from kineme.movements.tables.columns import choose_roles, column_numbers
 from kineme.movements.tables.layout import Column, Layout, Parsed, listed, no_lines
@@ -35,14 +34,7 @@ _TOLERANCE = 1e-4  # s between the stored stamps and the frames at the declared 
 
 
 def lerobot_movements(folder: Path, layout: Layout) -> Parsed:
-    """Read a data set of LeRobot, version 2 or 3.
-
-    The coordinates are the entries of ``observation.state``, or of the features that ``columns`` names: whole ones or
-    single entries. A movement is an episode, its place is ``episode 12``, its label the text of its task. Where the
-    stamps are those of frames at the declared rate, to 0.1 ms, exactly these are taken.
-    """
-    with needs("pyarrow", "read Parquet", "parquet"):
-        import pyarrow  # noqa: F401
+    """Read a data set of LeRobot, version 2 or 3: ``observation.state``, or what ``columns`` names, of each episode."""
     # Refuse a choice of times, movements or labels that the data set has already made otherwise.
     named = {"label": (layout.label, ("task", "task_index")), "time": (layout.time, ("timestamp",))}
     for what, (given, names) in named.items():
@@ -81,7 +73,7 @@ def _chosen(info: Info, layout: Layout) -> tuple[dict[str, int], tuple[str, ...]
     owners = [name for name, entries in info.heads.items() for _ in entries]
     entries = [entry for entries_of_head in info.heads.values() for entry in entries_of_head]
     full = [f"{name}.{entry}" if entry else name for name, entry in zip(owners, entries, strict=True)]
-    vectors = info.vectors
+    vectors = {name: len(entries) for name, entries in info.heads.items() if entries != ("",)}
     name = STATE if STATE in info.heads else next(iter(vectors)) if len(vectors) == 1 else None
     if layout.coordinates is not None:
         short = [entry if owner == name else head for owner, entry, head in zip(owners, entries, full, strict=True)]
@@ -106,15 +98,13 @@ def _numbers_of(full: Sequence[str], short: Sequence[str], columns: Sequence[Col
         try:
             numbers += column_numbers(full, [column])
         except DataError:
-            if not isinstance(column, str) or column.isdecimal():
+            of_entry: tuple[int, ...] = ()
+            if isinstance(column, str) and not column.isdecimal():
+                with suppress(DataError):
+                    of_entry = column_numbers(short, [column])
+            if not of_entry:
                 raise
-            try:
-                numbers += column_numbers(short, [column])
-            except DataError:
-                pass
-            else:
-                continue
-            raise
+            numbers += of_entry
     return numbers
 
 
@@ -161,11 +151,7 @@ def _labels(frames: Frames, offsets: NDArray[np.intp], tasks: dict[int, str]) ->
 def whole_episodes(
     frames: Frames, declared: Episodes, unread: Collection[str]
 ) -> tuple[Frames, NDArray[np.intp], list[str]]:
-    """Return the frames of the whole episodes, where each begins and ends, and what is wrong with the others.
-
-    An episode that stands behind a later one is kept, and named among the problems; those of shards that could not be
-    read (`unread`) are not.
-    """
+    """Return the frames of the whole episodes, where each begins and ends, and what is wrong with the others."""
     n = len(frames.values)
     offsets = np.concatenate(([0], np.flatnonzero(np.diff(frames.episodes)) + 1, [n])).astype(np.intp)[: n + 1]
     numbers, lengths = frames.episodes[offsets[:-1]], np.diff(offsets)
@@ -202,13 +188,9 @@ def episode_names(numbers: Sequence[int]) -> str:
 
 
 def _divided(numbers: NDArray[np.int64]) -> dict[int, str]:
-    """Return episodes whose frames stand in several places."""
     episodes, counts = np.unique(numbers, return_counts=True)
-    several = counts > 1
-    return {
-        k: f"expected its frames in one place, got them in {count} places"
-        for k, count in zip(episodes[several].tolist(), counts[several].tolist(), strict=True)
-    }
+    pairs = zip(episodes.tolist(), counts.tolist(), strict=True)
+    return {k: f"expected its frames in one place, got them in {count} places" for k, count in pairs if count > 1}
 
 
 def _disordered(frames: Frames, offsets: NDArray[np.intp], numbers: NDArray[np.int64]) -> dict[int, str]:
@@ -223,23 +205,20 @@ def _disordered(frames: Frames, offsets: NDArray[np.intp], numbers: NDArray[np.i
 
 
 def _miscounted(numbers: NDArray[np.int64], lengths: NDArray[np.intp], declared: Episodes) -> dict[int, str]:
-    """Return episodes that are not declared, or with another length."""
     where = np.searchsorted(declared.numbers, numbers).clip(max=len(declared.numbers) - 1)
     is_declared = declared.numbers[where] == numbers
     wrong = dict.fromkeys(numbers[~is_declared].tolist(), "expected an episode that the meta folder declares")
-    odd = is_declared & (declared.lengths[where] != lengths)
-    return wrong | {
-        int(numbers[i]): f"expected {counted(int(declared.lengths[where[i]]), 'frame')} as declared, got {lengths[i]}"
-        for i in np.flatnonzero(odd).tolist()
-    }
+    for i in np.flatnonzero(is_declared & (declared.lengths[where] != lengths)).tolist():
+        expected = counted(int(declared.lengths[where[i]]), "frame")
+        wrong[int(numbers[i])] = f"expected {expected} as declared, got {lengths[i]}"
+    return wrong
 
 
 def _taken(frames: Frames, mask: NDArray[np.bool_]) -> Frames:
     """Return the kept frames; what is wrong with them keeps its rows."""
     row = np.cumsum(mask) - 1
     faults = {int(row[k]): reason for k, reason in frames.faults.items() if mask[k]}
-    values, episodes, numbers, tasks, stamps, _ = frames
-    return Frames(values[mask], episodes[mask], numbers[mask], tasks[mask], stamps[mask], faults)
+    return Frames._make([*(column[mask] for column in frames[:5]), faults])
 
 
 class Frames(NamedTuple):
@@ -255,13 +234,7 @@ class Frames(NamedTuple):
 
 
 def read_shard(folder: Path, shard: str, features: Mapping[str, int], taken: int) -> list[Frames]:
-    """Read the frames of a shard, in parts, with the features that are read, by their widths.
-
-    `taken` are the bytes of earlier shards, for the limit.
-    """
-    import pyarrow as pa
-    from pyarrow import parquet
-
+    """Read the frames of a shard, in parts, with features by their widths; earlier shards have taken so many bytes."""
     path = folder / shard
     if not path.is_file():
         raise DataError(f"expected the shard {shard}, found none")
@@ -292,8 +265,7 @@ def joined(parts: list[Frames]) -> Frames:
     faults = {
         start + row: reason for start, part in zip(starts, parts, strict=False) for row, reason in part.faults.items()
     }
-    arrays = [np.concatenate([part[k] for part in parts]) for k in range(5)]
-    return Frames(arrays[0], arrays[1], arrays[2], arrays[3], arrays[4], faults)
+    return Frames._make([*(np.concatenate([part[k] for part in parts]) for k in range(5)), faults])
 
 
 def _frames(batch: Any, features: Mapping[str, int]) -> Frames:

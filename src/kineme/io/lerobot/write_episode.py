@@ -33,27 +33,10 @@ Features = Mapping[str, Array]  # feature -> (T, d)
 def write_episode(
     folder: Path, features: Features, entries: Mapping[str, str | None], fps: float, task: str, robot: str
 ) -> int:
-    """Write one episode; every file is written whole or not at all, and what counts the episodes last.
+    """Write one episode, and return its number; every file is written whole or not at all, what counts episodes last.
 
-    Parameters
-    ----------
-    folder : Path
-        A new folder, or a data set of version 3 with the same features, names and rate: the episode is then its last.
-    features : mapping of str to ndarray of shape (T, d)
-        As ``action`` and ``observation.state``.
-    entries : mapping of d str to str or None
-        Names of their entries, and the unit of each as meta/info.json says it; None where it is not known.
-    fps : float
-        Frames per second.
-    task : str
-        What is done in the episode.
-    robot : str
-        Type of the robot, of a new data set.
-
-    Returns
-    -------
-    int
-        Number of the episode.
+    It begins a new folder, or is the last one of a data set of version 3 with the same features, names and rate.
+    `features` such as ``action`` have the entries that `entries` names, each with its unit, None where it is not known.
     """
     with needs("pyarrow", "write LeRobot", "parquet"):
         import pyarrow  # noqa: F401 - so that the message names the extra
@@ -76,7 +59,6 @@ def write_episode(
 
 
 def _check(info: Any, entry: Mapping[str, Any], fps: float) -> None:
-    """Refuse a data set that the episode does not fit into."""
     version, declared = info.get("codebase_version"), info.get("features")
     if not str(version).startswith("v3."):
         raise DataError(f"expected a LeRobot data set of version 3 to append to, got {version}")
@@ -148,7 +130,6 @@ def _append(folder: Path, info: dict[str, Any], features: Features, task: str) -
 
 
 def _tasks(folder: Path) -> list[str]:
-    """Return texts of the tasks in the order of their numbers."""
     from pyarrow import parquet
 
     if not (folder / _TASKS).is_file():
@@ -185,13 +166,9 @@ def _write_json(path: Path, content: Any) -> None:
 def statistics_of(values: NDArray[Any]) -> Statistics:
     """Return statistics of one feature over the frames of an episode, values of shape (T,) or (T, d)."""
     rows = np.asarray(values, dtype=np.float64).reshape(len(values), -1)
-    statistics = {"min": rows.min(axis=0), "max": rows.max(axis=0), "mean": rows.mean(axis=0), "std": rows.std(axis=0)}
-    quantiles = dict(zip(_QUANTILES, np.quantile(rows, list(_QUANTILES.values()), axis=0), strict=True))
-    return {
-        **{name: values.tolist() for name, values in statistics.items()},
-        "count": [len(rows)],
-        **{name: values.tolist() for name, values in quantiles.items()},
-    }
+    statistics = {name: getattr(rows, name)(axis=0).tolist() for name in ("min", "max", "mean", "std")}
+    quantiles = np.quantile(rows, list(_QUANTILES.values()), axis=0).tolist()
+    return {**statistics, "count": [len(rows)], **dict(zip(_QUANTILES, quantiles, strict=True))}
 
 
 def merged_statistics(first: Statistics | None, second: Statistics) -> Statistics:

@@ -31,6 +31,7 @@ _OTHER = re.compile(
     r"|(^|_)[vp][xyz]$|multiplier|lambda|/forceset/"
 )
 _TRANSLATION = re.compile(r"_t[xyz](/value)?$")
+_NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)(e[-+]?\d+)?|nan", re.IGNORECASE)
 
 STAMP = "time [s]"  # head of the times
 
@@ -81,10 +82,9 @@ def without_common_subject(names: Iterable[str]) -> list[str]:
 def opensim_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) -> ExportHead | None:
     """Return the head of a motion or storage file of OpenSim, or None if the first lines do not look like one.
 
-    Source: OpenSim, "Motion (.mot) Files" and "Storage (.sto) Files", in the older and the newer version of their head.
-    Lines such as ``nRows=153`` and ``inDegrees=yes``, or of SIMM ``datarows 153``, end with ``endheader``; then come a
-    row of names, the first of them ``time``, and the samples. Where ``DataType`` says ``Quaternion`` or ``Vec3``, a
-    cell holds several numbers between commas, of a quaternion w, x, y, z.
+    Source: OpenSim, "Motion (.mot) Files" and "Storage (.sto) Files". Lines such as ``inDegrees=yes``, or of SIMM
+    ``datarows 153``, end with ``endheader``; then come a row of names, the first of them ``time``, and the samples.
+    Where ``DataType`` says ``Quaternion`` or ``Vec3``, a cell holds several numbers between commas.
     """
     if not any(_KEY.match(line.strip().lstrip("\ufeff")) for line in lines[:3]):
         return None
@@ -120,10 +120,7 @@ def opensim_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]
 
 
 def _unit(name: str, in_degrees: str, title: str) -> str:
-    """Return the unit of a column: ``inDegrees`` says it of coordinates that turn, and those that shift are in meters.
-
-    Without degrees, radians are sure only where the title says that the columns are coordinates.
-    """
+    """Return the unit of a column, where ``inDegrees``, its name and the title tell it for certain."""
     plain = name.lower()
     coordinates = "coordinates" in title.lower() or plain.endswith("/value")
     if in_degrees.lower() not in ("yes", "no") or _OTHER.search(plain):
@@ -138,10 +135,9 @@ def _unit(name: str, in_degrees: str, title: str) -> str:
 def optitrack_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) -> ExportHead | None:
     """Return the head of an export of Motive, or None if the first line does not look like one.
 
-    Source: OptiTrack, "Data Export: CSV", versions 1.2 and later of the format. The first line holds names and values
-    in turn: ``Format Version,1.23,...,Export Frame Rate,120,...,Length Units,Meters``. After an empty line there are
-    rows with the type, the name, the id and, since version 1.25, the parent of each column, then one with what it
-    holds, and the row of heads ``Frame,Time (Seconds),X``.
+    Source: OptiTrack, "Data Export: CSV", versions 1.2 and later. The first line holds names and values in turn:
+    ``Format Version,1.23,...,Length Units,Meters``. After an empty line there are rows with the type, the name, the id
+    and more of each column, then one with what it holds, and the row of heads ``Frame,Time (Seconds),X``.
     """
     cells = cells_of(lines[0], ",") if lines else []
     if not cells or cells[0].lower() != "format version":
@@ -184,9 +180,8 @@ def optitrack_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str
 def qualisys_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) -> ExportHead | None:
     """Return the head of an export of Qualisys Track Manager, or None if the first line does not look like one.
 
-    Source: Qualisys, "Motion data (.tsv)" and "6DOF data (.tsv)". Lines of a keyword, a tab and its value:
-    ``FREQUENCY``, ``NO_OF_FRAMES``, ``MARKER_NAMES`` or ``BODY_NAMES``, ...; then, if asked for, a row of heads; then
-    the samples, with or without a frame and a time before them. Positions are in millimeters.
+    Source: Qualisys, "Motion data (.tsv)" and "6DOF data (.tsv)". Lines of a keyword, a tab and its value; then, if
+    asked for, a row of heads; then the samples, with or without a frame and a time before them. Positions are in mm.
     """
     if not lines or lines[0].lstrip("\ufeff").split("\t")[0].strip() not in ("NO_OF_FRAMES", "FILE_VERSION"):
         return None
@@ -203,7 +198,7 @@ def qualisys_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]
     if not names:
         raise DataError("expected a Qualisys export of 3D or 6DOF data with MARKER_NAMES or BODY_NAMES, got neither")
     row = cells_of(lines[at], "\t") if at < len(lines) else []
-    headed = bool(row) and not any(_is_number(cell) for cell in row)
+    headed = bool(row) and not any(_NUMBER.fullmatch(cell) for cell in row)
     at += headed
     sample = cells_of(lines[at], "\t") if at < len(lines) else []
     while sample and not sample[-1]:
@@ -233,23 +228,12 @@ def _columns(names: Sequence[str], bodies: bool) -> tuple[list[str], list[str]]:
     return heads, [unit for _ in names for _, unit in groups]
 
 
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell.replace(",", "."))
-    except ValueError:
-        return False
-    return True
-
-
 def trc_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) -> ExportHead | None:
-    """Return the head of a TRC file, or None if the first line does not look like one.
-
-    Tracked markers over time, as Cortex of Motion Analysis writes them, and OpenSim, OptiTrack and others after it.
+    """Return the head of a TRC file, tracked markers over time, or None if the first line does not look like one.
 
     Source: OpenSim, "Marker (.trc) Files". A line ``PathFileType 4 (X/Y/Z) name.trc``, a row of keys and one of their
-    values (``DataRate``, ``Units``, ...), a row with ``Frame#``, ``Time`` and the name above the first column of each
-    marker, a row of axes ``X1 Y1 Z1``, mostly an empty line, and the samples; all separated by tabs, or by commas where
-    a program for tables has saved the file.
+    values, a row with ``Frame#``, ``Time`` and the name above the first column of each marker, a row of axes
+    ``X1 Y1 Z1``, mostly an empty line, and the samples; a program for tables may have made commas of the tabs.
     """
     first = lines[0].lstrip("\ufeff") if lines else ""
     if not first.startswith(_FIRST):
@@ -261,9 +245,8 @@ def trc_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) ->
     said = dict(zip((key.lower() for key in keys), values, strict=False))
     if [cell.lower() for cell in names[:2]] != ["frame#", "time"]:
         raise DataError(f"expected the heads 'Frame#', 'Time' and names in line 4 of a TRC file, got {names[:2]}")
-    n = max(
-        (k + 1 for k, cell in enumerate(axes) if cell), default=len(names)
-    )  # names may end in more tabs than samples
+    # Names may end in more tabs than samples.
+    n = max((k + 1 for k, cell in enumerate(axes) if cell), default=len(names))
     plain, ends = list(filled((names + [""] * n)[:n])), (axes + [""] * n)[:n]
     columns = [
         f"{name}.{end[0].lower()}" if end[:1] in "XYZ" and end else "" for name, end in zip(plain, ends, strict=True)
@@ -277,11 +260,11 @@ def trc_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) ->
 
 
 def vicon_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) -> ExportHead | None:
-    """Return the head of the first section of markers, else of segments, objects, joints, outputs, devices; or None.
+    """Return the head of the first section of `_SECTIONS` in an export of Vicon, or None.
 
-    Source: Vicon, "Nexus User Guide: Export data to ASCII". A file has one or more sections: a line with the name of
-    the section, a line with its rate, a row with ``subject:marker`` above the first column of each, the row of heads
-    ``Frame,Sub Frame,X,Y,Z,...``, a row of units, and the samples up to an empty line.
+    Source: Vicon, "Nexus User Guide: Export data to ASCII". A section is a line with its name, one with its rate, a row
+    with ``subject:marker`` above the first column of each, the row of heads ``Frame,Sub Frame,X,Y,Z,...``, a row of
+    units, and the samples up to an empty line.
     """
     first = next((k for k, line in enumerate(lines) if line.strip(" \t\r\n,")), None)
     if first is None or _name(lines[first]) not in (*_SECTIONS, *_OTHERS):

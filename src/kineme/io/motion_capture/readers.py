@@ -1,17 +1,10 @@
 """Files of motion capture systems as tables: C3D, BVH and MVNX.
 
-C3D holds points or rotations; its parameters are read by the package of that name. Source: Motion Lab Systems, "The C3D
-File Format User Guide"; of rotations C-Motion, "ROTATION_DATA_TYPE": for each frame and segment 16 numbers of a matrix,
-column by column, that turns and shifts it, and one that is negative where it is unknown.
-
-BVH is a hierarchy of joints with their channels, and one line of numbers for each frame. Source: Biovision's format as
-Meredith and Maddock, "Motion Capture File Formats Explained", 2001, describe it. Channels are named
-``Joint.Xposition`` and ``Joint.Zrotation``; rotations are in degrees, positions in a unit that no file says.
-
-MVNX is XML of Xsens MVN. Source: Xsens, "MVN User Manual", the section on MVNX. ``<subject frameRate="60">`` holds
-``<segments>`` and ``<joints>``, which name what the numbers of each ``<frame time="16" type="normal">`` are of:
-``<orientation>`` has w, x, y, z and ``<position>`` x, y, z [m] of each segment, ``<jointAngle>`` three angles [deg] of
-each joint. Times are in milliseconds.
+Sources: of C3D, Motion Lab Systems, "The C3D File Format User Guide", and of its rotations C-Motion,
+"ROTATION_DATA_TYPE": for each frame and segment 16 numbers of a matrix, column by column, and one that is negative
+where it is unknown. Of BVH, Meredith and Maddock, "Motion Capture File Formats Explained", 2001; rotations are in
+degrees, positions in a unit that no file says. Of MVNX, Xsens, "MVN User Manual": ``<segments>`` and ``<joints>`` name
+what the numbers of each ``<frame time="16" type="normal">`` are of, in meters, degrees and milliseconds.
 """
 
 from __future__ import annotations
@@ -20,7 +13,7 @@ import io
 import warnings
 from collections.abc import Sequence
 from itertools import islice
-from typing import Any, NamedTuple
+from typing import Any
 from xml.parsers import expat
 
 import numpy as np
@@ -28,35 +21,29 @@ import numpy as np
 from kineme.errors import DataError
 from kineme.io.limits import check_expanded
 from kineme.io.motion_capture.export_heads import STAMP, positive, without_common_subject
-from kineme.io.records import needs
+from kineme.io.records import damaged_as, needs
 from kineme.movements.channels.column_match import Columns
 from kineme.movements.tables.columns import Roles, choose_roles
 from kineme.movements.tables.layout import Layout, no_lines
 from kineme.movements.tables.table import Table
 
 _DEEPEST = 32
-_MOST = 10_000  # segments and joints
+_MOST = 10_000  # segments and joints, or channels
+_MOST_LABELS = 260  # parameters of labels, of 255 each
+_COMPUTED = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")  # parameters that list such points
+_OFF = 1e-2  # of a matrix that counts as a rotation, from orthonormal
 
 
-class Quantity(NamedTuple):
-    """A kind of numbers in a frame: whose, what columns are called, and their unit."""
-
-    owners: str
-    ends: tuple[str, ...]
-    unit: str
-
-
-#: Element of a frame -> what it holds. Those of segments are learned unless columns are chosen.
+#: Element of a frame -> whose numbers it holds, what columns are called, and their unit. Those of segments are learned
+#: unless columns are chosen.
 _QUANTITIES = {
-    "position": Quantity("segment", tuple(f"position.{axis}" for axis in "xyz"), "m"),
-    "orientation": Quantity("segment", tuple(f"orientation.{axis}" for axis in "wxyz"), ""),
-    "jointAngle": Quantity("joint", tuple(f"angle.{axis}" for axis in "xyz"), "deg"),
+    "position": ("segment", [f"position.{axis}" for axis in "xyz"], "m"),
+    "orientation": ("segment", [f"orientation.{axis}" for axis in "wxyz"], ""),
+    "jointAngle": ("joint", [f"angle.{axis}" for axis in "xyz"], "deg"),
 }
 
 
 class _Content:
-    """The content that is gathered while the XML is parsed."""
-
     def __init__(self) -> None:
         self.rate = ""
         self.names: dict[str, list[str]] = {"segment": [], "joint": []}
@@ -100,25 +87,26 @@ class _Content:
 
 
 def read_mvnx_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
-    """Read the columns of an MVNX file: ``Pelvis.position.x``, ``Pelvis.orientation.w``, ``jRightElbow.angle.x``, ...
-
-    Unless columns are chosen, angles of joints are learned only where there are no segments. What a frame lacks is NaN.
-    """
+    """Read an MVNX file: ``Pelvis.position.x``, ``Pelvis.orientation.w``; angles where there are no segments."""
     check_expanded(3 * len(data))
     content = _parsed(data)
     count = len(content.stamps)
     if not count:
         raise DataError("expected frames of type 'normal' in an MVNX file, got none")
     heads, units, columns, faults = [STAMP], ["s"], [_times(content)], dict[int, str]()
-    for name, quantity in _QUANTITIES.items():
-        owners = content.names[quantity.owners]
+    for name, (kind, ends, unit) in _QUANTITIES.items():
+        owners = content.names[kind]
         if not any(content.texts[name]) or not owners:
             continue
-        width = len(owners) * len(quantity.ends)
+        width = len(owners) * len(ends)
         check_expanded(16 * count * width)
-        heads += [f"{owner}.{end}" for owner in owners for end in quantity.ends]
-        units += [quantity.unit] * width
-        columns += [*_numbers(content.texts[name], count, (name, width), faults).T]
+        heads += [f"{owner}.{end}" for owner in owners for end in ends]
+        units += [unit] * width
+        texts = content.texts[name] + [""] * (count - len(content.texts[name]))
+        values, wrong = _numbers(texts, width, f" in {name!r}")
+        # What a frame lacks altogether is a gap.
+        faults |= {row: reason for row, reason in wrong.items() if texts[row].strip()}
+        columns += [*values.T]
     if len(heads) == 1:
         raise DataError(f"expected {', '.join(_QUANTITIES)} in the frames of an MVNX file, got none of them")
     roles = choose_roles(heads, ("number",) * len(heads), layout)
@@ -135,10 +123,8 @@ def _parsed(data: bytes) -> _Content:
     parser.StartElementHandler, parser.EndElementHandler = content.start, content.end
     parser.CharacterDataHandler = content.characters
     parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = _refuse
-    try:
+    with damaged_as("expected an MVNX file, got something foreign, truncated or damaged", expat.ExpatError):
         parser.Parse(data, True)
-    except expat.ExpatError as error:
-        raise DataError(f"expected an MVNX file, got something foreign, truncated or damaged ({error})") from error
     return content
 
 
@@ -163,59 +149,43 @@ def _times(content: _Content) -> Any:
     return even
 
 
-def _numbers(texts: list[str], count: int, what: tuple[str, int], faults: dict[int, str]) -> Any:
-    """Parse numbers (count, width) of all frames, NaN where a frame has none; other counts are faults of frames."""
-    name, width = what
-    values = np.full((count, width), np.nan)
+def _numbers(texts: Sequence[str], width: int, where: str) -> tuple[Any, dict[int, str]]:
+    """Parse the numbers (T, width) of all frames, NaN in one that has not so many, and say what is wrong there."""
+    values, faults = np.full((len(texts), width), np.nan), {}
     for row, text in enumerate(texts):
         words = text.split()
-        try:
-            numbers = [float(word) for word in words]
-        except ValueError:
-            faults[row] = f"expected numbers in {name!r}, got {text.strip()[:40]!r}"
+        if len(words) != width:
+            faults[row] = f"expected {width} numbers{where}, got {len(words)}"
             continue
-        if len(numbers) == width:
-            values[row] = numbers
-        elif numbers:
-            faults[row] = f"expected {width} numbers in {name!r}, got {len(numbers)}"
-    return values
-
-
-_MOST_CHANNELS = 10_000
-
-_MOST_LABELS = 260  # parameters of labels, of 255 each
-_COMPUTED = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")  # parameters that list such points
-_OFF = 1e-2  # of a matrix that counts as a rotation, from orthonormal
+        try:
+            values[row] = [float(word) for word in words]
+        except ValueError:
+            faults[row] = f"expected {width} numbers{where}, got {text.strip()[:40]!r}"
+    return values, faults
 
 
 def read_c3d_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
-    """Read the positions of all points over time, without points the poses of all segments; what is lost is NaN.
-
-    Poses of segments beside points, and what a model computed instead of places, as the angles of joints, are left
-    aside unless columns name them.
-    """
+    """Read the positions of points, else the poses of segments, NaN where lost; the others if columns name them."""
     with needs("c3d", "read C3D files", "mocap"):
         import c3d
     if data[1:2] != b"\x50":
         raise DataError("expected a C3D file, got something foreign")
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of frames that are missing, which are counted below
-            reader = c3d.Reader(io.BytesIO(data))
-            names, values, units, rate = _content(reader, data)
-            is_point = [True] * len(names)
-            if int(reader.point_used) > 0:
-                computed = [unit for unit in _computed(reader, len(names) // 3) for _ in "xyz"]
-                is_point = [unit is None for unit in computed]
-                units = [own if unit is None else unit for own, unit in zip(units, computed, strict=True)]
-            if int(reader.point_used) > 0 and (segments := _beside(reader, data, rate, len(values), units[0])):
-                names, values = [*names, *segments[0]], np.hstack([values, segments[1]])
-                units = [*units, *segments[2]]
-                is_point += [False] * len(segments[0])
-    except DataError:
-        raise
-    except Exception as error:  # the package raises much on damaged files, even names that it did not assign
-        raise DataError(f"expected a C3D file, got a truncated or damaged one ({error})") from error
+    # The package raises much on damaged files, even names that it did not assign.
+    with damaged_as("expected a C3D file, got a truncated or damaged one", Exception), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of frames that are missing, which are counted below
+        reader = c3d.Reader(io.BytesIO(data))
+        names, values, units, rate = _content(reader, data)
+        is_point = [True] * len(names)
+        if int(reader.point_used) > 0:
+            computed = [unit for unit in _computed(reader, len(names) // 3) for _ in "xyz"]
+            is_point = [unit is None for unit in computed]
+            units = [own if unit is None else unit for own, unit in zip(units, computed, strict=True)]
+            used = reader.get("ROTATION:USED")
+            if used is not None and used.int16_value > 0:  # the poses of segments beside points
+                owners, poses, measured_in, same = _rotations(reader, data, len(values), units[0])
+                if same == rate and len(poses) == len(values):
+                    names, values, units = [*names, *owners], np.hstack([values, poses]), [*units, *measured_in]
+                    is_point += [False] * len(owners)
     heads = (STAMP, *names)
     is_read = is_point if layout.coordinates is None and any(is_point) else [True] * len(names)
     kinds = ("number", *("number" if is_number else "text" for is_number in is_read))
@@ -260,22 +230,8 @@ def _content(reader: Any, data: bytes) -> tuple[list[str], Any, list[str], float
     return heads, points.reshape(n_frames, -1), [length] * len(heads), rate
 
 
-def _beside(
-    reader: Any, data: bytes, rate: float, n_frames: int, length: str
-) -> tuple[list[str], Any, list[str]] | None:
-    """Return the poses of segments beside points, as `_content`; None where there are none of the same rate."""
-    used = reader.get("ROTATION:USED")
-    if used is None or used.int16_value < 1:
-        return None
-    names, values, units, same = _rotations(reader, data, n_frames, length)
-    return (names, values, units) if same == rate and len(values) == n_frames else None
-
-
 def _computed(reader: Any, count: int) -> list[str | None]:
-    """Return the unit of each point that holds an angle, a force, a moment or a power; None of places.
-
-    Source: Vicon's Plug-in Gait, which lists the points of each kind in parameters such as POINT:ANGLES.
-    """
+    """Return the unit of each point that holds an angle, a force or the like, as of Vicon's Plug-in Gait, else None."""
     unit_of: dict[str, str] = {}
     for kind in _COMPUTED:
         unit = reader.get(f"POINT:{kind.removesuffix('S')}_UNITS")
@@ -368,7 +324,6 @@ def read_bvh_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
 
 
 def _channels(lines: Sequence[str]) -> list[str]:
-    """Return the channels of all joints in their order."""
     joint, names = "", []
     for k, line in enumerate(lines, 1):
         words = line.split()
@@ -382,7 +337,7 @@ def _channels(lines: Sequence[str]) -> list[str]:
                     f"expected a joint's number of channels and their names in line {k}, got {line.strip()!r}"
                 )
             names += [f"{joint}.{channel}" for channel in words[2:]]
-    if not 0 < len(names) <= _MOST_CHANNELS:
+    if not 0 < len(names) <= _MOST:
         raise DataError(f"expected joints with channels in the hierarchy of a BVH file, got {len(names)} channels")
     return names
 
@@ -398,10 +353,7 @@ def _step(lines: Sequence[str], at: int) -> tuple[float, int]:
     raise DataError("expected 'Frame Time: SECONDS' below MOTION, got none: a truncated or damaged file")
 
 
-def _values(
-    lines: Sequence[str], first: int, width: int
-) -> tuple[np.ndarray[tuple[int, int], np.dtype[np.float64]], dict[int, str]]:
-    """Return the numbers of all frames, NaN in a line that is not one number per channel, and what is wrong there."""
+def _values(lines: Sequence[str], first: int, width: int) -> tuple[Any, dict[int, str]]:
     rows = [line for line in lines[first:] if line.strip()]
     if not rows:
         raise DataError("expected frames below the time of a frame, got none")
@@ -412,15 +364,4 @@ def _values(
             return values, {}
     except ValueError:
         pass
-    values, faults = np.full((len(rows), width), np.nan), {}
-    for row, line in enumerate(rows):
-        try:
-            numbers = [float(word) for word in line.split()]
-        except ValueError:
-            faults[row] = f"expected {width} numbers, got {line.strip()[:40]!r}"
-            continue
-        if len(numbers) == width:
-            values[row] = numbers
-        else:
-            faults[row] = f"expected {width} numbers, one for each channel, got {len(numbers)}"
-    return values, faults
+    return _numbers(rows, width, ", one for each channel")

@@ -1,7 +1,4 @@
-"""Fill short gaps, crop ends without values, drop the invalid movements of a file and report why.
-
-No Python loop runs over the valid movements.
-"""
+"""Fill short gaps, crop ends without values, drop the invalid movements of a file and report why."""
 
 from __future__ import annotations
 
@@ -15,7 +12,7 @@ from kineme.errors import DataError, TrajectoryError
 from kineme.io.records import Problem, in_shell
 from kineme.movements.channels.channel import Channel, Channels
 from kineme.movements.channels.coordinates import period_of_channel, without_wraps
-from kineme.movements.channels.detect import find_channels
+from kineme.movements.channels.detect import Given, find_channels
 from kineme.movements.rotations import slerp
 from kineme.movements.tables.layout import Block, Layout, Repair
 from kineme.reporting.text import counted
@@ -47,10 +44,8 @@ Flags = NDArray[np.bool_]
 def check_block(block: Block, file: str, layout: Layout, columns: Sequence[str]) -> tuple[Block, list[Problem]]:
     """Return the valid movements, gaps filled and ends cropped, and one problem for each invalid movement.
 
-    `skip` of the layout says what is dropped for a sample that is missing, infinite, out of range, or not later than
-    the one before: its movement, or the sample alone. Movements of fewer than `MIN_SAMPLES` samples, or with an extent
-    out of range, are always dropped; the ranges are those of `kineme.validation`. `columns` are the d names of the
-    columns, and `file` is what problems name.
+    `skip` of the layout says what is dropped for a sample that is missing, out of the ranges of `kineme.validation`, or
+    not later than the one before. Movements of fewer than `MIN_SAMPLES` samples or too small are always dropped.
     """
     skip, problems = layout.skip, list[Problem]()
     odd = _unusable(block, skip)
@@ -112,15 +107,12 @@ def _unusable(block: Block, skip: str) -> Flags:
     late = ~(step >= SHORTEST_STEP)
     if skip == "sample" and (odd | late).any():
         # Samples not later than all usable ones before them, in the movements that have a fault.
-        result = np.zeros_like(odd)
-        owners = np.unique(np.searchsorted(block.offsets, np.flatnonzero(odd | late), side="right") - 1)
-        for i in owners:
+        for i in np.unique(np.searchsorted(block.offsets, np.flatnonzero(odd | late), side="right") - 1):
             rows = slice(block.offsets[i], block.offsets[i + 1])
             usable = np.where(odd[rows], -np.inf, block.times[rows])
             before = np.maximum.accumulate(np.concatenate(([-np.inf], usable[:-1])))
             with np.errstate(invalid="ignore"):  # dropped samples may be NaN or infinite
-                result[rows] = ~odd[rows] & ~(usable - before >= SHORTEST_STEP)
-        return odd | result
+                late[rows] = ~(usable - before >= SHORTEST_STEP)
     return odd | late
 
 
@@ -161,7 +153,6 @@ def _reason(block: Block, i: int, k: int) -> str:
 
 
 def _keep(block: Block, mask: Flags) -> Block:
-    """Return the kept samples of every movement."""
     offsets = np.concatenate(([0], np.cumsum(mask)))[block.offsets].astype(np.intp)
     rows = np.flatnonzero(mask) if block.rows is None else block.rows[mask]
     times = None if block.times is None else block.times[mask]
@@ -182,10 +173,7 @@ def take_movements(block: Block, chosen: Flags) -> Block:
 
 
 def spans_of(missing: Flags, times: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
-    """Find runs of missing values (T,) at times (T,) [s]: first rows, rows after the last ones, and their lengths [s].
-
-    The length is that from the value before to the value after; it is infinite at the ends of a movement.
-    """
+    """Find runs of missing values (T,) at times (T,) [s]: first rows, rows after the last ones, and lengths [s]."""
     edges = np.diff(np.concatenate(([False], missing, [False])).astype(np.int8))
     first, stop = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
     before, after = np.concatenate(([-np.inf], times)), np.concatenate((times, [np.inf]))
@@ -193,10 +181,7 @@ def spans_of(missing: Flags, times: Array) -> tuple[NDArray[np.intp], NDArray[np
 
 
 def sentinels_as_missing(block: Block, columns: Sequence[str]) -> tuple[Block, tuple[str, ...]]:
-    """Take numbers as -9999 that stand for no value as missing, and say which in which columns.
-
-    They are that where they lie farther from all other values of their column than these do from each other.
-    """
+    """Take numbers as -9999, far from all others of their column, as missing values, and say which in which columns."""
     positions, said = block.positions, []
     with np.errstate(invalid="ignore"):
         suspected = np.flatnonzero((np.abs(positions) >= np.abs(SENTINELS).min()).any(axis=0))
@@ -245,38 +230,31 @@ def fill_gaps(block: Block, columns: Sequence[str], layout: Layout) -> Block:
         ends = times[[0, -1]] - times[inside][[0, -1]]
         filled = filled[inside]
         repairs[i] = Repair(int(np.count_nonzero(filled)), float(filled.max()), float(np.abs(ends).sum()))
-    samples_kept = ~outside
-    offsets = np.concatenate(([0], np.cumsum(samples_kept)))[block.offsets].astype(np.intp)
-    return replace(
-        block,
-        positions=positions[samples_kept],
-        times=block.times[samples_kept],
-        offsets=offsets,
-        rows=np.flatnonzero(samples_kept) if block.rows is None else block.rows[samples_kept],
-        repairs=repairs,
-    )
+    return replace(_keep(replace(block, positions=positions), ~outside), repairs=repairs)
 
 
 def _span_of_all(missing: Flags, skip: str) -> slice:
     """Return the samples from the first to the last one in which all columns of a movement (T, d) have values."""
-    n = len(missing)
-    complete = np.flatnonzero(~missing.any(axis=1))
-    if len(complete) and complete[-1] + 1 - complete[0] >= max(MIN_SAMPLES, 0 if skip == "sample" else _LEAST * n):
-        return slice(int(complete[0]), int(complete[-1]) + 1)
-    present = ~missing
+    n, present = len(missing), ~missing
     ends = np.where(missing.all(axis=0), n, present.argmax(axis=0) + present[::-1].argmax(axis=0))
-    complete = np.flatnonzero(~missing[:, ends < _EDGE * n].any(axis=1))
-    if len(complete) and complete[-1] + 1 - complete[0] >= max(MIN_SAMPLES, _LEAST * n):
-        return slice(int(complete[0]), int(complete[-1]) + 1)
+    for columns, least in ((ends <= n, 0 if skip == "sample" else _LEAST * n), (ends < _EDGE * n, _LEAST * n)):
+        complete = np.flatnonzero(present[:, columns].all(axis=1))
+        if len(complete) and complete[-1] + 1 - complete[0] >= max(MIN_SAMPLES, least):
+            return slice(int(complete[0]), int(complete[-1]) + 1)
     return slice(0, n)
+
+
+def kinds_of(given: Given, columns: Sequence[str]) -> dict[str, str]:
+    """Return the given kinds that are of these columns."""
+    named = {key: {key} if key in columns else {name.strip() for name in key.split(",")} for key in given}
+    return {key: given[key] for key, names in named.items() if names <= {*columns}}
 
 
 def _channels(block: Block, columns: Sequence[str], layout: Layout, complete: Flags) -> Channels:
     """Find the channels by the samples in which no value is missing; a step across a gap tells nothing."""
     if np.count_nonzero(complete) < MIN_SAMPLES:
         return tuple(Channel(name, "position", (name,)) for name in columns)
-    kinds = layout.kinds if isinstance(layout.kinds, Mapping) else {}
-    given = {key: kind for key, kind in kinds.items() if {name.strip() for name in key.split(",")} <= {*columns}}
+    given = kinds_of(layout.kinds if isinstance(layout.kinds, Mapping) else {}, columns)
     begins = complete & ~np.append(False, complete[:-1])
     firsts = block.offsets[:-1][np.diff(block.offsets) > 0]
     begins[firsts] = complete[firsts]
@@ -334,11 +312,7 @@ def _smooth(stamps: Array, values: Array, times: Array) -> Array:
 
 
 def lacking_values(block: Block, columns: Sequence[str], i: int, skip: str) -> tuple[tuple[str, ...], str]:
-    """Return what movement i lacks, and say in which share of its samples, and the options that read it nevertheless.
-
-    These are columns, or what several begin with before a dot that lack the same samples, the most frequently missing
-    first.
-    """
+    """Return the columns of movement i that lack values, or what they begin with, and say what reads them."""
     rows = slice(block.offsets[i], block.offsets[i + 1])
     missing = np.isnan(block.positions[rows])
     share_of = missing.mean(axis=0).tolist()
@@ -365,6 +339,5 @@ def lacking_values(block: Block, columns: Sequence[str], i: int, skip: str) -> t
     options |= {"skip=": "--skip sample"} if skip == "movement" else {}
     said = f"; say {' or '.join(options.values())}, in Python {' or '.join(options)}" if options else ""
     share = f"{shares[first]} % of the samples"
-    return tuple(
-        names
-    ), f"expected a number in {first!r}, got nothing in {share}{also if others else ''}{lasting}{said}"
+    words = f"expected a number in {first!r}, got nothing in {share}{also if others else ''}{lasting}{said}"
+    return tuple(names), words

@@ -32,11 +32,7 @@ _NAMED = 6  # columns that a note names
 def in_one_set(
     files: Sequence[FileRead], by_number: bool = False
 ) -> tuple[list[FileRead], list[FileRead], list[Problem]]:
-    """Return files, of equally many columns, with the columns of most, in the order and in the units of these.
-
-    Behind them are those whose columns have no names, and problems. Where the caller chose the columns `by_number`,
-    names do not matter.
-    """
+    """Return files with the columns of most in their order and units, others without names of columns, and problems."""
     columns = [_columns(file) for file in files]
     keys = [(frozenset(own.names), sensors_of(file.path)) for file, own in zip(files, columns, strict=True)]
     named = [key for key, file, own in zip(keys, files, columns, strict=True) if not _is_nameless(file, own)]
@@ -59,7 +55,7 @@ def in_one_set(
             )
             problems.append(Problem(file.path, None, unlike))
         else:
-            if own == ours or file.detected is None or file.block is None:
+            if own == ours:
                 same.append(file)
                 continue
             measured_in = tuple(unit or "" for unit in ours.units)
@@ -75,12 +71,12 @@ def in_one_set(
 def dimensions_unlike(files: Sequence[FileRead], most: Sequence[FileRead]) -> list[Problem]:
     """Say which columns files lack, or have besides, that have other numbers of columns than most."""
     named = Counter(own for own in map(_columns, most) if not own.are_nameless)
-    ours, n_dims = (named or Counter(map(_columns, most))).most_common(1)[0][0], _width(most[0])
+    ours, n_dims = (named or Counter(map(_columns, most))).most_common(1)[0][0], most[0].n_dims
     problems = []
     for file in files:
         own = _columns(file)
         unlike = "" if _is_nameless(file, own) or not named else f": {_differences(own, ours)}"
-        problems.append(Problem(file.path, None, f"{_width(file)} dimensions where most have {n_dims}{unlike}"))
+        problems.append(Problem(file.path, None, f"{file.n_dims} dimensions where most have {n_dims}{unlike}"))
     return problems
 
 
@@ -141,21 +137,17 @@ def _differences(own: Columns, ours: Columns) -> str:
     )
 
 
-def _width(file: FileRead) -> int:
-    return 0 if file.block is None else file.block.positions.shape[1]
-
-
 def sensors_of(path: str) -> frozenset[str]:
     """Return words in the name of a file that say which sensor of a device wrote it."""
     return _SENSORS.intersection(words_of(PurePosixPath(path).stem))
 
 
 def _is_nameless(file: FileRead, own: Columns) -> bool:
-    return own.are_nameless or (file.detected is not None and not file.detected.named)
+    return own.are_nameless or not file.detected.named
 
 
 def _columns(file: FileRead) -> Columns:
-    return _columns_of(file.detected) if file.detected else Columns((), ())
+    return _columns_of(file.detected)
 
 
 def _columns_of(how: Detected) -> Columns:

@@ -1,7 +1,4 @@
-"""The tables of formats: file extension -> reader, and what marks a folder that is one data set -> reader.
-
-By these the files to read are found among several files, folders and patterns, in an order that no file system changes.
-"""
+"""The tables of formats, file extension -> reader, and of folders that are one data set; and the files to read."""
 
 from __future__ import annotations
 
@@ -23,13 +20,11 @@ from kineme.io.arrays.npz import Npz, array_of_npy
 from kineme.io.arrays.rows import row_movements, series_movements
 from kineme.io.arrays.tree_movements import nested, tree_movements
 from kineme.io.lerobot.info import MARKER
-from kineme.io.lerobot.read import lerobot_movements
 from kineme.io.motion_capture.readers import read_bvh_table, read_c3d_table, read_mvnx_table
-from kineme.io.records import Contents, Problem
+from kineme.io.records import Contents, Problem, needs
 from kineme.io.ros.bags import check_records
 from kineme.io.ros.choose import bag_contents
 from kineme.io.ros.read_bag import read_bag
-from kineme.io.tables.parquet import read_parquet_table
 from kineme.io.tables.text_table import read_text_table
 from kineme.movements.tables.columns import Roles
 from kineme.movements.tables.layout import Layout, Parsed
@@ -42,13 +37,10 @@ _NAMED = 3  # paths that a message names
 
 
 class Format(NamedTuple):
-    """The reader of a format: of the bytes of a file, or of its path.
-
-    A reader of a path keeps only what it returns, so that files may be larger than the memory; it alone checks
-    `kineme.io.limits`, against what it keeps. `read_bytes` or `read_path` is given, never both.
-    """
+    """The reader of a format: of the bytes of a file, or of its path, never both."""
 
     read_bytes: Callable[[bytes, Layout], Parsed] | None = None
+    # Keeps only what it returns, so that files may be larger than the memory; it alone checks the limits of memory.
     read_path: Callable[[Path, Layout], Parsed] | None = None
     label_is_stem: bool = False  # whether the name of the file is the label of its movements
     # What a file holds besides what is read of it, for formats that hold more than one recording.
@@ -83,6 +75,18 @@ def _of_tables(read: Callable[[bytes, Layout], tuple[Table, Roles]], kind: str) 
     return lambda data, layout: table_movements(*read(data, layout), layout, kind)
 
 
+def _read_parquet(data: bytes, layout: Layout) -> Parsed:
+    with needs("pyarrow", "read Parquet", "parquet"):
+        from kineme.io.tables.parquet import read_parquet_table
+    return table_movements(*read_parquet_table(data, layout), layout, "Parquet")
+
+
+def _read_lerobot(folder: Path, layout: Layout) -> Parsed:
+    with needs("pyarrow", "read Parquet", "parquet"):
+        from kineme.io.lerobot.read import lerobot_movements
+    return lerobot_movements(folder, layout)
+
+
 def _read_npz(data: bytes, layout: Layout) -> Parsed:
     arrays = Npz(data, Path("it"))
     if (parsed := body_movements(arrays, layout, "NPZ")) is not None:
@@ -115,7 +119,7 @@ FORMATS: dict[str, Format] = {
     ".jsonl": Format(json_lines_movements),
     ".ndjson": Format(json_lines_movements),
     ".npy": Format(_read_npy),
-    ".parquet": Format(_of_tables(read_parquet_table, "Parquet")),
+    ".parquet": Format(_read_parquet),
     ".mat": Format(mat_movements, label_is_stem=True),
     ".h5": Format(read_path=hdf5_movements),
     ".hdf5": Format(read_path=hdf5_movements),
@@ -139,7 +143,7 @@ DATA_SETS: tuple[DataSet, ...] = (
         MARKER,
         ("data",),
         ("meta/*.jsonl", "meta/*.parquet", "meta/episodes/*/*.parquet", "data/*/*.parquet"),
-        Format(read_path=lerobot_movements),
+        Format(read_path=_read_lerobot),
     ),
     DataSet("metadata.yaml", ("*.db3*", "*.mcap*"), ("*.db3*", "*.mcap*"), _BAG, b"rosbag2_bagfile_information"),
 )
@@ -157,6 +161,13 @@ def data_set_of(folder: Path) -> DataSet | None:
                 if data_set.says in file.read(_HEAD):
                     return data_set
     return None
+
+
+def format_at(path: Path) -> Format | None:
+    """Return the format of a data set, or of a file by its ending; None for a folder of files and other endings."""
+    if (data_set := data_set_of(path)) is not None:
+        return data_set.format
+    return None if path.is_dir() else FORMATS.get(path.suffix.lower())
 
 
 class Entry(NamedTuple):
@@ -202,10 +213,7 @@ def is_alone(paths: Sequence[Path]) -> bool:
 
 
 def root_of(*paths: Path) -> Path:
-    """Give the folder that the names of sources are relative to: a folder of files itself, else the one around a file.
-
-    Of several paths it is the working folder: their names are as they were given.
-    """
+    """Give the folder that names of sources are relative to; of several paths, it is the working folder."""
     if not is_alone(paths):
         return Path()
     return paths[0] if _is_folder_of_files(paths[0]) else paths[0].parent
@@ -228,10 +236,9 @@ def _is_folder_of_files(path: Path) -> bool:
 def files_under(folder: Path, follow_links: bool = False) -> tuple[list[Path], list[Problem]]:
     """Return all files that are not hidden, sorted, and the problems with links and folders.
 
-    A folder that is one data set (`kineme.io.reading.formats.DATA_SETS`) stands for all of its files.
-    Names that begin with a dot are skipped. Links to folders are followed last, and no folder is entered twice. A link
-    that leads out of the folder is a problem, and followed only with `follow_links`: a folder from elsewhere must not
-    make the program read other files of this machine.
+    A folder that is one data set stands for all of its files. Links to folders are followed last, and no folder is
+    entered twice. A link that leads out of the folder is a problem, and followed only with `follow_links`: a folder
+    from elsewhere must not make the program read other files of this machine.
     """
     files: list[Path] = []
     problems: list[Problem] = []
@@ -247,14 +254,14 @@ def files_under(folder: Path, follow_links: bool = False) -> tuple[list[Path], l
             if here != folder and data_set_of(here) is not None:
                 files.append(here)
                 continue
-            entries = sorted(
-                (entry for entry in os.scandir(here) if not entry.name.startswith(".")), key=lambda e: e.name
-            )
+            entries = sorted(os.scandir(here), key=lambda entry: entry.name)
         except OSError as error:
             problems.append(Problem(as_text(here.relative_to(folder)), None, f"the folder cannot be listed, {error}"))
             continue
         for entry in entries:
             path = here / entry.name
+            if entry.name.startswith("."):
+                continue
             if entry.is_symlink() and not follow_links and leads_out(path, folder):
                 problems.append(Problem(as_text(path.relative_to(folder)), None, OUTSIDE))
             elif not _is_folder(entry):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,7 @@ import numpy as np
 from kineme.errors import DataError
 from kineme.io.reading.column_order import sensors_of
 from kineme.io.reading.formats import Entry, as_text, name_of
-from kineme.io.reading.read_file import FileRead, select_columns
+from kineme.io.reading.read_file import NO_MOVEMENTS, FileRead, select_columns, take_columns
 from kineme.io.records import Problem
 from kineme.io.ros.streams import interpolated
 from kineme.movements.channels.channel import recorded_names
@@ -20,7 +19,7 @@ from kineme.movements.channels.column_match import Columns, in_one_unit, numbers
 from kineme.movements.channels.coordinates import canonical, columns_of, in_order, off_norm
 from kineme.movements.channels.detect import Given, find_channels
 from kineme.movements.tables.columns import column_numbers, excluded_numbers
-from kineme.movements.tables.layout import Block, Detected, Layout, Parsed, Repair
+from kineme.movements.tables.layout import Block, Layout, Parsed, Repair
 from kineme.reporting.text import counted, first_names
 from kineme.validation import MIN_SAMPLES, Array
 
@@ -36,11 +35,9 @@ _NAMED = 4  # files that a note names
 def join_files(files: Sequence[Placed], layout: Layout) -> list[Placed]:
     """Return one recording of all files of a folder that hold one movement each on one clock; other files as they are.
 
-    The samples are those of the file that has most in a second, while all of them last. Others are interpolated:
-    linearly, angles without their wraps, orientations by turning evenly; a discrete channel keeps the value before.
-    Columns are named by their file, ``Gyroscope.x``, also in the layout; the label is the folder around that of the
-    recording. A file that covers less than half of the recording is a problem; one without any of the columns that are
-    chosen is passed over. The files come with all of their columns.
+    The samples are those of the file that has most in a second, while all of them last; others are interpolated.
+    Columns are named by their file, ``Gyroscope.x``, also in the layout. A file that covers less than half of the
+    recording is a problem; one without any of the columns that are chosen is passed over.
     """
     result: list[Placed] = []
     for members in _folders(files).values():
@@ -64,57 +61,41 @@ def join_files(files: Sequence[Placed], layout: Layout) -> list[Placed]:
         joined = [member for member in members if member[0].path in together]
         recording, place = _joined(joined, together, layout.kinds or {})
         aside = tuple(name for read in timed if read not in chosen for name in _heads(read))
-        if recording.detected is not None:
-            recording = recording._replace(
-                detected=recording.detected._replace(ignored=(*recording.detected.ignored, *aside))
-            )
+        recording = recording._replace(
+            detected=recording.detected._replace(ignored=(*recording.detected.ignored, *aside))
+        )
         result.append((_selected(recording, layout), place))
         for read, entry in members:
-            if read.path in together:
-                continue
-            if _is_timed(read):
-                if read not in chosen:
-                    continue
+            if not _is_timed(read):
+                result.append((read, entry))
+            elif read.path not in together and read in chosen:
                 begin, end = _span(read)
                 reason = (
                     f"expected samples at the time of {together[0]}, got some from {begin:.12g} to {end:.12g} s; move "
                     "it elsewhere if it is another recording"
                 )
-                lost = [*read.problems, Problem(read.path, None, reason)]
-                result.append((read._replace(block=None, problems=lost), entry))
-            else:
-                result.append((read, entry))
+                result.append((read.without_movements(reason), entry))
     return result
 
 
 def _heads(read: FileRead) -> list[str]:
-    assert read.detected is not None
     return [f"{Path(read.path).stem}.{name}" for name in read.detected.columns]
 
 
 def _selected(read: FileRead, layout: Layout) -> FileRead:
-    """Return a recording with the columns that are chosen, in their order."""
-    if read.detected is None or read.block is None:
+    def in_order(layout: Layout) -> Parsed:
+        if layout.coordinates is None:
+            return parsed
+        return take_columns(parsed, column_numbers(parsed.detected.columns, layout.coordinates))
+
+    if not read.block.labels:
         return read
     parsed = Parsed(read.detected, read.block)
     try:
-        parsed = select_columns(lambda choice: _in_order(parsed, choice), layout)
+        detected, block, _ = select_columns(in_order, layout)
     except DataError as error:
-        return read._replace(block=None, problems=[Problem(read.path, None, str(error)), *read.problems])
-    return read._replace(detected=parsed.detected, block=parsed.block)
-
-
-def _in_order(parsed: Parsed, layout: Layout) -> Parsed:
-    detected, block = parsed.detected, parsed.block
-    if layout.coordinates is None:
-        return parsed
-    chosen = column_numbers(detected.columns, layout.coordinates)
-    detected = detected._replace(
-        columns=tuple(detected.columns[k] for k in chosen),
-        measured_in=tuple(detected.measured_in[k] for k in chosen) if detected.measured_in else (),
-        ignored=(*detected.ignored, *(name for k, name in enumerate(detected.columns) if k not in chosen)),
-    )
-    return parsed._replace(detected=detected, block=replace(block, positions=block.positions[:, chosen]))
+        return read._replace(block=NO_MOVEMENTS, problems=[Problem(read.path, None, str(error)), *read.problems])
+    return read._replace(detected=detected, block=block)
 
 
 def notes_on_clocks(files: Sequence[Placed]) -> tuple[str, ...]:
@@ -133,7 +114,6 @@ def notes_on_clocks(files: Sequence[Placed]) -> tuple[str, ...]:
 
 
 def _folders(files: Sequence[Placed]) -> Mapping[Path, list[Placed]]:
-    """Return the files of each folder."""
     folders: dict[Path, list[Placed]] = {}
     for read, entry in files:
         folders.setdefault(entry.path.parent, []).append((read, entry))
@@ -141,12 +121,10 @@ def _folders(files: Sequence[Placed]) -> Mapping[Path, list[Placed]]:
 
 
 def _is_timed(read: FileRead) -> bool:
-    """Tell whether a file holds one movement with time stamps."""
-    return read.block is not None and read.block.times is not None and len(read.block.labels) == 1
+    return read.block.times is not None and len(read.block.labels) == 1
 
 
 def _times(read: FileRead) -> Array:
-    assert read.block is not None
     assert read.block.times is not None
     return read.block.times
 
@@ -180,10 +158,8 @@ def _are_sensors(files: Sequence[FileRead]) -> bool:
         return True
     if (np.ptp(spans, axis=0) > _ALIKE * np.ptp(spans)).any():
         return False
-    of_files = [
-        (frozenset(Columns(read.detected.columns, ()).names), sensors_of(read.path)) for read in files if read.detected
-    ]
-    return len({*of_files}) == len(files)
+    of_files = {(frozenset(Columns(read.detected.columns, ()).names), sensors_of(read.path)) for read in files}
+    return len(of_files) == len(files)
 
 
 def _joined(members: Sequence[Placed], together: Sequence[str], given: Given) -> Placed:
@@ -202,32 +178,29 @@ def _joined(members: Sequence[Placed], together: Sequence[str], given: Given) ->
     problems = [problem for read in reads for problem in read.problems]
     lines = "".join(f"{read.sha256}  {Path(read.path).name}\n" for read in reads)
     common = FileRead(
-        name, hashlib.sha256(lines.encode()).hexdigest(), sum(read.size for read in reads),
-        max(read.mtime for read in reads), None, None, problems,
+        name, problems, sha256=hashlib.sha256(lines.encode()).hexdigest(), size=sum(read.size for read in reads),
+        mtime=max(read.mtime for read in reads),
     )  # fmt: skip
     if len(at) < MIN_SAMPLES:
         reason = f"expected files that last together, got {counted(len(at), 'sample')} at the time of all"
-        return common._replace(problems=[*problems, Problem(name, None, reason)]), place
+        return common.without_movements(reason), place
     if len(at) < len(times):
         n_lost, of = len(times) - len(at), Path(reference.path).name
         reason = f"{counted(n_lost, 'sample')} of {of} before others begin or after they end"
         problems.append(Problem(name, None, reason, samples=n_lost))
     parts = [_part(read, at, given) for read in reads]
-    detected = reference.detected
-    assert detected is not None
     heads, units, ignored = (tuple(text for part in parts for text in part[k]) for k in (0, 1, 2))
-    how = Detected(
-        " and ".join(dict.fromkeys(read.detected.format for read in reads if read.detected)),
-        f"{len(reads)} files on one clock", heads, detected.time, detected.units, detected.units_from,
-        ignored=ignored, measured_in=units if any(units) else (),
-        converted=tuple(text for read in reads if read.detected for text in read.detected.converted),
+    how = reference.detected._replace(
+        format=" and ".join(dict.fromkeys(read.detected.format for read in reads)),
+        layout=f"{len(reads)} files on one clock", columns=heads, movement=(), label=(), ignored=ignored, person=(),
+        measured_in=units if any(units) else (), named=True, sentinels=(),
+        converted=tuple(text for read in reads for text in read.detected.converted),
     )  # fmt: skip
-    repairs = [repair for read in reads for repair in (read.block and read.block.repairs) or ()]
+    repairs = [repair for read in reads for repair in read.block.repairs or [Repair()]]
     repair = Repair(
-        sum(repair.filled for repair in repairs), max((repair.longest for repair in repairs), default=0.0),
-        max((repair.cropped for repair in repairs), default=0.0),
-    )  # fmt: skip
-    labels = {read.block.labels[0] for read in reads if read.block} - {as_text(entry.relative.parent.name), None}
+        sum(each.filled for each in repairs), *(max(column) for column in [*zip(*repairs, strict=True)][1:])
+    )
+    labels = {read.block.labels[0] for read in reads} - {as_text(entry.relative.parent.name), None}
     label = labels.pop() if len(labels) == 1 else as_text(place.relative.parent.name) or None
     block = Block(np.hstack([part[3] for part in parts]), at, np.array([0, len(at)]), [label], [""], repairs=[repair])
     how, block = in_one_unit(how, block)
@@ -236,10 +209,7 @@ def _joined(members: Sequence[Placed], together: Sequence[str], given: Given) ->
 
 def _part(read: FileRead, at: Array, given: Given) -> tuple[list[str], list[str], list[str], Array]:
     """Return heads, units, columns left aside, and values of a file at other times."""
-    block, detected = read.block, read.detected
-    assert block is not None
-    assert detected is not None
-    stem = Path(read.path).stem
+    block, detected, stem = read.block, read.detected, Path(read.path).stem
     own = {}  # the kinds that are given for columns of this file, by its own heads
     for key, kind in given.items():
         heads = [name.strip() for name in key.split(",")]

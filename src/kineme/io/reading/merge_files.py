@@ -1,7 +1,4 @@
-"""Merge many files into one set of demonstrations, each movement with its source and who made it.
-
-Of what is merged: sampling rates, jitter and gaps of movements, and notes on missing values and pauses.
-"""
+"""Many files as one set of demonstrations, with sources and people; sampling rates, gaps, and notes on them."""
 
 from __future__ import annotations
 
@@ -17,7 +14,7 @@ from numpy.typing import NDArray
 
 from kineme.errors import DataError, TrajectoryError
 from kineme.io.arrays.npz import Npz
-from kineme.io.reading.check_block import check_block, movement_of, take_movements
+from kineme.io.reading.check_block import check_block, kinds_of, movement_of, take_movements
 from kineme.io.reading.column_order import dimensions_unlike, in_one_set
 from kineme.io.reading.read_file import FileRead
 from kineme.io.records import Problem, note_on_missing
@@ -81,6 +78,11 @@ class Source(NamedTuple):
     longest_gap: float = 0.0
     cropped: float = 0.0
 
+    @property
+    def name(self) -> str:
+        """File and place, as ``long.csv#3``; the file alone if it holds but one movement."""
+        return f"{self.path}#{self.place}" if self.place else self.path
+
 
 @dataclass(frozen=True, eq=False)
 class Recordings(MovementSequence):
@@ -129,14 +131,7 @@ class Recordings(MovementSequence):
     def short_names(self) -> list[str]:
         """A name for each movement: its place where all are of one file, as ``episode 3``; else file and place."""
         one_file = len({source.path for source in self.sources}) == 1
-        return [
-            source.place
-            if source.place and one_file
-            else f"{source.path}#{source.place}"
-            if source.place
-            else source.path
-            for source in self.sources
-        ]
+        return [source.place if source.place and one_file else source.name for source in self.sources]
 
     def __repr__(self) -> str:
         n_files = len({source.path for source in self.sources})
@@ -158,65 +153,61 @@ def merge_files(
     skip: str = "movement",
     by_number: bool = False,
 ) -> Recordings:
-    """Return one `Recordings` of all files that hold movements, and of the problems that came before.
-
-    `where` is what is read, for the message where there is none. `kinds` are the channels that are given, see
-    `kineme.movements.channels.detect.find_channels`; `skip` says what a quaternion that is not of norm 1 costs. Where
-    columns were chosen `by_number`, other names are no problem.
-    """
+    """Return one `Recordings` of all files read at `where` that hold movements, and of problems that came before."""
     reported = [*problems, *(problem for file in files for problem in file.problems)]
-    full = [file for file in files if file.block is not None and len(file.block.labels)]
+    full = [file for file in files if file.block.labels]
     if not full:
         if len(reported) == 1 and reported[0].file == Path(where).name:  # one file alone: it is named once
             raise DataError(str(reported[0]._replace(file=where)))
         first = f"; {len(reported)} could not be read, the first {reported[0]}" if reported else ""
         raise DataError("; ".join([f"expected recordings in {where}, found none{first}", *note_on_missing(reported)]))
-    dims: Counter[int] = Counter()
-    for file in full:
-        dims[_block(file).positions.shape[1]] += len(_block(file).labels)
-    n_dims = dims.most_common(1)[0][0]
-    odd = [file for file in full if _block(file).positions.shape[1] != n_dims]
-    full = [file for file in full if _block(file).positions.shape[1] == n_dims]
+    n_dims = Counter(file.n_dims for file in full for _ in file.block.labels).most_common(1)[0][0]
+    odd = [file for file in full if file.n_dims != n_dims]
+    full = [file for file in full if file.n_dims == n_dims]
     reported += dimensions_unlike(odd, full)
     understood = {file.path: file.detected for file in full}
     full, channels, odd_channels = with_channels(full, kinds or {}, skip, by_number)
     reported += odd_channels
-    if not any(len(_block(file).labels) for file in full):
+    if not any(file.block.labels for file in full):
         none = next((problem for problem in reported if not problem.samples), reported[0])
         raise DataError(f"expected recordings in {where}, found none; the first that is none: {none}")
     sources = tuple(
         Source(file.path, file.sha256, file.size, file.mtime, place, label, person or file.person, *repair)
         for file in full
         for place, label, person, repair in zip(
-            _block(file).places,
-            _block(file).labels,
-            _block(file).people or [None] * len(_block(file).labels),
-            _block(file).repairs or [Repair()] * len(_block(file).labels),
+            file.block.places,
+            file.block.labels,
+            file.block.people or [None] * len(file.block.labels),
+            file.block.repairs or [Repair()] * len(file.block.labels),
             strict=True,
         )
     )
-    detected = Counter(how for file in full if (how := understood[file.path]))
-    blocks = [_block(file) for file in full]
-    lengths = np.concatenate([np.diff(block.offsets) for block in blocks])
-    offsets = np.concatenate(([0], np.cumsum(lengths)))
+    detected = Counter(understood[file.path] for file in full)
+    blocks = [file.block for file in full]
     positions = _concatenated([block.positions for block in blocks])
     times = _concatenated([_stamps(block) for block in blocks])
-    labels: Any = [source.label for source in sources]
-    names = tuple(f"{source.path}#{source.place}" if source.place else source.path for source in sources)
-    durations = times[offsets[1:] - 1] - times[offsets[:-1]]
+    demonstrations = demonstrations_of(positions, times, _offsets_of(blocks), sources, channels)
+    return Recordings(demonstrations, sources, tuple(reported), tuple(detected.most_common()))
+
+
+def demonstrations_of(
+    positions: Array,
+    times: Array,
+    offsets: NDArray[np.intp],
+    sources: Sequence[Source],
+    channels: Channels | None,
+    dimensions: tuple[str, ...] | None = None,
+) -> Demonstrations:
+    """Return movements with their names, and with labels if every one of them has one."""
+    labels, names = [source.label for source in sources], tuple(source.name for source in sources)
     labeled = None if None in labels else label_array(labels, len(labels), names)
-    merged = Movements(positions, offsets, durations, times, labeled, names)
-    return Recordings(
-        Demonstrations.of_movements(merged if channels is None else of_channels(merged, channels)),
-        sources,
-        tuple(reported),
-        tuple(detected.most_common()),
-    )
+    durations = times[offsets[1:] - 1] - times[offsets[:-1]]
+    merged = Movements(positions, offsets, durations, times, labeled, names, dimensions)
+    return Demonstrations.of_movements(merged if channels is None else of_channels(merged, channels))
 
 
-def _block(file: FileRead) -> Block:
-    assert file.block is not None
-    return file.block
+def _offsets_of(blocks: Sequence[Block]) -> NDArray[np.intp]:
+    return np.concatenate(([0], np.cumsum(np.concatenate([np.diff(block.offsets) for block in blocks]))))
 
 
 def _concatenated(arrays: Sequence[Any]) -> Any:
@@ -235,14 +226,10 @@ def _stamps(block: Block) -> Any:
 def with_channels(
     files: Sequence[FileRead], given: Given, skip: str = "movement", by_number: bool = False
 ) -> tuple[list[FileRead], Channels | None, list[Problem]]:
-    """Return the channels of files with equally many columns, the files that have them, and problems.
+    """Return files with equally many columns that have the same channels, these channels, and problems.
 
-    Kinds are found for all files together: a gripper that no file opens is one still, and one that some file moves
-    continuously is a position in all of them. Columns are put in order and converted by their names, see `in_one_set`.
-    Files whose columns have no names, or are chosen `by_number`, are merged by the order of their columns while all
-    are positions or angles, without the wraps of angles, and then nothing is known of the channels; else they are
-    problems. A quaternion that is not of norm 1 costs its movement, or with `skip`
-    ``"sample"`` that sample alone.
+    Kinds are found for all files together. Files whose columns have no names, or are chosen `by_number`, are merged by
+    the order of their columns while all are positions or angles, and then nothing is known of the channels.
     """
     same, nameless, problems = in_one_set(files, by_number)
     channels = _channels_of(same, given)
@@ -255,21 +242,16 @@ def with_channels(
         for file in nameless
     ]
     checked = [_check_orientations(file, channels, skip) for file in same]
-    return (
-        [file for file, _ in checked],
-        channels,
-        [*problems, *(problem for _, several in checked for problem in several)],
-    )
+    problems += [problem for _, several in checked for problem in several]
+    return [file for file, _ in checked], channels, problems
 
 
 def _channels_of(files: Sequence[FileRead], given: Given) -> Channels:
-    """Return the channels of files that all have the same heads."""
-    blocks, detected = [_block(file) for file in files], files[0].detected
-    assert detected is not None
+    blocks, detected = [file.block for file in files], files[0].detected
     return find_channels(
         detected.columns,
         np.concatenate([block.positions for block in blocks]) if len(blocks) > 1 else blocks[0].positions,
-        np.concatenate(([0], np.cumsum(np.concatenate([np.diff(block.offsets) for block in blocks])))),
+        _offsets_of(blocks),
         given,
         detected.measured_in,
     )
@@ -279,18 +261,13 @@ def _without_wraps(files: Sequence[FileRead], given: Given) -> list[FileRead]:
     """Return files of several heads, in the columns of each the angles continuous."""
     groups: dict[tuple[str, ...], list[FileRead]] = {}
     for file in files:
-        groups.setdefault(file.detected.columns if file.detected else (), []).append(file)
+        groups.setdefault(file.detected.columns, []).append(file)
     channels_of_heads = {}
     for heads, group in groups.items():
-        here = {
-            key: kind
-            for key, kind in given.items()
-            if key in heads or {name.strip() for name in key.split(",")} <= {*heads}
-        }
-        channels_of_heads[heads] = _channels_of(group, here)
+        channels_of_heads[heads] = _channels_of(group, kinds_of(given, heads))
     result = []
     for file in files:
-        block, channels = _block(file), channels_of_heads[file.detected.columns if file.detected else ()]
+        block, channels = file.block, channels_of_heads[file.detected.columns]
         if is_plain(channels):
             block = replace(block, positions=canonical(block.positions, block.offsets, channels))
         result.append(file._replace(block=block))
@@ -299,8 +276,7 @@ def _without_wraps(files: Sequence[FileRead], given: Given) -> list[FileRead]:
 
 def _check_orientations(file: FileRead, channels: Channels, skip: str) -> tuple[FileRead, list[Problem]]:
     """Return a file with the columns of channels side by side, without samples or movements of wrong quaternions."""
-    heads = file.detected.columns if file.detected else ()
-    block = replace(_block(file), positions=in_order(_block(file).positions, heads, channels))
+    block = replace(file.block, positions=in_order(file.block.positions, file.detected.columns, channels))
     problems, faults = list[Problem](), dict[int, str]()
     good = np.ones(len(block.labels), dtype=bool)
     for channel, odd, norms in off_norm(block.positions, channels):
@@ -322,12 +298,7 @@ def _check_orientations(file: FileRead, channels: Channels, skip: str) -> tuple[
 
 
 def each_person(path: Path, sources: Sequence[Source]) -> list[str | None]:
-    """Return the person of each movement, or None where it is unknown.
-
-    Where a column or a label pattern names the person, that one. In an npz archive, an array named as in `NAMES`, one
-    entry for each movement. Else the folder above that of the label: ``person/label/recording``. `path` is what was
-    read.
-    """
+    """Return the person of each movement of what was read at `path`, None where it is unknown."""
     of_file = cache(lambda name: _people_in(path / name if path.is_dir() else path))
     return [source.person or _person(source, of_file(source.path)) for source in sources]
 
@@ -343,7 +314,6 @@ def _person(source: Source, listed: list[str] | None) -> str | None:
 
 
 def _people_in(file: Path) -> list[str] | None:
-    """Return the people named in a file, or None."""
     if file.suffix.lower() != ".npz":
         return None
     arrays = Npz(file.read_bytes(), file)

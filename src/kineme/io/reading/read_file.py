@@ -25,41 +25,39 @@ from kineme.movements.tables.layout import Block, Detected, Known, Layout, Parse
 
 #: Exceptions of readers on invalid files; RecursionError is too deep nesting.
 _UNREADABLE = (
-    KinemeError,
-    ValueError,
-    KeyError,
-    TypeError,
-    EOFError,
-    OSError,
-    ArithmeticError,
-    RecursionError,
-    MemoryError,
-)
+    KinemeError, ValueError, KeyError, TypeError, EOFError, OSError, ArithmeticError, RecursionError, MemoryError
+)  # fmt: skip
 
 _SPREADSHEETS = frozenset({".xlsx", ".xlsm", ".xls", ".ods", ".numbers"})
 _NOWHERE = "expected a file, got a link that leads nowhere; delete it, or restore what it leads to"
+NO_MOVEMENTS = Block(np.empty((0, 0)), None, np.zeros(1, np.intp), [], [])
 
 
 class FileRead(NamedTuple):
-    """The result for one file: movements and how they were read, or neither; and its problems."""
+    """The result for one file: its problems, its movements, none where it cannot be read, and how they were read."""
 
     path: str  # relative to the folder that is read
-    sha256: str
-    size: int
-    mtime: float
-    detected: Detected | None
-    block: Block | None
     problems: list[Problem]
+    detected: Detected = Detected("", "", (), None, "", "")
+    block: Block = NO_MOVEMENTS
+    sha256: str = ""
+    size: int = 0
+    mtime: float = 0.0
     person: str | None = None  # who showed the movements, where the name of the file says it
+
+    @property
+    def n_dims(self) -> int:
+        """Number of coordinates."""
+        return self.block.positions.shape[1]
+
+    def without_movements(self, reason: str) -> FileRead:
+        """Return the file as one that cannot be read, with one problem more."""
+        return self._replace(block=NO_MOVEMENTS, problems=[*self.problems, Problem(self.path, None, reason)])
 
 
 def read_file(path: Path, relative: Path, layout: Layout, follow_links: bool = False) -> FileRead:
-    """Read a file, or a folder that is one data set; it need not exist any more.
-
-    `relative` is its path in the result. Its innermost folder is the label of movements without one in the file, unless
-    the format takes the name of the file itself.
-    """
-    name = as_text(relative)
+    """Read a file, or a folder that is one data set, called `relative` in the result; it need not exist any more."""
+    unread = FileRead(as_text(relative), [])
     try:
         parts, form = _parts(path, relative, follow_links)
         statuses = [os.stat(part) for part in parts]
@@ -69,30 +67,28 @@ def read_file(path: Path, relative: Path, layout: Layout, follow_links: bool = F
             check_expanded(statuses[0].st_size)
             data = path.read_bytes()
     except (OSError, MemoryError, DataError) as error:
-        reason = _NOWHERE if path.is_symlink() and not os.path.exists(path) else _plainly(error)
-        return FileRead(name, "", 0, 0.0, None, None, [Problem(name, None, reason)])
+        nowhere = path.is_symlink() and not os.path.exists(path)
+        return unread.without_movements(_NOWHERE if nowhere else _plainly(error))
     if form.read_path is None:
         return read_bytes(data, relative, layout, statuses[0].st_mtime)
     size, mtime = sum(status.st_size for status in statuses), max(status.st_mtime for status in statuses)
     read = _parsed(partial(form.read_path, path), form, relative, layout)
-    if read.block is None:
-        return read._replace(size=size, mtime=mtime)
     try:
-        return read._replace(sha256=_sha256(parts, path), size=size, mtime=mtime)
+        checksum = _sha256(parts, path) if read.block.labels else ""
     except OSError as error:  # it was there a moment ago
-        return FileRead(name, "", size, mtime, None, None, [Problem(name, None, _plainly(error))])
+        return unread.without_movements(_plainly(error))
+    return read._replace(sha256=checksum, size=size, mtime=mtime)
 
 
 def read_bytes(data: bytes, relative: Path, layout: Layout, mtime: float = 0.0) -> FileRead:
     """Read the content of a file of that name."""
     form = format_of(relative)
-    sha256 = hashlib.sha256(data).hexdigest()
     if form.read_bytes is None:
         reason = f"expected the path of a {relative.suffix} file, got its bytes alone; write them to a file"
-        read = FileRead(as_text(relative), "", 0, 0.0, None, None, [Problem(as_text(relative), None, reason)])
+        read = FileRead(as_text(relative), []).without_movements(reason)
     else:
         read = _parsed(partial(_expanded, form.read_bytes, data), form, relative, layout)
-    return read._replace(sha256=sha256, size=len(data), mtime=mtime)
+    return read._replace(sha256=hashlib.sha256(data).hexdigest(), size=len(data), mtime=mtime)
 
 
 def _expanded(read: Callable[[bytes, Layout], Parsed], data: bytes, layout: Layout) -> Parsed:
@@ -113,24 +109,22 @@ def _parsed(parse: Callable[[Layout], Parsed], form: Format, relative: Path, lay
             detected, block = in_one_unit(detected._replace(sentinels=sentinels), block)
             block, problems = check_block(block, name, layout, detected.columns)
     except _UNREADABLE as error:
-        return FileRead(name, "", 0, 0.0, None, None, [Problem(name, None, _plainly(error))])
+        return FileRead(name, []).without_movements(_plainly(error))
     label = as_text(relative.stem) if form.label_is_stem else as_text(relative.parent.name) or None
     labels = [label if own is None else _storable(own) for own in block.labels]
     people = block.people and [None if person is None else _storable(person) for person in block.people]
     bare = Block(block.positions, block.times, block.offsets, labels, block.places)  # releases the bytes of the file
     block = replace(bare, people=people, repairs=block.repairs)
     problems += [Problem(name, None, _storable(" ".join(reason.splitlines()))) for reason in left_out]
-    return FileRead(name, "", 0, 0.0, detected, block, problems)
+    return FileRead(name, problems, detected, block)
 
 
 def _parts(path: Path, relative: Path, follow_links: bool) -> tuple[list[Path], Format]:
-    """Return the files that hold a source, and its format."""
     data_set = data_set_of(path)
     if data_set is None:
         return [path], format_of(relative)
     parts = data_set.files(path)
-    outside = [] if follow_links else [part for part in parts if leads_out(part, path)]
-    if outside:
+    if not follow_links and (outside := [part for part in parts if leads_out(part, path)]):
         raise DataError(f"{as_text(outside[0].relative_to(path))} is {OUTSIDE}")
     return parts, data_set.format
 
@@ -164,21 +158,17 @@ def _storable(label: str) -> str:
 
 
 def _plainly(error: BaseException) -> str:
-    """Return the message of an exception on one line."""
-    return " ".join(_reason(error).splitlines())
-
-
-def _reason(error: BaseException) -> str:
+    got = f"no entry {error}" if isinstance(error, KeyError) else str(error) or type(error).__name__
+    reason = f"expected times and positions, got {got}"
     if isinstance(error, KinemeError):
-        return str(error)
-    if isinstance(error, MemoryError):
-        return "expected a file that fits into the memory; split it"
-    if isinstance(error, OSError):
-        return f"expected a file that can be read, got: {error.strerror or error}"
-    if isinstance(error, RecursionError):
-        return "expected times and positions, got lists within lists within lists, too many to be arrays"
-    reason = f"no entry {error}" if isinstance(error, KeyError) else str(error) or type(error).__name__
-    return f"expected times and positions, got {reason}"
+        reason = str(error)
+    elif isinstance(error, MemoryError):
+        reason = "expected a file that fits into the memory; split it"
+    elif isinstance(error, OSError):
+        reason = f"expected a file that can be read, got: {error.strerror or error}"
+    elif isinstance(error, RecursionError):
+        reason = "expected times and positions, got lists within lists within lists, too many to be arrays"
+    return " ".join(reason.splitlines())
 
 
 def in_blocks(parsed: Parsed, every: int) -> Parsed:
@@ -208,12 +198,7 @@ def in_blocks(parsed: Parsed, every: int) -> Parsed:
 
 
 def select_columns(parse: Callable[[Layout], Parsed], layout: Layout) -> Parsed:
-    """Parse a file, and keep the columns that are asked for.
-
-    Where nobody chooses columns, those of the movements to compare with are read, if the file has all of them; and a
-    column without any value is left aside. Columns that are chosen by their numbers are those in that order, whatever
-    their names.
-    """
+    """Parse a file, and keep the columns that are asked for, or those of the movements to compare with."""
     names = layout.reference.columns if layout.reference is not None and layout.coordinates is None else ()
     if names and not any(name.isdecimal() for name in names):
         try:
@@ -254,12 +239,19 @@ def _without_excluded(parsed: Parsed, layout: Layout) -> Parsed:
             if layout.excluded
             else f"expected numbers in the columns {listed(heads)}, got none"
         )
+    return take_columns(parsed, columns)
+
+
+def take_columns(parsed: Parsed, chosen: Sequence[int]) -> Parsed:
+    """Return a file with some of its coordinates, in that order; the others are ignored."""
+    detected, block, _ = parsed
+    others = {*range(len(detected.columns))} - {*chosen}
     detected = detected._replace(
-        columns=_at(heads, columns),
-        measured_in=detected.measured_in and _at(detected.measured_in, columns),
-        ignored=(*detected.ignored, *(heads[k] for k in sorted(dropped))),
+        columns=tuple(detected.columns[k] for k in chosen),
+        measured_in=detected.measured_in and tuple(detected.measured_in[k] for k in chosen),
+        ignored=(*detected.ignored, *(detected.columns[k] for k in sorted(others))),
     )
-    return parsed._replace(detected=detected, block=replace(block, positions=block.positions[:, columns]))
+    return parsed._replace(detected=detected, block=replace(block, positions=block.positions[:, chosen]))
 
 
 def _named_as(parsed: Parsed, others: Known) -> Parsed:
@@ -270,7 +262,3 @@ def _named_as(parsed: Parsed, others: Known) -> Parsed:
         return parsed
     units = detected.measured_in or tuple(unit_of(head) or "" for head in detected.columns)
     return parsed._replace(detected=detected._replace(columns=names, measured_in=units))
-
-
-def _at(texts: Sequence[str], numbers: Sequence[int]) -> tuple[str, ...]:
-    return tuple(texts[k] for k in numbers)

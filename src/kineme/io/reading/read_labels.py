@@ -1,7 +1,4 @@
-"""Labels beside a long recording, and the recording cut into labeled movements by them.
-
-Tables of labels are CSV, JSON, ELAN's documents and tab-delimited exports, and Audacity's label tracks.
-"""
+"""Labels beside a long recording, in CSV, JSON or of ELAN and Audacity, and the recording cut into movements."""
 
 from __future__ import annotations
 
@@ -13,19 +10,17 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
 
 from kineme.errors import DataError
 from kineme.io.limits import check_expanded, read_limited
-from kineme.io.reading.merge_files import Recordings, Source
+from kineme.io.reading.merge_files import Recordings, Source, demonstrations_of
 from kineme.io.records import UNKNOWN, Problem
 from kineme.movements.tables.time_stamps import TIME_UNITS
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.movements.trajectories.labels import label_array
-from kineme.movements.trajectories.movements import Movements, of_channels
 from kineme.reporting.text import counted, text_in
 from kineme.units import UNITS, converted, split_head, unit_named
 from kineme.validation import MIN_SAMPLES, Array
@@ -180,9 +175,8 @@ class LabelTable(NamedTuple):
 def read_labels(path: Path) -> LabelTable:
     """Read the labels in a file; a `DataError` names the file, and the line if there is one.
 
-    ``.eaf`` is a document of ELAN, ``.json`` a list of objects; anything else is a table whose cells are separated by
-    tabs, semicolons or commas. With heads, these name the columns; without, as Audacity and ELAN export tables, the
-    first two times are start and end, and the last column is the label.
+    ``.eaf`` is a document of ELAN, ``.json`` a list of objects; anything else a table. Without heads, as Audacity and
+    ELAN export tables, the first two times are start and end, and the last column is the label.
     """
     with path.open("rb") as file:
         data = read_limited(file)
@@ -220,11 +214,8 @@ def _json(data: bytes) -> tuple[list[LabelRow], bool]:
     heads = heads_of(names)
     if heads is None:
         raise DataError(f"expected objects with start, end and label, got {names[:20]}")
-    return [row_of([_text(row.get(name)) for name in names], heads, k) for k, row in enumerate(rows, 1)], False
-
-
-def _text(value: Any) -> str:
-    return "" if value is None else str(value)
+    cells = [["" if row.get(name) is None else str(row[name]) for name in names] for row in rows]
+    return [row_of(texts, heads, k) for k, texts in enumerate(cells, 1)], False
 
 
 def _elan(data: bytes) -> tuple[list[LabelRow], bool]:
@@ -249,10 +240,9 @@ def _elan(data: bytes) -> tuple[list[LabelRow], bool]:
 def labeled_pieces(recordings: Recordings, table: LabelTable) -> Recordings:
     """Return the stretches of recordings that a table labels, as movements of their own.
 
-    A stretch begins and ends at the samples nearest to its times. Times by the recording's clock that all lie outside
-    of it, and would fit counted from its first sample, are taken so. Columns named recording and place say which
-    recording a row is of; without them there must be one. A stretch outside of its recording, of fewer than four
-    samples, or labeled twice is a problem, and so are rows of recordings that are not there.
+    A stretch begins and ends at the samples nearest to its times. Those by the recording's clock that all lie outside
+    of it, and would fit counted from its first sample, are taken so. A stretch outside of its recording, of fewer than
+    four samples, or labeled twice is a problem, and so are rows of recordings that are not there.
     """
     demos, rows = recordings.demonstrations, table.rows
     if len(demos) > 1 and not any(row.recording or row.place for row in rows):
@@ -263,27 +253,19 @@ def labeled_pieces(recordings: Recordings, table: LabelTable) -> Recordings:
     stretches: list[tuple[int, int]] = []
     sources: list[Source] = []
     paths = {source.path for source in recordings.sources}
-    meant = {name: _paths_of(name, paths) for name in dict.fromkeys(row.recording for row in rows)}
+    meant = {name: _paths_of(name, paths) if name else [] for name in dict.fromkeys(row.recording for row in rows)}
     # The rows of which several recordings may be meant, one problem for each name.
-    first = {row.recording: row.line for row in reversed(table.rows)}
-    problems = [
-        *recordings.problems,
-        *_of_none(table, recordings.sources, meant),
-        *[
-            Problem(
-                table.name,
-                first[name],
-                f"expected one recording {name}, got {', '.join(paths)}; write its folder in the column recording too",
+    lines_of_names = {row.recording: row.line for row in reversed(table.rows)}
+    problems = [*recordings.problems, *_of_none(table, recordings.sources, meant)]
+    for name, several in meant.items():
+        if len(several) > 1:
+            said = (
+                f"expected one recording {name}, got {', '.join(several)}; write its folder in the column recording too"
             )
-            for name, paths in meant.items()
-            if name and len(paths) > 1
-        ],
-    ]
+            problems.append(Problem(table.name, lines_of_names[name], said))
     for i, source in enumerate(recordings.sources):
         first, last = demos.offsets[i : i + 2]
-        own = [
-            row for row in rows if (not row.recording or len(meant[row.recording]) == 1) and _is_of(row, source, meant)
-        ]
+        own = [row for row in rows if len(meant[row.recording]) < 2 and _is_of(row, source, meant)]
         times = demos.movements.stamps[first:last]
         since = table.since_start or _counts_from_start(own, times)
         lines: dict[tuple[int, int], int] = {}  # stretch -> line that labels it
@@ -298,9 +280,8 @@ def labeled_pieces(recordings: Recordings, table: LabelTable) -> Recordings:
                 )
                 problems.append(Problem(table.name, row.line, reason))
             elif (line := lines.setdefault((start, stop), row.line)) != row.line:
-                problems.append(
-                    Problem(table.name, row.line, f"expected one label for a stretch, line {line} has it too")
-                )
+                reason = f"expected one label for a stretch, line {line} has it too"
+                problems.append(Problem(table.name, row.line, reason))
             else:
                 stretches.append((int(first) + start, int(first) + stop))
                 sources.append(source._replace(place=_place(source, times, start, stop), label=row.label))
@@ -315,15 +296,13 @@ def labeled_pieces(recordings: Recordings, table: LabelTable) -> Recordings:
 
 
 def _of_none(table: LabelTable, sources: Sequence[Source], meant: Mapping[str, Sequence[str]]) -> list[Problem]:
-    """Return the rows of recordings that are not there, as one problem."""
     lost = [row for row in table.rows if not any(_is_of(row, source, meant) for source in sources)]
     if not lost:
         return []
     wanted = f"{lost[0].recording} {lost[0].place}".strip()
     more = f", and {counted(len(lost) - 1, 'row')} more" if len(lost) > 1 else ""
-    return [
-        Problem(table.name, lost[0].line, f"expected a recording {wanted} among those that are read, found none{more}")
-    ]
+    reason = f"expected a recording {wanted} among those that are read, found none{more}"
+    return [Problem(table.name, lost[0].line, reason)]
 
 
 def _paths_of(recording: str, paths: Collection[str]) -> list[str]:
@@ -363,12 +342,7 @@ def _cut(demos: Demonstrations, stretches: Sequence[tuple[int, int]], sources: S
     """Return the stretches of samples as movements; what is learned of orientations and angles begins anew in each."""
     movements, samples = demos.movements, np.concatenate([np.arange(*stretch) for stretch in stretches])
     offsets = np.concatenate(([0], np.cumsum([stop - start for start, stop in stretches])))
-    times, labels = movements.stamps[samples], [source.label for source in sources]
-    names = tuple(f"{source.path}#{source.place}" for source in sources)
     positions = np.ascontiguousarray((demos.positions if movements.channels is None else demos.recorded)[samples])
-    labeled = None if None in labels else label_array(labels, len(labels), names)
-    durations = times[offsets[1:] - 1] - times[offsets[:-1]]
-    pieces = Movements(positions, offsets, durations, times, labeled, names, movements.dimensions)
-    return Demonstrations.of_movements(
-        pieces if movements.channels is None else of_channels(pieces, movements.channels)
+    return demonstrations_of(
+        positions, movements.stamps[samples], offsets, sources, movements.channels, movements.dimensions
     )

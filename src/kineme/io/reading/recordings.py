@@ -16,7 +16,6 @@ from kineme.io.reading.formats import as_text, data_set_of, entries_of, in_words
 from kineme.io.reading.join_files import Placed, join_files, notes_on_clocks
 from kineme.io.reading.merge_files import Recordings, merge_files, notes_on_gaps
 from kineme.io.reading.read_file import FileRead, format_of, read_bytes, read_file
-from kineme.io.records import Problem
 from kineme.movements.preparation.trim import TrimRest
 from kineme.movements.tables.columns import excluded_numbers
 from kineme.movements.tables.layout import FILL_GAPS, Column, Layout, listed
@@ -258,12 +257,7 @@ class Part(NamedTuple):
 class NameRule:
     """The origin of labels, if not the recording or its innermost folder."""
 
-    # A file name with fields in braces, as ``"{person}_{label}_{n}.csv"``. ``{label}`` is the label, ``{person}`` who
-    # showed the movements; other fields are passed over, and ``{n}`` is a number. Each takes as little as it can, and
-    # all other text is taken literally. With slashes it is compared with as many folders too.
-    label_pattern: str | None = None
-    # ``"task"``: the label in the recording alone, as the tasks of LeRobot; ``"folder"``: the innermost folder, also of
-    # a file that is given alone; a number: the folder so many levels up, 1 for the innermost.
+    label_pattern: str | None = None  # both as in `read_recordings`
     label_by: str | int | None = None
 
     def __post_init__(self) -> None:
@@ -303,26 +297,23 @@ class NameRule:
 
     def apply(self, read: FileRead, path: Path) -> FileRead:
         """Return a file with the labels that its path says; one that the pattern does not match is a problem."""
-        if read.block is None:
+        if not read.block.labels:
             return read
-        label = _folder(path, 1 if self.label_by == FOLDER else self.label_by) if self._by_folder else None
-        person = None
+        by_folder, person = self.label_by not in {None, TASK}, None
+        label = _folder(path, 1 if self.label_by == FOLDER else self.label_by) if by_folder else None
         if self.label_pattern is not None:
             depth = self.label_pattern.count("/") + 1
             name = "/".join(_parts(path, depth)[-depth:])
             fields = match(self.parts, name)
             if fields is None:
-                reason = f"expected a name like {self.label_pattern}, as the label pattern says, got {name}"
-                return read._replace(block=None, problems=[*read.problems, Problem(read.path, None, reason)])
+                return read.without_movements(
+                    f"expected a name like {self.label_pattern}, as the label pattern says, got {name}"
+                )
             label, person = fields.get(LABEL, label), fields.get(PERSON)
-        if label is None and not self._by_folder:
+        if label is None and not by_folder:
             return read._replace(person=person)
         block = replace(read.block, labels=[label] * len(read.block.labels))
         return read._replace(block=block, person=person)
-
-    @property
-    def _by_folder(self) -> bool:
-        return self.label_by not in {None, TASK}
 
     def _not_understood(self, why: str) -> SpecificationError:
         return SpecificationError(

@@ -11,7 +11,6 @@ from functools import partial
 from heapq import merge
 from math import inf
 from pathlib import Path, PurePath
-from shutil import copyfile
 from typing import Any, NamedTuple
 
 from kineme.errors import DataError
@@ -25,11 +24,7 @@ Texts = Sequence[tuple[int, str]]  # time of recording [ns] and text of each mes
 
 
 def copy_with_topic(source: Path, target: Path, name: str, texts: Callable[[int, int], Texts]) -> None:
-    """Copy a bag to a new file, or a folder to a new one, with a topic of texts.
-
-    `texts` takes the times of the first and of the last message of the bag [ns]. Without texts it is a plain copy.
-    Memory does not grow with the bag.
-    """
+    """Copy a bag with a topic of texts, which take the times of the first and the last message [ns]."""
     with bags.open_bag(source) as bag:
         chosen = texts(int(bag.reader.start_time), int(bag.reader.end_time) - 1)
         added = added_topic(bag, name, chosen)
@@ -78,7 +73,6 @@ def _copy_folder(bag: bags.Bag, source: Path, target: Path, added: AddedTopic) -
 
 
 def _copy_file(source: Path, target: Path, added: AddedTopic, storage: Any) -> None:
-    """Write a copy of a file of ROS 2, which rosbags reads with that storage."""
     ending = source.suffix.lower()
     if ending == ".db3":
         copy_sqlite(source, target, added)
@@ -145,11 +139,7 @@ def added_topic(bag: bags.Bag, name: str, texts: Sequence[tuple[int, str]]) -> A
 
 
 def copy_bag(bag: bags.Bag, target: Path, added: AddedTopic) -> None:
-    """Write a copy of an open bag of ROS 1 with a topic more, in the order of time.
-
-    It is written anew, by rosbags: roscpp, rospy and the mode "append" of rosbag order the fields of their records each
-    in another way, and a bag whose records are of several orders is damaged to most readers.
-    """
+    """Write a copy of an open bag of ROS 1 with a topic more: anew, since readers take fields in one order only."""
     from rosbags.rosbag1 import Writer
 
     writer = Writer(target)
@@ -163,16 +153,9 @@ def copy_bag(bag: bags.Bag, target: Path, added: AddedTopic) -> None:
     copies: dict[tuple[Any, ...], Any] = {}  # a node that began anew has connections that are equal
     with writer:
         for existing in bag.reader.connections:
-            about = (
-                existing.topic,
-                existing.msgtype,
-                existing.msgdef.data,
-                existing.digest,
-                existing.ext.callerid,
-                existing.ext.latching,
-            )
+            extra = {"callerid": existing.ext.callerid, "latching": existing.ext.latching}
+            about = (existing.topic, existing.msgtype, existing.msgdef.data, existing.digest, *extra.values())
             if about not in copies:
-                extra = {"callerid": existing.ext.callerid, "latching": existing.ext.latching}
                 copies[about] = writer.add_connection(*about[:2], msgdef=about[2], md5sum=about[3], **extra)
             copies[existing.id,] = copies[about]
         copies[()] = writer.add_connection(added.name, TEXT, msgdef=added.definition, md5sum=added.digest)
@@ -205,15 +188,12 @@ def copy_mcap(source: Path, target: Path, added: AddedTopic, compression: str) -
             if isinstance(record, records.Schema) and record.id not in schemas:
                 schemas[record.id] = writer.register_schema(record.name, record.encoding, record.data)
             elif isinstance(record, records.Channel) and record.id not in channels:
-                schema = schemas[record.schema_id]
-                channels[record.id] = writer.register_channel(
-                    record.topic, record.message_encoding, schema, record.metadata
-                )
+                about = (record.topic, record.message_encoding, schemas[record.schema_id], record.metadata)
+                channels[record.id] = writer.register_channel(*about)
             elif isinstance(record, records.Message):
                 write_texts(record.log_time)
-                writer.add_message(
-                    channels[record.channel_id], record.log_time, record.data, record.publish_time, record.sequence
-                )
+                message = (record.log_time, record.data, record.publish_time, record.sequence)
+                writer.add_message(channels[record.channel_id], *message)
             elif isinstance(record, records.Attachment):
                 writer.add_attachment(**vars(record))
             elif isinstance(record, records.Metadata):
@@ -226,7 +206,7 @@ def copy_mcap(source: Path, target: Path, added: AddedTopic, compression: str) -
 
 def copy_sqlite(source: Path, target: Path, added: AddedTopic) -> None:
     """Write a copy of a database of ROS 2 with a topic more, in the columns that its version has."""
-    copyfile(source, target)
+    shutil.copyfile(source, target)
     about = {"name": added.name, "type": TEXT, "serialization_format": "cdr", "offered_qos_profiles": ""}
     meaning = {"topic_type": TEXT, "encoding": "ros2msg", "encoded_message_definition": added.definition}
     digest = {"type_description_hash": added.digest}

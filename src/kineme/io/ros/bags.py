@@ -1,8 +1,7 @@
 """Open a bag of ROS 1 or ROS 2 and stream the bytes of its messages, by the package rosbags.
 
-Bags in SQLite need names that SQLite takes, and the log of what is not in the database yet. Whatever rosbags raises on
-damaged bags becomes a `DataError`, and nothing expands beyond a limit: what compressed bytes say of their size may be
-wrong, and a few may become gigabytes. Rosbags itself expands a chunk whole before it looks at its size, if it does.
+Whatever rosbags raises on damaged bags becomes a `DataError`, and nothing expands beyond a limit: what compressed bytes
+say of their size may be wrong, and rosbags expands a chunk whole before it looks at its size, if it does.
 """
 
 from __future__ import annotations
@@ -51,15 +50,12 @@ _KINDS = {".bag": "ROS 1 bag", ".mcap": "MCAP", ".db3": "ROS 2 SQLite"}
 
 
 class Topic(NamedTuple):
-    """A topic of a bag: what it is called, the type of its messages, and how many there are.
-
-    `connections` are of rosbags; several nodes may publish one topic.
-    """
+    """A topic of a bag."""
 
     name: str
-    type: str
+    type: str  # of its messages
     n_messages: int
-    connections: tuple[Any, ...]
+    connections: tuple[Any, ...]  # of rosbags; several nodes may publish one topic
 
 
 class Bag(NamedTuple):
@@ -108,10 +104,7 @@ def open_bag(path: Path) -> Iterator[Bag]:
 
 
 def _read_any_order(reader: Any) -> None:
-    """Let rosbags look at the order of fields in each index record of a bag of ROS 1, and not in the first alone.
-
-    roscpp writes them in another order than rosbag, which may have appended to what roscpp recorded.
-    """
+    """Let rosbags look at the order of fields in each index record: roscpp writes them in another order than rosbag."""
     read = reader.read_index_data
 
     def read_anew(at: int, indexes: Any) -> None:
@@ -122,10 +115,7 @@ def _read_any_order(reader: Any) -> None:
 
 
 def messages_of(bag: Bag, topics: Sequence[Topic]) -> Iterator[tuple[int, int, bytes]]:
-    """Index of the topic, time of recording [ns since 1970] and bytes of every message of some topics.
-
-    They come in the order of that time.
-    """
+    """Index of the topic, time of recording [ns since 1970] and bytes of the messages of some topics, in that order."""
     connections = [connection for topic in topics for connection in topic.connections]
     if not connections:  # none would mean all to rosbags
         return
@@ -161,19 +151,15 @@ def _topics(connections: Sequence[Any]) -> tuple[Topic, ...]:
 def check_records(path: Path) -> bytes:
     """Refuse a file that is none of ROS by its first bytes, and an MCAP file whose records are none or too large.
 
-    Returns the profile of an MCAP file, ``b"ros2"`` of one of ROS 2; nothing of other files.
-
-    Records are passed over by their lengths. Other damage is left to rosbags, which may find its way by the index.
+    Other damage is left to rosbags. Returns the profile of an MCAP file, ``b"ros2"`` of one of ROS 2, else nothing.
     """
-    magic = _MAGIC[path.suffix.lower()]
+    ending = path.suffix.lower()
     with path.open("rb") as file:
-        first = file.read(len(magic))
+        first = file.read(len(magic := _MAGIC[ending]))
         if first != magic:
-            raise DataError(
-                f"expected a {path.suffix.lower()} file of ROS, which begins with {magic!r}, got "
-                f"{'an empty file' if not first else repr(first)}"
-            )
-        return _check_mcap(file, len(magic)) if path.suffix.lower() == ".mcap" else b""
+            got = repr(first) if first else "an empty file"
+            raise DataError(f"expected a {ending} file of ROS, which begins with {magic!r}, got {got}")
+        return _check_mcap(file, len(magic)) if ending == ".mcap" else b""
 
 
 def _check_mcap(file: BinaryIO, at: int) -> bytes:
@@ -247,10 +233,7 @@ def refused(expected: str, remedy: str) -> Iterator[None]:
 
 
 def expand(compression: str, data: bytes, size: int, what: str = "a chunk") -> bytes:
-    """Expand all frames in some bytes, of "zstd", "lz4" or "bz2".
-
-    `size` is how many bytes they should become, which is checked against the limit on files first.
-    """
+    """Expand all frames in some bytes, of "zstd", "lz4" or "bz2", to `size` bytes, which is checked first."""
     check_in_passing(size, what)
     parts, n_bytes = [], 0
     while True:
@@ -323,10 +306,7 @@ def _expand_of_ros_1(file: Any, at: int, data: bytes) -> bytes:
 
 @cache
 def bound_chunks_of_mcap() -> None:
-    """Bound the chunks of every MCAP file from now on: it is a table of rosbags that says how they are expanded.
-
-    Each entry takes the bytes and the size that they must have; rosbags refuses another size later.
-    """
+    """Bound the chunks of every MCAP file from now on: it is a table of rosbags that says how they are expanded."""
     from rosbags.rosbag2.storage_mcap import DECOMPRESSORS
 
     DECOMPRESSORS.update({name: partial(expand, name) for name in ("lz4", "zstd")})
@@ -335,11 +315,12 @@ def bound_chunks_of_mcap() -> None:
 def check_overlaps(storage: Any, topics: Sequence[str]) -> None:
     """Refuse an MCAP file of which too much must be in memory at once: chunks whose times overlap are read together."""
     ids = [connection.id for connection in storage.connections if connection.topic in topics]
-    chunks = [chunk for chunk in getattr(storage, "chunks", ()) if any(chunk.channel_count.get(k, 0) for k in ids)]
-    begins = [(chunk.message_start_time, 0, max(chunk.uncompressed_size, chunk.compressed_size)) for chunk in chunks]
-    ends = [(chunk.message_end_time, 1, -max(chunk.uncompressed_size, chunk.compressed_size)) for chunk in chunks]
-    n_bytes = 0
-    for _, _, change in sorted(begins + ends):
+    changes, n_bytes = [], 0
+    for chunk in getattr(storage, "chunks", ()):
+        if any(chunk.channel_count.get(k, 0) for k in ids):
+            size = max(chunk.uncompressed_size, chunk.compressed_size)
+            changes += [(chunk.message_start_time, 0, size), (chunk.message_end_time, 1, -size)]
+    for _, _, change in sorted(changes):
         n_bytes += change
         check_in_passing(n_bytes, "a set of chunks of one time")
 
@@ -354,10 +335,7 @@ class Folder(NamedTuple):
 
 @contextmanager
 def expanded_folder(path: Path) -> Iterator[Folder]:
-    """Yield the folder, or one with its files expanded.
-
-    A folder that is none of ROS 2, or whose files are missing, is left to rosbags to refuse.
-    """
+    """Yield the folder, or one with its files expanded; one that is none of ROS 2 is left to rosbags to refuse."""
     from ruamel.yaml import YAML
 
     about: dict[str, Any] = {}

@@ -6,6 +6,7 @@ from collections import Counter, deque
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from difflib import get_close_matches
+from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -31,15 +32,12 @@ FRAMES_LOOKED_AT = 50_000  # transforms that are read to list the frames
 
 
 class Choice(NamedTuple):
-    """Topics in the order that was asked for, and pairs of frames, which come first, with the topics they are from.
+    """What is read of a bag."""
 
-    `as_known`: nobody asked for them; they are what the movements to compare with were read from.
-    """
-
-    topics: tuple[Topic, ...]
-    frames: tuple[Edge, ...] = ()
-    transforms: tuple[Topic, ...] = ()
-    as_known: bool = False
+    topics: tuple[Topic, ...]  # in the order that was asked for
+    frames: tuple[Edge, ...] = ()  # pairs, which come before the topics
+    transforms: tuple[Topic, ...] = ()  # the topics that the frames are from
+    as_known: bool = False  # nobody asked for it, but the movements to compare with were read from it
 
 
 def choose(bag: Bag, layout: Layout) -> Choice:
@@ -81,12 +79,9 @@ def _as_known(bag: Bag, movements: Known, candidates: Sequence[Topic]) -> Choice
     """Choose what the movements to compare with were read from, or the only topic with such columns; else None."""
     choices = []
     for topics, frames in movements.choices:
-        try:
-            choice = choose(bag, Layout(topic=topics, frame=frames))
-        except DataError:
-            continue
-        if choice.transforms or not choice.frames:
-            choices.append(choice)
+        with suppress(DataError):
+            choices.append(choose(bag, Layout(topic=topics, frame=frames)))
+    choices = [choice for choice in choices if choice.transforms or not choice.frames]
     if not choices:
         choices = [Choice((topic,)) for topic in fitting_topics(bag, candidates, movements)]
     return choices[0] if len(choices) == 1 else None
@@ -172,14 +167,12 @@ def _first_sample(bag: Bag, topic: Topic) -> tuple[Heads, Sequence[float]]:
     row_of = TYPES[topic.type].row if topic.type in TYPES else None
     if row_of is None:
         return (), ()
-    try:
+    with suppress(KinemeError, ValueError):  # a topic that cannot be read fits nothing
         decode = decoder_of(bag, topic)
-        for (_, _, raw), _ in zip(messages_of(bag, [topic]), range(_LOOKED_AT), strict=False):
+        for _, _, raw in islice(messages_of(bag, [topic]), _LOOKED_AT):
             heads, row = row_of(decode(raw))
             if heads:
                 return heads, row
-    except (KinemeError, ValueError):
-        pass  # a topic that cannot be read fits nothing
     return (), ()
 
 
@@ -222,10 +215,7 @@ def edge_of(transform: Any) -> Edge:
 
 
 def connected_graph(bag: Bag, topics: Sequence[Topic], wanted: Sequence[Edge], most: int | None = None) -> list[Edge]:
-    """Return the frames, read until all wanted pairs are connected, or `most` transforms, or to the end.
-
-    Each is a child with the parent that it has most transforms of, in alphabetic order.
-    """
+    """Return the frames, each with its usual parent, of `most` transforms, or until all wanted pairs are connected."""
     parents: dict[str, Counter[str]] = {}
 
     def ordered() -> list[Edge]:
@@ -295,15 +285,14 @@ def bag_contents(path: Path) -> list[Contents]:
 def _read_as(bag: Bag, topic: Topic) -> str:
     if topic.type in TRANSFORMS:
         return "frames" if topic.n_messages else "nothing: empty"
-    if topic.type not in TYPES:
-        try:
-            n = len(number_fields(bag, topic).heads)
-        except DataError:
-            return "nothing: no numbers"
-        return f"{counted(n, 'number')}: {PLAIN}" if holds_samples(topic) else "nothing: too few messages"
-    if not can_be_read(topic):
-        return "nothing: too few messages"
-    return "a movement for each message" if TYPES[topic.type].path else "a movement"
+    if topic.type in TYPES:
+        said = "a movement for each message" if TYPES[topic.type].path else "a movement"
+        return said if can_be_read(topic) else "nothing: too few messages"
+    try:
+        n = len(number_fields(bag, topic).heads)
+    except DataError:
+        return "nothing: no numbers"
+    return f"{counted(n, 'number')}: {PLAIN}" if holds_samples(topic) else "nothing: too few messages"
 
 
 def _frames(bag: Bag) -> Contents:

@@ -1,17 +1,16 @@
 """Messages as numbers: a row of named numbers, or a movement of its own.
 
-Those of known types are decoded by the definitions that come with rosbags. Those in a bag are not used: rosbags makes
-program code of them, and a recording must not make programs run. A type that differs from its standard is refused where
-the bag says so, by the checksum of its definition. The numbers in messages of any other type are found by the
-definition in the bag, of which no program is made.
+Those of known types are decoded by the definitions that come with rosbags, and refused if their checksum differs. Of
+the definitions in a bag rosbags makes program code, which a recording must not make run: the numbers of other types are
+found by these definitions without it.
 """
 
 from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cache, cached_property, lru_cache
+from functools import cache, lru_cache
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 from kineme.errors import DataError
@@ -20,9 +19,12 @@ from kineme.io.ros.bags import Bag, Topic, refused
 Heads = tuple[str, ...]
 Row = Sequence[float]
 
-_XYZ = ("x", "y", "z")
-POSE: Heads = (*(f"position.{axis}" for axis in _XYZ), *(f"orientation.{axis}" for axis in (*_XYZ, "w")))
-_TWIST: Heads = (*(f"linear.{axis}" for axis in _XYZ), *(f"angular.{axis}" for axis in _XYZ))
+POSE: Heads = (*(f"position.{axis}" for axis in "xyz"), *(f"orientation.{axis}" for axis in "xyzw"))
+_TRANSFORM: Heads = (*(f"translation.{axis}" for axis in "xyz"), *(f"rotation.{axis}" for axis in "xyzw"))
+_TWIST: Heads = (*(f"linear.{axis}" for axis in "xyz"), *(f"angular.{axis}" for axis in "xyz"))
+
+_pose_row: Callable[[Any], Row] = attrgetter(*POSE)
+transform_row: Callable[[Any], Row] = attrgetter(*_TRANSFORM)  # the numbers of `POSE`
 
 #: The types of messages with transforms between frames.
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
@@ -41,26 +43,6 @@ class MessageType(NamedTuple):
 def nanoseconds_of(time: Any) -> int:
     """Return a time or a duration of ROS [ns]."""
     return int(time.sec) * 1_000_000_000 + int(time.nanosec)
-
-
-def transform_row(transform: Any) -> Row:
-    """Return translation and rotation, the numbers of `POSE`."""
-    p, q = transform.translation, transform.rotation
-    return p.x, p.y, p.z, q.x, q.y, q.z, q.w
-
-
-def _pose_row(pose: Any) -> Row:
-    p, q = pose.position, pose.orientation
-    return p.x, p.y, p.z, q.x, q.y, q.z, q.w
-
-
-def _twist_row(twist: Any) -> Row:
-    v, w = twist.linear, twist.angular
-    return v.x, v.y, v.z, w.x, w.y, w.z
-
-
-def _point_row(point: Any) -> Row:
-    return point.x, point.y, point.z
 
 
 def _joint_state(message: Any) -> tuple[Heads, Row]:
@@ -98,37 +80,32 @@ def _path(message: Any) -> tuple[Heads, list[int], list[Row]]:
     return POSE, stamps, [_pose_row(pose.pose) for pose in message.poses]
 
 
-def _fixed(heads: Heads, row: Callable[[Any], Row]) -> Callable[[Any], tuple[Heads, Row]]:
+def _below(path: str, heads: Heads, fields: Sequence[str] = ()) -> Callable[[Any], tuple[Heads, Row]]:
+    """Return the reader of the fields below a path, which are called as the heads unless they are named."""
+    row = attrgetter(*(f"{path}{field}" for field in fields or heads))
     return lambda message: (heads, row(message))
 
 
 #: Name of a type -> how its messages are read; those of `TRANSFORMS` are composed, see `kineme.io.ros.choose`.
 TYPES: dict[str, MessageType] = {
     "sensor_msgs/msg/JointState": MessageType(_joint_state, has_header=True),
-    "geometry_msgs/msg/Pose": MessageType(_fixed(POSE, _pose_row)),
-    "geometry_msgs/msg/PoseStamped": MessageType(_fixed(POSE, lambda m: _pose_row(m.pose)), has_header=True),
-    "geometry_msgs/msg/PoseWithCovarianceStamped": MessageType(
-        _fixed(POSE, lambda m: _pose_row(m.pose.pose)), has_header=True
-    ),
+    "geometry_msgs/msg/Pose": MessageType(_below("", POSE)),
+    "geometry_msgs/msg/PoseStamped": MessageType(_below("pose.", POSE), has_header=True),
+    "geometry_msgs/msg/PoseWithCovarianceStamped": MessageType(_below("pose.pose.", POSE), has_header=True),
     "geometry_msgs/msg/PoseArray": MessageType(_pose_array, has_header=True),
-    "geometry_msgs/msg/TransformStamped": MessageType(
-        _fixed(POSE, lambda m: transform_row(m.transform)), has_header=True
-    ),
-    "geometry_msgs/msg/Twist": MessageType(_fixed(_TWIST, _twist_row)),
-    "geometry_msgs/msg/TwistStamped": MessageType(_fixed(_TWIST, lambda m: _twist_row(m.twist)), has_header=True),
-    "geometry_msgs/msg/PointStamped": MessageType(_fixed(POSE[:3], lambda m: _point_row(m.point)), has_header=True),
-    "geometry_msgs/msg/Vector3Stamped": MessageType(
-        _fixed(("vector.x", "vector.y", "vector.z"), lambda m: _point_row(m.vector)), has_header=True
-    ),
-    "nav_msgs/msg/Odometry": MessageType(_fixed(POSE, lambda m: _pose_row(m.pose.pose)), has_header=True),
+    "geometry_msgs/msg/TransformStamped": MessageType(_below("transform.", POSE, _TRANSFORM), has_header=True),
+    "geometry_msgs/msg/Twist": MessageType(_below("", _TWIST)),
+    "geometry_msgs/msg/TwistStamped": MessageType(_below("twist.", _TWIST), has_header=True),
+    "geometry_msgs/msg/PointStamped": MessageType(_below("point.", POSE[:3], "xyz"), has_header=True),
+    "geometry_msgs/msg/Vector3Stamped": MessageType(_below("", ("vector.x", "vector.y", "vector.z")), has_header=True),
+    "nav_msgs/msg/Odometry": MessageType(_below("pose.pose.", POSE), has_header=True),
     "nav_msgs/msg/Path": MessageType(path=_path),
     "trajectory_msgs/msg/JointTrajectory": MessageType(path=_joint_trajectory),
     "std_msgs/msg/Float64MultiArray": MessageType(_numbers),
     "std_msgs/msg/Float32MultiArray": MessageType(_numbers),
 }
 
-#: In ROS 1 both names of the type of /tf have one definition.
-_TF_1 = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
+
 _TF_DEFINITION = "geometry_msgs/TransformStamped[] transforms\n"
 
 _FORMATS = {
@@ -156,49 +133,26 @@ class Numbers(NamedTuple):
     stamp: int
 
 
-@dataclass(frozen=True)
-class NumberFields:
-    """The places of the numbers of a type: columns by the path of their field, as ``angular_velocity.x``.
-
-    Arrays of fixed size are columns as well, ``ranges.0``; texts and sequences of any length are passed over. The
-    header is no column: it is the stamp.
-    """
+class NumberFields(NamedTuple):
+    """The places of the numbers of a type: columns by the path of their field, ``angular_velocity.x``, ``ranges.0``."""
 
     type: str
     version: int  # of ROS
     steps: tuple[Step, ...]
+    heads: tuple[str, ...]  # of the columns
+    samples: tuple[int, ...]  # places of the columns among all numbers
+    stamp: tuple[int, ...]  # places of seconds and nanoseconds; none where messages do not tell their own time
 
-    @cached_property
-    def _all(self) -> list[str]:
-        return [head for step in self.steps for head in step.heads]
-
-    @cached_property
-    def _samples(self) -> list[int]:
-        return [k for k, head in enumerate(self._all) if not head.startswith("header.")]
-
-    @cached_property
-    def _stamp(self) -> tuple[int, int] | None:
-        seconds, nanoseconds = _STAMP
-        return (self._all.index(seconds), self._all.index(nanoseconds)) if nanoseconds in self._all else None
-
-    @property
-    def has_header(self) -> bool:
-        """True if messages tell their own time."""
-        return self._stamp is not None
-
-    @cached_property
-    def heads(self) -> tuple[str, ...]:
-        """The columns."""
-        return tuple(self._all[k] for k in self._samples)
+    @classmethod
+    def of(cls, name: str, version: int, steps: tuple[Step, ...]) -> NumberFields:
+        """Find the columns and the stamp among the numbers of the steps."""
+        names = [head for step in steps for head in step.heads]
+        samples = tuple(k for k, head in enumerate(names) if not head.startswith("header."))
+        stamp = tuple(map(names.index, _STAMP)) if _STAMP[1] in names else ()
+        return cls(name, version, steps, tuple(names[k] for k in samples), samples, stamp)
 
     def decode(self, raw: bytes) -> Numbers:
-        """Return the numbers in the bytes of a message.
-
-        Raises
-        ------
-        ValueError
-            They are of another type, or cut off.
-        """
+        """Return the numbers in the bytes of a message; a `ValueError` if they are of another type, or cut off."""
         is_2 = self.version == 2
         if is_2 and (len(raw) < _ORIGIN or raw[0] != 0 or raw[1] > 1):
             raise ValueError(f"expected a {self.type}, got no bytes in CDR")
@@ -209,11 +163,8 @@ class NumberFields:
             raise ValueError(f"expected a {self.type}, got {len(raw)} bytes, which are too few") from error
         if not is_2 and end != len(raw):
             raise ValueError(f"expected a {self.type}, got {len(raw)} bytes for {end}")
-        stamp = 0
-        if self._stamp is not None:
-            seconds, nanoseconds = (int(row[k]) for k in self._stamp)
-            stamp = seconds * 1_000_000_000 + nanoseconds
-        return Numbers([row[k] for k in self._samples], stamp)
+        seconds, nanoseconds = (int(row[k]) for k in self.stamp) if self.stamp else (0, 0)
+        return Numbers([row[k] for k in self.samples], seconds * 1_000_000_000 + nanoseconds)
 
 
 def number_fields(bag: Bag, topic: Topic) -> NumberFields:
@@ -228,13 +179,12 @@ def number_fields(bag: Bag, topic: Topic) -> NumberFields:
     from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
     with refused(where, "convert the topic to CSV"):
-        parse = (
-            get_types_from_idl if definition.format.name == "IDL" else lambda text: get_types_from_msg(text, topic.type)
-        )
-        standard = get_typestore(Stores.ROS1_NOETIC if bag.version == 1 else Stores.LATEST).fielddefs
-        types = {**standard, **(parse(text) if text.strip() else {})}
+        types = {**get_typestore(Stores.ROS1_NOETIC if bag.version == 1 else Stores.LATEST).fielddefs}
+        if text.strip():
+            is_idl = definition.format.name == "IDL"
+            types |= get_types_from_idl(text) if is_idl else get_types_from_msg(text, topic.type)
         steps = tuple(_steps(types, topic.type, "", bag.version, _DEEPEST))
-    fields = NumberFields(topic.type, bag.version, steps)
+    fields = NumberFields.of(topic.type, bag.version, steps)
     if not fields.heads:
         raise DataError(f"topic {topic.name}: expected numbers in messages of {topic.type}, got none")
     return fields
@@ -356,7 +306,7 @@ def standard_types(version: int) -> Any:
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
     store = get_typestore(Stores.ROS1_NOETIC if version == 1 else Stores.LATEST)
-    for name in _TF_1:
+    for name in TRANSFORMS:  # in ROS 1 both names have one definition
         if name not in store.types:
             store.register(get_types_from_msg(_TF_DEFINITION, name))
     return store

@@ -40,7 +40,6 @@ from kineme.movements.tables.table import Table, table_movements
 from kineme.reporting.text import counted
 from kineme.validation import MIN_SAMPLES, Array
 
-_SECOND = 1e9  # [ns]
 _COPIES = 3
 
 _CHECKED = 2**14
@@ -86,10 +85,7 @@ def read_bag(path: Path, layout: Layout) -> Parsed:
 
 
 def _roles(heads: tuple[str, ...], time: int, layout: Layout, of_joints: bool = True) -> Roles:
-    """Take all columns but stamps, numbers of things, and covariances as coordinates, or those chosen.
-
-    The names of joints are any words.
-    """
+    """Take as coordinates all columns but stamps, covariances, numbers of things (not of joints); or those chosen."""
     aside = {k for k, head in enumerate(heads) if "covariance" in head or (not of_joints and is_no_coordinate(head))}
     measured = tuple(k for k in range(2, len(heads)) if k not in aside)
     positions = measured or tuple(range(2, len(heads)))
@@ -176,10 +172,7 @@ def _usable(edge: Edge, samples: Samples, left_out: list[str]) -> Stream:
         if not good.any():
             raise DataError(left_out[-1])
     rows = np.flatnonzero(good)
-    rows = rows[np.diff(stream.stamped[rows], prepend=stream.stamped[rows[0]] - 1) != 0]
-    if len(rows) == len(good):
-        return stream
-    return replace(stream, values=stream.values[rows], recorded=stream.recorded[rows], stamped=stream.stamped[rows])
+    return stream.at(rows[np.diff(stream.stamped[rows], prepend=stream.stamped[rows[0]] - 1) != 0])
 
 
 def _composed(name: str, way: Sequence[Step], edges: dict[Edge, Stream], left_out: list[str]) -> Stream:
@@ -219,7 +212,6 @@ def _is_fixed(stream: Stream) -> bool:
 
 
 def _at(seconds: Array, start: int, stream: Stream, of_headers: bool) -> Array:
-    """Return a transform at the common stamps, (n, 7)."""
     if _is_fixed(stream):
         return np.repeat(stream.values[:1], len(seconds), axis=0)
     stamps, values = in_order(stream, of_headers)
@@ -234,10 +226,7 @@ class _Group(NamedTuple):
 
 
 def _movements_of_messages(bag: Bag, topic: Topic, layout: Layout) -> Parsed:
-    """Return the movements of a topic, one a message. Of those with different columns, the most frequent are read.
-
-    A message that cannot be read costs its own movement, whatever the layout says to skip.
-    """
+    """Return the movements of a topic, one a message. Of those with different columns, the most frequent are read."""
     groups: dict[Heads, _Group] = {}
     left_out: list[str] = []
     _collect_path(bag, topic, groups, left_out)
@@ -262,7 +251,7 @@ def _movements_of_messages(bag: Bag, topic: Topic, layout: Layout) -> Parsed:
     names = np.empty(len(stamps), dtype=object)
     names[:] = np.repeat([str(place) for place in places], lengths)
     columns = ("time_from_start" if is_planned else "header.stamp", "message", *stream.heads)
-    times = stamps / _SECOND if timed else np.zeros(len(stamps))
+    times = stamps / SECOND if timed else np.zeros(len(stamps))
     table = Table(columns, [times, names, *stream.values.T], len(names), no_lines, dates_in="s")
     roles = _roles(columns, 0, layout)._replace(movement=(1,))
     about = (bag.kind, f"topic {topic.name} of {topic.type}, a movement a message", "stamps of its points")

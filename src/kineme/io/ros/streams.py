@@ -43,6 +43,11 @@ class Stream:
     stamped: Stamps | None  # shape (n,); the stamps in the headers of the messages [ns]; None if they have no headers
     why: str = ""  # why there are no such stamps, where it is not for want of headers
 
+    def at(self, rows: NDArray[Any]) -> Stream:
+        """Return some of the samples."""
+        stamped = None if self.stamped is None else self.stamped[rows]
+        return replace(self, values=self.values[rows], recorded=self.recorded[rows], stamped=stamped)
+
 
 class Samples(NamedTuple):
     """Numbers that are collected: the rows one after the other, and two stamps for each [ns]."""
@@ -56,15 +61,8 @@ class Samples(NamedTuple):
         """Begin without samples."""
         return cls(array("d"), array("q"), array("q"))
 
-    @property
-    def n_bytes(self) -> int:
-        """Memory of the numbers."""
-        return 8 * (len(self.values) + len(self.recorded) + len(self.stamped))
-
 
 class _Open(NamedTuple):
-    """The samples collected of one topic."""
-
     decode: Any
     row: Any
     stamp: Any  # message -> [ns]; None if messages do not tell their own time
@@ -77,11 +75,7 @@ class _Open(NamedTuple):
 def read_streams(
     bag: Bag, topics: Sequence[Topic], skip: str, columns: Sequence[Column] | None = None
 ) -> tuple[list[Stream], list[str]]:
-    """Read the samples of topics, and what was left out; `columns` are those that are asked for.
-
-    Messages of one topic may have different columns, as the states of joints that several nodes publish. They are
-    streams of their own where they share no column; of those that do, the most frequent are read.
-    """
+    """Read the samples of topics, those of different columns as streams of their own, and say what was left out."""
     opened = [_open(bag, topic) for topic in topics]
     left_out: list[str] = []
     try:
@@ -125,7 +119,7 @@ def _open(bag: Bag, topic: Topic) -> _Open:
     kind = TYPES.get(topic.type)
     if kind is None:
         fields = number_fields(bag, topic)
-        heads, stamp = fields.heads, (lambda message: message.stamp) if fields.has_header else None
+        heads, stamp = fields.heads, (lambda message: message.stamp) if fields.stamp else None
         return _Open(fields.decode, lambda message: (heads, message.row), stamp, {}, {}, [], [0, 0])
     stamp = (lambda message: nanoseconds_of(message.header.stamp)) if kind.has_header else None
     return _Open(decoder_of(bag, topic), kind.row, stamp, {}, {}, [], [0, 0])
@@ -157,9 +151,8 @@ def _collect(bag: Bag, topics: Sequence[Topic], opened: Sequence[_Open]) -> None
 
 def check_samples(some: Sequence[Samples]) -> None:
     """Refuse to keep more numbers than the limit of memory allows; samples may occur several times."""
-    check_expanded(
-        _COPIES * sum(samples.n_bytes for samples in {id(samples): samples for samples in some}.values()), "a topic"
-    )
+    each = {id(samples): samples for samples in some}.values()
+    check_expanded(8 * _COPIES * sum(len(numbers) for samples in each for numbers in samples), "a topic")
 
 
 def _group(reading: _Open, heads: Heads) -> tuple[Samples, list[int] | None]:
@@ -211,20 +204,18 @@ def with_rotations(
     Those that are zero in every sample were never set: their columns are left out, and so are those that `columns`, if
     given, does not ask for. Others cost their sample or, where `skip` is ``"movement"``, the movement.
     """
-    unset = [k for k in rotations_in(stream.heads) if not stream.values[:, k : k + 4].any()]
-    if unset:
-        dropped = [k + i for k in unset for i in range(4)]
-        left_out.append(f"{where}{', '.join(stream.heads[k] for k in dropped)}, which are 0 in every message")
+    if unset := [k for k in rotations_in(stream.heads) if not stream.values[:, k : k + 4].any()]:
+        names = ", ".join(head for k in unset for head in stream.heads[k : k + 4])
+        left_out.append(f"{where}{names}, which are 0 in every message")
         stream = _without(stream, unset)
     wrong = [k for k in rotations_in(stream.heads) if not are_rotations(stream.values[:, k : k + 4]).all()]
     stream = _without(stream, [k for k in wrong if not _is_chosen(stream, range(k, k + 4), columns)])
-    good = np.ones(len(stream.values), dtype=bool)
-    for k in rotations_in(stream.heads):
-        good &= are_rotations(stream.values[:, k : k + 4])
+    rotations = [stream.values[:, k : k + 4] for k in rotations_in(stream.heads)]
+    good = np.all([are_rotations(q) for q in rotations] or [np.ones(len(stream.values), dtype=bool)], axis=0)
     if good.all():
         return stream
     bad = np.flatnonzero(~good)
-    norms = [float(np.linalg.norm(stream.values[bad[0], k : k + 4])) for k in rotations_in(stream.heads)]
+    norms = [float(np.linalg.norm(q[bad[0]])) for q in rotations]
     reason = (
         f"{where}expected orientations of norm 1, got the norm {max(norms, key=lambda norm: abs(norm - 1)):.3g} in "
         f"message {bad[0]}{f'; {len(bad) - 1} more like this' if len(bad) > 1 else ''}"
@@ -232,12 +223,10 @@ def with_rotations(
     if skip == "movement" or len(bad) == len(good):
         raise DataError(reason + (_TO_KEEP if len(bad) < len(good) else ""))
     left_out.append(reason)
-    stamped = None if stream.stamped is None else stream.stamped[good]
-    return replace(stream, values=stream.values[good], recorded=stream.recorded[good], stamped=stamped)
+    return stream.at(good)
 
 
 def _without(stream: Stream, rotations: Sequence[int]) -> Stream:
-    """Return the stream without the quaternions that begin at these columns."""
     if not rotations:
         return stream
     dropped = {k + i for k in rotations for i in range(4)}
@@ -246,10 +235,7 @@ def _without(stream: Stream, rotations: Sequence[int]) -> Stream:
 
 
 def _is_chosen(stream: Stream, numbers: Iterable[int], columns: Sequence[Column] | None) -> bool:
-    """Tell whether one of the columns with these numbers is asked for: by its name, the beginning of it, or a pattern.
-
-    A column that is asked for by its number may be any.
-    """
+    """Tell whether one of the columns is asked for: by its number, its name, the beginning of it, or a pattern."""
     if columns is None or any(not isinstance(column, str) or column.isdecimal() for column in columns):
         return True
     names = [name for k in numbers for name in (stream.heads[k], f"{stream.name}.{stream.heads[k]}")]
@@ -257,10 +243,7 @@ def _is_chosen(stream: Stream, numbers: Iterable[int], columns: Sequence[Column]
 
 
 def clock_of(streams: Sequence[Stream]) -> tuple[bool, str]:
-    """Tell whether the stamps in the headers are the time, and else why they are not.
-
-    They are where every message has one and they increase in every stream. Otherwise it is the time of recording.
-    """
+    """Tell whether the stamps in the headers are the time, as they increase everywhere, and else why they are not."""
     for stream in streams:
         if stream.stamped is None:
             return False, stream.why or f"{stream.name} has no stamps in headers"
@@ -283,11 +266,7 @@ def stamps_of(stream: Stream, of_headers: bool) -> Stamps:
 
 
 def merge_streams(streams: Sequence[Stream], of_headers: bool) -> tuple[Stream, list[str]]:
-    """Return one stream with the columns of all, at the stamps of the first; and what was left out.
-
-    Samples of the first stream before another one begins, or after it ends, are left out. Columns are prefixed with
-    the name of their stream where names occur twice.
-    """
+    """Return one stream with the columns of all, at the stamps of the first while others last; and what is left out."""
     first = streams[0]
     if len(streams) == 1:
         return first, []
@@ -308,13 +287,7 @@ def merge_streams(streams: Sequence[Stream], of_headers: bool) -> tuple[Stream, 
     seconds = (at[inside] - start) / SECOND
     values = [first.values[inside]]
     values += [values_at(seconds, (stamps - start) / SECOND, stream, x) for stream, (stamps, x) in others]
-    merged = replace(
-        first,
-        heads=_heads(streams),
-        values=np.hstack(values),
-        recorded=first.recorded[inside],
-        stamped=None if first.stamped is None else first.stamped[inside],
-    )
+    merged = replace(first.at(inside), heads=_heads(streams), values=np.hstack(values))
     n_lost = int(len(at) - inside.sum())
     lost = f"{counted(n_lost, 'sample')} of {first.name} before {names} begins or after it ends"
     return merged, [lost] if n_lost else []
@@ -333,7 +306,7 @@ def in_order(stream: Stream, of_headers: bool) -> tuple[Stamps, Array]:
     ticks = stamps_of(stream, of_headers)
     if (np.diff(ticks) > 0).all():
         return ticks, stream.values
-    stamps, where = np.unique(stamps_of(stream, of_headers), return_index=True)
+    stamps, where = np.unique(ticks, return_index=True)
     return stamps, stream.values[where]
 
 
@@ -363,10 +336,7 @@ def to_ros(q: Array) -> Array:
 
 
 def interpolated(at: Array, times: Array, q: Array) -> Array:
-    """Turn rows of q (n, 4) at times (n,) into rotations (m, 4) at other times (m,), by spherical linear interpolation.
-
-    Before the first time and after the last one the rotation stays.
-    """
+    """Turn rows of q (n, 4) at times (n,) into rotations (m, 4) at others, by spherical linear interpolation."""
     rotations = continuous(from_ros(q))
     if len(times) == 1:
         return np.repeat(to_ros(rotations), len(at), axis=0)

@@ -50,12 +50,7 @@ class Dialect(NamedTuple):
     names_rows: bool = False  # whether the first column tells movements or labels apart, be these numbers
 
     def is_sample(self, line: str) -> bool:
-        """Tell whether a line holds a sample. A comment does not, but a name may begin like a comment.
-
-        A line that begins with one of `COMMENTS` is a sample where the first column holds names, the line has as many
-        cells as there are columns, and those of numbers hold numbers. Where most of the names are numbers, as 1 and
-        2, ``%d`` is a name, and ``#1`` a row that was commented out.
-        """
+        """Tell whether a line holds a sample, also one that begins like a comment but fits the columns."""
         if not is_skipped(line):
             return True
         if not (self.names_rows or self.kinds[0] == "text") or not line.strip():
@@ -99,10 +94,7 @@ def split(line: str, separator: str | None) -> list[str]:
 
 
 def _quoted_cells(line: str, separator: str | None) -> list[str]:
-    """Return the cells of a line with quoted cells; a doubled quote within them stands for one quote.
-
-    Python's csv is not used: its limit on the length of cells holds for the whole process.
-    """
+    """Return cells, quoted ones as csv does, whose limit on their length holds for the whole process."""
     end = r"\s" if separator is None else re.escape(separator)
     cell = re.compile(rf'[^\S{end}]*"([^"]*(?:""[^"]*)*)(?:"([^{end}]*))?|([^{end}]*)')
     gap = re.compile(r"\s+" if separator is None else end)
@@ -188,10 +180,7 @@ def units_in(cells: Sequence[str]) -> tuple[str, ...]:
 
 
 def _below_preamble(lines: Sequence[str], own: list[int], cells: Sequence[list[str]]) -> list[int]:
-    """Return the lines from the heads on, where lines of other lengths without rows of numbers stand above them.
-
-    So loggers write the device, the rate and the time. Below the heads all lines have as many cells.
-    """
+    """Return the lines from the heads on, below lines of other lengths without rows of numbers, as of loggers."""
     widths = {*map(len, cells)}
     if len(widths) == 1 and widths != {1}:
         return own
@@ -208,10 +197,7 @@ def _below_preamble(lines: Sequence[str], own: list[int], cells: Sequence[list[s
 
 
 def _with_names_like_comments(lines: Sequence[str], numbers: list[int]) -> list[int]:
-    """Add the lines below the first of them that begin like comments but are rows: ``#1,0.0,0.25,0.75``.
-
-    Only if the first cells of all other rows are not numbers; otherwise such a line is a row that was commented out.
-    """
+    """Add lines that begin like comments but are rows, ``#1,0.0,0.25``, where no other row begins with a number."""
     separator = separator_of([lines[numbers[0]]])
     if separator is None or len(numbers) == len(lines) - numbers[0]:  # no line below was skipped
         return numbers
@@ -219,12 +205,13 @@ def _with_names_like_comments(lines: Sequence[str], numbers: list[int]) -> list[
     if any(is_number(row[0], separator != ",") for row in rows):
         return numbers
     below = (k for k in range(numbers[0] + 1, len(lines)) if lines[k].strip() and is_skipped(lines[k]))
-    marked = (k for k in below if _is_row(split(lines[k], separator), len(rows[0]), separator))
-    return sorted({*numbers, *islice(marked, _PEEK)})[:_PEEK]
-
-
-def _is_row(cells: Sequence[str], n_columns: int, separator: str) -> bool:
-    return len(cells) == n_columns and any(is_number(cell, separator != ",") for cell in cells[1:])
+    marked = ((k, split(lines[k], separator)) for k in below)
+    own = (
+        k
+        for k, row in marked
+        if len(row) == len(rows[0]) and any(is_number(cell, separator != ",") for cell in row[1:])
+    )
+    return sorted({*numbers, *islice(own, _PEEK)})[:_PEEK]
 
 
 def separator_of(lines: Sequence[str]) -> str | None:
@@ -246,10 +233,7 @@ def is_number(cell: str, comma: bool) -> bool:
 
 
 def marks_within(cell: str) -> str:
-    """Say how to write a number that nobody can read for its marks; nothing where a cell is no such number.
-
-    Those between thousands would have to be told from decimal marks anew in each column.
-    """
+    """Say how to write a number that nobody can read for its marks; nothing where a cell is no such number."""
     if _THOUSANDS.fullmatch(cell):
         return " without marks between thousands"
     return " with a decimal point, without marks between thousands" if COMMA_NUMBER.fullmatch(cell) else ""

@@ -1,7 +1,4 @@
-"""Parquet tables; the roles of the columns are found as in text tables.
-
-Cells may hold lists of numbers: a vector in each row, as robots' data sets store their states.
-"""
+"""Parquet tables; the roles of the columns are found as in text tables, and cells may hold lists of numbers."""
 
 from __future__ import annotations
 
@@ -11,10 +8,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
+from pyarrow import compute, parquet
 
 from kineme.errors import DataError
 from kineme.io.limits import check_expanded
-from kineme.io.records import needs
+from kineme.io.records import damaged_as
 from kineme.movements.tables.columns import Roles, choose_roles
 from kineme.movements.tables.layout import Layout, no_lines
 from kineme.movements.tables.table import Table
@@ -36,10 +35,8 @@ def read_parquet_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
     A column of lists counts as one column for each number in them, ``state.0``, ``state.1``. Without a choice such
     columns are coordinates only where no plain ones are, and ``observation.state`` always is.
     """
-    with needs("pyarrow", "read Parquet", "parquet"):
-        import pyarrow as pa
-        from pyarrow import parquet
-    try:
+    damaged = "expected a Parquet file, got something foreign, truncated or damaged"
+    with damaged_as(damaged, pa.ArrowException, OSError):
         file = parquet.ParquetFile(io.BytesIO(data))
         names, types = tuple(file.schema_arrow.names), file.schema_arrow.types
         heads, kinds, owners = _expanded(names, types, _lists_to_read(file, layout), file)
@@ -66,17 +63,17 @@ def read_parquet_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
             n_bytes += batch.nbytes
             check_expanded(n_bytes)
             batches.append(batch)
-        if not batches:
+        if not any(batch.num_rows for batch in batches):
             raise DataError("expected samples, got a table without rows")
         table = pa.Table.from_batches(batches)
-        faults: dict[int, str] = {}
-        read = {k: _read(table.column(names[k]), names[k], k in texts, (owners.count(k), faults)) for k in needed}
-    except (pa.ArrowException, OSError) as error:
-        if isinstance(error, DataError):
-            raise
-        raise DataError(f"expected a Parquet file, got something foreign, truncated or damaged ({error})") from error
-    if table.num_rows == 0:
-        raise DataError("expected samples, got a table without rows")
+        faults, read = dict[int, str](), dict[int, Any]()
+        for k in needed:
+            column = table.column(names[k])
+            if k in texts or not is_list(column.type):
+                read[k] = _texts(column, names[k]) if k in texts else _numbers(column, names[k])
+            else:
+                read[k], wrong = rows_of_lists(column, owners.count(k), names[k])
+                faults |= wrong
     for k in {owners[k] for k in roles.positions if not is_list(types[owners[k]])}:
         if (integer := too_long_integer(table.column(names[k]).to_numpy())) is not None:
             raise DataError(f"expected numbers in {names[k]!r} that floats can hold, got {integer}{ROUNDED}")
@@ -88,8 +85,6 @@ def read_parquet_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
 
 def _lists_to_read(file: Any, layout: Layout) -> set[str]:
     """Return the columns of lists that count: all if the caller chooses, else one, and only where it is meant."""
-    import pyarrow as pa
-
     names, types = file.schema_arrow.names, file.schema_arrow.types
     lists = {name for name, kind in zip(names, types, strict=True) if is_list(kind) and names.count(name) == 1}
     if layout.coordinates is not None or not lists:
@@ -97,7 +92,7 @@ def _lists_to_read(file: Any, layout: Layout) -> set[str]:
     if _STATE in lists:
         return {_STATE}
     try:
-        kinds = [_kind(pa, kind) for kind in types]
+        kinds = [_kind(kind) for kind in types]
         choose_roles(_without_commands(names, kinds, types, layout), kinds, layout)
     except DataError:
         if len(lists) > 1:
@@ -122,8 +117,6 @@ def _expanded(
     names: Sequence[str], types: Sequence[Any], lists: set[str], file: Any
 ) -> tuple[tuple[str, ...], tuple[str, ...], list[int]]:
     """Give heads and kinds of the columns, those of lists once for each number, and the column of the file of each."""
-    import pyarrow as pa
-
     heads, kinds, owners = [], [], []
     for k, (name, kind) in enumerate(zip(names, types, strict=True)):
         width = width_of(kind, file, name) if name in lists else 0
@@ -132,24 +125,12 @@ def _expanded(
             kinds += ["number"] * width
         else:
             heads.append(name)
-            kinds.append(_kind(pa, kind))
+            kinds.append(_kind(kind))
         owners += [k] * max(1, width if width <= _WIDEST else 1)
     return tuple(heads), tuple(kinds), owners
 
 
-def _read(column: Any, head: str, is_text: bool, listed: tuple[int, dict[int, str]]) -> Any:
-    """Read a column as texts, as numbers, or as the numbers in its lists, whose faults are added to those known."""
-    width, faults = listed
-    if is_text:
-        return _texts(column, head)
-    if not is_list(column.type):
-        return _numbers(column, head)
-    rows, wrong = rows_of_lists(column, width, head)
-    faults |= wrong
-    return rows
-
-
-def _kind(pa: Any, kind: Any) -> str:
+def _kind(kind: Any) -> str:
     of = pa.types
     if of.is_timestamp(kind) or of.is_date(kind) or of.is_duration(kind):
         return "date"
@@ -157,9 +138,6 @@ def _kind(pa: Any, kind: Any) -> str:
 
 
 def _texts(column: Any, head: str) -> Any:
-    """Return names as texts, empty for missing ones."""
-    import pyarrow as pa
-
     if not pa.types.is_dictionary(column.type):
         column = column.dictionary_encode()
     parts = [np.empty(0, dtype=object)]
@@ -192,8 +170,6 @@ def _numbers(column: Any, head: str) -> Any:
 
 def is_list(kind: Any) -> bool:
     """Tell whether a type of Arrow is a list of numbers, or of lists of them."""
-    import pyarrow as pa
-
     of = pa.types
     if not (of.is_list(kind) or of.is_large_list(kind) or of.is_fixed_size_list(kind)):
         return False
@@ -203,8 +179,6 @@ def is_list(kind: Any) -> bool:
 
 def width_of(kind: Any, file: Any, name: str) -> int:
     """Count the numbers in each row of a list column: by its type, else by its first row."""
-    import pyarrow as pa
-
     width, inner = 1, kind
     while pa.types.is_fixed_size_list(inner):
         width, inner = width * inner.list_size, inner.value_type
@@ -230,13 +204,8 @@ def rows_of_lists(column: Any, width: int, head: str) -> tuple[Array, dict[int, 
 
 
 def _rows(array: Any, width: int, head: str) -> tuple[Array, dict[int, str]]:
-    import pyarrow as pa
-    from pyarrow import compute
-
-    try:
+    with damaged_as(f"expected lists of numbers in {head!r}, got damaged bytes", pa.ArrowException):
         array.validate(full=True)  # pyarrow itself trusts the offsets of damaged files
-    except pa.ArrowException as error:
-        raise DataError(f"expected lists of numbers in {head!r}, got damaged bytes ({error})") from error
     lengths = compute.list_value_length(array).fill_null(0).to_numpy(zero_copy_only=False)
     valid = array.is_valid().to_numpy(zero_copy_only=False)
     flat = array

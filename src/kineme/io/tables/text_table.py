@@ -1,7 +1,4 @@
-"""CSV and similar text tables, read by NumPy's C parser; irregular lines are read one by one.
-
-Text exports of motion capture systems have heads of their own, and zeros for markers that were not found.
-"""
+"""CSV and similar text tables, and exports of motion capture, read by NumPy's C parser; irregular lines one by one."""
 
 from __future__ import annotations
 
@@ -50,26 +47,17 @@ _NUMBER, _TEXT, _COLUMN = 8, 64, 1000  # bytes of a number, a text and a column
 
 _HEAD_LINES = 400  # of an export with a head of its own, at most
 _FIRST = 3  # lines among which the first line of an export is
-_MAKERS = {
-    "OptiTrack": export_heads.optitrack_head,
-    "Vicon": export_heads.vicon_head,
-    "Qualisys": export_heads.qualisys_head,
-    "TRC": export_heads.trc_head,
-    "OpenSim": export_heads.opensim_head,
-}
+_MAKERS = (
+    export_heads.optitrack_head, export_heads.vicon_head, export_heads.qualisys_head, export_heads.trc_head,
+    export_heads.opensim_head,
+)  # fmt: skip
 _LINE = 100  # bytes of a line in Python, beside its characters
 _SAMPLES = 5  # in which decimal commas are looked for
 _ROUNDED = 1e-5  # s by which written times may differ from those of frames at the rate
 
 
 def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:  # noqa: PLR0912 - one check after the other
-    """Read a table of samples by lines.
-
-    Separated by comma, semicolon, tab or blanks; with a head line or without; quoted or not; with decimal commas
-    where the separator is another mark. Empty lines and comments are skipped, see `Dialect.is_sample`. A head may stand
-    in the last comment, as `numpy.savetxt` writes it.
-    """
-    _check_lines(data)
+    """Read a table of samples by lines, whatever their separator, heads, quotes and decimal mark, see `Dialect`."""
     encoding = _encoding(data)
     if (export := export_head(_lines(data, encoding), len(data))) is not None:
         return _read_export(data, encoding, export, layout)
@@ -108,12 +96,8 @@ def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:  # noqa
                 _check_grouped((row[k] for row in split_lines if k < len(row)), dialect.heads[k])
     if dated and roles.time is not None:
         columns[roles.time], others = seconds_of_dates(columns[roles.time].tolist())
-        head = dialect.heads[roles.time]
-        faults = {
-            row: f"expected a date in {head!r}, got {cell or 'nothing'!r}" for row, cell in others.items()
-        } | faults
-    line_of = _line_numbers(data, encoding, dialect)
-    dates_in = "s" if dated else None
+        said = f"expected a date in {dialect.heads[roles.time]!r}"
+        faults = {row: f"{said}, got {cell or 'nothing'!r}" for row, cell in others.items()} | faults
     # Heads with the names of joints in place of ``field.position0`` where the column ``field.name0`` says one name.
     renamed = list(dialect.heads)
     place = {head: k for k, head in enumerate(dialect.heads)}
@@ -123,7 +107,8 @@ def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:  # noqa
         if beside is not None and columns[beside].dtype.kind == "O" and len(names := {*columns[beside].tolist()}) == 1:
             renamed[k] = next(iter(names)) or head
     heads = tuple(renamed) if len({*renamed}) == len(renamed) else dialect.heads
-    return Table(heads, columns, len(rows), line_of, faults, dates_in, dialect.measured_in), roles
+    line_of = _line_numbers(data, encoding, dialect)
+    return Table(heads, columns, len(rows), line_of, faults, "s" if dated else None, dialect.measured_in), roles
 
 
 def _check_written(samples: Iterator[tuple[int, str]], dialect: Dialect, columns: Sequence[int]) -> None:
@@ -151,11 +136,7 @@ def _check_marks(samples: Iterator[tuple[int, str]], dialect: Dialect, columns: 
     for _, line in samples:
         cells = split(line, dialect.separator)
         if len(cells) == len(dialect.heads):
-            columns = [
-                k
-                for k in columns
-                if is_missing(cells[k]) or cells[k].lstrip("+-").isdecimal() or _GROUPED.fullmatch(cells[k])
-            ]
+            columns = [k for k in columns if is_missing(cells[k]) or _may_be_grouped(cells[k])]
             if not columns:
                 return
             for k in numbers:
@@ -170,11 +151,15 @@ def _check_marks(samples: Iterator[tuple[int, str]], dialect: Dialect, columns: 
             )
 
 
+def _may_be_grouped(cell: str) -> bool:
+    return cell.lstrip("+-").isdecimal() or _GROUPED.fullmatch(cell) is not None
+
+
 def _check_grouped(column: Iterable[str], head: str) -> None:
     """Refuse cells in which a mark is between thousands: 999, 1.002, which are one step apart and not one thousand."""
     cells: list[str] = []
     for cell in column:
-        if not (cell.lstrip("+-").isdecimal() or _GROUPED.fullmatch(cell)):
+        if not _may_be_grouped(cell):
             return
         cells.append(cell)
     marked = np.array([_GROUPED.fullmatch(cell) is not None for cell in cells])
@@ -211,15 +196,22 @@ def export_head(lines: Iterable[str], n_bytes: int) -> tuple[ExportHead, Dialect
     some = list(islice(lines, _FIRST))
     for line in some:
         check_line(line)
-    if (maker := _head(some, probe=True)) is None:
-        return None
-    if maker == "Vicon":  # the section that is read may stand anywhere
-        check_expanded(2 * n_bytes + _LINE)
-        some += list(lines)
+    for find in _MAKERS:
+        try:
+            is_made = find(some, split) is not None
+        except DataError:  # the head is longer than the first lines
+            is_made = True
+        if is_made:
+            break
     else:
-        some += list(islice(lines, _HEAD_LINES))
-    head = _head(some)
-    assert isinstance(head, ExportHead)
+        return None
+    most: int | None = _HEAD_LINES
+    if find is export_heads.vicon_head:  # the section that is read may stand anywhere
+        check_expanded(2 * n_bytes + _LINE)
+        most = None
+    some += list(islice(lines, most))
+    head = find(some, split)
+    assert head is not None
     rows = [split(line, head.separator) for line in some[head.first : head.end][:_SAMPLES] if line.strip()]
     if not rows:
         raise DataError(f"expected samples below the heads of a {head.maker} export, got none")
@@ -230,20 +222,6 @@ def export_head(lines: Iterable[str], n_bytes: int) -> tuple[ExportHead, Dialect
     )
     kinds = ("number",) * len(heads)
     return head, Dialect(head.separator, comma, heads, True, head.first, kinds, units, head.end)
-
-
-def _head(lines: Sequence[str], probe: bool = False) -> Any:
-    """Return the head of an export, or None; with `probe` the name of its maker from the first lines alone."""
-    for maker, find in _MAKERS.items():
-        try:
-            head = find(lines, split)
-        except DataError:
-            if not probe:
-                raise
-            return maker  # the head is longer than the first lines
-        if head is not None:
-            return maker if probe else head
-    return None
 
 
 def _read_export(data: bytes, encoding: str, export: tuple[ExportHead, Dialect], layout: Layout) -> tuple[Table, Roles]:
@@ -290,37 +268,26 @@ def _with_times_and_gaps(head: ExportHead, names: Sequence[str], columns: list[A
 
 
 def _rows(data: bytes, encoding: str, dialect: Dialect, texts: set[int]) -> tuple[Any, dict[int, str]]:
-    """Return the samples as a structured array, and row -> what is wrong there."""
     dtype = np.dtype([(f"c{k}", "O" if k in texts else "f8") for k in range(len(dialect.heads))])
     rows = _read_fast(data, encoding, dialect, dtype)
     return read_slowly(_samples(data, encoding, dialect), dialect, dtype) if rows is None else (rows, {})
 
 
 def _line_numbers(data: bytes, encoding: str, dialect: Dialect) -> Callable[[int], int | None]:
-    @cache
-    def lines() -> Any:
-        return np.fromiter((line for line, _ in _samples(data, encoding, dialect)), np.intp)
-
-    def line_of(row: int) -> int | None:
-        return int(lines()[row])
-
-    return line_of
-
-
-def _check_lines(data: bytes) -> None:
-    """Refuse bytes with a stretch so long that no table has such lines, before anything is made of them."""
-    for at in range(0, len(data) - LONGEST, LONGEST):
-        if data.find(b"\n", at, at + LONGEST) < 0 and data.find(b"\r", at, at + LONGEST) < 0:
-            raise DataError(f"expected lines of at most {LONGEST:,} characters, got a longer one")
+    lines = cache(lambda: np.fromiter((line for line, _ in _samples(data, encoding, dialect)), np.intp))
+    return lambda row: int(lines()[row])
 
 
 def lines_of(data: bytes) -> Iterator[str]:
     """Return the lines of a text of any encoding that `read_text_table` takes; a `DataError` if it is none."""
-    _check_lines(data)
     return _lines(data, _encoding(data))
 
 
 def _encoding(data: bytes) -> str:
+    """Tell the encoding of a text, of which no stretch is longer than the lines of a table ever are."""
+    for at in range(0, len(data) - LONGEST, LONGEST):
+        if data.find(b"\n", at, at + LONGEST) < 0 and data.find(b"\r", at, at + LONGEST) < 0:
+            raise DataError(f"expected lines of at most {LONGEST:,} characters, got a longer one")
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return "utf-16"
     if b"\0" in data:
@@ -333,15 +300,14 @@ def _encoding(data: bytes) -> str:
 
 
 def _lines(data: bytes, encoding: str) -> Iterator[str]:
-    """Return the lines, decoded; `_encoding` has checked that all bytes are valid."""
-    if encoding != "utf-16":
-        return iter(io.TextIOWrapper(io.BytesIO(data), encoding=encoding))
-    return _checked_lines(data, encoding)
+    """Return the lines, decoded; `_encoding` has checked that all bytes of 8 bits are valid."""
+    lines = io.TextIOWrapper(io.BytesIO(data), encoding=encoding)
+    return _checked(lines) if encoding == "utf-16" else iter(lines)
 
 
-def _checked_lines(data: bytes, encoding: str) -> Iterator[str]:
+def _checked(lines: Iterable[str]) -> Iterator[str]:
     try:
-        for line in io.TextIOWrapper(io.BytesIO(data), encoding=encoding):
+        for line in lines:
             if "\0" in line:
                 raise DataError("expected text, got bytes that are none")
             yield line

@@ -14,10 +14,9 @@ from typing import Any, NamedTuple
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from kineme.errors import DataError
-from kineme.io.lerobot.copy import OWN, Motion, copy_with_motions
 from kineme.io.lerobot.info import MARKER, read_info
-from kineme.io.reading.formats import FORMATS, data_set_of
-from kineme.io.records import UNKNOWN
+from kineme.io.reading.formats import FORMATS, data_set_of, format_at
+from kineme.io.records import UNKNOWN, needs
 from kineme.io.ros.add_topic import copy_with_topic
 from kineme.io.ros.choose import bag_contents
 from kineme.io.writing.write_movement import Movement, distinct_stems
@@ -29,34 +28,16 @@ HEADS = ("recording", "place", "start", "end", "symbol", "p_value", "confidence"
 
 @dataclass(frozen=True)
 class Annotation:
-    """A stretch of motion in a recording, and the symbol that it shows.
+    """A stretch of motion in a recording, and the symbol that it shows."""
 
-    Attributes
-    ----------
-    recording : str
-        The recording, as `kineme.io.reading.merge_files.Source.path` names it.
-    place : str
-        Which movement of the file, such as the number of an episode; empty if the file holds but one.
-    start, end : float
-        Time stamps of the first and the last sample [s], by the clock of the recording.
-    symbol : str or None
-        None: motion that is like no symbol.
-    p_value : float
-        Share of movements of known symbols that would be as novel or more, see `kineme.recognition.answer.Answer`.
-    confidence : float
-        Probability that the symbol is right if the movement is one of the library's; if unknown, 1 minus `p_value`.
-    origin : float
-        Time stamp of the first sample of the recording [s].
-    """
-
-    recording: str
-    place: str
-    start: float
-    end: float
-    symbol: str | None
-    p_value: float
-    confidence: float
-    origin: float = 0.0
+    recording: str  # as `kineme.io.reading.merge_files.Source.path` names it
+    place: str  # which movement of the file, such as the number of an episode; empty if the file holds but one
+    start: float  # time stamp of the first sample [s], by the clock of the recording
+    end: float  # that of the last one
+    symbol: str | None  # None: motion that is like no symbol
+    p_value: float  # share of movements of known symbols that would be as novel or more
+    confidence: float  # probability that the symbol is right if the library has it; if unknown, 1 minus `p_value`
+    origin: float = 0.0  # time stamp of the first sample of the recording [s]
 
     @property
     def unknown(self) -> bool:
@@ -76,10 +57,16 @@ def as_row(annotation: Annotation) -> dict[str, Any]:
 
 def to_csv(annotations: Sequence[Annotation]) -> bytes:
     """Write a row for each annotation; the symbol of unknown motion is empty, times are by the recording's clock."""
+
+    def cell(value: Any) -> str:
+        if isinstance(value, bool):
+            return "true" if value else "false"
+        return as_cell(value) if isinstance(value, str) else "" if value is None else str(value)
+
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow(HEADS)
-    table.writerows([_cell(value) for value in as_row(annotation).values()] for annotation in annotations)
+    table.writerows(map(cell, as_row(annotation).values()) for annotation in annotations)
     return text.getvalue().encode("utf-8", "backslashreplace")
 
 
@@ -94,12 +81,6 @@ def write_json(path: Path, annotations: Sequence[Annotation], source: Path | Non
     return write_atomically(path, (text + "\n").encode("utf-8", "backslashreplace"))
 
 
-def _cell(value: Any) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    return as_cell(value) if isinstance(value, str) else "" if value is None else str(value)
-
-
 def write_audacity(path: Path, annotations: Sequence[Annotation], source: Path | None) -> Path:
     """Write ``start TAB end TAB label`` lines, in seconds since the first sample, as File > Import > Labels reads."""
     rows = [(*note.span, UNKNOWN if note.symbol is None else " ".join(note.symbol.split())) for note in annotations]
@@ -107,10 +88,11 @@ def write_audacity(path: Path, annotations: Sequence[Annotation], source: Path |
     return write_atomically(path, "".join(lines).encode("utf-8", "backslashreplace"))
 
 
-_SCHEMA = {
+_DOCUMENT = {
     "xmlns:xsi": "http://www.w3.org/2001/XMLSchema-instance",
     "xsi:noNamespaceSchemaLocation": "http://www.mpi.nl/tools/elan/EAFv3.0.xsd",
-}
+    "AUTHOR": "", "FORMAT": "3.0", "VERSION": "3.0",
+}  # fmt: skip
 _ASSOCIATION = "Symbolic_Association"
 _MEANING = "1-1 association with a parent annotation"
 
@@ -122,15 +104,8 @@ _DEPENDENT: dict[str, Callable[[Annotation], str]] = {
 
 
 def write_elan(path: Path, annotations: Sequence[Annotation], source: Path | None) -> Path:
-    """Write a document with the tier ``symbol`` and, below it, tiers with p-values and confidences.
-
-    Times are milliseconds since the first sample. Unknown motion is annotated as ``unknown``.
-    """
-    root = Element(
-        "ANNOTATION_DOCUMENT",
-        {"AUTHOR": "", "DATE": datetime.now(UTC).isoformat(timespec="seconds"), "FORMAT": "3.0", "VERSION": "3.0"}
-        | _SCHEMA,
-    )
+    """Write a document with the tier ``symbol`` and, below it, tiers with p-values and confidences, in milliseconds."""
+    root = Element("ANNOTATION_DOCUMENT", _DOCUMENT, DATE=datetime.now(UTC).isoformat(timespec="seconds"))
     SubElement(root, "HEADER", MEDIA_FILE="", TIME_UNITS="milliseconds")
     order = SubElement(root, "TIME_ORDER")
     tier = SubElement(root, "TIER", LINGUISTIC_TYPE_REF="symbol", TIER_ID="symbol")
@@ -148,9 +123,8 @@ def write_elan(path: Path, annotations: Sequence[Annotation], source: Path | Non
             SubElement(order, "TIME_SLOT", TIME_SLOT_ID=slot, TIME_VALUE=str(value))
         ids = {"ANNOTATION_ID": f"a{k}"} | slots
         aligned = SubElement(SubElement(tier, "ANNOTATION"), "ALIGNABLE_ANNOTATION", ids)
-        SubElement(aligned, "ANNOTATION_VALUE").text = (
-            UNKNOWN if annotation.symbol is None else printable(annotation.symbol)
-        )
+        symbol = UNKNOWN if annotation.symbol is None else printable(annotation.symbol)
+        SubElement(aligned, "ANNOTATION_VALUE").text = symbol
     for number, (name, text) in enumerate(_DEPENDENT.items(), 1):
         below = SubElement(root, "TIER", LINGUISTIC_TYPE_REF="number", PARENT_REF="symbol", TIER_ID=name)
         for k, annotation in enumerate(annotations, 1):
@@ -169,16 +143,12 @@ def write_elan(path: Path, annotations: Sequence[Annotation], source: Path | Non
 TOPIC = "/kineme/annotations"
 _SECOND = 10**9  # ns
 _EPISODE = "episode "  # a movement's place in a data set of LeRobot begins with it
-_LEFT_OUT = ("recording",)  # of a row: the copy is the recording
 
 
 def is_bag(source: Path) -> bool:
     """Tell whether it is a bag of ROS, a file or a folder."""
-    if source.is_dir():
-        data_set = data_set_of(source)
-        return data_set is not None and data_set.format.contents is bag_contents
-    known_ending = FORMATS.get(source.suffix.lower())
-    return known_ending is not None and known_ending.contents is bag_contents
+    form = format_at(source)
+    return form is not None and form.contents is bag_contents
 
 
 def is_lerobot(source: Path) -> bool:
@@ -192,23 +162,14 @@ def write_bag(path: Path, annotations: Sequence[Annotation], source: Path | None
 
     A message is stamped with the end of its movement. Ends by a clock that the time of recording does not know, such as
     that of a simulation, count from the first sample as the time of recording counts from the first message.
-
-    Raises
-    ------
-    DataError
-        The copy is to be of another kind than the bag or in a folder that is there, or the bag takes no topic: see
-        `copy_with_topic`.
     """
-    source = _of_one(path, source)
-    check_bag(path, source)
+    assert source is not None  # see `writer_of`
 
     def texts(first: int, last: int) -> list[tuple[int, str]]:
-        inside = all(first - _SECOND <= annotation.end * _SECOND <= last + _SECOND for annotation in annotations)
-        spans = [
-            (annotation.end, 0) if inside else (annotation.end - annotation.origin, first) for annotation in annotations
-        ]
+        inside = all(first - _SECOND <= note.end * _SECOND <= last + _SECOND for note in annotations)
+        spans = [(note.end, 0) if inside else (note.end - note.origin, first) for note in annotations]
         stamps = [max(0, shift + round(time * _SECOND)) for time, shift in spans]
-        return [(stamp, _json(annotation)) for stamp, annotation in zip(stamps, annotations, strict=True)]
+        return [(stamp, _json(note)) for stamp, note in zip(stamps, annotations, strict=True)]
 
     with whole_folder(path) if source.is_dir() else whole_file(path) as beside:
         copy_with_topic(source, beside, TOPIC, texts)
@@ -216,18 +177,10 @@ def write_bag(path: Path, annotations: Sequence[Annotation], source: Path | None
 
 
 def write_lerobot(path: Path, annotations: Sequence[Annotation], source: Path | None) -> Path:
-    """Write a copy of a data set of LeRobot whose frames carry the annotations of their episode.
-
-    They are rows of the style `motion`, stamped with the start of their movement, with JSON as content. Those that an
-    earlier call has written are replaced. All else is as it was: see `copy_with_motions`.
-
-    Raises
-    ------
-    DataError
-        A damaged data set, or `path` is there.
-    """
-    source = _of_one(path, source)
-    check_lerobot(path, source)
+    """Write a copy of a data set of LeRobot whose frames carry the annotations of their episode as JSON."""
+    with needs("pyarrow", "write Parquet", "parquet"):
+        from kineme.io.lerobot.copy import OWN, Motion, copy_with_motions
+    assert source is not None  # see `writer_of`
     motions: dict[int, list[Motion]] = {}
     for annotation in annotations:
         number = annotation.place.removeprefix(_EPISODE)
@@ -258,12 +211,6 @@ def check_lerobot(path: Path, source: Path) -> None:
     read_info(source)
 
 
-def _of_one(path: Path, source: Path | None) -> Path:
-    if source is None:
-        raise DataError(f"expected one recording to copy with its annotations to {path.name}, got several")
-    return source
-
-
 def _check_apart(path: Path, source: Path) -> None:
     data = source.resolve()
     if path.resolve() == data or data in path.resolve().parents:
@@ -279,22 +226,18 @@ def _check_new_folder(path: Path, source: Path) -> None:
 
 
 def _json(annotation: Annotation) -> str:
-    row = {head: value for head, value in as_row(annotation).items() if head not in _LEFT_OUT}
-    plain = {
-        head: None if isinstance(value, float) and not math.isfinite(value) else value for head, value in row.items()
-    }
-    return json.dumps(plain, ensure_ascii=False)
-
-
-#: It takes the path to write, the annotations in order of recordings and time, and the recording that they are of as
-#: the user named it, None where there are several. It writes a whole file or folder or nothing, and returns its path.
-Write = Callable[[Path, Sequence[Annotation], Path | None], Path]
+    row = as_row(annotation)
+    del row["recording"]  # the copy is the recording
+    lost = {head: None for head, value in row.items() if isinstance(value, float) and not math.isfinite(value)}
+    return json.dumps(row | lost, ensure_ascii=False)
 
 
 class Writer(NamedTuple):
     """A format of annotations."""
 
-    write: Write  # see `Write`
+    # It takes the path to write, the annotations in order of recordings and time, and the recording that they are of,
+    # None where there are several. It writes a whole file or folder or nothing, and returns its path.
+    write: Callable[[Path, Sequence[Annotation], Path | None], Path]
     endings: tuple[str, ...]  # endings of paths that ask for it
     several: bool = True  # whether one file holds the annotations of several movements. Else there is a file for each.
     # Whether it writes a copy of a recording, given by its path, with the annotations inside. A path without ending
@@ -347,16 +290,13 @@ def targets_of(
 ) -> dict[Path, list[Movement]]:
     """Return the files to write, and the movements whose annotations each of them holds.
 
-    The path is a file, or a folder where a format, whose key of `WRITERS` is `name`, holds one movement in a file. The
-    sources are named as the user named them, and the movements are all that are annotated.
+    The path is a file, or a folder where a format, whose key of `WRITERS` is `name`, holds one movement in a file.
     """
     writer = writer_of(path, name, sources)
     if writer.check is not None:
         writer.check(path, sources[0])
-    if writer.several:
-        return {path: list(movements)}
-    if path.suffix.lower() in writer.endings:
-        if len(movements) > 1:
+    if writer.several or path.suffix.lower() in writer.endings:
+        if len(movements) > 1 and not writer.several:
             raise DataError(
                 f"expected one movement to annotate in {path.name}, got {len(movements)}; name a folder, and the format"
             )
@@ -372,11 +312,7 @@ def write_annotations(
     name: str | None = None,
     movements: Sequence[Movement] | None = None,
 ) -> list[Path]:
-    """Write annotations of recordings in the format that the name, the ending or the recording asks for.
-
-    `path`, `sources`, `movements` and `name` are those of `targets_of`; by default the movements are those that have
-    annotations. A folder is created where there is a file for each movement. What was written is returned.
-    """
+    """Write annotations of recordings, as `targets_of` says, and return what was written; a folder is created."""
     groups: dict[Movement, list[Annotation]] = {key: [] for key in movements or ()}
     for annotation in annotations:
         groups.setdefault((annotation.recording, annotation.place), []).append(annotation)

@@ -80,7 +80,6 @@ def write_movement(path: str | Path, movement: MovementsLike | Columns, names: C
 
 
 def _checked(columns: Mapping[str, ArrayLike], names: ColumnNames | None) -> Columns:
-    """Return a dict of columns as arrays, refused unless all belong to one movement."""
     if not set(_NAMES[:2]) <= set(columns) <= set(_NAMES):
         raise TrajectoryError(
             f"expected a dict of {', '.join(_NAMES[:2])} and, if you like, {', '.join(_DERIVATIVES)}, got "
@@ -115,11 +114,7 @@ def _heads(columns: Columns, names: ColumnNames | None) -> list[str]:
     """Name the columns of a table: time, the positions, ``v_`` and ``a_`` before names of the others."""
     axes = {name: axis_names(array.shape[-1]) for name, array in columns.items()}
     if names is not None:
-        axes |= {
-            "positions": list(names.positions),
-            "velocities": list(names.rates),
-            "accelerations": list(names.rates),
-        }
+        axes |= {"positions": list(names.positions), **{name: list(names.rates) for name in _DERIVATIVES}}
     marks = {"positions": ("", ""), "velocities": ("v_", "/s"), "accelerations": ("a_", "/s^2")}
     heads = ["time"]
     for name in (name for name in columns if name != "times"):
@@ -131,7 +126,6 @@ def _heads(columns: Columns, names: ColumnNames | None) -> list[str]:
 
 
 def _table(columns: Columns) -> Array:
-    """Return times and all else side by side, in the order of `_heads`."""
     return np.column_stack([columns["times"], *(columns[name] for name in columns if name != "times")])
 
 
@@ -176,10 +170,7 @@ WRITERS: dict[str, Callable[[Columns, ColumnNames | None], bytes]] = {
 
 
 def distinct_stems(movements: Sequence[Movement]) -> list[str]:
-    """Give a name for each movement, without ending, such as ``long`` or ``session-3``; none twice, whatever the case.
-
-    Characters that are neither letters nor digits become underscores, so that a name is never a path.
-    """
+    """Give a name for each movement, as ``long`` or ``session-3``, never a path; none twice, whatever the case."""
     stems: list[str] = []
     taken: set[str] = set()
     for recording, place in movements:
