@@ -6,10 +6,11 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import combinations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import TrajectoryError
 from kineme.reporting.table import Table
@@ -136,10 +137,7 @@ def _torques(robot: Robot, trajectory: JointTrajectory, state: Along) -> Iterato
 
 
 def _of_the_arm(robot: Robot, trajectory: JointTrajectory, dense: JointTrajectory, state: Along) -> Iterator[Check]:
-    """Check jumps and standing at both ends; then singularity, self-collision and how far the arm goes below its base.
-
-    A table may be at the base, which nobody says.
-    """
+    """Check jumps and standing at both ends; then singularity, self-collision and how far it goes below its base."""
     gaps = np.diff(trajectory.times)[:, None]
     expected = (trajectory.velocities[1:] + trajectory.velocities[:-1]) / 2 * gaps
     off = np.abs(np.diff(trajectory.positions, axis=0) - expected)
@@ -171,14 +169,13 @@ def _of_the_arm(robot: Robot, trajectory: JointTrajectory, dense: JointTrajector
 def _unchecked(robot: Robot) -> Iterator[str]:
     if not knows_masses(robot):
         yield "torques: the model has no masses"
-    elif np.isnan(robot.effort).any():
-        named = ", ".join(np.array(robot.joints)[np.isnan(robot.effort)])
-        yield f"torques of {named}: the model does not say the largest"
-    weightless = [
-        name for name, body in zip(robot.joints, list(robot.model.inertias)[1:], strict=True) if body.mass <= 0
-    ]
-    if knows_masses(robot) and weightless:
-        yield f"the weight of what {', '.join(weightless)} move: the model has no masses there"
+    else:
+        if np.isnan(robot.effort).any():
+            named = ", ".join(np.array(robot.joints)[np.isnan(robot.effort)])
+            yield f"torques of {named}: the model does not say the largest"
+        bodies = list(robot.model.inertias)[1:]
+        if weightless := [name for name, body in zip(robot.joints, bodies, strict=True) if body.mass <= 0]:
+            yield f"the weight of what {', '.join(weightless)} move: the model has no masses there"
     if robot.geometry.ngeoms == 0:
         yield "self-collision: the model has no shapes"
 
@@ -203,7 +200,7 @@ def steps_kept(robot: Robot, trajectory: JointTrajectory, generated: Steps) -> C
     """
     name, sent = generated.name, trajectory.steps[generated.name]
     before, now = _changes(generated.values), _changes(sent)
-    if not np.array_equal(_order(generated.values, before), _order(sent, now)):
+    if not np.array_equal(generated.values[[0, *before]], sent[[0, *now]]):
         return Check("steps", name, 0.0, len(now), len(before), "changes", False, math.inf)
     if len(now) == 0:
         return Check("steps", name, 0.0, 0, 0, "changes", True)
@@ -221,10 +218,6 @@ def steps_kept(robot: Robot, trajectory: JointTrajectory, generated: Steps) -> C
 def _changes(values: Array) -> NDArray[np.intp]:
     """Indices of the samples from which another value holds."""
     return np.flatnonzero(np.diff(values)) + 1
-
-
-def _order(values: Array, changes: NDArray[np.intp]) -> Array:
-    return values[np.concatenate(([0], changes))]
 
 
 def between_samples(robot: Robot, trajectory: JointTrajectory) -> Iterator[Check]:
@@ -300,7 +293,7 @@ def preflight_table(preflight: Preflight) -> Table:
         (
             f"{check.what}, {check.where}",
             f"{check.worst:.3g}",
-            _limit(check),
+            "" if math.isnan(check.limit) else f"{check.limit:.4g}",
             check.unit,
             f"{check.time:.2f}",
             "" if math.isnan(check.limit) else "ok" if check.passed else "FAILED",
@@ -311,19 +304,13 @@ def preflight_table(preflight: Preflight) -> Table:
     return Table("Preflight", ("check", "worst", "limit", "unit", "at [s]", ""), rows, unchecked)
 
 
-def _limit(check: Check) -> str:
-    return "" if math.isnan(check.limit) else f"{check.limit:.4g}"
-
-
 def tracking(
     robot: Robot, trajectory: JointTrajectory, path: TaskPath, follow: str, dense: tuple[Array, Along]
 ) -> Iterator[Check]:
     """Check how far the tip is from its path, and how far turned from it.
 
     Arms of fewer than six joints follow an orientation only as far as the position allows: of theirs, and of what is
-    not followed at all, the angle has no limit.
-
-    `path`: at times of the trajectory; `dense`: where those times end with the path's, nothing is computed again.
+    not followed at all, the angle has no limit. Where the times of `dense` end with the path's, it is computed already.
     """
     times, state = dense
     n = len(path.times)
@@ -370,17 +357,12 @@ def along(robot: Robot, trajectory: JointTrajectory) -> Along:
     import pinocchio
 
     model, data = robot.model, robot.model.createData()
-    tip = model.getFrameId(robot.tip)
+    positions, rotations, jacobians = kinematics(robot, trajectory.positions)
     n_samples, n = trajectory.positions.shape
-    positions, rotations, heights = (np.empty((n_samples, *shape)) for shape in ((3,), (3, 3), (n + 1,)))
-    jacobians, holding, total = np.empty((n_samples, 6, n)), np.empty((n_samples, n)), np.empty((n_samples, n))
+    heights, holding, total = np.empty((n_samples, n + 1)), np.empty((n_samples, n)), np.empty((n_samples, n))
     samples = zip(trajectory.positions, trajectory.velocities, trajectory.accelerations, strict=True)
     for t, (q, v, a) in enumerate(samples):
-        pinocchio.computeJointJacobians(model, data, q)
-        pinocchio.updateFramePlacement(model, data, tip)
-        jacobian = pinocchio.getFrameJacobian(model, data, tip, pinocchio.ReferenceFrame.LOCAL_WORLD_ALIGNED)
-        jacobians[t] = jacobian.reshape(6, n)  # of a single joint it has one axis
-        positions[t], rotations[t] = data.oMf[tip].translation, data.oMf[tip].rotation
+        pinocchio.forwardKinematics(model, data, q)
         heights[t] = [*(data.oMi[j].translation[2] for j in range(1, model.njoints)), positions[t, 2]]
         holding[t] = pinocchio.computeGeneralizedGravity(model, data, q)
         total[t] = pinocchio.rnea(model, data, q, v, a)
@@ -399,30 +381,18 @@ class Contact(NamedTuple):
 
 def contacts_of(robot: Robot, positions: Array) -> tuple[Contact, ...]:
     """The first contact of each pair of shapes that touch, over joint positions (T, n)."""
-    import pinocchio
-
     geometry, margins = _pair_geometry(robot)
-    if len(geometry.collisionPairs) == 0:
-        return ()
-    data, shapes = robot.model.createData(), geometry.createData()
-    for request, margin in zip(shapes.collisionRequests, margins, strict=True):
-        request.security_margin = margin
-    first_samples: dict[int, int] = {}
-    for t, q in enumerate(positions):
-        if pinocchio.computeCollisions(robot.model, data, geometry, shapes, q, False):
-            for k, result in enumerate(shapes.collisionResults):
-                if result.isCollision():
-                    first_samples.setdefault(k, t)
-    pairs = geometry.collisionPairs
+    touching = _touching(robot, geometry, positions, margins)
 
     def link(shape: int) -> str:
         return str(robot.model.frames[geometry.geometryObjects[shape].parentFrame].name)
 
-    return tuple(Contact(t, link(pairs[k].first), link(pairs[k].second)) for k, t in first_samples.items())
+    pairs = [(int(k), geometry.collisionPairs[int(k)]) for k in np.flatnonzero(touching.any(axis=0))]
+    return tuple(Contact(int(touching[:, k].argmax()), link(pair.first), link(pair.second)) for k, pair in pairs)
 
 
 @lru_cache(maxsize=8)
-def _pair_geometry(robot: Robot) -> tuple[Any, tuple[float, ...]]:
+def _pair_geometry(robot: Robot) -> tuple[Any, Array]:
     """The arm's shapes with the pairs that can touch, and the margin of each pair [m].
 
     None of neighboring links, and none that touch in nearly all postures: those overlap by design, as two links on one
@@ -432,30 +402,28 @@ def _pair_geometry(robot: Robot) -> tuple[Any, tuple[float, ...]]:
 
     geometry = robot.geometry.copy()
     geometry.removeAllCollisionPairs()
-    objects = geometry.geometryObjects
     parents = list(robot.model.parents)
-    for i, first in enumerate(objects):
-        for j in range(i + 1, len(objects)):
-            a, b = first.parentJoint, objects[j].parentJoint
-            if a != b and parents[a] != b and parents[b] != a:
-                geometry.addCollisionPair(pinocchio.CollisionPair(i, j))
+    for (i, first), (j, second) in combinations(enumerate(geometry.geometryObjects), 2):
+        a, b = first.parentJoint, second.parentJoint
+        if a != b and parents[a] != b and parents[b] != a:
+            geometry.addCollisionPair(pinocchio.CollisionPair(i, j))
     postures = np.random.default_rng(0).uniform(robot.lower, robot.upper, (_RANDOM_POSTURES, robot.n_joints))
     shares = _touching(robot, geometry, postures, _MARGIN).mean(axis=0)
     for k in np.flatnonzero(shares > _ALWAYS)[::-1]:
         geometry.removeCollisionPair(geometry.collisionPairs[int(k)])
     near, touching = (_touching(robot, geometry, robot.rest[None], margin)[0] for margin in (_MARGIN, 0.0))
-    return geometry, tuple(np.where(near & ~touching, 0.0, _MARGIN).tolist())
+    return geometry, np.where(near & ~touching, 0.0, _MARGIN)
 
 
-def _touching(robot: Robot, geometry: Any, postures: Array, margin: float) -> Array:
-    """Tell of each pair of shapes whether it is closer than the margin [m], in each posture: (T, pairs)."""
+def _touching(robot: Robot, geometry: Any, postures: Array, margins: ArrayLike) -> NDArray[np.bool_]:
+    """Tell of each pair of shapes whether it is closer than its margin [m], in each posture: (T, pairs)."""
     import pinocchio
 
     data, shapes = robot.model.createData(), geometry.createData()
-    for request in shapes.collisionRequests:
-        request.security_margin = margin
     touching = np.zeros((len(postures), len(geometry.collisionPairs)), dtype=bool)
+    for request, margin in zip(shapes.collisionRequests, np.broadcast_to(margins, touching.shape[1]), strict=True):
+        request.security_margin = float(margin)
     for t, q in enumerate(postures):
-        pinocchio.computeCollisions(robot.model, data, geometry, shapes, q, False)
-        touching[t] = [result.isCollision() for result in shapes.collisionResults]
+        if pinocchio.computeCollisions(robot.model, data, geometry, shapes, q, False):
+            touching[t] = [result.isCollision() for result in shapes.collisionResults]
     return touching

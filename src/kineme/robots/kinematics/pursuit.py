@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from itertools import product
-from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import solveh_banded
@@ -47,9 +46,7 @@ _SEEDS = 48  # starts from which the postures at one pose are sought
 _BEGINS = (0.0, 1.0, 0.5)  # of the path: postures are few where a joint is at a stop, and surest to be found from there
 _PULLS = (0.0, 0.01)  # of the way to the rest posture, at each pose: so far go joints that the pose leaves free
 _LARGEST_PULL = 0.01  # [rad, m]
-_AWAY = (
-    0.05  # of the way to the middle of its range, so far goes a joint at a stop; less by the 7th power farther from it
-)
+_AWAY = 0.05  # of the way to the middle, so far goes a joint at a stop; less by the 7th power farther from it
 _INSIDE = 0.9995  # of its range: between samples a joint goes a little beyond
 _WAYS = 18  # postures at most that are followed together, once for each pull
 _STEPS = 2  # of Newton's method at each pose
@@ -67,8 +64,6 @@ def pursue(robot: Robot, path: TaskPath, turn_costs: Array) -> tuple[Array, Task
     method with limits: a joint at a stop stays there and the others do its part. What a pose leaves free stays as it
     is, or goes slowly towards the rest posture and away from stops. Of the ways that stay within 0.01 mm of the path,
     that of least cost, smoothed as `relaxed`; the end and the middle are begun at only if it comes to a stop.
-
-    The parameters are those of `choose_posture`.
     """
     path = path if len(path.times) >= _DENSE else path.at(np.linspace(0.0, path.times[-1], _DENSE))
     last = len(path.times) - 1
@@ -162,8 +157,6 @@ def relaxed(robot: Robot, path: TaskPath, turn_costs: Array, joints: Array) -> A
 
     with v the limits of velocity over their mean, b = 0.0001 (T / 100)^4, and `beyond` how far the joints lie outside
     the middle 97 % of their ranges. Its equations are banded, with 2 n numbers below the diagonal.
-
-    The parameters are those of `choose_posture`.
     """
     n_poses, n = joints.shape
     weights = np.concatenate((np.ones(3), turn_costs))
@@ -192,31 +185,21 @@ def relaxed(robot: Robot, path: TaskPath, turn_costs: Array, joints: Array) -> A
     return np.asarray(np.clip(q, robot.lower, robot.upper))
 
 
-class Choice(NamedTuple):
-    """From which posture a movement is executed, and where."""
-
-    start: Array  # (n,), joint positions at the first pose
-    shift: Array  # (3,), what is added to the positions of the path [m]
-
-
-def choose_posture(robot: Robot, path: TaskPath, turn_costs: Array, stands: Array) -> Choice:
+def choose_posture(robot: Robot, path: TaskPath, turn_costs: Array, stands: Array) -> Array:
     """The posture at the start from which the whole movement costs least, with the way to it.
 
-    `turn_costs` (3,): as `InverseKinematics.costs`; `stands` (n,): where the joints stand: 0.1 is added for each radian
-    of the joint that has farthest to go. Raises TrajectoryError: no posture reaches the start: where and by how far.
+    0.1 is added for each radian of the joint that has farthest to go from where it `stands` (n,).
     """
     starts = reaching_postures(robot, path.positions[0], path.rotations[0], turn_costs, pose_in_words(path, 0))
     total = _costs_of_movements(robot, path, starts, np.zeros((len(starts), 3)), turn_costs)
     total += _APPROACH * np.abs(starts - stands).max(axis=1)
-    return Choice(starts[int(np.argmin(total))], np.zeros(3))
+    return np.asarray(starts[int(np.argmin(total))])
 
 
-def choose_place(robot: Robot, path: TaskPath, turn_costs: Array, stands: Array) -> Choice:
-    """The shift, among 27 around where the tip rests, and the posture, with which the whole movement costs least.
+def choose_place(robot: Robot, path: TaskPath, turn_costs: Array) -> TaskPath:
+    """The path shifted, among 27 places around where the tip rests, to where the whole movement costs least.
 
     A meter below z = 0, where the arm stands, or below the resting tip if that is lower, costs 100.
-
-    The parameters and errors are those of `choose_posture`.
     """
     tip = kinematics(robot, robot.rest[None])[0][0]
     center = (path.positions.min(axis=0) + path.positions.max(axis=0)) / 2
@@ -225,9 +208,7 @@ def choose_place(robot: Robot, path: TaskPath, turn_costs: Array, stands: Array)
     starts = descend(robot, rest, path.positions[0] + shifts, path.rotations[0], turn_costs, _FIRST_STEPS)
     costs = _costs_of_movements(robot, path, starts.joints, shifts, turn_costs)
     costs += _BELOW * np.maximum(0.0, min(0.0, tip[2]) - (path.positions[:, 2].min() + shifts[:, 2]))
-    shift = shifts[int(np.argmin(costs))]
-    moved = path._replace(positions=path.positions + shift)
-    return choose_posture(robot, moved, turn_costs, stands)._replace(shift=shift)
+    return path._replace(positions=path.positions + shifts[int(np.argmin(costs))])
 
 
 def _costs_of_movements(robot: Robot, path: TaskPath, starts: Array, shifts: Array, turn_costs: Array) -> Array:
