@@ -167,10 +167,7 @@ def _build(pinocchio: Any, path: Path, chain: Chain) -> tuple[Any, Any]:
 
 
 def _check_read(text: str, model: Any, shapes: Any, path: Path) -> None:
-    """Refuse a model with other numbers of collision shapes, or other masses that move, than its XML says.
-
-    Raises DataError: the first such link or joint, with what its XML says and what was read.
-    """
+    """Refuse a model with other numbers of collision shapes, or other masses that move, than its XML says."""
     frames = {str(frame.name): frame.parentJoint for frame in model.frames if frame.type.name == "BODY"}
     n_read = Counter(str(model.frames[shape.parentFrame].name) for shape in shapes.geometryObjects)
     masses = np.zeros(model.njoints)
@@ -214,11 +211,8 @@ def _assumptions(chain: Chain) -> list[str]:
             f"{in_words(list(chain.others))} (choose with tip=, --tip)"
         )
     if chain.gripper:
-        several = len(chain.gripper) > 1
-        named = _named(chain.gripper)
-        assumed.append(
-            f"{named} {'belong' if several else 'belongs'} to a gripper or a hand: locked, no part of the arm"
-        )
+        belong = "belong" if len(chain.gripper) > 1 else "belongs"
+        assumed.append(f"{_named(chain.gripper)} {belong} to a gripper or a hand: locked, no part of the arm")
     assumed += chain.doubts
     if chain.without_stops:
         are = "they are" if len(chain.without_stops) > 1 else "it is"
@@ -238,10 +232,7 @@ def _named(names: tuple[str, ...]) -> str:
 
 
 def checked_rest(rest: ArrayLike, lower: Array, upper: Array, joints: tuple[str, ...]) -> Array:
-    """Check a rest posture (n,) that is given.
-
-    Raises SpecificationError: one of another number of joints, or outside the limits; with the joint.
-    """
+    """Check a rest posture (n,) that is given."""
     posture = as_numbers(rest, "rest")
     if posture.shape != lower.shape:
         raise SpecificationError(f"expected a rest posture of {len(joints)} joints, got shape {posture.shape}")
@@ -258,8 +249,8 @@ def rest_posture(model: Any, tip: str, lower: Array, upper: Array) -> tuple[Arra
     """Return the middle of the limits (n,); if the arm is singular there, as a straight one is, with joints bent.
 
     Of the postures with up to three joints turned by 60 degrees, within the limits and with no link lower than in the
-    middle or than the base, that whose Jacobian has the largest smallest singular value. Whether
-    joints are bent comes second.
+    middle or than the base, that whose Jacobian has the largest smallest singular value. Whether joints are bent is
+    returned second.
     """
     wide = upper - lower > 2 * pi + 1e-9
     middle = np.where(wide, np.clip(0.0, lower, upper), (lower + upper) / 2)
@@ -352,19 +343,13 @@ class Robot:
 
 
 def check_robot(robot: object) -> None:
-    """Refuse what is not an arm.
-
-    Raises SpecificationError: something else than a `Robot`, as its name.
-    """
+    """Refuse what is not an arm, as its name."""
     if not isinstance(robot, Robot):
         raise SpecificationError(f"expected a robot, as of kineme.robots.load('panda'), got {robot!r:.80}")
 
 
 def check_start(robot: Robot, q: Array) -> None:
-    """Refuse joint positions (n,) outside the limits, where a movement is to start.
-
-    Raises SpecificationError: the first such joint, with its limits.
-    """
+    """Refuse joint positions (n,) outside the limits, where a movement is to start."""
     inside = (q >= robot.lower - _ROUNDING) & (q <= robot.upper + _ROUNDING)
     if not inside.all():
         i = int(np.argmin(inside))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
@@ -73,10 +74,6 @@ def read_chain(path: Path, tip: str | None) -> Chain:
     """Read the chain from the root of the URDF at `path` to the frame `tip`, by default the end of the longest chain.
 
     Joints of grippers and hands are no part of it.
-
-    Raises DataError: no such file, no URDF, a tip that does not exist, several chains as long and no tip, a joint
-    without limits or with a mimic joint in the chain, masses or shapes that cannot be read; each with the name of the
-    joint or link.
     """
     robot = read_root(path)
     parents: dict[str, ElementTree.Element] = {}  # the joint above each link that has one
@@ -89,7 +86,7 @@ def read_chain(path: Path, tip: str | None) -> Chain:
                 "a URDF is a tree"
             )
         parents[child] = joint
-    links = [str(link.get("name")) for link in robot.findall("link")]
+    links = _names(robot.findall("link"))
     ends = Ends(links, parents)
     candidates = ends.candidates()
     others = tuple(candidates[1:]) if tip is None else ()
@@ -99,33 +96,30 @@ def read_chain(path: Path, tip: str | None) -> Chain:
     while link in parents:
         above.insert(0, parents[link])
         link = _parent_link(parents[link])
-    moving = [joint for joint in above if joint.get("type") in MOVING]
-    moving = [joint for joint in moving if joint.get("name") not in ends.gripper]
+    moving = [joint for joint in above if joint.get("type") in MOVING and joint.get("name") not in ends.gripper]
     if not moving:
         raise DataError(f"{path}: expected at least one joint that moves between the root and {tip!r}, found none")
     doubts = tuple(doubts_of(above))
-    free = tuple(str(joint.get("name")) for joint in moving if joint.get("type") == "continuous")
+    free = _names(joint for joint in moving if joint.get("type") == "continuous")
     limits = tuple(_limits(joint, path) for joint in moving)
-    check_masses(robot, path)
-    check_shapes(robot, path)
-    check_origins(robot, path)
+    for check in (check_masses, check_shapes, check_origins):
+        check(robot, path)
     missing = tuple(dict.fromkeys(resolve_meshes(robot, path)))
-    joints = tuple(str(joint.get("name")) for joint in moving)
     units = tuple("m" if joint.get("type") == "prismatic" else "rad" for joint in moving)
-    gripper = tuple(str(joint.get("name")) for joint in robot.findall("joint") if joint.get("name") in ends.gripper)
+    gripper = tuple(name for name in _names(robot.findall("joint")) if name in ends.gripper)
     try:
         text = ElementTree.tostring(robot, "unicode")
     except RecursionError as error:
         raise DataError(f"{path}: expected a URDF file, got elements within one another without end") from error
-    return Chain(text, joints, units, limits, tip, free, missing, gripper, others, doubts)
+    return Chain(text, _names(moving), units, limits, tip, free, missing, gripper, others, doubts)
+
+
+def _names(elements: Iterable[ElementTree.Element]) -> tuple[str, ...]:
+    return tuple(str(element.get("name")) for element in elements)
 
 
 def read_root(path: Path) -> ElementTree.Element:
-    """Read the root of a URDF file, in which no link is called like a joint; a xacro file is converted.
-
-    Raises DataError: no such file, one of more than 20 MB, no XML, or XML that is no URDF; xacro without the package of
-    that name.
-    """
+    """Read the root of a URDF file, in which no link is called like a joint; a xacro file is converted."""
     try:
         if path.stat().st_size > _LARGEST:
             raise DataError(f"{path}: expected a URDF of at most {_LARGEST / 1e6:.0f} MB, got {path.stat().st_size:,}")
@@ -161,7 +155,7 @@ def _end(joint: ElementTree.Element, which: str, path: Path) -> str:
     return str(end.get("link"))
 
 
-def _tip(tip: str | None, links: list[str], candidates: list[Candidate], path: Path) -> str:
+def _tip(tip: str | None, links: Sequence[str], candidates: list[Candidate], path: Path) -> str:
     """Choose the link that is asked for, else the end of the longest chain if one is longer than all others."""
     if tip is not None:
         tip = f"{tip}{_TWIN}" if tip not in links and f"{tip}{_TWIN}" in links else tip
@@ -197,10 +191,7 @@ def _limits(joint: ElementTree.Element, path: Path) -> JointLimits:
     if joint.get("type") == "continuous":
         limit = ElementTree.SubElement(joint, "limit") if limit is None else limit
         joint.set("type", "revolute")
-        limit.set("lower", f"{-_TURNS}")
-        limit.set("upper", f"{_TURNS}")
-        limit.set("velocity", limit.get("velocity", "0"))
-        limit.set("effort", limit.get("effort", "0"))
+        limit.attrib.update({"lower": f"{-_TURNS}", "upper": f"{_TURNS}"})
     if limit is None or limit.get("lower") is None or limit.get("upper") is None:
         raise DataError(f"{path}: joint {name!r} has no limits; add <limit lower= upper= velocity= effort=/> to it")
     values = []
@@ -222,10 +213,7 @@ def _limits(joint: ElementTree.Element, path: Path) -> JointLimits:
 
 
 def without_macros(path: Path) -> ElementTree.Element:
-    """Convert a xacro file to a URDF with the defaults of its arguments, and return its root.
-
-    Raises DataError: the package ``xacro`` is not installed, or it cannot convert the file.
-    """
+    """Convert a xacro file to a URDF with the defaults of its arguments, and return its root."""
     remedy = f"xacro {path.name} > {path.name.split('.')[0]}_converted.urdf"
     try:
         import xacro
@@ -253,15 +241,12 @@ def resolve_meshes(robot: ElementTree.Element, path: Path) -> list[str]:
         for visual in link.findall("visual"):
             link.remove(visual)  # nothing here looks at it, and its meshes need not be there
         for collision in link.findall("collision"):
-            mesh = collision.find("geometry/mesh")
-            if mesh is None:
-                continue
-            file = find_mesh(mesh.get("filename", ""), path)
-            if file is None:
-                link.remove(collision)
-                missing.append(str(link.get("name")))
-            else:
-                mesh.set("filename", str(file))
+            if (mesh := collision.find("geometry/mesh")) is not None:
+                if (file := find_mesh(mesh.get("filename", ""), path)) is None:
+                    link.remove(collision)
+                    missing.append(str(link.get("name")))
+                else:
+                    mesh.set("filename", str(file))
     return missing
 
 
@@ -293,7 +278,7 @@ class Ends:
     equally many joints that leave the end of a chain at least twice as long. If nothing else moves, there are none.
     """
 
-    def __init__(self, links: list[str], parents: dict[str, ElementTree.Element]) -> None:
+    def __init__(self, links: Sequence[str], parents: dict[str, ElementTree.Element]) -> None:
         self._links, self._parents = links, parents
         self._bodies = {}  # link -> the link that stands for those which fixed joints hold together
         for link in links:
