@@ -304,6 +304,15 @@ def preflight_table(preflight: Preflight) -> Table:
     return Table("Preflight", ("check", "worst", "limit", "unit", "at [s]", ""), rows, unchecked)
 
 
+def checks_as_data(preflight: Preflight) -> list[dict[str, Any]]:
+    """List the checks as plain data; None where a number is not finite."""
+
+    def finite(value: Any) -> Any:
+        return None if isinstance(value, float) and not math.isfinite(value) else value
+
+    return [{name: finite(value) for name, value in check._asdict().items()} for check in preflight.checks]
+
+
 def tracking(
     robot: Robot, trajectory: JointTrajectory, path: TaskPath, follow: str, dense: tuple[Array, Along]
 ) -> Iterator[Check]:

@@ -40,13 +40,9 @@ class RequestBody(BaseModel):
 
 
 class Change(RequestBody):
-    """The body of a request for a change."""
+    """The body of a request for a change: the version that the client has seen, if it matters."""
 
     version: int | None = Field(None, description=VERSION)
-
-
-class RejectRequest(Change):
-    """The version that the client has seen, if it matters."""
 
 
 class ChangedOut(BaseModel):
