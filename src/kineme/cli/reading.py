@@ -11,7 +11,7 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from kineme.cli.options import READING, SPECIFICATION, Finite, Parsed, under
+from kineme.cli.options import READING, SPECIFICATION, Finite, Parsed, given_options, under
 from kineme.cli.output import progress
 from kineme.reporting.text import printable
 
@@ -134,8 +134,7 @@ def recordings_argument(command: Callable[..., Any]) -> Callable[..., Any]:
 def read(paths: Path | Sequence[Path], options: dict[str, Any], library: Any = None) -> Any:
     """Read recordings from files, folders, patterns of them, and - the standard input, with the `layout_options`.
 
-    Where a bag has several topics and none is asked for, it is read as the movements of `library` were; and where no
-    columns are asked for, a file that has the columns of `library` is read without others.
+    Topics of a bag and columns that are not asked for are those of `library`, where a file has them.
     """
     from kineme.io.limits import read_limited
     from kineme.io.reading.recordings import NameRule, read_paths
@@ -167,10 +166,7 @@ def read(paths: Path | Sequence[Path], options: dict[str, Any], library: Any = N
 
 
 def known_choices(parsed: Any, options: dict[str, Any], learned: Any) -> list[str]:
-    """A sentence for what was read since the movements of the library were read so: topics and frames, and columns.
-
-    `learned` are the channels of the library.
-    """
+    """A sentence for topics, frames and columns that were read since the library, of channels `learned`, has them."""
     from kineme.movements.channels.channel import recorded_names
     from kineme.movements.tables.layout import AS_KNOWN
 
@@ -205,7 +201,11 @@ def read_source(options: dict[str, Any]) -> Any:
     """The primitive of a symbol, a recording or a file, with the recording that it is of."""
     source = options["source"]
     if _is_symbol(source, options["folder"]):
-        _check_of_symbol(source)
+        if given := given_options((*LAYOUT_OPTIONS, *SPECIFICATION, "index")):
+            raise click.UsageError(
+                f"expected {given[0]} with a recording, got it with {printable(source)}, a symbol of a library: its "
+                f"columns and primitives are those that it was learned with; say {given[0]} to kineme learn"
+            )
         from kineme.library.grounding import learned_of
         from kineme.library.library import ActionLibrary
 
@@ -224,18 +224,6 @@ def read_source(options: dict[str, Any]) -> Any:
     dmp = DMP(**{name: options[name] for name in SPECIFICATION})
     recordings = read(Path(source), {name: options[name] for name in LAYOUT_OPTIONS})
     return learn_one(_chosen(recordings, options), dmp)
-
-
-def _check_of_symbol(source: str) -> None:
-    """Refuse options that say how a recording is read or learned: a symbol of a library was when it was learned."""
-    context = click.get_current_context()
-    for option in context.command.params:
-        is_given = context.get_parameter_source(option.name or "") == ParameterSource.COMMANDLINE
-        if is_given and option.name in (*LAYOUT_OPTIONS, *SPECIFICATION, "index"):
-            raise click.UsageError(
-                f"expected {option.opts[0]} with a recording, got it with {printable(source)}, a symbol of a library: "
-                f"its columns and primitives are those that it was learned with; say {option.opts[0]} to kineme learn"
-            )
 
 
 def name_of_source(options: dict[str, Any]) -> str:
@@ -270,7 +258,10 @@ def differences(learned: Any, asked: Any) -> list[str]:
 
     Other kinds are refused elsewhere; what differs here are names, units, and whether channels are known.
     """
-    from kineme.movements.channels.detect import name_of
+    from kineme.movements.channels import detect
+
+    def name_of(channel: Any) -> str:
+        return detect.name_of(channel.name).lower()
 
     if learned is None or not any(channel.coordinates for channel in learned):
         return []
@@ -280,12 +271,12 @@ def differences(learned: Any, asked: Any) -> list[str]:
             f"library: {_some([channel.name for channel in learned])}"
         ]
     moving = [[channel for channel in channels if channel.coordinates] for channels in (asked, learned)]
-    by_name = {name_of(channel.name).lower(): channel for channel in moving[0]}
-    if all(name_of(channel.name).lower() in by_name for channel in moving[1]):
-        moving[0] = [by_name[name_of(channel.name).lower()] for channel in moving[1]]
+    by_name = {name_of(channel): channel for channel in moving[0]}
+    if all(name_of(channel) in by_name for channel in moving[1]):
+        moving[0] = [by_name[name_of(channel)] for channel in moving[1]]
     pairs = list(zip(*moving, strict=False))
     sentences = []
-    if other := [pair for pair in pairs if name_of(pair[0].name).lower() != name_of(pair[1].name).lower()]:
+    if other := [pair for pair in pairs if name_of(pair[0]) != name_of(pair[1])]:
         here, there = (_some([pair[k].name for pair in other]) for k in (0, 1))
         sentences.append(f"Columns are compared in their order: {here} of the recordings with {there} of the library")
     if units := [pair for pair in pairs if None not in (pair[0].unit, pair[1].unit) and pair[0].unit != pair[1].unit]:
