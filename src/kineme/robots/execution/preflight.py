@@ -16,6 +16,7 @@ from kineme.errors import TrajectoryError
 from kineme.reporting.table import Table
 from kineme.robots.execution.joint_trajectory import (
     STANDS,
+    Extreme,
     JointTrajectory,
     between,
     dense_times,
@@ -36,7 +37,7 @@ TURNED = 1.0  # and turned by so many degrees from it, where the orientation is 
 _STANDING = 0.02  # of the fastest instant as generated, or of the limits of velocity
 
 SAMPLING = " between samples"  # the end of what these checks are called
-_POSITION = 1e-6  # beyond a limit between samples [rad, m]
+_POSITION = 1e-6  # beyond a limit [rad, m]
 _SLACK_BETWEEN = 1.001  # times the limit of velocity and acceleration between samples
 _SINGULAR = 0.02  # the smallest singular value of the Jacobian below which an arm is said to be singular
 _JUMP = 0.05  # a joint may deviate so far between two samples from what its velocities say [rad, m]
@@ -72,7 +73,7 @@ def preflight(
     times = dense_times(robot, trajectory)
     dense = trajectory if len(times) == len(trajectory) else between(trajectory, times)
     state = along(robot, dense)
-    checks = [*_positions(robot, trajectory), *_rates(robot, trajectory), *_torques(robot, dense, state)]
+    checks = [*_at_limits(robot, trajectory), *_torques(robot, dense, state)]
     checks += [*between_samples(robot, trajectory), *_of_the_arm(robot, trajectory, dense, state)]
     if path is not None:
         checks += tracking(robot, trajectory, path, follow, (times, state))
@@ -90,26 +91,41 @@ def _check_numbers(robot: Robot, trajectory: JointTrajectory) -> None:
         raise TrajectoryError("expected a trajectory of finite numbers, whose times increase")
 
 
-def _positions(robot: Robot, trajectory: JointTrajectory) -> Iterator[Check]:
-    beyond = np.maximum(trajectory.positions - robot.upper, robot.lower - trajectory.positions)
-    for j, name in enumerate(robot.joints):
-        t = int(np.argmax(beyond[:, j]))
-        worst = float(trajectory.positions[t, j])
-        limit = robot.upper[j] if worst > (robot.upper[j] + robot.lower[j]) / 2 else robot.lower[j]
-        passed, unit = bool(beyond[t, j] <= 1e-6), unit_of(robot, j)
-        slower = 1.0 if passed else math.inf
-        yield Check("position", name, _at(trajectory, t), worst, float(limit), unit, passed, slower)
+def _at_limits(robot: Robot, trajectory: JointTrajectory) -> Iterator[Check]:
+    """Check position, velocity and acceleration of each joint at its worst sample."""
+    arrays = trajectory.positions, trajectory.velocities, trajectory.accelerations
+    for order, (values, (limits, centers)) in enumerate(zip(arrays, _limits(robot), strict=True)):
+        shares = (values - centers) / limits
+        for j, t in enumerate(np.argmax(np.abs(shares), axis=0).tolist()):
+            yield _limited(robot, order, Extreme(float(shares[t, j]), j, _at(trajectory, t)), _SLACK)
 
 
-def _rates(robot: Robot, trajectory: JointTrajectory) -> Iterator[Check]:
-    velocities = ("velocity", trajectory.velocities, robot.velocity)
-    accelerations = ("acceleration", trajectory.accelerations, robot.acceleration)
-    for order, (what, values, limits) in enumerate((velocities, accelerations), 1):
-        for j, name in enumerate(robot.joints):
-            t = int(np.argmax(np.abs(values[:, j])))
-            worst, limit = abs(float(values[t, j])), float(limits[j])
-            passed, slower = worst <= limit * _SLACK, (worst / limit) ** (1 / order)
-            yield Check(what, name, _at(trajectory, t), worst, limit, unit_of(robot, j, order), passed, slower)
+def between_samples(robot: Robot, trajectory: JointTrajectory) -> Iterator[Check]:
+    """Positions, velocities and accelerations at their worst instant, whether a sample lies there or not.
+
+    Between samples lies what `between` says. Its acceleration overshoots where that of the movement is a step.
+    """
+    for order, (limits, centers) in enumerate(_limits(robot)):
+        yield _limited(robot, order, extreme(trajectory, order, limits, centers), _SLACK_BETWEEN, SAMPLING)
+
+
+def _limits(robot: Robot) -> tuple[tuple[Array, Array], ...]:
+    """Limits of positions, velocities and accelerations, each with what it is counted from."""
+    half, middle = (robot.upper - robot.lower) / 2, (robot.upper + robot.lower) / 2
+    return (half, middle), (robot.velocity, 0 * half), (robot.acceleration, 0 * half)
+
+
+def _limited(robot: Robot, order: int, at: Extreme, slack: float, when: str = "") -> Check:
+    """Check an extreme of the position (order 0), the velocity or the acceleration of a joint."""
+    j, share = at.joint, abs(at.share)
+    size, middle = (float(values[j]) for values in _limits(robot)[order])
+    what, unit = ("position", "velocity", "acceleration")[order] + when, unit_of(robot, j, order)
+    if order:
+        passed, slower = share <= slack, share ** (1 / order)
+        return Check(what, robot.joints[j], at.time, share * size, size, unit, passed, slower)
+    passed = (share - 1) * size <= _POSITION
+    limit, slower = float((robot.lower if at.share < 0 else robot.upper)[j]), 1.0 if passed else math.inf
+    return Check(what, robot.joints[j], at.time, middle + at.share * size, limit, unit, passed, slower)
 
 
 def _torques(robot: Robot, trajectory: JointTrajectory, state: Along) -> Iterator[Check]:
@@ -124,16 +140,8 @@ def _torques(robot: Robot, trajectory: JointTrajectory, state: Along) -> Iterato
         room = limit - holding * np.sign(moving)  # what is left in the direction in which the movement pushes
         is_hopeless = np.any((np.abs(holding) > limit) | (room <= 0))
         slower = math.inf if is_hopeless else float(np.sqrt(np.max(np.abs(moving) / room)))
-        yield Check(
-            "torque",
-            robot.joints[j],
-            _at(trajectory, t),
-            float(total[t]),
-            limit,
-            "N" if robot.units[j] == "m" else "Nm",
-            passed,
-            slower,
-        )
+        unit = "N" if robot.units[j] == "m" else "Nm"
+        yield Check("torque", robot.joints[j], _at(trajectory, t), float(total[t]), limit, unit, passed, slower)
 
 
 def _of_the_arm(robot: Robot, trajectory: JointTrajectory, dense: JointTrajectory, state: Along) -> Iterator[Check]:
@@ -218,24 +226,6 @@ def steps_kept(robot: Robot, trajectory: JointTrajectory, generated: Steps) -> C
 def _changes(values: Array) -> NDArray[np.intp]:
     """Indices of the samples from which another value holds."""
     return np.flatnonzero(np.diff(values)) + 1
-
-
-def between_samples(robot: Robot, trajectory: JointTrajectory) -> Iterator[Check]:
-    """Positions, velocities and accelerations at their worst instant, whether a sample lies there or not.
-
-    Between samples lies what `between` says. Its acceleration overshoots where that of the movement is a step.
-    """
-    half, middle = (robot.upper - robot.lower) / 2, (robot.upper + robot.lower) / 2
-    share, j, time = extreme(trajectory, 0, half, middle)
-    beyond = (abs(share) - 1) * float(half[j])
-    passed, slower = (True, 1.0) if beyond <= _POSITION else (False, math.inf)
-    limit, worst = float((robot.lower if share < 0 else robot.upper)[j]), float(middle[j] + share * half[j])
-    yield Check("position" + SAMPLING, robot.joints[j], time, worst, limit, unit_of(robot, j), passed, slower)
-    for order, (what, limits) in enumerate((("velocity", robot.velocity), ("acceleration", robot.acceleration)), 1):
-        share, j, time = extreme(trajectory, order, limits)
-        worst, limit, unit = abs(share), float(limits[j]), unit_of(robot, j, order)
-        passed, slower = worst <= _SLACK_BETWEEN, worst ** (1 / order)
-        yield Check(what + SAMPLING, robot.joints[j], time, worst * limit, limit, unit, passed, slower)
 
 
 class Check(NamedTuple):
