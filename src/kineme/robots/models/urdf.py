@@ -76,18 +76,26 @@ def read_chain(path: Path, tip: str | None) -> Chain:
     Joints of grippers and hands are no part of it.
     """
     robot = read_root(path)
+    links = _names(robot.findall("link"))
     parents: dict[str, ElementTree.Element] = {}  # the joint above each link that has one
+    below: dict[str, list[str]] = {link: [] for link in links}
     for joint in robot.findall("joint"):
-        _end(joint, "parent", path)
-        child = _end(joint, "child", path)
+        parent, child = (_end(joint, which, path) for which in ("parent", "child"))
+        if lost := {parent, child} - below.keys():
+            raise DataError(f"{path}: joint {joint.get('name')!r}: expected links of this file, got {min(lost)!r}")
+        below[parent].append(child)
         if child in parents:
             raise DataError(
                 f"{path}: link {child!r} is the child of {parents[child].get('name')!r} and of {joint.get('name')!r}; "
                 "a URDF is a tree"
             )
         parents[child] = joint
-    links = _names(robot.findall("link"))
-    ends = Ends(links, parents)
+    downwards = [link for link in links if link not in parents]  # each link after the one above it
+    for link in downwards:
+        downwards += below[link]
+    if circle := below.keys() - downwards:
+        raise DataError(f"{path}: link {min(circle)!r} is below itself, or below such a link; a URDF is a tree")
+    ends = Ends(links, downwards, parents)
     candidates = ends.candidates()
     others = tuple(candidates[1:]) if tip is None else ()
     tip = _tip(tip, links, candidates, path)
@@ -273,24 +281,26 @@ class Candidate(NamedTuple):
 class Ends:
     """The tree of a URDF as bodies, which are links that fixed joints hold together, and the joints between them.
 
-    `parents`: the joint above each link that has one. `gripper`: names of the joints of grippers and hands: by their
-    names (finger, thumb, jaw, gripper ...), joints that mimic others at the end of a chain, and two or more branches of
-    equally many joints that leave the end of a chain at least twice as long. If nothing else moves, there are none.
+    `downwards`: the links, each after the one above it; `parents`: the joint above each that has one. `gripper`: names
+    of the joints of grippers and hands: by their names (finger, thumb, jaw, gripper ...), joints that mimic others at
+    the end of a chain, and two or more branches of equally many joints that leave the end of a chain at least twice as
+    long. If nothing else moves, there are none.
     """
 
-    def __init__(self, links: Sequence[str], parents: dict[str, ElementTree.Element]) -> None:
+    def __init__(self, links: Sequence[str], downwards: list[str], parents: dict[str, ElementTree.Element]) -> None:
         self._links, self._parents = links, parents
-        self._bodies = {}  # link -> the link that stands for those which fixed joints hold together
-        for link in links:
-            body, passed = link, set[str]()
-            while body in parents and parents[body].get("type") not in MOVING and body not in passed:
-                passed.add(body)
-                body = _parent_link(parents[body])
-            self._bodies[link] = body
-        self._branches: dict[str, list[str]] = {body: [] for body in self._bodies.values()}
+        self._bodies: dict[str, str] = {}  # link -> the link that stands for those which fixed joints hold together
+        for link in downwards:
+            fixed = link in parents and parents[link].get("type") not in MOVING
+            self._bodies[link] = self._bodies[_parent_link(parents[link])] if fixed else link
+        self._branches: dict[str, list[str]] = {self._bodies[link]: [] for link in links}
         for link in links:
             if link in parents and parents[link].get("type") in MOVING:
                 self._branches[self._bodies[_parent_link(parents[link])]].append(link)
+        self._n_below: dict[str, int] = {}  # body -> joints of the longest chain below it
+        for body in reversed(downwards):
+            below = self._branches.get(body, ())
+            self._n_below[body] = max((1 + self._n_below[branch] for branch in below), default=0)
         self.gripper: set[str] = set()
         cut = [link for link in links if self._begins_gripper(link)]
         inside, left = set[str](), cut
@@ -314,17 +324,11 @@ class Ends:
 
     def _n_above(self, body: str) -> int:
         """Count the joints of the arm between the root and a body."""
-        count, passed = 0, set()
-        while body in self._parents and body not in passed:
-            passed.add(body)
+        count = 0
+        while body in self._parents:
             count += self._is_arm(body)
             body = self._bodies[_parent_link(self._parents[body])]
         return count
-
-    def _n_below(self, body: str, depth: int = 0) -> int:
-        """Count the joints of the longest chain below a body."""
-        below = self._branches[body] if depth < len(self._links) else []
-        return max((1 + self._n_below(branch, depth + 1) for branch in below), default=0)
 
     def _begins_gripper(self, link: str) -> bool:
         joint = self._parents.get(link)
@@ -334,9 +338,9 @@ class Ends:
         if _DIGITS.search(name) or _DIGITS.search(link) or (_GRIPPER.search(name) and not _WRIST.search(name)):
             return True
         if joint.find("mimic") is not None:
-            return self._n_below(link) == 0
+            return self._n_below[link] == 0
         body = self._bodies[_parent_link(joint)]
-        lengths = sorted((1 + self._n_below(branch) for branch in self._branches[body]), reverse=True)
+        lengths = sorted((1 + self._n_below[branch] for branch in self._branches[body]), reverse=True)
         return len(lengths) > 1 and lengths[0] == lengths[1] and 2 * lengths[0] <= self._n_above(body) + 1
 
     def _tip_of(self, body: str) -> str:
