@@ -40,6 +40,7 @@ _STOPS = 1.0  # cost of lying there, per squared distance
 _REGULARIZATION = 1e-6  # of a round, per squared change
 _LARGEST_CHANGE = 0.3  # change of a joint in a round [rad, m]
 _SECOND = (1.0, -2.0, 1.0)  # difference
+_Limits = tuple[Array, Array, Array]  # costs of turning; the lowest and the highest positions of the joints
 
 _DENSE = 400  # poses at least: between two of them, a step of Newton's method is nearly exact
 _SEEDS = 48  # starts from which the postures at one pose are sought
@@ -66,6 +67,8 @@ def pursue(robot: Robot, path: TaskPath, turn_costs: Array) -> tuple[Array, Task
     that of least cost, smoothed as `relaxed`; the end and the middle are begun at only if it comes to a stop.
     """
     path = path if len(path.times) >= _DENSE else path.at(np.linspace(0.0, path.times[-1], _DENSE))
+    margin = (1 - _INSIDE) * (robot.upper - robot.lower) / 2
+    limits = turn_costs, robot.lower + margin, robot.upper - margin
     last = len(path.times) - 1
     least, best = np.inf, None
     for share in _BEGINS:
@@ -75,14 +78,18 @@ def pursue(robot: Robot, path: TaskPath, turn_costs: Array) -> tuple[Array, Task
         joints = np.tile(starts, (last + 1, 1, 1))
         errors = np.full(joints.shape[:2], np.inf)
         for order in (range(begin, last + 1), range(begin, -1, -1)):
-            _follow(robot, path, turn_costs, order, joints, errors)
+            _follow(robot, path, limits, order, joints, errors)
         worst = errors.max(axis=0)
         close = min(_NEARLY, max(_FOLLOWED, min(worst, default=np.inf)))
         good = np.flatnonzero(worst <= close)
         if len(good) == 0:
             continue
         cheapest = good[int(np.argmin(_costs(robot, path.times, joints[:, good], errors[:, good])))]
-        way, errors = _relaxed(robot, path, turn_costs, joints[:, [cheapest]], errors[:, [cheapest]], close)
+        way, errors = joints[:, [cheapest]], errors[:, [cheapest]]
+        near = relaxed(robot, path, turn_costs, way[:, 0])
+        smooth, off = _newton(robot, near, np.zeros_like(near), (path.positions, path.rotations), limits)
+        if off.max() <= close:  # with less bending, and as near to the path
+            way, errors = smooth[:, None], off[:, None]
         cost = float(_costs(robot, path.times, way, errors)[0])
         if cost < least:
             least, best = cost, way[:, 0]
@@ -98,30 +105,17 @@ def _costs(robot: Robot, times: Array, joints: Array, errors: Array) -> Array:
     return costs_of(robot, times, joints, errors) + np.sqrt((bends / robot.acceleration).max(axis=(0, 2)))
 
 
-def _relaxed(
-    robot: Robot, path: TaskPath, turn_costs: Array, way: Array, errors: Array, close: float
-) -> tuple[Array, Array]:
-    """The way (T, 1, n) with less bending, and its errors (T, 1); itself, where that leads farther from the path."""
-    middle, half = (robot.upper + robot.lower) / 2, (robot.upper - robot.lower) / 2
-    limits = turn_costs, middle - _INSIDE * half, middle + _INSIDE * half
-    near = relaxed(robot, path, turn_costs, way[:, 0])
-    joints, off = _newton(robot, near, np.zeros_like(near), (path.positions, path.rotations), limits)
-    return (joints[:, None], off[:, None]) if off.max() <= close else (way, errors)
-
-
-def _follow(robot: Robot, path: TaskPath, turn_costs: Array, order: range, joints: Array, errors: Array) -> None:
+def _follow(robot: Robot, path: TaskPath, limits: _Limits, order: range, joints: Array, errors: Array) -> None:
     """Fill `joints` (T, m, n) and `errors` (T, m) in place, in that order of poses; ways that are lost end."""
     middle, half = (robot.upper + robot.lower) / 2, (robot.upper - robot.lower) / 2
-    lower, upper = middle - _INSIDE * half, middle + _INSIDE * half
     ways = np.arange(joints.shape[1])
     pulls = np.resize(_PULLS, joints.shape[1])[:, None]
     before = q = joints[order[0]] if len(order) else joints[0]
     for t in order:
         away = ((q - middle) / half) ** 7 * half  # from the stops
         pull = np.clip(pulls[ways] * (robot.rest - q) - _AWAY * away, -_LARGEST_PULL, _LARGEST_PULL)
-        ahead = np.clip(2 * q - before, lower, upper)
-        pose = path.positions[t], path.rotations[t]
-        moved, off = _newton(robot, ahead, pull, pose, (turn_costs, lower, upper))
+        ahead = np.clip(2 * q - before, *limits[1:])
+        moved, off = _newton(robot, ahead, pull, (path.positions[t], path.rotations[t]), limits)
         joints[t, ways], errors[t, ways] = moved, off
         near = off <= _LOST
         ways, before, q = ways[near], q[near], moved[near]
@@ -129,9 +123,7 @@ def _follow(robot: Robot, path: TaskPath, turn_costs: Array, order: range, joint
             return
 
 
-def _newton(
-    robot: Robot, q: Array, pull: Array, pose: tuple[Array, Array], limits: tuple[Array, Array, Array]
-) -> tuple[Array, Array]:
+def _newton(robot: Robot, q: Array, pull: Array, pose: tuple[Array, Array], limits: _Limits) -> tuple[Array, Array]:
     """Postures (m, n) brought to one pose, and how far they are from it (m,) [m, rad]."""
     turn_costs, lower, upper = limits
     weights = np.concatenate((np.ones(3), turn_costs))

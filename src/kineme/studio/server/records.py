@@ -69,11 +69,8 @@ class ChannelOut(BaseModel):
 def numbers(values: ArrayLike) -> Any:
     """An array as lists; None where a number is not finite."""
     array = np.asarray(values, dtype=np.float64)
-    if np.isfinite(array).all():
-        return array.tolist()
-    plain = array.astype(object)
-    plain[~np.isfinite(array)] = None
-    return plain.tolist()
+    finite = np.isfinite(array)
+    return (array if finite.all() else np.where(finite, array, np.array(None))).tolist()
 
 
 def trajectory(times: list[float], positions: list[list[float]]) -> Trajectory:

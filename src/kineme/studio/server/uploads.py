@@ -107,6 +107,7 @@ class Uploads:
         result = path.with_name(f"{secrets.token_hex(4)}.npz")
         command = [sys.executable, "-m", "kineme.studio.server.read_upload", str(path), str(result)]
         command += [str(self.memory), str(math.ceil(2 * self.seconds))]
+        remedy = "send a part of it, or learn it with kineme learn"
         try:
             code = _run(command, json.dumps(options), self.seconds, check)
             if code == REFUSED:
@@ -114,16 +115,12 @@ class Uploads:
             if code:
                 raise DataError(f"expected a recording, reading {path.name} ended with code {code}")
             if result.stat().st_size > self.held:
-                raise DataError(
-                    f"expected a recording of at most {self.held / 2**20:.0f} MB of numbers, {path.name} holds more; "
-                    "send a part of it, or learn it with kineme learn"
-                )
+                most = f"at most {self.held / 2**20:.0f} MB of numbers"
+                raise DataError(f"expected a recording of {most}, {path.name} holds more; {remedy}")
             return load(result)
         except TimeoutError:
-            raise DataError(
-                f"expected a recording that is read within {self.seconds:g} s, {path.name} takes longer; "
-                "send a part of it, or learn it with kineme learn"
-            ) from None
+            within = f"expected a recording that is read within {self.seconds:g} s"
+            raise DataError(f"{within}, {path.name} takes longer; {remedy}") from None
         finally:
             result.unlink(missing_ok=True)
 
