@@ -18,7 +18,7 @@ from kineme.cli.options import (
     library_option,
 )
 from kineme.cli.output import check_new, progress, say, table, write
-from kineme.cli.reading import differences, known_choices, layout_options, problem_lines, read, recordings_argument
+from kineme.cli.reading import layout_options, notes_beside, problem_lines, read, recordings_argument
 from kineme.reporting.text import counted, printable
 
 
@@ -59,7 +59,6 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
     Example: kineme annotate long.csv --library actions/ -o long-labels.csv
     """
     from kineme.io.reading.formats import expanded
-    from kineme.io.reading.merge_files import notes_on_gaps
     from kineme.io.reading.recordings import paths_of
     from kineme.io.writing.annotations import as_row, targets_of, to_csv, write_annotations
     from kineme.library.annotate import annotate as find
@@ -86,8 +85,7 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
         bar_format = "{l_bar}{bar}| {n:.0f} of {total:.0f} s [{elapsed}<{remaining}]"
         with progress(total=total, desc="annotating", bar_format=bar_format) as bar:
             report = find(library.store, parsed, error_rate, lambda done: bar.update(min(done, total) - bar.n))
-        notes = known_choices(parsed, options, library.channels) + notes_on_gaps(parsed)
-        notes += differences(library.channels, parsed.demonstrations.channels)
+        notes = notes_beside(parsed, options, library.channels)
     written = [] if output is None else write_annotations(output, report.annotations, sources, form, movements)
     is_guess = not report.calibrated
     data = {

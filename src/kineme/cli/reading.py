@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +14,9 @@ from click.core import ParameterSource
 
 from kineme.cli.options import READING, SPECIFICATION, Finite, Parsed, given_options, under
 from kineme.cli.output import progress
-from kineme.reporting.text import printable
+from kineme.reporting.text import first_names, printable
 
-_NAMED = 6  # columns that a sentence names
+_some = partial(first_names, most=6)  # columns that a sentence names
 STANDARD_INPUT = "standard input.csv"
 
 
@@ -165,8 +166,12 @@ def read(paths: Path | Sequence[Path], options: dict[str, Any], library: Any = N
     )
 
 
-def known_choices(parsed: Any, options: dict[str, Any], learned: Any) -> list[str]:
-    """A sentence for topics, frames and columns that were read since the library, of channels `learned`, has them."""
+def notes_beside(parsed: Any, options: dict[str, Any], learned: Any) -> list[str]:
+    """A sentence for each thing to know of recordings that are compared with a library, whose channels are `learned`.
+
+    For topics, frames and columns that were read since it has them, for gaps, and for channels other than its own.
+    """
+    from kineme.io.reading.merge_files import notes_on_gaps
     from kineme.movements.channels.channel import recorded_names
     from kineme.movements.tables.layout import AS_KNOWN
 
@@ -184,12 +189,7 @@ def known_choices(parsed: Any, options: dict[str, Any], learned: Any) -> list[st
             f"Read the columns of the library alone, {_some(columns or ())}, without {_some(aside)}; say --columns for "
             "others"
         )
-    return sentences
-
-
-def _some(names: Sequence[str]) -> str:
-    more = len(names) - _NAMED
-    return ", ".join(names[:_NAMED]) + (f" and {more} more" if more > 0 else "")
+    return sentences + notes_on_gaps(parsed) + _differences(learned, parsed.demonstrations.channels)
 
 
 def problem_lines(problems: Any, lost: str = "not read: ") -> list[str]:
@@ -253,7 +253,7 @@ def _is_symbol(source: str, folder: Path | None) -> bool:
     return folder is not None and (given != ParameterSource.ENVIRONMENT or not Path(source).exists())
 
 
-def differences(learned: Any, asked: Any) -> list[str]:
+def _differences(learned: Any, asked: Any) -> list[str]:
     """A sentence for each way in which recordings that are compared with a library have other channels than it.
 
     Other kinds are refused elsewhere; what differs here are names, units, and whether channels are known.

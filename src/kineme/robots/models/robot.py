@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.errors import DataError, SpecificationError
-from kineme.robots.models.urdf import Candidate, Chain, in_words, read_chain
+from kineme.reporting.text import first_names
+from kineme.robots.models.urdf import LISTED, Candidate, Chain, read_chain
 from kineme.validation import Array, as_numbers, check_number
 
 #: Where their URDF files lie.
@@ -208,11 +209,11 @@ def _assumptions(chain: Chain) -> list[str]:
     if chain.others:
         assumed.append(
             f"the tip is {Candidate(chain.tip, len(chain.joints))}, of the longest chain; others are "
-            f"{in_words(list(chain.others))} (choose with tip=, --tip)"
+            f"{first_names(chain.others, LISTED)} (choose with tip=, --tip)"
         )
     if chain.gripper:
         belong = "belong" if len(chain.gripper) > 1 else "belongs"
-        assumed.append(f"{_named(chain.gripper)} {belong} to a gripper or a hand: locked, no part of the arm")
+        assumed.append(f"{first_names(chain.gripper, 3)} {belong} to a gripper or a hand: locked, no part of the arm")
     assumed += chain.doubts
     if chain.without_stops:
         are = "they are" if len(chain.without_stops) > 1 else "it is"
@@ -224,11 +225,7 @@ def _assumptions(chain: Chain) -> list[str]:
 
 def _have(names: tuple[str, ...]) -> str:
     """Write up to three names, and that each has what follows."""
-    return f"{_named(names)} {'each have' if len(names) > 1 else 'has'}"
-
-
-def _named(names: tuple[str, ...]) -> str:
-    return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
+    return f"{first_names(names, 3)} {'each have' if len(names) > 1 else 'has'}"
 
 
 def checked_rest(rest: ArrayLike, lower: Array, upper: Array, joints: tuple[str, ...]) -> Array:

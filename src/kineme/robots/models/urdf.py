@@ -10,11 +10,12 @@ from typing import NamedTuple
 from xml.etree import ElementTree
 
 from kineme.errors import DataError
+from kineme.reporting.text import first_names
 from kineme.robots.models.numbers import check_axis, check_masses, check_origins, check_shapes, doubts_of, finite_number
 
 #: Types of joints that move.
 MOVING = ("revolute", "continuous", "prismatic")
-_LISTED = 8  # links that a message names
+LISTED = 8  # links that a message names
 _DIGITS = re.compile(r"finger|thumb|knuckle|jaw|claw", re.IGNORECASE)  # in the name of a joint, or of the link it moves
 _GRIPPER = re.compile(r"gripper|hand.*(index|middle|ring|little|pinky|mrl)", re.IGNORECASE)  # in the name of a joint
 _WRIST = re.compile(r"wrist|roll|pitch|yaw|rotat|swivel", re.IGNORECASE)  # turns the gripper, and is no part of it
@@ -171,14 +172,14 @@ def _tip(tip: str | None, links: Sequence[str], candidates: list[Candidate], pat
             from difflib import get_close_matches
 
             alike = get_close_matches(tip, links, 3)
-            listed = f"{', '.join(map(repr, alike))}, ..." if alike else in_words(candidates)
+            listed = f"{', '.join(map(repr, alike))}, ..." if alike else first_names(candidates, LISTED)
             raise DataError(f"{path}: has no link {tip!r} to be the tip; there are {listed}")
         return tip
     if not candidates:
         raise DataError(f"{path}: expected a robot with at least one joint that moves, found none")
     if len(candidates) > 1 and candidates[0].n_joints == candidates[1].n_joints:
         raise DataError(
-            f"{path}: expected a tip, as the robot ends in {len(candidates)} links: {in_words(candidates)}; "
+            f"{path}: expected a tip, as the robot ends in {len(candidates)} links: {first_names(candidates, LISTED)}; "
             "say which one follows the movement (tip=..., --tip)"
         )
     return candidates[0].link
@@ -360,12 +361,6 @@ class Ends:
         inner = {_parent_link(self._parents[link]) for link in links if link in self._parents}
         ends = [link for link in links if link not in inner]
         return ends[0] if len(ends) == 1 else body
-
-
-def in_words(candidates: list[Candidate]) -> str:
-    """Write the first eight, each with its number of joints."""
-    more = f" and {len(candidates) - _LISTED} more" if len(candidates) > _LISTED else ""
-    return ", ".join(map(str, candidates[:_LISTED])) + more
 
 
 def _parent_link(joint: ElementTree.Element) -> str:

@@ -21,7 +21,7 @@ from kineme.library.storage.rows import Row, among, listed, select
 from kineme.library.storage.schema import COLUMNS, RETURNS, UNDO
 from kineme.library.storage.store import Version
 from kineme.library.storage.undo import can_undo
-from kineme.reporting.text import counted, printable, shortened
+from kineme.reporting.text import counted, first_names, printable, shortened
 from kineme.runtime.collector import collector_paused
 from kineme.sampling import evenly_spaced
 from kineme.studio.server.records import ChannelOut, MovementKey, Points, numbers, thumbnail
@@ -99,8 +99,7 @@ def _name(name: str) -> str:
 
 
 def _names(names: list[str]) -> str:
-    more = len(names) - _NAMES
-    return ", ".join(map(_name, names[:_NAMES])) + (f" and {more} more" if more > 0 else "")
+    return first_names(list(map(_name, names)), _NAMES)
 
 
 def _value(value: Any) -> str:

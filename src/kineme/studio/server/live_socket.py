@@ -28,16 +28,8 @@ MOST_SAMPLES = 10_000  # in one message
 _SHOWN = 8  # classes of a movement under way
 _MOST_WAITING = 200  # messages that are taken in again when the library has changed: a few seconds
 _EMPTY: dict[str, Any] = {
-    "label": None,
-    "certainty": None,
-    "ranked": [],
-    "unknown": None,
-    "progress": None,
-    "arrival": None,
-    "path": [],
-    "goal": None,
-    "skipped": 0,
-    "status": [],
+    **dict.fromkeys(("label", "certainty", "unknown", "progress", "arrival", "goal")),
+    **{"ranked": [], "path": [], "skipped": 0, "status": []},
 }
 
 router = APIRouter()
