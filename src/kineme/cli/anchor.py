@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import click
 
 from kineme.cli.options import FOLDER, Parsed, json_option, library_option, whole
-from kineme.cli.output import confirm, say, table, write
+from kineme.cli.output import ask, confirm, say, table, write
 from kineme.errors import KinemeError
 from kineme.reporting.text import counted, printable
 
@@ -224,7 +224,7 @@ class Session:
             where = f"; see {printable(item.picture)}" if item.picture else ""
             write(f"\n{item.title}: {size}, stability {stability:.2f}{where}")
             try:
-                line = click.prompt("name", default="", show_default=False)
+                line = ask("name")
             except click.Abort:
                 write()
                 break

@@ -18,7 +18,7 @@ from kineme.cli.options import (
     source_options,
     specification_options,
 )
-from kineme.cli.output import check_new, write
+from kineme.cli.output import check_new, write, write_bytes
 from kineme.cli.reading import layout_options, read_source
 from kineme.reporting.text import printable
 
@@ -100,7 +100,7 @@ def generate(**options: Any) -> None:
         save_figure(draw_movement(learned, movement.columns, movement_options.obstacles), options["plot"])
     if str(options["output"]) == "-":
         ending = ".json" if options["as_json"] else ".csv"
-        click.echo(encode_movement(movement.columns, ending, movement.names), nl=False)
+        write_bytes(encode_movement(movement.columns, ending, movement.names))
     else:
         write_movement(options["output"], movement.columns, movement.names)
 

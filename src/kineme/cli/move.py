@@ -19,7 +19,7 @@ from kineme.cli.options import (
     specification_options,
     under,
 )
-from kineme.cli.output import check_new, say, write
+from kineme.cli.output import check_new, say, write, write_bytes
 from kineme.cli.reading import layout_options, name_of_source, read_source
 from kineme.reporting.text import printable
 
@@ -79,7 +79,7 @@ def write_files(movement: Any, options: dict[str, Any]) -> None:
     }
     for name, writer in writers.items():
         if name == "output" and str(options[name]) == "-":
-            click.echo(export_files.encode_joints(trajectory, ".json" if options["as_json"] else ".csv"), nl=False)
+            write_bytes(export_files.encode_joints(trajectory, ".json" if options["as_json"] else ".csv"))
         elif options[name] is not None:
             writer(options[name], trajectory)
     if options["plot"]:

@@ -36,6 +36,11 @@ def check_new(path: Path | None, force: bool, *inputs: str | Path, remedy: str =
         raise click.UsageError(f"expected a new file to write, {printable(path)} is there; write over it with {remedy}")
 
 
+def write_bytes(data: bytes) -> None:
+    """Print bytes unchanged, for other programs."""
+    click.echo(data, nl=False)
+
+
 def progress(items: Any = None, **options: Any) -> Any:
     """Show a bar of progress on a terminal; see `tqdm.tqdm`."""
     from tqdm import tqdm
@@ -48,6 +53,11 @@ def table(heads: tuple[str, ...], rows: Any, title: str = "") -> str:
     from kineme.reporting.table import Table, to_text
 
     return to_text(Table(title, heads, rows))
+
+
+def ask(question: str) -> str:
+    """Ask the user for a line; empty if none is entered."""
+    return str(click.prompt(printable_lines(question), default="", show_default=False))
 
 
 def confirm(question: str, **options: Any) -> bool:
