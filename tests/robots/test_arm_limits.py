@@ -87,7 +87,7 @@ def test_the_fastest_straight_line_of_the_joints_is_a_trapezoid():
         joints[:, 0] += distance * (10 * s**3 - 15 * s**4 + 6 * s**5)
         timing = fastest(robot, CubicSpline(s, joints))
         least = distance / v + v / a if distance > v**2 / a else 2 * np.sqrt(distance / a)
-        assert timing.ends[-1] == pytest.approx(least, rel=0.005)
+        assert timing.course.x[-1] == pytest.approx(least, rel=0.005)
         made = sampled(robot, timing, 100.0).trajectory
         assert made.duration == pytest.approx(least + 0.02, rel=0.005)
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.interpolate import BPoly, CubicSpline, PPoly
+from scipy.interpolate import BPoly, CubicSpline
 
 import kineme
 from arm_samples import simple_arm, stroke
@@ -16,7 +16,6 @@ from kineme.errors import TrajectoryError
 from kineme.robots import InfeasibleError, JointTrajectory, load, move, preflight
 from kineme.robots.execution.joint_trajectory import (
     Torques,
-    _bernstein,
     as_generated,
     between,
     dense_times,
@@ -72,13 +71,6 @@ def test_an_extreme_between_samples_is_that_of_five_hundred_instants_in_each_gap
         largest = np.abs(values / limits).max()
         made = extreme(trajectory, order, limits, centers if order == 0 else 0.0)
         assert largest * (1 - 1e-9) <= abs(made.share) <= largest * 1.001
-
-
-def test_coefficients_that_bound_a_polynomial_are_those_of_scipy():
-    for degree in range(1, 6):
-        powers = np.random.default_rng(degree).normal(size=degree + 1)
-        bounding = BPoly.from_power_basis(PPoly(powers[::-1, None], [0.0, 1.0])).c[:, 0]
-        np.testing.assert_allclose(_bernstein(degree) @ powers, bounding, atol=1e-12)
 
 
 @pytest.mark.parametrize(("share", "passes"), [(1.0005, True), (1.0015, False)])

@@ -7,6 +7,7 @@ import pytest
 
 from kineme.errors import DataError
 from kineme.robots import JointTrajectory, load, preflight
+from kineme.robots.models.urdf import read_chain
 
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")
 
@@ -24,6 +25,38 @@ def urdf(folder, inside="", before="", name="j", axis="0 0 1", velocity="1"):
     joint = JOINT.format(name=name, axis=axis, velocity=velocity)
     path.write_text(f'{before}<robot name="r"><link name="a"/><link name="b">{inside}</link>{joint}</robot>')
     return path
+
+
+def links(*names):
+    return "".join(f'<link name="{name}"/>' for name in names)
+
+
+def joint(k, parent, child):
+    text = JOINT.format(name=f"j{k}", axis="0 0 1", velocity="1")
+    return text.replace('"a"', f'"{parent}"').replace('"b"', f'"{child}"')
+
+
+@pytest.mark.parametrize("tip", [None, "a", "b"])
+@pytest.mark.parametrize(
+    ("joints", "words"),
+    [
+        (joint(1, "c", "b") + joint(2, "b", "c"), "link 'b' is below itself, or below such a link; a URDF is a tree"),
+        (joint(1, "ghost", "b"), "joint 'j1': expected links of this file, got 'ghost'"),
+        (joint(1, "a", "ghost"), "joint 'j1': expected links of this file, got 'ghost'"),
+    ],
+)
+def test_what_is_no_tree_is_refused(tmp_path, joints, words, tip):
+    path = tmp_path / "arm.urdf"
+    path.write_text(f'<robot name="r">{links("base", "a", "b", "c")}{joint(0, "base", "a")}{joints}</robot>')
+    with pytest.raises(DataError, match=words):
+        load(path, tip)
+
+
+def test_a_chain_longer_than_any_stack_is_an_arm(tmp_path):
+    n, path = 1200, tmp_path / "arm.urdf"
+    joints = "".join(joint(k, f"l{k}", f"l{k + 1}") for k in range(n))
+    path.write_text(f'<robot name="r">{links(*(f"l{k}" for k in range(n + 1)))}{joints}</robot>')
+    assert len(read_chain(path, None).joints) == n
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import click
 
-from kineme.cli.options import Parsed, json_option, library_option, whole
+from kineme.cli.options import FOLDER, Parsed, json_option, library_option, whole
 from kineme.cli.output import ask, confirm, say, table, write
 from kineme.errors import KinemeError
 from kineme.reporting.text import counted, printable
@@ -53,7 +53,7 @@ _CHOICE = Parsed("1,2,...|all", _choice)
 @click.option("--reject", type=_CHOICE, help="Reject these proposals, and do not propose their movements again.")
 @click.option("--names", type=click.Path(exists=True, dir_okay=False, path_type=Path),
               help='A JSON file of names: {"1": "wave", "2": "nod"}.  [default: cluster 1, ...]')  # fmt: skip
-@click.option("--pictures", type=click.Path(file_okay=False, path_type=Path), default="proposals", show_default=True,
+@click.option("--pictures", type=FOLDER, default="proposals", show_default=True,
               help="Folder for a picture of every proposal.")  # fmt: skip
 @json_option
 def anchor(folder: Path, **options: Any) -> None:

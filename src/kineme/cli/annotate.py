@@ -8,9 +8,17 @@ from typing import Any
 
 import click
 
-from kineme.cli.options import Finite, GroupedCommand, Parsed, force_option, heading, json_option, library_option
+from kineme.cli.options import (
+    GroupedCommand,
+    Parsed,
+    error_rate_option,
+    force_option,
+    heading,
+    json_option,
+    library_option,
+)
 from kineme.cli.output import check_new, progress, say, table, write
-from kineme.cli.reading import differences, known_choices, layout_options, problem_lines, read, recordings_argument
+from kineme.cli.reading import layout_options, notes_beside, problem_lines, read, recordings_argument
 from kineme.reporting.text import counted, printable
 
 
@@ -26,10 +34,7 @@ def _format(text: str) -> str:
 @click.command(cls=GroupedCommand, short_help="Find the symbols of a library in long recordings.")
 @recordings_argument
 @library_option
-@click.option(
-    "--error-rate", type=Finite(0, 1, min_open=True, max_open=True), default=0.05, show_default=True,
-    help="The smaller, the more a movement may differ from those of its symbol.",
-)  # fmt: skip
+@error_rate_option("The smaller, the more a movement may differ from those of its symbol.")
 @layout_options
 @heading("Output")
 @click.option(
@@ -54,7 +59,6 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
     Example: kineme annotate long.csv --library actions/ -o long-labels.csv
     """
     from kineme.io.reading.formats import expanded
-    from kineme.io.reading.merge_files import notes_on_gaps
     from kineme.io.reading.recordings import paths_of
     from kineme.io.writing.annotations import as_row, targets_of, to_csv, write_annotations
     from kineme.library.annotate import annotate as find
@@ -81,8 +85,7 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
         bar_format = "{l_bar}{bar}| {n:.0f} of {total:.0f} s [{elapsed}<{remaining}]"
         with progress(total=total, desc="annotating", bar_format=bar_format) as bar:
             report = find(library.store, parsed, error_rate, lambda done: bar.update(min(done, total) - bar.n))
-        notes = known_choices(parsed, options, library.channels) + notes_on_gaps(parsed)
-        notes += differences(library.channels, parsed.demonstrations.channels)
+        notes = notes_beside(parsed, options, library.channels)
     written = [] if output is None else write_annotations(output, report.annotations, sources, form, movements)
     is_guess = not report.calibrated
     data = {
@@ -119,17 +122,10 @@ def _text(data: dict[str, Any], problems: list[str]) -> str:
         lines.append(table(("symbol", "times", "seconds"), totals))
     elif rows:
         heads = ("recording", "start [s]", "end [s]", "symbol", "how sure")
-        cells = [
-            (
-                printable(f"{row['recording']} {row['place']}".strip()),
-                f"{row['start']:.2f}",
-                f"{row['end']:.2f}",
-                name,
-                row["certainty"],
-            )
-            for name, row in zip(names, rows, strict=True)
-        ]
-        lines.append(table(heads, cells))
+        where = [printable(f"{row['recording']} {row['place']}".strip()) for row in rows]
+        spans = [(f"{row['start']:.2f}", f"{row['end']:.2f}") for row in rows]
+        cells = zip(where, spans, names, rows, strict=True)
+        lines.append(table(heads, [(of, *span, name, row["certainty"]) for of, span, name, row in cells]))
     return "\n".join([*lines, *_remarks(data, problems), *(f"written to {printable(path)}" for path in written)])
 
 

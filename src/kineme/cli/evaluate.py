@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import click
-from click.core import ParameterSource
 
-from kineme.cli.options import GroupedCommand, whole
+from kineme.cli.options import FOLDER, GroupedCommand, given_options, whole
 from kineme.cli.output import progress, write
 from kineme.cli.reading import LAYOUT_OPTIONS, layout_options, read
 
@@ -43,7 +42,7 @@ _QUICK_SPLITS, _QUICK_SHOTS, _SLOW = 2, (1, 3), {"gak-svm", "hmm", "dtw-path"}
 )
 @click.option("--seed", type=whole(0), default=0, show_default=True, help="Seed of splits and perturbations.")
 @click.option("--jobs", type=whole(1), default=None, help="Number of processes.  [default: one per processor]")
-@click.option("--out", type=click.Path(file_okay=False, path_type=Path), default="out", show_default=True,
+@click.option("--out", type=FOLDER, default="out", show_default=True,
               help="Folder for evaluation.html and evaluation.json of each data set, and results.csv, results.json and "
               "ranks.png of all.")  # fmt: skip
 @click.option(
@@ -60,7 +59,7 @@ def evaluate(data: tuple[str, ...], protocols: tuple[str, ...], methods: tuple[s
     """
     from kineme.reporting.table import to_text
     from kineme.runtime.parallel import n_threads
-    from kineme_experiments.evaluation.data import load_data
+    from kineme_experiments.evaluation.data import PACKAGED, load_data
     from kineme_experiments.evaluation.methods import METHODS
     from kineme_experiments.evaluation.protocols import PROTOCOLS
     from kineme_experiments.evaluation.run import Runner
@@ -72,48 +71,36 @@ def evaluate(data: tuple[str, ...], protocols: tuple[str, ...], methods: tuple[s
     contenders = methods or tuple(name for name in METHODS if not (quick and name in _SLOW))
     splits = min(options["splits"], _QUICK_SPLITS) if quick else options["splits"]
     settings = Settings(splits, options["seed"], tuple(options["shots"]) or (_QUICK_SHOTS if quick else ()))
-    _check_read(data)
+    if {*data} <= {*PACKAGED} and (given := given_options(LAYOUT_OPTIONS)):
+        raise click.UsageError(f"expected {given[0]} with recordings, got it with {', '.join(data)} alone")
     reading = partial(read, options={name: options[name] for name in LAYOUT_OPTIONS})
     sets = _numbered([load_data(data_set, reading) for data_set in data])
-    for name, reason in ((name, reason) for data_set in sets for name, reason in data_set.left_out.items()):
-        write(f"left out {name}: {reason}", err=True)
-
-    def watched(items: Any, total: int) -> Any:
-        return progress(items, total=total, desc="evaluating", unit="part")
-
-    runner = Runner(options["jobs"] or n_threads(), watched)
+    for data_set in sets:
+        for name, reason in data_set.left_out.items():
+            write(f"left out {name}: {reason}", err=True)
+    runner = Runner(options["jobs"] or n_threads(), partial(_watched, "evaluating"))
     evaluations = []
     for data_set in sets:
         chosen = protocols or tuple(name for name, each in PROTOCOLS.items() if each.runs_by_default(data_set))
-        evaluations.append(
-            run(data_set, (chosen, contenders), settings, out / data_set.name if len(sets) > 1 else out, runner)
-        )
-        _print(data_set.name if len(sets) > 1 else "", evaluations[-1])
+        name = data_set.name if len(sets) > 1 else ""
+        evaluations.append(run(data_set, (chosen, contenders), settings, out / name, runner))
+        _print(name, evaluations[-1])
     ranks = summarize([data_set.name for data_set in sets], evaluations, out).ranks
     write(ranks if isinstance(ranks, str) else to_text(ranks))
     write(f"\nopen {evaluations[0].files[0]}")
-
-
-def _check_read(data: tuple[str, ...]) -> None:
-    """Refuse options that say how recordings are read where all data are packaged."""
-    from kineme_experiments.evaluation.data import PACKAGED
-
-    context = click.get_current_context()
-    for option in context.command.params:
-        is_given = context.get_parameter_source(option.name or "") == ParameterSource.COMMANDLINE
-        if is_given and option.name in LAYOUT_OPTIONS and {*data} <= {*PACKAGED}:
-            raise click.UsageError(f"expected {option.opts[0]} with recordings, got it with {', '.join(data)} alone")
 
 
 def _numbered(sets: list[Any]) -> list[Any]:
     """Data sets with names of their own: those of one name are numbered."""
     names = [data_set.name for data_set in sets]
     return [
-        data_set._replace(name=f"{data_set.name}-{names[: k + 1].count(data_set.name)}")
-        if names.count(data_set.name) > 1
-        else data_set
-        for k, data_set in enumerate(sets)
+        data_set._replace(name=f"{name}-{names[: k + 1].count(name)}") if names.count(name) > 1 else data_set
+        for k, (name, data_set) in enumerate(zip(names, sets, strict=True))
     ]
+
+
+def _watched(words: str, items: Any, total: int) -> Any:
+    return progress(items, total=total, desc=words, unit="part")
 
 
 def _print(name: str, evaluation: Any) -> None:
@@ -127,7 +114,7 @@ def _print(name: str, evaluation: Any) -> None:
 
 
 @click.command(short_help="Reproduce the paper's tables and figures.")
-@click.option("--out", type=click.Path(file_okay=False, path_type=Path), default="out", show_default=True,
+@click.option("--out", type=FOLDER, default="out", show_default=True,
               help="Folder for report.html, results.json, tables.txt and the figures.")  # fmt: skip
 @click.option("--draws", type=whole(1), default=None,
               help="Random draws of three demonstrations per shape.  [default: 12, with --quick 3]")  # fmt: skip
@@ -141,10 +128,7 @@ def reproduce(out: Path, draws: int | None, seed: int, quick: bool) -> None:
     """
     from kineme_experiments.paper.run import reproduce as run
 
-    def watched(items: Any, total: int) -> Any:
-        return progress(items, total=total, desc="reproducing", unit="part")
-
-    result = run(out, draws or (3 if quick else 12), seed, quick, watched)
+    result = run(out, draws or (3 if quick else 12), seed, quick, partial(_watched, "reproducing"))
     from kineme.reporting.table import to_text
 
     write("\n\n".join(map(to_text, result.tables)))

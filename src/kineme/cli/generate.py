@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import click
 
 from kineme.cli.options import (
+    FILE,
     NUMBERS,
     Finite,
     GroupedCommand,
-    SymbolName,
     force_option,
     heading,
     json_option,
-    library_option_of,
+    plot_option,
+    source_options,
     specification_options,
-    whole,
 )
 from kineme.cli.output import check_new, write, write_bytes
 from kineme.cli.reading import layout_options, read_source
@@ -28,14 +27,10 @@ _MISSED = 0.01  # of the extent of a column
 
 
 @click.command(cls=GroupedCommand, short_help="Generate a movement from a symbol or a recording.")
-@click.argument("source", type=SymbolName())
-@library_option_of(required=False, words="Folder of the action library that SOURCE is a symbol of.")
-@click.option("--index", type=whole(0), help="Number of the movement in a file with several, from 0.")
+@source_options
 @heading("Movement")
 @click.option(
-    "--start",
-    type=NUMBERS,
-    help="Where it starts: a value for each column but discrete ones.  [default: as demonstrated]",
+    "--start", type=NUMBERS, help="Where it starts, in all columns but discrete ones.  [default: as demonstrated]"
 )
 @click.option("--goal", type=NUMBERS, help="Where it ends, likewise.  [default: as demonstrated]")
 @click.option("--duration", type=Finite(), help="Duration in seconds.  [default: as demonstrated]")
@@ -45,13 +40,11 @@ _MISSED = 0.01  # of the extent of a column
 @specification_options
 @layout_options
 @heading("Output")
-@click.option(
-    "--save", type=click.Path(dir_okay=False, path_type=Path), help="Save the primitive to this .kineme file."
-)
-@click.option("--output", "-o", type=click.Path(dir_okay=False, path_type=Path), default="-", show_default=True,
+@click.option("--save", type=FILE, help="Save the primitive to this .kineme file.")
+@click.option("--output", "-o", type=FILE, default="-", show_default=True,
               help="A .csv, .npz, .json or .parquet file; - for the screen, as CSV or --json.")  # fmt: skip
 @json_option
-@click.option("--plot", type=click.Path(dir_okay=False, path_type=Path), help="Draw it: a .png, .svg or .pdf file.")
+@plot_option
 @force_option
 def generate(**options: Any) -> None:
     """Generate a movement from SOURCE: a symbol of a library, a recording, or a saved primitive (.kineme).
@@ -69,6 +62,7 @@ def generate(**options: Any) -> None:
 
     from kineme.dmp.generation.generate import MovementOptions, checked_point, largest_deviation
     from kineme.dmp.generation.generate import generate as make
+    from kineme.io.writing.write_movement import encode_movement, write_movement
 
     for name in ("output", "save", "plot"):
         check_new(options[name], options["force"], options["source"])
@@ -104,7 +98,11 @@ def generate(**options: Any) -> None:
         from kineme.reporting.figures import save_figure
 
         save_figure(draw_movement(learned, movement.columns, movement_options.obstacles), options["plot"])
-    _write(options["output"], movement, ".json" if options["as_json"] else ".csv")
+    if str(options["output"]) == "-":
+        ending = ".json" if options["as_json"] else ".csv"
+        write_bytes(encode_movement(movement.columns, ending, movement.names))
+    else:
+        write_movement(options["output"], movement.columns, movement.names)
 
 
 def _warn_of_missed_goal(learned: Any, movement: Any, goals: Any) -> None:
@@ -125,12 +123,3 @@ def _warn_of_missed_goal(learned: Any, movement: Any, goals: Any) -> None:
             f"there, say for instance --settle {_MISSED * extent:.1g}",
             err=True,
         )
-
-
-def _write(output: Path, movement: Any, ending: str) -> None:
-    from kineme.io.writing.write_movement import encode_movement, write_movement
-
-    if str(output) == "-":
-        write_bytes(encode_movement(movement.columns, ending, movement.names))
-    else:
-        write_movement(output, movement.columns, movement.names)

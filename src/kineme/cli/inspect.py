@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from kineme.cli.options import Finite, GroupedCommand, heading, json_option
+from kineme.cli.options import GroupedCommand, error_rate_option, json_option, plot_option
 from kineme.cli.output import progress, say
 from kineme.cli.reading import layout_options, read, recordings_argument
 
@@ -18,12 +18,8 @@ from kineme.cli.reading import layout_options, read, recordings_argument
 @click.option(
     "--outliers/--no-outliers", default=True, show_default=True, help="Look for movements unlike others of their label."
 )
-@click.option(
-    "--error-rate", type=Finite(0, 1, min_open=True, max_open=True), default=0.05, show_default=True,
-    help="Share of false alarms among the outliers.",
-)  # fmt: skip
-@heading("Output")
-@click.option("--plot", type=click.Path(dir_okay=False, path_type=Path), help="Draw them: a .png, .svg or .pdf file.")
+@error_rate_option("Share of false alarms among the outliers.")
+@plot_option
 @json_option
 def inspect(
     recordings: tuple[Path, ...], plot: Path | None, outliers: bool, error_rate: float, as_json: bool, **options: Any

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from collections.abc import Callable
+from functools import wraps
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import click
 
-from kineme.cli.options import ID, SymbolName, json_option, library_option, whole
+from kineme.cli.options import FILE, ID, SymbolName, json_option, library_option, whole
 from kineme.cli.output import confirm, in_words, say, table, to_json
 from kineme.reporting.text import counted, printable
 
@@ -27,24 +29,43 @@ def opened(folder: Path, *, read_only: bool = True) -> Any:
     return ActionLibrary(folder, read_only=read_only)
 
 
-@library.command("list")
-@library_option
+_Answer = tuple[Any, Callable[[], str]]
+
+
+def _command(*names: str, read_only: bool = True, **options: Any) -> Callable[[Callable[..., _Answer]], click.Command]:
+    """Add a command: a function of the open library that returns what is printed, as data and as text."""
+
+    def add(answer: Callable[..., _Answer]) -> click.Command:
+        @wraps(answer)
+        def run(folder: Path, as_json: bool, **arguments: Any) -> None:
+            with opened(folder, read_only=read_only) as actions:
+                data, text = answer(actions, **arguments)
+            say(as_json, data, text)
+
+        own = getattr(answer, "__click_params__", [])
+        run.__dict__["__click_params__"] = []
+        library_option(json_option(run))  # below the options of its own
+        run.__dict__["__click_params__"] += own
+        return library.command(*names, **options)(run)
+
+    return add
+
+
+@_command("list")
 @click.option("--at", "version", type=ID, help="Show this version of the library.")
-@json_option
-def list_symbols(folder: Path, version: int | None, as_json: bool) -> None:
+def list_symbols(actions: Any, version: int | None) -> _Answer:
     """List the symbols of a library."""
-    with opened(folder) as actions:
-        shown = actions if version is None else actions.at(version)
-        symbols, unlabeled = shown.symbols(), len(shown.unlabeled())
-        people = Counter(person for person in shown.groups().tolist() if person is not None)
-        data = {
-            "movements": len(shown),
-            "unlabeled": unlabeled,
-            "dimensions": shown.n_dims,
-            "people": dict(sorted(people.items())),
-            "version": shown.version,
-            "symbols": [brief(symbol) for symbol in symbols],
-        }
+    shown = actions if version is None else actions.at(version)
+    symbols, unlabeled = shown.symbols(), len(shown.unlabeled())
+    people = Counter(person for person in shown.groups().tolist() if person is not None)
+    data = {
+        "movements": len(shown),
+        "unlabeled": unlabeled,
+        "dimensions": shown.n_dims,
+        "people": dict(sorted(people.items())),
+        "version": shown.version,
+        "symbols": [brief(symbol) for symbol in symbols],
+    }
 
     def text() -> str:
         rows = [(printable(s.name), f"{len(s)}", s.id, printable(s.description)) for s in symbols]
@@ -55,52 +76,43 @@ def list_symbols(folder: Path, version: int | None, as_json: bool) -> None:
         )
         return table(("symbol", "movements", "id", "description"), rows, title) if rows else title
 
-    say(as_json, data, text)
+    return data, text
 
 
-@library.command(short_help="Show one symbol and its movements.")
+@_command(short_help="Show one symbol and its movements.")
 @click.argument("symbol", type=SymbolName())
-@library_option
-@json_option
-def show(symbol: str, folder: Path, as_json: bool) -> None:
+def show(actions: Any, symbol: str) -> _Answer:
     """Show one symbol: its movements, where they come from, and how they vary."""
     from kineme.library.storage.symbols import symbol_report
 
-    with opened(folder) as actions:
-        data = symbol_report(actions.store, symbol)
-    say(as_json, data, lambda: _report_text(data))
+    data = symbol_report(actions.store, symbol)
+    return data, lambda: _report_text(data)
 
 
-@library.command()
+@_command(read_only=False)
 @click.argument("symbol", type=SymbolName())
 @click.argument("name")
-@library_option
-@json_option
-def rename(symbol: str, name: str, folder: Path, as_json: bool) -> None:
+def rename(actions: Any, symbol: str, name: str) -> _Answer:
     """Give a symbol another NAME; its id stays."""
     from kineme.library.storage import changes
 
-    with opened(folder, read_only=False) as actions:
-        key = actions[symbol].id  # a name may be another symbol's when the change is made
-        version = changes.rename(actions.store, key, name)
-        data = {**brief(actions[key]), "was": symbol, "version": version}
-    say(as_json, data, lambda: f"{printable(symbol)} is now {printable(name)} ({data['id']})")
+    key = actions[symbol].id  # a name may be another symbol's when the change is made
+    version = changes.rename(actions.store, key, name)
+    data = {**brief(actions[key]), "was": symbol, "version": version}
+    return data, lambda: f"{printable(symbol)} is now {printable(name)} ({data['id']})"
 
 
-@library.command()
+@_command(read_only=False)
 @click.argument("symbol", type=SymbolName())
 @click.argument("text")
-@library_option
-@json_option
-def annotate(symbol: str, text: str, folder: Path, as_json: bool) -> None:
+def annotate(actions: Any, symbol: str, text: str) -> _Answer:
     """Set the description of a symbol."""
     from kineme.library.storage import changes
 
-    with opened(folder, read_only=False) as actions:
-        key = actions[symbol].id
-        version = changes.annotate(actions.store, key, description=text)
-        data = {**brief(actions[key]), "version": version}
-    say(as_json, data, lambda: f"{printable(data['name'])}: {printable(text)}")
+    key = actions[symbol].id
+    version = changes.annotate(actions.store, key, description=text)
+    data = {**brief(actions[key]), "version": version}
+    return data, lambda: f"{printable(data['name'])}: {printable(text)}"
 
 
 @library.command(short_help="Delete a symbol or movements; earlier versions keep them.")
@@ -130,48 +142,40 @@ def delete(symbol: str | None, movements: tuple[int, ...], yes: bool, folder: Pa
     say(as_json, data, lambda: f"deleted {what}; version {data['version']}")
 
 
-@library.command()
-@library_option
+@_command()
 @click.option(
     "--limit", "-n", type=whole(1), default=20, show_default=True, help="Number of versions to list, the latest ones."
 )
-@json_option
-def history(folder: Path, limit: int, as_json: bool) -> None:
+def history(actions: Any, limit: int) -> _Answer:
     """List the versions: what changed, and when."""
-    with opened(folder) as actions:
-        versions = actions.history()
-    data = [
-        {"version": version.id, "at": version.at, "action": version.action, **version.detail}
-        for version in versions[-limit:]
-    ]
+    versions = actions.history()
+    last = versions[-limit:]
+    data = [{"version": version.id, "at": version.at, "action": version.action, **version.detail} for version in last]
 
     def text() -> str:
         rows = [
             (str(version.id), version.at[:19].replace("T", " "), version.action, printable(in_words(version.detail)))
-            for version in versions[-limit:]
+            for version in last
         ]
         return table(("version", "at (UTC)", "action", "what"), rows, counted(len(versions), "version"))
 
-    say(as_json, data, text)
+    return data, text
 
 
-@library.command(short_help="Take back the last change, or restore a version.")
-@library_option
+@_command(read_only=False, short_help="Take back the last change, or restore a version.")
 @click.option("--at", "expected", type=ID, help="Only if this is still the last version, as history lists it.")
 @click.option("--to", type=ID, help="Restore this earlier version, as history lists it; 0 is the empty library.")
-@json_option
-def undo(folder: Path, expected: int | None, to: int | None, as_json: bool) -> None:
+def undo(actions: Any, expected: int | None, to: int | None) -> _Answer:
     """Take back the last change, whoever made it, as a new version; again, the one before.
 
     All that one call of kineme learn stored is one change. kineme library history lists the changes. With --to, the
     library is as it was at that version: versions between stay in the history, and undo takes the restoring back. What
     was undone is done again by restoring the version that was taken back.
     """
-    with opened(folder, read_only=False) as actions:
-        undone = actions.undo(expected, to)
-        data = {"undone": undone.action, "to": undone.to, "version": undone.version}
-    done = f"took back {data['undone']}; as at" if to is None else "restored"
-    say(as_json, data, lambda: f"{done} version {data['to']}; version {data['version']}")
+    undone = actions.undo(expected, to)
+    done = f"took back {undone.action}; as at" if to is None else "restored"
+    text = f"{done} version {undone.to}; version {undone.version}"
+    return {"undone": undone.action, "to": undone.to, "version": undone.version}, lambda: text
 
 
 @library.command(short_help="Check every byte of a library.")
@@ -183,25 +187,18 @@ def verify(ctx: click.Context, folder: Path, as_json: bool) -> None:
     with opened(folder) as actions:
         problems = [str(problem) for problem in actions.verify()]
         n = len(actions)
-    data = {"ok": not problems, "movements": n, "problems": problems}
-    say(
-        as_json,
-        data,
-        lambda: "\n".join(map(printable, problems)) if problems else f"{counted(n, 'movement')}, nothing wrong",
-    )
+    text = "\n".join(map(printable, problems)) or f"{counted(n, 'movement')}, nothing wrong"
+    say(as_json, {"ok": not problems, "movements": n, "problems": problems}, lambda: text)
     ctx.exit(1 if problems else 0)
 
 
-@library.command()
-@click.argument("path", type=click.Path(dir_okay=False, path_type=Path))
-@library_option
-@json_option
-def export(path: Path, folder: Path, as_json: bool) -> None:
+@_command()
+@click.argument("path", type=FILE)
+def export(actions: Any, path: Path) -> _Answer:
     """Write a whole library to one file, as a backup or for others."""
-    with opened(folder) as actions:
-        actions.export(path)
-        data: dict[str, Any] = {"path": str(path), "movements": len(actions), "bytes": path.stat().st_size}
-    say(as_json, data, lambda: f"wrote {printable(path)}: {counted(data['movements'], 'movement')}")
+    actions.export(path)
+    data: dict[str, Any] = {"path": str(path), "movements": len(actions), "bytes": path.stat().st_size}
+    return data, lambda: f"wrote {printable(path)}: {counted(data['movements'], 'movement')}"
 
 
 @library.command("import")
@@ -263,9 +260,14 @@ def ground(symbol: str, folder: Path, by: str, units: str | None, output: Path) 
 
     kineme library schema prints the JSON Schema of this output.
     """
+    from kineme.reporting.atomic import write_atomically
+
     with opened(folder) as actions:
         grounding = actions.ground(symbol, by, units.split(",") if units and "," in units else units)
-    _write(grounding, output)
+    if str(output) == "-":
+        say(True, grounding, str)
+    else:
+        write_atomically(output, (to_json(grounding) + "\n").encode())
 
 
 @library.command()
@@ -275,123 +277,84 @@ def schema() -> None:
     say(True, json.loads(text), str)  # kineme.anchoring.grounding_schema() would load all of anchoring
 
 
-@library.command()
+@_command()
 @click.argument("symbol", type=SymbolName())
 @click.option("-k", type=whole(1), default=3, show_default=True, help="Number of symbols to list.")
-@library_option
-@json_option
-def nearest(symbol: str, k: int, folder: Path, as_json: bool) -> None:
+def nearest(actions: Any, symbol: str, k: int) -> _Answer:
     """List the symbols most similar to one."""
-    with opened(folder) as actions:
-        data = [neighbor._asdict() for neighbor in actions.nearest(symbol, k)]
+    data = [neighbor._asdict() for neighbor in actions.nearest(symbol, k)]
     lines = [f"{neighbor['distance']:.3f}  {printable(neighbor['symbol'])}" for neighbor in data]
-    say(as_json, data, lambda: "\n".join(lines))
+    return data, lambda: "\n".join(lines)
 
 
-@library.command(short_help="List the symbols that lie between two.")
+@_command(short_help="List the symbols that lie between two.")
 @click.argument("first", type=SymbolName())
 @click.argument("second", type=SymbolName())
-@library_option
-@json_option
-def between(first: str, second: str, folder: Path, as_json: bool) -> None:
+def between(actions: Any, first: str, second: str) -> _Answer:
     """List the symbols that lie between two, the smallest detour first."""
-    with opened(folder) as actions:
-        data = [middle._asdict() for middle in actions.between(first, second)]
+    data = [middle._asdict() for middle in actions.between(first, second)]
     lines = [f"{row['share']:.0%} of the way, detour {row['excess']:.0%}  {printable(row['symbol'])}" for row in data]
-    none = f"no symbol lies between {printable(first)} and {printable(second)}"
-    say(as_json, data, lambda: "\n".join(lines) or none)
+    return data, lambda: "\n".join(lines) or f"no symbol lies between {printable(first)} and {printable(second)}"
 
 
-@library.command("map", short_help="Draw a map of the symbols, similar ones near each other.")
-@click.argument("path", type=click.Path(dir_okay=False, path_type=Path))
-@library_option
-@json_option
-def draw(path: Path, folder: Path, as_json: bool) -> None:
+@_command("map", short_help="Draw a map of the symbols, similar ones near each other.")
+@click.argument("path", type=FILE)
+def draw(actions: Any, path: Path) -> _Answer:
     """Draw a map of the symbols, similar ones near each other: a .png, .svg or .pdf file."""
     from kineme.anchoring.figures import draw_map
     from kineme.library.grounding import prototype_of, space_of
     from kineme.reporting.figures import save_figure
 
-    with opened(folder) as actions:
-        space = space_of(actions.store)
-        typical = [prototype_of(actions.store, actions[name]) for name in space.symbols]
-        save_figure(draw_map(space, actions.movements(ids=typical)), path)
-        data = {"path": str(path), "symbols": list(space.symbols), "distances": space.distances.tolist()}
-    say(as_json, data, lambda: f"wrote {printable(path)}: {counted(len(data['symbols']), 'symbol')}")
+    space = space_of(actions.store)
+    typical = [prototype_of(actions.store, actions[name]) for name in space.symbols]
+    save_figure(draw_map(space, actions.movements(ids=typical)), path)
+    data = {"path": str(path), "symbols": list(space.symbols), "distances": space.distances.tolist()}
+    return data, lambda: f"wrote {printable(path)}: {counted(len(space.symbols), 'symbol')}"
 
 
-def _write(data: dict[str, Any], output: Path) -> None:
-    from kineme.reporting.atomic import write_atomically
-
-    if str(output) == "-":
-        say(True, data, str)
-    else:
-        write_atomically(output, (to_json(data) + "\n").encode())
-
-
-@library.command()
+@_command(read_only=False)
 @click.argument("symbols", type=SymbolName(), nargs=-1, required=True)
 @click.option("--into", required=True, help="Name of the merged symbol.")
-@library_option
-@json_option
-def merge(symbols: tuple[str, ...], into: str, folder: Path, as_json: bool) -> None:
+def merge(actions: Any, symbols: tuple[str, ...], into: str) -> _Answer:
     """Merge several symbols into one."""
     from kineme.library.storage import changes
 
-    with opened(folder, read_only=False) as actions:
-        version = changes.merge(actions.store, symbols, into)
-        data = {**brief(actions[into]), "version": version}
-    say(as_json, data, lambda: _changed_text(data))
+    return _changed(actions, into, changes.merge(actions.store, symbols, into))
 
 
-@library.command()
+@_command(read_only=False)
 @click.argument("symbol", type=SymbolName())
 @click.option(
     "--movement", "movements", type=ID, multiple=True, required=True, help="Movement to take over; may be repeated."
 )
 @click.option("--into", required=True, help="Name of the new symbol.")
-@library_option
-@json_option
-def split(symbol: str, movements: tuple[int, ...], into: str, folder: Path, as_json: bool) -> None:
+def split(actions: Any, symbol: str, movements: tuple[int, ...], into: str) -> _Answer:
     """Split a symbol: some of its movements become a new symbol."""
     from kineme.library.storage import changes
 
-    with opened(folder, read_only=False) as actions:
-        version = changes.split(actions.store, symbol, list(movements), into)
-        data = {**brief(actions[into]), "version": version}
-    say(as_json, data, lambda: _changed_text(data))
+    return _changed(actions, into, changes.split(actions.store, symbol, list(movements), into))
 
 
-def _changed_text(data: dict[str, Any]) -> str:
+def _changed(actions: Any, into: str, version: int) -> _Answer:
+    data = {**brief(actions[into]), "version": version}
     holds = f"{printable(data['name'])} ({data['id']}): {counted(data['movements'], 'movement')}"
-    return f"{holds}; version {data['version']}"
+    return data, lambda: f"{holds}; version {version}"
 
 
-@library.command()
-@library_option
-@json_option
-def review(folder: Path, as_json: bool) -> None:
+@_command()
+def review(actions: Any) -> _Answer:
     """Find symbols that could be merged, and symbols that could be split."""
-    with opened(folder) as actions:
-        suggested = actions.review()
-    data = {
-        "merges": [suggestion._asdict() for suggestion in suggested.merges],
-        "splits": [
-            {**suggestion._asdict(), "parts": [part.tolist() for part in suggestion.parts]}
-            for suggestion in suggested.splits
-        ],
-    }
-
-    def text() -> str:
-        lines = [
-            f"{printable(merge.first)} and {printable(merge.second)} could be one: they overlap by {merge.overlap:.2f}"
-            for merge in suggested.merges
-        ]
-        lines += [
-            f"{printable(suggestion.symbol)} could be two: {len(suggestion.parts[0])} movements, and "
-            + ", ".join(map(str, suggestion.parts[1].tolist()))
-            for suggestion in suggested.splits
-        ]
-        return "\n".join(lines) or "the symbols are well apart, and none falls into two clusters"
-
-    say(as_json, data, text)
+    suggested = actions.review()
+    splits = [{**each._asdict(), "parts": [part.tolist() for part in each.parts]} for each in suggested.splits]
+    lines = [
+        f"{printable(merge.first)} and {printable(merge.second)} could be one: they overlap by {merge.overlap:.2f}"
+        for merge in suggested.merges
+    ]
+    for each in splits:
+        first, second = each["parts"]
+        lines.append(
+            f"{printable(each['symbol'])} could be two: {len(first)} movements, and {', '.join(map(str, second))}"
+        )
+    none = "the symbols are well apart, and none falls into two clusters"
+    data = {"merges": [suggestion._asdict() for suggestion in suggested.merges], "splits": splits}
+    return data, lambda: "\n".join(lines) or none

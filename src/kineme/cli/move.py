@@ -8,22 +8,20 @@ from typing import Any
 import click
 
 from kineme.cli.options import (
+    FOLDER,
     NUMBERS,
     Finite,
     GroupedCommand,
-    SymbolName,
+    flag_of,
     heading,
     json_option,
-    library_option_of,
+    source_options,
     specification_options,
     under,
-    whole,
 )
 from kineme.cli.output import check_new, say, write, write_bytes
 from kineme.cli.reading import layout_options, name_of_source, read_source
 from kineme.reporting.text import printable
-
-_NEW_FILE = click.Path(path_type=Path)
 
 #: Option -> its short name if it has one, endings of its files, what it says about itself.
 _FILES = {
@@ -43,26 +41,22 @@ _FILES = {
 file_options = under(
     "Output",
     *(
-        click.option(f"--{name.replace('_', '-')}", *([short] if short else []), type=_NEW_FILE, help=words)
+        click.option(flag_of(name), *([short] if short else []), type=click.Path(path_type=Path), help=words)
         for name, (short, _, words) in _FILES.items()
     ),
 )
 
 
 def check_files(options: dict[str, Any]) -> None:
-    """Refuse files that no writer writes, or that are there, before an arm is loaded.
-
-    Raises click.UsageError: the message names the option or the file.
-    """
+    """Refuse files that no writer writes, or that are there, before an arm is loaded."""
     for name, (_, endings, _) in _FILES.items():
         path = options[name]
         if path is None or (name == "output" and str(path) == "-"):
             continue
         if path.suffix.lower() not in endings:
             expected = ", ".join(ending or "a folder" for ending in endings)
-            raise click.BadParameter(
-                f"expected {expected}, got {path.suffix or 'no ending'}", param_hint=f"--{name.replace('_', '-')}"
-            )
+            words = f"expected {expected}, got {path.suffix or 'no ending'}"
+            raise click.BadParameter(words, param_hint=flag_of(name))
         if path.is_dir():
             raise click.UsageError(
                 f"expected a new file or folder to write, {printable(path)} is a folder that is there"
@@ -72,51 +66,38 @@ def check_files(options: dict[str, Any]) -> None:
         check_new(path, options["overwrite"] or options["force"], options["source"], remedy="--overwrite")
 
 
-def written_in_words(options: dict[str, Any]) -> str:
-    """Write the files and folders that are asked for in one line."""
-    paths = [options[name] for name in (*_FILES, "lerobot") if options[name] is not None]
-    named = ", ".join(str(path) for path in paths)
-    return f"wrote {named}" if paths else "checked only, nothing written; name a file: -o joints.csv, --view arm.html"
-
-
 def write_files(movement: Any, options: dict[str, Any]) -> None:
     """Write what is asked for."""
-    from kineme.robots.export_files import encode_joints, write_action_goal, write_bag, write_joints
+    from kineme.robots import export_files
 
     trajectory = movement.trajectory
-    writers = {"output": write_joints, "ros1": write_bag, "ros2": write_bag, "action_goal": write_action_goal}
+    writers = {
+        "output": export_files.write_joints,
+        "ros1": export_files.write_bag,
+        "ros2": export_files.write_bag,
+        "action_goal": export_files.write_action_goal,
+    }
     for name, writer in writers.items():
-        path = options[name]
-        if path is None:
-            continue
-        if str(path) == "-":
-            write_bytes(encode_joints(trajectory, ".json" if options["as_json"] else ".csv"))
-        else:
-            writer(path, trajectory)
+        if name == "output" and str(options[name]) == "-":
+            write_bytes(export_files.encode_joints(trajectory, ".json" if options["as_json"] else ".csv"))
+        elif options[name] is not None:
+            writer(options[name], trajectory)
     if options["plot"]:
         from kineme.reporting.figures import save_figure
         from kineme.robots.view.figure import draw_robot_movement
 
         save_figure(draw_robot_movement(movement), options["plot"])
     if options["lerobot"]:
-        from kineme.robots.export_files import write_lerobot
-
-        task = name_of_source(options)
-        units = "percent" if options["joint_units"] == "percent" else "deg"
-        write_lerobot(options["lerobot"], trajectory, task, options["fps"], movement.robot, units)
+        task, units = name_of_source(options), "percent" if options["joint_units"] == "percent" else "deg"
+        export_files.write_lerobot(options["lerobot"], trajectory, task, options["fps"], movement.robot, units)
     if options["view"]:
         from kineme.robots.view.write_view import write_view
 
         write_view(options["view"], movement)
 
 
-_NEW_FOLDER = click.Path(path_type=Path, file_okay=False)
-
-
 @click.command(cls=GroupedCommand, short_help="Move an arm: joints for a symbol or a recording, checked.")
-@click.argument("source", type=SymbolName())
-@library_option_of(required=False, words="Folder of the action library that SOURCE is a symbol of.")
-@click.option("--index", type=whole(0), help="Number of the movement in a file with several, from 0.")
+@source_options
 @heading("Arm")
 @click.option("--robot", required=True, help="panda, ur5e, wam, so101, or a .urdf file.")
 @click.option("--tip", help="Link that follows the movement.  [default: the end of the arm]")
@@ -146,7 +127,7 @@ _NEW_FOLDER = click.Path(path_type=Path, file_okay=False)
 @layout_options
 @heading("Output")
 @file_options
-@click.option("--lerobot", type=_NEW_FOLDER, help="A data set of LeRobot: a new one, or one to append an episode to.")
+@click.option("--lerobot", type=FOLDER, help="A data set of LeRobot: a new one, or one to append an episode to.")
 @click.option("--fps", type=Finite(), default=30.0, show_default=True, help="Frames per second of that data set.")
 @json_option
 @click.option("--overwrite", is_flag=True, help="Write over files that are there; never over the input.")
@@ -167,8 +148,9 @@ def move(**options: Any) -> None:
     """  # noqa: D301 - a backspace tells click to keep the lines
     from kineme.errors import heard_warnings
     from kineme.reporting.table import to_text
-    from kineme.robots.execution.preflight import preflight_table
+    from kineme.robots.execution.preflight import checks_as_data, preflight_table
     from kineme.robots.models.robot import load
+    from kineme.robots.planning.robot_movement import InfeasibleError, duration_in_words
 
     if options["slow_down"] and options["fastest"]:
         raise click.UsageError("expected one of --slow-down and --fastest")
@@ -181,26 +163,40 @@ def move(**options: Any) -> None:
     with heard_warnings() as heard:
         try:
             movement = _moved(robot, options)
+        except InfeasibleError as error:
+            if error.preflight is not None:
+                write(to_text(preflight_table(error.preflight)), err=True)
+            raise
         finally:
             for sentence in heard:
                 write(f"note: {sentence}", err=True)
-    if str(options["output"]) != "-":
-        say(
-            options["as_json"],
-            _as_data(movement),
-            lambda: "\n".join([to_text(preflight_table(movement.preflight)), _summary(movement)]),
-        )
-    if not movement.preflight.passed:
-        write(f"warning: checks FAILED: {len(movement.preflight.failed)}; written because of --force", err=True)
+    report, on_screen = movement.preflight, str(options["output"]) == "-"
+    n_samples, n_joints = movement.trajectory.positions.shape
+    summary = f"{robot.name}: {duration_in_words(movement)}; {n_samples} samples of {n_joints} joints"
+    data = {
+        "robot": robot.name,
+        "duration": movement.trajectory.duration,
+        "approach": movement.begins,
+        "factor": movement.factor,
+        "assumed": list(robot.assumed),
+        "passed": report.passed,
+        "checks": checks_as_data(report),
+        "not_checked": list(report.unchecked),
+    }
+    if not on_screen:
+        say(options["as_json"], data, lambda: f"{to_text(preflight_table(report))}\n{summary}")
+    if not report.passed:
+        write(f"warning: checks FAILED: {len(report.failed)}; written because of --force", err=True)
     write_files(movement, options)
-    if not options["as_json"] and str(options["output"]) != "-":
-        write(written_in_words(options))
+    if not options["as_json"] and not on_screen:
+        named = ", ".join(str(options[name]) for name in (*_FILES, "lerobot") if options[name] is not None)
+        nothing = "checked only, nothing written; name a file: -o joints.csv, --view arm.html"
+        write(f"wrote {named}" if named else nothing)
 
 
 def _moved(robot: Any, options: dict[str, Any]) -> Any:
     from kineme.robots.planning.generate_at import generate_at
     from kineme.robots.planning.move import move as move_robot
-    from kineme.robots.planning.robot_movement import InfeasibleError
     from kineme.robots.planning.roles import space_of
 
     learned = read_source(options)
@@ -221,53 +217,14 @@ def _moved(robot: Any, options: dict[str, Any]) -> Any:
         joint_units=options["joint_units"],
         plane=options["plane"],
     )
-    timing = "fastest" if options["fastest"] else "slowed" if options["slow_down"] else "generated"
-    try:
-        return move_robot(
-            generated.movement,
-            robot,
-            space=space,
-            orientation=options["orientation"],
-            follow=options["follow"],
-            plane=options["plane"],
-            place="as given" if options["at"] or options["as_recorded"] or space == "joints" else "free",
-            timing=timing,
-            rate=options["rate"],
-            start=options["start"],
-            steps=generated.steps,
-            continuous=generated.continuous,
-            force=options["force"],
-        )
-    except InfeasibleError as error:
-        from kineme.reporting.table import to_text
-        from kineme.robots.execution.preflight import preflight_table
-
-        if error.preflight is not None:
-            write(to_text(preflight_table(error.preflight)), err=True)
-        raise
-
-
-def _summary(movement: Any) -> str:
-    from kineme.robots.planning.robot_movement import duration_in_words
-
-    n_samples, n_joints = movement.trajectory.positions.shape
-    return f"{movement.robot.name}: {duration_in_words(movement)}; {n_samples} samples of {n_joints} joints"
-
-
-def _as_data(movement: Any) -> dict[str, Any]:
-    import math
-
-    def finite(value: Any) -> Any:
-        return None if isinstance(value, float) and not math.isfinite(value) else value
-
-    report = movement.preflight
-    return {
-        "robot": movement.robot.name,
-        "duration": movement.trajectory.duration,
-        "approach": movement.begins,
-        "factor": movement.factor,
-        "assumed": list(movement.robot.assumed),
-        "passed": report.passed,
-        "checks": [{name: finite(value) for name, value in check._asdict().items()} for check in report.checks],
-        "not_checked": list(report.unchecked),
-    }
+    is_placed = options["at"] or options["as_recorded"] or space == "joints"
+    return move_robot(
+        generated.movement,
+        robot,
+        space=space,
+        place="as given" if is_placed else "free",
+        timing="fastest" if options["fastest"] else "slowed" if options["slow_down"] else "generated",
+        steps=generated.steps,
+        continuous=generated.continuous,
+        **{name: options[name] for name in ("orientation", "follow", "plane", "rate", "start", "force")},
+    )

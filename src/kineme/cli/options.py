@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Container
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,22 @@ _LARGEST_ID = 2**62 - 2  # of versions and movements, as in `library.storage.sch
 def whole(least: int, most: int = _MOST) -> click.IntRange:
     """A whole number from `least` to `most`."""
     return click.IntRange(least, most)
+
+
+def flag_of(name: str) -> str:
+    """A parameter as it is written in the shell."""
+    return f"--{name.replace('_', '-')}"
+
+
+def given_options(names: Container[str | None]) -> list[str]:
+    """List those of some parameters that the command line gives, as they are written there."""
+    context = click.get_current_context()
+    return [
+        option.opts[0]
+        for option in context.command.params
+        if option.name in names
+        and context.get_parameter_source(option.name or "") == click.core.ParameterSource.COMMANDLINE
+    ]
 
 
 #: Id of a movement, or number of a version.
@@ -134,27 +151,24 @@ class SymbolName(click.ParamType):  # type: ignore[type-arg]
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
         """Names and ids that begin with the typed text; none without a library, and never an error."""
         from kineme.errors import KinemeError
+        from kineme.library.library import ActionLibrary
 
-        folder = ctx.params.get("folder") or ctx.lookup_default("folder")
-        try:
-            names = _names(Path(folder)) if folder else []
-        except (KinemeError, OSError):
-            names = []
-        return [CompletionItem(name) for name in names if name.startswith(incomplete)]
+        if folder := ctx.params.get("folder") or ctx.lookup_default("folder"):
+            with suppress(KinemeError, OSError), ActionLibrary(Path(folder), read_only=True) as library:
+                names = (symbol.name if _PLAIN.fullmatch(symbol.name) else symbol.id for symbol in library.symbols())
+                return [CompletionItem(name) for name in names if name.startswith(incomplete)]
+        return []
 
 
-def _names(folder: Path) -> list[str]:
-    from kineme.library.library import ActionLibrary
-
-    with ActionLibrary(folder, read_only=True) as library:
-        return [symbol.name if _PLAIN.fullmatch(symbol.name) else symbol.id for symbol in library.symbols()]
+#: A file that is written, and a folder.
+FILE, FOLDER = click.Path(dir_okay=False, path_type=Path), click.Path(file_okay=False, path_type=Path)
 
 
 def library_option_of(*, required: bool, words: str) -> Callable[[Any], Any]:
     """The option ``--library``, also from the environment."""
     return click.option(
         "--library", "-l", "folder", required=required, envvar="KINEME_LIBRARY", is_eager=True, show_envvar=True,
-        type=click.Path(file_okay=False, path_type=Path), help=words,
+        type=FOLDER, help=words,
     )  # fmt: skip
 
 
@@ -163,6 +177,21 @@ force_option = under(
     "Output", click.option("--force", is_flag=True, help="Write over files that are there; never over the input.")
 )
 json_option = under("Output", click.option("--json", "as_json", is_flag=True, help="Answer in JSON."))
+plot_option = under("Output", click.option("--plot", type=FILE, help="A drawing of it: a .png, .svg or .pdf file."))
+
+
+def error_rate_option(words: str) -> Callable[[Any], Any]:
+    """The option ``--error-rate``, with what it says of itself."""
+    share = Finite(0, 1, min_open=True, max_open=True)
+    return click.option("--error-rate", type=share, default=0.05, show_default=True, help=words)
+
+
+def source_options(command: Any) -> Any:
+    """Add the argument SOURCE, a symbol or a file, with what says which one is meant."""
+    index = click.option("--index", type=whole(0), help="Number of the movement in a file with several, from 0.")
+    words = "Folder of the action library that SOURCE is a symbol of."
+    source = click.argument("source", type=SymbolName())
+    return source(library_option_of(required=False, words=words)(index(command)))
 
 
 class SpecificationOption(click.Option):
@@ -185,11 +214,13 @@ SPECIFICATION: dict[str, tuple[type, str]] = {
 }
 
 
-def _specification_option(name: str) -> Callable[[Any], Any]:
-    kind, words = SPECIFICATION[name]
-    flag, text = f"--{name.replace('_', '-')}", f"{words} for a recording."
-    return click.option(flag, type=kind, cls=SpecificationOption, show_default=True, help=text)
-
-
 #: Add an option for each field of `SPECIFICATION`.
-specification_options = under("Movement", *map(_specification_option, SPECIFICATION))
+specification_options = under(
+    "Movement",
+    *(
+        click.option(
+            flag_of(name), type=kind, cls=SpecificationOption, show_default=True, help=f"{words} for a recording."
+        )
+        for name, (kind, words) in SPECIFICATION.items()
+    ),
+)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -26,10 +27,7 @@ def write(text: Any = "", *, err: bool = False) -> None:
 
 
 def check_new(path: Path | None, force: bool, *inputs: str | Path, remedy: str = "--force") -> None:
-    """Refuse to write over an input, and without --force, or what `remedy` names, over any file.
-
-    Raises click.UsageError: the message names the file.
-    """
+    """Refuse to write over an input, and without --force, or what `remedy` names, over any file."""
     if path is None or str(path) == "-" or not path.exists():
         return
     if any(Path(source).exists() and path.samefile(source) for source in inputs):
@@ -70,13 +68,11 @@ def confirm(question: str, **options: Any) -> bool:
 def to_json(data: Any, encoding: str = "utf-8") -> str:
     """One JSON document; in ASCII if it has control characters, or characters that the encoding lacks."""
     text = json.dumps(data, ensure_ascii=False, allow_nan=False, indent=1)
-    try:
+    with suppress(UnicodeEncodeError):
         text.encode(encoding)
-    except UnicodeEncodeError:
-        shown = False
-    else:
-        shown = printable_lines(text) == text
-    return text if shown else json.dumps(data, allow_nan=False, indent=1)
+        if printable_lines(text) == text:
+            return text
+    return json.dumps(data, allow_nan=False, indent=1)
 
 
 def in_words(detail: Mapping[str, Any]) -> str:

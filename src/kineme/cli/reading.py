@@ -5,17 +5,18 @@ from __future__ import annotations
 import csv
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
 from click.core import ParameterSource
 
-from kineme.cli.options import READING, SPECIFICATION, Finite, Parsed, under
+from kineme.cli.options import READING, SPECIFICATION, Finite, Parsed, given_options, under
 from kineme.cli.output import progress
-from kineme.reporting.text import printable
+from kineme.reporting.text import first_names, printable
 
-_NAMED = 6  # columns that a sentence names
+_some = partial(first_names, most=6)  # columns that a sentence names
 STANDARD_INPUT = "standard input.csv"
 
 
@@ -134,8 +135,7 @@ def recordings_argument(command: Callable[..., Any]) -> Callable[..., Any]:
 def read(paths: Path | Sequence[Path], options: dict[str, Any], library: Any = None) -> Any:
     """Read recordings from files, folders, patterns of them, and - the standard input, with the `layout_options`.
 
-    Where a bag has several topics and none is asked for, it is read as the movements of `library` were; and where no
-    columns are asked for, a file that has the columns of `library` is read without others.
+    Topics of a bag and columns that are not asked for are those of `library`, where a file has them.
     """
     from kineme.io.limits import read_limited
     from kineme.io.reading.recordings import NameRule, read_paths
@@ -166,11 +166,12 @@ def read(paths: Path | Sequence[Path], options: dict[str, Any], library: Any = N
     )
 
 
-def known_choices(parsed: Any, options: dict[str, Any], learned: Any) -> list[str]:
-    """A sentence for what was read since the movements of the library were read so: topics and frames, and columns.
+def notes_beside(parsed: Any, options: dict[str, Any], learned: Any) -> list[str]:
+    """A sentence for each thing to know of recordings that are compared with a library, whose channels are `learned`.
 
-    `learned` are the channels of the library.
+    For topics, frames and columns that were read since it has them, for gaps, and for channels other than its own.
     """
+    from kineme.io.reading.merge_files import notes_on_gaps
     from kineme.movements.channels.channel import recorded_names
     from kineme.movements.tables.layout import AS_KNOWN
 
@@ -188,12 +189,7 @@ def known_choices(parsed: Any, options: dict[str, Any], learned: Any) -> list[st
             f"Read the columns of the library alone, {_some(columns or ())}, without {_some(aside)}; say --columns for "
             "others"
         )
-    return sentences
-
-
-def _some(names: Sequence[str]) -> str:
-    more = len(names) - _NAMED
-    return ", ".join(names[:_NAMED]) + (f" and {more} more" if more > 0 else "")
+    return sentences + notes_on_gaps(parsed) + _differences(learned, parsed.demonstrations.channels)
 
 
 def problem_lines(problems: Any, lost: str = "not read: ") -> list[str]:
@@ -205,7 +201,11 @@ def read_source(options: dict[str, Any]) -> Any:
     """The primitive of a symbol, a recording or a file, with the recording that it is of."""
     source = options["source"]
     if _is_symbol(source, options["folder"]):
-        _check_of_symbol(source)
+        if given := given_options((*LAYOUT_OPTIONS, *SPECIFICATION, "index")):
+            raise click.UsageError(
+                f"expected {given[0]} with a recording, got it with {printable(source)}, a symbol of a library: its "
+                f"columns and primitives are those that it was learned with; say {given[0]} to kineme learn"
+            )
         from kineme.library.grounding import learned_of
         from kineme.library.library import ActionLibrary
 
@@ -224,18 +224,6 @@ def read_source(options: dict[str, Any]) -> Any:
     dmp = DMP(**{name: options[name] for name in SPECIFICATION})
     recordings = read(Path(source), {name: options[name] for name in LAYOUT_OPTIONS})
     return learn_one(_chosen(recordings, options), dmp)
-
-
-def _check_of_symbol(source: str) -> None:
-    """Refuse options that say how a recording is read or learned: a symbol of a library was when it was learned."""
-    context = click.get_current_context()
-    for option in context.command.params:
-        is_given = context.get_parameter_source(option.name or "") == ParameterSource.COMMANDLINE
-        if is_given and option.name in (*LAYOUT_OPTIONS, *SPECIFICATION, "index"):
-            raise click.UsageError(
-                f"expected {option.opts[0]} with a recording, got it with {printable(source)}, a symbol of a library: "
-                f"its columns and primitives are those that it was learned with; say {option.opts[0]} to kineme learn"
-            )
 
 
 def name_of_source(options: dict[str, Any]) -> str:
@@ -265,12 +253,15 @@ def _is_symbol(source: str, folder: Path | None) -> bool:
     return folder is not None and (given != ParameterSource.ENVIRONMENT or not Path(source).exists())
 
 
-def differences(learned: Any, asked: Any) -> list[str]:
+def _differences(learned: Any, asked: Any) -> list[str]:
     """A sentence for each way in which recordings that are compared with a library have other channels than it.
 
     Other kinds are refused elsewhere; what differs here are names, units, and whether channels are known.
     """
-    from kineme.movements.channels.detect import name_of
+    from kineme.movements.channels import detect
+
+    def name_of(channel: Any) -> str:
+        return detect.name_of(channel.name).lower()
 
     if learned is None or not any(channel.coordinates for channel in learned):
         return []
@@ -280,12 +271,12 @@ def differences(learned: Any, asked: Any) -> list[str]:
             f"library: {_some([channel.name for channel in learned])}"
         ]
     moving = [[channel for channel in channels if channel.coordinates] for channels in (asked, learned)]
-    by_name = {name_of(channel.name).lower(): channel for channel in moving[0]}
-    if all(name_of(channel.name).lower() in by_name for channel in moving[1]):
-        moving[0] = [by_name[name_of(channel.name).lower()] for channel in moving[1]]
+    by_name = {name_of(channel): channel for channel in moving[0]}
+    if all(name_of(channel) in by_name for channel in moving[1]):
+        moving[0] = [by_name[name_of(channel)] for channel in moving[1]]
     pairs = list(zip(*moving, strict=False))
     sentences = []
-    if other := [pair for pair in pairs if name_of(pair[0].name).lower() != name_of(pair[1].name).lower()]:
+    if other := [pair for pair in pairs if name_of(pair[0]) != name_of(pair[1])]:
         here, there = (_some([pair[k].name for pair in other]) for k in (0, 1))
         sentences.append(f"Columns are compared in their order: {here} of the recordings with {there} of the library")
     if units := [pair for pair in pairs if None not in (pair[0].unit, pair[1].unit) and pair[0].unit != pair[1].unit]:

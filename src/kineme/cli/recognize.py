@@ -8,9 +8,9 @@ from typing import Any
 
 import click
 
-from kineme.cli.options import Finite, GroupedCommand, json_option, library_option, whole
+from kineme.cli.options import GroupedCommand, error_rate_option, json_option, library_option, whole
 from kineme.cli.output import progress, say, table
-from kineme.cli.reading import differences, known_choices, layout_options, problem_lines, read, recordings_argument
+from kineme.cli.reading import layout_options, notes_beside, problem_lines, read, recordings_argument
 from kineme.reporting.text import printable
 
 _AT_ONCE = 250  # movements recognized between two steps of the progress bar: fewer cost more each
@@ -19,10 +19,7 @@ _AT_ONCE = 250  # movements recognized between two steps of the progress bar: fe
 @click.command(cls=GroupedCommand, short_help="Recognize recordings with the symbols of a library.")
 @recordings_argument
 @library_option
-@click.option(
-    "--error-rate", type=Finite(0, 1, min_open=True, max_open=True), default=0.05, show_default=True,
-    help="Share of true movements that may be called unknown.",
-)  # fmt: skip
+@error_rate_option("Share of true movements that may be called unknown.")
 @click.option("--top", type=whole(1), default=3, show_default=True, help="Symbols listed per movement.")
 @layout_options
 @json_option
@@ -44,14 +41,12 @@ def recognize(
 
     Example: kineme recognize *.csv --library actions/
     """
-    from kineme.io.reading.merge_files import notes_on_gaps
     from kineme.library.library import ActionLibrary
 
     with ActionLibrary(folder, read_only=True) as library:
         parsed = read(recordings, options, library)
         answers = _recognized(library, parsed.demonstrations, error_rate)
-        notes = known_choices(parsed, options, library.channels) + notes_on_gaps(parsed)
-        notes += differences(library.channels, parsed.demonstrations.channels)
+        notes = notes_beside(parsed, options, library.channels)
         ids = {symbol.name: symbol.id for symbol in library.symbols()}
     data = {
         "movements": [

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from kineme.cli.options import Finite, GroupedCommand, force_option, heading, json_option, whole
+from kineme.cli.options import Finite, GroupedCommand, flag_of, force_option, heading, json_option, plot_option, whole
 from kineme.cli.output import check_new, say, table
 from kineme.cli.reading import layout_options, read, recordings_argument
 from kineme.reporting.text import counted, printable
@@ -27,7 +27,7 @@ _PARAMETERS: dict[str, tuple[Any, str]] = {
 
 def _parameters(command: Callable[..., Any]) -> Callable[..., Any]:
     for name, (kind, words) in reversed(_PARAMETERS.items()):
-        command = click.option(f"--{name.replace('_', '-')}", type=kind, help=f"Of --by {words}")(command)
+        command = click.option(flag_of(name), type=kind, help=f"Of --by {words}")(command)
     return command
 
 
@@ -43,7 +43,7 @@ def _parameters(command: Callable[..., Any]) -> Callable[..., Any]:
 )  # fmt: skip
 @click.option("--format", "form", type=click.Choice(["csv", "npz", "json"]), default="csv", show_default=True,
               help="Format of the pieces.")  # fmt: skip
-@click.option("--plot", type=click.Path(dir_okay=False, path_type=Path), help="Draw them: a .png, .svg or .pdf file.")
+@plot_option
 @layout_options
 @json_option
 @force_option
@@ -57,7 +57,9 @@ def segment(
 
     Example: kineme segment long.csv -o pieces/ --plot pieces.png
     """
+    from kineme.errors import DataError
     from kineme.io.reading.recordings import paths_of
+    from kineme.io.writing.write_movement import write_movement
 
     as_json, force = options.pop("as_json"), options.pop("force")
     chosen = {name: value for name in _PARAMETERS if (value := options.pop(name)) is not None}
@@ -69,9 +71,16 @@ def segment(
     for path in (plot, *files):
         check_new(path, force, *paths_of(recordings, parsed))
     if output is not None:
-        _write(cut, files, output)
+        output.mkdir(parents=True, exist_ok=True)
+        for path, piece in zip(files, (piece for segmentation in cut for piece in segmentation), strict=True):
+            write_movement(path, piece)
     if plot is not None:
-        _draw(cut, plot)
+        if not cut:
+            raise DataError("expected recordings that can be cut, to draw them, got none")
+        from kineme.movements.segmentation.figure import draw_segmentations
+        from kineme.reporting.figures import save_figure
+
+        save_figure(draw_segmentations(cut), plot)
     pieces = _as_data(cut, movements, files)
     say(as_json, {"pieces": pieces, "problems": problems}, lambda: _text(pieces, problems, output))
 
@@ -84,10 +93,8 @@ def _check_parameters(by: str, chosen: dict[str, Any]) -> None:
     parameters = [field.name for field in fields(SEGMENTERS[by])]
     for name in chosen:
         if name not in parameters:
-            flags = ", ".join(
-                f"--{parameter.replace('_', '-')}" for parameter in parameters if parameter in _PARAMETERS
-            )
-            raise click.UsageError(f"expected parameters of --by {by}: {flags}; got --{name.replace('_', '-')}")
+            flags = ", ".join(map(flag_of, filter(_PARAMETERS.get, parameters)))
+            raise click.UsageError(f"expected parameters of --by {by}: {flags}; got {flag_of(name)}")
 
 
 def _cut(parsed: Any, by: str, chosen: dict[str, Any], problems: list[str]) -> tuple[list[Any], list[Any]]:
@@ -118,25 +125,6 @@ def _files(cut: list[Any], movements: list[Any], output: Path | None, form: str)
         for stem, segmentation in zip(stems, cut, strict=True)
         for k in range(1, len(segmentation) + 1)
     ]
-
-
-def _write(cut: list[Any], files: list[Path], output: Path) -> None:
-    from kineme.io.writing.write_movement import write_movement
-
-    output.mkdir(parents=True, exist_ok=True)
-    pieces = (piece for segmentation in cut for piece in segmentation)
-    for path, piece in zip(files, pieces, strict=True):
-        write_movement(path, piece)
-
-
-def _draw(cut: list[Any], path: Path) -> None:
-    from kineme.errors import DataError
-    from kineme.movements.segmentation.figure import draw_segmentations
-    from kineme.reporting.figures import save_figure
-
-    if not cut:
-        raise DataError("expected recordings that can be cut, to draw them, got none")
-    save_figure(draw_segmentations(cut), path)
 
 
 def _as_data(cut: list[Any], movements: list[Any], files: list[Path]) -> list[dict[str, Any]]:

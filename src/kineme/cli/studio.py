@@ -10,7 +10,7 @@ from pathlib import Path
 import click
 
 from kineme.cli.library import opened
-from kineme.cli.options import force_option, json_option, library_option, library_option_of, whole
+from kineme.cli.options import FILE, force_option, json_option, library_option, library_option_of, whole
 from kineme.cli.output import check_new, say, write
 from kineme.reporting.text import printable
 
@@ -57,7 +57,7 @@ def studio(folder: Path, port: int | None, no_open: bool, read_only: bool, host:
 
 @click.command(short_help="A library as one HTML page: draw, recognize, drag.")
 @library_option
-@click.option("--output", "-o", type=click.Path(path_type=Path, dir_okay=False), required=True, help="An .html file.")
+@click.option("--output", "-o", type=FILE, required=True, help="An .html file.")
 @click.option("--title", help="Of the page.  [default: the name of the library's folder]")
 @click.option("--most", type=whole(1), help="Movements in the page.  [default: as many as fit into 2 MB]")
 @json_option

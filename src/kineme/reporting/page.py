@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from base64 import b64encode
+from hashlib import sha256
 from typing import Any
 
 from kineme.reporting.text import in_markup
@@ -33,6 +35,20 @@ def picture(svg: bytes, caption: str, head: str = "") -> str:
         f'<figure><img alt="{in_markup(caption)}" src="data:image/svg+xml;base64,{b64encode(svg).decode()}">'
         f"<figcaption>{in_markup(head + caption)}</figcaption></figure>"
     )
+
+
+def filled(template: str, parts: dict[str, str], style: str, scripts: dict[str, str], allowed: str = "") -> str:
+    """Fill the marks ``{{name}}`` of a page, whose policy allows its own scripts and style by their hashes, no more."""
+
+    def hashed(text: str) -> str:
+        return f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'"
+
+    policy = (
+        f"default-src 'none'; script-src {' '.join(map(hashed, scripts.values()))}; style-src {hashed(style)}; "
+        f"{allowed}base-uri 'none'; form-action 'none'"
+    )
+    texts = {**parts, **scripts, "style": style, "policy": policy}
+    return re.sub(r"\{\{(\w+)\}\}", lambda match: texts[match[1]], template)
 
 
 def page(title: str, heading: str, body: str, facts: dict[str, Any]) -> str:

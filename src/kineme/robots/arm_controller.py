@@ -95,7 +95,6 @@ class ArmState(NamedTuple):
 
 _TURNED = math.radians(TURNED)
 _FOLLOWS = ArmStatus(0)
-_LIMITS = (ArmStatus.POSITION_LIMIT, ArmStatus.VELOCITY_LIMIT, ArmStatus.ACCELERATION_LIMIT)  # as in `Reasons`
 
 
 class ArmController:
@@ -154,7 +153,12 @@ class ArmController:
             )
         self.robot, self.controller = robot, controller
         self._ik, self._torques = LiveKinematics(robot, follow, controller.dt), Torques(robot)
-        self._rotation = self._ik.tip_rotation if orientation is None else _rotation(orientation)
+        self._rotation = self._ik.tip_rotation
+        if orientation is not None:
+            q = as_numbers(orientation, "orientation")
+            if q.shape != (4,):
+                raise TrajectoryError(f"expected orientation as one quaternion (w, x, y, z), got shape {q.shape}")
+            self._rotation = matrices_of(q)
         controller.reset()
         self._start = self._nearest_start() if start is None else as_numbers(start, "start")
         if self._start.shape != (robot.n_joints,):
@@ -187,7 +191,7 @@ class ArmController:
         if "dt" in options:
             raise SpecificationError("expected no dt: an arm moves in steps of its controller's dt")
         if self._waits and "position" not in options:
-            options["position"] = self._tip()
+            options["position"] = self._ik.tip_pose[: len(self.state.movement.position)]
         movement = self.controller.step(**options)
         self._ik.step(*self._pose(movement))
         self.state = self._report(movement)
@@ -199,19 +203,13 @@ class ArmController:
         torques = self._torques.of(q, ik.velocities, ik.accelerations)
         status = ArmStatus.TORQUE_LIMIT if self._torques.exceeded(torques) else _FOLLOWS
         if distance > TRACKED or ik.turned > _TURNED:
-            status |= ArmStatus.LAGS
-            for limit, bounds in zip(_LIMITS, ik.reasons, strict=True):
-                status |= limit if bounds else _FOLLOWS
+            status |= ArmStatus.LAGS | ik.reasons
         return ArmState(q, ik.velocities, ik.accelerations, torques, distance, status, movement)
 
     def _pose(self, movement: State) -> tuple[Array, Array]:
         """Position (3,) and rotation (3, 3) of the tip that the movement asks for."""
         columns = movement.position
         return columns[:3], self._rotation if len(columns) == 3 else np.array(matrix_one(columns[3:].tolist()))
-
-    def _tip(self) -> Array:
-        """Return the pose of the tip in the columns of the movement."""
-        return self._ik.tip_pose[: len(self.state.movement.position)]
 
     def _nearest_start(self) -> Array:
         position, rotation = self._pose(self.controller.state)
@@ -221,23 +219,13 @@ class ArmController:
         return np.asarray(postures[int(np.argmin(away))])
 
 
-def _rotation(orientation: ArrayLike) -> Array:
-    q = as_numbers(orientation, "orientation")
-    if q.shape != (4,):
-        raise TrajectoryError(f"expected orientation as one quaternion (w, x, y, z), got shape {q.shape}")
-    return matrices_of(q)
-
-
 class LiveKinematics(InverseKinematics):
     """Follows a pose that moves, within limits of position, velocity and acceleration of the joints.
 
     A step asks for the pose's own motion since the last step, and for that part of the gap to it which the joints can
     still brake at its end. The least squares of `InverseKinematics` are solved within the velocities of `Braking`. Far
     from the pose the step is damped in proportion to the distance, so that an arm stretched towards a pose out of reach
-    comes to rest.
-
-    `orientation` ({"full", "axis", "free"}): see `InverseKinematics`; `time_step`: of a step [s]. `velocities`,
-    `accelerations` (n,): of the joints in the last step; 0 at first.
+    comes to rest. `velocities` and `accelerations` (n,) are those of the joints in the last step; 0 at first.
     """
 
     def __init__(self, robot: Robot, orientation: str, time_step: float) -> None:
@@ -273,7 +261,7 @@ class LiveKinematics(InverseKinematics):
         return math.hypot(*(self._turns * pinocchio.log3(self._at.rotation.T @ self._wanted.rotation)))
 
     @property
-    def reasons(self) -> Reasons:
+    def reasons(self) -> ArmStatus:
         """The limits that bound the last step."""
         return self._braking.reasons(self._allowed, self._before, self.velocities)
 
@@ -335,15 +323,12 @@ def _bounded(way: Array) -> Array:
 
 
 def brakeable(distance: Array, change: Array, dt: float) -> Array:
-    """The fastest velocities (..., n) from which joints stop within distances (..., n).
+    """The fastest velocities (..., n) from which joints stop within distances (..., n), in steps of `dt` [s].
 
     Velocities are constant over a step and decrease by `change` (n,) from one to the next. Of one that stops in m steps
     the distance is ``dt (m v - change m (m - 1) / 2)``; m is the least number of steps with
     ``distance <= dt change m (m + 1) / 2``. For short steps that is ``sqrt(2 change / dt distance)``, which alone would
     overshoot by up to a step.
-
-    `distance` (..., n): what is left, from 0; `change` (n,): largest change of velocity in one step; `dt`: time of a
-    step [s].
     """
     steps = distance / (change * dt)
     m = np.maximum(1.0, np.ceil(0.5 * (np.sqrt(1.0 + 8.0 * steps) - 1.0)))
@@ -361,14 +346,6 @@ class Range(NamedTuple):
         return np.minimum(np.maximum(velocity, self.least), self.most)
 
 
-class Reasons(NamedTuple):
-    """The limits that a velocity meets, of any joint."""
-
-    position: bool
-    velocity: bool
-    acceleration: bool
-
-
 class Braking:
     """The range of velocities from which every later step keeps the limits of position, velocity and acceleration.
 
@@ -379,8 +356,6 @@ class Braking:
     Sources: F. Flacco, A. De Luca, O. Khatib, "Control of Redundant Robots Under Hard Joint Constraints: Saturation in
     the Null Space", IEEE Transactions on Robotics 31(3), 2015; A. Del Prete, "Joint Position and Velocity Bounds in
     Discrete-Time Acceleration/Torque Control of Robot Arms", IEEE Robotics and Automation Letters 3(1), 2018.
-
-    `dt`: time of a step [s].
     """
 
     def __init__(self, robot: Robot, dt: float) -> None:
@@ -394,11 +369,11 @@ class Braking:
         least, most = np.maximum(velocity - self.change, -down), np.minimum(velocity + self.change, up)
         return Range(np.minimum(least, most), most)  # they differ by rounding where only one velocity is left
 
-    def reasons(self, allowed: Range, before: Array, after: Array) -> Reasons:
-        """Tell which limits keep a velocity `after` (n,) one of `before` within the range."""
+    def reasons(self, allowed: Range, before: Array, after: Array) -> ArmStatus:
+        """Tell which limits keep a velocity `after` (n,) one of `before` within the range, of any joint."""
         at_end = (after >= allowed.most) | (after <= allowed.least)
         changed = np.abs(after - before) >= self.change * _AT
         fastest = np.abs(after) >= self.robot.velocity * _AT
-        return Reasons(
-            bool((at_end & ~changed & ~fastest).any()), bool((at_end & fastest).any()), bool((at_end & changed).any())
-        )
+        status = ArmStatus.POSITION_LIMIT if (at_end & ~changed & ~fastest).any() else _FOLLOWS
+        status |= ArmStatus.VELOCITY_LIMIT if (at_end & fastest).any() else _FOLLOWS
+        return status | (ArmStatus.ACCELERATION_LIMIT if (at_end & changed).any() else _FOLLOWS)

@@ -33,55 +33,14 @@ TRAJECTORY, STATE = "trajectory_msgs/msg/JointTrajectory", "sensor_msgs/msg/Join
 _SECOND = 1_000_000_000  # [ns]
 
 
-def trajectory_message(types: dict[str, Any], trajectory: JointTrajectory) -> Any:
-    """One JointTrajectory; its time stamp is 0, which controllers take as now."""
-    points = [
-        types["trajectory_msgs/msg/JointTrajectoryPoint"](
-            positions=positions,
-            velocities=velocities,
-            accelerations=accelerations,
-            effort=np.zeros(0),
-            time_from_start=types["builtin_interfaces/msg/Duration"](**seconds_and_nanoseconds(nanoseconds(time))),
-        )
-        for time, positions, velocities, accelerations in zip(
-            trajectory.times, trajectory.positions, trajectory.velocities, trajectory.accelerations, strict=True
-        )
-    ]
-    return types[TRAJECTORY](header=_header(types, 0), joint_names=list(trajectory.joints), points=points)
+def _stamp(time: float) -> dict[str, int]:
+    """A time [s] as ROS divides it."""
+    seconds, nanoseconds = divmod(_nanoseconds(time), _SECOND)
+    return {"sec": seconds, "nanosec": nanoseconds}
 
 
-def state_messages(types: dict[str, Any], trajectory: JointTrajectory) -> Iterator[tuple[int, Any]]:
-    """A JointState for each sample with its time from the start [ns]; discrete channels are further names."""
-    names = [*trajectory.joints, *trajectory.steps]
-    steps = np.column_stack([np.zeros((len(trajectory), 0)), *trajectory.steps.values()])
-    for t, time in enumerate(trajectory.times):
-        stamp = nanoseconds(time)
-        yield (
-            stamp,
-            types[STATE](
-                header=_header(types, stamp),
-                name=names,
-                position=np.concatenate((trajectory.positions[t], steps[t])),
-                velocity=np.concatenate((trajectory.velocities[t], np.zeros(steps.shape[1]))),
-                effort=np.zeros(0),
-            ),
-        )
-
-
-def nanoseconds(time: float) -> int:
-    """A time [s] in nanoseconds."""
+def _nanoseconds(time: float) -> int:
     return round(float(time) * _SECOND)
-
-
-def seconds_and_nanoseconds(stamp: int) -> dict[str, int]:
-    """Nanoseconds as ROS divides them."""
-    return {"sec": stamp // _SECOND, "nanosec": stamp % _SECOND}
-
-
-def _header(types: dict[str, Any], stamp: int) -> Any:
-    header = types["std_msgs/msg/Header"]
-    counted = {"seq": 0} if "seq" in header.__dataclass_fields__ else {}  # ROS 1 counts messages
-    return header(stamp=types["builtin_interfaces/msg/Time"](**seconds_and_nanoseconds(stamp)), frame_id="", **counted)
 
 
 def write_bag(path: str | Path, trajectory: JointTrajectory, topic: str = TOPIC) -> Path:
@@ -96,25 +55,31 @@ def write_bag(path: str | Path, trajectory: JointTrajectory, topic: str = TOPIC)
         Another ending, the extra ``ros`` is not installed, or a file that cannot be written.
     """
     try:
-        import rosbags  # noqa: F401 - so that the message names the extra
+        from rosbags import rosbag1, rosbag2
     except ImportError as error:
         raise DataError("expected the package rosbags to write bags; pip install 'kineme[ros]'") from error
+
+    def write_2(folder: Path) -> None:
+        with rosbag2.Writer(folder, version=9, storage_plugin=rosbag2.StoragePlugin.MCAP) as writer:
+            _fill(writer, trajectory, topic, is_ros1=False)
+
     path = Path(path)
     if path.suffix == ".bag":
         with whole_file(path) as hidden:
             hidden.unlink(missing_ok=True)
-            _write_1(hidden, trajectory, topic)
+            with rosbag1.Writer(hidden) as writer:
+                _fill(writer, trajectory, topic, is_ros1=True)
     elif path.suffix == ".mcap":
         with whole_file(path) as hidden:
             folder = hidden.with_name(hidden.name + ".folder")
             try:
-                _write_2(folder, trajectory, topic)
+                write_2(folder)
                 next(folder.glob("*.mcap")).replace(hidden)
             finally:
                 rmtree(folder, ignore_errors=True)
     elif not path.suffix:
         with whole_folder(path) as hidden:
-            _write_2(hidden / path.name, trajectory, topic)
+            write_2(hidden / path.name)
             for part in (hidden / path.name).iterdir():
                 part.replace(hidden / part.name)
             (hidden / path.name).rmdir()
@@ -123,39 +88,55 @@ def write_bag(path: str | Path, trajectory: JointTrajectory, topic: str = TOPIC)
     return path
 
 
-def _write_1(path: Path, trajectory: JointTrajectory, topic: str) -> None:
-    from rosbags.rosbag1 import Writer
+def _fill(writer: Any, trajectory: JointTrajectory, topic: str, *, is_ros1: bool) -> None:
+    """Write a JointTrajectory, whose time stamp 0 controllers take as now, and a JointState for each sample.
+
+    Discrete channels are further names of the latter.
+    """
     from rosbags.typesys import Stores, get_typestore
 
-    store = get_typestore(Stores.ROS1_NOETIC)
-    with Writer(path) as writer:
-        _fill(writer, store, store.serialize_ros1, trajectory, topic)
-
-
-def _write_2(folder: Path, trajectory: JointTrajectory, topic: str) -> None:
-    from rosbags.rosbag2 import StoragePlugin, Writer
-    from rosbags.typesys import Stores, get_typestore
-
-    store = get_typestore(Stores.LATEST)
-    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        _fill(writer, store, store.serialize_cdr, trajectory, topic)
-
-
-def _fill(writer: Any, store: Any, serialize: Any, trajectory: JointTrajectory, topic: str) -> None:
+    store = get_typestore(Stores.ROS1_NOETIC if is_ros1 else Stores.LATEST)
+    serialize, types = store.serialize_ros1 if is_ros1 else store.serialize_cdr, store.types
     wanted, states = (
-        writer.add_connection(name, kind, **_definition(store, kind, trajectory))
+        writer.add_connection(name, kind, **_definition(store, kind, trajectory, is_ros1))
         for name, kind in ((topic, TRAJECTORY), (STATES, STATE))
     )
-    writer.write(wanted, 0, serialize(trajectory_message(store.types, trajectory), TRAJECTORY))
-    for stamp, message in state_messages(store.types, trajectory):
-        writer.write(states, stamp, serialize(message, STATE))
+
+    def header(time: float) -> Any:
+        counted = {"seq": 0} if is_ros1 else {}  # ROS 1 counts messages
+        stamp = types["builtin_interfaces/msg/Time"](**_stamp(time))
+        return types["std_msgs/msg/Header"](stamp=stamp, frame_id="", **counted)
+
+    points = [
+        types["trajectory_msgs/msg/JointTrajectoryPoint"](
+            positions=positions,
+            velocities=velocities,
+            accelerations=accelerations,
+            effort=np.zeros(0),
+            time_from_start=types["builtin_interfaces/msg/Duration"](**_stamp(time)),
+        )
+        for time, positions, velocities, accelerations in _samples(trajectory)
+    ]
+    message = types[TRAJECTORY](header=header(0.0), joint_names=list(trajectory.joints), points=points)
+    writer.write(wanted, 0, serialize(message, TRAJECTORY))
+    names, n_steps = [*trajectory.joints, *trajectory.steps], len(trajectory.steps)
+    values = np.column_stack((trajectory.positions, *trajectory.steps.values()))
+    rates = np.column_stack((trajectory.velocities, np.zeros((len(trajectory), n_steps))))
+    for time, position, velocity in zip(trajectory.times, values, rates, strict=True):
+        state = types[STATE](header=header(time), name=names, position=position, velocity=velocity, effort=np.zeros(0))
+        writer.write(states, _nanoseconds(time), serialize(state, STATE))
 
 
-def _definition(store: Any, kind: str, trajectory: JointTrajectory) -> dict[str, str]:
+def _samples(trajectory: JointTrajectory) -> Iterator[tuple[Any, ...]]:
+    """Time, positions, velocities and accelerations of each sample."""
+    return zip(trajectory.times, trajectory.positions, trajectory.velocities, trajectory.accelerations, strict=True)
+
+
+def _definition(store: Any, kind: str, trajectory: JointTrajectory, is_ros1: bool) -> dict[str, str]:
     """The definition of a type with the units in front, which its checksum leaves out, and that checksum."""
     units = ", ".join(f"{name} [{unit}]" for name, unit in zip(trajectory.joints, trajectory.units, strict=True))
     about = f"# positions of {units}; velocities per s, accelerations per s^2\n"
-    if "seq" in store.types["std_msgs/msg/Header"].__dataclass_fields__:  # ROS 1
+    if is_ros1:
         definition, checksum = store.generate_msgdef(kind)
         return {"msgdef": about + definition, "md5sum": checksum}
     definition, _ = store.generate_msgdef(kind, ros_version=2)
@@ -167,27 +148,18 @@ def write_action_goal(path: str | Path, trajectory: JointTrajectory) -> Path:
 
     Numbers without a decimal point, as 1e-05, get one: YAML 1.1 takes them for texts.
     """
-    goal = action_goal(trajectory)["trajectory"]
-    points = _WITHOUT_POINT.sub(r"\1.0\2", json.dumps(goal["points"]))  # there are no texts in them but their keys
-    text = f'{{"trajectory": {{"joint_names": {json.dumps(goal["joint_names"])}, "points": {points}}}}}\n'
+    rows = [
+        {
+            "positions": positions.tolist(),
+            "velocities": velocities.tolist(),
+            "accelerations": accelerations.tolist(),
+            "time_from_start": _stamp(time),
+        }
+        for time, positions, velocities, accelerations in _samples(trajectory)
+    ]
+    points = _WITHOUT_POINT.sub(r"\1.0\2", json.dumps(rows))  # there are no texts in them but their keys
+    text = f'{{"trajectory": {{"joint_names": {json.dumps(trajectory.joints)}, "points": {points}}}}}\n'
     return write_atomically(Path(path), text.encode())
-
-
-def action_goal(trajectory: JointTrajectory) -> dict[str, dict[str, Any]]:
-    """The goal as numbers, texts, lists and dicts."""
-    points = []
-    for time, q, v, a in zip(
-        trajectory.times, trajectory.positions, trajectory.velocities, trajectory.accelerations, strict=True
-    ):
-        points.append(
-            {
-                "positions": q.tolist(),
-                "velocities": v.tolist(),
-                "accelerations": a.tolist(),
-                "time_from_start": seconds_and_nanoseconds(nanoseconds(time)),
-            }
-        )
-    return {"trajectory": {"joint_names": list(trajectory.joints), "points": points}}
 
 
 def write_joints(path: str | Path, trajectory: JointTrajectory) -> Path:
@@ -293,9 +265,8 @@ def _in_units(
             "expected the robot of the trajectory, with limits of every joint, to write percent of their ranges, got "
             f"{robot!r:.80}; give robot=, or write joint_units='deg'"
         )
-    return 200 * (positions - robot.lower) / (robot.upper - robot.lower) - 100, [JOINT_UNITS["percent"]] * len(
-        robot.joints
-    )
+    percent = 200 * (positions - robot.lower) / (robot.upper - robot.lower) - 100
+    return percent, [JOINT_UNITS["percent"]] * len(robot.joints)
 
 
 def states_at(trajectory: JointTrajectory, fps: float) -> Array:

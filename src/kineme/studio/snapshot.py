@@ -20,7 +20,7 @@ from kineme.kernels.pair_distances import Shapes
 from kineme.kernels.procrustes import Procrustes
 from kineme.library.grounding import prototype_of
 from kineme.library.library import ActionLibrary
-from kineme.library.members import Members, members_of, some_of_each
+from kineme.library.members import Members, members_of
 from kineme.library.recognize import known_members
 from kineme.library.storage import read
 from kineme.library.storage.symbols import symbol
@@ -33,15 +33,10 @@ from kineme.recognition.conformal import GUESSES, RULES, Calibration
 from kineme.recognition.early import evidence
 from kineme.recognition.early import hypotheses as beginnings
 from kineme.recognition.early.hypotheses import Early, hypotheses
+from kineme.sampling import evenly_spaced
 from kineme.similarity.comparison import Comparison
 from kineme.similarity.describe import N_POINTS, Pairs, even_paths, feature_rows
-from kineme.similarity.specification import (
-    DETAILED_POSITIONS,
-    ComparisonSpecification,
-    Representation,
-    forcing_operator,
-    rotating,
-)
+from kineme.similarity.specification import DETAILED_POSITIONS, Representation, forcing_operator, rotating
 
 #: Numbers of the stored paths, those of early recognition included, at most: 1.3 MB in base64, so that a page with all
 #: else stays below 2 MB.
@@ -60,6 +55,8 @@ _AGAIN = (
     "learn the same movements in another library: other = ActionLibrary(folder, create=True, recognizer=Recognizer()), "
     "then other.learn(library.movements(symbol.name)) for every symbol in library.symbols()"
 )
+
+_Arrays = dict[str, NDArray[Any]]
 
 FORMAT, VERSION = "kineme-snapshot", 5
 _KINDS = ("float64", "float32", "int32")
@@ -94,41 +91,32 @@ class Snapshot:
 def recognition_parts(classes: KnownClasses) -> Snapshot:
     """Header and arrays of what recognizes movements."""
     demos = classes.references.all_movements()
-    comparison, comparison_arrays = _comparison(classes.comparison, classes.references.described.pairs)
-    calibration, calibration_arrays = _calibration(classes.calibration)
+    paths = even_paths(demos, 0, len(demos), classes.comparison.cutoff)
+    arrays: _Arrays = {
+        "paths": paths.astype(np.float32),
+        "starts": np.asarray(demos.positions[demos.offsets[:-1]], dtype=np.float64),
+    }
     header = {
         "n_movements": len(classes.references),
         "classes": [str(name) for name in classes.references.classes.tolist()],
         "first": classes.references.first.tolist(),
-        "comparison": comparison,
-        "calibration": calibration,
+        "comparison": _comparison(classes.comparison, classes.references.described.pairs, arrays),
+        "calibration": _calibration(classes.calibration, arrays),
         "certainty": dict(LEAST_CONFIDENCE),
         **_classifier(classes.classifier),
     }
-    paths = even_paths(demos, 0, len(demos), classes.comparison.cutoff)
-    arrays: dict[str, NDArray[Any]] = {
-        "paths": paths.astype(np.float32),
-        "starts": np.asarray(demos.positions[demos.offsets[:-1]], dtype=np.float64),
-        **comparison_arrays,
-        **calibration_arrays,
-    }
-    if comparison["details"] is not None:
+    if header["comparison"]["details"] is not None:
         arrays["detailed rows"] = feature_rows(demos, classes.comparison.specification)[-1].astype(np.float32)
     return Snapshot(header, arrays)
 
 
-def _comparison(how: Comparison, pairs: Pairs | None) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+def _comparison(how: Comparison, pairs: Pairs | None, arrays: _Arrays) -> dict[str, Any]:
+    """Write how movements are compared; the matrices that this needs are added to the arrays."""
     representations, similarity = how.representations, how.similarity
     by_rows = [representation for representation in representations if not representation.in_pairs]
-    rows = []
-    arrays: dict[str, NDArray[Any]] = {}
-    for r, representation in enumerate(by_rows):
-        row, more = _row_representation(representation, r)
-        rows.append(row)
-        arrays |= more
     n = len(representations)
     weights = np.full(n, 1.0 / n) if similarity.weights is None else similarity.weights
-    header = {
+    return {
         "n_dims": how.n_dims,
         "cutoff": how.cutoff,
         "translation": how.normalization.translation,
@@ -136,34 +124,27 @@ def _comparison(how: Comparison, pairs: Pairs | None) -> tuple[dict[str, Any], d
         "pauses": pause_rule(),
         "mean": how.mean,
         "rule": rotation_rule(how.procrustes),
-        "by_rows": rows,
+        "by_rows": [_row_representation(representation, r, arrays) for r, representation in enumerate(by_rows)],
         "by_pairs": [representation.measure for representation in representations[len(by_rows) :]],
         "rotating": rotating(representations) if pairs is not None else -1,
         "shapes": None if pairs is None else pair_rule(pairs.shapes),
-        "details": None if pairs is None or pairs.details is None else _detail_rule(how.specification, pairs.details),
+        "details": None if pairs is None or pairs.details is None else _detail_rule(how, pairs.details),
         "widths": [float(width) if np.isfinite(width) else None for width in similarity.widths],
         "weights": weights.tolist(),
         "names": [representation.name for representation in representations],
     }
-    return header, arrays
 
 
-def _row_representation(representation: Representation, r: int) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+def _row_representation(representation: Representation, r: int, arrays: _Arrays) -> dict[str, Any]:
     """Write what is compared sample by sample: its parameters, and the matrices that describing needs."""
-    row: dict[str, Any] = {
-        "quantity": representation.quantity,
-        "arc_share": representation.arc_share,
-        "n_points": representation.n_points,
-        "signal": representation.signal,
-    }
-    arrays: dict[str, NDArray[Any]] = {}
+    row = _fields(representation, "quantity", "arc_share", "n_points", "signal")
     if representation.quantity == "forcing":
         row["operator"] = f"operator {r}"
         arrays[row["operator"]] = forcing_operator(representation, np.dtype(np.float32))
     if representation.arc_share == 0 and (N_POINTS - 1) % (representation.n_points - 1):
         row["resample"] = f"resample {r}"
         arrays[row["resample"]] = spline_matrix(N_POINTS, representation.n_points)
-    return row, arrays
+    return row
 
 
 def pause_rule(allowance: float = 1.0) -> dict[str, float]:
@@ -172,6 +153,17 @@ def pause_rule(allowance: float = 1.0) -> dict[str, float]:
     return {name: allowance * share for name, share in shares.items()} | _numbers(
         pauses, "RADIUS", "GAP", "SHORTEST", "WINDOWS", "FEWEST", "EQUAL", "SAME_COUNT", "ROUNDS"
     )
+
+
+def _detail_rule(how: Comparison, details: Shapes) -> dict[str, Any]:
+    """Write how movements are compared in detail."""
+    own = _fields(how.specification, "upright") | {"cutoff": how.specification.detailed_cutoff}
+    positions = _fields(DETAILED_POSITIONS, "arc_share", "n_points", "signal")
+    return pair_rule(details) | own | {"positions": positions}
+
+
+def _fields(record: Any, *names: str) -> dict[str, Any]:
+    return {name: getattr(record, name) for name in names}
 
 
 def _numbers(module: ModuleType, *names: str) -> dict[str, float]:
@@ -195,20 +187,10 @@ def pair_rule(shapes: Shapes) -> dict[str, Any]:
     """Write how segments and points are compared."""
     elastic, cloud = shapes.elastic, shapes.cloud
     return {
-        "n_segments": elastic.n_segments,
-        "band": elastic.band,
-        "position_weight": elastic.position_weight,
-        "turning_weight": elastic.turning_weight,
-        "n_points": cloud.n_points,
+        **_fields(elastic, "n_segments", "band", "position_weight", "turning_weight"),
+        **_fields(cloud, "n_points", "line_weight"),
         "cloud_turning_weight": cloud.turning_weight,
-        "line_weight": cloud.line_weight,
     }
-
-
-def _detail_rule(how: ComparisonSpecification, details: Shapes) -> dict[str, Any]:
-    """Write how movements are compared in detail."""
-    positions = {name: getattr(DETAILED_POSITIONS, name) for name in ("arc_share", "n_points", "signal")}
-    return pair_rule(details) | {"cutoff": how.detailed_cutoff, "upright": how.upright, "positions": positions}
 
 
 def _classifier(classifier: Classifier) -> dict[str, Any]:
@@ -223,8 +205,8 @@ def _classifier(classifier: Classifier) -> dict[str, Any]:
     )
 
 
-def _calibration(calibration: Calibration) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
-    """Scores in rising order; classes that share the pooled ones name the same number."""
+def _calibration(calibration: Calibration, arrays: _Arrays) -> dict[str, Any]:
+    """Add scores to the arrays in rising order; classes that share the pooled ones name the same number."""
     shared = [(id(a), id(b)) for a, b in zip(calibration.pooled, calibration.pooled_novelties, strict=True)]
     numbers = {pair: k for k, pair in enumerate(dict.fromkeys(shared))}
     first = [shared.index(pair) for pair in numbers]
@@ -234,28 +216,23 @@ def _calibration(calibration: Calibration) -> tuple[dict[str, Any], dict[str, ND
         "pooled scores": [calibration.pooled[c] for c in first],
         "pooled novelties": [calibration.pooled_novelties[c] for c in first],
     }
-    arrays: dict[str, NDArray[Any]] = {"scales": np.asarray(calibration.scales, dtype=np.float64)}
+    arrays["scales"] = np.asarray(calibration.scales, dtype=np.float64)
     for name, several in parts.items():
         arrays[name] = np.concatenate([np.sort(scores) for scores in several])
         arrays[f"{name} ends"] = np.cumsum([len(scores) for scores in several]).astype(np.int32)
-    header = {
-        "between": calibration.between,
-        "exponent": calibration.exponent,
+    return {
+        "pooled": [numbers[pair] for pair in shared],
+        **_fields(calibration, "between", "exponent"),
         "guesses": list(GUESSES),
         "promises": dict(RULES),
         **_numbers(conformal, "LEAST", "ROUNDING", "DIMENSIONS", "MEAN_LENGTH", "REACH_OF_STRANGERS", "REACH_TO_NEXT"),
     }
-    return {"pooled": [numbers[pair] for pair in shared], **header}, arrays
 
 
 def early_parts(classes: KnownClasses, early: Early | None = None) -> Snapshot:
-    """Header and arrays of early recognition.
-
-    Spreads, rotations, widths, how fast movements are at their end, and the stored movements that have another path
-    where pauses count more.
-    """
+    """Header and arrays of early recognition, with the movements that have another path where pauses count more."""
     described = hypotheses(classes.comparison, classes.references, early or Early())
-    spreads = {name: getattr(described.early, name) for name in ("size_spread", "duration_spread", "timing_spread")}
+    spreads = _fields(described.early, "size_spread", "duration_spread", "timing_spread")
     assert described.described.pairs is not None
     header = {
         "n_progress": described.early.n_progress,
@@ -288,23 +265,16 @@ def early_parts(classes: KnownClasses, early: Early | None = None) -> Snapshot:
 def movement_parts(primitives: Primitives, *, learns: bool = True) -> Snapshot:
     """Header and arrays of C primitives, one of each class, and of their specification.
 
-    `learns` says whether the matrices are among them that fit other movements, and the same ones in other formulations.
-
+    With `learns`, the matrices are among them that fit other movements, and the same ones in other formulations.
     Weights are in single precision, as libraries store them; all else is in double. The matrix that fits the path has
     no goal in it, so that the runtime can fit any formulation: ``W = E (y - goal (g - x0))``, of which only `goal`
     differs.
     """
     dmp = primitives.dmp
     header = {
-        "formulation": dmp.formulation,
+        **_fields(dmp, "formulation", "n_basis", "n_points", "K", "D", "overlap", "gating"),
         "n_dims": primitives.n_dims,
-        "n_basis": dmp.n_basis,
-        "n_points": dmp.n_points,
-        "K": dmp.K,
-        "D": dmp.D,
         "alpha": dmp.basis.phase.alpha,
-        "overlap": dmp.overlap,
-        "gating": dmp.gating,
         "encodes": learns and dmp.fit == "trajectory" and not dmp.preprocessing,
     }
     arrays: dict[str, NDArray[Any]] = {
@@ -346,16 +316,15 @@ def snapshot_of_library(library: ActionLibrary, most: int | None = None, early: 
     """
     store = library.store
     members = members_of(store)
-    rows = store.specification.comparison
-    of_each = N_POINTS + DETAILED_POSITIONS.n_points * (len(rows.stored_rows) - len(rows.by_rows))
-    fitting = MOST_NUMBERS // (of_each * (store.n_dims or 1))
+    how = store.specification.comparison
+    numbers = N_POINTS + DETAILED_POSITIONS.n_points * (len(how.stored_rows) - len(how.by_rows))
+    fitting = MOST_NUMBERS // (numbers * (store.n_dims or 1))
     taken = some_members(members, fitting if most is None else most)
     prototypes = [prototype_of(store, symbol(store, str(name))) for name in members.names]
     primitives = read.primitives(store, np.array(prototypes, dtype=np.int64))
     snapshot = _snapshot(known_members(store, taken), primitives, early)
-    stored = sum(
-        snapshot.arrays[name].size for name in ("paths", "early paths", "detailed rows") if name in snapshot.arrays
-    )
+    paths = ("paths", "early paths", "detailed rows")
+    stored = sum(array.size for name, array in snapshot.arrays.items() if name in paths)
     if most is None and stored > MOST_NUMBERS:
         return snapshot_of_library(library, max(fitting * MOST_NUMBERS // stored, len(members.names)), early)
     snapshot.header["n_all"] = len(members.ids)
@@ -383,7 +352,12 @@ def some_members(members: Members, most: int) -> Members:
     each = int(counts.max(initial=1))
     while np.minimum(counts, each).sum() > most:
         each -= 1
-    return some_of_each(members, each)
+    chosen = np.concatenate(
+        [start + evenly_spaced(int(n), min(each, int(n))) for start, n in zip(members.first, counts, strict=True)]
+    )
+    first = np.concatenate(([0], np.cumsum(np.minimum(counts, each))[:-1])).astype(np.intp)
+    groups = None if members.groups is None else members.groups[chosen]
+    return Members(members.ids[chosen], members.names, first, groups)
 
 
 def _snapshot(classes: KnownClasses, primitives: Primitives, early: Early | None = None) -> Snapshot:

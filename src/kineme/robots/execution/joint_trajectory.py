@@ -5,19 +5,16 @@ from __future__ import annotations
 import logging
 import math
 from dataclasses import dataclass
-from math import comb
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import BPoly, CubicHermiteSpline, CubicSpline, PPoly
 
 from kineme.errors import DataError, SpecificationError, TrajectoryError
 from kineme.robots.models.robot import Robot
 from kineme.validation import Array
 
-_KNOTS_APART = (
-    1e-3  # between two knots of the path, in lengths that the joints pass in a second at their limits of velocity
-)
+_KNOTS_APART = 1e-3  # between two knots of the path: of what joints at their limits of velocity pass in a second
 _KNOTS = 500, 5000  # of the path at least, and at most
 _PER_GAP = 3  # intervals between two knots at whose ends the limits hold: corners are sharp between knots
 _FINE = 20_000  # points at which the length is measured
@@ -35,7 +32,6 @@ LONGEST = 1_000_000  # samples of one trajectory, at most
 _LEAST = 4  # samples
 
 _APART = 0.05  # between two postures that are looked at no joint moves farther [rad, m]
-_HALVINGS = 40  # of an interval between samples, which leave 1e-12 of it
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -97,20 +93,10 @@ def between(trajectory: JointTrajectory, times: Array) -> JointTrajectory:
     Between two samples lies the polynomial of the fifth order that has the positions, velocities and accelerations of
     both at its ends: that is how the joint_trajectory_controller of ROS interpolates. Discrete channels hold.
     """
+    path = _path(trajectory)
     held = np.searchsorted(trajectory.times, times, "right") - 1
-    k = np.clip(held, 0, len(trajectory) - 2)
-    h = np.diff(trajectory.times)[k, None]
-    u = (times - trajectory.times[k])[:, None] / h
-    c = _polynomials(trajectory)[:, k]
-    velocities = _derivative(c)
-    return JointTrajectory(
-        trajectory.joints,
-        times,
-        _values(c, u),
-        _values(velocities, u) / h,
-        _values(_derivative(velocities), u) / h**2,
-        {name: values[held] for name, values in trajectory.steps.items()},
-    )
+    steps = {name: values[held] for name, values in trajectory.steps.items()}
+    return JointTrajectory(trajectory.joints, times, path(times), path(times, 1), path(times, 2), steps)
 
 
 class Extreme(NamedTuple):
@@ -127,70 +113,31 @@ def extreme(trajectory: JointTrajectory, order: int, limits: Array, centers: Arr
     The maximum of a polynomial lies at an end or where its derivative vanishes. Only those are searched whose Bernstein
     coefficients, which bound them, are beyond all samples.
     """
-    gaps = np.diff(trajectory.times)
-    c = _polynomials(trajectory)
-    c[0] -= centers
-    for _ in range(order):
-        c = _derivative(c)
-    c = c / (limits * gaps[:, None] ** order)
-    ends = np.maximum(np.abs(_values(c, 0.0)), np.abs(_values(c, 1.0)))
-    bounds = np.abs(np.tensordot(_bernstein(len(c) - 1), c, 1)).max(axis=0)
-    k, j = np.nonzero((bounds > ends.max()) | (ends == ends.max()))
-    u = np.concatenate((np.zeros((1, len(k))), _roots(_derivative(c[:, k, j])), np.ones((1, len(k)))))
-    shares = _values(c[:, k, j], u)
-    at = np.unravel_index(int(np.argmax(np.abs(shares))), shares.shape)
-    gap = int(k[at[1]])
-    return Extreme(float(shares[at]), int(j[at[1]]), float(trajectory.times[gap] + u[at] * gaps[gap]))
+    path = _path(trajectory)
+    path.c[-1] -= centers
+    path = path.derivative(order)
+    path.c /= limits
+    largest = np.abs(path(path.x)).max()
+    slope = path.derivative()
+    slope.c[:, np.abs(BPoly.from_power_basis(path).c).max(axis=0) < largest] = 0.0
+    times = np.concatenate((path.x, *slope.roots(False, False)))
+    times = times[np.isfinite(times)]  # nan stands where a polynomial is 0 throughout
+    shares = path(times)
+    t, j = np.unravel_index(int(np.argmax(np.abs(shares))), shares.shape)
+    return Extreme(float(shares[t, j]), int(j), float(times[t]))
 
 
-def _polynomials(trajectory: JointTrajectory) -> Array:
-    """Coefficients (6, T - 1, n) of the powers of u, which goes from 0 to 1 between two samples."""
+def _path(trajectory: JointTrajectory) -> PPoly:
+    """Return the joints over time: between two samples the polynomial that has the derivatives of both at its ends."""
     h = np.diff(trajectory.times)[:, None]
     q, v, a = trajectory.positions, h * trajectory.velocities[:-1], h**2 * trajectory.accelerations[:-1]
     distance = np.diff(q, axis=0) - v - a / 2
     more = h * trajectory.velocities[1:] - v - a
     most = h**2 * trajectory.accelerations[1:] - a
-    c3, c4, c5 = (
-        10 * distance - 4 * more + most / 2,
-        -15 * distance + 7 * more - most,
-        6 * distance - 3 * more + most / 2,
-    )
-    return np.stack((q[:-1], v, a / 2, c3, c4, c5))
-
-
-def _values(c: Array, u: Array | float) -> Array:
-    """Polynomials with coefficients c (k + 1, ...) at u."""
-    total = c[-1]
-    for lower in c[-2::-1]:
-        total = lower + u * total
-    return np.asarray(total + 0 * u)
-
-
-def _derivative(c: Array) -> Array:
-    return np.asarray(c[1:] * np.arange(1, len(c)).reshape(-1, *[1] * (c.ndim - 1)))
-
-
-def _bernstein(degree: int) -> Array:
-    """From coefficients of powers to those of Bernstein polynomials, between which the values on [0, 1] lie."""
-    return np.array([[comb(i, j) / comb(degree, j) for j in range(degree + 1)] for i in range(degree + 1)])
-
-
-def _roots(c: Array) -> Array:
-    """Points (k, m) of [0, 1], among which all roots there are of m polynomials with coefficients c (k + 1, m).
-
-    Between two neighboring roots of the derivative a polynomial is monotone: bisection finds its root, if it has one.
-    """
-    ends = np.zeros((1, c.shape[1])), np.ones((1, c.shape[1]))
-    edges = np.sort(
-        np.concatenate((ends[0], _roots(_derivative(c)), ends[1])) if len(c) > 2 else np.concatenate(ends), 0
-    )
-    low, high = edges[:-1], edges[1:]
-    positive = _values(c, low) > 0
-    for _ in range(_HALVINGS):
-        middle = (low + high) / 2
-        before = (_values(c, middle) > 0) == positive
-        low, high = np.where(before, middle, low), np.where(before, high, middle)
-    return low
+    c3 = 10 * distance - 4 * more + most / 2
+    c4 = -15 * distance + 7 * more - most
+    c5 = 6 * distance - 3 * more + most / 2
+    return PPoly(np.stack((c5 / h**5, c4 / h**4, c3 / h**3, a / 2 / h**2, v / h, q[:-1])), trajectory.times)
 
 
 def dense_times(robot: Robot, trajectory: JointTrajectory) -> Array:
@@ -218,10 +165,7 @@ class Timed(NamedTuple):
 
 
 def n_samples(duration: float, rate: float, most: int = LONGEST) -> int:
-    """Number of even samples from 0 to `duration` [s], about `rate` for each second.
-
-    Raises SpecificationError: more than `most`.
-    """
+    """Number of even samples from 0 to `duration` [s], about `rate` for each second."""
     if not duration * rate <= most:
         raise SpecificationError(
             f"expected at most {most:,} samples of one trajectory, got {duration * rate:,.0f}; choose a lower "
@@ -256,10 +200,8 @@ def as_generated(robot: Robot, path: CubicSpline, rate: float, factor: float = 1
     s = np.clip(s, 0.0, duration)
     slope, bend = path(s, 1), path(s, 2)
     velocity, acceleration = velocity[:, None] / factor, acceleration[:, None] / factor**2
-    trajectory = JointTrajectory(
-        robot.joints, factor * times, path(s), slope * velocity, bend * velocity**2 + slope * acceleration, {}
-    )
-    return Timed(trajectory, s)
+    velocities, accelerations = slope * velocity, bend * velocity**2 + slope * acceleration
+    return Timed(JointTrajectory(robot.joints, factor * times, path(s), velocities, accelerations, {}, robot.units), s)
 
 
 def _ramp(robot: Robot, velocity: Array) -> float:
@@ -285,15 +227,13 @@ def approach(robot: Robot, start: Array, end: Array, rate: float, factor: float 
     shape = u**3 * (10 - 15 * u + 6 * u**2)
     velocity = 30 * u**2 * (1 - u) ** 2 / duration
     acceleration = 60 * u * (1 - u) * (1 - 2 * u) / duration**2
-    change = (end - start)[None]
-    return JointTrajectory(
-        robot.joints, duration * u[:, 0], start + change * shape, change * velocity, change * acceleration, {}
-    )
+    q, v, a = start + (end - start) * shape, (end - start) * velocity, (end - start) * acceleration
+    return JointTrajectory(robot.joints, duration * u[:, 0], q, v, a, {}, robot.units)
 
 
 def knows_masses(robot: Robot) -> bool:
     """Tell whether the model says what its links weigh."""
-    return float(sum(inertia.mass for inertia in robot.model.inertias)) > 0
+    return any(inertia.mass > 0 for inertia in robot.model.inertias)
 
 
 class Torques:
@@ -322,12 +262,10 @@ class Torques:
 
 
 class Parameterization(NamedTuple):
-    """A path q(s) with the velocity along it, whose square is linear in s between the points of a grid."""
+    """A path q(s) and its least time."""
 
     curve: CubicSpline  # q(s), s the length of the path
-    grid: Array  # (m,), of s
-    velocities: Array  # (m,), ds/dt
-    ends: Array  # (m,), t [s]
+    course: CubicHermiteSpline  # s(t)
     generated: Array  # (k,), times of the movement as it was generated [s]
     lengths: Array  # (k,), s at these times
 
@@ -339,8 +277,6 @@ def fastest(robot: Robot, path: CubicSpline) -> Parameterization | None:
     acceleration along the path is constant between two points of its grid, and the limits hold at both. The path is
     one of its length: each joint is counted in its limit of velocity, so where the movement stands nothing is passed.
     None of a path for which toppra finds no timing, as of one that the arm cannot hold.
-
-    Raises DataError: the extra ``robot`` is not installed; TrajectoryError: a path on which no joint moves.
     """
     try:
         import toppra
@@ -366,7 +302,7 @@ def fastest(robot: Robot, path: CubicSpline) -> Parameterization | None:
     if velocities is None or not np.isfinite(velocities).all() or not (velocities[1:] + velocities[:-1] > 0).all():
         return None
     ends = np.concatenate(([0.0], np.cumsum(2 * np.diff(grid) / (velocities[1:] + velocities[:-1]))))
-    return Parameterization(curve, grid, velocities, ends, generated, lengths)
+    return Parameterization(curve, CubicHermiteSpline(ends, grid, velocities), generated, lengths)
 
 
 def sampled(robot: Robot, fast: Parameterization, rate: float, factor: float = 1.0) -> Timed:
@@ -383,20 +319,15 @@ def sampled(robot: Robot, fast: Parameterization, rate: float, factor: float = 1
     its acceleration is linear between samples, where the polynomials of the fifth order of a controller are therefore
     this spline itself. It leaves the path by ``h^2 a / 6``.
     """
-    total = factor * float(fast.ends[-1])
-    n = n_samples(total, rate)
-    h = total / (n - 1)
-    s = _along(fast, np.linspace(0.0, fast.ends[-1], n))
+    least = float(fast.course.x[-1])
+    n = n_samples(factor * least, rate)
+    h = factor * least / (n - 1)
+    s = np.clip(fast.course(np.linspace(0.0, least, n)), 0.0, fast.lengths[-1])
     s = np.concatenate((s[[0, 0]], s, s[[-1, -1]]))
-    controls = fast.curve(s)
-    trajectory = JointTrajectory(
-        robot.joints,
-        h * np.arange(n + 2.0),
-        _smooth(controls),
-        (controls[2:] - controls[:-2]) / (2 * h),
-        (controls[:-2] - 2 * controls[1:-1] + controls[2:]) / h**2,
-        {},
-    )
+    c = fast.curve(s)
+    velocities, accelerations = (c[2:] - c[:-2]) / (2 * h), (c[:-2] - 2 * c[1:-1] + c[2:]) / h**2
+    times = h * np.arange(n + 2.0)
+    trajectory = JointTrajectory(robot.joints, times, _smooth(c), velocities, accelerations, {}, robot.units)
     return Timed(trajectory, np.interp(_smooth(s), fast.lengths, fast.generated))
 
 
@@ -404,19 +335,8 @@ def _smooth(controls: Array) -> Array:
     return np.asarray((controls[:-2] + 4 * controls[1:-1] + controls[2:]) / 6)
 
 
-def _along(fast: Parameterization, times: Array) -> Array:
-    """Lengths s(t) at times (T,)."""
-    k = np.clip(np.searchsorted(fast.ends, times, "right") - 1, 0, len(fast.grid) - 2)
-    since, v = times - fast.ends[k], fast.velocities
-    acceleration = (v[k + 1] ** 2 - v[k] ** 2) / (2 * (fast.grid[k + 1] - fast.grid[k]))
-    return np.asarray(np.clip(fast.grid[k] + v[k] * since + acceleration * since**2 / 2, 0.0, fast.grid[-1]))
-
-
 def _by_length(robot: Robot, path: CubicSpline) -> tuple[CubicSpline, Array, Array]:
-    """The path by its length, each joint counted in its limit of velocity; times of the movement, and lengths there.
-
-    Where the movement stands, its time would have to pass infinitely fast; the length does not.
-    """
+    """The path by its length, each joint counted in its limit of velocity; times of the movement, and lengths there."""
     generated = np.linspace(0.0, float(path.x[-1]), _FINE)
     joints = path(generated)
     lengths = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(joints, axis=0) / robot.velocity, axis=1))))

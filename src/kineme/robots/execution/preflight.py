@@ -6,15 +6,17 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import combinations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import TrajectoryError
 from kineme.reporting.table import Table
 from kineme.robots.execution.joint_trajectory import (
     STANDS,
+    Extreme,
     JointTrajectory,
     between,
     dense_times,
@@ -35,7 +37,7 @@ TURNED = 1.0  # and turned by so many degrees from it, where the orientation is 
 _STANDING = 0.02  # of the fastest instant as generated, or of the limits of velocity
 
 SAMPLING = " between samples"  # the end of what these checks are called
-_POSITION = 1e-6  # beyond a limit between samples [rad, m]
+_POSITION = 1e-6  # beyond a limit [rad, m]
 _SLACK_BETWEEN = 1.001  # times the limit of velocity and acceleration between samples
 _SINGULAR = 0.02  # the smallest singular value of the Jacobian below which an arm is said to be singular
 _JUMP = 0.05  # a joint may deviate so far between two samples from what its velocities say [rad, m]
@@ -71,7 +73,7 @@ def preflight(
     times = dense_times(robot, trajectory)
     dense = trajectory if len(times) == len(trajectory) else between(trajectory, times)
     state = along(robot, dense)
-    checks = [*_positions(robot, trajectory), *_rates(robot, trajectory), *_torques(robot, dense, state)]
+    checks = [*_at_limits(robot, trajectory), *_torques(robot, dense, state)]
     checks += [*between_samples(robot, trajectory), *_of_the_arm(robot, trajectory, dense, state)]
     if path is not None:
         checks += tracking(robot, trajectory, path, follow, (times, state))
@@ -89,26 +91,41 @@ def _check_numbers(robot: Robot, trajectory: JointTrajectory) -> None:
         raise TrajectoryError("expected a trajectory of finite numbers, whose times increase")
 
 
-def _positions(robot: Robot, trajectory: JointTrajectory) -> Iterator[Check]:
-    beyond = np.maximum(trajectory.positions - robot.upper, robot.lower - trajectory.positions)
-    for j, name in enumerate(robot.joints):
-        t = int(np.argmax(beyond[:, j]))
-        worst = float(trajectory.positions[t, j])
-        limit = robot.upper[j] if worst > (robot.upper[j] + robot.lower[j]) / 2 else robot.lower[j]
-        passed, unit = bool(beyond[t, j] <= 1e-6), unit_of(robot, j)
-        slower = 1.0 if passed else math.inf
-        yield Check("position", name, _at(trajectory, t), worst, float(limit), unit, passed, slower)
+def _at_limits(robot: Robot, trajectory: JointTrajectory) -> Iterator[Check]:
+    """Check position, velocity and acceleration of each joint at its worst sample."""
+    arrays = trajectory.positions, trajectory.velocities, trajectory.accelerations
+    for order, (values, (limits, centers)) in enumerate(zip(arrays, _limits(robot), strict=True)):
+        shares = (values - centers) / limits
+        for j, t in enumerate(np.argmax(np.abs(shares), axis=0).tolist()):
+            yield _limited(robot, order, Extreme(float(shares[t, j]), j, _at(trajectory, t)), _SLACK)
 
 
-def _rates(robot: Robot, trajectory: JointTrajectory) -> Iterator[Check]:
-    velocities = ("velocity", trajectory.velocities, robot.velocity)
-    accelerations = ("acceleration", trajectory.accelerations, robot.acceleration)
-    for order, (what, values, limits) in enumerate((velocities, accelerations), 1):
-        for j, name in enumerate(robot.joints):
-            t = int(np.argmax(np.abs(values[:, j])))
-            worst, limit = abs(float(values[t, j])), float(limits[j])
-            passed, slower = worst <= limit * _SLACK, (worst / limit) ** (1 / order)
-            yield Check(what, name, _at(trajectory, t), worst, limit, unit_of(robot, j, order), passed, slower)
+def between_samples(robot: Robot, trajectory: JointTrajectory) -> Iterator[Check]:
+    """Positions, velocities and accelerations at their worst instant, whether a sample lies there or not.
+
+    Between samples lies what `between` says. Its acceleration overshoots where that of the movement is a step.
+    """
+    for order, (limits, centers) in enumerate(_limits(robot)):
+        yield _limited(robot, order, extreme(trajectory, order, limits, centers), _SLACK_BETWEEN, SAMPLING)
+
+
+def _limits(robot: Robot) -> tuple[tuple[Array, Array], ...]:
+    """Limits of positions, velocities and accelerations, each with what it is counted from."""
+    half, middle = (robot.upper - robot.lower) / 2, (robot.upper + robot.lower) / 2
+    return (half, middle), (robot.velocity, 0 * half), (robot.acceleration, 0 * half)
+
+
+def _limited(robot: Robot, order: int, at: Extreme, slack: float, when: str = "") -> Check:
+    """Check an extreme of the position (order 0), the velocity or the acceleration of a joint."""
+    j, share = at.joint, abs(at.share)
+    size, middle = (float(values[j]) for values in _limits(robot)[order])
+    what, unit = ("position", "velocity", "acceleration")[order] + when, unit_of(robot, j, order)
+    if order:
+        passed, slower = share <= slack, share ** (1 / order)
+        return Check(what, robot.joints[j], at.time, share * size, size, unit, passed, slower)
+    passed = (share - 1) * size <= _POSITION
+    limit, slower = float((robot.lower if at.share < 0 else robot.upper)[j]), 1.0 if passed else math.inf
+    return Check(what, robot.joints[j], at.time, middle + at.share * size, limit, unit, passed, slower)
 
 
 def _torques(robot: Robot, trajectory: JointTrajectory, state: Along) -> Iterator[Check]:
@@ -123,23 +140,12 @@ def _torques(robot: Robot, trajectory: JointTrajectory, state: Along) -> Iterato
         room = limit - holding * np.sign(moving)  # what is left in the direction in which the movement pushes
         is_hopeless = np.any((np.abs(holding) > limit) | (room <= 0))
         slower = math.inf if is_hopeless else float(np.sqrt(np.max(np.abs(moving) / room)))
-        yield Check(
-            "torque",
-            robot.joints[j],
-            _at(trajectory, t),
-            float(total[t]),
-            limit,
-            "N" if robot.units[j] == "m" else "Nm",
-            passed,
-            slower,
-        )
+        unit = "N" if robot.units[j] == "m" else "Nm"
+        yield Check("torque", robot.joints[j], _at(trajectory, t), float(total[t]), limit, unit, passed, slower)
 
 
 def _of_the_arm(robot: Robot, trajectory: JointTrajectory, dense: JointTrajectory, state: Along) -> Iterator[Check]:
-    """Check jumps and standing at both ends; then singularity, self-collision and how far the arm goes below its base.
-
-    A table may be at the base, which nobody says.
-    """
+    """Check jumps and standing at both ends; then singularity, self-collision and how far it goes below its base."""
     gaps = np.diff(trajectory.times)[:, None]
     expected = (trajectory.velocities[1:] + trajectory.velocities[:-1]) / 2 * gaps
     off = np.abs(np.diff(trajectory.positions, axis=0) - expected)
@@ -171,14 +177,13 @@ def _of_the_arm(robot: Robot, trajectory: JointTrajectory, dense: JointTrajector
 def _unchecked(robot: Robot) -> Iterator[str]:
     if not knows_masses(robot):
         yield "torques: the model has no masses"
-    elif np.isnan(robot.effort).any():
-        named = ", ".join(np.array(robot.joints)[np.isnan(robot.effort)])
-        yield f"torques of {named}: the model does not say the largest"
-    weightless = [
-        name for name, body in zip(robot.joints, list(robot.model.inertias)[1:], strict=True) if body.mass <= 0
-    ]
-    if knows_masses(robot) and weightless:
-        yield f"the weight of what {', '.join(weightless)} move: the model has no masses there"
+    else:
+        if np.isnan(robot.effort).any():
+            named = ", ".join(np.array(robot.joints)[np.isnan(robot.effort)])
+            yield f"torques of {named}: the model does not say the largest"
+        bodies = list(robot.model.inertias)[1:]
+        if weightless := [name for name, body in zip(robot.joints, bodies, strict=True) if body.mass <= 0]:
+            yield f"the weight of what {', '.join(weightless)} move: the model has no masses there"
     if robot.geometry.ngeoms == 0:
         yield "self-collision: the model has no shapes"
 
@@ -203,7 +208,7 @@ def steps_kept(robot: Robot, trajectory: JointTrajectory, generated: Steps) -> C
     """
     name, sent = generated.name, trajectory.steps[generated.name]
     before, now = _changes(generated.values), _changes(sent)
-    if not np.array_equal(_order(generated.values, before), _order(sent, now)):
+    if not np.array_equal(generated.values[[0, *before]], sent[[0, *now]]):
         return Check("steps", name, 0.0, len(now), len(before), "changes", False, math.inf)
     if len(now) == 0:
         return Check("steps", name, 0.0, 0, 0, "changes", True)
@@ -221,28 +226,6 @@ def steps_kept(robot: Robot, trajectory: JointTrajectory, generated: Steps) -> C
 def _changes(values: Array) -> NDArray[np.intp]:
     """Indices of the samples from which another value holds."""
     return np.flatnonzero(np.diff(values)) + 1
-
-
-def _order(values: Array, changes: NDArray[np.intp]) -> Array:
-    return values[np.concatenate(([0], changes))]
-
-
-def between_samples(robot: Robot, trajectory: JointTrajectory) -> Iterator[Check]:
-    """Positions, velocities and accelerations at their worst instant, whether a sample lies there or not.
-
-    Between samples lies what `between` says. Its acceleration overshoots where that of the movement is a step.
-    """
-    half, middle = (robot.upper - robot.lower) / 2, (robot.upper + robot.lower) / 2
-    share, j, time = extreme(trajectory, 0, half, middle)
-    beyond = (abs(share) - 1) * float(half[j])
-    passed, slower = (True, 1.0) if beyond <= _POSITION else (False, math.inf)
-    limit, worst = float((robot.lower if share < 0 else robot.upper)[j]), float(middle[j] + share * half[j])
-    yield Check("position" + SAMPLING, robot.joints[j], time, worst, limit, unit_of(robot, j), passed, slower)
-    for order, (what, limits) in enumerate((("velocity", robot.velocity), ("acceleration", robot.acceleration)), 1):
-        share, j, time = extreme(trajectory, order, limits)
-        worst, limit, unit = abs(share), float(limits[j]), unit_of(robot, j, order)
-        passed, slower = worst <= _SLACK_BETWEEN, worst ** (1 / order)
-        yield Check(what + SAMPLING, robot.joints[j], time, worst * limit, limit, unit, passed, slower)
 
 
 class Check(NamedTuple):
@@ -300,7 +283,7 @@ def preflight_table(preflight: Preflight) -> Table:
         (
             f"{check.what}, {check.where}",
             f"{check.worst:.3g}",
-            _limit(check),
+            "" if math.isnan(check.limit) else f"{check.limit:.4g}",
             check.unit,
             f"{check.time:.2f}",
             "" if math.isnan(check.limit) else "ok" if check.passed else "FAILED",
@@ -311,8 +294,13 @@ def preflight_table(preflight: Preflight) -> Table:
     return Table("Preflight", ("check", "worst", "limit", "unit", "at [s]", ""), rows, unchecked)
 
 
-def _limit(check: Check) -> str:
-    return "" if math.isnan(check.limit) else f"{check.limit:.4g}"
+def checks_as_data(preflight: Preflight) -> list[dict[str, Any]]:
+    """List the checks as plain data; None where a number is not finite."""
+
+    def finite(value: Any) -> Any:
+        return None if isinstance(value, float) and not math.isfinite(value) else value
+
+    return [{name: finite(value) for name, value in check._asdict().items()} for check in preflight.checks]
 
 
 def tracking(
@@ -321,9 +309,7 @@ def tracking(
     """Check how far the tip is from its path, and how far turned from it.
 
     Arms of fewer than six joints follow an orientation only as far as the position allows: of theirs, and of what is
-    not followed at all, the angle has no limit.
-
-    `path`: at times of the trajectory; `dense`: where those times end with the path's, nothing is computed again.
+    not followed at all, the angle has no limit. Where the times of `dense` end with the path's, it is computed already.
     """
     times, state = dense
     n = len(path.times)
@@ -370,17 +356,12 @@ def along(robot: Robot, trajectory: JointTrajectory) -> Along:
     import pinocchio
 
     model, data = robot.model, robot.model.createData()
-    tip = model.getFrameId(robot.tip)
+    positions, rotations, jacobians = kinematics(robot, trajectory.positions)
     n_samples, n = trajectory.positions.shape
-    positions, rotations, heights = (np.empty((n_samples, *shape)) for shape in ((3,), (3, 3), (n + 1,)))
-    jacobians, holding, total = np.empty((n_samples, 6, n)), np.empty((n_samples, n)), np.empty((n_samples, n))
+    heights, holding, total = np.empty((n_samples, n + 1)), np.empty((n_samples, n)), np.empty((n_samples, n))
     samples = zip(trajectory.positions, trajectory.velocities, trajectory.accelerations, strict=True)
     for t, (q, v, a) in enumerate(samples):
-        pinocchio.computeJointJacobians(model, data, q)
-        pinocchio.updateFramePlacement(model, data, tip)
-        jacobian = pinocchio.getFrameJacobian(model, data, tip, pinocchio.ReferenceFrame.LOCAL_WORLD_ALIGNED)
-        jacobians[t] = jacobian.reshape(6, n)  # of a single joint it has one axis
-        positions[t], rotations[t] = data.oMf[tip].translation, data.oMf[tip].rotation
+        pinocchio.forwardKinematics(model, data, q)
         heights[t] = [*(data.oMi[j].translation[2] for j in range(1, model.njoints)), positions[t, 2]]
         holding[t] = pinocchio.computeGeneralizedGravity(model, data, q)
         total[t] = pinocchio.rnea(model, data, q, v, a)
@@ -399,30 +380,18 @@ class Contact(NamedTuple):
 
 def contacts_of(robot: Robot, positions: Array) -> tuple[Contact, ...]:
     """The first contact of each pair of shapes that touch, over joint positions (T, n)."""
-    import pinocchio
-
     geometry, margins = _pair_geometry(robot)
-    if len(geometry.collisionPairs) == 0:
-        return ()
-    data, shapes = robot.model.createData(), geometry.createData()
-    for request, margin in zip(shapes.collisionRequests, margins, strict=True):
-        request.security_margin = margin
-    first_samples: dict[int, int] = {}
-    for t, q in enumerate(positions):
-        if pinocchio.computeCollisions(robot.model, data, geometry, shapes, q, False):
-            for k, result in enumerate(shapes.collisionResults):
-                if result.isCollision():
-                    first_samples.setdefault(k, t)
-    pairs = geometry.collisionPairs
+    touching = _touching(robot, geometry, positions, margins)
 
     def link(shape: int) -> str:
         return str(robot.model.frames[geometry.geometryObjects[shape].parentFrame].name)
 
-    return tuple(Contact(t, link(pairs[k].first), link(pairs[k].second)) for k, t in first_samples.items())
+    pairs = [(int(k), geometry.collisionPairs[int(k)]) for k in np.flatnonzero(touching.any(axis=0))]
+    return tuple(Contact(int(touching[:, k].argmax()), link(pair.first), link(pair.second)) for k, pair in pairs)
 
 
 @lru_cache(maxsize=8)
-def _pair_geometry(robot: Robot) -> tuple[Any, tuple[float, ...]]:
+def _pair_geometry(robot: Robot) -> tuple[Any, Array]:
     """The arm's shapes with the pairs that can touch, and the margin of each pair [m].
 
     None of neighboring links, and none that touch in nearly all postures: those overlap by design, as two links on one
@@ -432,30 +401,28 @@ def _pair_geometry(robot: Robot) -> tuple[Any, tuple[float, ...]]:
 
     geometry = robot.geometry.copy()
     geometry.removeAllCollisionPairs()
-    objects = geometry.geometryObjects
     parents = list(robot.model.parents)
-    for i, first in enumerate(objects):
-        for j in range(i + 1, len(objects)):
-            a, b = first.parentJoint, objects[j].parentJoint
-            if a != b and parents[a] != b and parents[b] != a:
-                geometry.addCollisionPair(pinocchio.CollisionPair(i, j))
+    for (i, first), (j, second) in combinations(enumerate(geometry.geometryObjects), 2):
+        a, b = first.parentJoint, second.parentJoint
+        if a != b and parents[a] != b and parents[b] != a:
+            geometry.addCollisionPair(pinocchio.CollisionPair(i, j))
     postures = np.random.default_rng(0).uniform(robot.lower, robot.upper, (_RANDOM_POSTURES, robot.n_joints))
     shares = _touching(robot, geometry, postures, _MARGIN).mean(axis=0)
     for k in np.flatnonzero(shares > _ALWAYS)[::-1]:
         geometry.removeCollisionPair(geometry.collisionPairs[int(k)])
     near, touching = (_touching(robot, geometry, robot.rest[None], margin)[0] for margin in (_MARGIN, 0.0))
-    return geometry, tuple(np.where(near & ~touching, 0.0, _MARGIN).tolist())
+    return geometry, np.where(near & ~touching, 0.0, _MARGIN)
 
 
-def _touching(robot: Robot, geometry: Any, postures: Array, margin: float) -> Array:
-    """Tell of each pair of shapes whether it is closer than the margin [m], in each posture: (T, pairs)."""
+def _touching(robot: Robot, geometry: Any, postures: Array, margins: ArrayLike) -> NDArray[np.bool_]:
+    """Tell of each pair of shapes whether it is closer than its margin [m], in each posture: (T, pairs)."""
     import pinocchio
 
     data, shapes = robot.model.createData(), geometry.createData()
-    for request in shapes.collisionRequests:
-        request.security_margin = margin
     touching = np.zeros((len(postures), len(geometry.collisionPairs)), dtype=bool)
+    for request, margin in zip(shapes.collisionRequests, np.broadcast_to(margins, touching.shape[1]), strict=True):
+        request.security_margin = float(margin)
     for t, q in enumerate(postures):
-        pinocchio.computeCollisions(robot.model, data, geometry, shapes, q, False)
-        touching[t] = [result.isCollision() for result in shapes.collisionResults]
+        if pinocchio.computeCollisions(robot.model, data, geometry, shapes, q, False):
+            touching[t] = [result.isCollision() for result in shapes.collisionResults]
     return touching

@@ -1,7 +1,4 @@
-"""Many postures at once, each a step nearer to its pose: fast enough to compare branches and places.
-
-`InverseKinematics` then solves the one that is chosen, with the limits as constraints.
-"""
+"""Poses of the tip to joints: many postures at once, to compare branches and places, and one with its limits."""
 
 from __future__ import annotations
 
@@ -65,11 +62,8 @@ def descend(
 ) -> Reached:
     """Steps of damped least squares (Levenberg and Marquardt) towards poses of the tip.
 
-    A step minimizes ``|p - p*|^2 + |c log(R' R*)|^2 + (0.0001 |q - rest|)^2`` to first order, as those of
-    `InverseKinematics` do; joints that come to a stop stay there, and the others do their part.
-
-    `joints` (m, n): where to start; `positions`, `rotations` (m, 3) and (m, 3, 3): the poses; `turn_costs` (3,): c, of
-    turning about x, y, z of the tip [1/rad], besides 1 per meter.
+    Steps from `joints` (m, n) to poses (m, 3) and (m, 3, 3) minimize what those of `InverseKinematics` do, whose costs
+    `turn_costs` are; joints that come to a stop stay there, and the others do their part.
     """
     q = np.array(joints, dtype=float)
     weights = np.concatenate((np.ones(3), turn_costs))
@@ -90,10 +84,8 @@ def step_within(
 ) -> Array:
     """Minimize ``|A x - error|^2 + pull |x - drift|^2 + damping |x|^2`` within limits, for m postures at once.
 
-    Joints that would pass a limit stop there, and the others are solved again.
-
-    `slopes` (m, 6, n): A; `error` (m, 6); `costs`: drift (m, n), pull and damping (m,); `range_left`, two of (m, n):
-    the least and the largest change x.
+    Joints that would pass a limit stop there, and the others are solved again. `slopes` (m, 6, n): A; `error` (m, 6);
+    `costs`: drift (m, n), pull and damping (m,); `range_left`: the least and the largest x (m, n).
     """
     drift, pull, damping = costs
     diagonal = (pull + damping)[:, None, None] * np.eye(drift.shape[1])
@@ -165,10 +157,7 @@ def postures(robot: Robot, position: Array, rotation: Array, turn_costs: Array, 
 
 @lru_cache(maxsize=8)
 def _starts(robot: Robot, n: int) -> Array:
-    """The same every time, so that the same question has the same answer.
-
-    A Halton sequence within the limits, at most half a turn to each side.
-    """
+    """The rest posture and a Halton sequence within the limits, at most half a turn to each side; always the same."""
     lower, upper = np.clip((-np.pi, np.pi), robot.lower[:, None], robot.upper[:, None]).T
     spread = qmc.Halton(robot.n_joints, scramble=False).random(n)[1:]
     return np.vstack((robot.rest, lower + spread * (upper - lower)))
@@ -193,16 +182,9 @@ class TaskPath(NamedTuple):
 def task_path(
     times: Array, positions: Array, orientation: ArrayLike, plane: str = "xy", through: ArrayLike | None = None
 ) -> TaskPath:
-    """Positions of two or three dimensions, and orientations, as poses.
+    """Positions (T, 2) or (T, 3), and one unit quaternion w, x, y, z for all samples or for each, as poses.
 
-    - `times` (T,).
-    - `positions` (T, 2) or (T, 3).
-    - `orientation` (4,) or (T, 4): unit quaternion w, x, y, z of the tip, one for all samples or one for each.
-    - `plane` ({"xy", "xz", "yz"}): where the two axes of a two-dimensional movement lie.
-    - `through` (3,): a point of that plane; the origin if it is not given.
-
-    Raises TrajectoryError: positions of another number of dimensions; an orientation of another shape, or not of norm
-    1; SpecificationError: an unknown plane.
+    Positions of two dimensions lie in a plane through a point (3,), by default the origin.
     """
     d = positions.shape[1]
     if d not in (2, 3):
@@ -214,17 +196,12 @@ def task_path(
         raise SpecificationError(f"expected plane as one of {', '.join(PLANES)}, got {plane!r}")
     points = np.tile(np.zeros(3) if through is None else as_numbers(through, "through"), (len(times), 1))
     points[:, list(PLANES[plane]) if d == 2 else [0, 1, 2]] = positions
-    return TaskPath(times, points, np.broadcast_to(_rotations(orientation, len(times)), (len(times), 3, 3)))
-
-
-def _rotations(orientation: ArrayLike, n_samples: int) -> Array:
-    """Rotation matrices, (3, 3) or (T, 3, 3)."""
     q = as_numbers(orientation, "orientation")
-    if q.shape not in {(4,), (n_samples, 4)}:
+    if q.shape not in {(4,), (len(times), 4)}:
         raise TrajectoryError(
-            f"expected orientation as one quaternion (w, x, y, z) or {n_samples} of them, got shape {q.shape}"
+            f"expected orientation as one quaternion (w, x, y, z) or {len(times)} of them, got shape {q.shape}"
         )
-    return matrices_of(q)
+    return TaskPath(times, points, np.broadcast_to(matrices_of(q), (len(times), 3, 3)))
 
 
 class OutOfReachError(TrajectoryError):
@@ -232,24 +209,16 @@ class OutOfReachError(TrajectoryError):
 
 
 def reaching_postures(robot: Robot, position: Array, rotation: Array, turn_costs: Array, what: str) -> Array:
-    """Postures (m, n) whose tips reach a pose; `what` says which pose it is.
-
-    Raises OutOfReachError: there is none: where, and by how far.
-    """
-    reached = postures(robot, position, rotation, turn_costs)
-    if reached.errors[0] > _REACHED:
-        reached = postures(robot, position, rotation, turn_costs, _SEEDS)
-    if reached.errors[0] > _REACHED:
-        raise OutOfReachError(_unreachable(robot, what, float(reached.errors[0])))
-    return reached.joints
+    """Postures (m, n) whose tips reach a pose, which the message of an OutOfReachError calls `what`."""
+    for n_starts in (_STARTS, _SEEDS):
+        reached = postures(robot, position, rotation, turn_costs, n_starts)
+        if reached.errors[0] <= _REACHED:
+            return reached.joints
+    raise OutOfReachError(_unreachable(robot, what, float(reached.errors[0])))
 
 
 def check_reached(robot: Robot, path: TaskPath, joints: Array, turn_costs: Array, tolerance: float) -> None:
-    """Refuse joints (T, n) whose tip stays farther from the poses of the path than `tolerance` [m].
-
-    Raises OutOfReachError: the pose that is farthest out of reach: at which time, where and by how far;
-    TrajectoryError: every pose is within reach, but the tip does not keep up: from when to when.
-    """
+    """Refuse joints (T, n) whose tip stays farther from the path than `tolerance` [m]; OutOfReachError of a pose."""
     errors = np.linalg.norm(kinematics(robot, joints)[0] - path.positions, axis=1)
     missed = np.flatnonzero(~(errors <= tolerance))
     if len(missed) == 0:
@@ -375,15 +344,13 @@ class InverseKinematics:
 
     def step(self, position: Array, rotation: Array) -> Array:
         """Move towards a pose by one step, and return the joint positions (n,) after it."""
-        self._aim(position, rotation)
-        self._advance()
+        self._advance(position, rotation)
         return self.q
 
     def solve(self, position: Array, rotation: Array, most: int = 30, tolerance: float = 1e-6) -> Array:
         """Move towards a pose until the tip is within `tolerance` [m] and the joints stand, `most` steps at most."""
         for _ in range(most):
-            self._aim(position, rotation)
-            change = self._advance()
+            change = self._advance(position, rotation)
             if self.error < tolerance and change < 1e-4:
                 break
         return self.q
@@ -401,28 +368,26 @@ class InverseKinematics:
                 ahead = np.clip(2 * path[t - 1] - path[t - 2], self.robot.lower, self.robot.upper)
                 self._configuration.update(ahead)
             for _ in range(_MOST_STEPS):
-                self._aim(position, rotation)
-                self._advance()
+                self._advance(position, rotation)
                 if self.error < _CLOSE:
                     break
             path[t] = self._configuration.q
         return path
 
-    def _aim(self, position: Array, rotation: Array) -> None:
-        """Set the pose that the tip is to have; with its z axis alone, that of the shortest turn."""
+    def _advance(self, position: Array, rotation: Array) -> float:
+        """Take one step towards a pose, where the z axis counts alone that of the shortest turn.
+
+        Return the largest change of a joint.
+        """
         import pinocchio
+        from pink import build_ik
+        from qpsolvers import solve_problem
 
         if self.costs[2] == 0 < self.costs[0]:
             here = self.tip_rotation
             turn = distances((np.zeros((1, 3)), here[None]), (np.zeros(3), rotation), self.costs)[0, 3:]
             rotation = here @ pinocchio.exp3(turn)
         self._tip.set_target(pinocchio.SE3(rotation, position))
-
-    def _advance(self) -> float:
-        """Take one step towards the target of the tip, and return the largest change of a joint."""
-        from pink import build_ik
-        from qpsolvers import solve_problem
-
         problem = build_ik(self._configuration, (self._tip, self._posture), 1.0, _STEP_DAMPING, self._limits)
         solution = solve_problem(problem, solver="daqp")
         if not solution.found or solution.x is None:  # as of a pose beyond all numbers

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from itertools import product
-from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import solveh_banded
@@ -41,15 +40,14 @@ _STOPS = 1.0  # cost of lying there, per squared distance
 _REGULARIZATION = 1e-6  # of a round, per squared change
 _LARGEST_CHANGE = 0.3  # change of a joint in a round [rad, m]
 _SECOND = (1.0, -2.0, 1.0)  # difference
+_Limits = tuple[Array, Array, Array]  # costs of turning; the lowest and the highest positions of the joints
 
 _DENSE = 400  # poses at least: between two of them, a step of Newton's method is nearly exact
 _SEEDS = 48  # starts from which the postures at one pose are sought
 _BEGINS = (0.0, 1.0, 0.5)  # of the path: postures are few where a joint is at a stop, and surest to be found from there
 _PULLS = (0.0, 0.01)  # of the way to the rest posture, at each pose: so far go joints that the pose leaves free
 _LARGEST_PULL = 0.01  # [rad, m]
-_AWAY = (
-    0.05  # of the way to the middle of its range, so far goes a joint at a stop; less by the 7th power farther from it
-)
+_AWAY = 0.05  # of the way to the middle, so far goes a joint at a stop; less by the 7th power farther from it
 _INSIDE = 0.9995  # of its range: between samples a joint goes a little beyond
 _WAYS = 18  # postures at most that are followed together, once for each pull
 _STEPS = 2  # of Newton's method at each pose
@@ -67,10 +65,10 @@ def pursue(robot: Robot, path: TaskPath, turn_costs: Array) -> tuple[Array, Task
     method with limits: a joint at a stop stays there and the others do its part. What a pose leaves free stays as it
     is, or goes slowly towards the rest posture and away from stops. Of the ways that stay within 0.01 mm of the path,
     that of least cost, smoothed as `relaxed`; the end and the middle are begun at only if it comes to a stop.
-
-    The parameters are those of `choose_posture`.
     """
     path = path if len(path.times) >= _DENSE else path.at(np.linspace(0.0, path.times[-1], _DENSE))
+    margin = (1 - _INSIDE) * (robot.upper - robot.lower) / 2
+    limits = turn_costs, robot.lower + margin, robot.upper - margin
     last = len(path.times) - 1
     least, best = np.inf, None
     for share in _BEGINS:
@@ -80,14 +78,18 @@ def pursue(robot: Robot, path: TaskPath, turn_costs: Array) -> tuple[Array, Task
         joints = np.tile(starts, (last + 1, 1, 1))
         errors = np.full(joints.shape[:2], np.inf)
         for order in (range(begin, last + 1), range(begin, -1, -1)):
-            _follow(robot, path, turn_costs, order, joints, errors)
+            _follow(robot, path, limits, order, joints, errors)
         worst = errors.max(axis=0)
         close = min(_NEARLY, max(_FOLLOWED, min(worst, default=np.inf)))
         good = np.flatnonzero(worst <= close)
         if len(good) == 0:
             continue
         cheapest = good[int(np.argmin(_costs(robot, path.times, joints[:, good], errors[:, good])))]
-        way, errors = _relaxed(robot, path, turn_costs, joints[:, [cheapest]], errors[:, [cheapest]], close)
+        way, errors = joints[:, [cheapest]], errors[:, [cheapest]]
+        near = relaxed(robot, path, turn_costs, way[:, 0])
+        smooth, off = _newton(robot, near, np.zeros_like(near), (path.positions, path.rotations), limits)
+        if off.max() <= close:  # with less bending, and as near to the path
+            way, errors = smooth[:, None], off[:, None]
         cost = float(_costs(robot, path.times, way, errors)[0])
         if cost < least:
             least, best = cost, way[:, 0]
@@ -103,30 +105,17 @@ def _costs(robot: Robot, times: Array, joints: Array, errors: Array) -> Array:
     return costs_of(robot, times, joints, errors) + np.sqrt((bends / robot.acceleration).max(axis=(0, 2)))
 
 
-def _relaxed(
-    robot: Robot, path: TaskPath, turn_costs: Array, way: Array, errors: Array, close: float
-) -> tuple[Array, Array]:
-    """The way (T, 1, n) with less bending, and its errors (T, 1); itself, where that leads farther from the path."""
-    middle, half = (robot.upper + robot.lower) / 2, (robot.upper - robot.lower) / 2
-    limits = turn_costs, middle - _INSIDE * half, middle + _INSIDE * half
-    near = relaxed(robot, path, turn_costs, way[:, 0])
-    joints, off = _newton(robot, near, np.zeros_like(near), (path.positions, path.rotations), limits)
-    return (joints[:, None], off[:, None]) if off.max() <= close else (way, errors)
-
-
-def _follow(robot: Robot, path: TaskPath, turn_costs: Array, order: range, joints: Array, errors: Array) -> None:
+def _follow(robot: Robot, path: TaskPath, limits: _Limits, order: range, joints: Array, errors: Array) -> None:
     """Fill `joints` (T, m, n) and `errors` (T, m) in place, in that order of poses; ways that are lost end."""
     middle, half = (robot.upper + robot.lower) / 2, (robot.upper - robot.lower) / 2
-    lower, upper = middle - _INSIDE * half, middle + _INSIDE * half
     ways = np.arange(joints.shape[1])
     pulls = np.resize(_PULLS, joints.shape[1])[:, None]
     before = q = joints[order[0]] if len(order) else joints[0]
     for t in order:
         away = ((q - middle) / half) ** 7 * half  # from the stops
         pull = np.clip(pulls[ways] * (robot.rest - q) - _AWAY * away, -_LARGEST_PULL, _LARGEST_PULL)
-        ahead = np.clip(2 * q - before, lower, upper)
-        pose = path.positions[t], path.rotations[t]
-        moved, off = _newton(robot, ahead, pull, pose, (turn_costs, lower, upper))
+        ahead = np.clip(2 * q - before, *limits[1:])
+        moved, off = _newton(robot, ahead, pull, (path.positions[t], path.rotations[t]), limits)
         joints[t, ways], errors[t, ways] = moved, off
         near = off <= _LOST
         ways, before, q = ways[near], q[near], moved[near]
@@ -134,9 +123,7 @@ def _follow(robot: Robot, path: TaskPath, turn_costs: Array, order: range, joint
             return
 
 
-def _newton(
-    robot: Robot, q: Array, pull: Array, pose: tuple[Array, Array], limits: tuple[Array, Array, Array]
-) -> tuple[Array, Array]:
+def _newton(robot: Robot, q: Array, pull: Array, pose: tuple[Array, Array], limits: _Limits) -> tuple[Array, Array]:
     """Postures (m, n) brought to one pose, and how far they are from it (m,) [m, rad]."""
     turn_costs, lower, upper = limits
     weights = np.concatenate((np.ones(3), turn_costs))
@@ -162,8 +149,6 @@ def relaxed(robot: Robot, path: TaskPath, turn_costs: Array, joints: Array) -> A
 
     with v the limits of velocity over their mean, b = 0.0001 (T / 100)^4, and `beyond` how far the joints lie outside
     the middle 97 % of their ranges. Its equations are banded, with 2 n numbers below the diagonal.
-
-    The parameters are those of `choose_posture`.
     """
     n_poses, n = joints.shape
     weights = np.concatenate((np.ones(3), turn_costs))
@@ -192,31 +177,21 @@ def relaxed(robot: Robot, path: TaskPath, turn_costs: Array, joints: Array) -> A
     return np.asarray(np.clip(q, robot.lower, robot.upper))
 
 
-class Choice(NamedTuple):
-    """From which posture a movement is executed, and where."""
-
-    start: Array  # (n,), joint positions at the first pose
-    shift: Array  # (3,), what is added to the positions of the path [m]
-
-
-def choose_posture(robot: Robot, path: TaskPath, turn_costs: Array, stands: Array) -> Choice:
+def choose_posture(robot: Robot, path: TaskPath, turn_costs: Array, stands: Array) -> Array:
     """The posture at the start from which the whole movement costs least, with the way to it.
 
-    `turn_costs` (3,): as `InverseKinematics.costs`; `stands` (n,): where the joints stand: 0.1 is added for each radian
-    of the joint that has farthest to go. Raises TrajectoryError: no posture reaches the start: where and by how far.
+    0.1 is added for each radian of the joint that has farthest to go from where it `stands` (n,).
     """
     starts = reaching_postures(robot, path.positions[0], path.rotations[0], turn_costs, pose_in_words(path, 0))
     total = _costs_of_movements(robot, path, starts, np.zeros((len(starts), 3)), turn_costs)
     total += _APPROACH * np.abs(starts - stands).max(axis=1)
-    return Choice(starts[int(np.argmin(total))], np.zeros(3))
+    return np.asarray(starts[int(np.argmin(total))])
 
 
-def choose_place(robot: Robot, path: TaskPath, turn_costs: Array, stands: Array) -> Choice:
-    """The shift, among 27 around where the tip rests, and the posture, with which the whole movement costs least.
+def choose_place(robot: Robot, path: TaskPath, turn_costs: Array) -> TaskPath:
+    """The path shifted, among 27 places around where the tip rests, to where the whole movement costs least.
 
     A meter below z = 0, where the arm stands, or below the resting tip if that is lower, costs 100.
-
-    The parameters and errors are those of `choose_posture`.
     """
     tip = kinematics(robot, robot.rest[None])[0][0]
     center = (path.positions.min(axis=0) + path.positions.max(axis=0)) / 2
@@ -225,9 +200,7 @@ def choose_place(robot: Robot, path: TaskPath, turn_costs: Array, stands: Array)
     starts = descend(robot, rest, path.positions[0] + shifts, path.rotations[0], turn_costs, _FIRST_STEPS)
     costs = _costs_of_movements(robot, path, starts.joints, shifts, turn_costs)
     costs += _BELOW * np.maximum(0.0, min(0.0, tip[2]) - (path.positions[:, 2].min() + shifts[:, 2]))
-    shift = shifts[int(np.argmin(costs))]
-    moved = path._replace(positions=path.positions + shift)
-    return choose_posture(robot, moved, turn_costs, stands)._replace(shift=shift)
+    return path._replace(positions=path.positions + shifts[int(np.argmin(costs))])
 
 
 def _costs_of_movements(robot: Robot, path: TaskPath, starts: Array, shifts: Array, turn_costs: Array) -> Array:

@@ -35,11 +35,7 @@ def finite_numbers(text: str | None, length: int) -> list[float]:
 
 
 def check_origins(robot: ElementTree.Element, path: Path) -> None:
-    """Refuse places of joints, masses and collision shapes that readers would leave out or misread.
-
-    Raises DataError: the first <origin> that is misspelt or whose values are no numbers or degrees, with the joint or
-    link.
-    """
+    """Refuse places of joints, masses and collision shapes that readers would leave out or misread."""
     for part in robot:
         if part.tag not in ("joint", "link"):
             continue
@@ -88,10 +84,7 @@ def doubts_of(joints: Sequence[ElementTree.Element]) -> list[str]:
 
 
 def check_masses(robot: ElementTree.Element, path: Path) -> None:
-    """Refuse masses and moments of inertia that are no numbers: torques would be checked without them.
-
-    Raises DataError: the first link with such a number.
-    """
+    """Refuse masses and moments of inertia that are no numbers: torques would be checked without them."""
     for link in robot.findall("link"):
         for inertial in link.findall("inertial"):
             mass, inertia = inertial.find("mass"), inertial.find("inertia")
@@ -106,10 +99,7 @@ def check_masses(robot: ElementTree.Element, path: Path) -> None:
 
 
 def check_axis(joint: ElementTree.Element, path: Path) -> None:
-    """Refuse a joint that moves about or along no axis.
-
-    Raises DataError: an axis of length 0, or of other than three finite numbers.
-    """
+    """Refuse a joint that moves about or along no axis."""
     axis = joint.find("axis")
     values = [1.0, 0.0, 0.0] if axis is None else finite_numbers(axis.get("xyz"), 3)
     if not values or not 1e-6 < math.hypot(*values) < 1e6:
@@ -120,10 +110,7 @@ def check_axis(joint: ElementTree.Element, path: Path) -> None:
 
 
 def check_shapes(robot: ElementTree.Element, path: Path) -> None:
-    """Refuse collision shapes that cannot be read: contacts would be looked for without them.
-
-    Raises DataError: the first link with another shape than a mesh, or a box, cylinder or sphere larger than nothing.
-    """
+    """Refuse collision shapes that cannot be read: contacts would be looked for without them."""
     for link in robot.findall("link"):
         for collision in link.findall("collision"):
             shapes = [shape for geometry in collision.findall("geometry") for shape in geometry]

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.errors import DataError, SpecificationError
-from kineme.robots.models.urdf import Candidate, Chain, in_words, read_chain
+from kineme.reporting.text import first_names
+from kineme.robots.models.urdf import LISTED, Candidate, Chain, read_chain
 from kineme.validation import Array, as_numbers, check_number
 
 #: Where their URDF files lie.
@@ -167,10 +168,7 @@ def _build(pinocchio: Any, path: Path, chain: Chain) -> tuple[Any, Any]:
 
 
 def _check_read(text: str, model: Any, shapes: Any, path: Path) -> None:
-    """Refuse a model with other numbers of collision shapes, or other masses that move, than its XML says.
-
-    Raises DataError: the first such link or joint, with what its XML says and what was read.
-    """
+    """Refuse a model with other numbers of collision shapes, or other masses that move, than its XML says."""
     frames = {str(frame.name): frame.parentJoint for frame in model.frames if frame.type.name == "BODY"}
     n_read = Counter(str(model.frames[shape.parentFrame].name) for shape in shapes.geometryObjects)
     masses = np.zeros(model.njoints)
@@ -211,14 +209,11 @@ def _assumptions(chain: Chain) -> list[str]:
     if chain.others:
         assumed.append(
             f"the tip is {Candidate(chain.tip, len(chain.joints))}, of the longest chain; others are "
-            f"{in_words(list(chain.others))} (choose with tip=, --tip)"
+            f"{first_names(chain.others, LISTED)} (choose with tip=, --tip)"
         )
     if chain.gripper:
-        several = len(chain.gripper) > 1
-        named = _named(chain.gripper)
-        assumed.append(
-            f"{named} {'belong' if several else 'belongs'} to a gripper or a hand: locked, no part of the arm"
-        )
+        belong = "belong" if len(chain.gripper) > 1 else "belongs"
+        assumed.append(f"{first_names(chain.gripper, 3)} {belong} to a gripper or a hand: locked, no part of the arm")
     assumed += chain.doubts
     if chain.without_stops:
         are = "they are" if len(chain.without_stops) > 1 else "it is"
@@ -230,18 +225,11 @@ def _assumptions(chain: Chain) -> list[str]:
 
 def _have(names: tuple[str, ...]) -> str:
     """Write up to three names, and that each has what follows."""
-    return f"{_named(names)} {'each have' if len(names) > 1 else 'has'}"
-
-
-def _named(names: tuple[str, ...]) -> str:
-    return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
+    return f"{first_names(names, 3)} {'each have' if len(names) > 1 else 'has'}"
 
 
 def checked_rest(rest: ArrayLike, lower: Array, upper: Array, joints: tuple[str, ...]) -> Array:
-    """Check a rest posture (n,) that is given.
-
-    Raises SpecificationError: one of another number of joints, or outside the limits; with the joint.
-    """
+    """Check a rest posture (n,) that is given."""
     posture = as_numbers(rest, "rest")
     if posture.shape != lower.shape:
         raise SpecificationError(f"expected a rest posture of {len(joints)} joints, got shape {posture.shape}")
@@ -258,8 +246,8 @@ def rest_posture(model: Any, tip: str, lower: Array, upper: Array) -> tuple[Arra
     """Return the middle of the limits (n,); if the arm is singular there, as a straight one is, with joints bent.
 
     Of the postures with up to three joints turned by 60 degrees, within the limits and with no link lower than in the
-    middle or than the base, that whose Jacobian has the largest smallest singular value. Whether
-    joints are bent comes second.
+    middle or than the base, that whose Jacobian has the largest smallest singular value. Whether joints are bent is
+    returned second.
     """
     wide = upper - lower > 2 * pi + 1e-9
     middle = np.where(wide, np.clip(0.0, lower, upper), (lower + upper) / 2)
@@ -352,19 +340,13 @@ class Robot:
 
 
 def check_robot(robot: object) -> None:
-    """Refuse what is not an arm.
-
-    Raises SpecificationError: something else than a `Robot`, as its name.
-    """
+    """Refuse what is not an arm, as its name."""
     if not isinstance(robot, Robot):
         raise SpecificationError(f"expected a robot, as of kineme.robots.load('panda'), got {robot!r:.80}")
 
 
 def check_start(robot: Robot, q: Array) -> None:
-    """Refuse joint positions (n,) outside the limits, where a movement is to start.
-
-    Raises SpecificationError: the first such joint, with its limits.
-    """
+    """Refuse joint positions (n,) outside the limits, where a movement is to start."""
     inside = (q >= robot.lower - _ROUNDING) & (q <= robot.upper + _ROUNDING)
     if not inside.all():
         i = int(np.argmin(inside))

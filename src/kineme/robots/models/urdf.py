@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
 
 from kineme.errors import DataError
+from kineme.reporting.text import first_names
 from kineme.robots.models.numbers import check_axis, check_masses, check_origins, check_shapes, doubts_of, finite_number
 
 #: Types of joints that move.
 MOVING = ("revolute", "continuous", "prismatic")
-_LISTED = 8  # links that a message names
+LISTED = 8  # links that a message names
 _DIGITS = re.compile(r"finger|thumb|knuckle|jaw|claw", re.IGNORECASE)  # in the name of a joint, or of the link it moves
 _GRIPPER = re.compile(r"gripper|hand.*(index|middle|ring|little|pinky|mrl)", re.IGNORECASE)  # in the name of a joint
 _WRIST = re.compile(r"wrist|roll|pitch|yaw|rotat|swivel", re.IGNORECASE)  # turns the gripper, and is no part of it
@@ -73,24 +75,28 @@ def read_chain(path: Path, tip: str | None) -> Chain:
     """Read the chain from the root of the URDF at `path` to the frame `tip`, by default the end of the longest chain.
 
     Joints of grippers and hands are no part of it.
-
-    Raises DataError: no such file, no URDF, a tip that does not exist, several chains as long and no tip, a joint
-    without limits or with a mimic joint in the chain, masses or shapes that cannot be read; each with the name of the
-    joint or link.
     """
     robot = read_root(path)
+    links = _names(robot.findall("link"))
     parents: dict[str, ElementTree.Element] = {}  # the joint above each link that has one
+    below: dict[str, list[str]] = {link: [] for link in links}
     for joint in robot.findall("joint"):
-        _end(joint, "parent", path)
-        child = _end(joint, "child", path)
+        parent, child = (_end(joint, which, path) for which in ("parent", "child"))
+        if lost := {parent, child} - below.keys():
+            raise DataError(f"{path}: joint {joint.get('name')!r}: expected links of this file, got {min(lost)!r}")
+        below[parent].append(child)
         if child in parents:
             raise DataError(
                 f"{path}: link {child!r} is the child of {parents[child].get('name')!r} and of {joint.get('name')!r}; "
                 "a URDF is a tree"
             )
         parents[child] = joint
-    links = [str(link.get("name")) for link in robot.findall("link")]
-    ends = Ends(links, parents)
+    downwards = [link for link in links if link not in parents]  # each link after the one above it
+    for link in downwards:
+        downwards += below[link]
+    if circle := below.keys() - downwards:
+        raise DataError(f"{path}: link {min(circle)!r} is below itself, or below such a link; a URDF is a tree")
+    ends = Ends(links, downwards, parents)
     candidates = ends.candidates()
     others = tuple(candidates[1:]) if tip is None else ()
     tip = _tip(tip, links, candidates, path)
@@ -99,33 +105,30 @@ def read_chain(path: Path, tip: str | None) -> Chain:
     while link in parents:
         above.insert(0, parents[link])
         link = _parent_link(parents[link])
-    moving = [joint for joint in above if joint.get("type") in MOVING]
-    moving = [joint for joint in moving if joint.get("name") not in ends.gripper]
+    moving = [joint for joint in above if joint.get("type") in MOVING and joint.get("name") not in ends.gripper]
     if not moving:
         raise DataError(f"{path}: expected at least one joint that moves between the root and {tip!r}, found none")
     doubts = tuple(doubts_of(above))
-    free = tuple(str(joint.get("name")) for joint in moving if joint.get("type") == "continuous")
+    free = _names(joint for joint in moving if joint.get("type") == "continuous")
     limits = tuple(_limits(joint, path) for joint in moving)
-    check_masses(robot, path)
-    check_shapes(robot, path)
-    check_origins(robot, path)
+    for check in (check_masses, check_shapes, check_origins):
+        check(robot, path)
     missing = tuple(dict.fromkeys(resolve_meshes(robot, path)))
-    joints = tuple(str(joint.get("name")) for joint in moving)
     units = tuple("m" if joint.get("type") == "prismatic" else "rad" for joint in moving)
-    gripper = tuple(str(joint.get("name")) for joint in robot.findall("joint") if joint.get("name") in ends.gripper)
+    gripper = tuple(name for name in _names(robot.findall("joint")) if name in ends.gripper)
     try:
         text = ElementTree.tostring(robot, "unicode")
     except RecursionError as error:
         raise DataError(f"{path}: expected a URDF file, got elements within one another without end") from error
-    return Chain(text, joints, units, limits, tip, free, missing, gripper, others, doubts)
+    return Chain(text, _names(moving), units, limits, tip, free, missing, gripper, others, doubts)
+
+
+def _names(elements: Iterable[ElementTree.Element]) -> tuple[str, ...]:
+    return tuple(str(element.get("name")) for element in elements)
 
 
 def read_root(path: Path) -> ElementTree.Element:
-    """Read the root of a URDF file, in which no link is called like a joint; a xacro file is converted.
-
-    Raises DataError: no such file, one of more than 20 MB, no XML, or XML that is no URDF; xacro without the package of
-    that name.
-    """
+    """Read the root of a URDF file, in which no link is called like a joint; a xacro file is converted."""
     try:
         if path.stat().st_size > _LARGEST:
             raise DataError(f"{path}: expected a URDF of at most {_LARGEST / 1e6:.0f} MB, got {path.stat().st_size:,}")
@@ -161,7 +164,7 @@ def _end(joint: ElementTree.Element, which: str, path: Path) -> str:
     return str(end.get("link"))
 
 
-def _tip(tip: str | None, links: list[str], candidates: list[Candidate], path: Path) -> str:
+def _tip(tip: str | None, links: Sequence[str], candidates: list[Candidate], path: Path) -> str:
     """Choose the link that is asked for, else the end of the longest chain if one is longer than all others."""
     if tip is not None:
         tip = f"{tip}{_TWIN}" if tip not in links and f"{tip}{_TWIN}" in links else tip
@@ -169,14 +172,14 @@ def _tip(tip: str | None, links: list[str], candidates: list[Candidate], path: P
             from difflib import get_close_matches
 
             alike = get_close_matches(tip, links, 3)
-            listed = f"{', '.join(map(repr, alike))}, ..." if alike else in_words(candidates)
+            listed = f"{', '.join(map(repr, alike))}, ..." if alike else first_names(candidates, LISTED)
             raise DataError(f"{path}: has no link {tip!r} to be the tip; there are {listed}")
         return tip
     if not candidates:
         raise DataError(f"{path}: expected a robot with at least one joint that moves, found none")
     if len(candidates) > 1 and candidates[0].n_joints == candidates[1].n_joints:
         raise DataError(
-            f"{path}: expected a tip, as the robot ends in {len(candidates)} links: {in_words(candidates)}; "
+            f"{path}: expected a tip, as the robot ends in {len(candidates)} links: {first_names(candidates, LISTED)}; "
             "say which one follows the movement (tip=..., --tip)"
         )
     return candidates[0].link
@@ -197,10 +200,7 @@ def _limits(joint: ElementTree.Element, path: Path) -> JointLimits:
     if joint.get("type") == "continuous":
         limit = ElementTree.SubElement(joint, "limit") if limit is None else limit
         joint.set("type", "revolute")
-        limit.set("lower", f"{-_TURNS}")
-        limit.set("upper", f"{_TURNS}")
-        limit.set("velocity", limit.get("velocity", "0"))
-        limit.set("effort", limit.get("effort", "0"))
+        limit.attrib.update({"lower": f"{-_TURNS}", "upper": f"{_TURNS}"})
     if limit is None or limit.get("lower") is None or limit.get("upper") is None:
         raise DataError(f"{path}: joint {name!r} has no limits; add <limit lower= upper= velocity= effort=/> to it")
     values = []
@@ -222,10 +222,7 @@ def _limits(joint: ElementTree.Element, path: Path) -> JointLimits:
 
 
 def without_macros(path: Path) -> ElementTree.Element:
-    """Convert a xacro file to a URDF with the defaults of its arguments, and return its root.
-
-    Raises DataError: the package ``xacro`` is not installed, or it cannot convert the file.
-    """
+    """Convert a xacro file to a URDF with the defaults of its arguments, and return its root."""
     remedy = f"xacro {path.name} > {path.name.split('.')[0]}_converted.urdf"
     try:
         import xacro
@@ -253,15 +250,12 @@ def resolve_meshes(robot: ElementTree.Element, path: Path) -> list[str]:
         for visual in link.findall("visual"):
             link.remove(visual)  # nothing here looks at it, and its meshes need not be there
         for collision in link.findall("collision"):
-            mesh = collision.find("geometry/mesh")
-            if mesh is None:
-                continue
-            file = find_mesh(mesh.get("filename", ""), path)
-            if file is None:
-                link.remove(collision)
-                missing.append(str(link.get("name")))
-            else:
-                mesh.set("filename", str(file))
+            if (mesh := collision.find("geometry/mesh")) is not None:
+                if (file := find_mesh(mesh.get("filename", ""), path)) is None:
+                    link.remove(collision)
+                    missing.append(str(link.get("name")))
+                else:
+                    mesh.set("filename", str(file))
     return missing
 
 
@@ -288,24 +282,26 @@ class Candidate(NamedTuple):
 class Ends:
     """The tree of a URDF as bodies, which are links that fixed joints hold together, and the joints between them.
 
-    `parents`: the joint above each link that has one. `gripper`: names of the joints of grippers and hands: by their
-    names (finger, thumb, jaw, gripper ...), joints that mimic others at the end of a chain, and two or more branches of
-    equally many joints that leave the end of a chain at least twice as long. If nothing else moves, there are none.
+    `downwards`: the links, each after the one above it; `parents`: the joint above each that has one. `gripper`: names
+    of the joints of grippers and hands: by their names (finger, thumb, jaw, gripper ...), joints that mimic others at
+    the end of a chain, and two or more branches of equally many joints that leave the end of a chain at least twice as
+    long. If nothing else moves, there are none.
     """
 
-    def __init__(self, links: list[str], parents: dict[str, ElementTree.Element]) -> None:
+    def __init__(self, links: Sequence[str], downwards: list[str], parents: dict[str, ElementTree.Element]) -> None:
         self._links, self._parents = links, parents
-        self._bodies = {}  # link -> the link that stands for those which fixed joints hold together
-        for link in links:
-            body, passed = link, set[str]()
-            while body in parents and parents[body].get("type") not in MOVING and body not in passed:
-                passed.add(body)
-                body = _parent_link(parents[body])
-            self._bodies[link] = body
-        self._branches: dict[str, list[str]] = {body: [] for body in self._bodies.values()}
+        self._bodies: dict[str, str] = {}  # link -> the link that stands for those which fixed joints hold together
+        for link in downwards:
+            fixed = link in parents and parents[link].get("type") not in MOVING
+            self._bodies[link] = self._bodies[_parent_link(parents[link])] if fixed else link
+        self._branches: dict[str, list[str]] = {self._bodies[link]: [] for link in links}
         for link in links:
             if link in parents and parents[link].get("type") in MOVING:
                 self._branches[self._bodies[_parent_link(parents[link])]].append(link)
+        self._n_below: dict[str, int] = {}  # body -> joints of the longest chain below it
+        for body in reversed(downwards):
+            below = self._branches.get(body, ())
+            self._n_below[body] = max((1 + self._n_below[branch] for branch in below), default=0)
         self.gripper: set[str] = set()
         cut = [link for link in links if self._begins_gripper(link)]
         inside, left = set[str](), cut
@@ -329,17 +325,11 @@ class Ends:
 
     def _n_above(self, body: str) -> int:
         """Count the joints of the arm between the root and a body."""
-        count, passed = 0, set()
-        while body in self._parents and body not in passed:
-            passed.add(body)
+        count = 0
+        while body in self._parents:
             count += self._is_arm(body)
             body = self._bodies[_parent_link(self._parents[body])]
         return count
-
-    def _n_below(self, body: str, depth: int = 0) -> int:
-        """Count the joints of the longest chain below a body."""
-        below = self._branches[body] if depth < len(self._links) else []
-        return max((1 + self._n_below(branch, depth + 1) for branch in below), default=0)
 
     def _begins_gripper(self, link: str) -> bool:
         joint = self._parents.get(link)
@@ -349,9 +339,9 @@ class Ends:
         if _DIGITS.search(name) or _DIGITS.search(link) or (_GRIPPER.search(name) and not _WRIST.search(name)):
             return True
         if joint.find("mimic") is not None:
-            return self._n_below(link) == 0
+            return self._n_below[link] == 0
         body = self._bodies[_parent_link(joint)]
-        lengths = sorted((1 + self._n_below(branch) for branch in self._branches[body]), reverse=True)
+        lengths = sorted((1 + self._n_below[branch] for branch in self._branches[body]), reverse=True)
         return len(lengths) > 1 and lengths[0] == lengths[1] and 2 * lengths[0] <= self._n_above(body) + 1
 
     def _tip_of(self, body: str) -> str:
@@ -371,12 +361,6 @@ class Ends:
         inner = {_parent_link(self._parents[link]) for link in links if link in self._parents}
         ends = [link for link in links if link not in inner]
         return ends[0] if len(ends) == 1 else body
-
-
-def in_words(candidates: list[Candidate]) -> str:
-    """Write the first eight, each with its number of joints."""
-    more = f" and {len(candidates) - _LISTED} more" if len(candidates) > _LISTED else ""
-    return ", ".join(map(str, candidates[:_LISTED])) + more
 
 
 def _parent_link(joint: ElementTree.Element) -> str:

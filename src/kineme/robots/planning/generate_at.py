@@ -14,7 +14,7 @@ from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.robots.execution.preflight import TRACKED
 from kineme.robots.kinematics.descent import PLANES
 from kineme.robots.models.robot import Robot
-from kineme.robots.planning.roles import Roles, Scales, roles_of, scales_of
+from kineme.robots.planning.roles import Scales, roles_of, scales_of
 from kineme.validation import Array, as_numbers
 
 
@@ -24,17 +24,6 @@ class GeneratedMovement(NamedTuple):
     movement: Trajectory  # [m] or [rad]; of the tip alone or, (T, 7), with its orientations w, x, y, z
     steps: dict[str, Array]  # name -> (T,)
     continuous: dict[str, Array]  # the same of what moves beside joints, as a gripper
-
-
-class _Frame(NamedTuple):
-    """Place of n recorded positions in the frame of the robot: the recorded start at the origin, scaled by units."""
-
-    start: Array  # (n,), as recorded
-    units: Array  # (n,), meters or radians for one of each
-    origin: Array  # (n,) [m] or [rad]
-
-    def to_recording(self, point: Array) -> Array:
-        return self.start + (point - self.origin) / self.units
 
 
 def generate_at(  # noqa: PLR0913 - one parameter per option
@@ -62,9 +51,6 @@ def generate_at(  # noqa: PLR0913 - one parameter per option
     - `joints`: it is a movement of the joints of this arm; without, one of the tip.
     - `joint_units` ({"deg", "rad", "percent"}, optional): of columns of joints that say no unit; see `move`.
     - `plane` ({"xy", "xz", "yz"}): where the axes of a movement of two dimensions lie.
-
-    Raises TrajectoryError: a movement of the tip without two or three positions; SpecificationError: a start or goal of
-    another number of coordinates; of a movement of two dimensions, a goal in another plane.
     """
     roles = roles_of(learned.primitive.channels, len(learned.columns), "joints" if joints else "tip", joints)
     n = len(roles.positions)
@@ -86,15 +72,19 @@ def generate_at(  # noqa: PLR0913 - one parameter per option
     shown = generate(learned, MovementOptions(duration=duration, rate=rate)).columns["positions"]
     start = shown[0, roles.positions]
     scales = Scales(np.full(n, scale), np.zeros(n)) if scale is not None else scales_of(roles, joints, joint_units)
-    shown_there = start * scales.size + scales.offset
-    frame = _Frame(start, scales.size, shown_there if begin is None else begin[axes])
-    target = None if end is None else _goal_as_recorded(shown[-1], roles, frame.to_recording(end[axes]))
-    if (way := _point(displacement, "displacement", n)) is not None:
-        target = _goal_as_recorded(shown[-1], roles, start + way)
+    origin = start * scales.size + scales.offset if begin is None else begin[axes]
+    way = _point(displacement, "displacement", n)
+    if way is None and end is not None:
+        way = (end[axes] - origin) / scales.size
+    target = None
+    if way is not None:  # positions as asked for, what moves besides as it is demonstrated
+        target = shown[-1].copy()
+        target[roles.positions] = start + way
+        target = target[roles.moving]
     options = MovementOptions(goal=target, duration=duration, rate=rate, meet_goal=target is not None)
     generated = generate(learned, options).columns
     recorded = generated["positions"]
-    moved = (recorded[:, roles.positions] - frame.start) * frame.units + frame.origin
+    moved = (recorded[:, roles.positions] - start) * scales.size + origin
     through = end if begin is None else begin
     if through is not None and len(through) > n:
         flat, moved = moved, np.tile(through, (len(moved), 1))  # in the plane through that point
@@ -107,13 +97,6 @@ def generate_at(  # noqa: PLR0913 - one parameter per option
         for columns in (roles.discrete, roles.continuous)
     )
     return GeneratedMovement(Trajectory(times=generated["times"], positions=moved), steps, continuous)
-
-
-def _goal_as_recorded(end: Array, roles: Roles, goal: Array) -> Array:
-    """Return the goal in all columns that move: positions as asked for, the others as they are demonstrated."""
-    end = end.copy()
-    end[roles.positions] = goal
-    return np.asarray(end[roles.moving])
 
 
 def _point(point: ArrayLike | None, name: str, n: int) -> Array | None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -35,7 +34,6 @@ from kineme.robots.planning.robot_movement import (
     TIMINGS,
     PlannedPath,
     RobotMovement,
-    loses_its_path,
     refuse_failed,
     refuse_outside,
     with_timing,
@@ -49,6 +47,7 @@ _SAMPLES = (150, 600)  # poses at least for which the joints are solved, whateve
 _CLOSE = 1e-5  # to the path between them [m]
 
 _HURRIED = 4.0  # times the mean acceleration, from which on another way is sought; a stroke takes less than three
+_LOST = ("tracking", "turned away", "jump", "position")  # checks of what another way may mend
 _SLOWER = 1.1  # times as slow as demonstrated: other ways are tried
 
 
@@ -135,7 +134,14 @@ def move(  # noqa: PLR0913 - one parameter per option
     check_number("rate", rate, least=SLOWEST_RATE, most=FASTEST_RATE)
     check_switch("force", force)
     request = request_of(movement, robot, space, steps, continuous, joint_units)
-    stands = robot.rest if start is None else _posture(start, robot)
+    stands = robot.rest
+    if start is not None:
+        stands = as_numbers(start, "start")
+        if stands.shape != (robot.n_joints,):
+            raise TrajectoryError(
+                f"expected start as the positions of {robot.n_joints} joints, got shape {stands.shape}"
+            )
+        check_start(robot, stands)
     planned = PlannedPath(
         robot,
         CubicSpline(request.times, request.positions),
@@ -150,7 +156,7 @@ def move(  # noqa: PLR0913 - one parameter per option
     if request.space == "joints":
         if not force:
             refuse_outside(robot, request.times, request.positions)
-        result = _timed(planned, timing)
+        result = with_timing(planned, timing)
         if not force:
             refuse_failed(result, planned, timing)
         return result
@@ -165,10 +171,7 @@ def move(  # noqa: PLR0913 - one parameter per option
 def _along(
     ik: InverseKinematics, path: TaskPath, place: str, planned: PlannedPath, timing: str, force: bool
 ) -> RobotMovement:
-    """Return the first way along the path that passes its checks; with `force`, the first.
-
-    Of ways that are slower than what was demonstrated, the fastest.
-    """
+    """Return the first way along the path that passes its checks, of slow ones the fastest; with `force`, the first."""
     failed: list[tuple[RobotMovement, PlannedPath]] = []
     slower: list[RobotMovement] = []
     errors: list[TrajectoryError] = []
@@ -181,7 +184,7 @@ def _along(
             if not force:
                 check_reached(ik.robot, placed, joints(placed.times), way.ik.costs, TRACKED)
             solved = planned._replace(joints=joints, path=placed)
-            result = _timed(solved, timing)
+            result = with_timing(solved, timing)
         except TrajectoryError as error:
             errors.append(error)
             lost |= not isinstance(error, OutOfReachError)
@@ -189,7 +192,7 @@ def _along(
         passed = result.preflight.passed
         if force or (passed and (timing == "generated" or result.factor <= _SLOWER)):
             return result
-        lost |= loses_its_path(result) or _hurries(solved)
+        lost |= any(check.what in _LOST for check in result.preflight.failed) or _hurries(solved)
         if passed:
             slower.append(result)
         else:
@@ -209,20 +212,6 @@ def _hurries(planned: PlannedPath) -> bool:
     return bool(shares.max() > _HURRIED * shares.mean())
 
 
-def _timed(planned: PlannedPath, timing: str) -> RobotMovement:
-    """Time the movement, and put the units of the arm's joints beside it."""
-    result = with_timing(planned, timing)
-    return replace(result, trajectory=replace(result.trajectory, units=planned.robot.units))
-
-
-def _posture(start: ArrayLike, robot: Robot) -> Array:
-    q = as_numbers(start, "start")
-    if q.shape != (robot.n_joints,):
-        raise TrajectoryError(f"expected start as the positions of {robot.n_joints} joints, got shape {q.shape}")
-    check_start(robot, q)
-    return q
-
-
 class Way(NamedTuple):
     """A way in which the joints may follow a movement; it is solved when it is asked for."""
 
@@ -233,39 +222,33 @@ class Way(NamedTuple):
         """Solve the joints over time, and place the path, for an arm that stands at `stands` (n,).
 
         The posture at the start, and a place that is free, are those with which the whole movement costs least.
-
-        Raises OutOfReachError: no posture reaches the start of the path; TrajectoryError: None of the postures that are
-        followed keeps to the path.
         """
-        choose = choose_place if place == "free" else choose_posture
-        chosen = choose(self.ik.robot, path, self.ik.costs, stands)
-        path = path._replace(positions=path.positions + chosen.shift)
+        robot, costs = self.ik.robot, self.ik.costs
+        if place == "free":
+            path = choose_place(robot, path, costs)
+        start = choose_posture(robot, path, costs, stands)
         if self.sought:
-            way = pursue(self.ik.robot, path, self.ik.costs)
+            way = pursue(robot, path, costs)
             if way is None:
-                raise TrajectoryError(f"{self.ik.robot.name} reaches no way along this movement")
+                raise TrajectoryError(f"{robot.name} reaches no way along this movement")
             return CubicSpline(way[1].times, way[0]), way[1]
         for n in _SAMPLES:
             dense = path if len(path.times) >= n else path.at(np.linspace(0.0, path.times[-1], n))
-            self.ik.reset(chosen.start)
+            self.ik.reset(start)
             self.ik.solve(dense.positions[0], dense.rotations[0])
             joints = CubicSpline(dense.times, self.ik.follow(dense.positions, dense.rotations))
             between = (dense.times[:-1] + dense.times[1:]) / 2
-            off = kinematics(self.ik.robot, joints(between))[0] - dense.at(between).positions
+            off = kinematics(robot, joints(between))[0] - dense.at(between).positions
             if np.abs(off).max() <= _CLOSE:
                 break
         return joints, dense
 
 
 def ways_along(ik: InverseKinematics, follow: str) -> Iterator[Way]:
-    """Yield the ways to try, the quickest first.
-
-    An orientation that need not be followed may be: what is left free never loses a movement.
-    """
-    solvers = [ik]
-    yield Way(ik, False)
-    for stricter in _STRICTER[follow][1:]:
-        solvers.append(InverseKinematics(ik.robot, stricter))
+    """Yield the ways to try, the quickest first; what may be left free may also be followed."""
+    solvers: list[InverseKinematics] = []
+    for stricter in _STRICTER[follow]:
+        solvers.append(InverseKinematics(ik.robot, stricter) if solvers else ik)
         yield Way(solvers[-1], False)
     for solver in solvers:
         yield Way(solver, True)
@@ -285,11 +268,7 @@ class Request(NamedTuple):
 def request_of(
     movement: Any, robot: Robot, space: str, steps: Any = None, continuous: Any = None, joint_units: str | None = None
 ) -> Request:
-    """Read the arguments of `move` as one movement; `steps` and `continuous` besides such channels of its own.
-
-    Raises TrajectoryError: several movements, several orientations, joints of another number, or steps of another
-    length; SpecificationError: steps that are no dict.
-    """
+    """Read the arguments of `move` as one movement; `steps` and `continuous` besides such channels of its own."""
     if isinstance(movement, Primitives | PosePrimitives):
         movement = movement.rollout()
     recording = as_recording(movement)
@@ -306,27 +285,15 @@ def request_of(
     if space == "joints":
         check_plausible(positions, robot)
     turned = None if roles.orientation is None else as_wxyz(columns[:, roles.orientation[1]], roles.orientation[0])
-    recorded, others = (
-        {name: columns[:, k] for name, k in channels.items()} for channels in (roles.discrete, roles.continuous)
-    )
-    steps, continuous = {**recorded, **_given(steps)}, {**others, **_given(continuous, "continuous")}
-    if taken := sorted({*steps, *continuous} & set(robot.joints)):
-        raise TrajectoryError(f"expected other channels of other names than the joints have, got {taken[0]!r}")
-    steps, continuous = (
-        {name: _one_for_each(times, values, name) for name, values in channels.items()}
-        for channels in (steps, continuous)
-    )
-    return Request(times - times[0], space, positions, turned, steps, continuous)
-
-
-def _given(steps: Any, what: str = "steps") -> Mapping[str, Any]:
-    if not isinstance(steps, Mapping | None) or not all(isinstance(name, str) for name in steps or {}):
-        raise SpecificationError(f"expected {what} as a dict of channels and their values, got {steps!r:.80}")
-    return steps or {}
-
-
-def _one_for_each(times: Array, values: Any, name: str) -> Array:
-    values = as_numbers(values, name)
-    if values.shape != times.shape:
-        raise TrajectoryError(f"expected {len(times)} values of {name}, one for each sample, got {values.shape}")
-    return values
+    beside: list[dict[str, Array]] = []
+    for what, recorded, given in (("steps", roles.discrete, steps), ("continuous", roles.continuous, continuous)):
+        if not isinstance(given, Mapping | None) or not all(isinstance(name, str) for name in given or {}):
+            raise SpecificationError(f"expected {what} as a dict of channels and their values, got {given!r:.80}")
+        channels = {name: columns[:, k] for name, k in recorded.items()}
+        beside.append(channels | {name: as_numbers(values, name) for name, values in (given or {}).items()})
+    for name, values in (*beside[0].items(), *beside[1].items()):
+        if name in robot.joints:
+            raise TrajectoryError(f"expected other channels of other names than the joints have, got {name!r}")
+        if values.shape != times.shape:
+            raise TrajectoryError(f"expected {len(times)} values of {name}, one for each sample, got {values.shape}")
+    return Request(times - times[0], space, positions, turned, *beside)

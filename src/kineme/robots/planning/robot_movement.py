@@ -37,7 +37,6 @@ _ENOUGH = 1_000.0  # samples per second to learn by how much; more of them pass 
 _MORE = 10  # times the samples, where they are too few
 
 _FAR = 0.5  # outside its limits, a joint is not checked further [rad, m]
-_LOST = ("tracking", "turned away", "jump", "position")  # checks of what another way may mend
 _NAMED = 4  # checks that the message names, the worst first
 
 SLOWEST_RATE, FASTEST_RATE = 1.0, 10_000.0  # samples per second of what is sent
@@ -111,17 +110,12 @@ def with_timing(planned: PlannedPath, timing: str, most: int = LONGEST) -> Robot
     """The movement with that timing; "slowed" and "fastest" as slow as it passes, if any speed does.
 
     Where the fastest timing along the path is slower than the movement itself, it is that.
-
-    Raises SpecificationError: more than a million samples; slowed down, more than `most`; TrajectoryError: the fastest
-    timing of a movement in which no joint moves.
     """
     robot, joints, rate = planned.robot, planned.joints, planned.rate
     itself = partial(as_generated, robot, joints, rate)
     if timing == "generated":
         return _checked(planned, itself(1.0))
-    if timing == "slowed":
-        return _slowed(planned, itself, most)
-    parameterization = fastest(robot, joints)
+    parameterization = fastest(robot, joints) if timing == "fastest" else None
     if parameterization is None:
         return _slowed(planned, itself, most)
     result = _slowed(planned, partial(sampled, robot, parameterization, rate), most, follows=True)
@@ -217,10 +211,7 @@ class InfeasibleError(TrajectoryError):
 
 
 def refuse_outside(robot: Robot, times: Array, joints: Array) -> None:
-    """Refuse a movement of the joints (T, n) that is far outside their limits, before anything is computed.
-
-    Raises InfeasibleError: the joint that is farthest outside: when, its position and its limit.
-    """
+    """Refuse a movement of the joints (T, n) that is far outside their limits, before anything is computed."""
     beyond = np.maximum(robot.lower - joints, joints - robot.upper)
     t, j = np.unravel_index(int(np.argmax(beyond)), beyond.shape)
     if beyond[t, j] > _FAR:
@@ -231,16 +222,8 @@ def refuse_outside(robot: Robot, times: Array, joints: Array) -> None:
         )
 
 
-def loses_its_path(movement: RobotMovement) -> bool:
-    """Tell whether the joints left their path or jumped, so that another way along it may be better."""
-    return any(check.what in _LOST for check in movement.preflight.failed)
-
-
 def refuse_failed(movement: RobotMovement, planned: PlannedPath, timing: str) -> None:
-    """Refuse a movement that did not pass its checks.
-
-    Raises InfeasibleError: a check that did not pass, with the least duration that works.
-    """
+    """Refuse a movement that did not pass its checks, with the least duration that works."""
     failed, path = movement.preflight.failed, movement.path
     if not failed:
         return
@@ -264,8 +247,9 @@ def remedy(movement: RobotMovement, planned: PlannedPath, timing: str) -> str:
     failed, duration = movement.preflight.failed, movement.trajectory.duration - movement.begins
     finer = planned._replace(rate=min(_MORE * planned.rate, FASTEST_RATE))
     sampled = any(check.what in _OF_SAMPLING or check.what.endswith(SAMPLING) for check in failed)
+    elsewhere = OTHER_JOINTS if movement.path is None else _ELSEWHERE
     if not sampled and not np.isfinite(movement.preflight.slower):
-        return _elsewhere(movement)
+        return elsewhere
     more = f"{finer.rate:g} samples per second (rate=, --rate)"
     if sampled and _tried(finer, timing) is not None:
         return f"Choose a higher rate, as of {more}"
@@ -276,12 +260,8 @@ def remedy(movement: RobotMovement, planned: PlannedPath, timing: str) -> str:
             slow = "slow it down (timing='slowed', --slow-down)"
             return f"It works in {slower:.3g} s instead of {duration:.3g}{besides}: {slow}"
     if not np.isfinite(movement.preflight.slower):
-        return _elsewhere(movement)
+        return elsewhere
     return "No speed helps, or only a very low one: look at the movement for jumps, or choose another posture"
-
-
-def _elsewhere(movement: RobotMovement) -> str:
-    return OTHER_JOINTS if movement.path is None else _ELSEWHERE
 
 
 def _tried(planned: PlannedPath, timing: str) -> float | None:

@@ -20,9 +20,7 @@ from kineme.validation import Array
 
 DRIVERS = ".pos"  # names of LeRobot's drivers end in it: shoulder_pan.pos
 #: Words of columns that say how joints move, and not where they are.
-_RATES = frozenset(
-    ("velocity", "velocities", "vel", "acceleration", "accelerations", "acc", "effort", "torque", "current")
-)
+_RATES = {"velocity", "velocities", "vel", "acceleration", "accelerations", "acc", "effort", "torque", "current"}
 _SIDES = ("left", "right")  # what names of two arms begin with
 _Words = tuple[str, ...]
 
@@ -56,9 +54,6 @@ def roles_of(channels: Channels | None, n_columns: int, space: str, robot: Robot
 
     Columns with the names of the joints of the arm are these joints, in its order; the others, as of a gripper, go
     along. As many columns of other names are the joints one after the other, which a warning says.
-
-    Raises TrajectoryError: several orientations of the tip, or angles beside its position; names of joints at the
-    places of others.
     """
     if channels is None:
         posed = space == "tip" and n_columns == 7
@@ -106,9 +101,6 @@ def scales_of(roles: Roles, robot: Robot | None, joint_units: str | None = None)
     -100 to 100 between the limits of each joint, as LeRobot's drivers normalize to their calibration. Without it
     columns that are called as LeRobot's drivers call them are in degrees, which is said by a warning; others are in
     radians and meters, and so are positions of the tip.
-
-    Raises TrajectoryError: a unit of another quantity, or that is not in the table of units; `joint_units` beside
-    another unit in the head.
     """
     n = len(roles.positions)
     size, offset = np.ones(n), np.zeros(n)
@@ -151,22 +143,19 @@ def _scale(name: str, text: str, native: str, robot: Robot | None, k: int) -> tu
         size = float(unit.size) * extent
         return size, float(robot.lower[k]) - unit.zero * size
     if unit is None or unit.quantity != quantity:
-        is_range = unit is not None and unit.quantity == "range"
-        remedy = (
-            "or, where it goes from limit to limit of the arm, say joint_units='percent', in the shell --joint-units"
-        )
+        remedy = "or name its unit in brackets at the end of its head"
+        if unit is not None and unit.quantity == "range":
+            percent = "say joint_units='percent', in the shell --joint-units"
+            remedy = f"or, where it goes from limit to limit of the arm, {percent}"
         raise TrajectoryError(
             f"expected {name!r} in a unit of {quantity} ({_USUAL[quantity]}), got {text!r}; convert the column, "
-            f"{remedy if is_range else 'or name its unit in brackets at the end of its head'}"
+            f"{remedy}"
         )
     return float(unit.size), 0.0
 
 
 def check_plausible(positions: Array, robot: Robot) -> None:
-    """Refuse joint positions (T, n) [rad, m] that are turns beyond the limits: degrees that are taken for radians.
-
-    Raises TrajectoryError: the message names the option for units of joints.
-    """
+    """Refuse joint positions (T, n) [rad, m] that are turns beyond the limits: degrees that are taken for radians."""
     beyond = np.maximum(positions.max(axis=0) - robot.upper, robot.lower - positions.min(axis=0))
     wrong = np.array([unit == "rad" for unit in robot.units]) & (beyond > tau)
     if wrong.any():
@@ -187,11 +176,9 @@ def space_of(channels: Channels | None, columns: Array, robot: Robot) -> str:
     nothing is known and which are neither points nor poses.
     """
     if channels is not None:
+        names = [channel.name for channel in channels if channel.kind in _KINDS["joints"]]
         angles = sum(channel.kind == "angle" for channel in channels)
-        named = (
-            joints_among([channel.name for channel in channels if channel.kind in _KINDS["joints"]], robot) is not None
-        )
-        return "joints" if named or angles == robot.n_joints else "tip"
+        return "joints" if joints_among(names, robot) is not None or angles == robot.n_joints else "tip"
     d = columns.shape[1]
     posed = d == 7 and bool(np.all(np.abs(np.linalg.norm(columns[:, 3:], axis=1) - 1) <= NORM_TOLERANCE))
     return "joints" if d == robot.n_joints and d not in (2, 3) and not posed else "tip"
@@ -206,8 +193,6 @@ def joints_among(names: Sequence[str], robot: Robot) -> list[int] | None:
     joints, those that differ from one another by the same words as the joints, as ``elbow`` or ``q1``.
 
     Columns of velocities, accelerations and efforts are no joints.
-
-    Raises TrajectoryError: every joint is there for both sides, or several times and nothing else.
     """
     names = ["" if _is_rate(name) else name for name in names]
     plain = [split_head(name)[0].removesuffix(DRIVERS) for name in names]
@@ -236,8 +221,7 @@ def joints_among(names: Sequence[str], robot: Robot) -> list[int] | None:
 def check_order(names: Sequence[str], robot: Robot) -> None:
     """Say that columns, as many as joints and of other names, are taken as these one after the other.
 
-    Raises TrajectoryError: Velocities; a column at the place of another joint than its name says, or numbers that do
-    not rise.
+    Velocities are refused, and names or numbers of the columns that say another order.
     """
     rates = list(filter(_is_rate, names))
     if rates:

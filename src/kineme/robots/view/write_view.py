@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-import re
 from base64 import b64encode
 from collections.abc import Iterator
-from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -18,6 +16,7 @@ import numpy as np
 from kineme.errors import DataError
 from kineme.reporting.atomic import write_atomically
 from kineme.reporting.figures import BLUE, GRAY, GREEN, ORANGE
+from kineme.reporting.page import filled
 from kineme.reporting.text import counted, in_markup, printable
 from kineme.robots.execution.preflight import preflight_table
 from kineme.robots.kinematics.descent import kinematics
@@ -84,16 +83,9 @@ def view_page(movement: RobotMovement) -> str:
     """The text of the page."""
     shapes = shapes_of(movement.robot)
     scripts = {"scene": _asset(_SCENE), "viewer": _asset("page/viewer.js")}
-    style = _asset("page/viewer.css")
     n_failed = len(movement.preflight.failed)
     checks = f"{counted(n_failed, 'check')} FAILED." if n_failed else "All checks passed."
     parts = {
-        **scripts,
-        "style": style,
-        "policy": (
-            f"default-src 'none'; script-src {' '.join(map(_hash, scripts.values()))}; style-src {_hash(style)}; "
-            "img-src data:; base-uri 'none'; form-action 'none'"
-        ),
         "title": in_markup(f"{movement.robot.name} moves"),
         "summary": in_markup(f"{duration_in_words(movement)}. {checks}"),
         "notes": _notes(movement, shapes.stand_ins),
@@ -102,15 +94,11 @@ def view_page(movement: RobotMovement) -> str:
         "data": as_script_data(scene_data(movement, shapes)),
         "licenses": "\n\n".join(in_markup(_asset(name)) for name in _LICENSES),
     }
-    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], _asset("page/page.html"))
+    return filled(_asset("page/page.html"), parts, _asset("page/viewer.css"), scripts, "img-src data:; ")
 
 
 def _asset(name: str) -> str:
     return (_FOLDER / name).read_text(encoding="utf-8")
-
-
-def _hash(text: str) -> str:
-    return f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'"
 
 
 def _notes(movement: RobotMovement, stand_ins: tuple[str, ...]) -> str:
@@ -128,14 +116,12 @@ def _preflight(movement: RobotMovement) -> str:
     table = preflight_table(movement.preflight)
     rows = sorted(zip(movement.preflight.checks, table.rows, strict=True), key=lambda pair: pair[0].passed)
     heads = "".join(f'<th scope="col">{in_markup(head or "result")}</th>' for head in table.columns)
-    lines = "".join(_row(cells, check.passed) for check, cells in rows)
+    lines = ""
+    for check, cells in rows:
+        values = "".join(f"<td>{in_markup(cell)}</td>" for cell in cells[1:])
+        opened = "<tr>" if check.passed else '<tr class="failed">'
+        lines += f'{opened}<th scope="row">{in_markup(cells[0])}</th>{values}</tr>\n'
     return f"<table><thead><tr>{heads}</tr></thead><tbody>\n{lines}</tbody></table><p>{in_markup(table.reading)}</p>"
-
-
-def _row(cells: tuple[str, ...], passed: bool) -> str:
-    opened = "<tr>" if passed else '<tr class="failed">'
-    values = "".join(f"<td>{in_markup(cell)}</td>" for cell in cells[1:])
-    return f'{opened}<th scope="row">{in_markup(cells[0])}</th>{values}</tr>\n'
 
 
 def charts(movement: RobotMovement) -> str:
@@ -185,7 +171,7 @@ def scene_data(movement: RobotMovement, shapes: Shapes) -> dict[str, Any]:
     wanted = np.empty((0, 3)) if movement.path is None else movement.path.positions
     return {
         "urdf": shapes.urdf,
-        "meshes": [{"kind": mesh.kind, "content": b64encode(mesh.content).decode()} for mesh in shapes.meshes],
+        "meshes": list(shapes.meshes),
         "joints": shapes.joints,
         "tip": shapes.tip,
         "times": _rounded(trajectory.times[sent]),
@@ -213,7 +199,7 @@ class Shapes(NamedTuple):
     """Shapes of an arm. Links are called l0, l1, ... and joints j0, j1, ...: no name of the file is in the text."""
 
     urdf: str
-    meshes: tuple[Mesh, ...]  # a file name in `urdf` is an index into them
+    meshes: tuple[dict[str, str], ...]  # kind, content in base64; a file name in `urdf` is an index into them
     joints: tuple[str, ...]  # those of the robot, in its order
     tip: str
     stand_ins: tuple[str, ...]  # links of the file that are drawn as cylinders
@@ -230,8 +216,7 @@ def shapes_of(robot: Robot) -> Shapes:
     joints = {str(joint.get("name")): f"j{i}" for i, joint in enumerate(root.findall("joint"))}
     drawer = LinkShapes(root, robot.source)
     drawn = {name: drawer.of(link) for name, link in zip(links, root.findall("link"), strict=True)}
-    nothing = not any(drawn.values())
-    bare = [name for name in links if not drawn[name] and (nothing or name in drawer.without)]
+    bare = drawer.without if any(drawn.values()) else list(links)  # drawn as cylinders
     arm = ElementTree.Element("robot", name="arm")
     for i, (name, link) in enumerate(links.items()):
         to = ElementTree.SubElement(arm, "link", name=link)
@@ -239,15 +224,14 @@ def shapes_of(robot: Robot) -> Shapes:
         for shape in shapes:
             set_color(shape, _GRAYS[i % 2])
         to.extend(shapes)
-    moving = {str(joint.get("name")): joint for joint in root.findall("joint") if joint.get("name") in robot.joints}
     for joint in root.findall("joint"):
-        arm.append(_joint(joint, joints[str(joint.get("name"))], links, str(joint.get("name")) in moving))
+        arm.append(_joint(joint, joints[str(joint.get("name"))], links, joint.get("name") in robot.joints))
     return Shapes(
         ElementTree.tostring(arm, "unicode"),
         tuple(drawer.meshes),
         tuple(joints[name] for name in robot.joints),
         links[robot.tip],
-        tuple(name for name in bare if name in drawer.without),
+        tuple(drawer.without),
     )
 
 
@@ -284,13 +268,6 @@ def _cylinders(root: Element, link: str) -> Iterator[Element]:
         yield visual
 
 
-class Mesh(NamedTuple):
-    """A mesh as the page holds it."""
-
-    kind: str  # "stl" or "collada"
-    content: bytes
-
-
 class LinkShapes:
     """The shapes of one link after the other, and the meshes that they need."""
 
@@ -301,7 +278,7 @@ class LinkShapes:
             if (color := material.find("color")) is not None
         }
         self.path = path
-        self.meshes: list[Mesh] = []
+        self.meshes: list[dict[str, str]] = []
         self.without: list[str] = []  # links with shapes, none of which can be drawn
         self._numbers: dict[Path, int] = {}
         self._bytes = 0
@@ -356,7 +333,8 @@ class LinkShapes:
             if self._bytes > _LARGEST:
                 return None
             self._numbers[path] = len(self.meshes)
-            self.meshes.append(Mesh(_MESHES[path.suffix.lower()], path.read_bytes()))
+            content = b64encode(path.read_bytes()).decode()
+            self.meshes.append({"kind": _MESHES[path.suffix.lower()], "content": content})
         return self._numbers[path]
 
 

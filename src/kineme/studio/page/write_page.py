@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-from base64 import b64encode
-from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +10,7 @@ import numpy as np
 from kineme.errors import KinemeError, SpecificationError
 from kineme.library.library import ActionLibrary
 from kineme.reporting.atomic import whole_file
+from kineme.reporting.page import filled
 from kineme.reporting.text import counted, in_markup
 from kineme.similarity.describe import N_POINTS
 from kineme.studio.snapshot import DRAWN, Snapshot, snapshot_of_library
@@ -39,31 +38,21 @@ def library_page(library: ActionLibrary, title: str, most: int | None = None) ->
 def page_of(snapshot: Snapshot, title: str) -> str:
     """Make the page of a snapshot; its content security policy allows its own script and style by hashes, no more."""
     snapshot.header["view"] = view_of(snapshot)
-    script = bundled(_FOLDER / "face.js")
     style = _TOKENS.read_text(encoding="utf-8") + (_FOLDER / "page.css").read_text(encoding="utf-8")
     parts = {
-        "policy": (
-            f"default-src 'none'; script-src {_hash(script)}; style-src {_hash(style)}; base-uri 'none'; "
-            "form-action 'none'"
-        ),
-        "style": style,
-        "script": script,
         "title": in_markup(title),
         "summary": in_markup(summary_of(snapshot)),
         "footer": in_markup("Recognized and generated in this page by kineme; nothing leaves it."),
         "snapshot": snapshot.to_json(),
     }
     template = (_FOLDER / "page.html").read_text(encoding="utf-8")
-    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], template)
+    return filled(template, parts, style, {"script": bundled(_FOLDER / "face.js")})
 
 
 def write_page(
     path: str | Path, library: ActionLibrary, title: str | None = None, most: int | None = None, *, replace: bool = True
 ) -> Snapshot:
-    """Write the page of a library, see `library_page`; the title is by default the name of the library's folder.
-
-    Raises FileExistsError: `replace` is False and there is a file; OSError: the folder is missing, read-only or full.
-    """
+    """Write the page of a library, see `library_page`; the title is by default the name of the library's folder."""
     text, snapshot = library_page(library, title or library.store.folder.resolve().name, most)
     with whole_file(Path(path), replace=replace) as beside:
         beside.write_text(text, encoding="utf-8")
@@ -91,10 +80,6 @@ def summary_of(snapshot: Snapshot) -> str:
     of_all = "" if held == n_all else f" of {n_all:,}"
     symbols = counted(len(snapshot.header["classes"]), "symbol")
     return f"{symbols}, {held:,}{of_all} {'movement' if n_all == 1 else 'movements'}"
-
-
-def _hash(text: str) -> str:
-    return f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'"
 
 
 def bundled(entry: Path) -> str:

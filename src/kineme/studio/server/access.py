@@ -18,7 +18,7 @@ from urllib.parse import parse_qs
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from kineme.studio.server.refusals import refuse
+from kineme.studio.server.refusals import answer, refuse
 
 _READING = frozenset({"GET", "HEAD", "OPTIONS"})
 #: A name or an address, and a port: nothing else, as a user before an @, of which readers differ what the name is.
@@ -61,10 +61,8 @@ class Guard:
         if not _same_origin(scope, headers):
             return 403, "expected a request of the studio's own page or of a program, got one of another page"
         if not self._knows_token(scope, headers):
-            return (
-                401,
-                "expected the token: open the address that kineme studio printed, with ?token= and what follows it",
-            )
+            text = "expected the token: open the address that kineme studio printed, with ?token= and what follows it"
+            return 401, text
         return None
 
     def _is_ours(self, host: str) -> bool:
@@ -97,10 +95,8 @@ class Guard:
         site, is_page = headers.get("sec-fetch-site"), "text/html" in headers.get("accept", "")
         is_linked = is_page and site not in {"none", "same-origin"}
         status, way = (200, (b"refresh", b"0; url=/")) if is_linked else (303, (b"location", b"/"))
-        sent = [way, (b"set-cookie", cookie.encode()), (b"content-length", b"0"), (b"cache-control", b"no-store")]
-        sent.append((b"content-type", b"text/html"))
-        await send({"type": "http.response.start", "status": status, "headers": sent})
-        await send({"type": "http.response.body", "body": b""})
+        sent = [way, (b"set-cookie", cookie.encode()), (b"cache-control", b"no-store"), (b"content-type", b"text/html")]
+        await answer(send, status, sent, b"")
 
 
 def own_names(host: str) -> tuple[str, ...]:

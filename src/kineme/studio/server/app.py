@@ -9,7 +9,7 @@ from contextlib import asynccontextmanager, suppress
 from importlib.metadata import version
 from importlib.resources import files
 from importlib.resources.abc import Traversable
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any, NamedTuple
 
 import anyio.to_thread
@@ -133,10 +133,8 @@ def create_app(
     answer_errors(app)
     for router in ROUTERS:
         app.include_router(router)
-    app.add_middleware(NotifyAfterChanges)
-    app.add_middleware(LimitedBodies)
-    app.add_middleware(StaticFiles)
-    app.add_middleware(AnswersFailures)
+    for middleware in (NotifyAfterChanges, LimitedBodies, StaticFiles, AnswersFailures):
+        app.add_middleware(middleware)
     app.add_middleware(Guard, token=token, once=once, hosts=hosts)
     return app
 
@@ -174,7 +172,8 @@ class LimitedBodies:
             if body.refused is None:
                 await send(message)
 
-        if not body.is_announced_too_large(scope):
+        announced = dict(scope["headers"]).get(b"content-length", b"0")
+        if not body.is_too_large(int(announced[:20]) if announced.isdigit() else 0):
             with suppress(_RefusedError):
                 await self.app(scope, body, unless_refused)
         if body.refused is not None:
@@ -202,20 +201,15 @@ class _Body:
             raise _RefusedError from None
         self.got += len(message.get("body", b""))
         self.complete = not message.get("more_body", False)
-        if self.got > self.most:
-            self._refuse_size()
+        if self.is_too_large(self.got):
             raise _RefusedError
         return message
 
-    def is_announced_too_large(self, scope: Scope) -> bool:
-        """Tell whether the head of the request says so."""
-        length = dict(scope["headers"]).get(b"content-length", b"0")
-        if length.isdigit() and int(length[:20]) > self.most:
-            self._refuse_size()
-        return self.refused is not None
-
-    def _refuse_size(self) -> None:
-        self.refused = 413, f"expected at most {self.most // 2**20} MB, got more; send less at once"
+    def is_too_large(self, size: int) -> bool:
+        """Refuse a body of more bytes than it may have."""
+        if size > self.most:
+            self.refused = 413, f"expected at most {self.most // 2**20} MB, got more; send less at once"
+        return size > self.most
 
 
 class StaticFile(NamedTuple):
@@ -227,11 +221,7 @@ class StaticFile(NamedTuple):
 
 
 class StaticFiles:
-    """Answer for the files of the page at once, and pass everything else on.
-
-    The page is made of some fifty modules. Answering for them before routes are searched, and without a thread for
-    each, is a large part of a short first view.
-    """
+    """Answer for the fifty files of the page at once, without routes and threads, and pass everything else on."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app, self.files = app, static_files()
@@ -266,16 +256,12 @@ def _below(folder: Traversable, path: str) -> dict[str, Traversable]:
     for entry in folder.iterdir():
         if entry.is_dir():
             by_path |= _below(entry, f"{path}{entry.name}/")
-        elif _ending(entry.name) in _KINDS:
+        elif PurePath(entry.name).suffix in _KINDS:
             by_path[path + entry.name] = entry
     return by_path
-
-
-def _ending(name: str) -> str:
-    return f".{name.rpartition('.')[2]}"
 
 
 def _read(file: Traversable) -> StaticFile:
     body = file.read_bytes()
     tag = f'"{hashlib.sha256(body).hexdigest()[:20]}"'
-    return StaticFile(body, _KINDS[_ending(file.name)].encode(), tag.encode())
+    return StaticFile(body, _KINDS[PurePath(file.name).suffix].encode(), tag.encode())

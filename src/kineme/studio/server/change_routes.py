@@ -41,7 +41,7 @@ def assign(studio: Writes, body: AssignRequest) -> dict[str, Any]:
 
 
 @router.post("/movements/delete", response_model=records.ChangedOut, summary="Delete movements")
-def delete_movements(studio: Writes, body: DeleteRequest) -> dict[str, Any]:
+def delete_movements(studio: Writes, body: MovementsRequest) -> dict[str, Any]:
     """Earlier versions still hold them."""
     studio.check_movements(body.ids, body.version)
     return {"version": changes.delete_movements(studio.library.store, body.ids)}
@@ -123,13 +123,6 @@ class DescribeRequest(records.Change):
     text: records.Description
 
 
-class SplitRequest(records.Change):
-    """Members of a symbol that become a new one."""
-
-    ids: records.Ids
-    name: records.Name
-
-
 class MergeRequest(records.Change):
     """Symbols that become one."""
 
@@ -137,23 +130,27 @@ class MergeRequest(records.Change):
     into: records.Name
 
 
-class AssignRequest(records.Change):
-    """Movements, and the symbol that they belong to from now on; none if null."""
-
-    ids: records.Ids
-    symbol: records.Name | None
-
-
-class DeleteRequest(records.Change):
+class MovementsRequest(records.Change):
     """Movements."""
 
     ids: records.Ids
 
 
-class AcceptRequest(records.Change):
-    """A name for a proposal."""
+class AssignRequest(MovementsRequest):
+    """Movements, and the symbol that they belong to from now on; none if null."""
+
+    symbol: records.Name | None
+
+
+class SplitRequest(MovementsRequest):
+    """Members of a symbol that become a new one."""
 
     name: records.Name
+
+
+class AcceptRequest(RenameRequest):
+    """A name for a proposal."""
+
     description: records.Description | None = None
 
 
@@ -188,7 +185,7 @@ def accept(studio: Writes, key: records.ProposalKey, body: AcceptRequest) -> dic
 
 
 @proposal_router.post("/{key}/reject", response_model=records.ChangedOut, summary="Propose it no more")
-def reject(studio: Writes, key: records.ProposalKey, body: records.RejectRequest | None = None) -> dict[str, Any]:
+def reject(studio: Writes, key: records.ProposalKey, body: records.Change | None = None) -> dict[str, Any]:
     """Its movements stay without a name."""
     return {"version": stored.reject(studio.library.store, _proposal(studio, key))}
 

@@ -21,7 +21,7 @@ from kineme.library.storage.rows import Row, among, listed, select
 from kineme.library.storage.schema import COLUMNS, RETURNS, UNDO
 from kineme.library.storage.store import Version
 from kineme.library.storage.undo import can_undo
-from kineme.reporting.text import counted, printable, shortened
+from kineme.reporting.text import counted, first_names, printable, shortened
 from kineme.runtime.collector import collector_paused
 from kineme.sampling import evenly_spaced
 from kineme.studio.server.records import ChannelOut, MovementKey, Points, numbers, thumbnail
@@ -29,32 +29,8 @@ from kineme.studio.server.studio import Reads, Studio
 
 _VERSIONS = 200  # that are listed, the last ones
 _NAMES = 8  # of a list; more are counted
+_LISTED = 20  # items of a list in a detail; of longer ones the length
 _STATE = {name: k for k, name in enumerate(COLUMNS["symbol_state"])}
-
-
-def listed_history(studio: Studio) -> dict[str, Any]:
-    """The last versions, the last one first."""
-    every = studio.library.history()
-    last = every[: -_VERSIONS - 1 : -1]
-    keys = {"keys": listed(version.id for version in last if version.action == "annotate")}
-    with studio.library.store.reading() as connection:
-        rows = select(connection, "symbol_state", among("removed"), keys)
-    before = {row[_STATE["removed"]]: row for row in rows}  # version -> the state of the symbol that it replaced
-    now = _same_as(every, len(every))
-    return {
-        "total": len(every),
-        "versions": [
-            {
-                "number": version.id,
-                "time": version.at,
-                "what": version.action,
-                "said": said(version, before.get(version.id), _undone(every, version)),
-                "can_restore": not studio.read_only and _same_as(every, version.id) != now,
-                "detail": _short(dict(version.detail)),
-            }
-            for version in last
-        ],
-    }
 
 
 def said(version: Version, before: Row | None = None, undone: Sequence[Version] = ()) -> str:
@@ -123,8 +99,7 @@ def _name(name: str) -> str:
 
 
 def _names(names: list[str]) -> str:
-    more = len(names) - _NAMES
-    return ", ".join(map(_name, names[:_NAMES])) + (f" and {more} more" if more > 0 else "")
+    return first_names(list(map(_name, names)), _NAMES)
 
 
 def _value(value: Any) -> str:
@@ -151,13 +126,6 @@ def _undone(every: Sequence[Version], version: Version) -> Sequence[Version]:
     if version.action != UNDO or not _returned(version):
         return ()
     return every[version.detail["to"] : _same_as(every, version.id - 1, (UNDO,))]
-
-
-def _short(detail: dict[str, Any]) -> dict[str, Any]:
-    """Replace long lists by their length."""
-    return {
-        name: len(value) if isinstance(value, list) and len(value) > 20 else value for name, value in detail.items()
-    }
 
 
 class SymbolOut(BaseModel):
@@ -258,7 +226,14 @@ _MOST_ON_MAP = 2000  # where there are more symbols than that
 @router.get("", response_model=LibraryOut, summary="What the library holds")
 def library(request: Request, studio: Reads) -> Response:
     """Symbols with the path of their prototype, and how many movements have none."""
-    body, tag = studio.cached("library", lambda: _document(studio))
+
+    def document() -> tuple[bytes, str]:
+        """Make the answer of one version, and a tag that is another one when the answer is."""
+        with collector_paused():  # 10,000 symbols are 640,000 lists
+            body = LibraryOut.model_validate(_library(studio)).model_dump_json().encode()
+        return body, f'"{sha256(body).hexdigest()[:20]}"'
+
+    body, tag = studio.cached("library", document)
     same = request.headers.get("if-none-match") == tag
     return Response(None if same else body, 304 if same else 200, {"ETag": tag}, media_type="application/json")
 
@@ -302,14 +277,28 @@ def movement_map(studio: Reads) -> dict[str, Any]:
 @router.get("/history", response_model=HistoryOut, summary="What was changed, the last change first")
 def history(studio: Reads) -> dict[str, Any]:
     """The last 200 versions, each in a sentence, and whether its state is another one than now."""
-    return listed_history(studio)
-
-
-def _document(studio: Studio) -> tuple[bytes, str]:
-    """Make the answer of one version, and a tag that is another one when the answer is."""
-    with collector_paused():  # 10,000 symbols are 640,000 lists
-        body = LibraryOut.model_validate(_library(studio)).model_dump_json().encode()
-    return body, f'"{sha256(body).hexdigest()[:20]}"'
+    every = studio.library.history()
+    last = every[: -_VERSIONS - 1 : -1]
+    keys = {"keys": listed(version.id for version in last if version.action == "annotate")}
+    with studio.library.store.reading() as connection:
+        rows = select(connection, "symbol_state", among("removed"), keys)
+    before = {row[_STATE["removed"]]: row for row in rows}  # version -> the state of the symbol that it replaced
+    now = _same_as(every, len(every))
+    versions = [
+        {
+            "number": version.id,
+            "time": version.at,
+            "what": version.action,
+            "said": said(version, before.get(version.id), _undone(every, version)),
+            "can_restore": not studio.read_only and _same_as(every, version.id) != now,
+            "detail": {
+                name: len(value) if isinstance(value, list) and len(value) > _LISTED else value
+                for name, value in version.detail.items()
+            },
+        }
+        for version in last
+    ]
+    return {"total": len(every), "versions": versions}
 
 
 def _library(studio: Studio) -> dict[str, Any]:

@@ -1,8 +1,7 @@
 """The websocket: samples in, answers to the movement out, and word of every change of the library.
 
-Clients that watch are the pages: they are told of the movements of all others, the programs. A source keeps what it has
-sent of its movement of now; each page knows how much of that it was told. A page that reads slowly is told more at
-once, and nobody waits for it.
+Clients that watch are the pages: they are told of the movements of all others, the programs. A page that reads slowly
+is told more at once, and nobody waits for it.
 """
 
 from __future__ import annotations
@@ -18,29 +17,19 @@ from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 
 from kineme.errors import KinemeError, SpecificationError, TrajectoryError
 from kineme.recognition.early.stream import Live
-from kineme.studio.server.studio import Changes, Studio
+from kineme.studio.server.studio import Changes, News, Studio
 from kineme.validation import LARGEST, Array
 
 MOST = 10_000  # samples that are shown of a movement; of a longer one the last ones
 LONGEST = 100  # characters of a name
 UNNAMED = "a program"
 
-Tell = Callable[[], object]  # must not wait
-
 MOST_SAMPLES = 10_000  # in one message
 _SHOWN = 8  # classes of a movement under way
 _MOST_WAITING = 200  # messages that are taken in again when the library has changed: a few seconds
 _EMPTY: dict[str, Any] = {
-    "label": None,
-    "certainty": None,
-    "ranked": [],
-    "unknown": None,
-    "progress": None,
-    "arrival": None,
-    "path": [],
-    "goal": None,
-    "skipped": 0,
-    "status": [],
+    **dict.fromkeys(("label", "certainty", "unknown", "progress", "arrival", "goal")),
+    **{"ranked": [], "path": [], "skipped": 0, "status": []},
 }
 
 router = APIRouter()
@@ -205,15 +194,16 @@ def _parsed(message: Any) -> _Received:
         content = json.loads(message.get("text") or "")
     except (ValueError, RecursionError):
         return _Received(wrong=f"expected JSON: {_WORDS}; got something else")
+    content = content if isinstance(content, dict) else {}
     try:
-        if isinstance(content, dict) and "samples" in content:
+        if "samples" in content:
             return _Received(samples=parsed_samples(content["samples"]))
-        if isinstance(content, dict) and "name" in content:
+        if "name" in content:
             return _Received(name=parsed_name(content["name"]))
     except TrajectoryError as error:
         return _Received(wrong=str(error))
     for command in ("finish", "reset", "watch"):
-        if isinstance(content, dict) and content.get(command) is True:
+        if content.get(command) is True:
             return _Received(command=command)
     return _Received(wrong=f"expected {_WORDS}; got something else")
 
@@ -253,9 +243,12 @@ class LiveSession:
             if self.studio.warm == self.studio.library.version or len(self._waiting) > _MOST_WAITING:
                 self._renew()
                 return self._state
+        self._take(samples)
+        return self._state
+
+    def _take(self, samples: Array) -> None:
         if self._stream is not None:
             self._state = self._stream.update(samples[:, 0], samples[:, 1:]).to_dict(_SHOWN)
-        return self._state
 
     def finish(self) -> dict[str, Any] | None:
         """Return the answer to the whole movement; None if nothing recognizes it."""
@@ -283,8 +276,7 @@ class LiveSession:
             self._stream = None
         self._version, self._is_old, self._state = version, False, _EMPTY
         for samples in self._waiting:
-            if self._stream is not None:
-                self._state = self._stream.update(samples[:, 0], samples[:, 1:]).to_dict(_SHOWN)
+            self._take(samples)
         self._waiting.clear()
 
 
@@ -306,26 +298,13 @@ def parsed_samples(given: Any) -> Array:
     return np.array(given, dtype=np.float64)
 
 
-class Sources:
-    """The programs that send samples, by number, and who is told of them."""
+class Sources(News):
+    """The programs that send samples, by number, for those who are told of them."""
 
     def __init__(self) -> None:
+        super().__init__()
         self.sources: dict[int, Source] = {}
-        self._listeners: set[Tell] = set()
         self._last = 0
-
-    def listen(self, tell: Tell) -> None:
-        """Call `tell` whenever a source has something new."""
-        self._listeners.add(tell)
-
-    def leave(self, tell: Tell) -> None:
-        """Call it no more."""
-        self._listeners.discard(tell)
-
-    def tell(self) -> None:
-        """Tell everyone."""
-        for listener in list(self._listeners):
-            listener()
 
     def add(self) -> Source:
         """Add a program that was not there yet."""
@@ -342,7 +321,7 @@ class Sources:
 class Source:
     """A program: its name, its movement of now, and what was answered to it."""
 
-    def __init__(self, tell: Tell) -> None:
+    def __init__(self, tell: Callable[[], object]) -> None:
         self.name, self._tell = UNNAMED, tell
         self.movement, self.changes = 0, 0
         self._begin()
@@ -418,16 +397,8 @@ class Follower:
             self._followed[key] = _FollowedSource(
                 source, source.movement, source.dropped + len(source.samples), source.changes
             )
-            news.append(
-                {
-                    "id": key,
-                    "name": source.name,
-                    "movement": source.movement,
-                    "samples": source.samples[first:],
-                    "state": source.state,
-                    "ended": source.ended,
-                }
-            )
+            told = {name: getattr(source, name) for name in ("name", "movement", "state", "ended")}
+            news.append({"id": key, **told, "samples": source.samples[first:]})
         for key in sorted(gone):  # after what they have sent last
             news.append({"id": key, "gone": True})
             del self._followed[key]

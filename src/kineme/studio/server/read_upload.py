@@ -21,6 +21,7 @@ from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import Movements, of_channels
 
 REFUSED = 3  # exit code
+_ARRAYS = ("offsets", "durations", "stamps")
 
 
 def save(recordings: Recordings, path: Path) -> None:
@@ -34,35 +35,25 @@ def save(recordings: Recordings, path: Path) -> None:
         "sources": [list(source) for source in recordings.sources],
         "problems": [[problem.file, problem.line, problem.reason] for problem in recordings.problems],
     }
-    recorded = demos.positions if demos.channels is None else demos.recorded
+    arrays = {
+        "header": np.frombuffer(json.dumps(header).encode(), np.uint8),
+        "recorded": demos.positions if demos.channels is None else demos.recorded,
+        **{name: getattr(movements, name) for name in _ARRAYS},
+    }
     with path.open("wb") as file:
-        np.savez(
-            file,
-            header=np.frombuffer(json.dumps(header).encode(), np.uint8),
-            recorded=recorded,
-            offsets=demos.offsets,
-            durations=demos.durations,
-            stamps=movements.stamps,
-        )
+        np.savez(file, **arrays)
 
 
 def load(path: Path) -> Recordings:
-    """Read such an archive.
-
-    Raises
-    ------
-    DataError
-        An archive that `save` did not write.
-    """
+    """Read such an archive; a DataError of one that `save` did not write."""
     try:
         with np.load(path, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in ("recorded", "offsets", "durations", "stamps")}
+            recorded, offsets, durations, stamps = (archive[name] for name in ("recorded", *_ARRAYS))
             header = json.loads(archive["header"].tobytes())
         sources = tuple(Source(*source) for source in header["sources"])
         names = tuple(f"{source.path}#{source.place}" if source.place else source.path for source in sources)
         dimensions = None if header["dimensions"] is None else tuple(header["dimensions"])
-        parts = (arrays["recorded"], arrays["offsets"], arrays["durations"], arrays["stamps"], None, names, dimensions)
-        movements = Movements(*parts)
+        movements = Movements(recorded, offsets, durations, stamps, None, names, dimensions)
         if header["channels"] is not None:
             movements = of_channels(movements, channels_from_data(header["channels"], header["n_dims"]))
         problems = tuple(Problem(*problem) for problem in header["problems"])

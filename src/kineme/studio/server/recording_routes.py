@@ -84,20 +84,18 @@ class UploadOut(BaseModel):
     plots: list[PlotOut] = Field(description="One of each table.")
 
 
-class SpannedOut(BaseModel):
-    """A stretch of motion, and what it shows; null is unknown."""
-
-    begin: float
-    end: float
-    label: str | None
-    p: float | None
-
-
 class RestOut(BaseModel):
     """A stretch without motion."""
 
     begin: float
     end: float
+
+
+class SpannedOut(RestOut):
+    """A stretch of motion, and what it shows; null is unknown."""
+
+    label: str | None
+    p: float | None
 
 
 class SpottedOut(BaseModel):
@@ -160,13 +158,8 @@ async def spotted(studio: Reads, request: Request, key: records.RecordingKey, bo
         if report.problems:
             raise SpecificationError(report.problems[0].what)
         spans = [
-            {
-                "begin": annotation.span[0],
-                "end": annotation.span[1],
-                "label": annotation.symbol,
-                "p": records.numbers(annotation.p_value),
-            }
-            for annotation in report.annotations
+            {"begin": each.span[0], "end": each.span[1], "label": each.symbol, "p": records.numbers(each.p_value)}
+            for each in report.annotations
         ]
         ends = [0.0, *(span["end"] for span in spans)]
         begins = [*(span["begin"] for span in spans), duration]
@@ -243,16 +236,12 @@ def _table(read: Recordings, k: int) -> dict[str, Any]:
         {"name": name, "kind": "position", "columns": [name], "unit": None} for name in axis_names(demos.n_dims)
     ]
     if demos.channels is not None:
-        channels = [
-            {"name": channel.name, "kind": channel.kind, "columns": list(channel.columns), "unit": channel.unit}
-            for channel in demos.channels
-        ]
-    rate = records.numbers((n - 1) / duration)
+        channels = [channel._asdict() for channel in demos.channels]
     return {
         "name": _name(read, k),
         "channels": channels,
         "duration": duration,
-        "rate": rate,
+        "rate": records.numbers((n - 1) / duration),
         "n_samples": n,
         "label": read.labels[k],
     }

@@ -40,13 +40,9 @@ class RequestBody(BaseModel):
 
 
 class Change(RequestBody):
-    """The body of a request for a change."""
+    """The body of a request for a change: the version that the client has seen, if it matters."""
 
     version: int | None = Field(None, description=VERSION)
-
-
-class RejectRequest(Change):
-    """The version that the client has seen, if it matters."""
 
 
 class ChangedOut(BaseModel):
@@ -73,11 +69,8 @@ class ChannelOut(BaseModel):
 def numbers(values: ArrayLike) -> Any:
     """An array as lists; None where a number is not finite."""
     array = np.asarray(values, dtype=np.float64)
-    if np.isfinite(array).all():
-        return array.tolist()
-    plain = array.astype(object)
-    plain[~np.isfinite(array)] = None
-    return plain.tolist()
+    finite = np.isfinite(array)
+    return (array if finite.all() else np.where(finite, array, np.array(None))).tolist()
 
 
 def trajectory(times: list[float], positions: list[list[float]]) -> Trajectory:

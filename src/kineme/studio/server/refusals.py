@@ -82,7 +82,7 @@ async def refuse(scope: Scope, send: Send, status: int, text: str) -> None:
         )
         kind, body = b"text/html; charset=utf-8", page.encode()
     more = [(b"connection", b"close")] if status in {408, 413} else []  # the rest of the body is not read
-    await _answer(send, status, [(b"content-type", kind), *more], body)
+    await answer(send, status, [(b"content-type", kind), *more], body)
 
 
 class AnswersFailures:
@@ -107,10 +107,11 @@ class AnswersFailures:
                 raise
             _LOG.exception("%s %s failed", scope["method"], scope["path"])
             text = _plain("internal error; details are in the server log")
-            await _answer(send, 500, [(b"content-type", b"application/json")], text)
+            await answer(send, 500, [(b"content-type", b"application/json")], text)
 
 
-async def _answer(send: Send, status: int, headers: list[tuple[bytes, bytes]], body: bytes) -> None:
+async def answer(send: Send, status: int, headers: list[tuple[bytes, bytes]], body: bytes) -> None:
+    """Send a whole answer."""
     length = (b"content-length", str(len(body)).encode())
     await send({"type": "http.response.start", "status": status, "headers": [*headers, length]})
     await send({"type": "http.response.body", "body": body})
@@ -123,13 +124,13 @@ def _plain(text: str) -> bytes:
 def answer_errors(app: FastAPI) -> None:
     """Answer to errors with {"error": what was expected, what came, what to do}."""
 
-    async def answer(_: Request, error: Any) -> JSONResponse:
+    async def refusal(_: Request, error: Any) -> JSONResponse:
         kind = next(kind for kind in type(error).__mro__ if kind in _STATUSES)
         status, text = _STATUSES[kind](error)
         return JSONResponse({"error": text}, status)
 
     for kind in _STATUSES:
-        app.add_exception_handler(kind, answer)
+        app.add_exception_handler(kind, refusal)
 
 
 def _first_problem(error: RequestValidationError) -> str:

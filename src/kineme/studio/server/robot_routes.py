@@ -9,7 +9,7 @@ from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
 from kineme.errors import KinemeError, SpecificationError
-from kineme.robots.execution.preflight import Preflight
+from kineme.robots.execution.preflight import Preflight, checks_as_data
 from kineme.robots.models.robot import MODELS, Robot, load
 from kineme.robots.planning.generate_at import generate_at
 from kineme.robots.planning.move import move as move_arm
@@ -129,22 +129,10 @@ def move(studio: Reads, body: MoveRequest) -> dict[str, Any]:
 
 
 def _answer(robot: Robot, preflight: Preflight | None) -> dict[str, Any]:
-    checks = [] if preflight is None else preflight.checks
     joints = zip(robot.joints, numbers(robot.lower), numbers(robot.upper), strict=True)
     return {
         "passed": preflight is not None and preflight.passed,
-        "checks": [
-            {
-                "what": check.what,
-                "where": check.where,
-                "worst": numbers(check.worst),
-                "limit": numbers(check.limit),
-                "unit": check.unit,
-                "time": numbers(check.time),
-                "passed": bool(check.passed),
-            }
-            for check in checks
-        ],
+        "checks": [] if preflight is None else checks_as_data(preflight),
         "unchecked": [] if preflight is None else list(preflight.unchecked),
         "assumed": list(robot.assumed),
         "joints": [{"name": name, "low": low, "high": high} for name, low, high in joints],

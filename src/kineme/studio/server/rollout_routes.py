@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 from urllib.parse import quote
 
 import numpy as np
@@ -29,13 +29,6 @@ _SAMPLES, _MOST_SAMPLES = 200, 20_000
 _STRONGER = (1.0, 2.0, 4.0, 8.0)  # steering that is tried until no obstacle is touched
 
 
-class Rollout(NamedTuple):
-    """A new movement, with warnings."""
-
-    movement: Generated
-    warnings: list[str]
-
-
 def learned_as(studio: Studio, body: PrimitiveRequest) -> Learned:
     """Learn the primitive that is asked for, in the formulation that is asked for, once for each version."""
     key = body.what.model_dump_json() + str(body.formulation)
@@ -48,8 +41,8 @@ def styles_of(studio: Studio, symbol: str) -> StyleModel:
     return studio.cached_item("styles", symbol, lambda: learn_styles(studio.library.primitives(name)))
 
 
-def make(studio: Studio, body: RolloutRequest) -> Rollout:
-    """Generate the movement that is asked for."""
+def make(studio: Studio, body: RolloutRequest) -> tuple[Generated, list[str]]:
+    """Generate the movement that is asked for, with warnings."""
     learned = learned_as(studio, body)
     duration = body.duration or float(learned.primitive.durations[0])
     rate = body.rate or _SAMPLES / duration
@@ -67,7 +60,7 @@ def make(studio: Studio, body: RolloutRequest) -> Rollout:
     )
     with heard_warnings() as heard:
         movement, touched = _around(learned, options, body.obstacles)
-    return Rollout(movement, list(dict.fromkeys([*heard, *touched])))
+    return movement, list(dict.fromkeys([*heard, *touched]))
 
 
 def moving_positions(learned: Learned, movement: Generated) -> Array:
@@ -242,9 +235,7 @@ def primitive(studio: Reads, body: PrimitiveRequest) -> Response:
     return Response(studio.cached_item("primitive", key, document), media_type="application/json")
 
 
-@router.get(
-    "/library/symbols/{key}/styles", response_model=StylesOut, summary="In which ways members of a symbol differ"
-)
+@router.get("/library/symbols/{key}/styles", response_model=StylesOut, summary="How members of a symbol differ")
 def styles(studio: Reads, key: records.SymbolKey) -> dict[str, Any]:
     """The range of each direction; values of a rollout's style lie between."""
     model = styles_of(studio, key)

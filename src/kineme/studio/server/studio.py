@@ -27,8 +27,6 @@ PERIOD = 0.2  # seconds between looks whether the client is there
 
 LOOKS = 0.25  # seconds between looks at the version, for changes by other processes
 
-Tell = Callable[[int], object]  # must not wait
-
 Result = TypeVar("Result")
 
 _WRITERS = 4  # changes that are worked on at once; each holds a thread until it has its turn
@@ -128,10 +126,7 @@ class Studio:
             return await asyncio.get_running_loop().run_in_executor(self.long, lambda: self.cached(name, make))
 
     def symbol(self, key: str, expected: int | None = None) -> Symbol:
-        """Return the symbol of an id.
-
-        Raises ConflictError: it is gone since the version that the client has seen; MissingError: there is none.
-        """
+        """Return the symbol of an id, unless it is gone, also since the version that the client has seen."""
         symbols = self.view().symbols
         if key not in symbols:
             raise self._gone(f"the symbol {key!r}", expected)
@@ -174,10 +169,7 @@ def studio_of(request: Request) -> Studio:
 
 
 async def writable_studio_of(request: Request) -> AsyncIterator[Studio]:
-    """The same for a change, of which few are worked on at once: while another process writes, others still read.
-
-    Raises PermissionError: the studio is open for reading only.
-    """
+    """The same for a change, of which few are worked on at once: while another process writes, others still read."""
     studio = studio_of(request)
     if studio.read_only:
         raise PermissionError(
@@ -191,22 +183,34 @@ Reads = Annotated[Studio, Depends(studio_of)]
 Writes = Annotated[Studio, Depends(writable_studio_of)]
 
 
-class Changes:
-    """Watch the version of a library, and tell it to those who listen."""
+class News:
+    """What those who listen are told; what is called must not wait."""
 
-    def __init__(self, studio: Studio, period: float = LOOKS) -> None:
-        self.studio, self.period = studio, period
-        self.version = studio.library.version
-        self._listeners: set[Tell] = set()
-        self._look = asyncio.Event()
+    def __init__(self) -> None:
+        self._listeners: set[Callable[..., object]] = set()
 
-    def listen(self, tell: Tell) -> None:
-        """Call `tell` with every new version."""
+    def listen(self, tell: Callable[..., object]) -> None:
+        """Call `tell` with whatever is new."""
         self._listeners.add(tell)
 
-    def leave(self, tell: Tell) -> None:
+    def leave(self, tell: Callable[..., object]) -> None:
         """Call it no more."""
         self._listeners.discard(tell)
+
+    def tell(self, *news: object) -> None:
+        """Tell everyone."""
+        for listener in list(self._listeners):
+            listener(*news)
+
+
+class Changes(News):
+    """The versions of a library, for those who listen."""
+
+    def __init__(self, studio: Studio, period: float = LOOKS) -> None:
+        super().__init__()
+        self.studio, self.period = studio, period
+        self.version = studio.library.version
+        self._look = asyncio.Event()
 
     def look(self) -> None:
         """Look at once, as after a change of our own."""
@@ -221,16 +225,11 @@ class Changes:
                     await self._look.wait()
             self._look.clear()
             with suppress(KinemeError, sqlite3.Error):  # what cannot be read now: it is looked at again
-                await self._compare()
-
-    async def _compare(self) -> None:
-        version = await asyncio.to_thread(lambda: self.studio.library.version)
-        if version == self.version:
-            return
-        self.version = version
-        for tell in list(self._listeners):
-            tell(version)
-        self.studio.warm_up()
+                version = await asyncio.to_thread(lambda: self.studio.library.version)
+                if version != self.version:
+                    self.version = version
+                    self.tell(version)
+                    self.studio.warm_up()
 
 
 class NotifyAfterChanges:
@@ -258,10 +257,7 @@ class Work:
         self._stopped.set()
 
     def check(self) -> None:
-        """End the work, if it is not wanted any more.
-
-        Raises StoppedError.
-        """
+        """End the work by a StoppedError, if it is not wanted any more."""
         if self._stopped.is_set():
             raise StoppedError
 
@@ -307,10 +303,7 @@ class Works:
 
 
 async def while_wanted(request: Request, pool: Executor, work: Work, act: Callable[[], Result]) -> Result:
-    """Return the result of `act`, which looks at `work`; where its client goes meanwhile, it is not wanted any more.
-
-    Raises StoppedError: it was stopped.
-    """
+    """Return the result of `act`, which looks at `work`; where its client goes meanwhile, it is not wanted any more."""
     result = asyncio.get_running_loop().run_in_executor(pool, act)
     try:
         while not (await asyncio.wait({result}, timeout=PERIOD))[0]:

@@ -85,9 +85,6 @@ class Uploads:
         """Read a file that was sent, in these columns or in those that are found.
 
         `check` is called again and again, and raises where nobody waits any more.
-
-        Raises MissingError: it was not sent, or too long ago; DataError: it cannot be read, takes too long or too much
-        memory.
         """
         path, chosen = self._files.get(key), tuple(columns)
         if path is None:
@@ -98,26 +95,19 @@ class Uploads:
         if read is None:
             read = self._read_apart(path, {"columns": list(chosen)} if chosen else {}, check)
             with self._turn:
-                if key in self._files:
-                    self._hold((key, chosen), read)
+                if key in self._files:  # of each file it is kept as it is, and in the columns chosen last
+                    for old in [which for which in self._read if which[0] == key and which[1] and chosen]:
+                        self._read.pop(old)
+                    self._read[key, chosen] = read
+                while len(self._read) > 1 and sum(map(_bytes, self._read.values())) > self.held:
+                    self._read.pop(next(iter(self._read)))
         return read
-
-    def _hold(self, which: tuple[str, tuple[str, ...]], read: Recordings) -> None:
-        """Keep what was read for the next question: of each file as it is, and in the columns chosen last.
-
-        What was read long ago is read again if it is too much in all.
-        """
-        key, columns = which
-        for old in [which for which in self._read if which[0] == key and which[1] and columns]:
-            self._read.pop(old)
-        self._read[which] = read
-        while len(self._read) > 1 and sum(map(_bytes, self._read.values())) > self.held:
-            self._read.pop(next(iter(self._read)))
 
     def _read_apart(self, path: Path, options: dict[str, object], check: Callable[[], object]) -> Recordings:
         result = path.with_name(f"{secrets.token_hex(4)}.npz")
         command = [sys.executable, "-m", "kineme.studio.server.read_upload", str(path), str(result)]
         command += [str(self.memory), str(math.ceil(2 * self.seconds))]
+        remedy = "send a part of it, or learn it with kineme learn"
         try:
             code = _run(command, json.dumps(options), self.seconds, check)
             if code == REFUSED:
@@ -125,25 +115,18 @@ class Uploads:
             if code:
                 raise DataError(f"expected a recording, reading {path.name} ended with code {code}")
             if result.stat().st_size > self.held:
-                raise DataError(
-                    f"expected a recording of at most {self.held / 2**20:.0f} MB of numbers, {path.name} holds more; "
-                    "send a part of it, or learn it with kineme learn"
-                )
+                most = f"at most {self.held / 2**20:.0f} MB of numbers"
+                raise DataError(f"expected a recording of {most}, {path.name} holds more; {remedy}")
             return load(result)
         except TimeoutError:
-            raise DataError(
-                f"expected a recording that is read within {self.seconds:g} s, {path.name} takes longer; "
-                "send a part of it, or learn it with kineme learn"
-            ) from None
+            within = f"expected a recording that is read within {self.seconds:g} s"
+            raise DataError(f"{within}, {path.name} takes longer; {remedy}") from None
         finally:
             result.unlink(missing_ok=True)
 
 
 def _run(command: Sequence[str], given: str, seconds: float, check: Callable[[], object]) -> int:
-    """Run a child process, and return its exit code.
-
-    It is ended after so many seconds (TimeoutError), and where `check` raises.
-    """
+    """Return the exit code of a child process, which is ended after so many seconds, and where `check` raises."""
     end, pipe = time.monotonic() + seconds, subprocess.PIPE
     with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True) as child:
         try:
