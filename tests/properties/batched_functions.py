@@ -37,8 +37,9 @@ from kineme import (
     styles,
 )
 from kineme.dmp import Primitives
-from kineme.dmp.discrete.specification import FITS, FORMULATIONS, GATINGS
+from kineme.dmp.discrete.specification import FORMULATIONS, GATINGS
 from kineme.dmp.join import laid_out, laid_out_poses
+from kineme.dmp.spring_damper import FITS
 from kineme.errors import ExtrapolationWarning
 from kineme.features.movement_features import FEATURES, PoseFeatures
 from kineme.kernels import KERNELS, MEANS, averaged
@@ -481,8 +482,8 @@ def posed(demos: Demonstrations, rollout: Any) -> list[dict[str, Any]]:
         len(demos),
         path=(rollout.poses[:, :, :3] - start) / unit,
         orientations=rollout.orientations,
-        velocities=np.concatenate((velocities[:, :, :3] / unit, velocities[:, :, 3:]), axis=2),
-        accelerations=np.concatenate((accelerations[:, :, :3] / unit, accelerations[:, :, 3:]), axis=2),
+        velocities=np.concatenate((velocities[:, :, :3] / unit, rollout.angular_velocities * tau), axis=2),
+        accelerations=np.concatenate((accelerations[:, :, :3] / unit, rollout.angular_accelerations * tau**2), axis=2),
         times=rollout.times / demos.durations[:, None],
         stamps=[one.times / demos[i].duration for i, one in enumerate(rollout.trajectories)],
     )

@@ -61,7 +61,7 @@ def _phase(n_samples: int) -> Array:
 def _weights_of_target_over_s(demos: Demonstrations) -> Array:
     """Bio-inspired weights when the target is divided by s before a fit with the basis gated by s."""
     dmp, u = specification("bio-inspired", gating="phase"), np.linspace(0.0, 1.0, N_POINTS)
-    over_s = forcing_target(dmp.basis, dmp.system, dmp.K, dmp.D, u) / _phase(N_POINTS)[:, None]
+    over_s = forcing_target(dmp, u) / _phase(N_POINTS)[:, None]
     operator = local_regression(dmp.basis, u) @ over_s
     return (relative_rows(demos, 0, len(demos), N_POINTS) @ operator.T).reshape(len(demos), -1)
 

@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
+from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.dmp.recorded_as import DiscreteSteps, RecordedAs, merged
+from kineme.dmp.recorded_as import DiscreteSteps, RecordedAs, make_read_only, merged
 from kineme.errors import DataError, KinemeError, SpecificationError, TrajectoryError
 from kineme.movements.channels.channel import Channels, channels_from_data, channels_to_data, check_alike
 from kineme.movements.preparation.resample import Resample
 from kineme.movements.preparation.smooth import Smooth
 from kineme.movements.preparation.trim import TrimRest
 from kineme.movements.trajectories.labels import as_indices, label_array
-from kineme.movements.trajectories.movements import Names
+from kineme.movements.trajectories.movements import Names, axis_names
 from kineme.validation import as_path
 
 #: The preprocessing steps in files, by names of this table; files never contain names of classes.
@@ -26,6 +26,9 @@ STEPS = {"trim-rest": TrimRest, "smooth": Smooth, "resample": Resample}
 #: Name of an array in files -> field of `DiscreteSteps`.
 _STEPS_OF = {"step_values": "values", "step_shares": "shares", "step_offsets": "offsets"}
 
+#: What a header that does not fit may raise.
+_UNFIT = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError, MemoryError)
+
 _LABEL_TYPES = (str, int, float, bool)
 
 Arrays = Mapping[str, NDArray[Any]]
@@ -33,10 +36,7 @@ T = TypeVar("T")
 
 
 class Batch:
-    """Base of frozen records of n learned movements of d dimensions, with one specification of N basis functions.
-
-    A subclass lists its arrays once, in `ROWS`; write protection, indexing, concatenation and files use that list.
-    """
+    """Base of n learned movements of d dimensions with N basis functions: all that goes over the arrays of `ROWS`."""
 
     #: Name of an array -> its shape in the letters n, d, N, and q for what the array itself says.
     ROWS: ClassVar[dict[str, str]]
@@ -45,29 +45,13 @@ class Batch:
     #: Name of the content in saved files.
     KIND: ClassVar[str]
 
-    if TYPE_CHECKING:  # read-only here: fields or properties of the subclass
-
-        @property
-        def dmp(self) -> Any:
-            """The specification."""
-
-        @property
-        def labels(self) -> NDArray[Any] | None:
-            """Labels of the demonstrations, shape (n,), or None."""
-
-        @property
-        def names(self) -> tuple[str | None, ...] | None:
-            """Source of each demonstration, or None."""
-
-        @property
-        def recorded_as(self) -> RecordedAs | None:
-            """Channels of the recordings and the steps of discrete ones, or None."""
+    dmp: Any
+    labels: NDArray[Any] | None
+    names: Names
+    recorded_as: RecordedAs | None
 
     def __post_init__(self) -> None:
-        for name in self.ROWS:
-            view = getattr(self, name).view()
-            view.setflags(write=False)
-            object.__setattr__(self, name, view)
+        make_read_only(self, self.ROWS)
         if self.labels is not None and np.asarray(self.labels).dtype.kind not in "biufO":
             object.__setattr__(self, "labels", label_array(self.labels))
 
@@ -77,7 +61,8 @@ class Batch:
     def __getitem__(self, index: Any) -> Self:
         """The chosen primitives as a batch; an integer gives a batch of one."""
         chosen = np.atleast_1d(as_indices(index, len(self)))
-        return self._with(
+        return self._of_rows(
+            self.dmp,
             {name: self.row(name)[chosen] for name in self.ROWS},
             None if self.labels is None else self.labels[chosen],
             None if self.names is None else tuple(self.names[i] for i in chosen),
@@ -108,12 +93,14 @@ class Batch:
 
     @property
     def to_recording(self) -> RecordedAs | None:
-        """`recorded_as`, if the movements can be written in the columns of the recording; else None.
-
-        An orientation that was learned as its integrated rotation cannot: it does not know where it started.
-        """
+        """`recorded_as` if the recording's columns can be written; an orientation learned as its integral cannot."""
         about = self.recorded_as
         return None if about is None or about.orientations or not about.has_steps else about
+
+    @property
+    def plain_names(self) -> tuple[list[str], list[str]]:
+        """Names of the columns of movements and of their rates, where no recording names them."""
+        return axis_names(self.n_dims), axis_names(self.n_dims)
 
     @classmethod
     def concatenate(cls, batches: Iterable[Self]) -> Self:
@@ -156,7 +143,8 @@ class Batch:
             types = ("texts" if of_batch.dtype == object else str(of_batch.dtype) for of_batch in labels)
             raise TrajectoryError(f"expected labels of one type, got {', '.join(types)}")
         named = any(batch.names is not None for batch in batches)
-        return first._with(
+        return cls._of_rows(
+            first.dmp,
             {name: np.concatenate([batch.row(name) for batch in batches]) for name in cls.ROWS},
             np.concatenate(labels) if labels else None,
             tuple(name for batch in batches for name in batch.names or (None,) * len(batch)) if named else None,
@@ -202,15 +190,7 @@ class Batch:
         header, arrays = read_container(path, cls.KIND)
         try:
             return cls._from_file(header, arrays)
-        except (
-            LookupError,
-            TypeError,
-            ValueError,
-            AttributeError,
-            ArithmeticError,
-            RecursionError,
-            MemoryError,
-        ) as error:
+        except _UNFIT as error:
             reason = error if isinstance(error, KinemeError) else f"{type(error).__name__}: {error}"
             raise DataError(
                 f"expected {path} to hold complete {cls.KIND}, got a header that does not fit ({reason})"
@@ -219,11 +199,6 @@ class Batch:
     def row(self, name: str) -> NDArray[Any]:
         """Return the array of that name in `ROWS`."""
         return np.asarray(getattr(self, name))
-
-    def _with(
-        self, arrays: dict[str, Any], labels: NDArray[Any] | None, names: Names, about: RecordedAs | None
-    ) -> Self:
-        return self._of_rows(self.dmp, arrays, labels, names, about)
 
     @classmethod
     def _of_rows(
@@ -322,8 +297,6 @@ def specification_to_dict(dmp: Any) -> dict[str, Any]:
 
 def specification_from_dict(specification: type[T], data: dict[str, Any]) -> T:
     """Plain data as a specification; every parameter is checked like user input."""
-    steps = []
-    for record in data["preprocessing"]:
-        parameters = dict(record)
-        steps.append(STEPS[parameters.pop("step")](**parameters))
-    return specification(**{**data, "preprocessing": tuple(steps)})
+    steps = [dict(record) for record in data["preprocessing"]]
+    built = tuple(STEPS[parameters.pop("step")](**parameters) for parameters in steps)
+    return specification(**{**data, "preprocessing": built})

@@ -1,7 +1,5 @@
 """Movements as a function of the task's parameters, as a scikit-learn estimator.
 
-Regression of many numbers on few parameters, as weighted sums of what was demonstrated.
-
 Every smoother here is linear in the demonstrated values y (n,): ``y(c) = w(c) y``, with the same weights for all that a
 primitive consists of. With K the covariance of the demonstrations and P their trend, [1, c],
 
@@ -24,15 +22,7 @@ from sklearn.base import BaseEstimator
 from sklearn.utils.validation import check_is_fitted
 
 from kineme.dmp.discrete.dmp import DMP, Primitives
-from kineme.dmp.styles.parameters import (
-    as_primitives,
-    from_numbers,
-    map_rows,
-    path_matrix,
-    shared_label,
-    shared_recording,
-    to_numbers,
-)
+from kineme.dmp.styles.parameters import as_primitives, map_rows, path_matrix, to_numbers, with_numbers
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.validation import LARGEST, Array, as_numbers, check_choice, check_number
@@ -131,11 +121,18 @@ class Contextual(BaseEstimator):
         SpecificationError
             A parameter of the estimator out of its range.
         """
-        self._check()
-        primitives = self._learned(movements)
+        check_choice("regression", self.regression, REGRESSIONS)
+        if not isinstance(self.dmp, DMP | None):
+            raise SpecificationError(f"expected dmp to be a kineme.DMP, got {type(self.dmp).__name__}")
+        for name in ("length_scale", "noise"):
+            if getattr(self, name) is not None:
+                check_number(name, getattr(self, name), above=0.0)
+        primitives = as_primitives(movements, self.dmp)
+        if self.dmp is not None and primitives.dmp != self.dmp:
+            raise SpecificationError(f"expected primitives of the specification {self.dmp}, got {primitives.dmp}")
         C = demonstrated_parameters(parameters, len(primitives))
         self.center_, self.scale_ = C.mean(axis=0), C.std(axis=0)
-        X = _standardized(C, self.center_, self.scale_)
+        X = (C - self.center_) / self.scale_
         Y = _compressed_paths(primitives)
         tried = candidates(self.length_scale, self.noise)
         names = list(tried) if self.regression == "auto" else [self.regression]
@@ -154,7 +151,7 @@ class Contextual(BaseEstimator):
         return self
 
     def primitive(self, parameters: ArrayLike, extrapolate: bool = False) -> Primitives:
-        """One primitive for each task.
+        """One primitive for each of m tasks, to be used as any others.
 
         Parameters
         ----------
@@ -162,11 +159,6 @@ class Contextual(BaseEstimator):
         extrapolate : bool, default False
             Allow parameters outside the demonstrated range: the box between the smallest and the largest of each. Its
             corners need not have been demonstrated either.
-
-        Returns
-        -------
-        Primitives
-            m primitives: roll them out, describe them, control with them as with any others.
 
         Raises
         ------
@@ -184,25 +176,10 @@ class Contextual(BaseEstimator):
         C = _finite(C)
         if not extrapolate:
             check_range(C, self.parameters_)
-        w = self._solved.weights(_standardized(C, self.center_, self.scale_))
+        w = self._solved.weights((C - self.center_) / self.scale_)
         theta = np.tensordot(w, to_numbers(self.primitives_), axes=1)
         durations = np.exp(w @ np.log(self.primitives_.durations))
-        about = shared_recording(self.primitives_)
-        return from_numbers(self.dmp_, theta, durations, shared_label(self.primitives_), about)
-
-    def _check(self) -> None:
-        check_choice("regression", self.regression, REGRESSIONS)
-        if not isinstance(self.dmp, DMP | None):
-            raise SpecificationError(f"expected dmp to be a kineme.DMP, got {type(self.dmp).__name__}")
-        for name in ("length_scale", "noise"):
-            if getattr(self, name) is not None:
-                check_number(name, getattr(self, name), above=0.0)
-
-    def _learned(self, movements: Primitives | MovementsLike) -> Primitives:
-        primitives = as_primitives(movements, self.dmp)
-        if self.dmp is not None and primitives.dmp != self.dmp:
-            raise SpecificationError(f"expected primitives of the specification {self.dmp}, got {primitives.dmp}")
-        return primitives
+        return with_numbers(self.primitives_, theta, durations)
 
 
 def _compressed_paths(primitives: Primitives) -> Array:
@@ -217,18 +194,12 @@ def _rms(errors: Array) -> float:
     return float(np.sqrt(np.mean(errors**2)))
 
 
-def _standardized(C: Array, center: Array, scale: Array) -> Array:
-    return (C - center) / scale
-
-
 @dataclass(frozen=True)
 class Smoother:
     """Regression of numbers on parameters.
 
-    - `name` ({"average", "linear", "gaussian-process"}): no dependence; least squares of [1, c]; the same trend and a
-      Gaussian process around it with the covariance ``exp(-|c - c'|^2 / (2 l^2))`` of parameters in units of their
-      standard deviation.
-    - `noise`: variance of a demonstration that the parameters do not explain, as a share of the process's.
+    "average" has no dependence, "linear" is least squares of [1, c], and "gaussian-process" has the same trend and the
+    covariance ``exp(-|c - c'|^2 / (2 l^2))`` around it, of parameters in units of their standard deviation.
     """
 
     name: str
@@ -290,11 +261,7 @@ def _covariance(smoother: Smoother, A: Array, B: Array) -> Array:
 
 
 def demonstrated_parameters(parameters: ArrayLike, n: int) -> Array:
-    """The parameters (n, k) of n demonstrations, as a copy.
-
-    Raises `TrajectoryError`: another number or shape, not finite, equal in all demonstrations or in all but one, or
-    depending on each other; fewer than k + 2 demonstrations.
-    """
+    """The parameters (n, k) of n demonstrations, as a copy."""
     C = as_numbers(parameters, "parameters")
     C = C[:, None] if C.ndim == 1 else C
     if C.ndim != 2 or len(C) != n or not C.shape[1]:
@@ -328,10 +295,7 @@ def demonstrated_parameters(parameters: ArrayLike, n: int) -> Array:
 
 
 def check_range(C: Array, shown: Array) -> None:
-    """Refuse parameters (m, k) outside the box around the demonstrated ones (n, k).
-
-    Raises `SpecificationError`: the first such parameter, and how far beyond the range it is.
-    """
+    """Refuse parameters (m, k) outside the box around the demonstrated ones (n, k)."""
     lowest, highest = shown.min(axis=0), shown.max(axis=0)
     beyond = np.maximum(np.maximum(lowest - C, C - highest), 0.0)
     outside = beyond > _SLACK * (highest - lowest)

@@ -1,12 +1,9 @@
-"""Policy improvement of a primitive by trying variants of it in batches.
+"""Policy improvement of a primitive by trying variants that are smooth in acceleration, in batches.
 
-Variants of a primitive that are smooth in acceleration and keep start, goal and how they are reached.
-
-The weights of one dimension are changed with the covariance ``(L'L)^-1``, L being second differences with zeros beyond
-both ends, as in E. Theodorou, J. Buchli and S. Schaal, "A Generalized Path Integral Control Approach to Reinforcement
-Learning", JMLR 11, 2010, and M. Kalakrishnan et al., "STOMP", ICRA 2011. Theirs are differences of the
-path; weights are accelerations, so here the acceleration itself has no kinks. That covariance is conditioned on no
-change of position and velocity at the end.
+The weights of one dimension change with the covariance ``(L'L)^-1``, L being second differences with zeros beyond both
+ends, as in E. Theodorou, J. Buchli and S. Schaal, "A Generalized Path Integral Control Approach to Reinforcement
+Learning", JMLR 11, 2010, and M. Kalakrishnan et al., "STOMP", ICRA 2011, for differences of the path. It is conditioned
+on no change of position and velocity at the end.
 """
 
 from __future__ import annotations
@@ -31,10 +28,7 @@ _DECAY = 0.95  # of the exploration of PI^BB, in each update
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """Distribution of the next variants: ``center + size * N(0, covariance)``.
-
-    Variants are numbers z (p,) around a center, in units in which the first ones have the covariance I.
-    """
+    """Distribution of the next variants z (p,), ``center + size * N(0, covariance)``; that of the first is N(0, I)."""
 
     center: Array  # (p,)
     size: float
@@ -60,8 +54,7 @@ def path_integral(search: Search, variants: Array, costs: Array) -> Search:
     """PI^BB: the mean of the variants, weighted by ``exp(-h (J - min J) / (max J - min J))``, h = 10.
 
     F. Stulp and O. Sigaud, "Policy Improvement Methods: Between Black-Box Optimization and Episodic Reinforcement
-    Learning", 2012: path integrals with one change for a whole rollout. The exploration shrinks by 5 % an update and
-    keeps its shape.
+    Learning", 2012. The exploration shrinks by 5 % an update and keeps its shape.
     """
     relative = (costs - costs.min()) / max(np.ptp(costs), np.finfo(float).tiny)
     weights = np.exp(-_SHARPNESS * relative)
@@ -72,9 +65,8 @@ def path_integral(search: Search, variants: Array, costs: Array) -> Search:
 def covariance_adaptation(search: Search, variants: Array, costs: Array) -> Search:
     """CMA-ES: the better half, ranked; covariance and size follow the steps that were taken.
 
-    N. Hansen, "The CMA Evolution Strategy: A Tutorial", arXiv:1604.00772, 2016, Figure 6 and Table 1 with positive
-    weights: Eq. (42) center, (43)-(44) size, (45)-(47) covariance. The center is one of the variants and no
-    draw, so it is left out here.
+    N. Hansen, "The CMA Evolution Strategy: A Tutorial", arXiv:1604.00772, 2016, Table 1 with positive weights: Eq. (42)
+    center, (43)-(44) size, (45)-(47) covariance. The center is one of the variants and no draw: it is left out here.
     """
     p, drawn, paid = len(search.center), variants[1:], costs[1:]
     half = len(drawn) // 2
@@ -121,8 +113,7 @@ class Improvement:
     primitive : Primitives
         The variant with the least cost of all that were tried, a batch of one.
     costs : ndarray of shape (u, n)
-        Cost of each variant in each update; the first of each row is the center of the search, the very first the
-        primitive as it was.
+        Cost of each variant in each update; the first of a row is the center, the very first the primitive as it was.
     exploration : ndarray of shape (u,)
         Standard deviation of the paths in each update, where it is largest, as a share of the movement's extent.
     stopped : str
@@ -194,11 +185,6 @@ def improve(  # noqa: PLR0913 - one parameter per option
     progress : bool, default False
         Show a progress bar.
 
-    Returns
-    -------
-    Improvement
-        With ``primitive``, never worse than what it was, and the history of costs.
-
     Raises
     ------
     SpecificationError
@@ -217,7 +203,20 @@ def improve(  # noqa: PLR0913 - one parameter per option
     from tqdm import tqdm  # only who searches needs it
 
     check_primitives(primitive)
-    _check_options(primitive, rollouts, updates, method, exploration, target, smallest)
+    if len(primitive) != 1:
+        raise SpecificationError(f"expected one primitive to improve, got {len(primitive)}; choose one, primitives[:1]")
+    if primitive.dmp.n_basis < _FEWEST_BASIS:
+        raise SpecificationError(
+            f"expected at least {_FEWEST_BASIS} basis functions, so that the shape can change and the end stay, got "
+            f"{primitive.dmp.n_basis}"
+        )
+    check_count("rollouts", rollouts, 5, most=_MOST)
+    check_count("updates", updates, 1, most=_MOST)
+    check_choice("method", method, list(METHODS))
+    check_number("exploration", exploration, above=0.0, most=_WIDEST)
+    check_number("smallest", smallest, least=0.0)
+    if target is not None:
+        check_number("target", target)
     check_switch("progress", progress)
     if not callable(cost):
         raise SpecificationError(f"expected cost to be a function of a Rollout, got {cost!r}")
@@ -250,37 +249,8 @@ def improve(  # noqa: PLR0913 - one parameter per option
     return Improvement(variants(primitive, factor, best[1][None]), np.array(tried), np.array(sizes), stopped)
 
 
-def _check_options(  # noqa: PLR0913, PLR0917 - the options of improve, in its order
-    primitive: Primitives,
-    rollouts: int,
-    updates: int,
-    method: str,
-    exploration: float,
-    target: float | None,
-    smallest: float,
-) -> None:
-    if len(primitive) != 1:
-        raise SpecificationError(f"expected one primitive to improve, got {len(primitive)}; choose one, primitives[:1]")
-    if primitive.dmp.n_basis < _FEWEST_BASIS:
-        raise SpecificationError(
-            f"expected at least {_FEWEST_BASIS} basis functions, so that the shape can change and the end stay, got "
-            f"{primitive.dmp.n_basis}"
-        )
-    check_count("rollouts", rollouts, 5, most=_MOST)
-    check_count("updates", updates, 1, most=_MOST)
-    check_choice("method", method, list(METHODS))
-    check_number("exploration", exploration, above=0.0, most=_WIDEST)
-    check_number("smallest", smallest, least=0.0)
-    if target is not None:
-        check_number("target", target)
-
-
 def checked_costs(costs: ArrayLike, n: int, update: int) -> Array:
-    """The costs (n,) of the movements of an update, as a copy.
-
-    Raises `SpecificationError`: another number of costs, or costs that are NaN or infinite; with the number of the
-    movement.
-    """
+    """The costs (n,) of the movements of an update, as a copy."""
     paid = as_numbers(costs, "cost", f"{n} numbers, the cost of each movement")
     if paid.shape != (n,):
         raise SpecificationError(
@@ -297,10 +267,7 @@ def checked_costs(costs: ArrayLike, n: int, update: int) -> Array:
 
 
 def exploration_factor(dmp: Specification) -> Array:
-    """F of shape (r, N), ``F.T @ F`` being the covariance of one dimension's change of W.
-
-    The standard deviation of the path is 1 where it is largest; rows are in the order of how much they change the path.
-    """
+    """F (r, N), ``F.T @ F`` being the covariance of one dimension's change of W; the paths deviate by 1 at the most."""
     n_basis = dmp.n_basis
     L = np.diff(np.eye(n_basis + 4, n_basis, -2), n=2, axis=0)
     smooth = np.linalg.inv(np.linalg.qr(L, mode="r")).T  # F0' F0 = (L'L)^-1
@@ -321,10 +288,7 @@ def variants(primitive: Primitives, factor: Array, z: Array) -> Primitives:
 
 
 def largest_deviation(search: Search, responses: Array) -> float:
-    """Standard deviation of the paths where it is largest, over dimensions and time; 1 at the start.
-
-    `responses` (r, T) are what each of the r numbers of a dimension adds to its path.
-    """
+    """Largest standard deviation of the paths, 1 at the start; `responses` (r, T) are the paths of r numbers."""
     r = len(responses)
     blocks = search.covariance.reshape(-1, r, search.covariance.shape[0] // r, r)
     variances = [np.einsum("ru,rs,su->u", responses, blocks[k, :, k], responses).max() for k in range(len(blocks))]

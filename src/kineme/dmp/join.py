@@ -1,22 +1,17 @@
 """Several movements as one: one after another, or one that turns into another on the way.
 
 The paths are laid out over time and learned again as one primitive whose basis functions are as dense in time as those
-of the densest part. They overlap across the transitions, so position, velocity and acceleration are continuous
-everywhere, as in T. Kulvicius, K. Ning, M. Tamosiunaite, F. Worgotter, "Joining Movement Sequences: Modified Dynamic
-Movement Primitives for Robotics Applications Exemplified on Handwriting", IEEE Transactions on Robotics 28(1), 2012,
-which lets the kernels of two movements overlap. Ours are fitted anew, so the path stays near its parts; giving these a
-common velocity and acceleration at each transition, by an exact solve, bends them more. docs/guide/modulation.md holds
-both as `python -m bench --only joining` measures them.
+of the densest part. They overlap across the transitions, so all is continuous, as in T. Kulvicius, K. Ning, M.
+Tamosiunaite, F. Worgotter, "Joining Movement Sequences: Modified Dynamic Movement Primitives for Robotics Applications
+Exemplified on Handwriting", IEEE Transactions on Robotics 28(1), 2012. Ours are fitted anew, so the path stays near its
+parts; docs/guide/modulation.md holds both as `python -m bench --only joining` measures them.
 
-Two movements over one phase, whose places keep a difference over a stretch: two arms that carry one thing.
-
-With the changes of both weights in one vector, what is asked for is linear in it as via points are,
+Two arms that carry one thing keep a difference over a stretch. With the changes of both weights in one vector,
 
     Phi_right(u) dW_right - Phi_left(u) dW_left = offset - (x_right - x_left)        for u in the stretch,
 
-and goals and end velocities stay. Both give: the most probable change of both together, under the covariances of
-`kineme.dmp.discrete.modulate`: of single demonstrations, so that the sum of both mean square accelerations of
-the change is least; of averages, as their demonstrations differ.
+is linear in it, as via points are, and goals and end velocities stay: the most probable change of both together, under
+the covariances of `kineme.dmp.discrete.modulate`.
 """
 
 from __future__ import annotations
@@ -31,14 +26,15 @@ from numpy.typing import ArrayLike
 from scipy.linalg import block_diag, solve_triangular
 
 from kineme.dmp.discrete.dmp import DMP, Primitives
-from kineme.dmp.discrete.modulate import SLACK, changes, mixed_factor, path_variance, smooth_factor
+from kineme.dmp.discrete.modulate import SLACK, changes, mixed_factor, path_at, path_variance, smooth_factor
 from kineme.dmp.discrete.operators import condition, decoder, decoder_at, smoothness_factor, trajectory_columns
 from kineme.dmp.discrete.rollout import Rollout
+from kineme.dmp.discrete.specification import MOST_POINTS
 from kineme.dmp.discrete.via_points import per_movement
 from kineme.dmp.pose.pose_dmp import PosePrimitives
 from kineme.dmp.pose.pose_rollout import PoseRollout, rates_in_tangent
 from kineme.dmp.pose.tangent import unwrapped
-from kineme.dmp.recorded_as import DiscreteSteps, RecordedAs, merged
+from kineme.dmp.recorded_as import DiscreteSteps, RecordedAs, concatenated, merged
 from kineme.dmp.styles.average import AveragePrimitive
 from kineme.errors import ExtrapolationWarning, SpecificationError, TrajectoryError, warn
 from kineme.movements.channels.channel import check_alike
@@ -83,6 +79,10 @@ def join(
     other primitive. Its start, goal and the velocities there are exact; in between it deviates by tenths of a percent
     of its extent from the parts, near the transitions.
 
+    It has the specification of the first part, ``fit="trajectory"``, and as many basis functions per second as that
+    part which has most, and that movement which needs most. Labels, names and channels are kept where they are those of
+    all parts; discrete channels step when they did in the parts, those of each part until the next one begins.
+
     Parameters
     ----------
     parts : sequence of Primitives or Rollout, or of PosePrimitives or PoseRollout
@@ -93,14 +93,6 @@ def join(
     overlap : float, default 0.0
         Time [s] for which two neighbors go on together: the end of one fades into the beginning of the next, which
         begins that much earlier. It cuts the corner instead of slowing down in it.
-
-    Returns
-    -------
-    Primitives, or PosePrimitives of poses
-        With the specification of the first part, ``fit="trajectory"``, and as many basis functions per second as
-        that part which has most; the movements of a batch share one specification, so all have as many as the one that
-        needs most. Labels and names are kept where they are those of all parts, channels if all were recorded as the
-        same; discrete channels step when they did in the parts, those of each part until the next one begins.
 
     Raises
     ------
@@ -117,9 +109,8 @@ def join(
         raise SpecificationError(
             f"expected overlap of at most half the shortest part, {0.5 * durations.min():.3g} s, got {overlap:g} s"
         )
-    plain = [movement for movement in movements if isinstance(movement, Primitives)]
-    turning = [movement for movement in movements if isinstance(movement, PosePrimitives)]
-    laid, references = laid_out_poses(turning, shift) if turning else (laid_out(plain, shift), None)
+    turning = isinstance(movements[0], PosePrimitives)
+    laid, references = laid_out_poses(movements, shift) if turning else (laid_out(movements, shift), None)
     begins = np.vstack((np.zeros(durations.shape[1]), np.cumsum(durations[:-1] - overlap, axis=0)))
     total = begins[-1] + durations[-1]
     dmp = fitting_specification(
@@ -134,11 +125,9 @@ def join(
     when = [np.column_stack((a, a + b)) / total[:, None] for a, b in zip(begins, durations, strict=True)]
     ends = (laid[0].begin_velocities, laid[-1].positions[:, -1], laid[-1].end_velocities)
     joined = carried_over(refitted(dmp, path, times, ends), movements, when, begins[1:] / total)
-    return (
-        joined
-        if references is None
-        else PosePrimitives(replace(joined, recorded_as=None), references, joined.recorded_as)
-    )
+    if references is None:
+        return joined
+    return PosePrimitives(replace(joined, recorded_as=None), references, joined.recorded_as)
 
 
 def _at(x: Array, u: Array) -> Array:
@@ -170,12 +159,7 @@ def laid_out(movements: Sequence[Primitives], shift: bool) -> list[LaidOut]:
 
 
 def laid_out_poses(movements: Sequence[PosePrimitives], shift: bool) -> tuple[list[LaidOut], Array]:
-    """The same of poses, in positions and rotation vectors from the last orientations of all, and these (n, 4 k).
-
-    A shifted part is turned as a tool that is mounted otherwise: its angular velocities stay.
-
-    Raises `TrajectoryError`: orientations farther than a full turn from the last one, about an axis that changes.
-    """
+    """The same of poses, in positions and rotation vectors from the last orientations of all, and these (n, 4 k)."""
     rolled: list[PoseRollout] = []
     for movement in movements:
         start = rolled[-1].positions[:, -1] if rolled else movement.starts
@@ -222,11 +206,7 @@ def _vectors(turned: Array, references: Array) -> Array:
     return vectors
 
 
-@overload
-def moving(parts: Sequence[Primitives | Rollout]) -> list[Primitives]: ...
-@overload
-def moving(parts: Sequence[Any], poses: bool) -> list[Primitives] | list[PosePrimitives]: ...
-def moving(parts: Sequence[Any], poses: bool = False) -> list[Primitives] | list[PosePrimitives]:
+def moving(parts: Sequence[Any], poses: bool = False) -> list[Any]:
     """All parts as primitives of the same number of movements; all of poses where that is possible and the first is."""
     if (
         isinstance(parts, (Primitives, Rollout, PosePrimitives, PoseRollout))
@@ -269,29 +249,15 @@ def within(stretch: tuple[float, float], name: str) -> tuple[float, float]:
 
 
 def fitting_specification(parts: Sequence[Primitives | PosePrimitives], n_basis: float) -> DMP:
-    """The specification of the first part, with which a path that was generated is fitted as it is.
-
-    Raises `SpecificationError`: more than 2,000 basis functions.
-    """
-    first = parts[0].dmp
-    least = max(part.dmp.n_points for part in parts)
-    n = math.ceil(n_basis - 1e-9)
+    """The specification of the first part, with which a path that was generated is fitted as it is."""
+    first, n = parts[0].dmp, math.ceil(n_basis - 1e-9)
+    n_points = max(min(MOST_POINTS, _PER_BASIS * n), *(part.dmp.n_points for part in parts))
     ridge = first.ridge if first.fit == "trajectory" else None
-    return replace(
-        first,
-        n_basis=n,
-        n_points=max(least, min(10_000, _PER_BASIS * n)),
-        fit="trajectory",
-        ridge=ridge,
-        preprocessing=(),
-    )
+    return replace(first, n_basis=n, n_points=n_points, fit="trajectory", ridge=ridge, preprocessing=())
 
 
 def smooth_rise(passed: Array, length: float) -> Array:
-    """From 0 to 1 over a length, ``10 z^3 - 15 z^4 + 6 z^5`` with z = passed / length; a step if the length is 0.
-
-    Its first two derivatives are 0 at both ends.
-    """
+    """From 0 to 1 over a length, ``10 z^3 - 15 z^4 + 6 z^5``, with two derivatives of 0 at both ends; or a step."""
     if length == 0.0:
         return np.asarray(np.where(passed >= 0.0, 1.0, 0.0))
     z = np.clip(passed / length, 0.0, 1.0)
@@ -299,7 +265,7 @@ def smooth_rise(passed: Array, length: float) -> Array:
 
 
 def refitted(dmp: DMP, path: Array, times: Array, ends: tuple[Array, Array, Array]) -> Primitives:
-    """Learn paths (n, T, d) at times (n, T), under the condition that their ends are exactly those that are given.
+    """Learn paths (n, T, d) at times (n, T), under the condition that their ends are exactly as given.
 
     `ends` are the velocities at the start (n, d), the positions at the end, and the velocities there.
     """
@@ -319,11 +285,7 @@ def refitted(dmp: DMP, path: Array, times: Array, ends: tuple[Array, Array, Arra
 
 
 def _end_gain(dmp: DMP) -> Array:
-    """From initial velocity, goal and end velocity that are missing to W / K and v0 (3, N + 1), at the least cost.
-
-    The cost is what the fit minimizes, so the result is the fit under these conditions. The inverse of its second
-    derivatives is the covariance of `condition`; it keeps the path where it is, but near the ends.
-    """
+    """From initial velocity, goal and end velocity that are missing to W / K and v0 (3, N + 1), at the least cost."""
     response = decoder(dmp, dmp.n_points)
     columns, curvature = trajectory_columns(response, dmp.K)
     R = np.linalg.qr(np.vstack((columns, math.sqrt(dmp.ridge_strength) * curvature)), mode="r")
@@ -336,11 +298,10 @@ def _end_gain(dmp: DMP) -> Array:
 def carried_over(
     joined: Primitives, parts: Sequence[Primitives | PosePrimitives], when: Sequence[Array], switches: Array
 ) -> Primitives:
-    """The movements with the labels and names that all their parts have in common, and with their channels.
+    """The n movements with the labels, names and channels that all p parts have in common.
 
-    `joined`: n movements; `parts`: the p parts, each of n movements; `when` (n, 2 or more): of each part, at even
-    shares of its duration: when that is, as a share of the duration of the whole; `switches` (p - 1, n): from when on
-    discrete channels are those of the next part.
+    Of each part `when` (n, 2 or more) is the time of even shares of its duration, as a share of the whole; from
+    `switches` (p - 1, n) on, discrete channels are those of the next part.
     """
     labels, names = [part.labels for part in parts], [part.names for part in parts]
     first = labels[0]
@@ -364,7 +325,7 @@ def _one_after_another(parts: Sequence[DiscreteSteps], when: Sequence[Array], sw
     n = len(when[0])
     begins = np.vstack((np.zeros((1, n)), switches))
     ends = np.vstack((switches, np.full((1, n), np.inf)))
-    values, shares, lengths = [], [], []
+    movements = []
     for i in range(n):
         rows = [
             _within(part, i, at[i], (begins[k, i], ends[k, i]))
@@ -372,10 +333,8 @@ def _one_after_another(parts: Sequence[DiscreteSteps], when: Sequence[Array], sw
         ]
         value, share = (np.concatenate([row[k] for row in rows]) for k in (0, 1))
         changed = np.append(True, (value[1:] != value[:-1]).any(axis=1))
-        values.append(value[changed])
-        shares.append(share[changed])
-        lengths.append(int(changed.sum()))
-    return DiscreteSteps(np.concatenate(values), np.concatenate(shares), np.concatenate(([0], np.cumsum(lengths))))
+        movements.append(DiscreteSteps(value[changed], share[changed], np.array([0, changed.sum()])))
+    return concatenated(movements)
 
 
 def _within(part: DiscreteSteps, i: int, when: Array, stretch: tuple[float, float]) -> tuple[Array, Array]:
@@ -393,7 +352,7 @@ def blend(first: Primitives | Rollout, second: Primitives | Rollout, stretch: tu
 
     Both go on at the same phase t / tau, ``x = (1 - b) x_first + b x_second``, with b rising from 0 to 1 over the
     stretch, with its first two derivatives: so position, velocity and acceleration are continuous. The tempo changes
-    in the same way.
+    in the same way, discrete channels in the middle of the stretch; the larger number of basis functions is taken.
 
     Parameters
     ----------
@@ -402,17 +361,10 @@ def blend(first: Primitives | Rollout, second: Primitives | Rollout, stretch: tu
     stretch : tuple of float
         Where the change begins and where it ends, as shares of the duration.
 
-    Returns
-    -------
-    Primitives
-        As of `join`, with the larger number of basis functions. Discrete channels are those of the second movement
-        from the middle of the stretch on.
-
     Raises
     ------
     TrajectoryError
-        Something else than primitives and rollouts, different dimensions or numbers of movements; channels
-        that are known to differ, as joint angles and positions.
+        As of `join`.
     SpecificationError
         A stretch that is not within the movement.
     """
@@ -462,8 +414,7 @@ def couple(
     Raises
     ------
     TrajectoryError
-        Something else than primitives and rollouts, different dimensions or numbers of movements; channels
-        that are known to differ, as joint angles and positions; an offset of the wrong shape.
+        As of `join`; an offset of the wrong shape.
     SpecificationError
         A stretch that is not within the movement; too few basis functions to keep goals and velocities.
 
@@ -490,13 +441,14 @@ def couple(
     arms = [Primitives.from_rollout(arm.rollout(duration=longer)) for arm in arms]
     n_times = math.ceil(_POINTS_PER_BASIS * max(arm.dmp.n_basis for arm in arms) * (end - begin)) + 2
     times = tuple(np.linspace(begin, end, n_times).tolist())
-    paths = [_places(arm, times) for arm in arms]  # (n, d, K)
+    paths = [path_at(arm.rollout(), times) for arm in arms]  # (n, d, K)
     wanted = _offset(offset, paths[1] - paths[0])
     coupled = [
         replace(arm, scaled_weights=arm.scaled_weights + change)
         for arm, change in zip(arms, _shared(arms, spread, times, wanted - (paths[1] - paths[0])), strict=True)
     ]
-    missing = np.abs(_places(coupled[1], times) - _places(coupled[0], times) - wanted)
+    reached = [path_at(arm.rollout(), times) for arm in coupled]
+    missing = np.abs(reached[1] - reached[0] - wanted)
     worst = np.where(np.isnan(missing), 0.0, missing).max(axis=(1, 2))
     extents = np.maximum(*(arm.extents.max(axis=1) for arm in coupled))
     if (worst > _LOOSE * extents).any():
@@ -508,15 +460,6 @@ def couple(
             stacklevel=2,
         )
     return coupled[0], coupled[1]
-
-
-def _places(arm: Primitives, times: tuple[float, ...]) -> Array:
-    """Positions (n, d, K) at any times."""
-    response = decoder_at(arm.dmp, times)
-    path = arm.scaled_weights @ response.Phi[0].T + arm.starts[:, :, None]
-    path += (arm.goals - arm.starts)[:, :, None] * response.goal[0]
-    path += (arm.velocities * arm.durations[:, None])[:, :, None] * response.velocity[0]
-    return np.asarray(path)
 
 
 def _offset(offset: ArrayLike | None, difference: Array) -> Array:

@@ -1,8 +1,7 @@
 """Channels of the recordings of learned movements, and from the columns of a primitive back to those of the recording.
 
-The columns of a primitive are the positions and angles, in the order of their channels, and after them the orientations
-as (w, x, y, z); its rates are those of the positions and angles, and after them angular velocities in the world frame.
-Discrete channels step as they were recorded, each step at its share of the duration.
+Those of a primitive are the positions and angles, in the order of their channels, and then orientations (w, x, y, z),
+or their angular velocities in the world frame. Discrete channels step at their shares of the duration.
 """
 
 from __future__ import annotations
@@ -10,12 +9,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.movements.channels.channel import Channels, is_plain, learned_names, same_columns
-from kineme.movements.channels.coordinates import as_wxyz, columns_of, from_wxyz
+from kineme.movements.channels.channel import Channels, is_plain, learned_names, recorded_names, same_columns
+from kineme.movements.channels.coordinates import columns_of
 from kineme.movements.preparation.trim import Step, TrimRest, preprocess
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import Movements, of_channels
@@ -24,19 +24,20 @@ from kineme.validation import Array
 _ROUNDING = 1e-9  # of a duration: shares that are equal but for rounding
 
 
+def make_read_only(record: Any, names: Iterable[str]) -> None:
+    """Let a frozen record hold views of its arrays that nobody can write to."""
+    for name in names:
+        view = getattr(record, name).view()
+        view.setflags(write=False)
+        object.__setattr__(record, name, view)
+
+
 @dataclass(frozen=True, eq=False)
 class RecordedAs:
-    """The channels of the recordings that a batch of primitives was learned from.
-
-    Attributes
-    ----------
-    channels : tuple of Channel
-    steps : DiscreteSteps or None
-        Of the discrete channels, if there are any and it is known when they step.
-    """
+    """The channels of the recordings that a batch of primitives was learned from."""
 
     channels: Channels
-    steps: DiscreteSteps | None = None
+    steps: DiscreteSteps | None = None  # of discrete channels, where it is known when they step
 
     def take(self, chosen: NDArray[np.intp]) -> RecordedAs:
         """Return that of the chosen movements."""
@@ -65,8 +66,7 @@ class RecordedAs:
     @property
     def column_names(self) -> tuple[str, ...]:
         """Names of the columns of a primitive."""
-        turned = [channel.columns[channel.order.index(part)] for channel in self.orientations for part in "wxyz"]
-        return (*(name for channel in self.plain for name in channel.columns), *turned)
+        return tuple(recorded_names(self.channels)[k] for k in primitive_columns(self.channels))
 
     @property
     def rate_names(self) -> tuple[str, ...]:
@@ -76,26 +76,16 @@ class RecordedAs:
     @property
     def rates_in_order(self) -> list[int]:
         """The rates of a primitive in the order of the recording."""
-        kinds = [channel.kind for channel in self.moving for _ in channel.coordinates]
-        plain = [k for k, kind in enumerate(kinds) if kind != "orientation"]
-        turned = [k for k, kind in enumerate(kinds) if kind == "orientation"]
-        return np.argsort(plain + turned).tolist()
+        turned = [channel.kind == "orientation" for channel in self.moving for _ in channel.coordinates]
+        return np.argsort(np.argsort(turned, kind="stable")).tolist()
 
 
 def recorded_as(movements: Demonstrations, steps: Iterable[Step] = ()) -> RecordedAs | None:
-    """Return what movements were recorded as, where that is known.
-
-    Of the steps that are applied before learning, trimming moves the steps of discrete channels, too.
-    """
+    """Channels and discrete steps of movements, where they are known; trimming before learning moves the steps."""
     channels = movements.channels
     if channels is None:
         return None
-    columns = [
-        k
-        for channel, some in zip(channels, columns_of(channels), strict=True)
-        if channel.kind == "discrete"
-        for k in range(some.start, some.stop)
-    ]
+    columns = [k for k, kind in enumerate(c.kind for c in channels for _ in c.columns) if kind == "discrete"]
     if not columns:
         return RecordedAs(channels)
     trimmed = preprocess(movements, [step for step in steps if isinstance(step, TrimRest)])
@@ -103,10 +93,7 @@ def recorded_as(movements: Demonstrations, steps: Iterable[Step] = ()) -> Record
 
 
 def merged(several: Sequence[RecordedAs | None]) -> RecordedAs | None:
-    """Merge those of several batches, one after the other; None if they were not recorded as the same.
-
-    Without steps where those of a batch are not known.
-    """
+    """Those of several batches, one after the other; None if these were not recorded as the same."""
     recordings = [about for about in several if about is not None]
     if len(recordings) < len(several) or not all(
         same_columns(about.channels, recordings[0].channels) for about in recordings
@@ -116,43 +103,28 @@ def merged(several: Sequence[RecordedAs | None]) -> RecordedAs | None:
     return replace(recordings[0], steps=concatenated(steps) if len(steps) == len(recordings) else None)
 
 
-def in_primitive(point: Array, about: RecordedAs) -> Array:
-    """A point in the columns of `RecordedAs.moving`, in the columns of the primitive."""
-    parts = [(channel, point[columns]) for channel, columns in zip(about.moving, columns_of(about.moving), strict=True)]
-    return np.concatenate(
-        [part for channel, part in parts if channel.kind != "orientation"]
-        + [as_wxyz(part, channel) for channel, part in parts if channel.kind == "orientation"]
-    )
+def primitive_columns(channels: Channels) -> list[int]:
+    """Numbers of the columns of a recording in the order of a primitive's, which has no discrete ones."""
+    named = list(zip(channels, columns_of(channels), strict=True))
+    plain = [
+        k for channel, some in named if channel.kind in ("position", "angle") for k in range(some.start, some.stop)
+    ]
+    turned = [(channel.order, some.start) for channel, some in named if channel.kind == "orientation"]
+    return plain + [start + order.index(part) for order, start in turned for part in "wxyz"]
 
 
 def in_recording(columns: Array, about: RecordedAs, i: int, shares: Array) -> Array:
-    """Movement i in the columns of a primitive (T, d), in all columns of the recording.
-
-    `columns` (T, d); `i`: which movement of the batch the steps of discrete channels are taken from; `shares` (T,):
-    when, as a share of the duration.
-    """
-    values = None if about.steps is None else about.steps.at(i, shares)
-    parts, plain, turned, discrete = [], 0, len(about.plain), 0
-    for channel in about.channels:
-        if channel.kind == "orientation":
-            parts.append(from_wxyz(columns[:, turned : turned + 4], channel))
-            turned += 4
-        elif channel.kind == "discrete":
-            assert values is not None
-            parts.append(values[:, discrete : discrete + 1])
-            discrete += 1
-        else:
-            parts.append(columns[:, plain : plain + 1])
-            plain += 1
-    return np.concatenate(parts, axis=1)
+    """Movement i of a batch (T, d), given in the columns of a primitive, in all columns of the recording."""
+    order = primitive_columns(about.channels)
+    recorded = np.empty((len(columns), len(recorded_names(about.channels))))
+    recorded[:, order] = columns
+    if about.steps is not None:
+        recorded[:, np.setdiff1d(np.arange(recorded.shape[1]), order)] = about.steps.at(i, shares)
+    return recorded
 
 
 def with_recorded(movements: Movements, about: RecordedAs, shares: Array, n_primitives: int) -> Movements:
-    """Movements of T samples each in the columns of primitives, with their channels.
-
-    `movements`: all of T samples; `shares` (T,): when the samples are, as a share of the duration; `n_primitives`: one,
-    for all movements, or one for each.
-    """
+    """Movements in the columns of primitives, all with samples at the same shares (T,), with their channels."""
     named = {"channels": about.channels, "dimensions": learned_names(about.channels)}
     if is_plain(about.channels):
         return replace(movements, **named)  # type: ignore[arg-type]
@@ -173,10 +145,7 @@ class DiscreteSteps:
     offsets: NDArray[np.intp]  # (n + 1,), movement i has the steps ``offsets[i]:offsets[i + 1]``
 
     def __post_init__(self) -> None:
-        for name in ("values", "shares", "offsets"):
-            view = getattr(self, name).view()
-            view.setflags(write=False)
-            object.__setattr__(self, name, view)
+        make_read_only(self, ("values", "shares", "offsets"))
 
     def at(self, i: int, shares: Array) -> Array:
         """The values (T, c) of movement i at shares (T,) of its duration; past the end the last ones."""

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from kineme.validation import Array, check_number
+from kineme.validation import Array, check_choice, check_number
 
 _DEFAULT_RIDGE = {"forcing": 1e-8, "trajectory": 1e-6}
+FITS = tuple(_DEFAULT_RIDGE)
 
 #: Nodes and weights of Gauss-Legendre quadrature on [0, 1]: with 8 of them the order is 16.
 NODES, NODE_WEIGHTS = np.polynomial.legendre.leggauss(8)
@@ -25,6 +26,7 @@ class SpringDamper:
     ridge: float | None
 
     def _check_spring_damper(self) -> None:
+        check_choice("fit", self.fit, FITS)
         check_number("stiffness", self.stiffness, above=0.0)
         if self.damping is not None:
             check_number("damping", self.damping, above=0.0)

@@ -37,11 +37,20 @@ def features_of(primitives: Primitives | RhythmicPrimitives, feature: str, n_sam
     return by_time.transpose(0, 2, 1).reshape(len(primitives), -1)
 
 
-class MovementFeatures(TransformerMixin, BaseEstimator, Generic[Specification]):
+class _TakesMovements(TransformerMixin, BaseEstimator):
+    """A transformer of movements, no rows of numbers."""
+
+    def __sklearn_tags__(self) -> Any:
+        tags = super().__sklearn_tags__()
+        tags.input_tags.two_d_array = False
+        tags.input_tags.three_d_array = True
+        return tags
+
+
+class MovementFeatures(_TakesMovements, Generic[Specification]):
     """Base of transformers that learn one primitive per movement and describe it by one feature.
 
-    The fields of `dmp` are parameters of the transformer too, as ``dmp__n_basis`` and so on: `set_params` replaces
-    the specification, which is itself never changed.
+    The fields of `dmp` are parameters, too, as ``dmp__n_basis``: `set_params` replaces the specification.
     """
 
     _specification_type: ClassVar[type]  # of the specification
@@ -94,6 +103,15 @@ class MovementFeatures(TransformerMixin, BaseEstimator, Generic[Specification]):
             self.dmp = replace(self._specification(), **nested)
         return self
 
+    def fit(self, X: MovementsLike, y: Any = None) -> Self:
+        """Check the parameters and store the number of dimensions; y is ignored."""
+        check_choice("feature", self.feature, list(FEATURES))
+        check_count("n_samples", self.n_samples, 2)
+        check_choice("dtype", self.dtype, ("float64", "float32"))
+        self.dmp_ = self._specification()
+        self.n_dims_ = Demonstrations.of(X).n_dims
+        return self
+
     def transform(self, X: MovementsLike) -> NDArray[Any]:
         """Features of movements, shape (n, d * S), or (n, d * N) for weights.
 
@@ -120,13 +138,6 @@ class MovementFeatures(TransformerMixin, BaseEstimator, Generic[Specification]):
         names = [f"{axis}_{k + 1}" for axis in axis_names(self.n_dims_) for k in range(size)]
         return np.array(names, dtype=object)
 
-    def _checked(self) -> Specification:
-        """The specification, after a check of all other parameters."""
-        check_choice("feature", self.feature, list(FEATURES))
-        check_count("n_samples", self.n_samples, 2)
-        check_choice("dtype", self.dtype, ("float64", "float32"))
-        return self._specification()
-
     def _specification(self) -> Specification:
         dmp = self._specification_type() if self.dmp is None else self.dmp
         if not isinstance(dmp, self._specification_type):
@@ -146,12 +157,6 @@ class MovementFeatures(TransformerMixin, BaseEstimator, Generic[Specification]):
                 f"{self._specification_type.__name__} has no parameter {', '.join(map(repr, unknown))}; it has {names}"
             )
         return nested, others
-
-    def __sklearn_tags__(self) -> Any:
-        tags = super().__sklearn_tags__()
-        tags.input_tags.two_d_array = False
-        tags.input_tags.three_d_array = True
-        return tags
 
 
 class DMPFeatures(MovementFeatures[DMP]):
@@ -190,12 +195,6 @@ class DMPFeatures(MovementFeatures[DMP]):
 
     _specification_type: ClassVar[type] = DMP
 
-    def fit(self, X: MovementsLike, y: Any = None) -> Self:
-        """Check the parameters and store the number of dimensions; y is ignored."""
-        self.dmp_ = self._checked()
-        self.n_dims_ = Demonstrations.of(X).n_dims
-        return self
-
 
 class RhythmicFeatures(MovementFeatures[RhythmicDMP]):
     """Describe each recording by its rhythmic DMP: features of one cycle, wherever it started, rows as in Eq. (9).
@@ -230,17 +229,14 @@ class RhythmicFeatures(MovementFeatures[RhythmicDMP]):
         TrajectoryError
             Recordings that cannot be used; see `RhythmicDMP.learn`.
         """
-        dmp = self._checked()
-        demonstrations = Demonstrations.of(X)
-        if dmp.align_on is None:
-            aligned_on = dmp.learn(demonstrations).aligned_on
-            dmp = replace(dmp, align_on=int(np.bincount(aligned_on).argmax()))
-        self.dmp_ = dmp
-        self.n_dims_ = demonstrations.n_dims
+        super().fit(demonstrations := Demonstrations.of(X))
+        if self.dmp_.align_on is None:
+            aligned_on = self.dmp_.learn(demonstrations).aligned_on
+            self.dmp_ = replace(self.dmp_, align_on=int(np.bincount(aligned_on).argmax()))
         return self
 
 
-class PoseFeatures(TransformerMixin, BaseEstimator):
+class PoseFeatures(_TakesMovements):
     """Describe movements of an orientation, or of a position and an orientation, by their DMPs.
 
     The features of `DMPFeatures` on the rotation vector from the goal; see `PoseDMP`.
@@ -252,8 +248,7 @@ class PoseFeatures(TransformerMixin, BaseEstimator):
         ``features__dmp__n_basis`` and so on.
     orientation_weight : float, default 0.2
         Weight of a radian beside the positions, in their unit per radian. With 0.2 m, about the length of a hand or a
-        tool, a rotation counts as much as the displacement of the tip. Positions in millimeters need 200. Not used
-        without positions.
+        tool, a rotation counts as much as the displacement of the tip. Positions in millimeters need 200.
 
     Attributes
     ----------
@@ -315,9 +310,3 @@ class PoseFeatures(TransformerMixin, BaseEstimator):
         weights = np.repeat([1.0, float(self.orientation_weight)], 3)
         weighted = replace(tangent.movements, positions=tangent.positions * weights)
         return Demonstrations.of_movements(weighted, tangent.steps)
-
-    def __sklearn_tags__(self) -> Any:
-        tags = super().__sklearn_tags__()
-        tags.input_tags.two_d_array = False
-        tags.input_tags.three_d_array = True
-        return tags

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kineme.dmp.control.plan import MovingGoal, ObstacleAvoidance, Status, steering
-from kineme.dmp.discrete.plan import plan_of
+from kineme.dmp.discrete.modulate import plan_of
 
 
 def test_how_strongly_obstacles_turn_a_movement_by_default():

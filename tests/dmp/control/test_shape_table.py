@@ -8,7 +8,7 @@ import pytest
 from kineme import DMP
 from kineme.dmp.control import _compiled
 from kineme.dmp.control.stepping import shape_table
-from kineme.dmp.discrete.plan import plan_of
+from kineme.dmp.discrete.modulate import plan_of
 
 
 def look_up(table, u):

@@ -100,7 +100,7 @@ def test_the_forcing_target_is_the_printed_equation_solved_for_f(formulation):
             scale, f = g - x0, (a + dmp.D * v - dmp.K * (g - x)) / (g - x0)
         else:
             scale, f = dmp.K, s * ((a + dmp.D * v - (1 - s) * dmp.K * (g - x)) / (s * dmp.K) - x0 + x)
-        target = forcing_target(dmp.basis, dmp.system, dmp.K, dmp.D, u) @ (x - x0) / scale
+        target = forcing_target(dmp, u) @ (x - x0) / scale
         errors.append(np.abs(target - f)[2:-2].max() / np.abs(f).max())
     assert errors[1] < 1e-3
     assert np.log2(errors[0] / errors[1]) > 1.9
@@ -123,8 +123,6 @@ def test_the_shape_attractor_is_the_term_of_eq_4(make_movement, agree):
 def test_the_kink_at_the_end_of_the_demonstration_falls_into_no_quadrature(formulation, n_basis, agree):
     """Past u = 1 an ungated f fades: steps that end at u = 1 and steps that straddle it give the same."""
     dmp = DMP(formulation, n_basis=n_basis)
-    straddling, ending = (
-        spring_damper_response(dmp.basis, dmp.system, dmp.K, dmp.D, np.linspace(0.0, 1.36, n)) for n in (9, 137)
-    )
+    straddling, ending = (spring_damper_response(dmp, np.linspace(0.0, 1.36, n)) for n in (9, 137))
     agree(straddling.Phi, ending.Phi[:, ::17], 1e-12)
     agree(straddling.goal, ending.goal[:, ::17], 1e-12)

@@ -46,7 +46,7 @@ def test_it_is_the_error_of_leaving_one_sample_out(formulation):
     ridges = np.array([1e-6, 1e-4, 1e-2])
     for n_basis in (6, 10, 15):
         one = replace(dmp, n_basis=n_basis)
-        found = score(one, rows, ridges).errors
+        found = score(one, rows, ridges)[0]
         real = [left_out(one, rows, ridge) for ridge in ridges]
         np.testing.assert_allclose(found, real, rtol=0.1)  # the mean of the diagonal stands for its elements
 
@@ -67,9 +67,9 @@ def test_degrees_of_freedom_are_the_trace_of_the_fit():
     columns, curvature = trajectory_columns(decoder(dmp, 50), dmp.K)
     normal = columns.T @ columns + 1e-5 * curvature.T @ curvature
     expected = np.trace(columns @ np.linalg.solve(normal, columns.T))
-    assert score(dmp, relative_paths(dmp, noisy(n_samples=50)), np.array([1e-5])).degrees_of_freedom[
-        0
-    ] == pytest.approx(expected, rel=1e-6)
+    assert score(dmp, relative_paths(dmp, noisy(n_samples=50)), np.array([1e-5]))[1][0] == pytest.approx(
+        expected, rel=1e-6
+    )
 
 
 def test_noise_is_smoothed_and_clean_paths_are_followed():

@@ -45,7 +45,7 @@ def test_the_response_converges_with_twice_the_nodes(monkeypatch, n_nodes):
         monkeypatch.setattr(operators, "NODES", 0.5 * (on_both_sides + 1.0))
         monkeypatch.setattr(operators, "NODE_WEIGHTS", 0.5 * weights)
         u = np.linspace(0, 1, 3)
-        return operators.spring_damper_response(dmp.basis, dmp.system, dmp.K, dmp.D, u)
+        return operators.spring_damper_response(dmp, u)
 
     exact = solve(200, 8)
     responses = [solve(steps, n_nodes) for steps in (20, 40, 80)]
@@ -57,9 +57,7 @@ def test_the_response_converges_with_twice_the_nodes(monkeypatch, n_nodes):
 def test_the_chosen_quadrature_has_converged():
     """Twice the steps change nothing: the 16th order is at rounding level for any basis."""
     dmp = DMP("bio-inspired", 80)
-    coarse, fine = (
-        operators.spring_damper_response(dmp.basis, dmp.system, dmp.K, dmp.D, np.linspace(0, 1, n)) for n in (80, 800)
-    )
+    coarse, fine = (operators.spring_damper_response(dmp, np.linspace(0, 1, n)) for n in (80, 800))
     np.testing.assert_allclose(coarse.Phi[:, -1], fine.Phi[:, -1], atol=1e-12)
 
 

@@ -7,7 +7,8 @@ import pytest
 
 import kineme
 from kineme import DMP
-from kineme.dmp.discrete.specification import FITS, FORMULATIONS, GATINGS
+from kineme.dmp.discrete.specification import FORMULATIONS, GATINGS
+from kineme.dmp.spring_damper import FITS
 from kineme.errors import SpecificationError
 from soaking import combined
 

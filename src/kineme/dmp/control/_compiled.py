@@ -15,10 +15,7 @@ _transition = jit(transition)
 
 @jit
 def advance(spring, table, avoidance, state, u, du, influences, motion):  # type: ignore[no-untyped-def]
-    """Write position, dx/du and x'' at u + du into `motion` (3, d); see `stepping.advance`.
-
-    `spring` is (K, D, intervals per unit of u), `table` a `ShapeTable`, `avoidance` (gamma, beta, fading, rounding).
-    """
+    """Write position, dx/du and x'' at u + du into `motion` (3, d); `stepping` passes the rest, in this order."""
     K, D, _ = spring
     goal, ratio, rate, push, obstacles, velocities = influences
     d = len(goal)

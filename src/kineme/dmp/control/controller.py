@@ -1,7 +1,4 @@
-"""One movement under live control, whatever kind of primitive it comes from.
-
-Limits of velocity and acceleration are reported where they are exceeded, never enforced.
-"""
+"""One movement under live control, whatever kind of primitive it comes from."""
 
 from __future__ import annotations
 
@@ -43,29 +40,14 @@ class Controller(Generic[S]):
     its rollout, at any dt. What is passed to a step is held over it: goal and coupling as they are, obstacles at rest
     or with their velocities (second order in dt).
 
-    Parameters
-    ----------
-    plan : Plan
-        The movement: equation, start and goal.
-    dt : float
-        Time of a step [s], at most the duration.
-    options : Options
-        Feedback, limits, goal filter, obstacle avoidance.
-
     Attributes
     ----------
     state : State
         After the last step; at first the start.
 
-    Raises
-    ------
-    SpecificationError
-        A step or a limit out of its range.
-
     Notes
     -----
-    The twin, compiled unless `KINEME_COMPILED=never`, is chosen and warmed up when the controller is made. A controller
-    belongs to one thread.
+    Its twin, compiled unless `KINEME_COMPILED=never`, is warmed up when it is made. It belongs to one thread.
     """
 
     state: S
@@ -86,7 +68,7 @@ class Controller(Generic[S]):
             _limit("velocity_limit", options.velocity_limit, self._n_dims),
             _limit("acceleration_limit", options.acceleration_limit, self._n_dims),
         )
-        self._limited = self._limits.exist
+        self._limited = any(limit is not None for limit in self._limits)
         self._settle = float(options.settle or plan.settle)
         self._advance = stepper(plan, options.avoidance or ObstacleAvoidance())
         self._zeros, self._nowhere = np.zeros(self._n_dims), np.zeros((0, plan.n_positions))
@@ -140,10 +122,6 @@ class Controller(Generic[S]):
             Where obstacles are now, and their velocities per second; by default at rest. Without, there are none.
         dt : float, optional
             Time of this step [s].
-
-        Returns
-        -------
-        State
         """
         wanted = read_number(tempo)
         if wanted >= 0.0 and wanted * self.dt <= self._longest:
@@ -280,10 +258,7 @@ class Controller(Generic[S]):
 
 
 class RunningSum:
-    """Neumaier's compensated sum: what rounding loses is kept and added back.
-
-    A. Neumaier, "Rundungsfehleranalyse einiger Verfahren zur Summation endlicher Summen", ZAMM 54, 1974.
-    """
+    """Neumaier's compensated sum (ZAMM 54, 1974): what rounding loses is added back."""
 
     __slots__ = ("_lost", "_sum")
 
@@ -309,14 +284,7 @@ class RunningSum:
 
 
 class Clock:
-    """Seconds and phase since the start.
-
-    The phase is normalized time u; that of a rhythm counts from `begin` and stays below 1, so that it is as exact after
-    a million periods as in the first.
-
-    `time`: seconds since the start; `u`: the phase, of a rhythm within its period; `progress`: the phase since the
-    start.
-    """
+    """Seconds and phase since the start; the phase `u` of a rhythm stays below 1, so that it stays exact."""
 
     __slots__ = ("_begin", "_periodic", "_phase", "_seconds", "_turns", "progress", "time", "u")
 
@@ -347,16 +315,8 @@ class Limits(NamedTuple):
     velocity: Array | None
     acceleration: Array | None
 
-    @property
-    def exist(self) -> bool:
-        """True with any limit."""
-        return self.velocity is not None or self.acceleration is not None
-
     def exceeded(self, before: Array, velocity: Array, acceleration: Array, dt: float) -> Status:
-        """Return those that are exceeded after a step of dt from the velocity `before` it, as members of `Status`.
-
-        The acceleration is the larger of that at the end of the step and the mean change of velocity over it.
-        """
+        """Status of the limits that a step of dt from the velocity `before` exceeds, by the mean change over it too."""
         events = _NOTHING
         if self.velocity is not None and (np.abs(velocity) > self.velocity).any():
             events |= Status.VELOCITY_LIMIT
@@ -388,13 +348,10 @@ def read_vector(value: Any, n_dims: int) -> Array | None:
 def _read_rows(value: Any, n_dims: int) -> Array | None:
     """`value` (m, d), or (d,) for one, as contiguous (m, d) finite float64, or None."""
     array = _read_array(value)
-    if array is not None and array.ndim == 1 and len(array):
-        array = array[None]
     if array is None or array.ndim not in (1, 2):
         return None
-    if array.size == 0:
-        return np.zeros((0, n_dims))
-    return np.ascontiguousarray(array) if array.shape[1] == n_dims else None
+    rows = np.atleast_2d(array) if array.size else np.zeros((0, n_dims))
+    return np.ascontiguousarray(rows) if rows.shape[1] == n_dims else None
 
 
 def read_points(positions: Any, velocities: Any, n_dims: int) -> tuple[Array, Array] | None:

@@ -6,7 +6,8 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import Flag, auto
-from functools import cached_property
+from functools import cached_property, reduce
+from operator import or_
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -70,16 +71,8 @@ MESSAGES = {
     ),
 }
 
-REJECTED = (
-    Status.MEASUREMENT_REJECTED
-    | Status.GOAL_REJECTED
-    | Status.TEMPO_REJECTED
-    | Status.DT_REJECTED
-    | Status.COUPLING_REJECTED
-    | Status.OBSTACLES_REJECTED
-    | Status.AMPLITUDE_REJECTED
-    | Status.PERIOD_REJECTED
-)
+#: What says that something could not be used.
+REJECTED = reduce(or_, (member for member in Status if str(member.name).endswith("_REJECTED")))
 
 
 class State(NamedTuple):
@@ -97,8 +90,7 @@ class State(NamedTuple):
     goal : ndarray of shape (d,)
         The goal in force, of a rhythm the baseline; on the way to a new one where the controller filters goals.
     via_missed : float
-        Distance from the via point whose time passed in this step, the largest of several; 0 where none did. Of poses
-        that of the positions.
+        Largest distance from via points whose time passed in this step; 0 where none did. Of poses in positions.
     status : Status
     """
 
@@ -152,14 +144,11 @@ class Plan:
     In normalized time u, with positions and goals relative to the origin,
 
         x'' = K (g - x) - D x' + ratio scale_f(u) + coupling(u) g,        ' = d/du.
-
-    - `mixing` (N + 1, d + 1): from the terms of the specification, its basis functions and the coupling, to `shape`.
-    - `ratio`: what scale f is multiplied by for a goal (d,); not finite where the formulation cannot go.
     """
 
     dmp: Any  # the specification: stiffness, damping, and the terms from which `shape` is mixed
-    mixing: Array
-    ratio: Callable[[Array], Array]
+    mixing: Array  # (N + 1, d + 1), from basis functions and coupling to `shape`
+    ratio: Callable[[Array], Array]  # of a goal (d,); not finite where the formulation cannot go
     origin: Array  # (d,), from where positions and goals count; x0 of a discrete movement
     goal: Array  # (d,), the first goal
     state: Array  # (2, d), the first position and dx/du
@@ -215,16 +204,12 @@ def passed(via: ViaPlaces, begin: float, end: float, du: float, periodic: bool) 
 
 
 class FilteredValue:
-    """Numbers that approach a target with a time constant, ``filter dx/dt = target - x``, or jump without one.
-
-    - `target` (d,): what was set last.
-    - `lag` (d,) or None: value in force minus target; None where it has arrived.
-    """
+    """Numbers that approach a target with a time constant, ``filter dx/dt = target - x``, or jump without one."""
 
     def __init__(self, target: Array, time_constant: float | None) -> None:
         self._time_constant = time_constant
         self.target = target
-        self.lag: Array | None = None
+        self.lag: Array | None = None  # value in force minus target; None where it has arrived
 
     @property
     def now(self) -> Array:
@@ -256,17 +241,14 @@ class MovingGoal(FilteredValue):
 
         x'' = (K + coupling(u)) (g + D / K g') + scale f - K x - D x'  =  K (g - x) + D (g' - x') + ...,
 
-    which is the moving target of J. Kober, K. Mulling, O. Kromer, C. H. Lampert, B. Scholkopf, J. Peters, "Movement
-    Templates for Learning of Hitting and Batting", ICRA 2010, the paper's reference [3]: there too what draws
-    to the target is weighted by 1 - s, so that it begins without a jump, wherever the formulation does so with goals.
-    Scale f belongs to where the goal will be at the end.
-
-    `velocity` (d,) or None: per second; None at rest.
+    the moving target of J. Kober, K. Mulling, O. Kromer, C. H. Lampert, B. Scholkopf, J. Peters, "Movement Templates
+    for Learning of Hitting and Batting", ICRA 2010, the paper's reference [3]: there too what draws to the target is
+    weighted by 1 - s. Scale f belongs to where the goal will be at the end.
     """
 
     def __init__(self, plan: Plan, target: Array, time_constant: float | None) -> None:
         super().__init__(target, time_constant)
-        self.velocity: Array | None = None
+        self.velocity: Array | None = None  # per second
         self._plan, self._ratio, self._arrival = plan, plan.ratio(target), target
 
     def aim(self, target: Array, velocity: Array | None = None, remaining: float = 0.0) -> bool:
@@ -286,10 +268,7 @@ class MovingGoal(FilteredValue):
         return goal + self._plan.D / self._plan.K * rate
 
     def follow(self, dt: float) -> tuple[Array, Array]:
-        """Go on by dt; returns the goal in force at the start of it and the ratio that belongs to it.
-
-        Of a goal on its way to a target, the mean distance from it meanwhile counts.
-        """
+        """Go on by dt; returns the goal at the start of it, or the mean of one on its way, and the ratio for it."""
         start = self.target
         if self.lag is None:
             ratio = self._ratio
@@ -444,12 +423,9 @@ class ObstacleAvoidance:
 def steering(
     avoidance: ObstacleAvoidance, state: Array, obstacles: Array, velocities: Array, rounding: float = 0.0
 ) -> Array:
-    """The sum of all obstacles' terms (d,).
+    """The sum of all obstacles' terms (d,), of a state (2, d) of position and dx/du, and obstacles (m, d) likewise.
 
-    - `state` (2, d): position and dx/du.
-    - `obstacles`, `velocities` (m, d): positions and their derivatives with respect to u.
-    - `rounding`: an obstacle within this distance is at the position; one so little beside the line behind it has no
-      effect.
+    An obstacle within `rounding` is at the position; one so little beside the line behind it has no effect.
     """
     r, v = obstacles - state[0], state[1] - velocities  # (m, d)
     speed, distance = np.linalg.norm(v, axis=1), np.linalg.norm(r, axis=1)

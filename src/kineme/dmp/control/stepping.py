@@ -35,11 +35,7 @@ _A_LONG_LIFE = 10**12  # operations: a controller is made to run for many steps,
 
 
 def stepper(plan: Plan, avoidance: ObstacleAvoidance) -> Advance:
-    """The function ``advance(state, u, du, influences)`` for this plan.
-
-    Compiled, unless ``KINEME_COMPILED=never``: what that costs - Numba's import, loading or building the machine code,
-    tabulating the shape - is spent here, so that no step waits for it.
-    """
+    """The function ``advance(state, u, du, influences)`` for this plan; what compiling it costs is spent here."""
     return _compiled(plan, avoidance) if use_compiled(_A_LONG_LIFE) else partial(advance, plan, avoidance)
 
 
@@ -61,10 +57,7 @@ def _compiled(plan: Plan, avoidance: ObstacleAvoidance) -> Advance:
 
 
 class ShapeTable(NamedTuple):
-    """Chebyshev coefficients on intervals ``breaks[i], breaks[i + 1]``; beyond the last break everything is 0.
-
-    A periodic table ends at 1 and goes on as it began.
-    """
+    """Chebyshev coefficients on intervals ``breaks[i], breaks[i + 1]``; 0 beyond the last break, if not periodic."""
 
     breaks: Array  # (n + 1,)
     coefficients: Array  # (n, terms, d + 1)
@@ -72,10 +65,7 @@ class ShapeTable(NamedTuple):
 
 
 def shape_table(plan: Plan) -> ShapeTable:
-    """Tabulate `Plan.shape`, which is linear in the terms of its specification: from their table, where it is exact.
-
-    It is not where large weights cancel, and magnify the errors of the terms.
-    """
+    """Tabulate `Plan.shape` from the table of its terms, except where large weights cancel and magnify its errors."""
     if plan.dmp.n_basis <= _MOST_CACHED and (terms := _terms_table(plan.dmp, plan.n_gaps, plan.periodic)) is not None:
         coefficients = terms.coefficients @ plan.mixing
         means = np.abs(terms.coefficients[:, 0]) @ np.abs(plan.mixing)
@@ -134,13 +124,10 @@ def _tabulated(
 def advance(
     plan: Plan, avoidance: ObstacleAvoidance, state: Array, u: float, du: float, influences: Influences
 ) -> Array:
-    """Carry position and dx/du from u to u + du, and add x'' there.
+    """Carry position and dx/du, a state (2, d) relative to the origin, from u to u + du, and add x'' there: (3, d).
 
-    Spring, damper, forcing term and all that is held over the step are exact, for any du. Obstacles enter by
-    the midpoint rule: their term, held over a first half step, gives the state in the middle, whose term is held over
-    the whole; so the error falls as du^2.
-
-    `state` (2, d): relative to the origin. Returns (3, d).
+    All that is held over the step is exact, for any du. Obstacles enter by the midpoint rule: their term, held over a
+    first half step, gives the state in the middle, whose term is held over the whole; so the error falls as du^2.
     """
     with np.errstate(all="ignore"):  # the caller looks at the result
         push = influences.push
@@ -165,8 +152,7 @@ def _turn(plan: Plan, avoidance: ObstacleAvoidance, state: Array, passed: float,
 
 
 def _carry(plan: Plan, state: Array, u: float, du: float, influences: Influences, push: Array) -> Array:
-    """Position and dx/du (2, d) at u + du, under a constant push."""
-    """In the frame of the goal, which the spring pulls to and which moves on: ``y = x - goal``."""
+    """Position and dx/du (2, d) at u + du, under a constant push, by way of ``y = x - goal``."""
     rate = influences.goal_rate
     y = np.vstack((state[0] - influences.goal, state[1] - rate))
     to_end = min(max(1.0 - u, 0.0), du)  # an ungated forcing term has a kink at u = 1

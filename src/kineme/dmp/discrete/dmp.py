@@ -52,8 +52,7 @@ class DMP(Specification):
         Fit the path itself by regularized least squares on the system's response: no numerical derivatives, robust to
         noise. Or solve the equation for f and fit that, as the paper does, with 80 basis functions.
     regression : {"local", "ridge"}, default "local"
-        How ``fit="forcing"`` finds the weights: locally weighted, or jointly by ridge regression. The fit of the path
-        does not use it.
+        How ``fit="forcing"``, and only that, finds the weights: locally weighted, or jointly by ridge regression.
     ridge : float, optional
         Strength of the penalty of ``regression="ridge"`` (default 1e-8) and ``fit="trajectory"`` (1e-6).
     phase_end : float, default 0.01
@@ -79,17 +78,12 @@ class DMP(Specification):
     """
 
     def learn(self, movements: MovementsLike) -> Primitives:
-        """Learn one primitive per movement, all in one matrix product.
+        """Learn one primitive per movement, all in one product: weights, start, goal, velocity there and duration.
 
         Parameters
         ----------
         movements : Demonstrations, Trajectory, sequence of Trajectory or of (T_i, d) arrays, or (n, T, d) array
             Any lengths, any sampling.
-
-        Returns
-        -------
-        Primitives
-            Weights, start, goal, initial velocity and duration of each movement.
 
         Raises
         ------
@@ -128,11 +122,6 @@ class DMP(Specification):
             Good enough is an error within this share of the smallest one; the noise of the samples is part of both,
         negligible : float, default 1e-4
             or below this share of the movements' extents.
-
-        Returns
-        -------
-        BasisSelection
-            With ``dmp``, the specification to learn with, and the error of all that was tried.
 
         Raises
         ------
@@ -226,8 +215,7 @@ class Primitives(Batch):
 
         ``(g - x0) f(s)`` in Eq. (1), ``s K (f(s)/s + x0 - x) = K f(s) + K s (x0 - x)`` in Eq. (4), with x the
         primitive's own path. It needs no division, neither by g - x0 nor by s, so it exists for every
-        movement. Section 2.2 gives the name to the bracket without the leading s; that one grows without bound
-        as s vanishes.
+        movement. Section 2.2 gives the name to the bracket without the leading s; that one grows as s vanishes.
         """
         term = self._scaled_forcing(n_samples)
         s = self.dmp.basis.phase(np.linspace(0.0, 1.0, term.shape[2]))
@@ -268,8 +256,7 @@ class Primitives(Batch):
         via : sequence of (time, point) or ((begin, end), points), optional
             Where to pass, and when as a share of the duration, above 0 and below 1. A point (d,) is for all movements,
             (n, d) for each its own; a stretch of points (m, d) or (n, m, d) is at even times from `begin` to `end`. NaN
-            leaves a dimension free. Points are met exactly, and then the goal too; a stretch as well as the basis
-            functions can.
+            leaves a dimension free. Points and goal are then met exactly, a stretch as well as the basis can.
         end_velocity : array_like of shape (d,) or (n, d), optional
             Velocity at the goal, at the end of the duration, per second; the goal is then met exactly.
         goal_velocity : array_like of shape (d,) or (n, d), optional
@@ -383,11 +370,6 @@ class Primitives(Batch):
         feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance, settle : optional
             What to do with measurements, new goals, limits and obstacles; see `kineme.control.Options`.
 
-        Returns
-        -------
-        Controller
-            At the start, with ``step``, ``reset`` and ``state``.
-
         Raises
         ------
         SpecificationError
@@ -405,7 +387,7 @@ class Primitives(Batch):
         """
         from kineme.dmp.control.controller import Controller  # these load where a robot moves, not to learn
         from kineme.dmp.control.plan import Options
-        from kineme.dmp.discrete.plan import plan_of
+        from kineme.dmp.discrete.modulate import plan_of
 
         options = Options(feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance, settle)
         return Controller(

@@ -1,25 +1,20 @@
 """Learn a batch of movements: resample, subtract the start, multiply by the encode matrix.
 
-Number of basis functions and ridge by generalized cross-validation.
+The number of basis functions and the ridge are chosen by generalized cross-validation, G. H. Golub, M. Heath and G.
+Wahba, Technometrics 21(2), 1979, Eq. (1.4). With H the matrix from the T samples of a path to the fitted ones,
 
-Source: G. H. Golub, M. Heath and G. Wahba, "Generalized cross-validation as a method for choosing a good ridge
-parameter", Technometrics 21(2), 1979, Eq. (1.4). With H the matrix from the T samples of a path to the fitted ones,
+    GCV = mean (y - H y)^2 / (1 - trace(H) / T)^2.
 
-    GCV = mean (y - H y)^2 / (1 - trace(H) / T)^2,
-
-which is the mean squared error of predicting each sample from all others, with every diagonal element of H replaced
-by their mean.
-
-For one N, H of every ridge comes from one singular value decomposition: with A the columns that the path is fitted
-with and B the second differences of the weights, ``[A; B] = [Q1; Q2] R`` and ``Q1 = U C Z'``, so that
-``H = U C^2 (C^2 + ridge S^2)^-1 U'``, where S^2 are the squared lengths of the columns of ``Q2 Z``.
+For one N, H of every ridge comes from one decomposition: with A the columns that the path is fitted with and B the
+second differences of the weights, ``[A; B] = [Q1; Q2] R`` and ``Q1 = U C Z'``, ``H = U C^2 (C^2 + ridge S^2)^-1 U'``,
+where S^2 are the squared lengths of the columns of ``Q2 Z``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
@@ -128,13 +123,6 @@ class BasisSelection(Generic[S]):
         return {int(n): float(error) for n, error in zip(self.n_basis, self.errors.min(axis=1), strict=True)}
 
 
-class Scores(NamedTuple):
-    """Of one number of basis functions, for every ridge."""
-
-    errors: Array  # (b,), root of the score
-    degrees_of_freedom: Array  # (b,)
-
-
 def choose(
     dmp: S,
     movements: MovementsLike,
@@ -160,21 +148,15 @@ def choose(
     if not len(counts) or not len(ridges):
         raise SpecificationError(f"expected at least one n_basis and one ridge, got {len(counts)} and {len(ridges)}")
     scores = [score(replace(dmp, n_basis=count), rows, ridges) for count in counts]
-    errors = np.array([scored.errors for scored in scores])
+    errors, degrees = (np.array(column) for column in zip(*scores, strict=True))
     best = errors.min(axis=1)
     a = int(np.argmax(best <= max((1.0 + tolerance) * best.min(), negligible)))  # the fewest that are good enough
     chosen = replace(dmp, n_basis=counts[a], ridge=float(ridges[errors[a].argmin()]))
-    return BasisSelection(
-        chosen, np.array(counts), ridges, errors, np.array([scored.degrees_of_freedom for scored in scores])
-    )
+    return BasisSelection(chosen, np.array(counts), ridges, errors, degrees)
 
 
 def relative_paths(dmp: Specification, movements: MovementsLike) -> Array:
-    """Paths from the start in units of their largest extent at T even times, shape (n d, T).
-
-    T is the specification's `n_points`, or the median number of recorded samples if that is smaller: samples between
-    recorded ones say nothing new, and the score would take them for agreement.
-    """
+    """Paths from the start (n d, T) in units of their extent, T at most the median number of recorded samples."""
     demos = preprocess(Demonstrations.of(movements), dmp.preprocessing)
     demos = demos[evenly_spaced(len(demos), _MOST_MOVEMENTS)]
     extents = extents_of(demos, 0, len(demos))
@@ -184,8 +166,8 @@ def relative_paths(dmp: Specification, movements: MovementsLike) -> Array:
     return np.asarray(rows.reshape(-1, n_points))
 
 
-def score(dmp: Specification, rows: Array, ridges: Array) -> Scores:
-    """Generalized cross-validation of relative paths (m, T), for one number of basis functions."""
+def score(dmp: Specification, rows: Array, ridges: Array) -> tuple[Array, Array]:
+    """Root of the score of relative paths (m, T), and degrees of freedom, of one number of basis functions."""
     n_points = rows.shape[1]
     response = decoder(dmp, n_points)
     columns, curvature = trajectory_columns(response, dmp.K)
@@ -201,7 +183,7 @@ def score(dmp: Specification, rows: Array, ridges: Array) -> Scores:
     free = 1.0 - degrees / n_points
     errors = np.full(len(ridges), np.inf)  # where as many numbers as samples leave nothing to predict
     np.divide(np.sqrt(mean_square), free, out=errors, where=free > _FREE)
-    return Scores(errors, degrees)
+    return errors, degrees
 
 
 def _counts(n_basis: Sequence[int] | None, n_points: int) -> list[int]:

@@ -1,32 +1,23 @@
 """Movements changed as little as possible so that they pass where they are asked to: via points and end velocity.
 
-A path is linear in its weights W, so what is asked for at some times is ``A W = b`` with A the rows of the decode
-matrix at these times, and the most probable change of the weights that grants it is one small solve,
+A path is linear in its weights W, so what is asked for is ``A W = b``, with A the rows of the decode matrix at these
+times, and the most probable change of the weights that grants it is one small solve for all movements of a batch,
 
-    W += Sigma A' (A Sigma A' + eps I)^-1 e,        e = b - A W,
+    W += Sigma A' (A Sigma A' + eps I)^-1 e,        e = b - A W.
 
-the same for all movements of a batch; see `kineme.dmp.discrete.operators`. Two rows are always among those of A: the
-goal, at the end, and the velocity there. The forcing term acts on neither the start nor the velocity there.
+Always among the rows of A: the goal, at the end, and the velocity there. Y. Zhou, J. Gao, T. Asfour, "Learning
+Via-Movement Primitives with Inter- and Extrapolation Capabilities", IROS 2019, take the covariance of demonstrations
+for Sigma. Our choice for one demonstration, and beside few, is the least mean square acceleration
+(`smoothness_factor`), as of a cubic spline; docs/guide/modulation.md has what was measured.
 
-Source: Y. Zhou, J. Gao, T. Asfour, "Learning Via-Movement Primitives with Inter- and Extrapolation Capabilities",
-IROS 2019. There Sigma is the covariance of the demonstrations' weights. Our choice where there is one
-demonstration only, and beside those where there are few: Sigma is such that the change of the path has the least mean
-square acceleration (`smoothness_factor`), as a cubic spline has. See docs/guide/modulation.md for what was measured.
+The points of a stretch may be more than the basis functions can meet, or noisy, and the path would swing far out beside
+them. So each has a deviation, of a millionth of its own under the covariance; where the path swings, larger ones are
+tried. `python -m bench --only via_points` measures both on the shapes of LASA.
 
-The points of a stretch may be more than the basis functions can meet, or noisy: met as closely as possible, the path
-would swing far out beside them. So each has a deviation of its own, of a millionth of what it has under the covariance.
-Where the path swings, larger ones are tried: a stretch may be missed so that the path is led less far away. How far it
-swings with both, `python -m bench --only via_points` measures on the shapes of LASA.
-
-Positions kept within limits: the smoothest change of the weights under inequalities, a small quadratic program.
-
-With z the change in the coordinates of a covariance factor, minimize |z| under ``low <= path + Phi F' z <= high`` at
-the specification's samples, and between them where the path would leave the limits by more than 1e-7 of its extent:
-least distance programming, which is a nonnegative least squares problem (C. L. Lawson, R. J. Hanson, "Solving Least
-Squares Problems", 1974, chapter 23), and solved by SciPy's. The factor is conditioned on no change at the via
-points, at the goal and of the velocity there.
-A few problems for each dimension of each movement that leaves the limits, a few milliseconds each; all others cost
-nothing.
+Positions kept within limits are a small quadratic program: with z the change in the coordinates of a covariance factor,
+minimize |z| under ``low <= path + Phi F' z <= high``. It is least distance programming, a nonnegative least squares
+problem (C. L. Lawson, R. J. Hanson, "Solving Least Squares Problems", 1974, chapter 23), solved by SciPy's. The factor
+is conditioned on no change at via points, at the goal and of the velocity there.
 """
 
 from __future__ import annotations
@@ -41,12 +32,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import nnls
 
+from kineme.dmp.batch import Batch
+from kineme.dmp.control.plan import MISSED, Plan, ViaPlaces, check_one, one_vector
 from kineme.dmp.discrete.operators import condition, decoder, decoder_at, smoothness_factor
-from kineme.dmp.discrete.rollout import Change, Rollout
+from kineme.dmp.discrete.rollout import Change, Rollout, rollout
 from kineme.dmp.discrete.specification import Specification
 from kineme.dmp.discrete.via_points import SHARES, Span, ViaLike, ViaPoints, broadcast_length, per_movement, via_points
 from kineme.errors import ExtrapolationWarning, SpecificationError, warn
-from kineme.validation import Array, as_numbers
+from kineme.validation import Array, as_numbers, check_number
 
 _ROUNDING = 1e-9  # of the extent: so far outside counts as at a limit
 _MISSED = 1e-6  # of the largest position: more than this is outside
@@ -56,6 +49,7 @@ _ROUNDS = 8  # of adding instants between samples; two or three are enough
 _INFEASIBLE = 1e-8  # residual of the nonnegative problem, 0 where no change is enough
 
 _LOOSE = 1e-3  # of the extent: a stretch that is met less closely is said
+_SETTLED = 1e-3  # of the demonstration's largest extent: distance within which a controlled movement has settled
 _WIDE = 3.0  # times the extent and what is missing: a change that leads farther away is said
 
 
@@ -81,10 +75,7 @@ class Changed(NamedTuple):
 def warn_far(
     extents: Array, targets: ViaPoints, errors: Array, measured: Measured = MEASURED, span: Span = SHARES
 ) -> None:
-    """Say how far a via point is from the path as it is, if that is farther than the movement is large, `extents` (n,).
-
-    `errors` (n, d, K or more) is what is missing at the points.
-    """
+    """Say how far a via point is from the path, if farther than the movement is large; errors are what is missing."""
     distances, unit = _distances(targets, errors, measured), measured.unit
     far = distances > extents[:, None]
     if far.any():
@@ -175,11 +166,9 @@ def modulated(
     factor: Array | None = None,
     measured: Sequence[Measured] = (MEASURED,),
 ) -> Rollout:
-    """The movement through the via points, with the end velocity and within the limits.
+    """The movement through the via points, with the end velocity and within the limits; see `Primitives.rollout`.
 
-    `movement`: as asked for otherwise; `via`, `end_velocity`, `position_limits`: as in `Primitives.rollout`; `factor`
-    (r, d, N): of the covariance of the demonstrations' scaled weights; `measured`: dimensions whose distances are
-    measured together, when it is said how far movements are led away.
+    `factor` (r, d, N) is of the covariance of demonstrations' weights; distances are measured in `measured` together.
     """
     if via is None and end_velocity is None and position_limits is None:
         return movement
@@ -281,8 +270,7 @@ def _stretch(targets: ViaPoints) -> Array:
 def mixed_factor(dmp: Specification, factor: Array) -> Array:
     """Of the covariance of all weights (d N): r demonstrations' spread, and smoothness that is worth ten of them.
 
-    r demonstrations vary in r directions only. The share of the smooth changes is ``10 / (r + 10)``, and they are as
-    large: they have the same mean variance of the path.
+    Smooth changes, which are as large, have the share ``10 / (r + 10)``: demonstrations vary in r directions only.
     """
     r, d, _ = factor.shape
     share = _WORTH / (r + _WORTH)
@@ -323,8 +311,7 @@ def changes(factor: Array, observed: Array, errors: Array, slack: Array) -> Arra
 def loose_changes(looks: Array, factor: Array, observed: Array, errors: Array, stretch: Array) -> Array:
     """The same (m, p), of the weights of one or more dimensions of one movement.
 
-    The rows of a stretch, those where `stretch` (k,) is 1 and not 0, are met so closely that the path does not swing,
-    which `looks` (N, T) shows: from the weights of a dimension to its path.
+    Rows of a stretch, `stretch` (k,) being 1, are met so closely that the path, by `looks` (N, T), does not swing.
     """
     change = changes(factor, observed, errors, SLACK * stretch)
     if not stretch.any():
@@ -353,13 +340,9 @@ def looks_of(dmp: Specification) -> Array:
 def within_limits(
     movement: Rollout, limits: tuple[ArrayLike, ArrayLike], points: Array, held: Array, slack: Array
 ) -> Rollout:
-    """The movement within limits (low, high), each a number or (d,), with ``held @ W`` (K,) as it is.
+    """The movement within limits (low, high), with ``held @ W`` (K,) as it is.
 
-    `points` (1 or n, k, d) are those at which it is held, `slack` (K,) how
-    loosely, as a share of what each deviates under the covariance: more points of a stretch than can be met are held.
-
-    Raises `SpecificationError`: limits of the wrong shape or order; a start, goal or via point outside; a movement that
-    cannot stay inside.
+    It is held at `points` (1 or n, k, d), with `slack` (K,) as a share of what each deviates under the covariance.
     """
     low, high = as_limits(limits, movement.starts.shape[1])
     dmp = movement.primitives.dmp
@@ -401,10 +384,7 @@ def within_limits(
 
 
 def as_limits(limits: tuple[ArrayLike, ArrayLike], n_dims: int) -> tuple[Array, Array]:
-    """Limits (low, high), each (d,), of numbers or arrays.
-
-    Raises `SpecificationError`: no two numbers or (d,) arrays, or low that is not below high.
-    """
+    """Limits (low, high), each (d,), of numbers or arrays."""
     try:
         low, high = (np.broadcast_to(as_numbers(limit, "position_limits"), n_dims) for limit in limits)
     except (TypeError, ValueError) as error:
@@ -417,10 +397,7 @@ def as_limits(limits: tuple[ArrayLike, ArrayLike], n_dims: int) -> tuple[Array, 
 
 
 def _near(movement: Rollout, low: Array, high: Array, rounding: Array) -> NDArray[np.bool_]:
-    """Dimensions of movements (n, d) that leave the limits at a sample, or may do so between two of them.
-
-    Between samples h apart a path goes beyond both by ``h^2 |x''| / 8``; counted twice, from differences of samples.
-    """
+    """Dimensions of movements (n, d) that leave the limits, or may between samples: by ``h^2 |x''| / 8``, doubled."""
     path = replace(movement, n_samples=movement.primitives.dmp.n_points, end=1.0).positions  # (n, T, d)
     beyond = np.abs(np.diff(path, 2, axis=1)).max(axis=1) / 4 - rounding
     return np.asarray((path.min(axis=1) < low + beyond) | (path.max(axis=1) > high - beyond))
@@ -463,3 +440,57 @@ def _inside(effect: Array, path: Array, limits: tuple[float, float], where: tupl
             f"{where[0]} cannot; start more slowly, move the via points inside, or use more basis functions"
         )
     return z
+
+
+def plan_of(  # noqa: PLR0913, PLR0917 - one parameter per option
+    primitive: Batch,
+    start: ArrayLike | None = None,
+    goal: ArrayLike | None = None,
+    duration: float | None = None,
+    velocity: ArrayLike | None = None,
+    via: ViaLike | None = None,
+    end_velocity: ArrayLike | None = None,
+    position_limits: tuple[ArrayLike, ArrayLike] | None = None,
+) -> Plan:
+    """The plan of one primitive, with the options of `Primitives.rollout` checked for one movement."""
+    check_one(len(primitive))
+    if duration is not None:
+        check_number("duration", duration, above=0.0)
+    d = primitive.n_dims
+    movement = rollout(
+        primitive,
+        one_vector("start", start, d),
+        one_vector("goal", goal, d),
+        duration,
+        one_vector("velocity", velocity, d),
+    )
+    targets = None if via is None else via_points(via, d)
+    movement = modulated(movement, targets, one_vector("end_velocity", end_velocity, d), position_limits)
+    return plan_along(movement, d, targets)
+
+
+def plan_along(movement: Rollout, n_positions: int, via: ViaPoints | None) -> Plan:
+    """The plan of one generated movement through via points, with that many positions, others behind them."""
+    check_one(len(movement))
+    primitive, own = movement.primitives, movement.change is None
+    dmp, d, extents = primitive.dmp, primitive.n_dims, primitive.row("extents")
+    x0, tau = movement.starts[0].copy(), float(movement.durations[0])
+    learned = primitive.row("goals") - primitive.row("starts") if own else movement.goals - movement.starts
+    columns = slice(0, n_positions or None)
+    mixing = np.zeros((dmp.n_basis + 1, d + 1))
+    mixing[:-1, :-1], mixing[-1, -1] = (primitive.row("scaled_weights") if own else movement.weights)[0].T, 1.0
+
+    return Plan(
+        dmp,
+        mixing,
+        ratio=lambda goal: np.array(dmp.system.ratio(goal[None], learned, extents)[0]),
+        origin=x0,
+        goal=movement.goals[0] - x0,
+        state=np.vstack((np.zeros(d), movement.velocities_at_start[0] * tau)),
+        duration=tau,
+        settle=_SETTLED * float(extents.max()),
+        n_positions=n_positions,
+        via=None
+        if via is None
+        else ViaPlaces(via.times, via.points[0, :, columns] - x0[columns], MISSED * float(extents.max())),
+    )

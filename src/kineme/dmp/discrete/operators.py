@@ -1,20 +1,12 @@
-"""The matrices of a specification, built once and cached.
+"""The matrices of a specification, built once and cached: decoding, encoding, and conditioning of Gaussians.
 
 The decode matrix is the spring-damper's exact response to each part of the forcing term; the encode matrix is one of
-two fits of the weights, from a resampled movement to its weights.
-
-Numbers with a Gaussian distribution, conditioned on what some linear functions of them are: one small linear solve.
-
-The covariance is kept as a factor F, ``Sigma = F' F``, and never formed. With ``B = F A'`` and ``B = Q R``,
+two fits of the weights. A covariance is kept as a factor F, ``Sigma = F' F``. With ``B = F A' = Q R``,
 
     Sigma A' (A Sigma A' + diag(s^2))^-1 e = F' Q R'^-1 e,
 
-where s is stacked below B, if it is not 0, before it is decomposed. The condition number of B is not squared, so what
-is observed exactly is met to rounding, at close times too. The change is the most probable one: among all that meet e
-it has the least Mahalanobis norm.
-
-Source: Y. Zhou, J. Gao, T. Asfour, "Learning Via-Movement Primitives with Inter- and Extrapolation Capabilities",
-IROS 2019, for the weights of movements; the formula is that of any Gaussian.
+s being stacked below B before it is decomposed: its condition number is not squared, and what is observed exactly is
+met to rounding. Among all changes that meet e, it has the least Mahalanobis norm.
 """
 
 from __future__ import annotations
@@ -25,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kineme.dmp.discrete.specification import Formulation, GaussianBasis, Specification
+from kineme.dmp.discrete.specification import GaussianBasis, Specification
 from kineme.dmp.spring_damper import NODE_WEIGHTS, NODES, transitions
 from kineme.errors import SpecificationError
 from kineme.movements.preparation.smooth import spline_matrix
@@ -60,7 +52,7 @@ def encoder(dmp: Specification, n_samples: int) -> Encoder:
         regression = (
             local_regression(dmp.basis, u) if local else ridge_regression(dmp.basis.design(u), dmp.ridge_strength)
         )
-        weights = regression @ forcing_target(dmp.basis, dmp.system, dmp.K, dmp.D, u)
+        weights = regression @ forcing_target(dmp, u)
         velocity = differentiation_matrices(dmp.n_points)[0][0]
     if n_samples != dmp.n_points:
         resample = spline_matrix(n_samples, dmp.n_points)
@@ -71,22 +63,32 @@ def encoder(dmp: Specification, n_samples: int) -> Encoder:
 @lru_cache(maxsize=32)
 def decoder(dmp: Specification, n_samples: int, end: float = 1.0) -> Response:
     """The decode matrices of `dmp` at `n_samples` even times from 0 to `end` durations."""
-    return spring_damper_response(dmp.basis, dmp.system, dmp.K, dmp.D, np.linspace(0.0, end, n_samples))
+    return spring_damper_response(dmp, np.linspace(0.0, end, n_samples))
 
 
 @lru_cache(maxsize=32)
 def decoder_at(dmp: Specification, times: tuple[float, ...]) -> Response:
-    """The decode matrices of `dmp` at any times in [0, 1], in durations."""
-    grid = decoder(dmp, max(dmp.n_points, 2 * dmp.n_basis))
-    return response_between(grid, dmp.basis, dmp.system, dmp.K, dmp.D, np.array(times))
+    """The same at any times (k,) in [0, 1], each state carried on in one step from the even time before it."""
+    u, grid = np.array(times), decoder(dmp, max(dmp.n_points, 2 * dmp.n_basis))
+    n_steps = grid.goal.shape[1] - 1
+    before = np.minimum(np.floor(u * n_steps).astype(np.intp), n_steps)
+    h = np.maximum(u - before / n_steps, 0.0)[:, None]
+    carry = transitions(dmp.K, dmp.D, h[:, 0])
+    impulse = transitions(dmp.K, dmp.D, (h * (1.0 - NODES)).ravel())[:, :, 1].reshape(len(u), -1, 2)
+    nodes = before[:, None] / n_steps + h * NODES
+    forcing = _forcing(dmp, nodes.ravel()).reshape(*nodes.shape, -1)
+    states = np.empty((len(u), 3, dmp.n_basis + 3))
+    there = np.dstack((grid.Phi, grid.goal, grid.moving_goal, grid.velocity))[:2, before].transpose(1, 0, 2)
+    states[:, :2] = carry @ there
+    states[:, :2, :-1] += np.einsum("kqz,kq,kqf->kzf", impulse, h * NODE_WEIGHTS, forcing)
+    return _response(dmp, states, u)
 
 
 @lru_cache(maxsize=32)
 def smoothness_factor(dmp: Specification) -> Array:
     """Factor S (N, N) of a covariance of the weights under which smooth changes of the path are the likely ones.
 
-    ``S' S = (mean_u Phi''(u)' Phi''(u) + 1e-8 m I)^-1`` with m the mean of the diagonal: the least likely changes are
-    those with the largest mean square acceleration, whatever the gating, the fit or the unit of the weights.
+    ``S' S = (mean_u Phi''(u)' Phi''(u) + 1e-8 m I)^-1`` with m the mean of the diagonal.
     """
     bend = decoder(dmp, dmp.n_points).Phi[2]
     precision = bend.T @ bend / dmp.n_points
@@ -103,9 +105,8 @@ def forcing_matrix(dmp: Specification, n_samples: int) -> Array:
 class Response(NamedTuple):
     """Positions, velocities and accelerations at T normalized times as linear maps of (W, g - x0, v0, g').
 
-    ``x - x0 = Phi[0] W + goal[0] (g - x0) + velocity[0] v0 + moving_goal[0] g'``; index 1 gives dx/du and index 2 its
-    derivative in the same way. W are the weights times the formulation's scale, v0 is dx/du at the start, g is the goal
-    at the start and g' its dg/du, 0 of a goal at rest; what draws is ``g + (u + D / K) g'``, see `MovingGoal`.
+    ``x - x0 = Phi[0] W + goal[0] (g - x0) + velocity[0] v0 + moving_goal[0] g'``; indices 1 and 2 give the derivatives
+    in u. v0 is dx/du and g the goal at the start, g' its dg/du; what draws is ``g + (u + D / K) g'``, see `MovingGoal`.
     """
 
     Phi: Array  # (3, T, N)
@@ -114,35 +115,31 @@ class Response(NamedTuple):
     moving_goal: Array  # (3, T)
 
 
-def spring_damper_response(
-    basis: GaussianBasis, formulation: Formulation, stiffness: float, damping: float, u: Array
-) -> Response:
-    """Solve ``x'' = K (g - x) - D x' + F(u)`` for every basis function, the goal and the initial velocity.
+def spring_damper_response(dmp: Specification, u: Array) -> Response:
+    """Solve ``x'' = K (g - x) - D x' + F(u)`` for every basis function, the goal and v0, at even u (T,) from 0.
 
-    The state is propagated from one time to the next by the matrix exponential, which is exact for any step; the
-    forcing enters by Gauss-Legendre quadrature of the convolution integral with 8 nodes per interval, of order 16.
-
-    `u` (T,): even normalized times from 0.
+    States are propagated by the matrix exponential, exact for any step; the forcing enters by Gauss-Legendre quadrature
+    of the convolution integral with 8 nodes per interval, of order 16.
     """
-    n_steps = max(1, math.ceil(_STEPS_PER_BASIS * (basis.n_basis - 1) * (u[1] - u[0])))
+    n_steps = max(1, math.ceil(_STEPS_PER_BASIS * (dmp.n_basis - 1) * (u[1] - u[0])))
     h = (u[1] - u[0]) / n_steps
     nodes = h * NODES
-    carry = transitions(stiffness, damping, np.array([h]))[0]
+    carry = transitions(dmp.K, dmp.D, np.array([h]))[0]
     # An acceleration at a node reaches the end of the step through the second column.
-    impulse = transitions(stiffness, damping, h - nodes)[:, :, 1] * (h * NODE_WEIGHTS)[:, None]  # (8, 2)
+    impulse = transitions(dmp.K, dmp.D, h - nodes)[:, :, 1] * (h * NODE_WEIGHTS)[:, None]  # (8, 2)
     starts = u[0] + np.arange((len(u) - 1) * n_steps) * h
-    driven = np.empty((len(starts), 2, basis.n_basis + 2))  # the term that each step adds to (x, x')
-    for some in np.array_split(np.arange(len(starts)), max(1, len(starts) * basis.n_basis // _NUMBERS_AT_ONCE)):
-        forcing = _forcing(basis, formulation, (stiffness, damping), (starts[some, None] + nodes).ravel())
+    driven = np.empty((len(starts), 2, dmp.n_basis + 2))  # the term that each step adds to (x, x')
+    for some in np.array_split(np.arange(len(starts)), max(1, len(starts) * dmp.n_basis // _NUMBERS_AT_ONCE)):
+        forcing = _forcing(dmp, (starts[some, None] + nodes).ravel())
         driven[some] = np.einsum("qz,kqf->kzf", impulse, forcing.reshape(len(some), len(nodes), -1))
     at_end = np.flatnonzero((starts < 1.0) & (starts + h > 1.0))
     for k in at_end:  # one step at most: an ungated f has a kink at u = 1, where quadrature must be split
         driven[k] = 0.0
         for left, right in ((starts[k], 1.0), (1.0, starts[k] + h)):
             inside = left + (right - left) * NODES
-            weighted = transitions(stiffness, damping, starts[k] + h - inside)[:, :, 1] * NODE_WEIGHTS[:, None]
-            driven[k] += (right - left) * weighted.T @ _forcing(basis, formulation, (stiffness, damping), inside)
-    states = np.zeros((len(u), 3, basis.n_basis + 3))
+            weighted = transitions(dmp.K, dmp.D, starts[k] + h - inside)[:, :, 1] * NODE_WEIGHTS[:, None]
+            driven[k] += (right - left) * weighted.T @ _forcing(dmp, inside)
+    states = np.zeros((len(u), 3, dmp.n_basis + 3))
     states[0, 1, -1] = 1.0
     state = states[0, :2]
     for done, added in enumerate(driven, start=1):
@@ -150,59 +147,32 @@ def spring_damper_response(
         state[:, :-1] += added
         if done % n_steps == 0:
             states[done // n_steps, :2] = state
-    states[:, 2] = -stiffness * states[:, 0] - damping * states[:, 1]
-    states[:, 2, :-1] += _forcing(basis, formulation, (stiffness, damping), u)
-    return _parts(states)
+    return _response(dmp, states, u)
 
 
-def response_between(
-    grid: Response, basis: GaussianBasis, formulation: Formulation, stiffness: float, damping: float, u: Array
-) -> Response:
-    """The same at any normalized times u (k,) in [0, 1], from the response at even times that are close enough.
-
-    Each state is carried on from the last even time before it, in one step.
-    """
-    n_steps = grid.goal.shape[1] - 1
-    before = np.minimum(np.floor(u * n_steps).astype(np.intp), n_steps)
-    h = np.maximum(u - before / n_steps, 0.0)[:, None]
-    carry = transitions(stiffness, damping, h[:, 0])
-    impulse = transitions(stiffness, damping, (h * (1.0 - NODES)).ravel())[:, :, 1].reshape(len(u), -1, 2)
-    times = before[:, None] / n_steps + h * NODES
-    forcing = _forcing(basis, formulation, (stiffness, damping), times.ravel()).reshape(*times.shape, -1)
-    states = np.empty((len(u), 3, basis.n_basis + 3))
-    there = np.dstack((grid.Phi, grid.goal, grid.moving_goal, grid.velocity))[:2, before].transpose(1, 0, 2)
-    states[:, :2] = carry @ there
-    states[:, :2, :-1] += np.einsum("kqz,kq,kqf->kzf", impulse, h * NODE_WEIGHTS, forcing)
-    states[:, 2] = -stiffness * states[:, 0] - damping * states[:, 1]
-    states[:, 2, :-1] += _forcing(basis, formulation, (stiffness, damping), u)
-    return _parts(states)
-
-
-def _parts(states: Array) -> Response:
-    """States (T, 3, N + 3) as the response to weights, goal, velocity of the goal and initial velocity."""
+def _response(dmp: Specification, states: Array, u: Array) -> Response:
+    """States (T, 3, N + 3), of which the accelerations follow from the rest, as the response."""
+    states[:, 2] = -dmp.K * states[:, 0] - dmp.D * states[:, 1]
+    states[:, 2, :-1] += _forcing(dmp, u)
     by_part = states.transpose(1, 0, 2)
     goal, moving_goal, velocity = (by_part[:, :, k].copy() for k in (-3, -2, -1))
     return Response(np.ascontiguousarray(by_part[:, :, :-3]), goal, velocity, moving_goal)
 
 
-def _forcing(basis: GaussianBasis, formulation: Formulation, spring: tuple[float, float], u: Array) -> Array:
+def _forcing(dmp: Specification, u: Array) -> Array:
     """Accelerations besides spring and damper, per unit of each W, of g - x0 and of g', shape (T, N + 2)."""
-    stiffness, damping = spring
-    goal = stiffness + formulation.coupling(stiffness, basis.phase(u))
-    return np.column_stack((basis.design(u), goal, (u + damping / stiffness) * goal))
+    terms = dmp.terms(u)
+    goal = dmp.K + terms[:, -1]
+    return np.column_stack((terms[:, :-1], goal, (u + dmp.D / dmp.K) * goal))
 
 
 @lru_cache(maxsize=64)
 def differentiation_matrices(n_points: int) -> tuple[Array, Array]:
     """First and second differentiation matrices D1, D2 (T, T) in u on T even points of [0, 1].
 
-    D1 is central inside and one-sided at the ends (the summation-by-parts operator, of order 2 inside and 1 at
-    the ends), and ``D2 = D1 D1``: second order inside. In the two points next to each end D2 falls short of the
-    derivative, by half at the very end, where a sample stands for half a cell.
-
-    That is a choice. Against second-order ends and the compact three-point D2 it lowers the worst reconstruction
-    error on LASA (N = 80, ridge) from 1.2 % of the extent to 0.11 %, and 1 % of noise changes f by 1.1 times its
-    norm instead of 3.8: one-sided second-order stencils magnify noise where nothing averages it out.
+    D1 is central inside and one-sided at the ends (the summation-by-parts operator), and ``D2 = D1 D1``. Next to each
+    end D2 falls short of the derivative, by choice: against second-order ends it lowers the worst reconstruction error
+    on LASA (N = 80, ridge) from 1.2 % of the extent to 0.11 %, and 1 % of noise changes f by 1.1 of its norm, not 3.8.
     """
     h = 1.0 / (n_points - 1)
     inner = np.arange(1, n_points - 1)
@@ -216,22 +186,16 @@ def differentiation_matrices(n_points: int) -> tuple[Array, Array]:
     return D1, D2
 
 
-def forcing_target(basis: GaussianBasis, formulation: Formulation, stiffness: float, damping: float, u: Array) -> Array:
-    """The matrix (T, T) from y = x - x0 to scale * f, the equation of the formulation solved for it.
-
-    ``scale f = (D2 + D D1 + K) y - (K + coupling(s)) (g - x0)``; the last sample of y is g - x0.
-    """
+def forcing_target(dmp: Specification, u: Array) -> Array:
+    """From y = x - x0 to ``scale f = (D2 + D D1 + K) y - (K + coupling(s)) (g - x0)`` (T, T); g - x0 ends y."""
     D1, D2 = differentiation_matrices(len(u))
-    target = D2 + damping * D1 + stiffness * np.eye(len(u))
-    target[:, -1] -= stiffness + formulation.coupling(stiffness, basis.phase(u))
+    target = D2 + dmp.D * D1 + dmp.K * np.eye(len(u))
+    target[:, -1] -= dmp.K + dmp.terms(u)[:, -1]
     return target
 
 
 def local_regression(basis: GaussianBasis, u: Array) -> Array:
-    """Locally weighted regression (N, T): each weight fits the target around its own center.
-
-    ``w_i = sum_t psi_i(s_t) q_t y_t / sum_t psi_i(s_t) q_t^2`` with the gate q = 1 or s.
-    """
+    """Locally weighted regression (N, T), ``w_i = sum_t psi_i q y / sum_t psi_i q^2`` with the gate q = 1 or s."""
     exponents, gate = basis.exponents(u), basis.gate(u)[:, None]
     psi = np.exp(exponents - exponents.max(axis=0))  # a factor per function cancels; this one prevents underflow
     return np.asarray((psi * gate / (psi * gate**2).sum(axis=0)).T)
@@ -246,12 +210,9 @@ def ridge_regression(design: Array, ridge: float) -> Array:
 
 
 def trajectory_regression(response: Response, stiffness: float, ridge: float) -> tuple[Array, Array]:
-    """Least squares of the path itself on the decode matrix, with a penalty on the weights' curvature.
+    """Matrices from y = x - x0 to W (T, N) and v0 (T,): least squares of the path on the decode matrix.
 
-    Minimizes ``mean (y - Phi W - goal (g - x0) - velocity v0)^2 + ridge mean (diff^2 W / K)^2`` over W and v0:
-    no numerical derivative of the data occurs.
-
-    Returns `weights` (N, T): from y = x - x0 to W; `velocity` (T,): from y to v0.
+    Minimizes ``mean (y - Phi W - goal (g - x0) - velocity v0)^2 + ridge mean (diff^2 W / K)^2``.
     """
     n_points, n_basis = response.Phi[0].shape
     columns, curvature = trajectory_columns(response, stiffness)
@@ -263,10 +224,9 @@ def trajectory_regression(response: Response, stiffness: float, ridge: float) ->
 
 
 def trajectory_columns(response: Response, stiffness: float) -> tuple[Array, Array]:
-    """Return what `trajectory_regression` fits a path with and what it keeps small, both per square root of their rows.
+    """Columns (T, N + 1) of W / K and v0 that a path is fitted with, and second differences (N - 2, N + 1) of W / K.
 
-    Returns `columns` (T, N + 1): paths of W / K, comparable to y, and of v0; `curvature` (N - 2, N + 1): second
-    differences of W / K; times the square root of the ridge they are rows of the least-squares problem.
+    Both are per square root of their rows; the differences count times the square root of the ridge.
     """
     n_points, n_basis = response.Phi[0].shape
     columns = np.column_stack((response.Phi[0] * stiffness, response.velocity[0])) / np.sqrt(n_points)
@@ -283,12 +243,7 @@ class Conditioned(NamedTuple):
 def condition(factor: Array, observed: Array, deviation: float | Array = 0.0) -> Conditioned:
     """Condition a Gaussian with covariance ``factor.T @ factor`` on observations of ``observed @ numbers``.
 
-    - `factor` (r, p).
-    - `observed` (k, p): A, the linear functions that are observed.
-    - `deviation` (k,): s, standard deviation of each observation, in its own unit; 0 is exact.
-
-    Raises `SpecificationError`: exact observations of which one follows from the others, or of what the covariance does
-    not allow to vary.
+    `factor` (r, p); `observed` (k, p); `deviation` (k,) is that of each observation, in its own unit; 0 is exact.
     """
     from scipy.linalg import qr  # a larger import than all of learning
 

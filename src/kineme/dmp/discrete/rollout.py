@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any, NamedTuple, Self, overload
 
@@ -16,12 +16,12 @@ from kineme.dmp.batch import Batch
 from kineme.dmp.discrete.operators import decoder
 from kineme.dmp.discrete.specification import Specification
 from kineme.dmp.discrete.via_points import broadcast_length, check_durations, per_movement
-from kineme.dmp.recorded_as import RecordedAs, with_recorded
+from kineme.dmp.recorded_as import with_recorded
 from kineme.errors import DegenerateMovementError, SpecificationError
 from kineme.movements.channels.channel import Channels, recorded_names
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import as_indices
-from kineme.movements.trajectories.movements import Samples, axis_names
+from kineme.movements.trajectories.movements import Samples
 from kineme.movements.trajectories.presented import Presented, with_units
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.runtime.parallel import for_tiles
@@ -29,35 +29,51 @@ from kineme.validation import Array, as_numbers, check_count, check_number, chec
 
 _PER_BASIS = 32  # samples for each basis function: parabolas through three of them miss a maximum by less than 1e-5
 _LIMITED_SAMPLES = 200_000  # in one tile of movements, each with so many
+_LONGEST = 10.0  # durations after which a movement that has not settled is given up
+_SETTLING_SAMPLES = 400
+_TILE_SAMPLES = 100_000  # numbers in one tile of the result
 
 
+class Change(NamedTuple):
+    """A change of the weights of n movements: ``W + coefficients @ directions``."""
+
+    coefficients: Array  # (n, d, k)
+    directions: Array  # (k, N)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class BaseRollout(Presented, ABC):
     """n generated movements of T samples each: a sequence of `Trajectory`, taken wherever movements are expected.
 
-    ``len(rollout)`` is n, iterating gives one `Trajectory` each, ``rollout[i]`` is one `Trajectory` and
-    ``rollout[2:5]``, as any slice, mask or list of indices, a rollout of the chosen movements. `numpy.asarray` gives
-    `positions`.
+    ``rollout[i]`` is one `Trajectory` and ``rollout[2:5]``, as any slice, mask or list of indices, a rollout of the
+    chosen movements. `numpy.asarray` gives `positions`.
     """
+
+    primitives: Batch  # that move, one for each movement or one for all
 
     @property
     @abstractmethod
     def times(self) -> Array:
         """Times of the samples (n, T), from 0 [s]."""
 
-    @property
-    @abstractmethod
+    @cached_property
     def positions(self) -> Array:
-        """Movements in the columns that were demonstrated, (n, T, d)."""
+        """Movements in the columns and in the unit of the demonstrations, (n, T, d)."""
+        return self._derivative(0)
 
-    @property
-    @abstractmethod
+    @cached_property
     def velocities(self) -> Array:
-        """Velocities, per second."""
+        """Velocities, per second; of orientations angular ones in the world frame."""
+        return self._derivative(1)
 
-    @property
-    @abstractmethod
+    @cached_property
     def accelerations(self) -> Array:
-        """Accelerations, per second squared."""
+        """Accelerations, per second squared; of orientations angular ones in the world frame."""
+        return self._derivative(2)
+
+    @abstractmethod
+    def _derivative(self, order: int) -> Array:
+        """Positions (n, T, d), or a derivative of them in time."""
 
     @property
     def _shares(self) -> Array:
@@ -65,31 +81,35 @@ class BaseRollout(Presented, ABC):
         return np.asarray(self.times[0] / self.times[0, -1])
 
     @property
-    def _to_recording(self) -> RecordedAs | None:
-        return self._batch.to_recording
-
-    @property
     def _column_channels(self) -> Channels | None:
         """Channels of the columns of `positions`, where these are no coordinates and no recording is known."""
         return None
 
-    @property
-    @abstractmethod
-    def _batch(self) -> Batch:
-        """The primitives that move, one for each movement or one for all."""
-
-    @abstractmethod
     def _take(self, chosen: NDArray[np.intp]) -> Self:
-        """The rollout of the chosen movements."""
+        """The rollout of the chosen movements; a field that all of them share stays."""
+
+        def of(value: Any) -> Any:
+            if isinstance(value, Change):
+                return value._replace(coefficients=value.coefficients[chosen])
+            each = isinstance(value, (np.ndarray, BaseRollout)) and len(value) == len(self)
+            return value[chosen] if each or (isinstance(value, Batch) and len(value) > 1) else value
+
+        return replace(self, **{field.name: of(getattr(self, field.name)) for field in fields(self)})
+
+    def _with_samples(self, n_samples: int) -> Self:
+        return replace(self, **{"n_samples": n_samples})  # type: ignore[arg-type]
 
     @abstractmethod
     def __len__(self) -> int: ...
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({len(self)} movements of {self.times.shape[1]} samples from {self.primitives!r})"
+
     @property
     def axis_names(self) -> list[str]:
         """Names of the d columns of `positions`, in tables and figures."""
-        about = self._to_recording
-        return axis_names(self.positions.shape[2]) if about is None else list(about.column_names)
+        about = self.primitives.to_recording
+        return self.primitives.plain_names[0] if about is None else list(about.column_names)
 
     @property
     def _samples(self) -> Samples:
@@ -102,24 +122,24 @@ class BaseRollout(Presented, ABC):
     @property
     def rate_names(self) -> list[str]:
         """Names of the columns of `velocities` and `accelerations`."""
-        about = self._to_recording
-        return axis_names(self.velocities.shape[2]) if about is None else list(about.rate_names)
+        about = self.primitives.to_recording
+        return self.primitives.plain_names[1] if about is None else list(about.rate_names)
 
     @property
     def channels(self) -> Channels | None:
         """Channels of the recordings, where they are known; see `Demonstrations.channels`."""
-        return self._batch.channels
+        return self.primitives.channels
 
     @property
     def labels(self) -> NDArray[Any] | None:
         """Labels of the movements (n,), those of their primitives, or None."""
-        labels = self._batch.labels
+        labels = self.primitives.labels
         return labels if labels is None or len(labels) == len(self) else np.repeat(labels, len(self))
 
     @property
     def names(self) -> tuple[str | None, ...] | None:
         """Names of the movements, those of their primitives, or None."""
-        names = self._batch.names
+        names = self.primitives.names
         return names if names is None or len(names) == len(self) else names * len(self)
 
     @cached_property
@@ -127,10 +147,8 @@ class BaseRollout(Presented, ABC):
         """The movements as `Demonstrations`, with the labels, names and channels of their primitives.
 
         Of primitives that were learned from recordings with named columns they are what a recording of the movement
-        would be: orientations in the recorded order, and discrete channels that step where they did.
-
-        Of other poses the positions are the columns that are generated, quaternions (w, x, y, z) too. Their channels
-        say so, and recognition converts them.
+        would be: orientations in the recorded order, and discrete channels that step where they did. Of other poses the
+        positions are the columns that are generated, quaternions (w, x, y, z) too.
 
         Raises
         ------
@@ -140,10 +158,9 @@ class BaseRollout(Presented, ABC):
         demonstrations = Demonstrations.from_arrays(
             self.positions, self.labels, list(self.times), self.names, copy=False
         )
-        about = self._to_recording
-        if about is not None:
+        if (about := self.primitives.to_recording) is not None:
             return Demonstrations.of_movements(
-                with_recorded(demonstrations.movements, about, self._shares, len(self._batch))
+                with_recorded(demonstrations.movements, about, self._shares, len(self.primitives))
             )
         if (columns := self._column_channels) is None:
             return demonstrations
@@ -168,41 +185,30 @@ class BaseRollout(Presented, ABC):
         chosen = as_indices(index, len(self))
         return self.demonstrations[int(chosen)] if chosen.ndim == 0 else self._take(chosen)
 
+    def _least(self, durations: Array, passed: float, fixed_velocity: bool, *limits: ArrayLike | None) -> Array:
+        """Least durations (n,); see `Rollout.least_duration`. `passed` is the last sample's time in durations."""
+        if fixed_velocity:
+            raise SpecificationError(
+                "expected a movement whose velocities scale with its tempo, got one with velocity=, end_velocity= or "
+                "goal_velocity= other than 0: its path depends on the duration; try durations, and look at velocities "
+                "and accelerations"
+            )
+        if all(limit is None for limit in limits):
+            raise SpecificationError("expected a limit: velocity, acceleration, or both")
+        n_samples = math.ceil(_PER_BASIS * passed * self.primitives.dmp.n_basis) + 1
+        factors, size = np.zeros(len(durations)), max(1, _LIMITED_SAMPLES // n_samples)
+        for first in range(0, len(durations), size):
+            chosen = slice(first, first + size)
+            tile = self[chosen]._with_samples(n_samples)
+            for power, name, limit in zip((1, 2), ("velocity", "acceleration"), limits, strict=True):
+                if limit is not None:
+                    rates = tile.velocities if power == 1 else tile.accelerations
+                    exceeded = (_maximum(np.abs(rates)) / _largest(name, limit, rates.shape[2])).max(axis=1)
+                    factors[chosen] = np.maximum(factors[chosen], exceeded ** (1.0 / power))
+        return np.asarray(durations * factors)
+
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
         return np.array(self.positions, dtype=dtype, copy=copy)
-
-
-def least_durations(
-    movements: Any,
-    durations: Array,
-    finely: tuple[float, Callable[[Any, int], Any]],
-    fixed_velocity: bool,
-    limits: tuple[ArrayLike | None, ArrayLike | None],
-) -> Array:
-    """Least durations (n,) of n movements; see `Rollout.least_duration`.
-
-    `finely` is the number of basis functions that they pass, and what gives them so many samples.
-    """
-    if fixed_velocity:
-        raise SpecificationError(
-            "expected a movement whose velocities scale with its tempo, got one with velocity=, end_velocity= or "
-            "goal_velocity= other than 0: its path depends on the duration; try durations, and look at velocities "
-            "and accelerations"
-        )
-    if all(limit is None for limit in limits):
-        raise SpecificationError("expected a limit: velocity, acceleration, or both")
-    n_basis, with_samples = finely
-    n_samples = math.ceil(_PER_BASIS * n_basis) + 1
-    factors, size = np.zeros(len(durations)), max(1, _LIMITED_SAMPLES // n_samples)
-    for first in range(0, len(durations), size):
-        chosen = slice(first, first + size)
-        tile = with_samples(movements[chosen], n_samples)
-        for power, name, limit in zip((1, 2), ("velocity", "acceleration"), limits, strict=True):
-            if limit is not None:
-                rates = tile.velocities if power == 1 else tile.accelerations
-                exceeded = (_maximum(np.abs(rates)) / _largest(name, limit, rates.shape[2])).max(axis=1)
-                factors[chosen] = np.maximum(factors[chosen], exceeded ** (1.0 / power))
-    return np.asarray(durations * factors)
 
 
 def _maximum(x: Array) -> Array:
@@ -222,34 +228,14 @@ def _largest(name: str, limit: ArrayLike, n_dims: int) -> Array:
     return np.broadcast_to(value, n_dims)
 
 
-_LONGEST = 10.0  # durations after which a movement that has not settled is given up
-_SETTLING_SAMPLES = 400
-
-_TILE_SAMPLES = 100_000  # numbers in one tile of the result
-
-
-class Change(NamedTuple):
-    """A change of the weights of n movements: ``W + coefficients @ directions``."""
-
-    coefficients: Array  # (n, d, k)
-    directions: Array  # (k, N)
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Rollout(BaseRollout):
     """n generated movements of T samples each; positions and derivatives are computed when asked for.
 
     A sequence of `Trajectory`, taken wherever movements are expected; see `BaseRollout`. Each of `positions`,
-    `velocities` and `accelerations` is one product of the movements' numbers, ``[W, g - x0, v0, x0]``, with the decode
-    matrix of the specification.
-
-    Attributes
-    ----------
-    times : ndarray of shape (n, T)
-        From 0 [s].
+    `velocities` and `accelerations` is one product of numbers ``[W, g - x0, v0, x0]`` with the decode matrix.
     """
 
-    primitives: Batch
     ratio: Array  # (n, d), what scale f is multiplied by
     starts: Array  # (n, d)
     goals: Array  # (n, d)
@@ -263,9 +249,6 @@ class Rollout(BaseRollout):
 
     def __len__(self) -> int:
         return len(self.starts)
-
-    def __repr__(self) -> str:
-        return f"Rollout({len(self)} movements of {self.n_samples} samples from {self.primitives!r})"
 
     @property
     def weights(self) -> Array:
@@ -290,21 +273,6 @@ class Rollout(BaseRollout):
         """Times of the samples (n, T) [s]."""
         return self.durations[:, None] * self._shares
 
-    @cached_property
-    def positions(self) -> Array:
-        """Positions (n, T, d), in the unit of the demonstrations."""
-        return self._derivative(0)
-
-    @cached_property
-    def velocities(self) -> Array:
-        """Velocities (n, T, d), per second."""
-        return self._derivative(1)
-
-    @cached_property
-    def accelerations(self) -> Array:
-        """Accelerations (n, T, d), per second squared."""
-        return self._derivative(2)
-
     def least_duration(self, velocity: ArrayLike | None = None, acceleration: ArrayLike | None = None) -> Array:
         """The least duration of each movement (n,) [s] in which the same path stays within limits.
 
@@ -324,27 +292,11 @@ class Rollout(BaseRollout):
             No limit, or one that is not above 0; a rollout that was given a velocity other than 0, initial, at the end
             or of the goal, for its path depends on the duration.
         """
-        finely = self.end * self.primitives.dmp.n_basis, lambda movements, n: replace(movements, n_samples=n)
-        return least_durations(self, self.durations, finely, self.fixed_velocity, (velocity, acceleration))
+        return self._least(self.durations, self.end, self.fixed_velocity, velocity, acceleration)
 
     @property
     def _shares(self) -> Array:
         return np.linspace(0.0, self.end, self.n_samples)
-
-    @property
-    def _batch(self) -> Batch:
-        return self.primitives
-
-    def _take(self, chosen: NDArray[np.intp]) -> Rollout:
-        rows = ("ratio", "starts", "goals", "velocities_at_start", "durations")
-        change, moving = self.change, self.goal_velocities
-        return replace(
-            self,
-            goal_velocities=None if moving is None else moving[chosen],
-            change=None if change is None else change._replace(coefficients=change.coefficients[chosen]),
-            primitives=self.primitives if len(self.primitives) == 1 else self.primitives[chosen],
-            **{name: getattr(self, name)[chosen] for name in rows},
-        )
 
     def _derivative(self, order: int) -> Array:
         response = decoder(self.primitives.dmp, self.n_samples, self.end)
@@ -391,13 +343,9 @@ def rollout(
 ) -> Rollout:
     """Check the options and broadcast them over the primitives; see `Primitives.rollout`."""
     d, row = primitives.n_dims, primitives.row
-    options = {
-        "start": per_movement(start, "start", d),
-        "goal": per_movement(goal, "goal", d),
-        "velocity": per_movement(velocity, "velocity", d),
-        "goal_velocity": per_movement(goal_velocity, "goal_velocity", d),
-        "duration": per_movement(duration, "duration", None),
-    }
+    vectors = {"start": start, "goal": goal, "velocity": velocity, "goal_velocity": goal_velocity}
+    options = {name: per_movement(vector, name, d) for name, vector in vectors.items()}
+    options["duration"] = per_movement(duration, "duration", None)
     n = broadcast_length(len(primitives), options)
 
     def fill(name: str, default: Array) -> Array:

@@ -1,12 +1,10 @@
 """Parameters of a discrete DMP, checked: the canonical system, basis functions over its phase, spring and fit.
 
-The formulations: the factor of the forcing term, and how the goal enters besides the spring.
-
 In normalized time u = t / tau every formulation is one linear spring-damper,
 
     x'' = K (g - x) - D x' + scale f(s) + coupling(s) (g - x0),        ' = d/du,
 
-and only scale and coupling differ. Encoding, decoding and features are written once for all of them.
+and only scale and coupling differ: encoding, decoding and features are written once for all of them.
 """
 
 from __future__ import annotations
@@ -31,21 +29,13 @@ _NEAR = 1e-2  # of its largest extent; the original formulation magnifies noise 
 
 @dataclass(frozen=True)
 class Formulation:
-    """One row of `FORMULATIONS`.
-
-    - `divides_by_amplitude`: whether scale is ``g - x0`` (then weights and f do not exist where it is 0) or the
-      stiffness K.
-    - `coupling`: ``coupling(K, s)``: the factor of ``g - x0`` in the equation and, the same function, of ``x - x0`` in
-      the shape-attractor term.
-    - `ratio`: ``ratio(new, learned, extents)``: what scale f is multiplied by when a movement learned with one ``g -
-      x0`` is generated with another; all of shape (n, d).
-    """
+    """One row of `FORMULATIONS`."""
 
     name: str
     equation: str  # the transformation system as the paper prints it
-    divides_by_amplitude: bool
-    coupling: Callable[[float, Array], Array]
-    ratio: Callable[[Array, Array, Array], Array]
+    coupling: Callable[[float, Array], Array]  # of K and s: of g - x0, and of x - x0 in the shape-attractor term
+    ratio: Callable[[Array, Array, Array], Array]  # new by learned g - x0 and extents, all (n, d): a factor of scale f
+    divides_by_amplitude: bool = False  # scale is g - x0, and weights and f do not exist where it is 0; else K
 
     def scale(self, stiffness: float, amplitude: Array) -> Array:
         """The factor of f in the equation, for learned amplitudes g - x0 of any shape."""
@@ -81,12 +71,9 @@ HANDOVER = 0.2
 def late_shape_weight(s: Array) -> Array:
     """Weight of the shape-attractor in the decoupled formulation: 1 at the start, 0 in the end.
 
-    ``w_s(s) = (1 + c^3) s^3 / (s^3 + c^3)`` with c = `HANDOVER`. As s decays exponentially this is a logistic curve in
-    time, ``1 / (1 + exp(3 alpha (u - u_c)))`` with ``s(u_c) = c``, up to the factor that makes it 1 at the start.
-
-    With K = 100 a change of the goal has gone through to 7 % at 30 % of the time, against 39 % in Eq. (4), to 20 % at
-    40 % of the time, against 56 %, and to 98 % at the end, against 97 %, with a smaller largest acceleration. Later or
-    slower curves arrive late.
+    ``w_s(s) = (1 + c^3) s^3 / (s^3 + c^3)`` with c = `HANDOVER`: a logistic curve in time. With K = 100 a change of the
+    goal has gone through to 7 % at 30 % of the time, against 39 % in Eq. (4), to 20 % at 40 % of the time, against 56
+    %, and to 98 % at the end, against 97 %, with a smaller largest acceleration. Later or slower curves arrive late.
     """
     return (1.0 + HANDOVER**3) * s**3 / (s**3 + HANDOVER**3)
 
@@ -105,7 +92,6 @@ FORMULATIONS = {
         Formulation(
             name="bio-inspired",
             equation="tau v' = s K (f(s)/s + x0 - x) + (1 - s) K (g - x) - D v  (Eq. 4)",
-            divides_by_amplitude=False,
             coupling=lambda K, s: -K * s,
             ratio=_unchanged,
         ),
@@ -115,19 +101,15 @@ FORMULATIONS = {
         Formulation(
             name="amplitude-scaled",
             equation="tau v' = s K (r f(s)/s + x0 - x) + (1 - s) K (g - x) - D v,  r = |g - x0| / |g - x0| learned",
-            divides_by_amplitude=False,
             coupling=lambda K, s: -K * s,
             ratio=_isotropic,
         ),
-        # Prada and Remazeilles (2012), the paper's [9], decouple the weights of the two attractors, s and 1 - s in
-        # Eq. (4). Taken from there: each attractor has a weight of its own, so that the goal can act later than with s.
-        # Chosen here: a logistic curve in time, and weights whose sum is 1, which keeps the spring constant.
-        # Multiplied out, K f + w_s K (x0 - x) + (1 - w_s) K (g - x) = K (g - x) + K f - K w_s (g - x0): nothing is
-        # divided by w_s, and w_s vanishes with s, so the goal is reached.
+        # From Prada and Remazeilles (2012), the paper's [9]: each attractor has a weight of its own, so that the goal
+        # can act later than with s. Chosen here: a logistic curve in time, and weights whose sum is 1, which keeps the
+        # spring constant: K f + w_s K (x0 - x) + (1 - w_s) K (g - x) = K (g - x) + K f - K w_s (g - x0).
         Formulation(
             name="decoupled",
             equation="tau v' = w_s K (f(s)/w_s + x0 - x) + w_g K (g - x) - D v,  w_g = 1 - w_s, w_s logistic in time",
-            divides_by_amplitude=False,
             coupling=lambda K, s: -K * late_shape_weight(s),
             ratio=_unchanged,
         ),
@@ -136,12 +118,7 @@ FORMULATIONS = {
 
 
 def safe_amplitudes(amplitudes: Array, extents: Array, names: Sequence[str | None] | None, feature: str) -> Array:
-    """Return `amplitudes` g - x0 (n, d) if none is zero.
-
-    Raises `DegenerateMovementError`: where g = x0 in a dimension: a closed or a flat movement. Warns
-    `DegenerateMovementWarning`: once, with a count, for movements whose g is closer to x0 than 1 % of the movement's
-    largest extent.
-    """
+    """Return `amplitudes` g - x0 (n, d) if none is zero; warn where one is below 1 % of the largest extent."""
     relative = np.abs(amplitudes) / extents.max(axis=1, keepdims=True)
     zero = relative <= ZERO
     if zero.any():
@@ -164,7 +141,6 @@ def safe_amplitudes(amplitudes: Array, extents: Array, names: Sequence[str | Non
     return amplitudes
 
 
-FITS = ("forcing", "trajectory")
 REGRESSIONS = ("local", "ridge")
 GATINGS = ("none", "phase")
 MOST_BASIS = 2_000  # the response to N functions takes 32 N^2 numbers
@@ -193,7 +169,6 @@ class Specification(SpringDamper):
 
     def __post_init__(self) -> None:
         check_choice("formulation", self.formulation, list(FORMULATIONS))
-        check_choice("fit", self.fit, FITS)
         check_choice("regression", self.regression, REGRESSIONS)
         self._check_spring_damper()
         check_count("n_points", self.n_points, 10, most=MOST_POINTS)
@@ -242,17 +217,11 @@ class ExponentialPhase:
 
 @dataclass(frozen=True)
 class GaussianBasis:
-    """Basis functions ``psi_i(s) = exp(-h_i (s - c_i)^2)``, Eq. (3), with centers equally spaced in time.
-
-    - `overlap`: value of each function at the next center, between 0 and 1. It sets the widths: ``h_i = -ln(overlap) /
-      (c_{i+1} - c_i)^2``.
-    - `gating` ({"none", "phase"}): whether f carries the factor s: ``f = sum psi w / sum psi`` (Eq. 2) or that times s.
-      Papers mix the two and call both f.
-    """
+    """Basis functions ``psi_i(s) = exp(-h_i (s - c_i)^2)``, Eq. (3), with centers equally spaced in time."""
 
     n_basis: int  # number N of basis functions
-    overlap: float
-    gating: str
+    overlap: float  # value of each function at the next center: ``h_i = -ln(overlap) / (c_{i+1} - c_i)^2``
+    gating: str  # "phase" if f is Eq. (2) times s; papers mix the two and call both f
     phase: ExponentialPhase  # maps time to s
 
     def __post_init__(self) -> None:
@@ -274,11 +243,7 @@ class GaussianBasis:
         return -math.log(self.overlap) / np.append(gaps, gaps[-1]) ** 2
 
     def activations(self, u: Array) -> Array:
-        """Eq. (3) at normalized times u (T,), shape (T, N), up to a common factor per row.
-
-        The factor makes the largest activation of a row 1, so that far beyond the last center, where
-        every Gaussian underflows, Eq. (2) does not become 0/0.
-        """
+        """Eq. (3) at u (T,), shape (T, N), up to a factor per row that makes its largest 1: Eq. (2) is never 0/0."""
         exponents = self.exponents(u)
         return np.exp(exponents - exponents.max(axis=1, keepdims=True))
 
@@ -295,8 +260,8 @@ class GaussianBasis:
     def gate(self, u: Array) -> Array:
         """The factor that f carries besides the basis, shape (T,): s if gated, else 1.
 
-        Eq. (2) leaves f for u > 1 open, past the end of the demonstration; there the last weight would keep the
-        movement away from its goal forever. So past the end an ungated f decays with the phase, as ``s / s(tau)``.
+        Past the end, where Eq. (2) leaves f open, an ungated f decays with the phase, as ``s / s(tau)``: the last
+        weight would keep the movement away from its goal forever.
         """
         s = self.phase(u)
         return s if self.gating == "phase" else np.minimum(1.0, s / self.phase.end)

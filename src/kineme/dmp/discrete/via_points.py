@@ -47,16 +47,9 @@ SHARES = Span(1.0, False, _FORM, "{:g} of the duration", _BOUNDS)
 
 
 def via_points(via: ViaLike, n_dims: int, learned: Learned | None = None, span: Span = SHARES) -> ViaPoints:
-    """Check what a user wrote; see `Primitives.rollout`.
+    """Check what a user wrote, points of `n_dims` and times of `span`; see `Primitives.rollout`.
 
-    - `via` as in `Primitives.rollout`.
-    - `n_dims`: of the points as they are written.
-    - `learned`: ``learned(times, points)`` gives points (n, k, n_dims) at times (k,) in the coordinates that are
-      learned, if these are others.
-    - `span`: what the times are; those of the result are shares of it.
-
-    Raises `SpecificationError` (no list of pairs, a time outside ]0, 1[, two places at one time) and `TrajectoryError`
-    (points of the wrong shape, infinite, or without any number; batches of different lengths).
+    ``learned(times, points)`` gives points (n, k, n_dims) at times (k,) in the coordinates that are learned, if others.
     """
     if isinstance(via, (str, bytes)) or not isinstance(via, (Sequence, np.ndarray)):
         raise SpecificationError(f"expected {span.form}, got {via!r}")
@@ -91,16 +84,12 @@ def _part(i: int, pair: Any, n_dims: int, span: Span) -> tuple[Array, Array, boo
         raise SpecificationError(f"expected {span.form}, got {pair!r} as via[{i}]") from error
     points = as_numbers(where, f"via[{i}]")
     stretch = not _is_time(when)
-    if stretch:
-        points = points[:, None] if n_dims == 1 and points.ndim == 1 else points
-        fits, shape = points.ndim in (2, 3) and points.shape[-2] >= 2, f"(m, {n_dims}) or (n, m, {n_dims})"
-    else:
-        points = points[None] if n_dims == 1 and points.ndim == 0 else points
-        fits, shape = points.ndim in (1, 2), f"({n_dims},) or (n, {n_dims})"
-    if not fits or points.shape[-1] != n_dims or not points.size:
+    points = points[..., None] if n_dims == 1 and points.ndim == stretch else points
+    fits = points.size and points.ndim in (1 + stretch, 2 + stretch) and points.shape[-1] == n_dims
+    if not fits or (stretch and points.shape[-2] < 2):
+        shape = f"(m, {n_dims}) or (n, m, {n_dims})" if stretch else f"({n_dims},) or (n, {n_dims})"
         raise TrajectoryError(f"via[{i}]: expected points of shape {shape}, got shape {np.shape(where)}")
-    points = points if points.ndim == 2 + stretch else points[None]
-    points = points if stretch else points[:, None]
+    points = points.reshape(-1, points.shape[-2] if stretch else 1, n_dims)
     if np.isinf(points).any() or np.nanmax(np.abs(points), initial=0.0) > LARGEST or np.isnan(points).all(axis=2).any():
         raise TrajectoryError(
             f"via[{i}]: expected numbers up to {LARGEST:g}, NaN only for dimensions that are free, got {where!r}"
@@ -167,13 +156,9 @@ def per_movement(option: ArrayLike | None, name: str, n_dims: int | None) -> Arr
         raise TrajectoryError(f"expected numbers for {name}, got {option!r}") from error
     if n_dims == 1 and value.ndim == 0:
         value = value[None]
-    if n_dims is None:
-        value = value[None] if value.ndim == 0 else value
-        fits = value.ndim == 1
-    else:
-        value = value[None] if value.ndim == 1 else value
-        fits = value.ndim == 2 and value.shape[1] == n_dims
-    if not fits:
+    own = () if n_dims is None else (n_dims,)
+    value = value[None] if value.ndim == len(own) else value
+    if value.shape[1:] != own:
         shape = "a number or (n,)" if n_dims is None else f"({n_dims},) or (n, {n_dims})"
         raise TrajectoryError(f"expected {name} of shape {shape}, got shape {np.shape(option)}")
     if (bad := ~np.isfinite(value)).any():

@@ -26,11 +26,7 @@ _MADE: dict[str, Any] = {"color": BLUE}
 
 
 def draw_movement(learned: Learned, generated: Columns, obstacles: Array | None) -> Figure:
-    """The path, where it lies in the plane or in space, and each column over time.
-
-    Three lines: the recording, where it is known; the fit, which is the primitive moved as demonstrated; and the new
-    movement. The legend says how far the fit is off the recording.
-    """
+    """The path, where there is one, and each column over time: the recording, its fit, and the new movement."""
     fitted, paths = generate(learned, MovementOptions()).columns, path_columns(learned)
     n_columns = math.ceil(len(learned.columns) / _ROWS)
     n_rows = math.ceil(len(learned.columns) / n_columns)
@@ -66,10 +62,7 @@ def _draw_over_time(grid: NDArray[Any], learned: Learned, fitted: Columns, gener
 
 
 def path_columns(learned: Learned) -> list[list[int]]:
-    """The columns of each path: two or three positions, if there are no more, or those of each of several points.
-
-    Names of points differ before the last letter, which is an axis: left.x, left.y, right.x, right.y.
-    """
+    """The columns of each path: two or three positions, or those of each of several points, as left.x, left.y."""
     about = learned.primitive.to_recording
     if about is None:
         d = learned.primitive.n_dims

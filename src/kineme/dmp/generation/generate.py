@@ -12,14 +12,13 @@ import numpy as np
 from kineme.dmp.control.plan import ObstacleAvoidance, Status
 from kineme.dmp.discrete.dmp import DMP, Primitives
 from kineme.dmp.pose.pose_dmp import PoseDMP, PosePrimitives
-from kineme.dmp.recorded_as import in_primitive, in_recording
+from kineme.dmp.recorded_as import in_recording, primitive_columns
 from kineme.errors import ExtrapolationWarning, SpecificationError, heard_warnings, warn
 from kineme.io.arrays.npz import kind_of
 from kineme.io.writing.write_movement import ColumnNames, Columns
 from kineme.movements.channels.channel import learned_names, recorded_names
 from kineme.movements.channels.coordinates import as_wxyz, columns_of
 from kineme.movements.rotations import NORM_TOLERANCE, angle_between
-from kineme.movements.trajectories.movements import axis_names
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.validation import LARGEST, Array
 
@@ -32,14 +31,10 @@ _MET = 0.01  # of the extent: a via point that is missed by more is said
 
 @dataclass(frozen=True, eq=False)
 class MovementOptions:
-    """Options of a new movement; None leaves it as demonstrated.
+    """Options of a new movement; None leaves it as demonstrated. Points are in the columns that are not discrete.
 
-    - `start`, `goal` (d,): in the columns of the recording that are not discrete, in their order.
-    - `meet_goal`: whether the movement ends exactly at its goal, with the velocity that it has at the demonstrated one.
-      Otherwise it comes as close as the primitive brings it, to some hundredths of the way between the two goals.
-    - `via`, pairs of a share and a point: points to pass, and when as shares of the duration, between 0 and 1; as start
-      and goal. Obstacles lead away from them; the movement is aimed beside them for it, and what is missed all the same
-      is said.
+    With `meet_goal` it ends exactly at its goal, with the velocity that it has at the demonstrated one; else as close
+    as the primitive brings it, to some hundredths of the way between the two goals.
     """
 
     start: Array | None = None
@@ -49,7 +44,7 @@ class MovementOptions:
     settle: float | None = None  # continue until within this distance of the goal
     obstacles: Array | None = None  # (m, d), points to steer around
     meet_goal: bool = False
-    via: tuple[tuple[float, Array], ...] = ()
+    via: tuple[tuple[float, Array], ...] = ()  # when, between 0 and 1, and where; obstacles are aimed around
     avoidance: ObstacleAvoidance | None = None  # how strongly it steers around obstacles
 
 
@@ -61,15 +56,10 @@ class Generated(NamedTuple):
 
 
 def generate(learned: Learned, options: MovementOptions) -> Generated:
-    """The new movement in the columns of the recording.
+    """The new movement in the columns of the recording, discrete channels stepping where they did.
 
-    Orientations are quaternions of norm 1, with angular velocities in the world frame; discrete channels step where
-    they did, at the same share of the duration.
-
-    Raises `SpecificationError`: an option that cannot be met; among them obstacles that keep the movement from its
-    goal, more samples than fit into memory, and numbers that are not finite: a robot gets no movement that was not
-    checked. Warns `ExtrapolationWarning`: a via point that obstacles make the movement miss by more than 1 % of its
-    extent: which, and by how much.
+    Raises `SpecificationError`: an option that cannot be met, obstacles that keep it from its goal, numbers that are
+    not finite. Warns `ExtrapolationWarning`: a via point missed by more than 1 % of the extent because of obstacles.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # refused below
         start, goal = (checked_point(learned, getattr(options, name), name) for name in ("start", "goal"))
@@ -94,11 +84,7 @@ def generate(learned: Learned, options: MovementOptions) -> Generated:
 
 
 def checked_point(learned: Learned, point: Array | None, name: str) -> Array | None:
-    """A start or goal in the columns of the recording that move, in those of the primitive.
-
-    `point` (columns,) or None; `name`: what the message calls it. Raises `SpecificationError`: another number of
-    values, or such that no movement can start or end there.
-    """
+    """A start or goal in the columns of the recording that move (columns,), in those of the primitive."""
     if point is None:
         return None
     names = learned.moving_columns
@@ -115,7 +101,7 @@ def checked_point(learned: Learned, point: Array | None, name: str) -> Array | N
                 f"expected a unit quaternion for {', '.join(channel.columns)} of {name}, got norm {norm + 1.0:.6g}; "
                 "check the order of the columns, or divide it by its norm"
             )
-    return point if about is None else in_primitive(point, about)
+    return point if about is None else point[primitive_columns(about.moving)]
 
 
 def _signed(columns: Array, learned: Learned) -> Array:
@@ -142,12 +128,7 @@ def _undisturbed(primitive: Primitives | PosePrimitives, options: MovementOption
         rate=options.rate,
         settle=options.settle,
     )
-    return {
-        "times": movement.times[0],
-        "positions": movement.positions[0],
-        "velocities": movement.velocities[0],
-        "accelerations": movement.accelerations[0],
-    }
+    return {name: getattr(movement, name)[0] for name in ("times", "positions", "velocities", "accelerations")}
 
 
 def _around_obstacles(primitive: Primitives | PosePrimitives, options: MovementOptions) -> Columns:
@@ -250,9 +231,7 @@ class Learned:
         about = self.primitive.to_recording
         if about is not None:
             return recorded_names(about.channels)
-        if isinstance(self.primitive, PosePrimitives):
-            return (*"xyz"[: self.primitive.n_positions], "qw", "qx", "qy", "qz")
-        return self.rates
+        return tuple(self.primitive.plain_names[0]) if isinstance(self.primitive, PosePrimitives) else self.rates
 
     @property
     def moving_columns(self) -> tuple[str, ...]:
@@ -264,11 +243,7 @@ class Learned:
     def rates(self) -> tuple[str, ...]:
         """Names of the columns that have velocities: an orientation has three, a discrete channel none."""
         channels = self.primitive.channels
-        if channels is not None:
-            return learned_names(channels)
-        if isinstance(self.primitive, PosePrimitives):
-            return (*"xyz"[: self.primitive.n_positions], "q.rx", "q.ry", "q.rz")
-        return tuple(axis_names(self.primitive.n_dims))
+        return tuple(self.primitive.plain_names[1]) if channels is None else learned_names(channels)
 
     @property
     def recorded(self) -> Array | None:
@@ -282,10 +257,7 @@ class Learned:
 
 
 def learn_one(demonstration: Trajectory, dmp: DMP) -> Learned:
-    """The primitive of a recording, whatever it holds; with orientations it is one of poses.
-
-    Raises `TrajectoryError`: a movement that cannot be learned.
-    """
+    """The primitive of a recording, whatever it holds; with orientations it is one of poses."""
     return Learned((PoseDMP(dmp) if has_orientation(demonstration) else dmp).learn([demonstration]), demonstration)
 
 
@@ -295,31 +267,21 @@ def has_orientation(demonstration: Trajectory) -> bool:
 
 
 def load_saved(path: Path) -> Primitives | PosePrimitives:
-    """Saved primitives of either kind.
-
-    Raises `DataError` or `FileNotFoundError`: see `Primitives.load`.
-    """
+    """Saved primitives of either kind."""
     is_pose = path.is_file() and kind_of(path) == PosePrimitives.KIND
     return PosePrimitives.load(path) if is_pose else Primitives.load(path)
 
 
 class Deviation(NamedTuple):
-    """The largest distance from a recording.
-
-    `of`: what deviates so far: "positions", "angles", or the name of an orientation; empty if the recording is of one
-    kind.
-    """
+    """The largest distance from a recording."""
 
     largest: float  # in the unit of the recording; of an orientation the angle [rad]
     share: float  # of the extent: the diagonal of the bounding box, or the largest angle from the start
-    of: str
+    of: str  # "positions", "angles" or an orientation's name; empty in a recording of one kind
 
 
 def largest_deviation(learned: Learned) -> Deviation | None:
-    """Return the deviation of positions, angles or one orientation that is the largest share of its extent.
-
-    It is measured at the recorded times. None without a demonstration, or where nothing of it moves.
-    """
+    """Of positions, angles or an orientation, at the recorded times, that which is the largest share of its extent."""
     demonstration = learned.demonstration
     if demonstration is None:
         return None

@@ -50,11 +50,6 @@ class PoseController(Controller[PoseState]):
     the linear ones, and external accelerations (`coupling`) likewise. With a `goal_velocity` the orientation of the
     goal goes on as a rotation vector does. Obstacles are points (m, 3) that the position steers around; orientations
     without a position have none.
-
-    Attributes
-    ----------
-    state : PoseState
-        After the last step; at first the start.
     """
 
     def __init__(self, plan: Plan, dt: float, options: Options, reference: Array) -> None:
@@ -80,10 +75,7 @@ class PoseController(Controller[PoseState]):
         return np.array(tangent) - self._origin
 
     def _read_rates(self, value: Any, place: Array) -> Array | None:
-        """Return rates of position and rotation vector at a place, from linear and angular ones.
-
-        Of accelerations it is the part that is linear in them, ``J p''``.
-        """
+        """Rates of position and rotation vector, of linear and angular ones; of accelerations the linear part."""
         array = read_vector(value, self._n_dims)
         if array is None:
             return None

@@ -11,14 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 from kineme.dmp.batch import Arrays, Batch, check_array
 from kineme.dmp.control.plan import ObstacleAvoidance, Options, check_one
 from kineme.dmp.discrete.dmp import DMP, Primitives
-from kineme.dmp.discrete.modulate import modulated
-from kineme.dmp.discrete.plan import plan_along
+from kineme.dmp.discrete.modulate import modulated, plan_along
 from kineme.dmp.discrete.rollout import Rollout, rollout, sampled
 from kineme.dmp.discrete.via_points import ViaLike, broadcast_length
 from kineme.dmp.pose.pose_controller import PoseController
 from kineme.dmp.pose.pose_rollout import PoseRollout, changes_in_tangent, checked_poses, rates_in_tangent
 from kineme.dmp.pose.tangent import to_tangent
-from kineme.dmp.recorded_as import RecordedAs, recorded_as
+from kineme.dmp.recorded_as import RecordedAs, make_read_only, recorded_as
 from kineme.errors import SpecificationError
 from kineme.movements.channels.channel import Channels
 from kineme.movements.rotations import conjugate, exp, log, nearest, normalized, product
@@ -137,9 +136,7 @@ class PosePrimitives(Batch):
     recorded_as: RecordedAs | None = None
 
     def __post_init__(self) -> None:
-        view = self.references.view()
-        view.setflags(write=False)
-        object.__setattr__(self, "references", view)
+        make_read_only(self, ["references"])
 
     def __repr__(self) -> str:
         columns = {4: "orientations", 7: "poses"}.get(self.n_columns, f"{self.n_columns} columns")
@@ -163,10 +160,7 @@ class PosePrimitives(Batch):
         check_array("references", loaded.references, (len(loaded), 4 * k))
         if loaded.recorded_as is None and loaded.n_dims not in {3, 6}:
             raise ValueError(f"scaled_weights should have 3 or 6 dimensions, have {loaded.n_dims}")
-        for at in range(0, 4 * k, 4):
-            normalized(
-                loaded.references[:, at : at + 4]
-            )  # refuses what is no rotation; the numbers stay as they were saved
+        normalized(loaded._goals)  # refuses what is no rotation; the numbers stay as they were saved
         return loaded
 
     @property
@@ -185,12 +179,12 @@ class PosePrimitives(Batch):
         return self.tangent.dmp
 
     @property
-    def labels(self) -> NDArray[Any] | None:
+    def labels(self) -> NDArray[Any] | None:  # type: ignore[override]
         """Labels of the demonstrations, shape (n,), or None."""
         return self.tangent.labels
 
     @property
-    def names(self) -> tuple[str | None, ...] | None:
+    def names(self) -> tuple[str | None, ...] | None:  # type: ignore[override]
         """Source of each demonstration, or None."""
         return self.tangent.names
 
@@ -198,6 +192,12 @@ class PosePrimitives(Batch):
     def durations(self) -> Array:
         """Duration tau of each demonstration, shape (n,) [s]."""
         return self.tangent.durations
+
+    @property
+    def plain_names(self) -> tuple[list[str], list[str]]:
+        """Names of the columns and of their rates without a recording: x, y, z, then qw, ... and q.rx, ..."""
+        places = [*"xyz"[: self.n_positions]]
+        return [*places, "qw", "qx", "qy", "qz"], [*places, "q.rx", "q.ry", "q.rz"]
 
     @property
     def n_orientations(self) -> int:
@@ -261,14 +261,12 @@ class PosePrimitives(Batch):
         position_limits : (low, high), optional
             Where the positions stay, each a number or one for each position; see `Primitives.rollout`.
         settle : float, optional
-            Go on past the duration until every position and every component of the rotation vector [rad] stays within
-            this distance of the goal.
+            Go on past the duration until every position and rotation vector [rad] stays this near the goal.
 
         Raises
         ------
         TrajectoryError
-            A start, goal, velocity or via point of the wrong shape, a quaternion not of norm 1, numbers that do not go
-            together.
+            A start, goal, velocity or via point of the wrong shape, a quaternion not of norm 1, unequal numbers.
         SpecificationError
             As of `Primitives.rollout`, with its warnings, in positions or in radians; limits of orientations alone.
         DegenerateMovementError
@@ -283,7 +281,7 @@ class PosePrimitives(Batch):
         movement = modulated(movement, *changes_in_tangent(movement, references, via, end_velocity, position_limits))
         movement = sampled(movement, rate, n_samples, settle)
         references = np.broadcast_to(references, (len(movement), references.shape[1]))
-        return PoseRollout(movement, references, self.recorded_as)
+        return PoseRollout(self, movement, references)
 
     @classmethod
     def from_rollout(cls, movement: PoseRollout) -> PosePrimitives:
@@ -322,8 +320,7 @@ class PosePrimitives(Batch):
 
         Start, goal, velocity, via points, end velocity and limits are as in `rollout`, for one movement. Limits of
         `Options` hold for linear and angular velocities and accelerations, as the state reports them; obstacles are
-        points (m, 3) that the position steers around; `settle` holds for positions and the components of the rotation
-        vector [rad].
+        points (m, 3) that the position steers around; `settle` holds for positions and rotation vectors [rad].
 
         Raises
         ------
@@ -339,13 +336,6 @@ class PosePrimitives(Batch):
         options = Options(feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance, settle)
         return PoseController(plan, dt, options, references[0])
 
-    def in_tangent(
-        self, start: ArrayLike | None, goal: ArrayLike | None, velocity: ArrayLike | None
-    ) -> tuple[Array, Array, Array, Array | None]:
-        """Start, goal, reference orientations and initial velocity of the movements that these options make."""
-        starts, goals, references = self._endpoints(start, goal)
-        return starts, goals, references, rates_in_tangent(velocity, starts, self.n_positions, "velocity")
-
     def _asked_for(
         self,
         start: ArrayLike | None,
@@ -355,7 +345,8 @@ class PosePrimitives(Batch):
         goal_velocity: ArrayLike | None = None,
     ) -> tuple[Rollout, Array]:
         """The movements in positions and rotation vectors, and the orientations (1 or n, 4 k) that these refer to."""
-        starts, goals, references, velocities = self.in_tangent(start, goal, velocity)
+        starts, goals, references = self._endpoints(start, goal)
+        velocities = rates_in_tangent(velocity, starts, self.n_positions, "velocity")
         return rollout(self.tangent, starts, goals, duration, velocities, goal_velocity), references
 
     def _endpoints(self, start: ArrayLike | None, goal: ArrayLike | None) -> tuple[Array, Array, Array]:

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from kineme.dmp.batch import Batch
 from kineme.dmp.discrete.modulate import Measured, as_limits, path_at
-from kineme.dmp.discrete.rollout import BaseRollout, Rollout, least_durations
+from kineme.dmp.discrete.rollout import BaseRollout, Rollout
 from kineme.dmp.discrete.via_points import ViaLike, ViaPoints, broadcast_length, per_movement, via_points
 from kineme.dmp.pose.tangent import angular_acceleration, angular_velocity, rotation_vector_rate
 from kineme.dmp.recorded_as import RecordedAs
@@ -39,29 +36,23 @@ class PoseRollout(BaseRollout):
         The movement in positions and rotation vectors.
     references : ndarray of shape (n, 4), or (n, 4 k) of k orientations
         Goal orientations, from which the rotation vectors count.
-    recorded_as : RecordedAs or None
-        Channels of the recordings, where they are known.
     """
 
     tangent: Rollout
     references: Array
-    recorded_as: RecordedAs | None = None
 
     def __len__(self) -> int:
         return len(self.tangent)
-
-    def __repr__(self) -> str:
-        return f"PoseRollout({len(self)} movements of {self.tangent.n_samples} samples)"
 
     @property
     def times(self) -> Array:
         """Times of the samples (n, T) [s]."""
         return self.tangent.times
 
-    @cached_property
+    @property
     def orientations(self) -> Array:
         """Unit quaternions (n, T, 4); of k orientations (n, T, 4 k), one after the other, as all that follows."""
-        return self._of_each(lambda r, p: product(exp(p), r), 4, 1)
+        return self.positions[..., self._n_positions :]
 
     @property
     def poses(self) -> Array:
@@ -69,56 +60,27 @@ class PoseRollout(BaseRollout):
         return self.positions
 
     @property
-    def positions(self) -> Array:
-        """Movements as demonstrated: orientations (n, T, 4), or positions and orientations (n, T, 7)."""
-        return np.concatenate((self.tangent.positions[..., : self._n_positions], self.orientations), axis=-1)
-
-    @cached_property
     def angular_velocities(self) -> Array:
         """Angular velocities in the world frame (n, T, 3) [rad/s]."""
-        return self._of_each(lambda _, p, rate: angular_velocity(p, rate), 3, 2)
+        return self.velocities[..., self._n_positions :]
 
-    @cached_property
+    @property
     def angular_accelerations(self) -> Array:
         """Angular accelerations in the world frame (n, T, 3) [rad/s^2]."""
-        return self._of_each(lambda _, p, rate, bend: angular_acceleration(p, rate, bend), 3, 3)
+        return self.accelerations[..., self._n_positions :]
 
     @property
-    def velocities(self) -> Array:
-        """Angular velocities (n, T, 3), for poses after the linear ones (n, T, 6), in the world frame."""
-        return np.concatenate((self.tangent.velocities[..., : self._n_positions], self.angular_velocities), axis=-1)
-
-    @property
-    def accelerations(self) -> Array:
-        """Angular accelerations (n, T, 3), for poses after the linear ones (n, T, 6), in the world frame."""
-        linear = self.tangent.accelerations[..., : self._n_positions]
-        return np.concatenate((linear, self.angular_accelerations), axis=-1)
+    def recorded_as(self) -> RecordedAs | None:
+        """Channels of the recordings, where they are known."""
+        return self.primitives.recorded_as
 
     def least_duration(self, velocity: ArrayLike | None = None, acceleration: ArrayLike | None = None) -> Array:
         """The least duration (n,) [s] as `Rollout.least_duration`, with limits in the columns of `velocities`."""
         tangent = self.tangent
-        finely = (
-            tangent.end * tangent.primitives.dmp.n_basis,
-            lambda movements, n: replace(movements, tangent=replace(movements.tangent, n_samples=n)),
-        )
-        return least_durations(self, tangent.durations, finely, tangent.fixed_velocity, (velocity, acceleration))
+        return self._least(tangent.durations, tangent.end, tangent.fixed_velocity, velocity, acceleration)
 
-    @property
-    def axis_names(self) -> list[str]:
-        """Names of the columns of `positions`: as recorded, else x, y, z and qw, qx, qy, qz."""
-        about = self._to_recording
-        return list(about.column_names) if about else [*"xyz"[: self._n_positions], "qw", "qx", "qy", "qz"]
-
-    @property
-    def rate_names(self) -> list[str]:
-        """Names of the columns of `velocities` and `accelerations`: as recorded, else x, y, z, q.rx, ..."""
-        about = self._to_recording
-        return list(about.rate_names) if about else [*"xyz"[: self._n_positions], "q.rx", "q.ry", "q.rz"]
-
-    @property
-    def channels(self) -> Channels | None:
-        """Channels of the recordings, where they are known; see `Demonstrations.channels`."""
-        return None if self.recorded_as is None else self.recorded_as.channels
+    def _with_samples(self, n_samples: int) -> PoseRollout:
+        return replace(self, tangent=replace(self.tangent, n_samples=n_samples))
 
     @property
     def _column_channels(self) -> Channels | None:
@@ -131,10 +93,6 @@ class PoseRollout(BaseRollout):
         )
 
     @property
-    def _to_recording(self) -> RecordedAs | None:
-        return self.recorded_as if self.recorded_as is not None and self.recorded_as.has_steps else None
-
-    @property
     def _shares(self) -> Array:
         return self.tangent._shares
 
@@ -142,42 +100,28 @@ class PoseRollout(BaseRollout):
     def _n_positions(self) -> int:
         return self.tangent.starts.shape[1] - 3 * (self.references.shape[1] // 4)
 
-    @property
-    def _batch(self) -> Batch:
-        return self.tangent.primitives
-
-    def _take(self, chosen: NDArray[np.intp]) -> PoseRollout:
-        shared = len(self._batch) == 1 or self.recorded_as is None
-        about = self.recorded_as if shared or self.recorded_as is None else self.recorded_as.take(chosen)
-        return PoseRollout(self.tangent[chosen], self.references[chosen], about)
-
-    def _of_each(self, function: Callable[..., Array], size: int, orders: int) -> Array:
-        """A function of the reference and the first derivatives of each rotation vector: (n, T, size times k)."""
-        motion = [getattr(self.tangent, name) for name in ("positions", "velocities", "accelerations")[:orders]]
-        results = []
-        for i in range(self.references.shape[1] // 4):
-            at = self._n_positions + 3 * i
-            vectors = (rows[..., at : at + 3] for rows in motion)
-            results.append(self._by_tiles(function, size, self.references[:, None, 4 * i : 4 * i + 4], *vectors))
-        return results[0] if len(results) == 1 else np.concatenate(results, axis=-1)
-
-    def _by_tiles(self, function: Callable[..., Array], size: int, *arrays: Array) -> Array:
-        """Apply an elementwise function to movements, tile by tile in a core's cache; result (n, T, size)."""
-        n_samples = self.tangent.n_samples
-        result = np.empty((size, len(self), n_samples)).transpose(1, 2, 0)
+    def _derivative(self, order: int) -> Array:
+        """Tile by tile in a core's cache, elementwise functions of the rotation vectors and their rates."""
+        function = (lambda p, reference: product(exp(p), reference), angular_velocity, angular_acceleration)[order]
+        motion = [getattr(self.tangent, name) for name in ("positions", "velocities", "accelerations")[: order + 1]]
+        m, k, size = self._n_positions, self.references.shape[1] // 4, 3 if order else 4
+        n, n_samples, _ = motion[order].shape
+        result = np.empty((m + size * k, n, n_samples)).transpose(1, 2, 0)
+        result[..., :m] = motion[order][..., :m]
 
         def tile(start: int, stop: int) -> None:
-            result[start:stop] = function(*(array[start:stop] for array in arrays))
+            for i in range(k):
+                vectors = [x[start:stop, :, m + 3 * i : m + 3 * i + 3] for x in motion]
+                if not order:
+                    vectors.append(self.references[start:stop, None, 4 * i : 4 * i + 4])
+                result[start:stop, :, m + size * i : m + size * (i + 1)] = function(*vectors)
 
-        for_tiles(tile, len(self), max(1, _TILE_SAMPLES // n_samples))
+        for_tiles(tile, n, max(1, _TILE_SAMPLES // n_samples))
         return result
 
 
 def checked_poses(option: ArrayLike | None, name: str, n_positions: int, n_columns: int) -> Array | None:
-    """Poses (1 or n, n_columns) with quaternions of norm 1.
-
-    Raises `TrajectoryError`: another shape; a quaternion that is none.
-    """
+    """Poses (1 or n, n_columns) with quaternions of norm 1."""
     poses = per_movement(option, name, n_columns)
     if poses is None:
         return None
@@ -189,10 +133,7 @@ def checked_poses(option: ArrayLike | None, name: str, n_positions: int, n_colum
 
 
 def rates_in_tangent(velocity: ArrayLike | None, places: Array, n_positions: int, name: str) -> Array | None:
-    """Rates (n, p + 3 k) of positions and rotation vectors at places of this shape, of linear and angular velocities.
-
-    Raises `TrajectoryError`: another shape, or another number of movements.
-    """
+    """Rates (n, p + 3 k) of positions and rotation vectors at these places, of linear and angular velocities."""
     option = per_movement(velocity, name, places.shape[1])
     if option is None:
         return None
@@ -222,12 +163,7 @@ def changes_in_tangent(
 
 
 def via_poses(movement: Rollout, references: Array, via: ViaLike | None) -> ViaPoints | None:
-    """Via points (d,) of poses in the coordinates of a tangent movement: each orientation the vector nearest its path.
-
-    `movement`: in positions and rotation vectors; `references` (1 or n, 4 k): the orientations that the rotation
-    vectors refer to; `via` as in `PosePrimitives.rollout`. Raises `SpecificationError` or `TrajectoryError`: as
-    `via_points`; quaternions that are none, or of which some numbers are free.
-    """
+    """Via points of poses in the coordinates of a tangent movement: each orientation the vector nearest to its path."""
     if via is None:
         return None
     k = references.shape[1] // 4
@@ -264,11 +200,7 @@ def _vectors(q: Array, references: Array, near: Array) -> Array:
 def limits_of_positions(
     limits: tuple[ArrayLike, ArrayLike] | None, n_positions: int, n_dims: int
 ) -> tuple[Array, Array] | None:
-    """Limits (low, high) of the positions as those of all coordinates, of which rotation vectors have none.
-
-    Raises `SpecificationError`: limits of orientations alone; limits that are no two numbers, or (p,) of p positions;
-    low not below high.
-    """
+    """Limits (low, high) of the positions as those of all coordinates, of which rotation vectors have none."""
     if limits is None:
         return None
     if not n_positions:

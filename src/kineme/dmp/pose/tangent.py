@@ -1,17 +1,13 @@
 """From orientations to rotation vectors relative to the goal, where an ordinary DMP applies, and back.
 
-Rates of a rotation vector, angular velocity and acceleration: the Jacobian of the logarithm.
-
-For ``q = exp(p) r`` with a fixed r, and omega in the world frame,
+For ``q = exp(p) r`` with a fixed r, and omega in the world frame, the Jacobian of the logarithm gives
 
     omega = J(p) p',    J(p) = I + a [p]x + b [p]x^2,    a = (1 - cos t) / t^2,    b = (t - sin t) / t^3,    t = |p|,
 
-which leaves only p' parallel to p as it is (Sola, Deray and Atchuthan, "A micro Lie theory for state estimation
-in robotics", 2018, Eq. 145). Taking p' itself for omega is what Koutras and Doulgeri (2020) correct in Ude et al.
-(2014).
+(Sola, Deray and Atchuthan, "A micro Lie theory for state estimation in robotics", 2018, Eq. 145). Taking p' itself for
+omega is what Koutras and Doulgeri (2020) correct in Ude et al. (2014).
 
-The formulas are written in components, which are arrays, or Python's floats where there is one vector: NumPy needs a
-microsecond for each operation however small, which a step of live control has no time for.
+Formulas are in components, arrays or Python's floats: a step of live control has no time for NumPy's microseconds.
 """
 
 from __future__ import annotations
@@ -25,9 +21,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from kineme.dmp.recorded_as import primitive_columns
 from kineme.errors import TrajectoryError
-from kineme.movements.channels.channel import Channels, is_plain, learned_names
-from kineme.movements.channels.coordinates import as_wxyz, columns_of
+from kineme.movements.channels.channel import is_plain, learned_names
 from kineme.movements.preparation.trim import Step, preprocess
 from kineme.movements.rotations import (
     TINY,
@@ -119,22 +115,16 @@ def _to_tangent(demos: Demonstrations, k: int) -> tuple[Demonstrations, Array]:
 
 
 def with_orientations_last(movements: MovementsLike) -> tuple[Demonstrations, int]:
-    """Movements in columns with the orientations (w, x, y, z) last, and how many these are.
-
-    Raises `TrajectoryError`: movements without known channels that are of other than 4 or 7 columns.
-    """
+    """Movements in columns with the orientations (w, x, y, z) last, and how many these are."""
     demos = Demonstrations.of(movements)
     k = sum(channel.kind == "orientation" for channel in demos.channels or ())
     if k and demos.channels is not None:
-        return _with_positions(demos, np.concatenate(_columns(demos.channels, demos.recorded), axis=1)), k
+        return _with_positions(demos, demos.recorded[:, primitive_columns(demos.channels)]), k
     return as_poses(demos), 1
 
 
 def as_poses(movements: MovementsLike) -> Demonstrations:
-    """Movements of 4 columns (w, x, y, z) or 7, a position before it; see `to_tangent`.
-
-    Raises `TrajectoryError`: another number of columns, or channels that are no pose.
-    """
+    """Movements of 4 columns (w, x, y, z) or 7, a position before it; see `to_tangent`."""
     demos = Demonstrations.of(movements)
     if demos.channels is not None and not is_plain(demos.channels):
         kinds = [channel.kind for channel in demos.channels]
@@ -144,22 +134,13 @@ def as_poses(movements: MovementsLike) -> Demonstrations:
                 f"{', '.join(f'{channel.name} ({channel.kind})' for channel in demos.channels)}; "
                 "choose the columns by columns= of read_recordings, in the shell --columns"
             )
-        return _with_positions(demos, np.concatenate(_columns(demos.channels, demos.recorded), axis=1))
+        return _with_positions(demos, demos.recorded[:, primitive_columns(demos.channels)])
     if demos.n_dims not in COLUMNS:
         raise TrajectoryError(
             "expected movements of 4 columns, an orientation (w, x, y, z), or 7, a position (x, y, z) and an "
             f"orientation, got {demos.n_dims} columns"
         )
     return demos
-
-
-def _columns(channels: Channels, recorded: Array) -> list[Array]:
-    """The positions and angles, and after them the orientations as (w, x, y, z)."""
-    named = list(zip(channels, columns_of(channels), strict=True))
-    positions = [recorded[:, columns] for channel, columns in named if channel.kind in ("position", "angle")]
-    return positions + [
-        as_wxyz(recorded[:, columns], channel) for channel, columns in named if channel.kind == "orientation"
-    ]
 
 
 def _rotation_vectors(demos: Demonstrations, columns: slice, start: int, stop: int) -> tuple[Array, Array]:
@@ -206,19 +187,12 @@ def _with_positions(demos: Demonstrations, positions: Array) -> Demonstrations:
 
 
 def unwrapped(q: Array, offsets: NDArray[np.intp], where: Callable[[int], str]) -> Array:
-    """Logarithms of unit quaternions relative to the last of each movement, continuous along it.
+    """Logarithms (total, 3) of unit quaternions (total, 4) relative to the last of each movement, continuous along it.
 
-    Every rotation has the rotation vectors ``(t + 2 pi k) axis``. The last sample of a movement gets 0, every other
-    the one that continues its neighbor's, so that a tool that turns 4 rad about an axis gets
-    4 rad and not 2 pi - 4 rad the other way. The signs of the quaternions do not matter.
-
-    - `q` (total, 4): all movements, one after the other, each ending at 1; consecutive samples less than half a turn
-      apart.
-    - `offsets` (n + 1,): where each movement begins.
-    - `where`: names the movement and the sample of a row, for the message.
-
-    Returns (total, 3): rotation vectors [rad]. Raises `TrajectoryError`: a full turn or more from the last sample about
-    an axis that changes: there is no continuous rotation vector then, since at 2 pi all axes are the same orientation.
+    Every rotation has the rotation vectors ``(t + 2 pi k) axis``. The last sample of a movement, which is 1, gets 0,
+    every other the one that continues its neighbor's, so that a tool that turns 4 rad about an axis gets 4 rad and not
+    2 pi - 4 rad the other way. `where` names the movement and the sample of a row, for the message: a full turn or more
+    from the last sample about an axis that changes has no continuous rotation vector.
     """
     movement = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
     last = (offsets[1:] - 1)[movement]
@@ -244,10 +218,7 @@ def unwrapped(q: Array, offsets: NDArray[np.intp], where: Callable[[int], str]) 
 
 
 def _parity(flips: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Tell whether an odd number of flips (total - 1,) lies before each sample, shape (total,).
-
-    Counted through all movements: only differences within a movement matter.
-    """
+    """Tell whether an odd number of flips (total - 1,) lies before each sample, counted through all movements."""
     odd: NDArray[np.bool_] = np.logical_xor.accumulate(np.concatenate(([False], flips)))
     return odd
 

@@ -32,13 +32,7 @@ class RhythmicController(Controller[RhythmicState]):
     """Moves one limit cycle step by step; see `RhythmicPrimitives.controller` and `Controller`.
 
     The goal is the baseline. After a push, and after a change of baseline, amplitude or period, position and velocity
-    go on from where they are, and the movement approaches the new limit cycle as ``exp(-sqrt(K) t / period)``
-    (critical damping).
-
-    Attributes
-    ----------
-    state : RhythmicState
-        After the last step; at first the start.
+    go on from where they are, and the movement approaches the new cycle as ``exp(-sqrt(K) t / period)``.
     """
 
     def __init__(self, plan: Plan, dt: float, options: Options, learned_amplitude: float, gain: float) -> None:
@@ -76,10 +70,6 @@ class RhythmicController(Controller[RhythmicState]):
         period : float, optional
             A new period [s], for this step and all later ones. Unlike `tempo` it does not change the velocity at once:
             the spring acts per period, so the path bends until it is on the limit cycle of the new period.
-
-        Returns
-        -------
-        RhythmicState
         """
         if amplitude is not None:
             gain = np.array([read_number(amplitude) / self._learned_amplitude])

@@ -1,14 +1,13 @@
 """Learn a batch of rhythmic movements: resample, estimate the period, fold, align, multiply.
 
-The candidates for a period come from the self-similarity of the recording; a harmonic fit chooses and refines. All
-dimensions are used together in the user's unit, so the widest has the largest weight. The unknown is `cycles`, the
-number of periods from the first to the last sample, whole or not.
+Candidates for a period come from the self-similarity of the recording; a harmonic fit chooses and refines the number of
+`cycles` from the first to the last sample. All dimensions are used together, so the widest has the largest weight.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,8 +69,9 @@ def encode(dmp: RhythmicSpecification, movements: MovementsLike) -> dict[str, An
     phases, explained, aligned_on = np.empty(n), np.empty(n), np.empty(n, dtype=np.intp)
 
     def fold_tile(chosen: NDArray[np.intp], rows: Array) -> None:
-        cycle = fold(rows, estimated.cycles[chosen], demos.lengths[chosen], H, dmp.align_on)
-        coefficients[chosen], phases[chosen], aligned_on[chosen], explained[chosen] = cycle
+        coefficients[chosen], phases[chosen], aligned_on[chosen], explained[chosen] = fold(
+            rows, estimated.cycles[chosen], demos.lengths[chosen], H, dmp.align_on
+        )
 
     _for_even_rows(demos, fold_tile)
     series = as_real(coefficients)
@@ -91,10 +91,7 @@ def encode(dmp: RhythmicSpecification, movements: MovementsLike) -> dict[str, An
 
 
 def _for_even_rows(demos: Demonstrations, work: Callable[[NDArray[np.intp], Array], None]) -> None:
-    """Call ``work(chosen, rows)`` on tiles of recordings, each at as many even samples as it has itself.
-
-    Recordings of equal length are processed together, so that the result of one does not depend on the others.
-    """
+    """Call ``work(chosen, rows)`` on tiles of recordings of one length, with as many even samples as they have."""
     for length in np.unique(demos.lengths).tolist():
         alike = np.flatnonzero(demos.lengths == length)
         group = demos if len(alike) == len(demos) else demos[alike]
@@ -135,45 +132,29 @@ def periodicity(dmp: RhythmicSpecification, demos: Demonstrations) -> Periodicit
     _for_even_rows(demos, search_tile)
     aperiodic = ~(estimated.explained >= _LEAST_EXPLAINED)
     if aperiodic.any() and dmp.aperiodic == "raise":
-        _refuse(demos, estimated, aperiodic)
+        i, best = int(np.argmax(aperiodic)), "nothing in it repeats"
+        if not np.isnan(estimated.cycles[i]):
+            period = demos.durations[i] / estimated.cycles[i]
+            best = f"the best, {period:.4g} s, explains {max(estimated.explained[i], 0.0):.0%}"
+        raise TrajectoryError(
+            f"{describe(i, demos.names)}: expected a movement of at least {FEWEST_CYCLES:g} periods, found no period: "
+            f"{best} ({aperiodic.sum()} of {len(demos)} movements); record longer, remove drift, give period= if "
+            'known, learn a single reach with kineme.DMP, or take the best period with aperiodic="accept"'
+        )
     return Periodicity(np.where(np.isnan(estimated.cycles), 1.0, estimated.cycles), estimated.explained)
 
 
-def _refuse(demos: Demonstrations, estimated: Periodicity, aperiodic: np.ndarray) -> NoReturn:
-    i = int(np.argmax(aperiodic))
-    best = (
-        "nothing in it repeats"
-        if np.isnan(estimated.cycles[i])
-        else f"the best, {demos.durations[i] / estimated.cycles[i]:.4g} s, explains "
-        f"{max(estimated.explained[i], 0.0):.0%}"
-    )
-    raise TrajectoryError(
-        f"{describe(i, demos.names)}: expected a movement of at least {FEWEST_CYCLES:g} periods, found no period: "
-        f"{best} ({aperiodic.sum()} of {len(demos)} movements); record longer, remove drift, give period= if known, "
-        'learn a single reach with kineme.DMP, or take the best period with aperiodic="accept"'
-    )
-
-
-class Cycles(NamedTuple):
-    """One cycle of each of n recordings."""
-
-    coefficients: Complex  # (n, d, H + 1), Fourier series in the phase
-    phases: Array  # (n,), where the recording started, in [0, 2 pi)
-    aligned_on: NDArray[np.intp]  # (n,), dimension that set the phase
-    explained: Array  # (n,), share of the recording's variance that its cycle explains
-
-
-def fold(rows: Array, cycles: Array, lengths: NDArray[np.intp], most: int, dimension: int | None) -> Cycles:
+def fold(
+    rows: Array, cycles: Array, lengths: NDArray[np.intp], most: int, dimension: int | None
+) -> tuple[Complex, Array, NDArray[np.intp], Array]:
     """Average over periods by the least-squares Fourier series, then set the phase.
 
     For a whole number of periods the series is the Fourier series of the average period. For a fractional number it
     still uses every sample, has no jump where the recording begins and ends, and its mean is that of whole periods.
 
-    - `rows` (n, d, R): even samples.
-    - `cycles` (n,): periods per recording.
-    - `lengths` (n,): recorded samples; no harmonic above the sampling of a period is used.
-    - `most`: largest number of harmonics H.
-    - `dimension`: dimension whose first harmonic defines the phase; None for the one with the largest.
+    Of rows (n, d, R) with `cycles` (n,) periods and `lengths` (n,) recorded samples it finds coefficients of `most`
+    harmonics (n, d, H + 1), none above the sampling of a period; where recordings started, in [0, 2 pi); the dimension
+    that set this phase; and the share of the variance that is explained.
     """
     n_harmonics = np.clip(_RESOLVED * (lengths - 1) / cycles, 1, most).astype(np.intp)
     mean = rows.mean(axis=2, keepdims=True)
@@ -187,15 +168,11 @@ def fold(rows: Array, cycles: Array, lengths: NDArray[np.intp], most: int, dimen
     aligned_on = np.abs(first).argmax(axis=1) if dimension is None else np.full(len(rows), dimension)
     phases = start_phases(first[np.arange(len(rows)), aligned_on])
     turn = np.exp(-1j * phases[:, None] * np.arange(most + 1))
-    return Cycles(coefficients * turn[:, None], phases, aligned_on, explained)
+    return coefficients * turn[:, None], phases, aligned_on, explained
 
 
 def start_phases(first: Complex) -> Array:
-    """Phase of the first sample, from one first harmonic (n,): phase 0 is where it is largest.
-
-    Unlike a principal axis, a maximum has a sign, so the phase is not ambiguous by half a turn. A dimension without a
-    first harmonic defines no phase.
-    """
+    """Phase of the first sample, of one first harmonic (n,) that is largest at phase 0: a maximum has a sign."""
     phases = np.angle(first) % (2 * np.pi)
     return np.where(phases == 2 * np.pi, 0.0, phases)  # the remainder of a tiny negative angle rounds up to 2 pi
 
@@ -208,11 +185,11 @@ class Periodicity(NamedTuple):
 
 
 def dissimilarity(rows: Array) -> Array:
-    """Mean square distance of a recording (n, d, R) from itself, shifted by 0 ... R - 1 samples, shape (n, R).
+    """Mean square distance (n, R) of a recording (n, d, R) from itself, shifted by 0 ... R - 1 samples.
 
-    Unit: twice the variance, so 0 at a period and 1 on average. Unlike the autocorrelation it needs no mean, which a
-    fractional number of periods makes uncertain. It is the difference function of A. de Cheveigne and H. Kawahara,
-    "YIN, a fundamental frequency estimator", JASA 111(4), 2002, averaged over the overlap.
+    Its unit is twice the variance, and it needs no mean, which a fractional number of periods makes uncertain. It is
+    the difference function of A. de Cheveigne and H. Kawahara, "YIN, a fundamental frequency estimator", JASA 111(4),
+    2002.
     """
     n_samples = rows.shape[2]
     centered = rows - rows.mean(axis=2, keepdims=True)
@@ -229,8 +206,7 @@ def dissimilarity(rows: Array) -> Array:
 def candidates(rows: Array, lengths: NDArray[np.intp]) -> Array:
     """Possible numbers of cycles, descending, (n, C), NaN where there are fewer: valleys of `dissimilarity`.
 
-    Noise makes a small valley every few samples. Values within a share of a lag are therefore averaged, so that more
-    samples per period average more noise, and only the lowest valley within a tenth of a lag counts.
+    Of noise's valleys only the lowest within a tenth of a lag counts, and values within a share of a lag are averaged.
     """
     n_samples = rows.shape[2]
     longest = min(int((n_samples - 1) / FEWEST_CYCLES) + 4, n_samples)
@@ -284,14 +260,10 @@ def _lowest_near(distance: Array, lag: NDArray[np.intp]) -> Array:
 
 
 def find_cycles(rows: Array, lengths: NDArray[np.intp]) -> Periodicity:
-    """The number of periods of each recording; all candidates are refined and compared.
+    """The number of periods of each recording (n, d, R) of `lengths` (n,) samples: all candidates refined and compared.
 
-    The shortest candidate wins that no longer one beats clearly: a multiple of the period explains everything that the
-    period does, and a little of the noise. The residual variance of a fit is divided by its share of residual degrees
-    of freedom, ``1 - 1 / cycles``.
-
-    - `rows` (n, d, R): even samples.
-    - `lengths` (n,): recorded samples of each; bounds the harmonics that can be seen.
+    The shortest wins that no longer one beats clearly: a multiple of the period explains as much, and a little of the
+    noise. The residual variance is divided by its share of residual degrees of freedom, ``1 - 1 / cycles``.
     """
     rough = candidates(rows, lengths)
     chosen = np.isfinite(rough)
@@ -314,10 +286,9 @@ def find_cycles(rows: Array, lengths: NDArray[np.intp]) -> Periodicity:
 
 
 def refine(rows: Array, cycles: Array, lengths: NDArray[np.intp]) -> tuple[Array, Array]:
-    """Improve cycles (m,) known to a sample's width, or to two percent; also the share of the variance left (m,).
+    """Cycles (m,) known to a sample's width, or to two percent, improved, and the share of the variance left (m,).
 
-    Variable projection (G. H. Golub and V. Pereyra, 1973): the series is eliminated, one nonlinear unknown remains. A
-    scan as fine as the narrowest dip comes first, Gauss-Newton steps follow.
+    Variable projection (G. H. Golub and V. Pereyra, 1973) by a scan as fine as the narrowest dip, then Gauss-Newton.
     """
     n_harmonics = np.clip((lengths - 1) / cycles / _PER_HARMONIC, 1, _HARMONICS).astype(np.intp)
     total = (rows**2).sum(axis=(1, 2))

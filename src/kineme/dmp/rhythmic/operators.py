@@ -1,12 +1,10 @@
 """The matrices of a rhythmic specification, built once and cached.
 
-On the limit cycle everything is periodic, so differentiation and the response of the spring-damper multiply the
-harmonic ``e^(i h phi)`` by a number. Spectral derivatives of a Fourier series are exact, and the steady state needs no
-integration: ``x_h = f_h / (K - omega^2 + i omega D)`` with ``omega = 2 pi h`` per period.
+On the limit cycle differentiation and the response of the spring-damper multiply the harmonic ``e^(i h phi)`` by a
+number, so both are exact: ``x_h = f_h / (K - omega^2 + i omega D)`` with ``omega = 2 pi h`` per period.
 
-Fourier series of unknown or known period are fitted to even samples by least squares, on blocks of movements. The
-complex exponentials of even samples have a Toeplitz Gram matrix, so a fit costs two products with the exponentials and
-one small solve, for any number of periods, whole or not.
+Fourier series are fitted to even samples by least squares: complex exponentials have a Toeplitz Gram matrix, so a fit
+costs two products with them and one small solve, for any number of periods.
 """
 
 from __future__ import annotations
@@ -20,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.dmp.discrete.operators import ridge_regression
-from kineme.dmp.discrete.specification import FITS, MOST_BASIS, MOST_POINTS
+from kineme.dmp.discrete.specification import MOST_BASIS, MOST_POINTS
 from kineme.dmp.spring_damper import SpringDamper
 from kineme.errors import SpecificationError
 from kineme.movements.preparation.trim import check_steps
@@ -54,10 +52,7 @@ def encoder(dmp: RhythmicSpecification) -> Array:
 
 
 def trajectory_regression(dmp: RhythmicSpecification) -> Array:
-    """Least squares of the path itself on the periodic response, (N, T).
-
-    Minimizes ``mean (y - Phi W)^2 + ridge mean (diff^2 W / K)^2``; the second differences go around the circle.
-    """
+    """Least squares of the path (N, T): ``mean (y - Phi W)^2 + ridge mean (diff^2 W / K)^2``, around the circle."""
     phases = even_phases(dmp.n_points)
     response = limit_cycle(dmp)
     Phi = waves(phases, response.shape[1] - 1) @ as_real(response).T * dmp.K  # unit: W / K, comparable to y
@@ -108,12 +103,7 @@ class HarmonicFit(NamedTuple):
 
 
 def fit_harmonics(rows: Array, cycles: Array, n_harmonics: NDArray[np.intp]) -> HarmonicFit:
-    """Fit each recording by a Fourier series that runs through `cycles` periods from its first to its last sample.
-
-    - `rows` (n, d, R): even samples.
-    - `cycles` (n,): periods per recording; any positive number.
-    - `n_harmonics` (n,): highest harmonic of each; the coefficients above it are 0.
-    """
+    """Fit samples (n, d, R) by Fourier series of `n_harmonics` (n,) through `cycles` (n,) periods, whole or not."""
     n_samples, top = rows.shape[2], int(n_harmonics.max())
     theta = (2 * np.pi / (n_samples - 1)) * cycles[:, None] * np.arange(n_samples)
     powers = np.empty((len(rows), n_samples, 2 * top + 1), dtype=complex)  # e^(i h theta), h = 0 ... 2 H
@@ -169,7 +159,6 @@ class RhythmicSpecification(SpringDamper):
     preprocessing: tuple[Any, ...] = ()
 
     def __post_init__(self) -> None:
-        check_choice("fit", self.fit, FITS)
         check_choice("aperiodic", self.aperiodic, APERIODIC)
         self._check_spring_damper()
         if self.period is not None:
@@ -199,12 +188,8 @@ class RhythmicSpecification(SpringDamper):
 class VonMisesBasis:
     """Basis functions ``psi_i(phi) = exp(h (cos(phi - c_i) - 1))`` with N centers equally spaced on the circle.
 
-    `overlap`: value of each function at the next center, between 0 and 1. It sets the width of all of them:
-    ``h = -ln(overlap) / (1 - cos(2 pi / N))``.
-
-    Source: A. J. Ijspeert, J. Nakanishi, H. Hoffmann, P. Pastor, S. Schaal, "Dynamical Movement Primitives: Learning
-    Attractor Models for Motor Behaviors", Neural Computation 25(2), 2013: Table 1 and the rhythmic forcing term, Eq.
-    (2.6).
+    A. J. Ijspeert, J. Nakanishi, H. Hoffmann, P. Pastor, S. Schaal, "Dynamical Movement Primitives: Learning Attractor
+    Models for Motor Behaviors", Neural Computation 25(2), 2013: Table 1 and Eq. (2.6).
     """
 
     n_basis: int  # number N of basis functions, at least 3
@@ -236,12 +221,7 @@ class VonMisesBasis:
         return np.asarray(psi / psi.sum(axis=-1, keepdims=True))
 
     def spectrum(self) -> Array:
-        """Fourier coefficients F of one column of `design`, the one centered at 0: ``sum_h F_h e^(i h phi)``.
-
-        Real, because the function is even; shape (H + 1,), h = 0 ... H. The other columns are this one shifted by
-        their center: ``F_h e^(-i h c_i)``. The function is analytic, so the coefficients decay exponentially, and those
-        below the rounding error are left out.
-        """
+        """Real Fourier coefficients (H + 1,) of the column of `design` centered at 0; the others are shifted."""
         n_samples = _PER_GAP * self.n_basis
         phases = 2 * np.pi / n_samples * np.arange(n_samples)
         psi = np.exp(self.width * (np.cos(phases) - 1))

@@ -69,8 +69,7 @@ class RhythmicDMP(RhythmicSpecification):
         Dimension whose first harmonic is largest at phase 0. By default that with the largest first harmonic, chosen
         for each movement; to compare movements in which two dimensions are alike, name one.
     aperiodic : {"raise", "accept"}, default "raise"
-        For a recording without a clear period: an error, or the best estimate, at worst the whole recording as one
-        period.
+        For a recording without a clear period: an error, or the best estimate, at worst the whole recording.
     preprocessing : tuple of steps, default ()
         Steps applied before learning; they are part of the specification.
 
@@ -81,14 +80,10 @@ class RhythmicDMP(RhythmicSpecification):
 
     Notes
     -----
-    Ijspeert et al. write ``tau = period / (2 pi)`` and measure stiffness per ``tau^2``: their ``alpha_z = 25,
-    beta_z = 25/4`` is ``K = 4 pi^2 alpha_z beta_z = 6168.5`` here. Instead of locally weighted regression the weights
-    are found jointly, and r is estimated instead of set to 1.
-
-    References
-    ----------
     A. J. Ijspeert, J. Nakanishi, H. Hoffmann, P. Pastor, S. Schaal, "Dynamical Movement Primitives: Learning Attractor
-    Models for Motor Behaviors", Neural Computation 25(2), 2013: Eqs. (2.1), (2.5) and (2.6), Table 1.
+    Models for Motor Behaviors", Neural Computation 25(2), 2013, Eqs. (2.1), (2.5) and (2.6), Table 1, write ``tau =
+    period / (2 pi)`` and measure stiffness per ``tau^2``: their ``alpha_z = 25, beta_z = 25/4`` is
+    ``K = 4 pi^2 alpha_z beta_z = 6168.5`` here. The weights are found jointly here, and r is estimated.
 
     Examples
     --------
@@ -101,17 +96,12 @@ class RhythmicDMP(RhythmicSpecification):
     """
 
     def learn(self, movements: MovementsLike) -> RhythmicPrimitives:
-        """Learn one limit cycle per movement.
+        """Learn the weights, baseline, amplitude, period and starting phase of one limit cycle per movement.
 
         Parameters
         ----------
         movements : Demonstrations, Trajectory, sequence of Trajectory or of (T_i, d) arrays, or (n, T, d) array
             Any lengths, any sampling, any number of periods from 1.5 on, or from 1 on if the period is given.
-
-        Returns
-        -------
-        RhythmicPrimitives
-            Weights, baseline, amplitude, period and starting phase of each movement.
 
         Raises
         ------
@@ -224,13 +214,7 @@ class RhythmicPrimitives(Batch):
         rate : float, optional
             Samples per second, at least.
         n_samples : int, optional
-            Samples per movement, the last at `n_periods`; by default the specification's `n_points` per period. Give
-            this or `rate`.
-
-        Returns
-        -------
-        RhythmicRollout
-            With ``times``, ``positions``, ``velocities``, ``accelerations`` and ``trajectories``.
+            Samples per movement, the last at `n_periods`; by default `n_points` per period. Give this or `rate`.
 
         Raises
         ------
@@ -271,7 +255,7 @@ class RhythmicPrimitives(Batch):
         avoidance: ObstacleAvoidance | None = None,
         **others: Never,
     ) -> RhythmicController:
-        """One limit cycle under live control, in steps of `dt` [s].
+        """One limit cycle under live control, in steps of `dt` [s]; amplitude and period may change in a step.
 
         Parameters
         ----------
@@ -285,16 +269,10 @@ class RhythmicPrimitives(Batch):
             What to do with measurements, new baselines and amplitudes, limits and obstacles; see
             `kineme.control.Options`.
 
-        Returns
-        -------
-        RhythmicController
-            With ``step``, ``reset`` and ``state``. Its goal is the baseline; amplitude and period may change in a step.
-
         Raises
         ------
         SpecificationError
-            More than one primitive; both `baseline` and `goal`; an option out of its range, or one that a rhythm does
-            not have.
+            More than one primitive; both `baseline` and `goal`; an option out of its range, or one that rhythms lack.
         """
         from kineme.dmp.control.plan import Options  # these load where a robot moves, not to learn
         from kineme.dmp.rhythmic.controller import RhythmicController
@@ -312,10 +290,7 @@ class RhythmicPrimitives(Batch):
 def plan_of(
     primitive: RhythmicPrimitives, options: dict[str, ArrayLike | None], via: ViaLike | None = None
 ) -> tuple[Plan, float]:
-    """The plan of one limit cycle and its amplitude, with the options of `rollout` checked for one movement.
-
-    A rhythm is a discrete movement whose shape repeats, without coupling, and whose goal is the baseline.
-    """
+    """The plan of one limit cycle, a discrete movement whose shape repeats around its baseline, and its amplitude."""
     check_one(len(primitive))
     d, dmp = primitive.n_dims, primitive.dmp
     vectors = {name: one_vector(name, options[name], d) for name in ("baseline", "start", "velocity")}
@@ -348,10 +323,7 @@ def plan_of(
 
 
 def refuse_others(what: str, options: Mapping[str, object]) -> None:
-    """Refuse options that a rhythm does not have.
-
-    Raises `SpecificationError` (an option of discrete movements) and `TypeError` (another name, as of any function).
-    """
+    """Refuse options that a rhythm does not have, and other names as any function does."""
     for name, value in options.items():
         if name not in _INSTEAD:
             raise TypeError(f"{what}() got an unexpected keyword argument {name!r}")

@@ -1,22 +1,20 @@
 """Movements on the limit cycle and towards it, in a batch: any baseline, amplitude, period, phase and start.
 
-On the limit cycle ``x - b`` is linear in the weights, so points at phases phi_k ask for ``A W = e`` with A the rows of
-the periodic response there, and the change with the least mean square acceleration that grants it is one small solve,
-as of discrete movements (`kineme.dmp.discrete.modulate`). One row more is the mean over the cycle: it stays 0,
-for the baseline is where it was asked to be.
+On the limit cycle ``x - b`` is linear in the weights, so via points are met as by discrete movements
+(`kineme.dmp.discrete.modulate`); the mean over the cycle stays 0, for the baseline is where it was asked to be.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from kineme.dmp.batch import Batch
 from kineme.dmp.discrete.modulate import Changed, loose_changes, warn_changed, warn_far
-from kineme.dmp.discrete.rollout import BaseRollout, Change, least_durations
+from kineme.dmp.discrete.rollout import BaseRollout, Change
 from kineme.dmp.discrete.via_points import (
     Span,
     ViaLike,
@@ -44,15 +42,12 @@ _PER_BASIS = 4  # phases of a change for each basis function
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RhythmicRollout(BaseRollout):
-    """n generated movements of T samples each; positions and derivatives are computed when asked for.
+    """n generated movements of T samples each, computed when asked for; see `BaseRollout`.
 
-    A sequence of `Trajectory`, taken wherever movements are expected; see `BaseRollout`.
-
-    The equation is linear, so a movement is its limit cycle, a Fourier series, plus the free motion of the
-    spring-damper from the state off the cycle: ``x = b + a x_cycle(phi) + e^(A u) (z0 - z_cycle)``.
+    A movement is its limit cycle, a Fourier series, plus the free motion of the spring-damper from the state off the
+    cycle: ``x = b + a x_cycle(phi) + e^(A u) (z0 - z_cycle)``.
     """
 
-    primitives: Batch
     ratio: Array  # (n,), amplitude over the learned one
     baselines: Array  # (n, d)
     periods: Array  # (n,)
@@ -66,54 +61,15 @@ class RhythmicRollout(BaseRollout):
     def __len__(self) -> int:
         return len(self.baselines)
 
-    def __repr__(self) -> str:
-        return f"RhythmicRollout({len(self)} movements of {self.n_samples} samples from {self.primitives!r})"
-
     @property
     def times(self) -> Array:
         """Times of the samples (n, T), from 0 [s]."""
         return self.periods[:, None] * self._u
 
-    @cached_property
-    def positions(self) -> Array:
-        """Positions (n, T, d), in the unit of the demonstrations."""
-        return (self._derivative(0) + self.baselines[:, :, None]).transpose(0, 2, 1)
-
-    @cached_property
-    def velocities(self) -> Array:
-        """Velocities (n, T, d), per second."""
-        return (self._derivative(1) / self.periods[:, None, None]).transpose(0, 2, 1)
-
-    @cached_property
-    def accelerations(self) -> Array:
-        """Accelerations (n, T, d), per second squared."""
-        return (self._derivative(2) / self.periods[:, None, None] ** 2).transpose(0, 2, 1)
-
     def least_period(self, velocity: ArrayLike | None = None, acceleration: ArrayLike | None = None) -> Array:
-        """The least period of each movement (n,) [s] in which the same path stays within limits.
-
-        ``rollout(period=...)`` moves so. Limits and errors are those of `Rollout.least_duration`.
-        """
+        """The least period (n,) [s] in which the same path stays within limits; see `Rollout.least_duration`."""
         fixed = self.velocity is not None and bool(self.velocity.any())
-        finely = self.n_periods * self.primitives.dmp.n_basis, lambda movements, n: replace(movements, n_samples=n)
-        return least_durations(self, self.periods, finely, fixed, (velocity, acceleration))
-
-    @property
-    def _batch(self) -> Batch:
-        return self.primitives
-
-    def _take(self, chosen: NDArray[np.intp]) -> RhythmicRollout:
-        def of(rows: Array | None) -> Array | None:
-            return rows if rows is None or len(rows) == 1 else rows[chosen]
-
-        return replace(
-            self,
-            primitives=self.primitives if len(self.primitives) == 1 else self.primitives[chosen],
-            **{name: getattr(self, name)[chosen] for name in ("ratio", "baselines", "periods", "phases")},
-            start=of(self.start),
-            velocity=of(self.velocity),
-            change=None if self.change is None else self.change[chosen],
-        )
+        return self._least(self.periods, self.n_periods, fixed, velocity, acceleration)
 
     @property
     def _weights(self) -> tuple[Array, Array]:
@@ -128,26 +84,25 @@ class RhythmicRollout(BaseRollout):
         return np.linspace(0.0, self.n_periods, self.n_samples)
 
     def _derivative(self, order: int) -> Array:
-        """Position minus baseline and its derivatives in u = t / period, shape (n, d, T)."""
         u, dmp = self._u, self.primitives.dmp
         weights, ratio = self._weights
         result = cycle(dmp, weights, ratio, (self.phases, 2 * np.pi * u), order)
-        if self.start is None and self.velocity is None:
-            return result
-        at_start = np.zeros(1)
-        on_cycle = [cycle(dmp, weights, ratio, (self.phases, at_start), k)[:, :, 0] for k in (0, 1)]
-        offset = 0.0 if self.start is None else self.start - self.baselines - on_cycle[0]
-        push = 0.0 if self.velocity is None else self.velocity * self.periods[:, None] - on_cycle[1]
-        off_cycle = np.stack(np.broadcast_arrays(offset, push, on_cycle[0])[:2], axis=2)
-        free = transitions(dmp.K, dmp.D, u)  # (T, 2, 2)
-        rows = (free[:, 0], free[:, 1], -dmp.K * free[:, 0] - dmp.D * free[:, 1])[order]
-        return np.asarray(result + off_cycle @ rows.T)
+        if self.start is not None or self.velocity is not None:
+            at_start = np.zeros(1)
+            on_cycle = [cycle(dmp, weights, ratio, (self.phases, at_start), k)[:, :, 0] for k in (0, 1)]
+            offset = 0.0 if self.start is None else self.start - self.baselines - on_cycle[0]
+            push = 0.0 if self.velocity is None else self.velocity * self.periods[:, None] - on_cycle[1]
+            off_cycle = np.stack(np.broadcast_arrays(offset, push, on_cycle[0])[:2], axis=2)
+            free = transitions(dmp.K, dmp.D, u)  # (T, 2, 2)
+            result = result + off_cycle @ (free[:, 0], free[:, 1], -dmp.K * free[:, 0] - dmp.D * free[:, 1])[order].T
+        scaled = result / self.periods[:, None, None] ** order if order else result + self.baselines[:, :, None]
+        return np.asarray(scaled.transpose(0, 2, 1))
 
 
 def cycle(dmp: RhythmicSpecification, weights: Array, ratio: Array, when: tuple[Array, Array], order: int) -> Array:
-    """The x - b, or a derivative in u, on the limit cycle of these weights (1 or n, d, N), times the ratio (n,).
+    """The x - b (n, d, T), or a derivative in u, on the limit cycle of weights (1 or n, d, N), times the ratio (n,).
 
-    `when` is the phases (n,) of the movements and how many radians past them (T,); the result has shape (n, d, T).
+    `when` is the phases (n,) of the movements and how many radians past them (T,).
     """
     (phases, turn), response = when, limit_cycle(dmp)
     harmonics = np.arange(response.shape[1])
@@ -213,10 +168,7 @@ def _samples(
 
 
 def modulated(movement: RhythmicRollout, via: ViaLike | ViaPoints | None) -> RhythmicRollout:
-    """The movement on the limit cycle that passes the via points; see `RhythmicPrimitives.rollout`.
-
-    Raises `SpecificationError` or `TrajectoryError`: as `via_points`; an amplitude of 0.
-    """
+    """The movement on the limit cycle that passes the via points; see `RhythmicPrimitives.rollout`."""
     if via is None:
         return movement
     dmp = movement.primitives.dmp
@@ -244,10 +196,7 @@ def modulated(movement: RhythmicRollout, via: ViaLike | ViaPoints | None) -> Rhy
 
 @lru_cache(maxsize=32)
 def smoothness_factor(dmp: RhythmicSpecification) -> Array:
-    """Factor (N, N) of a covariance of the weights under which changes with small accelerations are likely.
-
-    What has no acceleration, a shift of the whole cycle, counts as its first harmonic does.
-    """
+    """That of discrete movements (N, N); a shift of the cycle, without acceleration, counts as its first harmonic."""
     bend = _path(dmp, even_phases(_PER_BASIS * dmp.n_basis), 2)
     shift = (2.0 * np.pi) ** 2 * limit_cycle(dmp)[:, 0].real
     precision = bend.T @ bend / len(bend) + np.outer(shift, shift)

@@ -1,21 +1,18 @@
-"""One primitive from several demonstrations, with their spread.
+"""One primitive from several demonstrations, with their spread; and two such averages blended into one.
 
-Two averages blended into one: at each time the product of their Gaussians, each to the power of its activation.
-
-A. Paraschos, C. Daniel, J. Peters and G. Neumann, "Probabilistic Movement Primitives", NIPS 2013, Section 2.2: with the
-activations a and b of two primitives at a time and their means and covariances of the position there,
+With the activations a and b at a time, and means and covariances of the position there, the blend is the product of
+Gaussians (A. Paraschos, C. Daniel, J. Peters and G. Neumann, "Probabilistic Movement Primitives", NIPS 2013),
 
     Sigma = (a Sigma_1^-1 + b Sigma_2^-1)^-1,    mean = Sigma (a Sigma_1^-1 mean_1 + b Sigma_2^-1 mean_2).
 
-Positions at one time say nothing about how they vary together over time. Our choice is ``sqrt(a) Sigma Sigma_1^-1``
-times the deviations of the one and ``sqrt(b) Sigma Sigma_2^-1`` times those of the other, which has this Sigma at each
-time and the deviations of one primitive where it is alone.
+How positions vary together over time is our choice: ``sqrt(a) Sigma Sigma_1^-1`` times the deviations of the one and
+``sqrt(b) Sigma Sigma_2^-1`` times those of the other, which has this Sigma at each time.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -34,9 +31,9 @@ from kineme.dmp.styles.parameters import (
     map_rows,
     path_matrix,
     shared_label,
-    shared_recording,
     to_numbers,
     updated,
+    with_numbers,
 )
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.channels.channel import check_alike
@@ -68,8 +65,7 @@ class AveragePrimitive:
         The same for ln tau.
     noise : float or None
         Standard deviation of a path, at each time, around what the factor explains: how far each demonstration is from
-        the nearest weighted mean of the others. None where there are too few demonstrations to say, or so many that
-        they explain every path.
+        the nearest weighted mean of the others. None where there are too few demonstrations to say, or too many.
     """
 
     primitive: Primitives
@@ -114,11 +110,6 @@ class AveragePrimitive:
 
         Movements are compared at equal phase t / tau, so `of` a velocity (per second) or an acceleration it is the
         deviation at the mean duration; differences in tempo are in `tempo_factor`.
-
-        Parameters
-        ----------
-        n_samples : int, default 100
-        of : {"position", "velocity", "acceleration"}, default "position"
         """
         check_count("n_samples", n_samples, 2)
         check_choice("of", of, list(_DERIVATIVES))
@@ -128,20 +119,12 @@ class AveragePrimitive:
         return np.sqrt(variance) / self.primitive.durations[0] ** order
 
     def sample(self, n: int, seed: int | np.random.Generator) -> Primitives:
-        """Draw `n` new variants from the Gaussian with this mean and covariance, durations (log-normal) included.
-
-        Parameters
-        ----------
-        n : int
-        seed : int or numpy.random.Generator
-        """
+        """Draw `n` new variants from the Gaussian with this mean and covariance, durations (log-normal) included."""
         check_count("n", n, 1)
         normal = np.random.default_rng(seed).standard_normal((n, len(self.factor)))
         theta = to_numbers(self.primitive) + np.tensordot(normal, self.factor, axes=1)
         durations = self.primitive.durations * np.exp(normal @ self.tempo_factor)
-        return from_numbers(
-            self.primitive.dmp, theta, durations, shared_label(self.primitive), self.primitive.recorded_as
-        )
+        return with_numbers(self.primitive, theta, durations)
 
     def condition(
         self,
@@ -171,11 +154,6 @@ class AveragePrimitive:
         velocity_std : float or array_like of shape (m,) or (m, d), default 0.0
             The same for the velocity.
 
-        Returns
-        -------
-        AveragePrimitive
-            Of the same kind: roll it out, sample it, condition it again.
-
         Raises
         ------
         SpecificationError
@@ -199,11 +177,8 @@ class AveragePrimitive:
             None if position is None else as_observations("position", times, position, std, d),
             None if velocity is None else as_observations("velocity", times, velocity, velocity_std, d),
         )
-        now = updated(self.primitive, self.factor, self.tempo_factor, observed)
-        mean = from_numbers(
-            self.primitive.dmp, now.theta, now.duration, shared_label(self.primitive), self.primitive.recorded_as
-        )
-        return AveragePrimitive(mean, now.factor, now.tempo_factor, self.noise)
+        theta, duration, factor, tempo = updated(self.primitive, self.factor, self.tempo_factor, observed)
+        return AveragePrimitive(with_numbers(self.primitive, theta, duration), factor, tempo, self.noise)
 
     def log_likelihood(self, movements: Primitives | MovementsLike, noise: float | None = None) -> Array:
         """Log probability density of the path of each movement, shape (n,), in nats.
@@ -231,8 +206,20 @@ class AveragePrimitive:
                 "movements"
             )
         check_number("noise", sigma, above=0.0)
+        matrix = path_matrix(self.primitive.dmp, self.primitive.dmp.n_points)
         deviations = to_numbers(self._of_this_kind(movements)) - to_numbers(self.primitive)
-        return log_likelihoods(self.primitive.dmp, deviations, self.factor, float(sigma))
+        paths = map_rows(deviations, matrix).reshape(len(deviations), -1)
+        n_numbers = paths.shape[1]
+        # With B = U diag(s) V' (r, d T) the path of the factor, ln N(e; 0, B' B + noise^2 I) follows from c = V' e, and
+        # nothing of the size (d T)^2 is formed.
+        spread = map_rows(self.factor, matrix).reshape(len(self.factor), n_numbers)
+        _, s, Vt = np.linalg.svd(spread, full_matrices=False)
+        along = paths @ Vt.T
+        beside = np.sum((paths - along @ Vt) ** 2, axis=1)
+        variances = s**2 + sigma**2
+        determinant = np.sum(np.log(variances)) + 2.0 * (n_numbers - len(s)) * np.log(sigma)
+        distances = along**2 @ (1.0 / variances) + beside / sigma**2
+        return np.asarray(-0.5 * (determinant + distances + n_numbers * np.log(2.0 * np.pi)))
 
     def blend(self, other: AveragePrimitive, activation: ArrayLike) -> AveragePrimitive:
         """One movement from two, each as much as it is active: the product of their Gaussians at each time.
@@ -262,20 +249,16 @@ class AveragePrimitive:
         if not isinstance(other, AveragePrimitive):
             raise SpecificationError(f"expected an AveragePrimitive to blend with, got {type(other).__name__}")
         own, its = self.primitive, self._of_this_kind(other.primitive)
-        gaussian = blended(
-            own.dmp,
-            (to_numbers(own), self.factor),
-            (to_numbers(its), other.factor),
-            a,
-            _CERTAIN * float(max(own.extents.max(), its.extents.max())),
-        )
+        floor = _CERTAIN * float(max(own.extents.max(), its.extents.max()))
+        first, second = (to_numbers(own), self.factor), (to_numbers(its), other.factor)
+        theta, factor = blended(own.dmp, first, second, a, floor)
         share = float(a.mean())
         duration = own.durations ** (1.0 - share) * its.durations**share
         label = shared_label(Primitives.concatenate([own, its])) if own.labels is not None is not its.labels else None
-        mean = from_numbers(own.dmp, gaussian.theta, duration, label, merged([own.recorded_as, its.recorded_as]))
+        mean = from_numbers(own.dmp, theta, duration, label, merged([own.recorded_as, its.recorded_as]))
         tempo = np.concatenate(((1.0 - share) * self.tempo_factor, share * other.tempo_factor))
         noises = [noise for noise in (self.noise, other.noise) if noise is not None]
-        return AveragePrimitive(mean, gaussian.factor, tempo, max(noises, default=None))
+        return AveragePrimitive(mean, factor, tempo, max(noises, default=None))
 
     def _of_this_kind(self, movements: Primitives | MovementsLike) -> Primitives:
         own = self.primitive
@@ -294,26 +277,19 @@ def average(primitives: Primitives | MovementsLike, weights: ArrayLike | None = 
     The mean of ``theta = [W, x0, g, tau v0]`` is the movement whose path is the mean of the demonstrations' paths at
     equal phase, in every formulation; see `kineme.dmp.styles.parameters` for why the mean of the *scaled*
     weights W, and not of w, is the right one when g - x0 differs. Durations are averaged geometrically, as tempi are
-    ratios.
+    ratios. The covariance is free of bias: divided by ``1 - sum p_i^2``, that is by n - 1 where all count alike.
 
     Parameters
     ----------
     primitives : Primitives, or movements as `DMP.learn` takes them
-        One movement shown n times; what is not learned yet is learned as ``DMP()`` does. One demonstration gives
-        itself, with no spread.
+        One movement shown n times; what is not learned yet is learned as ``DMP()`` does. One has no spread.
     weights : array_like of shape (n,), optional
         How much each demonstration counts, 0 or more; only their ratios matter. By default all count alike.
-
-    Returns
-    -------
-    AveragePrimitive
-        With the covariance free of bias: divided by ``1 - sum p_i^2``, that is by n - 1 where all count alike.
 
     Raises
     ------
     TrajectoryError
-        No primitive, movements that cannot be learned, or weights of the wrong number, negative, not finite, or all
-        zero.
+        No primitive, movements that cannot be learned, or weights of the wrong number, negative, infinite, or all zero.
     """
     primitives = as_primitives(primitives)
     p = _shares(weights, len(primitives))
@@ -327,9 +303,7 @@ def average(primitives: Primitives | MovementsLike, weights: ArrayLike | None = 
         factor = np.linalg.qr(factor, mode="r")  # the same covariance from as few rows as it has columns
     shape = (primitives.n_dims, primitives.dmp.n_basis + 3)
     duration = primitives.durations[:1] * np.exp(mean[-1:])
-    center = from_numbers(
-        primitives.dmp, mean[:-1].reshape(1, *shape), duration, shared_label(primitives), shared_recording(primitives)
-    )
+    center = with_numbers(primitives, mean[:-1].reshape(1, *shape), duration)
     noise = unexplained_noise(primitives.dmp, numbers[p > 0.0] - numbers[p > 0.0].mean(axis=0))
     return AveragePrimitive(center, factor[:, :-1].reshape(len(factor), *shape), factor[:, -1], noise)
 
@@ -369,20 +343,10 @@ def _shares(weights: ArrayLike | None, n: int) -> Array:
     return w / w.sum()
 
 
-class Blended(NamedTuple):
-    """Numbers of the mean, and the factor of their covariance."""
-
-    theta: Array  # (1, d, N + 3)
-    factor: Array  # (r1 + r2, d, N + 3)
-
-
 def blended(
     dmp: Specification, first: tuple[Array, Array], other: tuple[Array, Array], activation: Array, floor: float
-) -> Blended:
-    """Blend two averages, each (theta (1, d, N + 3), factor (r, d, N + 3)), with `activation` (T,) of the other.
-
-    `floor` is the deviation below which all positions count as equally certain, in the unit of the movements.
-    """
+) -> tuple[Array, Array]:
+    """Theta and factor of two averages blended with `activation` (T,); `floor` is the least deviation that counts."""
     matrix = path_matrix(dmp, len(activation))
     means = [map_rows(theta, matrix)[0].T for theta, _ in (first, other)]  # (T, d)
     deviations = [map_rows(factor, matrix).transpose(2, 0, 1) for _, factor in (first, other)]  # (T, r, d)
@@ -393,10 +357,8 @@ def blended(
     gains = np.linalg.inv(np.sum(a * precisions, axis=0)) @ precisions  # Sigma Sigma_i^-1
     mean = sum((a[i] * gains[i] @ means[i][:, :, None])[:, :, 0] for i in (0, 1))
     paths = [deviations[i] @ (np.sqrt(a[i]) * gains[i]).transpose(0, 2, 1) for i in (0, 1)]
-    return Blended(
-        encoded(dmp, np.asarray(mean)[None].transpose(0, 2, 1)),
-        encoded(dmp, np.concatenate(paths, axis=1).transpose(1, 2, 0)),
-    )
+    theta = encoded(dmp, np.asarray(mean)[None].transpose(0, 2, 1))
+    return theta, encoded(dmp, np.concatenate(paths, axis=1).transpose(1, 2, 0))
 
 
 def encoded(dmp: Specification, paths: Array) -> Array:
@@ -407,33 +369,11 @@ def encoded(dmp: Specification, paths: Array) -> Array:
     return np.concatenate((weights, np.stack((paths[:, :, 0], paths[:, :, -1], velocity), axis=2)), axis=2)
 
 
-def log_likelihoods(dmp: Specification, deviations: Array, factor: Array, noise: float) -> Array:
-    """Log density (n,) of the paths of theta, deviations (n, d, N + 3) from the mean, at T even times.
-
-    With B (r, d T) the path of the factor, ``ln N(e; 0, B' B + noise^2 I)`` from ``B = U diag(s) V'``:
-
-        -1/2 [sum ln(s^2 + noise^2) + (d T - r) ln noise^2 + sum c^2 / (s^2 + noise^2) + (e'e - c'c) / noise^2
-              + d T ln 2 pi],    c = V' e,
-
-    so nothing of the size (d T)^2 is formed.
-    """
-    paths = map_rows(deviations, path_matrix(dmp, dmp.n_points)).reshape(len(deviations), -1)
-    spread = map_rows(factor, path_matrix(dmp, dmp.n_points)).reshape(len(factor), paths.shape[1])
-    _, s, Vt = np.linalg.svd(spread, full_matrices=False)
-    along = paths @ Vt.T
-    beside = np.sum((paths - along @ Vt) ** 2, axis=1)
-    variances, n_numbers = s**2 + noise**2, paths.shape[1]
-    determinant = np.sum(np.log(variances)) + 2.0 * (n_numbers - len(s)) * np.log(noise)
-    distances = along**2 @ (1.0 / variances) + beside / noise**2
-    return np.asarray(-0.5 * (determinant + distances + n_numbers * np.log(2.0 * np.pi)))
-
-
 def unexplained_noise(dmp: Specification, deviations: Array) -> float | None:
-    """Estimate the standard deviation that others leave unexplained, from theta (n, d, N + 3) minus its mean.
+    """Standard deviation that others leave unexplained, from theta (n, d, N + 3) minus its mean; None if unknown.
 
-    Each demonstration is compared with the nearest weighted mean of the others, of any weights with the sum 1. With G
-    the products of the centered paths its squared distance is ``1 / (G^+)_ii``, in d T - (n - 2) directions. None where
-    there are too few demonstrations, or so many that they explain every path, or where nothing is left.
+    Each demonstration is compared with the nearest weighted mean of the others. With G the products of the centered
+    paths its squared distance is ``1 / (G^+)_ii``, in d T - (n - 2) directions.
     """
     n, d, n_numbers = deviations.shape
     if n < 3 or n - 2 >= d * n_numbers:

@@ -1,14 +1,10 @@
 """The styles in which several demonstrations differ: movements as points of a space of few dimensions, back and forth.
 
 Source: T. Matsubara, S. Hyon and J. Morimoto, "Learning Parametric Dynamic Movement Primitives from Multiple
-Demonstrations", Neural Networks 24(5), 2011; the paper's reference [6].
-
-Taken from there: f is a sum of few basis targets, the leading singular vectors over the demonstrations, each times a
-style parameter; one style is shared by all dimensions; where the movement starts and ends follows from the
-style by regression. Our choices: the mean is taken out first, so that style zero is the average and two kinds
-need one style, not two; the initial velocity and the duration follow from the style as well; and by default what is
-decomposed is the path that the forcing term makes (``metric="path"``) and not f itself (``metric="forcing"``, theirs),
-because f is dominated by accelerations and their noise.
+Demonstrations", Neural Networks 24(5), 2011; the paper's reference [6]. From there: f is a sum of few basis targets,
+the leading singular vectors over the demonstrations, and start and goal follow from the style by regression. Our
+choices: the mean is taken out first, so that style zero is the average; initial velocity and duration follow from the
+style as well; and by default the path is decomposed (``metric="path"``), for f is dominated by accelerations.
 """
 
 from __future__ import annotations
@@ -40,11 +36,7 @@ METRICS = ("path", "forcing")
 
 
 def compared(metric: str, dmp: DMP, theta: Array) -> Array:
-    """Return what the styles explain, shape (n, d T): its Euclidean norm is the root mean square over the T phases.
-
-    From theta of `kineme.dmp.styles.parameters` it is the path minus its start, for position in space is no style, or
-    the forcing term times the formulation's scale, the target of Matsubara et al. (2011).
-    """
+    """Rows (n, d T) of what the styles explain: paths minus their start, or f times its scale, per sqrt(T)."""
     if metric == "path":
         matrix = path_matrix(dmp, dmp.n_points)
         matrix[-3] -= 1.0
@@ -163,11 +155,6 @@ class StyleModel:
         movements : Primitives, or movements as `DMP.learn` takes them
             Place and tempo do not matter.
 
-        Returns
-        -------
-        StyleEstimate
-            Styles, residuals and whether they are inside the demonstrated range.
-
         Raises
         ------
         SpecificationError
@@ -215,6 +202,7 @@ def learn_styles(
 
     With X the rows of what the metric compares, minus their mean, ``X = U S V^T`` is cut after J terms. The styles of
     the demonstrations are the columns of U times ``sqrt(n)``; each number of the primitives is regressed on them.
+    Neither sign nor order depends on the order of demonstrations: the largest change that a style makes is positive.
 
     Parameters
     ----------
@@ -226,12 +214,6 @@ def learn_styles(
         Or the share of the variance to explain, by the fewest styles that do; 0.95 if neither is given.
     metric : {"path", "forcing"}, default "path"
         What should be told apart well: paths relative to their start, or forcing terms times their scale.
-
-    Returns
-    -------
-    StyleModel
-        The sign of a style is such that the largest change that it makes is positive, so neither sign nor
-        order depends on the order of the demonstrations.
 
     Raises
     ------

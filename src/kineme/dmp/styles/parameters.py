@@ -1,25 +1,18 @@
-"""The numbers that a movement depends on linearly, and the way back to primitives.
+"""The numbers that a movement depends on linearly, the way back to primitives, and conditioning on observations.
 
 Over the phase u = t / tau a movement is linear in ``theta = [W, x0, g, tau v0]`` (N + 3 numbers for each dimension):
 
-    x(u) = Phi W + (1 - goal) x0 + goal g + velocity tau v0,
+    x(u) = Phi W + (1 - goal) x0 + goal g + velocity tau v0.
 
-with the decode matrices of `kineme.dmp.discrete.operators`. So the mean of many theta makes the mean of the
-paths, and a covariance of theta the covariance of the path. This holds for the weights times the formulation's scale,
-W, and not for the weights w themselves: in the original formulation the mean of ``w = W / (g - x0)`` belongs to no mean
-path, and one demonstration with g close to x0 would drown all others. Where the demonstrations are one shape in several
-sizes the two agree.
+So the mean of many theta makes the mean of the paths, and a covariance of theta that of the path. This holds for the
+scaled weights W, and not for w: in the original formulation the mean of ``w = W / (g - x0)`` belongs to no mean path.
 
-An average conditioned on where the movement is at some times, and how fast: the Gaussian of its numbers, updated.
-
-Theta and ln tau together have the covariance ``F' F``, with F the factors of the average side by side. A position is a
-linear function of theta, so conditioning on it is exact (A. Paraschos, C. Daniel, J. Peters and G. Neumann,
-"Probabilistic Movement Primitives", NIPS 2013, Section 2.2):
+Theta and ln tau together have the covariance ``Sigma = F' F``. A position is linear in theta, so conditioning on it is
+exact (A. Paraschos, C. Daniel, J. Peters and G. Neumann, "Probabilistic Movement Primitives", NIPS 2013, Section 2.2):
 
     mean += Sigma A' (A Sigma A' + diag(s^2))^-1 e,    Sigma -= Sigma A' (A Sigma A' + diag(s^2))^-1 A Sigma.
 
-A velocity v is met where ``dx/du = v tau``, which is not linear in ln tau: the most probable theta and tau are found by
-a few Gauss-Newton steps, safeguarded in ln tau, and the covariance is that around them.
+A velocity v is met where ``dx/du = v tau``, which is not linear in ln tau: a few Gauss-Newton steps find it.
 """
 
 from __future__ import annotations
@@ -94,6 +87,11 @@ def from_numbers(
     )
 
 
+def with_numbers(primitives: Primitives, theta: Array, durations: Array) -> Primitives:
+    """Primitives from theta and tau, with what these primitives have in common."""
+    return from_numbers(primitives.dmp, theta, durations, shared_label(primitives), shared_recording(primitives))
+
+
 def path_matrix(dmp: Specification, n_samples: int, derivative: int = 0) -> Array:
     """From theta to the path at `n_samples` even phases, or to its derivative in u; shape (N + 3, n_samples)."""
     return response_matrix(decoder(dmp, n_samples), derivative)
@@ -122,15 +120,6 @@ def shared_label(primitives: Primitives) -> Any:
     return labels[0] if labels is not None and (labels == labels[0]).all() else None
 
 
-class Updated(NamedTuple):
-    """The Gaussian after what was observed."""
-
-    theta: Array  # (1, d, N + 3)
-    duration: Array  # (1,)
-    factor: Array  # (r, d, N + 3)
-    tempo_factor: Array  # (r,)
-
-
 class _Rows(NamedTuple):
     """K observed numbers as linear functions of theta (d (N + 3),)."""
 
@@ -143,11 +132,8 @@ class _Rows(NamedTuple):
 
 def updated(
     primitive: Primitives, factor: Array, tempo_factor: Array, kinds: tuple[Observations | None, Observations | None]
-) -> Updated:
-    """Condition the mean and the factors of an average on positions and velocities.
-
-    Raises `SpecificationError`: what cannot be met, or only with a duration that is no movement's.
-    """
+) -> tuple[Array, Array, Array, Array]:
+    """Theta, duration (1,) and both factors of an average that is conditioned on positions and velocities."""
     d, n_numbers = factor.shape[1:]
     rows = _rows(primitive.dmp, d, kinds)
     theta = to_numbers(primitive).ravel()
@@ -184,7 +170,7 @@ def updated(
             f"duration would change by a factor of 10^{change[-1] / np.log(10.0):.3g}; demonstrate such a movement, or "
             "give a larger std"
         )
-    return Updated(
+    return (
         (theta + change[:-1]).reshape(1, d, n_numbers),
         primitive.durations * np.exp(change[-1]),
         remaining[:, :-1].reshape(factor.shape),
@@ -193,11 +179,7 @@ def updated(
 
 
 class _Root:
-    """The place where a function is 0 that falls through it: by secants, halving where these lead out of the bracket.
-
-    Of ``f(ln tau)``, the change of ln tau that the velocities ask for at ln tau, a plain iteration goes back and forth
-    where they are far from those of the demonstrations.
-    """
+    """The place where a falling function of ln tau is 0: by secants, halving where these lead out of the bracket."""
 
     def __init__(self) -> None:
         self.at = 0.0

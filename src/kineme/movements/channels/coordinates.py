@@ -128,11 +128,6 @@ def as_wxyz(q: Array, channel: Channel) -> Array:
     return q[..., [channel.order.index(part) for part in "wxyz"]]
 
 
-def from_wxyz(q: Array, channel: Channel) -> Array:
-    """The inverse of `as_wxyz`."""
-    return q[..., ["wxyz".index(part) for part in channel.order]]
-
-
 def continuous_signs(q: Array, offsets: NDArray[np.intp]) -> Array:
     """Quaternions (total, 4) of norm 1; along each movement neighbors lie in one hemisphere, its first stays."""
     flips = np.concatenate(([False], (q[1:] * q[:-1]).sum(axis=1) < 0))
