@@ -45,7 +45,7 @@ def _functions_of(path):
 
 
 def test_files_and_functions_are_short():
-    """Tokens are read only where lines of any kind are too many."""
+    """Lines of code are counted only where lines of any kind are too many."""
     long = [
         path for path in SOURCES if len(path.read_text().splitlines()) > MAX_FILE
         or any(node.end_lineno - node.body[0].lineno >= MAX_FUNCTION for node in _functions_of(path))
@@ -63,7 +63,7 @@ def test_files_and_functions_are_short():
 #: Limits of the package. They are lowered as it gets lighter, and never raised in passing.
 BUDGET = {
     "files": 400,
-    "lines": 57_600,
+    "lines": 55_000,
     "lines of imports in code": 0.10,
     "private functions called once": 0.12,
     "empty names": 0.01,

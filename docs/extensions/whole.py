@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from functools import cache
 from html import unescape
@@ -68,12 +69,17 @@ def _addresses(kind: str, address: str) -> list[str]:
 
 def _leads_somewhere(page: Path, where: str) -> bool:
     name, _, place = where.partition("#")
-    target = (page.parent / unquote(name.partition("?")[0])).resolve() if name else page
-    if target.suffix != ".html" or not place:
-        return target.exists()
+    target = os.path.normpath(f"{page.parent}/{unquote(name.partition('?')[0])}" if name else page)
+    if not target.endswith(".html") or not place:
+        return _is_there(target)
     return unquote(place) in _places(target)
 
 
+@cache  # every page links to most others
+def _is_there(path: str) -> bool:
+    return Path(path).exists()
+
+
 @cache
-def _places(page: Path) -> frozenset[str]:
-    return frozenset(_ID.findall(page.read_text(encoding="utf-8"))) if page.exists() else frozenset()
+def _places(page: str) -> frozenset[str]:
+    return frozenset(_ID.findall(Path(page).read_text(encoding="utf-8"))) if _is_there(page) else frozenset()

@@ -11,7 +11,7 @@ import sys
 import time
 
 import pytest
-from commands import answer, run, start
+from commands import answer, run
 
 import kineme
 
@@ -46,7 +46,7 @@ def test_without_a_choice_it_only_lists(folder, tmp_path):
 def test_accepted_proposals_become_symbols_with_a_prototype(folder, tmp_path):
     (tmp_path / "names.json").write_text('{"1": "first/../kind", "3": "third"}')
     options = ("--accept", "all", "--names", tmp_path / "names.json", "--pictures", tmp_path / "p")
-    data = answer("anchor", "-l", folder, *options, by=start)
+    data = answer("anchor", "-l", folder, *options)
     assert sorted(data["accepted"]) == ["cluster 2", "cluster 4", "first/../kind", "third"]
     listed = answer("library", "list", "-l", folder)
     assert listed["unlabeled"] == 0

@@ -61,7 +61,7 @@ def test_a_goal_that_is_not_met_at_the_end_is_said_with_what_meets_it(recording,
 
 def test_a_saved_primitive_does_the_same_as_its_recording(recording, tmp_path):
     first = run(recording, "--goal", "3,3", "--save", tmp_path / "g.kineme")
-    second = run(tmp_path / "g.kineme", "--goal", "3,3", by=commands.start)
+    second = run(tmp_path / "g.kineme", "--goal", "3,3")
     assert first.returncode == second.returncode == 0, first.stderr + second.stderr
     assert first.stdout == second.stdout
 
@@ -79,8 +79,7 @@ def test_it_steers_around_an_obstacle_on_the_path_and_arrives(recording, tmp_pat
 
 @pytest.mark.parametrize(("ending", "magic"), [(".png", b"\x89PNG"), (".svg", b"<?xml"), (".pdf", b"%PDF")])
 def test_it_draws(recording, tmp_path, ending, magic):
-    by = commands.start if ending == ".svg" else commands.run
-    done = run(recording, "--goal", "3,3", "-o", tmp_path / "new.csv", "--plot", tmp_path / f"new{ending}", by=by)
+    done = run(recording, "--goal", "3,3", "-o", tmp_path / "new.csv", "--plot", tmp_path / f"new{ending}")
     assert done.returncode == 0, done.stderr
     assert (tmp_path / f"new{ending}").read_bytes().startswith(magic)
 
@@ -129,7 +128,7 @@ def test_options_that_make_no_sense_are_a_usage_error(recording, arguments):
 def test_a_truncated_primitive_is_refused(recording, tmp_path):
     run(recording, "--save", tmp_path / "g.kineme")
     (tmp_path / "g.kineme").write_bytes((tmp_path / "g.kineme").read_bytes()[:500])
-    done = run(tmp_path / "g.kineme", by=commands.start)
+    done = run(tmp_path / "g.kineme")
     assert done.returncode == 1
     assert "truncated or damaged" in done.stderr
 

@@ -52,7 +52,7 @@ def test_a_folder_as_data(folder):
 def test_a_table_from_the_standard_input_with_columns_named():
     rows = "".join(f"a;{k * 20};{k};{-k}\n" for k in range(9))
     options = ("--time", "clock", "--columns", "y, x", "--label-column", "what", "--units", "ms", "--json")
-    done = run("-", *options, input=f"what;clock;x;y\n{rows}", by=commands.start)
+    done = run("-", *options, input=f"what;clock;x;y\n{rows}")
     data = json.loads(done.stdout)
     assert data["detected"][0] | {"columns": ["y", "x"], "units": "ms", "units_from": "given"} == data["detected"][0]
     assert data["labels"][0]["rate"]["median"] == pytest.approx(50)

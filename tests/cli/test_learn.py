@@ -83,7 +83,7 @@ def test_what_cannot_be_read_is_listed_and_the_rest_is_learned(recordings, tmp_p
     learned = answer("learn", recordings, "-l", tmp_path / "actions")
     assert learned["added"] == 14
     assert learned["problems"] == ["CShape/bad.csv, line 3: expected a number in 'y', got 'oops'"]
-    text = start("learn", recordings, "-l", tmp_path / "actions").stdout
+    text = run("learn", recordings, "-l", tmp_path / "actions").stdout
     assert "14 stored already" in text
     assert "left out CShape/bad.csv, line 3" in text
 
@@ -115,7 +115,7 @@ def test_labels_can_be_given_or_left_out(recordings, tmp_path):
 def test_people_are_said_or_read_from_folders(recordings, tmp_path):
     library, plain = tmp_path / "actions", tmp_path / "plain"
     assert answer("learn", recordings, "-l", plain)["people"] == []
-    assert "by 1 person; " in start("learn", recordings, "--person", "anna", "-l", library).stdout
+    assert "by 1 person; " in run("learn", recordings, "--person", "anna", "-l", library).stdout
     by = tmp_path / "everybody"
     by.mkdir()
     recordings.rename(by / "ben")
@@ -172,7 +172,7 @@ def test_movements_of_other_dimensions_are_refused_and_nothing_changes(recording
     library = tmp_path / "actions"
     answer("learn", recordings, "-l", library)
     (tmp_path / "space.csv").write_text("time,x,y,z\n" + "".join(f"{t},{t},{t * t},1\n" for t in range(9)))
-    done = start("learn", tmp_path / "space.csv", "-l", library)
+    done = run("learn", tmp_path / "space.csv", "-l", library)
     assert done.returncode == 1
     assert "expected movements of 2 dimensions as all others of the library" in done.stderr
     assert len(answer("library", "history", "-l", library)) == 1

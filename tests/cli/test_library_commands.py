@@ -61,7 +61,7 @@ def test_any_name_is_data(folder):
     renamed = answer("library", "rename", "GShape", WICKED, "-l", folder, by=start)
     assert (renamed["name"], renamed["id"], renamed["was"]) == (WICKED, before["id"], "GShape")
     assert answer("library", "show", WICKED, "-l", folder)["members"] == before["members"]
-    text = start("library", "list", "-l", folder).stdout
+    text = run("library", "list", "-l", folder).stdout
     assert "\x1b" not in text
     assert "\u202e" not in text
     assert "\\x1b[31m" in text
@@ -118,7 +118,7 @@ def test_changes_are_taken_back_one_after_the_other(folder):
     answer("library", "undo", "-l", folder)
     assert answer("library", "list", "-l", folder)["movements"] == 0
     assert "has none left" in run("library", "undo", "-l", folder).stderr
-    assert start("library", "undo", "--to", 3, "-l", folder).stdout == "restored version 3; version 7\n"
+    assert run("library", "undo", "--to", 3, "-l", folder).stdout == "restored version 3; version 7\n"
     names = [one["name"] for one in answer("library", "list", "-l", folder)["symbols"]]
     assert names == ["GShape", "round"]
 

@@ -113,7 +113,7 @@ def test_a_recording_may_come_through_a_pipe(folder, asked):
 def test_a_library_without_symbols_cannot_say(tmp_path, asked):
     with kineme.ActionLibrary(tmp_path / "empty", create=True) as library:
         library.learn([one.positions for one in kineme.load_lasa(["CShape"])])
-    done = start("recognize", asked / "c.csv", "-l", tmp_path / "empty")
+    done = run("recognize", asked / "c.csv", "-l", tmp_path / "empty")
     assert done.returncode == 1
     assert done.stderr.count("\n") == 1
     assert "symbol" in done.stderr

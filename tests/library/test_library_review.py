@@ -8,9 +8,11 @@ import sys
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import kineme
 from kineme.anchoring.proposals import Proposal, Proposals
+from kineme.cli import main
 from kineme.library.proposals import _without
 
 MIXED = {"CShape": "round", "GShape": "gee", "NShape": "mixed", "Sine": "mixed"}
@@ -41,10 +43,12 @@ def test_review_names_what_is_one_and_what_is_two(folder):
 
 def test_the_shell_reviews_and_splits(folder):
     def run(*arguments):
-        command = [sys.executable, "-W", "error", "-m", "kineme", "library", *map(str, arguments), "-l", str(folder)]
-        return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+        done = CliRunner().invoke(main, ["library", *map(str, arguments), "-l", str(folder)], catch_exceptions=False)
+        assert done.exit_code == 0, done.output
+        return done.output
 
-    text = run("review")
+    command = [sys.executable, "-W", "error", "-m", "kineme", "library", "review", "-l", str(folder)]
+    text = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     assert "also round and round could be one" in text
     assert "mixed could be two: 7 movements, and " in text
     part = json.loads(run("review", "--json"))["splits"][0]["parts"][1]

@@ -33,16 +33,13 @@ DRAWS = 12  # of the page
 RUN = DRAWS if SOAK else 1
 
 
-def reproduce(*arguments):
-    command = [sys.executable, "-W", "error", "-m", "kineme", "reproduce", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
-
-
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     """How it ended, and its folder."""
     folder = tmp_path_factory.mktemp("run") / "new" / "out"
-    return reproduce("--quick", "--draws", RUN, "--out", folder), folder
+    command = [sys.executable, "-W", "error", "-m", "kineme", "reproduce", "--quick"]
+    command += ["--draws", str(RUN), "--out", str(folder)]
+    return subprocess.run(command, capture_output=True, text=True, check=False), folder
 
 
 @pytest.fixture(scope="module")
@@ -151,15 +148,15 @@ def test_nothing_but_the_results_is_left_in_the_folder(run):
 def test_a_folder_that_cannot_be_written_is_one_line(tmp_path):
     blocked = tmp_path / "file"
     blocked.write_text("not a folder")
-    done = reproduce("--quick", "--out", blocked / "out")
-    assert done.returncode == 1
-    assert done.stderr.startswith("kineme: ")
-    assert done.stderr.count("\n") == 1
+    done = CliRunner().invoke(main, ["reproduce", "--quick", "--out", str(blocked / "out")])
+    assert done.exit_code == 1
+    assert done.output.startswith("kineme: ")
+    assert done.output.count("\n") == 1
 
 
-@pytest.mark.parametrize("arguments", [("--draws", 0), ("--seed", -1), ("--draws", "many")])
+@pytest.mark.parametrize("arguments", [("--draws", "0"), ("--seed", "-1"), ("--draws", "many")])
 def test_impossible_options_are_refused(arguments):
-    assert reproduce(*arguments).returncode == 2
+    assert CliRunner().invoke(main, ["reproduce", *arguments]).exit_code == 2
 
 
 @pytest.mark.skipif(not ARM, reason="the extra robot is not installed")

@@ -42,7 +42,8 @@ def draw_movement(learned: Learned, generated: Columns, obstacles: Array | None)
         axes.tick_params(labelbottom=True)
     over_time.align_ylabels()
     figure.legend(handles=_key(learned, bool(paths), obstacles is not None), loc="outside lower center", ncols=3)
-    figure.draw_without_rendering()  # a first layout, without which the aligned names are cut off
+    # A first layout, without which the aligned names are cut off.
+    figure.get_layout_engine().execute(figure)  # type: ignore[union-attr]
     return figure
 
 
