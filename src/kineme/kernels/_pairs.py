@@ -339,17 +339,27 @@ def _add_halves(dims, numbers, block):  # type: ignore[no-untyped-def]
 
 @_jit
 def take_rotation(dims, rotations, i, j, block, lane):  # type: ignore[no-untyped-def]
-    d = len(dims)
-    if rotations.shape[2] == 0:
+    d, r = len(dims), rotations.shape[2]
+    if r == 0:
         for k in range(d * d):
             block[k, lane] = k % (d + 1) == 0
-    elif rotations.shape[2] == d * d:
+    elif r == d * d:
         for k in range(d * d):
             block[k, lane] = rotations[i, j, k]
-    else:
-        c, s = rotations[i, j, 0], rotations[i, j, 1]
-        block[0, lane], block[1, lane] = c, -s
-        block[2, lane], block[3, lane] = s, c
+    else:  # of one point of several, which lie along the diagonal
+        p = 3 if r == 9 else 2
+        for k in range(d * d):
+            block[k, lane] = 0
+        for first in range(0, d, p):
+            at = first * (d + 1)
+            if r == 2:
+                c, s = rotations[i, j, 0], rotations[i, j, 1]
+                block[at, lane], block[at + 1, lane] = c, -s
+                block[at + d, lane], block[at + d + 1, lane] = s, c
+            else:
+                for k in range(p):
+                    for h in range(p):
+                        block[at + k * d + h, lane] = rotations[i, j, k * p + h]
 
 
 @_jit

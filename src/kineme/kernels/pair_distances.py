@@ -45,6 +45,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
+from kineme.kernels.rotation import blocks
 from kineme.runtime.compiled import compiled_module, use_compiled
 from kineme.runtime.parallel import for_tiles
 from kineme.validation import Array
@@ -344,7 +345,8 @@ def pair_distances(A: Shapes, B: Shapes, rotations: NDArray[Any] | None = None) 
 
     - `A`, `B`: n and m movements with the same dimensions d and specifications.
     - `rotations` (n, m, d, d) or, in the plane, (n, m, 2): matrices R, or cosines and sines, that rotate B's movement
-      onto A's, float32 fastest. By default nothing is rotated.
+      onto A's, float32 fastest; of points in the plane or in space, J after each other, those of one, which rotate
+      all. By default nothing is rotated.
 
     In units of the movements' squared size. The turning distance does not depend on the rotation.
     Raises `SpecificationError`: dimensions, specifications or the shape of the rotations do not fit.
@@ -431,7 +433,8 @@ def _check(A: Shapes, B: Shapes) -> None:
 
 
 def _check_rotations(rotations: NDArray[Any], shape: tuple[int, ...], d: int) -> None:
-    if rotations.shape != (*shape, d, d) and (d != 2 or rotations.shape != (*shape, 2)):
+    sizes = {(*shape, p, p) for p in (2, 3, d) if d % p == 0} | ({(*shape, 2)} if d % 2 == 0 else set())
+    if rotations.shape not in sizes:
         wanted = f"{(*shape, d, d)}" + f" or {(*shape, 2)}" * (d == 2)
         raise SpecificationError(f"expected rotations of shape {wanted}, got {rotations.shape}; pass one for each pair")
 
@@ -511,10 +514,11 @@ def _matrices(entries: Floats, d: int) -> Array | None:
     """Rotations (k, d, d) of their entries (k, 1, r)."""
     if entries.shape[2] == 0:
         return None
-    if entries.shape[2] == d * d:
-        return entries.reshape(-1, d, d).astype(float)
+    if entries.shape[2] != 2:
+        p = math.isqrt(entries.shape[2])
+        return blocks(entries.reshape(-1, p, p).astype(float), d // p)
     c, s = entries.reshape(-1, 2).T.astype(float)
-    return np.stack((np.stack((c, -s), -1), np.stack((s, c), -1)), -2)
+    return blocks(np.stack((np.stack((c, -s), -1), np.stack((s, c), -1)), -2), d // 2)
 
 
 def _arrays(shapes: Shapes, chosen: slice) -> tuple[Floats, ...]:

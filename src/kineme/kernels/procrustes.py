@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +15,7 @@ from kineme.kernels.rotation import (
     RotationPrior,
     best_products,
     best_rotations,
+    blocks,
     half_angle,
     limited,
     soft_products,
@@ -57,7 +58,11 @@ class Procrustes:
     `kernels.rotation`, the root of a quartic with a prior. In one dimension, and with ``max_angle = 0``, it is the
     Euclidean distance.
 
-    - `n_dims`: dimensions d of the movements; rows are dimension-major, x_1 ... x_S, y_1 ... y_S, Eq. (9).
+    Of J points that move together, such as two hands or the joints of a body, the rotation is one: sums over t are then
+    over all points and times. At a cost linear in J.
+
+    - `n_dims`: dimensions d of the movements, or of each of their points; rows are dimension-major, x_1 ... x_S, y_1
+      ... y_S, Eq. (9), one point after the other.
     - `max_angle`: largest rotation [rad], 0 to pi. Choose it as small as the application allows: with pi, N and Z are
       the same, and with more than a right angle, V and caret. Beyond three dimensions only 0 is possible.
 
@@ -67,6 +72,9 @@ class Procrustes:
     n_dims: int
     max_angle: float = math.pi / 3
     prior: RotationPrior | None = None  # instead of a limit, with ``max_angle=pi``, in two and three dimensions
+    n_points: int = 1  # J, points in the plane or in space
+    #: Weights (q, J) by which points are added up to the q that are compared pair by pair; all J as they are if None.
+    mixing: tuple[tuple[float, ...], ...] | None = None
 
     def __post_init__(self) -> None:
         check_number("max_angle", self.max_angle, least=0.0, smallest=0.0)
@@ -83,12 +91,43 @@ class Procrustes:
                     f"max_angle={self.max_angle!r} and {self.n_dims} dimensions; leave the prior out"
                 )
             self.prior.matrix(self.n_dims)
+        if self.n_points > 1 and self.n_dims not in (2, 3):
+            raise SpecificationError(
+                f"expected points in the plane or in space, got points of {self.n_dims} dimensions"
+            )
+
+    @property
+    def n_columns(self) -> int:
+        """Dimensions of the movements, those of all points."""
+        return self.n_dims * self.n_points
+
+    def by_coordinates(self, rows: NDArray[Any]) -> NDArray[Any]:
+        """Rows (n, J d S), point after point, with the x of all points first: those of one movement of J S samples."""
+        if self.n_points == 1:
+            return rows
+        parts = rows.reshape(len(rows), self.n_points, self.n_dims, -1)
+        return np.ascontiguousarray(parts.transpose(0, 2, 1, 3)).reshape(len(rows), -1)
+
+    def by_points(self, rows: NDArray[Any]) -> NDArray[Any]:
+        """The inverse of `by_coordinates`."""
+        return replace(self, n_dims=self.n_points, n_points=self.n_dims, prior=None).by_coordinates(rows)
+
+    def mixed(self, paths: NDArray[Any]) -> NDArray[Any]:
+        """Paths (n, J d, S) of the q points that are compared pair by pair, (n, q d, S): centered, at size 1."""
+        if self.mixing is None:
+            return paths
+        n, samples = len(paths), paths.shape[2]
+        points = paths.reshape(n, self.n_points, self.n_dims, samples)
+        mixture = np.einsum("qj,njds->nqds", np.array(self.mixing, dtype=paths.dtype), points)
+        sizes = np.sqrt((mixture**2).sum(axis=(1, 2)).mean(axis=1))
+        return np.asarray(mixture.reshape(n, -1, samples) / np.where(sizes > 0, sizes, 1.0)[:, None, None])
 
     def prepare(self, rows: Array) -> Prepared:
         """Rows (n, d * S) in the form that comparisons need, so that stored movements are converted once.
 
         The products run in the rows' own precision, float64 or float32; the norms are float64.
         """
+        rows = self.by_coordinates(rows)
         in_plane = self.n_dims == 2 and self.max_angle > 0
         return Prepared(as_complex(rows) if in_plane else rows, _squares(rows))
 
@@ -144,12 +183,19 @@ class Procrustes:
     def rotations(self, A: Array, B: Array) -> Array:
         """Rotation matrices (m, d, d) that bring each row of B closest to the same row of A, or to A's only row.
 
+        Of points they are (m, J d, J d), with the rotation of each point along the diagonal.
+
         Of several rotations that are equally good, as about the axis of a straight movement, the smallest is returned.
         A prior decides how alike two movements are, not how one is best laid onto the other: it has no part here.
         """
         d = self.n_dims
         if self.max_angle == 0 or d not in (2, 3):
-            return np.broadcast_to(np.eye(d), (len(B), d, d)).copy()
+            return np.broadcast_to(np.eye(self.n_columns), (len(B), self.n_columns, self.n_columns)).copy()
+        return blocks(self._rotations(self.by_coordinates(A), self.by_coordinates(B)), self.n_points)
+
+    def _rotations(self, A: Array, B: Array) -> Array:
+        """The same of one point, rows with the x of all points first."""
+        d = self.n_dims
         if d == 2:
             product = np.einsum("ij,ij->i", *np.broadcast_arrays(as_complex(A), as_complex(B).conj()))
             angle = np.clip(np.angle(product), -self.max_angle, self.max_angle)

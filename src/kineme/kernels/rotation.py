@@ -345,3 +345,13 @@ def _largest_root(square: Array, determinant: Array, last: Array) -> Array:
 def turned(C: NDArray[np.floating], weight: Array, F: Array) -> Array:
     """``C + |a| |b| F`` for covariances C (n, 3, 3)."""
     return np.asarray(C + weight[:, None, None] * F)
+
+
+def blocks(R: Array, n_points: int) -> Array:
+    """Return matrices (m, J d, J d) with matrices (m, d, d) J times along the diagonal."""
+    if n_points == 1:
+        return R
+    m, d, _ = R.shape
+    result = np.zeros((m, n_points, d, n_points, d), R.dtype)
+    result[:, np.arange(n_points), :, np.arange(n_points)] = R
+    return result.reshape(m, n_points * d, n_points * d)

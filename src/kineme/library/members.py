@@ -77,8 +77,12 @@ def groups_of(store: Store, ids: Ids) -> NDArray[np.intp] | None:
 def described(store: Store, ids: ArrayLike, comparison: Comparison | None = None) -> Described:
     """Describe movements as the library does, or as a comparison does, from their stored features."""
     rows, how = read.features(store, np.asarray(ids, dtype=np.int64)), store.specification.comparison
-    every = describe_rows(rows, store.n_dims or 0, how)
-    return every if comparison is None else every.select(map(how.representations.index, comparison.representations))
+    if comparison is None:
+        return describe_rows(rows, store.n_dims or 0, how.with_points(store.channels))
+    blocks = np.split(rows, np.cumsum(store.specification.widths(store.n_dims or 0))[:-1], axis=1)
+    return comparison.prepared(
+        tuple(blocks[how.stored_rows.index(representation)] for representation in comparison.specification.stored_rows)
+    )
 
 
 def described_references(store: Store, ids: Ids, labels: NDArray[Any]) -> References:

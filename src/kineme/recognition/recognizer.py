@@ -74,6 +74,10 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         product of two equal paths in the plane and 0.2 in space, and none is forbidden. Pass
         ``RotationPrior(vertical=(0, 0, 1))`` for movements that are turned about the vertical, and rarely tilted. None
         forbids rotations beyond pi/3 and costs nothing below.
+    points : int, optional
+        How many points in the plane or in space the columns are, one after the other: hands, markers, joints of a body.
+        They turn and scale as one. By default they are those that the names of columns tell, such as ``left_hand_x,
+        left_hand_y, left_hand_z, right_hand_x, ...``; 1 compares columns that are not rotated.
 
     Attributes
     ----------
@@ -114,6 +118,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         classifier: str = "auto",
         weights: str | Sequence[float] = "auto",
         rotation_prior: RotationPrior | None = _PRIOR,
+        points: int | None = None,
     ) -> None:
         self.representations = representations
         self.max_angle = max_angle
@@ -124,6 +129,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         self.classifier = classifier
         self.weights = weights
         self.rotation_prior = rotation_prior
+        self.points = points
 
     @property
     def specification(self) -> ComparisonSpecification:
@@ -136,6 +142,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
             self.max_angle,
             self.mean,
             self.rotation_prior,
+            self.points,
         )
 
     def fit(self, X: MovementsLike, y: ArrayLike | None = None, groups: ArrayLike | None = None) -> Self:

@@ -115,6 +115,7 @@ class TwoStageSearch:
             np.concatenate((block.rows.real, block.rows.imag), axis=1) if np.iscomplexobj(block.rows) else block.rows
             for block in described.blocks
         )
+        rows = tuple(self.comparison.procrustes.by_points(block) for block in rows)
         return reduce_features(self.stored.bases, rows, self.comparison.n_dims)
 
     def compare(

@@ -106,6 +106,8 @@ def log_bounds(
         for features, width in zip(queries, similarity.widths, strict=True)
     ]
 
+    asked = [similarity.procrustes.by_coordinates(features.values) for features in scaled]
+
     def fill(start: int, stop: int) -> None:
         logs = np.empty((len(stored), stop - start, n), dtype=np.float32)
         for r, block in enumerate(stored):
@@ -113,7 +115,8 @@ def log_bounds(
             # |a| is divided by sigma^2 as a whole, like every other factor of the side that is asked.
             ours = np.asarray(np.sqrt(scaled[r].squares) / similarity.widths[r], dtype=np.float32)
             norms = np.sqrt(block.squares[start:stop, None]) * ours
-            most = _alignments(similarity.procrustes, scaled[r].values, block.values[start:stop], norms)
+            values = similarity.procrustes.by_coordinates(block.values[start:stop])
+            most = _alignments(similarity.procrustes, asked[r], values, norms)
             most += block.residual_norms[start:stop, None] * scaled[r].residual_norms
             most -= half * block.squares[start:stop, None]
             most -= np.float32(0.5 * (1.0 - _ROUNDING)) * scaled[r].squares - np.float32(log_weights[r])

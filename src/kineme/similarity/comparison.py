@@ -60,7 +60,7 @@ class Comparison:
     @property
     def n_dims(self) -> int:
         """Number of dimensions d of the movements."""
-        return self.procrustes.n_dims
+        return self.procrustes.n_columns
 
     @property
     def mean(self) -> str:
@@ -73,7 +73,13 @@ class Comparison:
         prior = self.procrustes.prior
         angle = self.procrustes.max_angle if prior is None else None
         return ComparisonSpecification(
-            self.representations, self.normalization, self.cutoff, angle, self.mean, prior or RotationPrior()
+            self.representations,
+            self.normalization,
+            self.cutoff,
+            angle,
+            self.mean,
+            prior or RotationPrior(),
+            self.procrustes.n_points,
         )
 
     def checked(self, movements: MovementsLike, what: str = "movements") -> Demonstrations:
@@ -116,6 +122,7 @@ def fit_comparison(
     weights that do not fit the specification, or movements that are all the same.
     """
     demos = Demonstrations.of_movements(in_coordinates(demos.movements), demos.steps)
+    specification = specification.with_points(demos.channels)
     order = np.argsort(labels, kind="stable")
     demos, labels = demos[order], labels[order]
     with single_threaded_blas():  # products of few rows: a second thread mostly waits

@@ -20,6 +20,7 @@ from kineme.movements.preparation.smooth import smooth_rows
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.runtime.parallel import for_tiles
+from kineme.sampling import evenly_spaced
 from kineme.similarity.specification import (
     DETAILED_CLOUD,
     DETAILED_ELASTIC,
@@ -36,6 +37,8 @@ from kineme.validation import Array
 _TILE_PAIRS = 100_000  # at a time: a pair's rotation in space has nine numbers
 
 _TILE_SAMPLES = 200_000  # numbers in one tile of paths: with smaller ones, threads wait for each other
+_MOST_MIXED = 4  # points that are compared pair by pair
+_MIXED_FROM = 500  # movements that tell which
 N_POINTS = 199  # even samples from which the phases are computed; every second one is one of 100
 
 
@@ -57,7 +60,7 @@ def describe(movements: Described | MovementsLike, like: Compares | None = None)
         return movements
     how = specification_of(like)
     demos = Demonstrations.of(movements)
-    return prepare(feature_rows(demos, how), how, how.procrustes(demos.n_dims))
+    return prepare(feature_rows(demos, how), how, how.with_points(demos.channels).procrustes(demos.n_dims))
 
 
 def describe_rows(rows: NDArray[Any], n_dims: int, like: Compares | None = None) -> Described:
@@ -94,19 +97,36 @@ def prepare(rows: Iterable[NDArray[Any]], like: Compares, procrustes: Procrustes
     In single precision: comparing with many stored movements is bound by memory, and widths are far above its error.
     What is compared pair by pair is made from the positions over arc length.
     """
-    how = like.specification
+    how, d = like.specification, procrustes.n_columns
     singles: tuple[Any, ...] = tuple(np.ascontiguousarray(block, dtype=np.float32) for block in rows)
     blocks = tuple(procrustes.prepare(block) for block in singles[: len(how.by_rows)])
-    own = tuple(representation.own_weight(procrustes.n_dims) for representation in how.representations)
+    own = tuple(representation.own_weight(d) for representation in how.representations)
     if not how.by_pairs:
         return Described(blocks, procrustes, how.mean, own_weights=own)
     r = rotating(how.representations)
-    paths = [block.reshape(len(block), procrustes.n_dims, -1) for block in (singles[r], *singles[len(how.by_rows) :])]
-    slopes = procrustes.n_dims == 1 and how.representations[r].signal
+    paths = [block.reshape(len(block), d, -1) for block in (singles[r], *singles[len(how.by_rows) :])]
+    procrustes = with_mixing(procrustes, paths[0])
+    paths = [procrustes.mixed(block) for block in paths]
+    slopes = d == 1 and how.representations[r].signal
     details = shapes_of(paths[1], DETAILED_ELASTIC, DETAILED_CLOUD, slopes=slopes) if len(paths) == 2 else None
     measures = tuple(representation.measure for representation in how.by_pairs)
     pairs = Pairs(blocks[r], shapes_of(paths[0], slopes=slopes), measures, details, how.upright)
     return Described(blocks, procrustes, how.mean, pairs, own)
+
+
+def with_mixing(procrustes: Procrustes, paths: NDArray[Any]) -> Procrustes:
+    """Return the distance with the points that are compared pair by pair: of many, the principal ones.
+
+    These are the q weighted sums of points that hold most of how all move, whatever their rotation: eigenvectors of
+    ``sum x_i x_j^T`` over the paths (n, J d, S). Pairs of segments are compared in 3 q numbers instead of 3 J.
+    """
+    J = procrustes.n_points
+    if procrustes.mixing is not None or J <= _MOST_MIXED:
+        return procrustes
+    points = paths.reshape(len(paths), J, -1)[evenly_spaced(len(paths), _MIXED_FROM)].astype(np.float64)
+    vectors = np.linalg.eigh(np.einsum("nis,njs->ij", points, points))[1][:, : -_MOST_MIXED - 1 : -1]
+    vectors *= np.sign(vectors[np.abs(vectors).argmax(axis=0), np.arange(_MOST_MIXED)])  # so that each has one sign
+    return replace(procrustes, mixing=tuple(map(tuple, vectors.T.tolist())))
 
 
 def feature_rows(movements: MovementsLike, specification: ComparisonSpecification) -> tuple[Array, ...]:
@@ -277,7 +297,7 @@ class Described:
     @property
     def n_dims(self) -> int:
         """Number of dimensions d."""
-        return self.procrustes.n_dims
+        return self.procrustes.n_columns
 
     def take(self, chosen: Any) -> Described:
         """Return the chosen movements: a slice, a mask or indices."""

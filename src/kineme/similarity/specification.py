@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import Any, Protocol
 
@@ -26,6 +26,8 @@ from kineme.errors import SpecificationError, TrajectoryError
 from kineme.kernels.pair_distances import CloudSpec, ElasticSpec
 from kineme.kernels.procrustes import Procrustes
 from kineme.kernels.rotation import RotationPrior
+from kineme.movements.channels.channel import Channels
+from kineme.movements.channels.points import count_points
 from kineme.movements.preparation.resample import resample_by_arc_length
 from kineme.movements.preparation.smooth import Smooth, spline_matrix
 from kineme.runtime.compiled import compiled_module, use_compiled
@@ -343,6 +345,7 @@ class ComparisonSpecification:
       time, elastic path, turning angles, and point cloud; elastic path and point cloud once more, in detail.
     - `cutoff`: movements are smoothed below this many cycles each, see `Smooth`; None for recordings without noise.
     - `max_angle`: largest rotation [rad] between movements of one class, instead of the prior; 0 for none.
+    - `points`: how many points in the plane or in space the columns are, one after the other; they turn together.
     - `prior`: how rare rotations are, in two and three dimensions, if there is no `max_angle`. None is a limit of pi/3.
 
     Raises `SpecificationError`: a parameter out of its range, or `max_angle` and a prior that is not the default.
@@ -354,8 +357,11 @@ class ComparisonSpecification:
     max_angle: float | None = None
     mean: str = "arithmetic"  # the A-average over representations
     prior: RotationPrior | None = field(default_factory=RotationPrior)
+    points: int | None = None  # J points that turn together; None: those that channels name, see `with_points`
 
     def __post_init__(self) -> None:
+        if self.points is not None:
+            check_count("points", self.points, 1)
         check_choice("mean", self.mean, list(LOG_MEANS))
         if self.cutoff is not None:
             Smooth(self.cutoff)  # checks its own parameter
@@ -406,13 +412,24 @@ class ComparisonSpecification:
 
     def procrustes(self, n_dims: int) -> Procrustes:
         """Return the distance between rows of movements of `n_dims` dimensions."""
-        if self.max_angle is not None and 0 <= self.max_angle - math.pi <= 1e-12 and n_dims in (2, 3):
-            return Procrustes(n_dims, math.pi, RotationPrior(0.0))  # no limit: the fast way
+        n_points = self.points or 1
+        if n_points > 1 and n_dims not in (2 * n_points, 3 * n_points):
+            raise SpecificationError(
+                f"expected {2 * n_points} or {3 * n_points} columns, those of points={n_points} in the plane or in "
+                f"space, got {n_dims}; leave points out, or select the columns"
+            )
+        d = n_dims // n_points
+        if self.max_angle is not None and 0 <= self.max_angle - math.pi <= 1e-12 and d in (2, 3):
+            return Procrustes(d, math.pi, RotationPrior(0.0), n_points)  # no limit: the fast way
         if self.max_angle is not None:
-            return Procrustes(n_dims, float(self.max_angle))
-        if n_dims not in (2, 3):
-            return Procrustes(n_dims, 0.0)
-        return Procrustes(n_dims, math.pi / 3 if self.prior is None else math.pi, self.prior)
+            return Procrustes(d, float(self.max_angle), None, n_points)
+        if d not in (2, 3):
+            return Procrustes(d, 0.0)
+        return Procrustes(d, math.pi / 3 if self.prior is None else math.pi, self.prior, n_points)
+
+    def with_points(self, channels: Channels | None) -> ComparisonSpecification:
+        """Return the specification with the number of points, which are told by the names of columns if at all."""
+        return self if self.points is not None else replace(self, points=count_points(channels))
 
 
 class Compares(Protocol):

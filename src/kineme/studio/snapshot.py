@@ -174,6 +174,11 @@ def _numbers(module: ModuleType, *names: str) -> dict[str, float]:
 def rotation_rule(procrustes: Procrustes) -> dict[str, Any]:
     """Write how movements are rotated."""
     d, prior = procrustes.n_dims, procrustes.prior
+    if procrustes.n_points > 1:
+        raise SpecificationError(
+            f"expected movements of one point, got {procrustes.n_points} points that turn together, which the page "
+            f"does not have; {_AGAIN}"
+        )
     if d == 3 and prior is None and procrustes.max_angle > 0:
         raise SpecificationError(
             "expected movements in space to be compared under a rotation prior, with max_angle=0 or with max_angle=pi, "

@@ -97,6 +97,7 @@ class Specification:
             "classifier": self.classifier,
             "weights": self.weights,
             "rotation_prior": how.prior,
+            "points": how.points,
         }
 
     def to_json(self) -> dict[str, str]:
@@ -140,6 +141,7 @@ def _of_texts(recognizer: str, dmp_text: str) -> Specification:
         parameters.pop("max_angle", None),
         parameters.pop("mean", "arithmetic"),
         parameters.pop("rotation_prior", None),
+        parameters.pop("points", 1),  # of libraries that do not say it, no columns turn together
     )
     return Specification(comparison, dmp=specification_from_dict(DMP, dmp), **parameters)
 

@@ -205,7 +205,7 @@ def beginning_procrustes(procrustes: Procrustes, max_angle: float | None) -> Pro
     A beginning is often nearly straight, and the same as any other one if it may be rotated freely.
     """
     if max_angle is not None:
-        return Procrustes(procrustes.n_dims, max_angle)
+        return replace(procrustes, max_angle=max_angle, prior=None)
     if procrustes.prior is None or procrustes.prior.concentration is not None:
         return procrustes
     return replace(procrustes, prior=replace(procrustes.prior, concentration=_CONCENTRATION))
@@ -322,7 +322,7 @@ def describe_prefixes(prefixes: Prefixes, procrustes: Procrustes) -> Described:
     """
     rows = prefixes.positions
     positions = procrustes.prepare(rows.astype(np.float32))
-    shapes = shapes_of(math.sqrt(N_PREFIX) * rows.reshape(len(rows), -1, N_PREFIX))
+    shapes = shapes_of(procrustes.mixed(math.sqrt(N_PREFIX) * rows.reshape(len(rows), -1, N_PREFIX)))
     return Described((positions,), procrustes, pairs=Pairs(positions, shapes, _PAIRS))
 
 

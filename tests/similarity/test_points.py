@@ -1,0 +1,187 @@
+"""Points that turn together: hands, markers, joints of a body, as columns one after the other."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import kineme
+from kineme.errors import SpecificationError
+from kineme.kernels.pair_distances import pair_distances, shapes_of
+from kineme.kernels.procrustes import Procrustes
+from kineme.movements.channels.channel import Channel
+from kineme.movements.channels.points import count_points
+from kineme.recognition import RotationPrior
+from kineme.similarity.bounds import fit_bases, log_bounds, reduce_features
+from kineme.similarity.comparison import fit_comparison
+from kineme.similarity.describe import describe, feature_rows, squared_distances
+from kineme.similarity.specification import ComparisonSpecification
+
+HANDS = [f"{side}_hand_{axis}" for side in ("left", "right") for axis in "xyz"]
+
+
+def draw_points(n_points, n_dims, seed, n_classes=4, each=3):
+    """Movements of J points: each class has its own waves, each movement a little noise; labels."""
+    rng = np.random.default_rng(seed)
+    u = np.linspace(0, 1, 70)[:, None, None]
+    arrays, labels = [], []
+    for label in range(n_classes):
+        waves = rng.normal(size=(3, 1, n_points, n_dims))
+        path = sum(wave * np.sin(np.pi * (k + 1) * u + wave) for k, wave in enumerate(waves))
+        for _ in range(each):
+            noise = 0.1 * rng.normal(size=(1, n_points, n_dims)) * np.sin(5 * u)
+            arrays.append((path + noise).reshape(len(u), -1))
+            labels.append(str(label))
+    return kineme.Demonstrations.from_arrays(arrays, labels)
+
+
+def turned(demos, n_points, n_dims, seed, axis=None):
+    """Each movement turned as a whole, by any angle about the axis, or by any rotation."""
+    rng = np.random.default_rng(seed)
+    arrays = []
+    for demo in demos:
+        if n_dims == 2:
+            angle = rng.uniform(-np.pi, np.pi)
+            R = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        elif axis is not None:
+            R = Rotation.from_rotvec(rng.uniform(-np.pi, np.pi) * np.array(axis)).as_matrix()
+        else:
+            R = Rotation.random(rng=rng).as_matrix()
+        arrays.append((demo.positions.reshape(-1, n_points, n_dims) @ R.T).reshape(len(demo.positions), -1))
+    return kineme.Demonstrations.from_arrays(arrays, demos.labels, [demo.times for demo in demos])
+
+
+@pytest.mark.parametrize(("n_points", "n_dims"), [(2, 2), (2, 3), (5, 3), (21, 3)])
+def test_points_that_turn_together_are_the_same_movement(n_points, n_dims):
+    demos = draw_points(n_points, n_dims, seed=n_points)
+    like = ComparisonSpecification(max_angle=np.pi, points=n_points)
+    squares = squared_distances(describe(demos, like), describe(demos, like))
+    comparison, references = fit_comparison(like, demos, np.asarray(demos.labels))
+    moved = describe(turned(demos, n_points, n_dims, seed=1), comparison)
+    own = np.einsum("rii->ri", comparison.similarity.squared_distances(moved, references.described))
+    assert own.max() < 2e-4 * np.median(squares)
+
+
+def test_the_distance_is_that_after_the_best_rotation_of_all_points():
+    """By singular values of the covariance of (T J, 3), Kabsch's algorithm."""
+    J, S, rng = 4, 30, np.random.default_rng(2)
+    A, B = rng.normal(size=(2, 5, J, 3, S))
+    procrustes = Procrustes(3, np.pi, None, J)
+    found = procrustes.squared_distances(procrustes.prepare(A.reshape(5, -1)), procrustes.prepare(B.reshape(5, -1)))
+    for i in range(5):
+        for j in range(5):
+            x, y = (P.transpose(0, 2, 1).reshape(-1, 3) for P in (A[i], B[j]))
+            R = Rotation.align_vectors(x, y)[0]
+            assert found[i, j] == pytest.approx(((x - R.apply(y)) ** 2).sum(), rel=1e-9)
+
+
+def test_rotations_of_points_lie_along_the_diagonal():
+    J, rng = 3, np.random.default_rng(3)
+    x = rng.normal(size=(1, J, 3, 20))
+    R = Rotation.from_rotvec([0.3, -0.5, 0.2]).as_matrix()
+    y = np.einsum("ab,njbs->njas", R.T, x)
+    procrustes = Procrustes(3, np.pi, None, J)
+    matrices = procrustes.rotations(x.reshape(1, -1), y.reshape(1, -1))
+    np.testing.assert_allclose(matrices[0], np.kron(np.eye(J), R), atol=1e-9)
+    rows = rng.normal(size=(4, J * 3 * 7))
+    np.testing.assert_array_equal(procrustes.by_points(procrustes.by_coordinates(rows)), rows)
+
+
+@pytest.mark.parametrize(("n_points", "n_dims"), [(2, 2), (3, 2), (2, 3)])
+def test_pairs_turned_by_the_rotation_of_one_point_are_those_turned_by_all(n_points, n_dims, monkeypatch):
+    rng = np.random.default_rng(4)
+    d = n_points * n_dims
+    A, B = (shapes_of(np.cumsum(rng.normal(size=(3, d, 40)), axis=2)) for _ in range(2))
+    one = np.linalg.qr(rng.normal(size=(3, 3, n_dims, n_dims)))[0].astype(np.float32)
+    whole = np.zeros((3, 3, d, d), np.float32)
+    for k in range(0, d, n_dims):
+        whole[:, :, k : k + n_dims, k : k + n_dims] = one
+    results = []
+    for compiled in ("always", "never"):
+        monkeypatch.setenv("KINEME_COMPILED", compiled)
+        results += [pair_distances(A, B, one), pair_distances(A, B, whole)]
+    for result in results[1:]:
+        np.testing.assert_allclose(result, results[0], rtol=2e-4, atol=1e-5)
+
+
+def test_bounds_of_points_hold():
+    demos = draw_points(3, 3, seed=5)
+    like = ComparisonSpecification(points=3)
+    comparison, references = fit_comparison(like, demos, np.asarray(demos.labels))
+    how = comparison.specification
+    rows = feature_rows(demos, how)[: len(how.by_rows)]
+    reduced = reduce_features(fit_bases(rows, 9, 4), rows, 9)
+    similarity = comparison.similarity
+    bounds = log_bounds(similarity, reduced, reduced)
+    by_rows = similarity.by_rows(len(rows))
+    squares = similarity.squared_distances(references.described, references.described)[: len(rows)]
+    exact = by_rows.logs_at(squares)
+    assert (bounds >= np.log(np.mean(np.exp(exact), axis=0)) - 1e-4).all()
+
+
+def test_names_of_columns_tell_the_points():
+    def channels(*names):
+        return tuple(Channel(name, "position", (name,)) for name in names)
+
+    assert count_points(channels(*HANDS)) == 2
+    assert count_points(channels("Wrist.X", "Wrist.Y", "Elbow.X", "Elbow.Y", "Tip.X", "Tip.Y")) == 3
+    assert count_points(channels("x1", "y1", "x2", "y2")) in (1, 2)  # numbers may be counted, or not be names
+    assert count_points(channels("x", "y", "z")) == 1
+    assert count_points(None) == 1
+    sensors = [f"{kind}_{axis}" for kind in ("acc", "gyro") for axis in "xyz"]
+    assert count_points(channels(*sensors)) == 1
+    assert count_points(channels(*HANDS[:4], HANDS[5], HANDS[4])) == 1
+    assert count_points(channels(*[f"joint{k}" for k in range(6)])) == 1
+
+
+def test_hands_with_names_turn_as_one_without_an_option(tmp_path):
+    """In a recognizer and in a library: turned about the vertical by up to 60 degrees, all are recognized."""
+    demos = draw_points(2, 3, seed=6, each=4)
+    rng = np.random.default_rng(7)
+
+    def written(movements, folder):
+        folder.mkdir()
+        for i, movement in enumerate(movements):
+            R = Rotation.from_rotvec([0, 0, rng.uniform(-np.pi / 3, np.pi / 3)]).as_matrix()
+            x = (movement.positions.reshape(-1, 2, 3) @ R.T).reshape(-1, 6)
+            table = np.column_stack((movement.times, x))
+            np.savetxt(folder / f"{i:02d}.csv", table, delimiter=",", header=",".join(["time", *HANDS]), comments="")
+        return kineme.read_recordings(folder).demonstrations
+
+    shown, fresh = written(demos[::4], tmp_path / "shown"), written(demos, tmp_path / "fresh")
+    labels = np.asarray(demos.labels)
+    recognizer = kineme.Recognizer().fit(shown, labels[::4])
+    assert recognizer.comparison_.procrustes.n_points == 2
+    assert (recognizer.predict(fresh) == labels).mean() >= 0.95
+    with kineme.ActionLibrary(tmp_path / "actions", create=True) as library:
+        library.learn(shown, labels[::4])
+    with kineme.ActionLibrary(tmp_path / "actions") as library:
+        answers = library.recognize(fresh)
+    for answer, expected in zip(answers, recognizer.recognize(fresh), strict=True):
+        assert answer.ranked[0] == expected.ranked[0]
+        assert answer.nearest[0].similarity == pytest.approx(expected.nearest[0].similarity, abs=1e-4)
+
+
+def test_movements_turned_about_the_vertical_are_recognized():
+    demos = draw_points(2, 3, seed=8, each=3)
+    fresh = turned(demos, 2, 3, seed=9, axis=(0, 0, 1))
+    prior = RotationPrior(vertical=(0, 0, 1))
+    recognizer = kineme.Recognizer(points=2, rotation_prior=prior).fit(demos[::3])
+    assert (recognizer.predict(fresh) == np.asarray(demos.labels)).mean() >= 0.95
+
+
+def test_many_points_are_compared_by_four():
+    demos = draw_points(21, 3, seed=10)
+    recognizer = kineme.Recognizer(points=21).fit(demos)
+    described = recognizer.references_.described
+    assert described.pairs.shapes.n_dims == 12
+    assert described.n_dims == 63
+    assert (recognizer.predict(demos) == np.asarray(demos.labels)).all()
+
+
+@pytest.mark.parametrize(("points", "n_dims"), [(2, 5), (4, 6), (3, 3)])
+def test_columns_that_are_no_points_are_refused(points, n_dims):
+    demos = draw_points(1, n_dims, seed=11)
+    with pytest.raises(SpecificationError, match=rf"expected {2 * points} or {3 * points} columns, .* got {n_dims}"):
+        kineme.Recognizer(points=points).fit(demos)
