@@ -22,6 +22,7 @@ from kineme.cli.output import write
 from kineme.cli.recognize import recognize
 from kineme.cli.segment import segment
 from kineme.cli.studio import page, studio
+from kineme.cli.why import why
 from kineme.errors import KinemeError
 from kineme.reporting.text import printable, printable_lines
 from kineme.runtime.compiled import tell_when_compiling
@@ -83,6 +84,7 @@ def main() -> None:
 
 
 for command in (
-    anchor, annotate, evaluate, generate, move, inspect, learn, library, page, recognize, reproduce, segment, studio
+    anchor, annotate, evaluate, generate, move, inspect, learn, library, page, recognize, reproduce, segment, studio,
+    why,
 ):  # fmt: skip
     main.add_command(command)

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kineme.errors import SpecificationError
 from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
 from kineme.movements.trajectories.labels import Label
 from kineme.movements.trajectories.trajectory import MovementLike, MovementsLike, Trajectory
+from kineme.recognition import explanation
 from kineme.recognition.classifiers import Classifier, NearestEach, fit_classifier
 from kineme.recognition.conformal import GUESSES, RULES, Calibration, calibrate, check_error_rate, class_probabilities
 from kineme.reporting.table import Table, data_frame, to_html
@@ -110,6 +112,7 @@ class Answer:
     nearest: tuple[Neighbor, ...]
     transform: Transform
     responsibilities: Mapping[str, float]
+    _rests_on: explanation.Compared | None = field(default=None, repr=False)
 
     @property
     def promise(self) -> str:
@@ -202,6 +205,26 @@ class Answer:
         row |= {"similarity": nearest.similarity, "angle": self.transform.angle}
         row["duration_ratio"] = self.transform.duration_ratio
         return data_frame({name: [value] for name, value in row.items()})
+
+    def explain(self) -> explanation.Explanation:
+        """Explain the answer: the movement over its nearest example, where they differ, and the runner-up.
+
+        ``answer.explain().plot()`` draws it, and ``answer.explain().in_words`` says it in a sentence.
+
+        Raises
+        ------
+        SpecificationError
+            An answer that was sent to another process: it leaves the movements behind.
+        """
+        if self._rests_on is None:
+            raise SpecificationError(
+                "expected an answer as it was given, got one that was sent to another process without its movements; "
+                "recognize the movement again and explain that answer"
+            )
+        return explanation.explain(self._rests_on, self.in_words, dict(self.responsibilities))
+
+    def __getstate__(self) -> dict[str, Any]:
+        return vars(self) | {"_rests_on": None}
 
     def plot(self, movement: MovementLike | None = None, demonstrations: MovementsLike | None = None) -> Figure:
         """Draw the probabilities of the first ten classes, and the share of each representation in the similarity.
@@ -302,6 +325,7 @@ class Verdict(NamedTuple):
     nearest: tuple[Neighbor, ...]
     responsibilities: Mapping[str, float]
     shares: Array
+    examples: tuple[tuple[Label, int, float], ...]  # of `explanation.Compared`
 
 
 def verdicts_of(
@@ -326,6 +350,15 @@ def verdicts_of(
     is_known = np.array([label is not None for label in labels])
     similar = compared.nearest_each if isinstance(classifier, NearestEach) else compared.nearest
     probabilities = class_probabilities(similar, calibration.exponent)
+    others = [next((c for c in ranks[i, :2].tolist() if c != shown[i]), None) for i in range(len(labels))]
+    near = [
+        [
+            (classes[c], _nearest(references, compared.log_average[i], slices[c])[0])
+            for c in (shown[i], others[i])
+            if c is not None
+        ]
+        for i in range(len(labels))
+    ]
     confidence = np.where(is_known, probabilities[np.arange(len(shown)), shown], 1.0 - p_known).tolist()
     return [
         Verdict(
@@ -340,6 +373,7 @@ def verdicts_of(
             like[i],
             _by_name(names, share[:, i]),
             share[:, i],
+            tuple((label, neighbor.index, neighbor.similarity) for label, neighbor in near[i]),
         )
         for i in range(len(labels))
     ]
@@ -356,10 +390,13 @@ def with_transforms(
     example = np.array([verdict.nearest[0].index for verdict in verdicts], dtype=np.intp)
     share = np.stack([verdict.shares for verdict in verdicts], axis=1)
     transforms = map_onto(comparison, references, example, demos, paths, share)
-    parts = [verdict._asdict() for verdict in verdicts]
-    for fields in parts:
+    given = []
+    for i, (verdict, transform) in enumerate(zip(verdicts, transforms, strict=True)):
+        fields = verdict._asdict()
         del fields["shares"]
-    return [Answer(**fields, transform=each) for fields, each in zip(parts, transforms, strict=True)]
+        rests_on = explanation.Compared(comparison, references, demos[i : i + 1], fields.pop("examples"))
+        given.append(Answer(**fields, transform=transform, _rests_on=rests_on))
+    return given
 
 
 def _by_name(names: Sequence[str], share: Array) -> dict[str, float]:

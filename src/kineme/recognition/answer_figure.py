@@ -7,6 +7,8 @@ from typing import Any, NamedTuple
 
 import matplotlib
 import numpy as np
+from matplotlib.collections import LineCollection
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from kineme.errors import SpecificationError
@@ -15,8 +17,10 @@ from kineme.movements.trajectories.figure import draw_movements_beside
 from kineme.movements.trajectories.labels import Label
 from kineme.movements.trajectories.movements import Samples
 from kineme.movements.trajectories.trajectory import MovementLike, MovementsLike
+from kineme.recognition.explanation import Explanation, Overlay
 from kineme.reporting.figures import BLUE, GRAY, figure_to_show
 from kineme.reporting.text import drawable, shortened
+from kineme.validation import Array
 
 _CLASSES = 10  # that are drawn, best first
 _NAME = 28  # letters of a name beside its bar
@@ -96,3 +100,60 @@ def _beside(example: Example, movement: Demonstrations, demonstrations: Demonstr
     names = np.array(["movement", f"{shortened(str(shown), _NAME)}, mapped onto it"], dtype=object)
     times, axes = np.concatenate((movement.times, times)), movement._samples.axis_names
     return Samples(times, offsets, positions, axes, positions, axes, names)
+
+
+def draw_explanation(explained: Explanation) -> Figure:
+    """Draw a panel for the nearest example and one for the runner-up; see `Explanation.plot`."""
+    overlays = [explained.nearest] + ([] if explained.runner_up is None else [explained.runner_up])
+    highest = max(float(overlay.differences.max()) for overlay in overlays)
+    with matplotlib.rc_context():
+        figure = figure_to_show(4.0 * len(overlays) + 0.6, 4.2)
+        panels = figure.subplots(1, len(overlays), squeeze=False)[0]
+        axes, names = _drawing_axes(explained.path)
+        for panel, overlay, role in zip(panels, overlays, ("nearest", "next"), strict=False):
+            colored = _draw_overlay(panel, explained.path, overlay, axes, max(highest, 1e-9))
+            panel.set_title(drawable(shortened(f"{role}: {overlay.label}, {overlay.similarity:.2f} alike", 40)))
+            panel.set(xlabel=names[0], ylabel=names[1])
+        panels[0].plot([], [], color=GRAY, linewidth=4, alpha=0.45, label="example, laid over it")
+        panels[0].plot([], [], "o", color=BLUE, markersize=5, label="start of the movement")
+        panels[0].legend(loc="best")
+        figure.colorbar(colored, ax=list(panels), label="distance from it, in sizes of the movement", shrink=0.8)
+        figure.suptitle(drawable(shortened(explained.answer, 60)))
+    return figure
+
+
+def _drawing_axes(path: Array) -> tuple[Array | None, tuple[str, str]]:
+    """Return the two directions that a path (T, d) is drawn along, with their names; None for its columns over time."""
+    d = path.shape[1]
+    if d == 2:
+        return np.eye(2), ("x", "y")
+    if d == 3:
+        return np.linalg.svd(path - path.mean(axis=0), full_matrices=False)[2][:2], (
+            "widest direction",
+            "second widest",
+        )
+    return None, ("share of the path", "coordinates")
+
+
+def _draw_overlay(panel: Any, path: Array, overlay: Overlay, axes: Array | None, highest: float) -> Any:
+    """Draw the example in gray and the movement over it, colored by their distance; return what has the colors."""
+    if axes is None:
+        share = np.linspace(0.0, 1.0, len(path))
+        curves = [
+            (np.column_stack((share, x)), np.column_stack((share, y)))
+            for x, y in zip(path.T, overlay.path.T, strict=True)
+        ]
+    else:
+        curves = [(path @ axes.T, overlay.path @ axes.T)]
+    for _, example in curves:
+        panel.plot(*example.T, color=GRAY, linewidth=4, alpha=0.45, solid_capstyle="round")
+    for movement, _ in curves:
+        pieces = np.stack((movement[:-1], movement[1:]), axis=1)
+        between = 0.5 * (overlay.differences[:-1] + overlay.differences[1:])
+        colored = LineCollection(list(pieces), array=between, cmap="plasma", norm=Normalize(0.0, highest), linewidth=2)
+        panel.add_collection(colored)
+        panel.plot(*movement[0], "o", color=BLUE, markersize=5)
+    panel.autoscale_view()
+    if axes is not None:
+        panel.set_aspect("equal", adjustable="datalim")
+    return colored

@@ -106,7 +106,8 @@ class TwoStageSearch:
             verdict = verdicts_of(compared, Nearest(), self.calibration.select(np.unique(owners)), error_rate)[0]
             rows = self.stored.members[chosen]
             near = tuple(replace(other, index=int(rows[other.index])) for other in verdict.nearest)
-            verdicts.append(verdict._replace(nearest=near))
+            examples = tuple((label, int(rows[index]), similarity) for label, index, similarity in verdict.examples)
+            verdicts.append(verdict._replace(nearest=near, examples=examples))
         return verdicts
 
     def reduced(self, described: Described) -> tuple[ReducedFeatures, ...]:

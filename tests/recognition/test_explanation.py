@@ -1,0 +1,95 @@
+"""Explanations of answers: the movement over its nearest example, where they differ, and the runner-up."""
+
+from __future__ import annotations
+
+import json
+import pickle
+
+import numpy as np
+import pytest
+
+import kineme
+from kineme.errors import SpecificationError
+
+
+@pytest.fixture(scope="module")
+def shapes():
+    demos = kineme.load_lasa()
+    labels = np.asarray(demos.labels).astype(str)
+    chosen = np.isin(labels, ["CShape", "Angle", "Zshape"])
+    return demos[chosen], labels[chosen]
+
+
+def test_a_movement_that_is_its_example_differs_nowhere(shapes):
+    demos, labels = shapes
+    recognizer = kineme.Recognizer().fit(demos, labels)
+    moved = kineme.Demonstrations.from_arrays([3.0 * demos[0].positions + [5.0, -2.0]], times=[demos[0].times])
+    explained = recognizer.recognize(moved)[0].explain()
+    assert explained.nearest.label == labels[0]
+    assert explained.nearest.differences.max() < 1e-6
+    np.testing.assert_allclose(explained.nearest.path, explained.path, atol=1e-5 * np.ptp(explained.path))
+    assert f"the same as an example of {labels[0]}" in explained.in_words
+
+
+def test_where_a_movement_leaves_its_example_is_said(shapes):
+    """A bump of a third of the size at three fifths of the path."""
+    demos, labels = shapes
+    recognizer = kineme.Recognizer().fit(demos, labels)
+    demo = demos[0]
+    u = np.linspace(0, 1, len(demo.times))
+    size = np.sqrt(demo.positions.var(axis=0).sum())
+    bump = 0.5 * size * np.exp(-0.5 * ((u - 0.6) / 0.04) ** 2)
+    bent = demo.positions + bump[:, None] * [0.0, 1.0]
+    explained = recognizer.recognize(kineme.Trajectory(demo.times, bent)).explain()
+    first, last = explained.nearest.where
+    assert first > 0.3
+    assert last < 0.95
+    assert explained.nearest.differences.max() > 0.2
+    assert f"{100 * first:.0f} to {100 * last:.0f} % of the path" in explained.in_words
+
+
+def test_the_runner_up_is_the_next_class_and_less_alike(shapes):
+    demos, labels = shapes
+    answer = kineme.Recognizer().fit(demos[::2], labels[::2]).recognize(demos[1])
+    explained = answer.explain()
+    assert explained.runner_up.label == answer.ranked[1]
+    assert explained.nearest.similarity == answer.nearest[0].similarity > explained.runner_up.similarity
+    data = json.loads(json.dumps(explained.to_dict()))
+    assert data["nearest"]["label"] == answer.ranked[0]
+    assert len(data["runner_up"]["differences"]) == len(data["path"]) == 100
+
+
+def test_of_one_class_there_is_no_runner_up(shapes):
+    demos, labels = shapes
+    own = labels == "Angle"
+    explained = kineme.Recognizer().fit(demos[own], labels[own]).recognize(demos[own][0]).explain()
+    assert explained.runner_up is None
+    assert len(explained.plot().axes) == 2
+
+
+@pytest.mark.parametrize("n_dims", [1, 2, 3, 6])
+def test_every_number_of_dimensions_is_drawn(make_movement, n_dims):
+    arrays = [make_movement(seed, n_dims)[1] for seed in (0, 1, 0, 1)]
+    recognizer = kineme.Recognizer().fit(arrays[:2], ["a", "b"])
+    figure = recognizer.recognize(arrays[2]).explain().plot()
+    assert [axes.get_title().split(",")[0] for axes in figure.axes[:2]] == ["nearest: a", "next: b"]
+
+
+def test_an_answer_from_another_process_says_what_it_lacks(shapes):
+    demos, labels = shapes
+    answer = pickle.loads(pickle.dumps(kineme.Recognizer().fit(demos, labels).recognize(demos[0])))
+    assert answer.label == labels[0]
+    with pytest.raises(SpecificationError, match="without its movements; recognize the movement again"):
+        answer.explain()
+
+
+def test_a_large_library_explains_too(shapes, tmp_path, monkeypatch):
+    from kineme.library import recognize
+
+    demos, labels = shapes
+    monkeypatch.setattr(recognize, "EXHAUSTIVE", 10)
+    with kineme.ActionLibrary(tmp_path / "actions", create=True) as library:
+        library.learn(demos, labels)
+        explained = library.recognize(demos[3:4])[0].explain()
+    assert explained.nearest.label == labels[3]
+    assert explained.nearest.differences.max() < 1e-3
