@@ -19,6 +19,7 @@ from kineme.movements.trajectories.trajectory import MovementLike, MovementsLike
 from kineme.recognition import explanation
 from kineme.recognition.classifiers import Classifier, NearestEach, fit_classifier
 from kineme.recognition.conformal import GUESSES, RULES, Calibration, calibrate, check_error_rate, class_probabilities
+from kineme.recognition.convolutions import Convolutions
 from kineme.reporting.table import Table, data_frame, to_html
 from kineme.runtime.parallel import single_threaded_blas
 from kineme.similarity.comparison import Comparison, IndexedMovements, References, fit_comparison, fit_to_references
@@ -348,8 +349,11 @@ def verdicts_of(
     share = compared.shares(np.array([near[0].index for near in like], dtype=np.intp))
     names = [representation.name for representation in compared.comparison.representations]
     is_known = np.array([label is not None for label in labels])
-    similar = compared.nearest_each if isinstance(classifier, NearestEach) else compared.nearest
-    probabilities = class_probabilities(similar, calibration.exponent)
+    if isinstance(classifier, Convolutions):
+        probabilities = classifier.probabilities(scores)
+    else:
+        similar = compared.nearest_each if isinstance(classifier, NearestEach) else compared.nearest
+        probabilities = class_probabilities(similar, calibration.exponent)
     others = [next((c for c in ranks[i, :2].tolist() if c != shown[i]), None) for i in range(len(labels))]
     near = [
         [

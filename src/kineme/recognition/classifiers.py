@@ -147,12 +147,19 @@ def fit_support_vectors(comparison: Comparison, references: References) -> Suppo
     return SupportVectors(similarity, model)
 
 
+def _fit_convolutions(comparison: Comparison, references: References) -> Classifier:
+    from kineme.recognition.convolutions import fit_convolutions
+
+    return fit_convolutions(comparison, references)[0]
+
+
 #: Name -> what fits the classifier.
 CLASSIFIERS: dict[str, Callable[[Comparison, References], Classifier]] = {
     "nearest": lambda comparison, references: Nearest(),
     "nearest-each": lambda comparison, references: NearestEach(),
     "prototype": fit_prototype,
     "svm": fit_support_vectors,
+    "convolutions": _fit_convolutions,
 }
 
 #: What "auto" stands for. Of gestures in space by other people, two to eight demonstrations of each class, and of bent

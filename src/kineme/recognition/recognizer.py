@@ -16,8 +16,9 @@ from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
 from kineme.movements.trajectories.trajectory import HasDemonstrations, MovementLike, MovementsLike, Trajectory
 from kineme.recognition.answer import Answer, answers, is_one, known_labels
-from kineme.recognition.classifiers import CLASSIFIERS, SupportVectors, fit_classifier
+from kineme.recognition.classifiers import CLASSIFIERS, SupportVectors
 from kineme.recognition.conformal import Calibration, calibrate, check_error_rate, check_groups, class_probabilities
+from kineme.recognition.convolutions import Convolutions, fit_best
 from kineme.runtime.compiled import load_compiled
 from kineme.similarity.comparison import Comparison, References, fit_comparison
 from kineme.similarity.describe import Described, Tile, describe
@@ -65,9 +66,11 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         Of the representations in the arithmetic mean. "own": their own; "fitted": half their own, half fitted to the
         training movements, see `kineme.similarity.similarity.fitted_weights`; "auto": "fitted" where a class has two
         movements and there are two classes, else "own".
-    classifier : {"auto", "nearest", "nearest-each", "prototype", "svm"}, default "auto"
+    classifier : {"auto", "nearest", "nearest-each", "prototype", "svm", "convolutions"}, default "auto"
         "nearest" stored movement, "nearest-each", where each representation has its own nearest stored movement of a
-        class, nearest class "prototype" (its medoid), or an "svm" on the averaged kernel. "auto" is "nearest-each".
+        class, nearest class "prototype" (its medoid), an "svm" on the averaged kernel, or a ridge regression on random
+        "convolutions" of the path. "auto" is "nearest-each", or from eight demonstrations of each class on
+        "convolutions" where these recognize more of them when they are left out.
     rotation_prior : RotationPrior or None
         How rare rotations between movements of one class are, in two and three dimensions, where there is no
         `max_angle`: one or the other can be given. By default a rotation by a right angle costs 0.06 of the inner
@@ -173,7 +176,8 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         order = np.argsort(labels, kind="stable")
         numbers = None if groups is None else check_groups(groups, len(demos))[order]
         comparison, references = fit_comparison(specification, demos, labels, self.weights)
-        classifier = fit_classifier(self.classifier, comparison, references)
+        fit = fit_best if self.classifier == "auto" else CLASSIFIERS[self.classifier]
+        classifier = fit(comparison, references)
         # All at once: where a fit is refused, what was fitted before goes on as it was.
         self.comparison_, self.references_, self.classifier_ = comparison, references, classifier
         self._groups: NDArray[np.intp] | None = numbers
@@ -255,6 +259,8 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         a known class at all is what `recognize` tells.
         """
         scores = self._scores(X)
+        if isinstance(self.classifier_, Convolutions):
+            return self.classifier_.probabilities(scores)
         if isinstance(self.classifier_, SupportVectors):
             shares = np.exp(scores - scores.max(axis=1, keepdims=True))
             return np.asarray(shares / shares.sum(axis=1, keepdims=True))

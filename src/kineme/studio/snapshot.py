@@ -205,8 +205,8 @@ def _classifier(classifier: Classifier) -> dict[str, Any]:
         if isinstance(classifier, kind):
             return {"classifier": name}
     raise SpecificationError(
-        "expected the classifier to be one of auto, nearest-each, nearest and prototype, got svm, which the page does "
-        f"not have; {_AGAIN}"
+        "expected the classifier to be one of auto, nearest-each, nearest and prototype, got svm or convolutions, "
+        f"which the page does not have; {_AGAIN}"
     )
 
 

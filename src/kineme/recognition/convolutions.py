@@ -1,0 +1,205 @@
+"""Linear classifier on random convolutions of movements, where many demonstrations of each class are there.
+
+Source: A. Dempster, D. Schmidt, G. Webb, "MiniRocket: a very fast (almost) deterministic transform for time series
+classification", KDD 2021: 84 kernels of length 9, dilated, each with several thresholds; the features are shares of
+samples above them. Here the series are midpoints and tangents of the detailed segments, 66 of each movement.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.errors import SpecificationError
+from kineme.recognition.classifiers import Classifier, NearestEach
+from kineme.sampling import evenly_spaced
+from kineme.similarity.comparison import Comparison, References
+from kineme.similarity.describe import Described
+from kineme.similarity.scores import Compared
+from kineme.similarity.specification import LOG_MEANS
+from kineme.validation import Array
+
+#: Fewest demonstrations of each class with which the classifier is considered, and most in all.
+FEWEST, MOST = 8, 1000
+_COMPARED = 500  # demonstrations by which the kernels are judged, at most
+#: Share of demonstrations left out that the kernels recognize from which on nothing else is tried, and by how much
+#: more the convolutions must recognize: on five of seven sets of people's movements the kernels are ahead.
+_ENOUGH, _AHEAD = 0.97, 0.01
+_LENGTH, _HEAVY = 9, 3  # of a kernel, of which so many weights are 2 and the others -1
+_FEATURES = 2000
+_AT_ONCE = 64  # movements transformed together
+_GOLDEN = (np.sqrt(5) + 1) / 2
+_ALPHAS = np.logspace(-1, 5, 13)
+_SHARPNESS = np.logspace(-1, 2, 61)  # of the softmax of scores, of which the most likely is taken
+
+Single = NDArray[np.float32]
+
+
+class Kernels(NamedTuple):
+    """Random convolutions: for each dilation which channels a kernel adds up, and its thresholds."""
+
+    dilations: tuple[int, ...]
+    channels: tuple[Single, ...]  # (84, c) of each dilation, 0 or 1
+    thresholds: tuple[Single, ...]  # (84, b) of each dilation
+
+
+def _weights() -> Single:
+    """Return the 84 kernels (84, 9): three weights of 2, six of -1, so that a constant has no effect."""
+    weights = -np.ones((84, _LENGTH), np.float32)
+    for row, heavy in zip(weights, combinations(range(_LENGTH), _HEAVY), strict=True):
+        row[list(heavy)] = 2.0
+    return weights
+
+
+def series_of(described: Described) -> Single:
+    """Return series (n, 2 d, 66) of movements that are described in detail: midpoints and tangents of segments."""
+    assert described.pairs is not None
+    assert described.pairs.details is not None
+    shapes = described.pairs.details
+    return np.concatenate((shapes.midpoints, shapes.tangents), axis=2).transpose(0, 2, 1)
+
+
+def fit_kernels(series: Single, seed: int = 0) -> Kernels:
+    """Draw the channels of the kernels, and thresholds from quantiles of what they make of movements drawn."""
+    rng, (n, c, T) = np.random.default_rng(seed), series.shape
+    dilations = tuple(range(1, (T - 1) // (_LENGTH - 1) + 1))
+    n_thresholds = max(1, _FEATURES // (84 * len(dilations)))
+    channels, thresholds = [], []
+    for at, dilation in enumerate(dilations):
+        chosen = np.zeros((84, c), np.float32)
+        for row in chosen:
+            row[rng.permutation(c)[: int(2 ** rng.uniform(0, np.log2(min(c, _LENGTH) + 1)))]] = 1.0
+        one_each = series[rng.integers(n, size=84)]
+        own = np.einsum("kct,kc->kt", _convolved(one_each, dilation)[np.arange(84), :, np.arange(84)], chosen)
+        shares = ((at * n_thresholds * 84 + np.arange(84 * n_thresholds) + 1) * _GOLDEN % 1.0).reshape(84, -1)
+        thresholds.append(np.stack([np.quantile(row, share) for row, share in zip(own, shares, strict=True)]))
+        channels.append(chosen)
+    return Kernels(dilations, tuple(channels), tuple(each.astype(np.float32) for each in thresholds))
+
+
+def _convolved(series: Single, dilation: int) -> Single:
+    """Return all kernels (n, c, 84, T) of series (n, c, T), which are continued by zeros."""
+    T = series.shape[2]
+    reach = (_LENGTH // 2) * dilation
+    padded = np.pad(series, ((0, 0), (0, 0), (reach, reach)))
+    shifted = np.stack([padded[:, :, k * dilation : k * dilation + T] for k in range(_LENGTH)], axis=2)
+    return np.asarray(_weights() @ shifted)
+
+
+def transform(series: Single, kernels: Kernels) -> Array:
+    """Return features (n, f): shares of samples above each threshold."""
+    rows = []
+    for start in range(0, len(series), _AT_ONCE):
+        some, parts = series[start : start + _AT_ONCE], []
+        for dilation, chosen, thresholds in zip(*kernels, strict=True):
+            sums = np.einsum("nckt,kc->nkt", _convolved(some, dilation), chosen, optimize=True)
+            parts.append((sums[:, :, None] > thresholds[:, :, None]).mean(axis=3).reshape(len(some), -1))
+        rows.append(np.concatenate(parts, axis=1))
+    return np.concatenate(rows) if rows else np.empty((0, 0))
+
+
+@dataclass(frozen=True, eq=False)
+class Convolutions:
+    """A ridge regression of the classes on features of random convolutions, `transform`.
+
+    Attributes
+    ----------
+    kernels : Kernels
+    mean, scale : ndarray of shape (f,)
+        By which features are centered and divided.
+    coefficients : ndarray of shape (f, C)
+    intercept : ndarray of shape (C,)
+    sharpness : float
+        Factor of the scores in probabilities, the most likely one for demonstrations left out.
+    """
+
+    kernels: Kernels
+    mean: Array
+    scale: Array
+    coefficients: Array
+    intercept: Array
+    sharpness: float
+
+    def scores(self, compared: Compared) -> Array:
+        """Return the values of the regression, (n, C)."""
+        features = transform(series_of(compared.described), self.kernels)
+        return np.asarray((features - self.mean) / self.scale @ self.coefficients + self.intercept)
+
+    def best(self, compared: Compared) -> NDArray[np.intp]:
+        """Return the index (n,) of the class with the largest value."""
+        return self.scores(compared).argmax(axis=1)
+
+    def probabilities(self, scores: Array) -> Array:
+        """Return the probability of each class, (n, C): a softmax of the scores."""
+        logs = self.sharpness * (scores - scores.max(axis=1, keepdims=True))
+        return np.asarray(np.exp(logs) / np.exp(logs).sum(axis=1, keepdims=True))
+
+
+def fit_convolutions(comparison: Comparison, references: References) -> tuple[Convolutions, float]:
+    """Fit the classifier; return it with the share of references that it recognizes when they are left out.
+
+    The penalty is chosen by leaving out (generalized cross-validation), as `sklearn.linear_model.RidgeClassifierCV`
+    does it.
+
+    Raises `SpecificationError`: references of one class, or that are not compared in detail.
+    """
+    from sklearn.linear_model import RidgeCV
+
+    pairs = references.described.pairs
+    if pairs is None or pairs.details is None or len(references.classes) == 1:
+        raise SpecificationError(
+            "expected movements of two or more classes that are compared in detail for classifier='convolutions', got "
+            f"{len(references.classes)} class(es) in {', '.join(each.name for each in comparison.representations)}; "
+            "add movements of another class, or pass classifier='nearest-each'"
+        )
+    series = series_of(references.described)
+    kernels = fit_kernels(series)
+    features = transform(series, kernels)
+    mean, scale = features.mean(axis=0), features.std(axis=0)
+    scale = np.where(scale > 0, scale, 1.0)
+    owners = np.searchsorted(references.classes, references.labels)
+    targets = np.where(owners[:, None] == np.arange(len(references.classes)), 1.0, -1.0)
+    model: Any = RidgeCV(_ALPHAS, store_cv_results=True).fit((features - mean) / scale, targets)
+    errors = model.cv_results_[:, :, int(np.flatnonzero(model.alpha_ == _ALPHAS)[0])]
+    left_out = targets - np.sqrt(errors) * np.where(targets > 0, 1.0, -1.0)
+    fitted = Convolutions(kernels, mean, scale, model.coef_.T, model.intercept_, 1.0)
+    likely = [
+        np.log(Convolutions(kernels, mean, scale, model.coef_.T, model.intercept_, sharp).probabilities(left_out)[
+            np.arange(len(owners)), owners] + 1e-12).sum()
+        for sharp in _SHARPNESS
+    ]  # fmt: skip
+    fitted = Convolutions(
+        kernels, mean, scale, model.coef_.T, model.intercept_, float(_SHARPNESS[int(np.argmax(likely))])
+    )
+    return fitted, float((left_out.argmax(axis=1) == owners).mean())
+
+
+def fit_best(comparison: Comparison, references: References) -> Classifier:
+    """Return the convolutions where they recognize clearly more of the demonstrations left out, else the kernels.
+
+    Considered from eight demonstrations of each class on, of movements that are compared in detail and not rotated.
+    """
+    pairs, how = references.described.pairs, comparison.specification
+    able = pairs is not None and pairs.details is not None and how.upright and how.normalization.translation
+    n_classes = len(references.classes)
+    if not able or n_classes < 2 or references.counts.min() < FEWEST or len(references) > MOST:
+        return NearestEach()
+    by_kernels = _recognized_left_out(comparison, references)
+    if by_kernels >= _ENOUGH:
+        return NearestEach()
+    fitted, by_convolutions = fit_convolutions(comparison, references)
+    return fitted if by_convolutions >= by_kernels + _AHEAD else NearestEach()
+
+
+def _recognized_left_out(comparison: Comparison, references: References) -> float:
+    """Return the share of references that the kernels recognize by the others."""
+    chosen = evenly_spaced(len(references), _COMPARED)
+    logs = comparison.similarity.logs(references.described.take(chosen), references.described)
+    logs[:, np.arange(len(chosen)), chosen] = -np.inf
+    scores = LOG_MEANS[comparison.mean](np.maximum.reduceat(logs, references.first, axis=2))
+    owners = np.searchsorted(references.first, chosen, side="right") - 1
+    return float((scores.argmax(axis=1) == owners).mean())

@@ -1,0 +1,92 @@
+"""Random convolutions: features, the classifier on them, and when it joins without being asked."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import kineme
+from kineme.errors import SpecificationError
+from kineme.recognition.classifiers import NearestEach
+from kineme.recognition.convolutions import Convolutions, _weights, fit_kernels, transform
+from kineme.similarity.specification import ROW_REPRESENTATIONS
+from kineme.studio.snapshot import snapshot_of_recognizer
+
+
+def draw_trembles(each, seed, n_classes=3):
+    """A path drawn at random each time, with a tremble at a random place whose frequency tells the class."""
+    rng = np.random.default_rng(seed)
+    u = np.linspace(0, 1, 150)
+    arrays, labels = [], []
+    for label in range(n_classes):
+        for _ in range(each):
+            waves = rng.normal(size=(3, 2)) / np.arange(1, 4)[:, None]
+            path = np.sin(np.pi * np.arange(1, 4) * u[:, None]) @ waves + u[:, None] * rng.normal(size=2)
+            place = np.exp(-0.5 * ((u - rng.uniform(0.3, 0.7)) / 0.12) ** 2)
+            tremble = 0.2 * place * np.sin(2 * np.pi * (4, 9, 16)[label] * u + rng.uniform(0, 6))
+            arrays.append(path + tremble[:, None] * [1.0, -1.0])
+            labels.append(str(label))
+    return kineme.Demonstrations.from_arrays(arrays, labels)
+
+
+def test_kernels_do_not_see_a_constant_and_are_all_different():
+    weights = _weights()
+    assert weights.shape == (84, 9)
+    np.testing.assert_array_equal(weights.sum(axis=1), 0)
+    assert len({tuple(row) for row in weights.tolist()}) == 84
+
+
+def test_features_are_shares_and_those_of_each_movement_alone():
+    series = np.random.default_rng(0).normal(size=(130, 4, 66)).astype(np.float32)
+    kernels = fit_kernels(series)
+    features = transform(series, kernels)
+    assert features.shape[1] >= 1000
+    assert features.min() >= 0
+    assert features.max() <= 1
+    for i in (0, 63, 64, 129):
+        np.testing.assert_allclose(transform(series[i : i + 1], kernels)[0], features[i], atol=1e-6)
+
+
+def test_they_join_where_they_recognize_more_of_what_is_left_out():
+    """The place of a tremble says nothing and its frequency all: no path is near another of its class."""
+    shown, fresh = draw_trembles(16, seed=1), draw_trembles(20, seed=2)
+    recognizer = kineme.Recognizer().fit(shown)
+    assert isinstance(recognizer.classifier_, Convolutions)
+    labels = np.asarray(fresh.labels)
+    kernels = kineme.Recognizer(classifier="nearest-each").fit(shown)
+    assert recognizer.score(fresh) >= kernels.score(fresh) + 0.1
+    shares = recognizer.predict_proba(fresh)
+    np.testing.assert_allclose(shares.sum(axis=1), 1)
+    np.testing.assert_array_equal(recognizer.classes_[shares.argmax(axis=1)], recognizer.predict(fresh))
+    answers = recognizer.recognize(fresh)
+    assert [answer.ranked[0] for answer in answers] == recognizer.predict(fresh).tolist()
+    assert answers[0].probabilities[answers[0].ranked[0]] == pytest.approx(shares[0].max())
+    assert (recognizer.predict(fresh) == labels).mean() == recognizer.score(fresh)
+
+
+def test_with_few_demonstrations_or_where_kernels_suffice_they_do_not():
+    assert isinstance(kineme.Recognizer().fit(draw_trembles(7, seed=3)).classifier_, NearestEach)
+    demos = kineme.load_lasa(["CShape", "NShape"])
+    twice = kineme.Demonstrations.from_arrays(
+        [demo.positions for demo in demos] + [1.1 * demo.positions for demo in demos], [*demos.labels, *demos.labels]
+    )
+    assert isinstance(kineme.Recognizer().fit(twice).classifier_, NearestEach)
+
+
+@pytest.mark.parametrize("options", [{"max_angle": 1.0}, {"translation": False}, {"scale": "none"}])
+def test_where_rotations_or_places_are_said_they_do_not(options):
+    assert isinstance(kineme.Recognizer(**options).fit(draw_trembles(8, seed=4)).classifier_, NearestEach)
+
+
+def test_they_can_be_asked_for():
+    shown = draw_trembles(4, seed=5)
+    recognizer = kineme.Recognizer(classifier="convolutions").fit(shown)
+    assert isinstance(recognizer.classifier_, Convolutions)
+    assert recognizer.score(shown) == 1
+    with pytest.raises(SpecificationError, match="got svm or convolutions, which the page does not have"):
+        snapshot_of_recognizer(recognizer)
+    one_class = shown[:4]
+    with pytest.raises(SpecificationError, match="expected movements of two or more classes"):
+        kineme.Recognizer(classifier="convolutions").fit(one_class)
+    with pytest.raises(SpecificationError, match="compared in detail"):
+        kineme.Recognizer(ROW_REPRESENTATIONS, classifier="convolutions").fit(shown)
