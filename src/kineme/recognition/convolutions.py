@@ -15,20 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
-from kineme.recognition.classifiers import Classifier, NearestEach
-from kineme.sampling import evenly_spaced
 from kineme.similarity.comparison import Comparison, References
 from kineme.similarity.describe import Described
 from kineme.similarity.scores import Compared
-from kineme.similarity.specification import LOG_MEANS
 from kineme.validation import Array
 
-#: Fewest demonstrations of each class with which the classifier is considered, and most in all.
-FEWEST, MOST = 8, 1000
-_COMPARED = 500  # demonstrations by which the kernels are judged, at most
-#: Share of demonstrations left out that the kernels recognize from which on nothing else is tried, and by how much
-#: more the convolutions must recognize: on five of seven sets of people's movements the kernels are ahead.
-_ENOUGH, _AHEAD = 0.97, 0.01
 _LENGTH, _HEAVY = 9, 3  # of a kernel, of which so many weights are 2 and the others -1
 _FEATURES = 2000
 _AT_ONCE = 64  # movements transformed together
@@ -176,30 +167,3 @@ def fit_convolutions(comparison: Comparison, references: References) -> tuple[Co
         kernels, mean, scale, model.coef_.T, model.intercept_, float(_SHARPNESS[int(np.argmax(likely))])
     )
     return fitted, float((left_out.argmax(axis=1) == owners).mean())
-
-
-def fit_best(comparison: Comparison, references: References) -> Classifier:
-    """Return the convolutions where they recognize clearly more of the demonstrations left out, else the kernels.
-
-    Considered from eight demonstrations of each class on, of movements that are compared in detail and not rotated.
-    """
-    pairs, how = references.described.pairs, comparison.specification
-    able = pairs is not None and pairs.details is not None and how.upright and how.normalization.translation
-    n_classes = len(references.classes)
-    if not able or n_classes < 2 or references.counts.min() < FEWEST or len(references) > MOST:
-        return NearestEach()
-    by_kernels = _recognized_left_out(comparison, references)
-    if by_kernels >= _ENOUGH:
-        return NearestEach()
-    fitted, by_convolutions = fit_convolutions(comparison, references)
-    return fitted if by_convolutions >= by_kernels + _AHEAD else NearestEach()
-
-
-def _recognized_left_out(comparison: Comparison, references: References) -> float:
-    """Return the share of references that the kernels recognize by the others."""
-    chosen = evenly_spaced(len(references), _COMPARED)
-    logs = comparison.similarity.logs(references.described.take(chosen), references.described)
-    logs[:, np.arange(len(chosen)), chosen] = -np.inf
-    scores = LOG_MEANS[comparison.mean](np.maximum.reduceat(logs, references.first, axis=2))
-    owners = np.searchsorted(references.first, chosen, side="right") - 1
-    return float((scores.argmax(axis=1) == owners).mean())

@@ -16,9 +16,9 @@ from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
 from kineme.movements.trajectories.trajectory import HasDemonstrations, MovementLike, MovementsLike, Trajectory
 from kineme.recognition.answer import Answer, answers, is_one, known_labels
-from kineme.recognition.classifiers import CLASSIFIERS, SupportVectors
+from kineme.recognition.classifiers import CLASSIFIERS, SupportVectors, fit_best
 from kineme.recognition.conformal import Calibration, calibrate, check_error_rate, check_groups, class_probabilities
-from kineme.recognition.convolutions import Convolutions, fit_best
+from kineme.recognition.convolutions import Convolutions
 from kineme.runtime.compiled import load_compiled
 from kineme.similarity.comparison import Comparison, References, fit_comparison
 from kineme.similarity.describe import Described, Tile, describe
