@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import matplotlib
@@ -17,7 +17,6 @@ from kineme.movements.trajectories.figure import draw_movements_beside
 from kineme.movements.trajectories.labels import Label
 from kineme.movements.trajectories.movements import Samples
 from kineme.movements.trajectories.trajectory import MovementLike, MovementsLike
-from kineme.recognition.explanation import Explanation, Overlay
 from kineme.reporting.figures import BLUE, GRAY, figure_to_show
 from kineme.reporting.text import drawable, shortened
 from kineme.validation import Array
@@ -102,23 +101,30 @@ def _beside(example: Example, movement: Demonstrations, demonstrations: Demonstr
     return Samples(times, offsets, positions, axes, positions, axes, names)
 
 
-def draw_explanation(explained: Explanation) -> Figure:
-    """Draw a panel for the nearest example and one for the runner-up; see `Explanation.plot`."""
-    overlays = [explained.nearest] + ([] if explained.runner_up is None else [explained.runner_up])
+class Panel(NamedTuple):
+    """An example that is laid over a movement: its path (T, d), and its distance (T,) from the movement."""
+
+    title: str
+    path: Array
+    differences: Array
+
+
+def draw_explanation(title: str, path: Array, overlays: Sequence[Panel]) -> Figure:
+    """Draw a movement (T, d) over each of the examples; see `Explanation.plot`."""
     highest = max(float(overlay.differences.max()) for overlay in overlays)
     with matplotlib.rc_context():
         figure = figure_to_show(4.0 * len(overlays) + 0.6, 4.2)
         panels = figure.subplots(1, len(overlays), squeeze=False)[0]
-        axes, names = _drawing_axes(explained.path)
-        for panel, overlay, role in zip(panels, overlays, ("nearest", "next"), strict=False):
-            colored = _draw_overlay(panel, explained.path, overlay, axes, max(highest, 1e-9))
-            panel.set_title(drawable(shortened(f"{role}: {overlay.label}, {overlay.similarity:.2f} alike", 40)))
+        axes, names = _drawing_axes(path)
+        for panel, overlay in zip(panels, overlays, strict=True):
+            colored = _draw_overlay(panel, path, overlay, axes, max(highest, 1e-9))
+            panel.set_title(drawable(shortened(overlay.title, 40)))
             panel.set(xlabel=names[0], ylabel=names[1])
         panels[0].plot([], [], color=GRAY, linewidth=4, alpha=0.45, label="example, laid over it")
         panels[0].plot([], [], "o", color=BLUE, markersize=5, label="start of the movement")
         panels[0].legend(loc="best")
         figure.colorbar(colored, ax=list(panels), label="distance from it, in sizes of the movement", shrink=0.8)
-        figure.suptitle(drawable(shortened(explained.answer, 60)))
+        figure.suptitle(drawable(shortened(title, 60)))
     return figure
 
 
@@ -135,7 +141,7 @@ def _drawing_axes(path: Array) -> tuple[Array | None, tuple[str, str]]:
     return None, ("share of the path", "coordinates")
 
 
-def _draw_overlay(panel: Any, path: Array, overlay: Overlay, axes: Array | None, highest: float) -> Any:
+def _draw_overlay(panel: Any, path: Array, overlay: Panel, axes: Array | None, highest: float) -> Any:
     """Draw the example in gray and the movement over it, colored by their distance; return what has the colors."""
     if axes is None:
         share = np.linspace(0.0, 1.0, len(path))

@@ -136,9 +136,18 @@ class Explanation:
         matplotlib.figure.Figure
             ``figure.savefig("why.png")`` writes it to a file; see `Demonstrations.plot` for ``plt.show()``.
         """
-        from kineme.recognition.answer_figure import draw_explanation
+        from kineme.recognition.answer_figure import Panel, draw_explanation
 
-        return draw_explanation(self)
+        overlays = {"nearest": self.nearest, "next": self.runner_up}
+        return draw_explanation(
+            self.answer,
+            self.path,
+            [
+                Panel(f"{role}: {overlay.label}, {overlay.similarity:.2f} alike", overlay.path, overlay.differences)
+                for role, overlay in overlays.items()
+                if overlay is not None
+            ],
+        )
 
 
 class Compared(NamedTuple):
