@@ -47,6 +47,7 @@ SUBJECTS = (
     "studio",
     "studio_in_browser",
     "by_person",
+    "strangers",
     "nested",
 )
 

@@ -19,7 +19,7 @@ from kineme.kernels.rotation import RotationPrior
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.recognition import classifiers
 from kineme.similarity import similarity as widths
-from kineme.similarity.specification import DEFAULT_REPRESENTATIONS as FIVE
+from kineme.similarity.specification import DEFAULT_REPRESENTATIONS
 from kineme.similarity.specification import POSITIONS, Representation
 from kineme_experiments.evaluation.conditions import TOGETHER
 from kineme_experiments.evaluation.data import load_data
@@ -35,7 +35,7 @@ BENT = Perturbation(rotation=math.radians(40), warp=0.8, noise=0.1)
 MANY: dict[str, tuple[float, dict[str, Any]]] = {
     "nearest of each representation": (2.0, {}),
     "the same, equal weights": (2.0, {"weights": "equal"}),
-    "the same, fitted weights": (2.0, {"weights": "fitted"}),
+    "the same, own weights": (2.0, {"weights": "own"}),
     "1-NN": (2.0, {"classifier": "nearest"}),
     "SVM, kernels of 1-NN": (1.0, {"classifier": "svm"}),
     "SVM, kernels twice as wide": (2.0, {"classifier": "svm"}),
@@ -62,14 +62,19 @@ def measure(quick: bool) -> list[Row]:
 
 def _options() -> dict[str, dict[str, Any]]:
     """Name -> parameters of `Recognizer` that differ from the defaults; "width" is a share of the typical distance."""
-    own = np.array([one.weight for one in FIVE])
-    names = {one: one.name.replace("forcing", "f") for one in FIVE}
+    own = np.array([one.weight for one in DEFAULT_REPRESENTATIONS])
+    names = {one: one.name.replace("forcing", "f") for one in DEFAULT_REPRESENTATIONS}
     options: dict[str, dict[str, Any]] = {}
-    for r, one in enumerate(FIVE):
-        alone = np.arange(len(FIVE)) == r
+    for r, one in enumerate(DEFAULT_REPRESENTATIONS):
+        alone = np.arange(len(DEFAULT_REPRESENTATIONS)) == r
         options[f"{names[one]} alone"] = {"weights": tuple(own * alone)}
         options[f"without {names[one]}"] = {"weights": tuple(own * ~alone)}
-    options["with f over arc length"] = {"representations": (POSITIONS, Representation("forcing", 1.0), *FIVE[1:])}
+    options["with f over arc length"] = {
+        "representations": (POSITIONS, Representation("forcing", 1.0), *DEFAULT_REPRESENTATIONS[1:])
+    }
+    coarse = np.array([not one.detailed for one in DEFAULT_REPRESENTATIONS])
+    options["without detail"] = {"weights": tuple(own * coarse)}
+    options["detail at the weight of the others"] = {"weights": tuple(np.where(coarse, own, 2.0))}
     options["equal weights"] = {"weights": "equal"}
     options |= {mean: {"mean": mean} for mean in ("geometric", "harmonic", "min", "quadratic")}
     options |= {f"{width} of it": {"width": width} for width in (0.25, 0.6)}

@@ -25,7 +25,8 @@ from kineme.similarity.similarity import SHARE
 from kineme.similarity.specification import DEFAULT_REPRESENTATIONS, ComparisonSpecification
 
 OWN = tuple(one.weight for one in DEFAULT_REPRESENTATIONS)
-WEIGHTS = (OWN, (1.0,) * 5, (1.0, 1.0, 2.0, 1.0, 2.0), (2.0, 1.0, 1.0, 1.0, 1.0))
+COARSE = OWN[:5]
+WEIGHTS = (OWN, (1.0,) * 7, (*COARSE, 0.0, 0.0), (*COARSE, 2.0, 2.0), (*COARSE, 12.0, 12.0))
 SHARES = (0.3, SHARE, 0.5)
 CONCENTRATIONS = ((0.03, 0.03), (CONCENTRATION[2], CONCENTRATION[3]), (0.1, 0.1))
 BANDS = (3, ElasticSpec().band, 12)
