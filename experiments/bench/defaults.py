@@ -19,8 +19,7 @@ from kineme.kernels.rotation import RotationPrior
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.recognition import classifiers
 from kineme.similarity import similarity as widths
-from kineme.similarity.specification import DEFAULT_REPRESENTATIONS
-from kineme.similarity.specification import POSITIONS, Representation
+from kineme.similarity.specification import DEFAULT_REPRESENTATIONS, POSITIONS, Representation
 from kineme_experiments.evaluation.conditions import TOGETHER
 from kineme_experiments.evaluation.data import load_data
 from kineme_experiments.evaluation.splits import few_shot

@@ -75,12 +75,14 @@ def two_hands(digits: Recorded, each: int = 6) -> Recorded:
                     digits.demos[int(rng.choice(np.flatnonzero((digits.people == person) & (digits.labels == of))))]
                     for of in (kind, kinds[(3 * k + 1) % len(kinds)])
                 ]
+                shares = [(hand.times - hand.times[0]) / np.ptp(hand.times) for hand in pair]
                 hands = [
-                    np.stack([np.interp(u, (one.times - one.times[0]) / np.ptp(one.times), x) for x in one.positions.T], 1)
-                    for one in pair
-                ]  # fmt: skip
+                    np.stack([np.interp(u, share, x) for x in hand.positions.T], axis=1)
+                    for share, hand in zip(shares, pair, strict=True)
+                ]
                 turn = Rotation.from_rotvec([0, rng.uniform(-np.pi / 3, np.pi / 3), 0]).as_matrix()
-                arrays.append(np.hstack([(hand + [0.4 * h, 0, 0]) @ turn.T for h, hand in enumerate(hands)]))
+                shift = np.array([0.4, 0.0, 0.0])
+                arrays.append(np.hstack([(x + h * shift) @ turn.T for h, x in enumerate(hands)]))
                 labels.append(kind)
                 people.append(person)
     demos = kineme.Demonstrations.from_arrays(arrays, labels, [2.0 * u] * len(arrays))
