@@ -180,6 +180,13 @@ def test_many_points_are_compared_by_four():
     assert (recognizer.predict(demos) == np.asarray(demos.labels)).all()
 
 
+def test_many_columns_that_are_no_points_are_compared_by_twelve():
+    demos = draw_points(21, 3, seed=12)
+    recognizer = kineme.Recognizer(points=1).fit(demos)
+    assert recognizer.references_.described.pairs.shapes.n_dims == 12
+    assert (recognizer.predict(demos) == np.asarray(demos.labels)).all()
+
+
 @pytest.mark.parametrize(("points", "n_dims"), [(2, 5), (4, 6), (3, 3)])
 def test_columns_that_are_no_points_are_refused(points, n_dims):
     demos = draw_points(1, n_dims, seed=11)

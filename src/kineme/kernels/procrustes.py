@@ -73,7 +73,8 @@ class Procrustes:
     max_angle: float = math.pi / 3
     prior: RotationPrior | None = None  # instead of a limit, with ``max_angle=pi``, in two and three dimensions
     n_points: int = 1  # J, points in the plane or in space
-    #: Weights (q, J) by which points are added up to the q that are compared pair by pair; all J as they are if None.
+    #: Weights (q, J) by which points, or the columns of what is no points, are added up to the q that are compared pair
+    #: by pair; all as they are if None.
     mixing: tuple[tuple[float, ...], ...] | None = None
 
     def __post_init__(self) -> None:
@@ -117,7 +118,7 @@ class Procrustes:
         if self.mixing is None:
             return paths
         n, samples = len(paths), paths.shape[2]
-        points = paths.reshape(n, self.n_points, self.n_dims, samples)
+        points = paths.reshape(n, len(self.mixing[0]), -1, samples)
         mixture = np.einsum("qj,njds->nqds", np.array(self.mixing, dtype=paths.dtype), points)
         sizes = np.sqrt((mixture**2).sum(axis=(1, 2)).mean(axis=1))
         return np.asarray(mixture.reshape(n, -1, samples) / np.where(sizes > 0, sizes, 1.0)[:, None, None])

@@ -37,7 +37,7 @@ from kineme.validation import Array
 _TILE_PAIRS = 100_000  # at a time: a pair's rotation in space has nine numbers
 
 _TILE_SAMPLES = 200_000  # numbers in one tile of paths: with smaller ones, threads wait for each other
-_MOST_MIXED = 4  # points that are compared pair by pair
+_MOST_MIXED = 4  # points that are compared pair by pair; of columns that are no points, three times as many
 _MIXED_FROM = 500  # movements that tell which
 N_POINTS = 199  # even samples from which the phases are computed; every second one is one of 100
 
@@ -118,14 +118,17 @@ def with_mixing(procrustes: Procrustes, paths: NDArray[Any]) -> Procrustes:
     """Return the distance with the points that are compared pair by pair: of many, the principal ones.
 
     These are the q weighted sums of points that hold most of how all move, whatever their rotation: eigenvectors of
-    ``sum x_i x_j^T`` over the paths (n, J d, S). Pairs of segments are compared in 3 q numbers instead of 3 J.
+    ``sum x_i x_j^T`` over the paths (n, J d, S). Pairs of segments are compared in 3 q numbers instead of 3 J. Of many
+    columns that are no points, which are not rotated, principal ones in the same way.
     """
-    J = procrustes.n_points
-    if procrustes.mixing is not None or J <= _MOST_MIXED:
+    J, most = procrustes.n_points, _MOST_MIXED
+    if J == 1:
+        J, most = procrustes.n_columns, 3 * _MOST_MIXED
+    if procrustes.mixing is not None or J <= most:
         return procrustes
     points = paths.reshape(len(paths), J, -1)[evenly_spaced(len(paths), _MIXED_FROM)].astype(np.float64)
-    vectors = np.linalg.eigh(np.einsum("nis,njs->ij", points, points))[1][:, : -_MOST_MIXED - 1 : -1]
-    vectors *= np.sign(vectors[np.abs(vectors).argmax(axis=0), np.arange(_MOST_MIXED)])  # so that each has one sign
+    vectors = np.linalg.eigh(np.einsum("nis,njs->ij", points, points))[1][:, : -most - 1 : -1]
+    vectors *= np.sign(vectors[np.abs(vectors).argmax(axis=0), np.arange(most)])  # so that each has one sign
     return replace(procrustes, mixing=tuple(map(tuple, vectors.T.tolist())))
 
 
