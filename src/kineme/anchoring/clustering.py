@@ -33,7 +33,7 @@ _FAR = 5.0  # times the usual distance to a neighbor
 _APART = 1e-3  # of their similarity is left to movements of components apart
 _NONE = 1e-6  # largest distance, as a share of the typical one, of movements that do not differ
 _LEAST = 1e-30  # similarity, above 0
-_LAST_GAP, _LEAST_GAP = 0.3, 0.15  # of the largest gap between eigenvalues: numbers of clusters that may be
+_LEAST_GAP = 0.15  # of the largest gap between eigenvalues: numbers of clusters that may be
 
 
 def fuse(squares: Array, weights: ArrayLike | None = None) -> Array:
@@ -158,11 +158,11 @@ def _diffused(sparse: csr_array, full: Array) -> Array:
 def count_by_eigengap(similar: Array) -> int:
     """The number of clusters c, from 2 to n / 2, by gaps between the c-th and the next eigenvalue.
 
-    Of the normalized similarities ``D^-1/2 W D^-1/2``. With c clusters that nothing connects, c eigenvalues are 1. The
-    largest gap is often that between a few groups of similar clusters, so the last one counts that is at least 0.3 of
-    it. Or that one of at least 0.15 of it whose clusters have the best silhouette (P. Rousseeuw, "Silhouettes", Journal
-    of Computational and Applied Mathematics 20, 1987) in ``-log W``, if these are more: two clusters of one kind are
-    merged by a person at a glance, and kinds that were never divided are not seen. W is as `fuse` gives it.
+    Of the normalized similarities ``D^-1/2 W D^-1/2``, with W as `fuse` gives it. With c clusters that nothing
+    connects, c eigenvalues are 1. It is the c with the largest gap, which is often that between a few groups of similar
+    clusters; or, if these are more, the c whose clusters have the best silhouette in ``-log W``, among gaps of at least
+    0.15 of it (P. Rousseeuw, "Silhouettes", Journal of Computational and Applied Mathematics 20, 1987): two clusters of
+    one kind are merged at a glance, and kinds that were never divided are not seen.
     """
     from sklearn.metrics import silhouette_score
 
@@ -170,17 +170,17 @@ def count_by_eigengap(similar: Array) -> int:
     values, vectors = (array[..., ::-1] for array in eigh(_normalized(similar)))
     most = min(max(2, n // 2), n - 1)
     gaps = values[1:most] - values[2 : most + 1]
-    last = int(np.flatnonzero(gaps >= _LAST_GAP * gaps.max())[-1]) + 2
     distances = -np.log(np.maximum(similar, _LEAST))
     distances = 0.5 * (distances + distances.T) - distances[~np.eye(n, dtype=bool)].min()
     np.fill_diagonal(distances, 0.0)
-    best, count = -np.inf, last
+    counts = [int(gaps.argmax()) + 2]
+    scores = [-np.inf]
     for c in (np.flatnonzero(gaps >= _LEAST_GAP * gaps.max()) + 2).tolist():
         clusters = _by_directions(vectors[:, :c], c)
         if 1 < len(np.unique(clusters)) < n:
-            score = float(silhouette_score(distances, clusters, metric="precomputed"))
-            best, count = max((best, count), (score, c))
-    return max(last, count)
+            counts.append(c)
+            scores.append(float(silhouette_score(distances, clusters, metric="precomputed")))
+    return max(counts[0], counts[int(np.argmax(scores))])
 
 
 def spectral(similar: Array, n_clusters: int, min_members: int = 1) -> Clusters:

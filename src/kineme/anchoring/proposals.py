@@ -355,15 +355,17 @@ def _by_neighbors(
 
 
 def by_shape(described: Described) -> Described:
-    """Without the forcing term, if movements are also compared pair by pair: across people it tells little."""
+    """Without the forcing term, if movements are also compared pair by pair: across people it tells little.
+
+    What is compared in detail counts as its twins that are rotated: with more weight clusters are those of people.
+    """
     if described.pairs is None:
         return described
-    n = len(described.blocks)
-    positions = [r for r, block in enumerate(described.blocks) if block is described.pairs.positions]
-    if described.own_weights is None:
-        return described.select([*positions, *range(n, described.n_representations)])
-    weighted = [r for r in range(n, described.n_representations) if described.own_weights[r] > 0]
-    return described.select([*positions, *weighted])
+    n, own, twins = len(described.blocks), described.own_weights, described.twins()
+    chosen = [r for r, block in enumerate(described.blocks) if block is described.pairs.positions]
+    chosen += [r for r in range(n, described.n_representations) if own is None or own[r] > 0]
+    selected = described.select(chosen)
+    return selected if own is None else replace(selected, own_weights=tuple(own[twins[r]] for r in chosen))
 
 
 def _by_distances(distances: Array, method: str, n_clusters: int | None, min_members: int) -> tuple[Clusters, Array]:

@@ -124,7 +124,7 @@ def with_mixing(procrustes: Procrustes, paths: NDArray[Any]) -> Procrustes:
     J, most = procrustes.n_points, _MOST_MIXED
     if J == 1:
         J, most = procrustes.n_columns, 3 * _MOST_MIXED
-    if procrustes.mixing is not None or J <= most:
+    if procrustes.mixing is not None or most >= J:
         return procrustes
     points = paths.reshape(len(paths), J, -1)[evenly_spaced(len(paths), _MIXED_FROM)].astype(np.float64)
     vectors = np.linalg.eigh(np.einsum("nis,njs->ij", points, points))[1][:, : -most - 1 : -1]
