@@ -14,7 +14,8 @@ from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.figure import Paths, draw_movements_beside
 from kineme.movements.trajectories.labels import Label
 from kineme.movements.trajectories.trajectory import MovementLike, MovementsLike
-from kineme.reporting.figures import BLUE, GRAY, figure_to_show
+from kineme.reporting.colors import BLUE, GRAY
+from kineme.reporting.figures import figure_to_show
 from kineme.reporting.text import drawable, shortened
 
 _CLASSES = 10  # that are drawn, best first

@@ -11,7 +11,7 @@ import numpy as np
 from fastapi import APIRouter, Query, Request, Response
 from pydantic import BaseModel
 
-from kineme.anchoring.figures import classical_scaling
+from kineme.anchoring.scaling import classical_scaling
 from kineme.anchoring.space import conceptual_space
 from kineme.dmp.discrete.specification import FORMULATIONS
 from kineme.io.writing.write_movement import WRITERS
