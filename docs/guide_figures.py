@@ -15,7 +15,8 @@ from walk_through import walk
 
 import kineme
 from kineme.control import ObstacleAvoidance
-from kineme.reporting.figures import BLUE, GRAY, GREEN, ORANGE, new_figure
+from kineme.reporting.colors import BLUE, GRAY, GREEN, ORANGE
+from kineme.reporting.figures import new_figure
 from result_tables.measured import DOCS, rows
 
 _FEWEST = 20  # answers that a point of the reliability diagram stands for

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from kineme.dmp.discrete.dmp import Primitives
 from kineme.dmp.styles.model import StyleModel, learn_styles
-from kineme.reporting.figures import BLUE, GRAY, ORANGE, new_figure
+from kineme.reporting.colors import BLUE, GRAY, ORANGE
+from kineme.reporting.figures import new_figure
 from kineme.reporting.text import drawable
 from kineme.validation import Array
 

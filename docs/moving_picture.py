@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 import kineme
-from kineme.reporting.figures import BLUE, GRAY, GREEN, ORANGE
+from kineme.reporting.colors import BLUE, GRAY, GREEN, ORANGE
 
 _WIDTH, _HEIGHT, _PANEL = 760, 270, 240
 _SECONDS = 9.0

@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 from walk_through import walk
 
 import kineme
-from kineme.reporting.figures import BLUE, GRAY, GREEN, ORANGE, new_figure
+from kineme.reporting.colors import BLUE, GRAY, GREEN, ORANGE
+from kineme.reporting.figures import new_figure
 
 _TUTORIALS = Path(__file__).parent / "tutorials"
 _COLORS = {"Sine": BLUE, "GShape": ORANGE, "WShape": GREEN}

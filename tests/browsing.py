@@ -34,31 +34,72 @@ def stroke(page, points, times, lift=True):
 
 
 class Pages:
-    """Pages in contexts of their own."""
+    """Pages that go from test to test: a new one costs more than most tests do with it.
 
-    def __init__(self, browser, errors=("error",)):
-        self.browser, self.errors = browser, errors
-        self.contexts, self.wrong, self.requests = [], [], []
+    Each has a window of its own, as a tab that is covered by another paints once a second. One that was left is used
+    again where the same options are wanted, and the same kind.
+    """
 
-    def new(self, width=1440, height=900, tolerated=(), **options):
+    def __init__(self, browser, errors=("error",), script=""):
+        self.browser, self.errors, self.script = browser, errors, script
+        self.windows, self.left, self.used, self.tolerated = [], [], [], {}
+        self.wrong, self.requests = [], []
+
+    def new(
+        self,
+        width=1440,
+        height=900,
+        tolerated=(),
+        reduced_motion="no-preference",
+        color_scheme="light",
+        kind="",
+        **options,
+    ):
         """An empty page; messages of its console with one of the tolerated texts are no errors."""
-        self.contexts.append(self.browser.new_context(viewport={"width": width, "height": height}, **options))
-        self.contexts[-1].set_default_timeout(300_000)  # [ms]: a busy machine is no fault
-        page = self.contexts[-1].new_page()
+        key = (kind, *sorted(options.items()))
+        at = next((k for k, (left, _) in enumerate(self.left) if left == key), None)
+        page = self._opened(options) if at is None else self.left.pop(at)[1]
+        self.used.append((key, page))
+        self.tolerated[page] = tolerated
+        page.set_viewport_size({"width": width, "height": height})
+        page.emulate_media(reduced_motion=reduced_motion, color_scheme=color_scheme)
+        return page
 
+    def _opened(self, options):
+        window = self.browser.new_context(**options)
+        window.set_default_timeout(300_000)  # [ms]: a busy machine is no fault
+        window.add_init_script(self.script)
+        self.windows.append(window)
+        page = window.new_page()
+        self._listen(page)
+        return page
+
+    def _listen(self, page):
         def hear(message):
-            if message.type in self.errors and not any(text in message.text for text in tolerated):
+            if message.type in self.errors and not any(text in message.text for text in self.tolerated[page]):
                 self.wrong.append(message.text)
 
         page.on("console", hear)
         page.on("pageerror", lambda error: self.wrong.append(str(error)))
         page.on("dialog", lambda dialog: self.wrong.append(dialog.message))
         page.on("request", lambda request: self.requests.append(request.url))
-        return page
 
-    def close(self, *allowed):
-        """Close them all: nothing went wrong, and nothing was asked for at other addresses than those allowed."""
-        for context in self.contexts:
-            context.close()
-        elsewhere = [url for url in self.requests if not url.startswith(allowed)]
-        assert (self.wrong, elsewhere) == ([], []), (self.wrong, elsewhere)
+    def leave(self, *allowed):
+        """Leave the pages of a test: nothing went wrong, and nothing was asked for elsewhere. What was asked for."""
+        for key, page in self.used:
+            if not page.is_closed():
+                page.mouse.up()
+                page.mouse.move(0, 0)
+                page.unroute_all(behavior="ignoreErrors")
+                page.goto("about:blank")
+                self.left.append((key, page))
+        wrong, requests = self.wrong, self.requests
+        self.used, self.wrong, self.requests = [], [], []
+        elsewhere = [url for url in requests if not url.startswith(allowed)]
+        assert (wrong, elsewhere) == ([], []), (wrong, elsewhere)
+        return requests
+
+    def close(self):
+        """Close them all."""
+        for window in self.windows:
+            window.close()

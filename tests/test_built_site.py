@@ -96,7 +96,8 @@ def pages(browser):
     """Pages that open files and nothing else, and whose console stays empty."""
     opened = Pages(browser)
     yield opened
-    opened.close("file:", "data:", "blob:")
+    opened.leave("file:", "data:", "blob:")
+    opened.close()
 
 
 @pytest.fixture(scope="module")

@@ -96,3 +96,13 @@ def test_importing_kineme_loads_nothing_heavy():
 def test_learning_a_few_movements_does_not_load_what_it_does_not_need():
     loaded = _loaded_by("import kineme, numpy\nkineme.DMP().learn([numpy.arange(20.0) ** 2]).weights")
     assert loaded.isdisjoint({"sklearn", "numba", "matplotlib"})
+
+
+def test_the_studio_starts_without_what_draws_compiles_or_finds_peaks():
+    pytest.importorskip("fastapi", reason="the extra studio is not installed")
+    show = "print(*{'.'.join(name.split('.')[:2]) for name in sys.modules})"
+    code = f"import sys, kineme.studio.server.app\n{show}"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = set(done.stdout.split())
+    assert "kineme.studio" in loaded
+    assert loaded.isdisjoint({"sklearn", "numba", "matplotlib", "scipy.signal", "scipy.stats"})

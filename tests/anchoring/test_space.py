@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from scipy.spatial.distance import pdist, squareform
 
 import kineme
-from kineme.anchoring.figures import apart, classical_scaling
+from kineme.anchoring.figures import apart
+from kineme.anchoring.scaling import classical_scaling
 from kineme.anchoring.space import ConceptualSpace, conceptual_space, morph
 from kineme.recognition.recognizer import Recognizer
 from kineme.similarity.specification import ComparisonSpecification

@@ -19,7 +19,7 @@ from kineme.robots import view
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")
 
 from kineme.movements.trajectories.trajectory import Trajectory
-from kineme.reporting import figures
+from kineme.reporting import colors
 from kineme.robots import load, move, write_view
 from kineme.robots.execution.preflight import along
 from kineme.robots.kinematics.descent import InverseKinematics
@@ -132,10 +132,10 @@ def test_the_data_are_those_of_the_trajectory(panda, page):
     assert data["begins"] == pytest.approx(panda.begins, abs=1e-6)
     np.testing.assert_allclose(data["start"], data["wanted"][0], atol=1e-3)
     np.testing.assert_allclose(data["goal"], data["wanted"][-1], atol=1e-3)
-    colors = {figures.BLUE, figures.ORANGE, figures.GRAY, figures.GREEN}
-    assert set(data["colors"].values()) == colors
+    palette = {colors.BLUE, colors.ORANGE, colors.GRAY, colors.GREEN}
+    assert set(data["colors"].values()) == palette
     style = (FOLDER / "page" / "viewer.css").read_text().lower().replace("#777;", "#777777;")
-    assert all(color.lower() in style for color in colors)
+    assert all(color.lower() in style for color in palette)
 
 
 def test_the_drawn_arm_has_the_joints_and_the_tip_of_the_model():

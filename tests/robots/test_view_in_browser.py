@@ -23,24 +23,33 @@ WIDTHS = (390, 820, 1440)
 COLLADA = Path(__file__).parent / "textured.dae"
 
 
+@pytest.fixture(scope="module")
+def pages(browser):
+    """The pages of all tests."""
+    pages = Pages(browser)
+    yield pages
+    pages.close()
+
+
 @pytest.fixture
-def opened(browser, tmp_path):
+def opened(pages, tmp_path):
     """A function that opens the page of a movement; at the end, nothing was requested and nothing went wrong."""
-    opening = Pages(browser)
+    addresses = []
 
     def open_page(made, width=1440, stands=False, **options):
-        page = opening.new(width, **options)
+        page = pages.new(width, kind="stands" if stands else "", **options)
         if stands:
             page.clock.install(time=0)
-        page.goto(write_view(tmp_path / "arm.html", made).as_uri())
+        addresses.append(write_view(tmp_path / "arm.html", made).as_uri())
+        page.goto(addresses[-1])
         wait_until(page, "window.kineme && kineme.frames() > 0")
         if stands:  # the time of the page, which goes on when the test says so, however busy the machine is
             page.clock.pause_at(page.evaluate("Date.now()") / 1000 + 60)
         return page
 
     yield open_page
-    opening.close("file:", "data:")
-    assert sum(url.startswith("file:") for url in opening.requests) == len(opening.contexts)
+    requests = pages.leave("file:", "data:")
+    assert [url for url in requests if url.startswith("file:")] == addresses
 
 
 def scrub(page, share):

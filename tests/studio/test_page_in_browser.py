@@ -39,20 +39,29 @@ def pages(tmp_path_factory):
     return folder
 
 
+@pytest.fixture(scope="module")
+def tabs(browser):
+    """The pages of the browser."""
+    tabs = Pages(browser, errors=("error", "warning"))
+    yield tabs
+    tabs.close()
+
+
 @pytest.fixture
-def opened(browser, pages):
+def opened(tabs, pages):
     """A function that opens a page; at the end, nothing was requested and nothing went wrong."""
-    opening = Pages(browser, errors=("error", "warning"))
+    addresses = []
 
     def open_page(name="plane", **options):
-        page = opening.new(**options)
-        page.goto((pages / f"{name}.html").as_uri())
+        addresses.append((pages / f"{name}.html").as_uri())
+        page = tabs.new(**options)
+        page.goto(addresses[-1])
         wait_until(page, "window.kineme !== undefined")
         return page
 
     yield open_page
-    opening.close("file:", "blob:")
-    assert sum(url.startswith("file:") for url in opening.requests) == len(opening.contexts)
+    requests = tabs.leave("file:", "blob:")
+    assert [url for url in requests if url.startswith("file:")] == addresses
 
 
 def draw(page, shape="GShape", index=5, until=1.0):

@@ -6,7 +6,6 @@ import json
 import os
 import re
 import shutil
-import subprocess
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise, product
@@ -15,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from node_runtime import NODE, REASON, RUNTIME, ask, question
+from node_runtime import NODE, REASON, RUNTIME, ask, in_node, question, unparsed
 
 import kineme
 from kineme.movements.preparation.pauses import cut_pauses
@@ -231,12 +230,8 @@ def test_pauses_are_cut_to_the_same_samples_as_in_python():
     movements = [
         {"times": case.times.tolist(), "positions": case.positions.ravel().tolist(), "d": case.n_dims} for case in cases
     ]
-    done = subprocess.run(
-        [NODE, "--input-type=module", "-e", CUTS, FOLDER / "pauses.js", *map(json.dumps, (movements, pause_rule()))],
-        capture_output=True, text=True, timeout=300, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    for (times, positions), case in zip(json.loads(done.stdout), cases, strict=True):
+    cuts = in_node(CUTS, FOLDER / "pauses.js", *map(json.dumps, (movements, pause_rule())))
+    for (times, positions), case in zip(cuts, cases, strict=True):
         cut = cut_pauses(case.times, case.positions, np.array([0, len(case.times)])) or (case.times, case.positions)
         np.testing.assert_allclose(times, cut[0], rtol=0, atol=1e-9)
         np.testing.assert_allclose(positions, cut[1].ravel(), rtol=0, atol=1e-9)
@@ -491,10 +486,7 @@ def test_words_are_those_of_python_at_every_confidence():
         f"{json.dumps([dict(LEAST_CONFIDENCE), cases])}; "
         "console.log(JSON.stringify(cases.map(([confidence, what]) => certainty(least, confidence, what))))"
     )
-    done = subprocess.run(
-        [NODE, "--input-type=module", "-e", script], capture_output=True, text=True, timeout=300, check=True
-    )
-    assert json.loads(done.stdout) == [
+    assert in_node(script) == [
         certainty(confidence, is_new=what["isNew"], is_guess=what["isGuess"], is_over=what["isOver"])
         for confidence, what in cases
     ]
@@ -505,8 +497,8 @@ def test_the_runtime_is_small_and_every_file_is_correct_javascript():
     lines = [line.strip() for path in files for line in path.read_text().splitlines()]
     code = [line for line in lines if line and not line.startswith(("//", "/*", "*"))]
     assert 500 < len(code) < 1600
+    assert unparsed(*files) == {}
     for path in files:
-        subprocess.run([NODE, "--check", path], check=True, timeout=300)
         imported = re.findall(r'from "([^"]+)"', path.read_text())
         assert all((FOLDER / name).is_file() and name.startswith("./") for name in imported), path.name
 

@@ -89,6 +89,15 @@ def test_movements_are_listed_some_at_a_time(client):
     assert client.get("/api/library/movements", params={"offset": -1}).status_code == 422
 
 
+def test_a_symbol_that_is_gone_since_it_was_seen_has_no_movements(client):
+    shown = client.get("/api/library").json()
+    asked = {"symbol": shown["symbols"][0]["id"], "version": shown["version"]}
+    assert client.get("/api/library/movements", params=asked).json()["total"] == 3
+    now = client.delete(f"/api/library/symbols/{asked['symbol']}").json()["version"]
+    assert client.get("/api/library/movements", params=asked).json() == {"total": 0, "movements": []}
+    assert client.get("/api/library/movements", params=asked | {"version": now}).status_code == 404
+
+
 def test_a_whole_movement_is_as_it_was_learned(client):
     movement = client.get("/api/library/movements/8").json()
     times, positions = drawing(2, seed=1)

@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import re
 import shutil
-import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
+from node_runtime import NODE, REASON, in_node, unparsed
+
+from kineme.reporting import colors
 
 WEB = Path(__file__).parents[2] / "src" / "kineme" / "studio" / "web"
 RUNTIME = WEB.parent / "javascript"
@@ -18,8 +20,7 @@ SCRIPTS = sorted(WEB.rglob("*.js"))
 PAGES = sorted(WEB.glob("*.html"))
 STYLES = sorted(WEB.glob("*.css"))
 MAX_FILE, MAX_LINE = 400, 120
-NODE = shutil.which("node")
-needs_node = pytest.mark.skipif(NODE is None, reason="node is not installed")
+needs_node = pytest.mark.skipif(NODE is None, reason=REASON)
 
 
 def _name(path):
@@ -49,28 +50,10 @@ console.log(JSON.stringify([...last, matching(field, symbols.slice(0, 5)).length
 """
 
 
-def _in_node(program, *arguments, options=()):
-    """What a module prints as JSON."""
-    command = [NODE, *options, "--input-type=module", "-e", program, *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
-
-
-PARSES = """import { readFileSync } from "node:fs";
-import { SourceTextModule } from "node:vm";
-const wrong = {};
-for (const path of process.argv.slice(1)) {
-  try { new SourceTextModule(readFileSync(path, "utf8")); } catch (error) { wrong[path] = String(error); }
-}
-console.log(JSON.stringify(wrong));"""
-
-
 @needs_node
 def test_every_module_parses(tmp_path):
     (tmp_path / "wrong.js").write_text("export const = 1;")
-    problems = _in_node(PARSES, tmp_path / "wrong.js", *SCRIPTS, options=["--experimental-vm-modules"])
-    assert list(problems) == [str(tmp_path / "wrong.js")]
+    assert list(unparsed(tmp_path / "wrong.js", *SCRIPTS)) == [str(tmp_path / "wrong.js")]
 
 
 @pytest.fixture
@@ -101,7 +84,7 @@ def test_the_canvas_is_as_high_as_the_movements_of_the_library_in_powers_of_ten(
     for several in symbols:
         several.append({"path": None})
     symbols[6][0]["path"] = [[3, 5], [3, 5]]  # it does not move
-    heights = _in_node(HEIGHTS, modules, *map(json.dumps, symbols))
+    heights = in_node(HEIGHTS, modules, *map(json.dumps, symbols))
     assert heights == [1, 1, 1, 100, 0.01, 100, 100, 1, 10]
 
 
@@ -117,7 +100,7 @@ def test_movements_in_space_are_seen_from_the_front_where_they_are_flat(modules)
     wave = np.column_stack((u, 2 * np.sin(u), 0.1 * np.cos(u)))
     knot = np.column_stack((np.cos(u), np.sin(u), np.sin(2 * u)))
     paths = [wave, wave[:, [0, 2, 1]], wave[:, [2, 0, 1]], knot]  # on a table, a wall, the wall beside it, none
-    seen = _in_node(FACING, modules, *(json.dumps(path.tolist()) for path in paths))
+    seen = in_node(FACING, modules, *(json.dumps(path.tolist()) for path in paths))
     np.testing.assert_allclose(seen, [[0, np.pi / 2], [0, 0], [np.pi / 2, 0], [-0.6, 0.5]])
 
 
@@ -168,7 +151,7 @@ console.log(JSON.stringify(log));"""
 
 @needs_node
 def test_a_movement_is_sent_from_its_beginning_where_the_connection_is_new(modules):
-    assert _in_node(SENDS, modules) == {
+    assert in_node(SENDS, modules) == {
         "first": ["reset", [0, 9]],
         "again": [[0, 29], [30, 5029], [5030, 6999]],
         "requests": [[0, 4999], [5000, 6999], "finish"],
@@ -241,7 +224,7 @@ console.log(JSON.stringify({ requests: requests.map(({ path, what }) => `${path}
 @needs_node
 def test_what_moves_is_never_the_path_of_another_movement_and_what_failed_is_asked_again(modules):
     moves, primitives = "/api/rollout", "/api/primitive"
-    assert _in_node(FOLLOWED, modules) == {
+    assert in_node(FOLLOWED, modules) == {
         "requests": [f"{moves} old", f"{moves} new", f"{moves} newer", f"{primitives} one", f"{primitives} one"],
         "seen": ["new"],
         "primitives": [None, None, None],
@@ -256,7 +239,7 @@ console.log(JSON.stringify(process.argv.slice(2).map((name) => breakable(name).j
 @needs_node
 def test_names_break_where_their_words_meet(modules):
     names = ["Double|Bended|Line", "pick_|and_|place", "GShape", "step-|2/|b", "a b", "x" * 190, "", "-"]
-    assert _in_node(BROKEN, modules, *(name.replace("|", "") for name in names)) == names
+    assert in_node(BROKEN, modules, *(name.replace("|", "") for name in names)) == names
 
 
 NAMED = """const [folder, n] = process.argv.slice(1);
@@ -286,7 +269,7 @@ console.log(JSON.stringify([all, drawn.at(-1), pixels]));"""
 
 @needs_node
 def test_a_map_of_many_symbols_has_the_names_that_fit_and_the_one_that_is_pointed_at(modules):
-    names, pointed, dots = _in_node(NAMED, modules, 100)
+    names, pointed, dots = in_node(NAMED, modules, 100)
     assert len(names) > 20
     at = np.array([name[1:3] for name in names])
     apart = np.abs(at[:, None] - at) >= [40, 15]
@@ -313,12 +296,12 @@ console.log(JSON.stringify([left, shown > 0.3 && shown < 0.5, picture.replayed, 
 
 @needs_node
 def test_a_replay_that_begins_anew_is_the_only_one(modules):
-    assert _in_node(REPLAYED, modules) == [1, True, None, 1]
+    assert in_node(REPLAYED, modules) == [1, True, None, 1]
 
 
 @needs_node
 def test_what_is_asked_after_a_change_is_answered_with_that_change(modules):
-    assert _in_node(REFRESHES, modules) == {
+    assert in_node(REFRESHES, modules) == {
         "seen": [1, 2, 2],
         "requests": 6,
         "log": [1, 2, 3, 3],
@@ -461,10 +444,9 @@ def test_the_dark_scheme_is_other_tokens_and_nothing_else():
 
 
 def test_colors_of_the_figures_are_those_of_the_page():
-    figures = pytest.importorskip("kineme.reporting.figures")
     tokens = (WEB / "tokens.css").read_text()
     for name in ("BLUE", "ORANGE", "GREEN", "PURPLE", "GRAY"):
-        assert f"--{name.lower()}: {getattr(figures, name).lower()};" in tokens
+        assert f"--{name.lower()}: {getattr(colors, name).lower()};" in tokens
 
 
 def _luminance(color):
@@ -487,7 +469,7 @@ console.log(JSON.stringify(process.argv.slice(2).map((hex) => readableOn(hex))))
 def test_names_of_spans_stand_out_from_their_colors(modules):
     tokens = (WEB / "tokens.css").read_text()
     colors = dict(re.findall(r"--(blue|orange|green|purple|sky|amber): (#[0-9a-f]{6});", tokens))
-    for paint, text in zip(colors.values(), _in_node(ON_COLORS, modules, *colors.values()), strict=True):
+    for paint, text in zip(colors.values(), in_node(ON_COLORS, modules, *colors.values()), strict=True):
         assert _contrast(paint, text[0] + 2 * text[1:]) >= 4.5, (paint, text)
 
 

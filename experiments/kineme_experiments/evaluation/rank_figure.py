@@ -6,7 +6,8 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from kineme.reporting.figures import BLUE, new_figure
+from kineme.reporting.colors import BLUE
+from kineme.reporting.figures import new_figure
 from kineme_experiments.evaluation.methods import METHODS, OURS
 from kineme_experiments.evaluation.ranks import Ranks
 

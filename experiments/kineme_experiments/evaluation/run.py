@@ -17,7 +17,8 @@ from typing import Any, NamedTuple
 
 from kineme.movements.trajectories.demonstrations import require_labels
 from kineme.reporting.atomic import write_atomically
-from kineme.reporting.figures import BLUE, GRAY, GREEN, ORANGE, PURPLE, encode_figure, new_figure
+from kineme.reporting.colors import BLUE, GRAY, GREEN, ORANGE, PURPLE
+from kineme.reporting.figures import encode_figure, new_figure
 from kineme.reporting.page import page, picture
 from kineme.reporting.table import Table, mean_and_range, to_html
 from kineme.reporting.text import in_markup

@@ -9,7 +9,8 @@ from matplotlib.figure import Figure
 
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.trajectory import Trajectory
-from kineme.reporting.figures import BLUE, GRAY, GREEN, LINES, ORANGE, PURPLE, new_figure
+from kineme.reporting.colors import BLUE, GRAY, GREEN, ORANGE, PURPLE
+from kineme.reporting.figures import LINES, new_figure
 from kineme.reporting.table import Table
 from kineme.robots.kinematics.descent import PLANES, InverseKinematics
 from kineme.robots.models.robot import load

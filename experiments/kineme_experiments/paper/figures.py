@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 from kineme.datasets.lasa import PAPER_LETTERS, load_lasa
 from kineme.dmp.discrete.dmp import Primitives
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.reporting.figures import GRAY, LINES, SEQUENCE, new_figure
+from kineme.reporting.colors import GRAY
+from kineme.reporting.figures import LINES, SEQUENCE, new_figure
 from kineme.validation import Array
 from kineme_experiments.paper import paper
 from kineme_experiments.paper.protocol import draw

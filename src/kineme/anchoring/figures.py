@@ -8,12 +8,14 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from kineme.anchoring.proposals import Proposal, Proposals, check_members
+from kineme.anchoring.scaling import classical_scaling
 from kineme.anchoring.space import ConceptualSpace
 from kineme.dmp.discrete.dmp import Primitives
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.trajectory import MovementsLike
-from kineme.reporting.figures import BLUE, GRAY, ORANGE, new_figure
+from kineme.reporting.colors import BLUE, GRAY, ORANGE
+from kineme.reporting.figures import new_figure
 from kineme.reporting.text import drawable
 from kineme.similarity.describe import maps_onto, paths_of
 from kineme.similarity.specification import Compares
@@ -182,27 +184,6 @@ def _side_by_side(axes: Any, paths: Array) -> None:
         drawn = drawn * 0.8 + np.array([[k % columns], [-(k // columns)]])
         plot_paths(axes, drawn[None], GRAY, 2.0, linewidth=0.7)
     bare(axes, 2)
-
-
-def classical_scaling(distances: Array) -> tuple[Array, float]:
-    """Positions (s, 2) in the plane whose distances are close to those given, and the share of their squares kept.
-
-    Classical multidimensional scaling: the two leading eigenvectors of ``-J D^2 J / 2``, J taking out the mean.
-
-    Source: W. S. Torgerson, "Multidimensional scaling: I. Theory and method", Psychometrika 17, 1952.
-    """
-    squares = distances**2
-    centered = squares - squares.mean(axis=0)
-    B = -0.5 * (centered - centered.mean(axis=1, keepdims=True))
-    values, vectors = np.linalg.eigh(0.5 * (B + B.T))
-    positive = np.maximum(values[::-1], 0.0)
-    positions = np.zeros((len(distances), 2))
-    k = min(2, len(distances))
-    leading = vectors[:, ::-1][:, :k]
-    sign = np.sign(leading[np.abs(leading).argmax(axis=0), np.arange(k)])  # an eigenvector has no sign of its own
-    positions[:, :k] = leading * np.where(sign == 0, 1.0, sign) * np.sqrt(positive[:k])
-    total = float(positive.sum())
-    return positions, float(positive[:2].sum() / total) if total > 0 else 1.0
 
 
 def draw_map(space: ConceptualSpace, prototypes: Primitives | MovementsLike) -> Figure:

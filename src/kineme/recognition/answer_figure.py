@@ -17,7 +17,8 @@ from kineme.movements.trajectories.figure import draw_movements_beside
 from kineme.movements.trajectories.labels import Label
 from kineme.movements.trajectories.movements import Samples
 from kineme.movements.trajectories.trajectory import MovementLike, MovementsLike
-from kineme.reporting.figures import BLUE, GRAY, figure_to_show
+from kineme.reporting.colors import BLUE, GRAY
+from kineme.reporting.figures import figure_to_show
 from kineme.reporting.text import drawable, shortened
 from kineme.validation import Array
 

@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import find_peaks
 
 from kineme.movements.segmentation.segment import moving
 from kineme.movements.segmentation.table import Motion, Rest, Rows, observe
@@ -247,6 +246,8 @@ def candidate_windows(recording: Trajectory, durations: Durations | None, most_b
 
 def _boundaries(motion: Motion, bouts: Rows, gap: float) -> Rows:
     """Return samples about `gap` seconds apart, at ends of rests and minima of speed where there are any nearby."""
+    from scipy.signal import find_peaks
+
     t = motion.times
     slowness = -np.log(motion.speed + max(_FLOOR * motion.peak, 2.0 * motion.noise))
     minima = find_peaks(slowness, prominence=_DEPTH)[0]

@@ -16,10 +16,9 @@ from matplotlib.text import Text
 
 from kineme.errors import DataError
 from kineme.reporting.atomic import write_atomically
+from kineme.reporting.colors import BLUE, GREEN, ORANGE
 from kineme.reporting.text import printable_lines
 
-#: Okabe and Ito's palette, from dark to light.
-BLUE, ORANGE, GREEN, PURPLE, GRAY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#777777"
 SEQUENCE = (BLUE, ORANGE, GREEN)
 LINES = ("-", "--", ":")
 

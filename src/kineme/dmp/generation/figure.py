@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from kineme.dmp.generation.generate import Learned, MovementOptions, generate, largest_deviation
 from kineme.io.writing.write_movement import Columns
 from kineme.movements.trajectories.figure import set_equal_scales
-from kineme.reporting.figures import BLUE, GRAY, GREEN, ORANGE, new_figure
+from kineme.reporting.colors import BLUE, GRAY, GREEN, ORANGE
+from kineme.reporting.figures import new_figure
 from kineme.reporting.text import drawable
 from kineme.validation import Array
 

@@ -15,7 +15,8 @@ from kineme.io.inspection.inspect import labels_in_order
 from kineme.io.reading.merge_files import Recordings
 from kineme.movements.trajectories.movements import axis_names
 from kineme.movements.trajectories.trajectory import Trajectory
-from kineme.reporting.figures import BLUE, GRAY, ORANGE, new_figure
+from kineme.reporting.colors import BLUE, GRAY, ORANGE
+from kineme.reporting.figures import new_figure
 from kineme.reporting.text import drawable, shortened
 from kineme.sampling import evenly_spaced
 

@@ -12,7 +12,8 @@ from kineme.movements.channels.channel import recorded_names
 from kineme.movements.segmentation.segment import Segmentation
 from kineme.movements.segmentation.table import observe
 from kineme.movements.trajectories.movements import axis_names
-from kineme.reporting.figures import BLUE, GRAY, ORANGE, new_figure
+from kineme.reporting.colors import BLUE, GRAY, ORANGE
+from kineme.reporting.figures import new_figure
 from kineme.reporting.text import drawable, shortened
 from kineme.sampling import evenly_spaced
 from kineme.validation import Array

@@ -12,7 +12,6 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, median_filter
-from scipy.signal import find_peaks
 
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.preparation.smooth import Smooth
@@ -164,6 +163,8 @@ class SpeedMinima:
 
     def inner_cuts(self, motion: Motion) -> Rows:
         """Rows at which one movement ends and the next begins, increasing, without the ends of the recording."""
+        from scipy.signal import find_peaks  # it takes long to load, and most commands cut nothing
+
         t = motion.times - motion.times[0]
         even = np.linspace(0.0, t[-1], len(t))
         slowness = np.interp(even, t, -np.log(motion.speed + max(_FLOOR * motion.peak, 2.0 * motion.noise)))

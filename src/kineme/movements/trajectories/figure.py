@@ -14,7 +14,8 @@ from matplotlib.figure import Figure, SubFigure
 
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.movements import Samples
-from kineme.reporting.figures import BLUE, GRAY, GREEN, ORANGE, PURPLE, figure_to_show
+from kineme.reporting.colors import BLUE, GRAY, GREEN, ORANGE, PURPLE
+from kineme.reporting.figures import figure_to_show
 from kineme.reporting.text import drawable
 from kineme.validation import Array
 

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
-from scipy.stats import qmc
 
 from kineme.errors import DataError, SpecificationError, TrajectoryError
 from kineme.movements.rotations import matrices_of
@@ -158,6 +157,8 @@ def postures(robot: Robot, position: Array, rotation: Array, turn_costs: Array, 
 @lru_cache(maxsize=8)
 def _starts(robot: Robot, n: int) -> Array:
     """The rest posture and a Halton sequence within the limits, at most half a turn to each side; always the same."""
+    from scipy.stats import qmc  # it takes long to load
+
     lower, upper = np.clip((-np.pi, np.pi), robot.lower[:, None], robot.upper[:, None]).T
     spread = qmc.Halton(robot.n_joints, scramble=False).random(n)[1:]
     return np.vstack((robot.rest, lower + spread * (upper - lower)))

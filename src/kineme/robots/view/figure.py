@@ -8,7 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from kineme.movements.trajectories.figure import set_equal_scales
-from kineme.reporting.figures import BLUE, GRAY, ORANGE, new_figure
+from kineme.reporting.colors import BLUE, GRAY, ORANGE
+from kineme.reporting.figures import new_figure
 from kineme.reporting.text import drawable
 from kineme.robots.kinematics.descent import kinematics
 from kineme.robots.planning.robot_movement import RobotMovement

@@ -15,7 +15,7 @@ import numpy as np
 
 from kineme.errors import DataError
 from kineme.reporting.atomic import write_atomically
-from kineme.reporting.figures import BLUE, GRAY, GREEN, ORANGE
+from kineme.reporting.colors import BLUE, GRAY, GREEN, ORANGE
 from kineme.reporting.page import filled
 from kineme.reporting.text import counted, in_markup, printable
 from kineme.robots.execution.preflight import preflight_table

@@ -11,7 +11,7 @@ import numpy as np
 from fastapi import APIRouter, Query, Request, Response
 from pydantic import BaseModel
 
-from kineme.anchoring.figures import classical_scaling
+from kineme.anchoring.scaling import classical_scaling
 from kineme.anchoring.space import conceptual_space
 from kineme.dmp.discrete.specification import FORMULATIONS
 from kineme.io.writing.write_movement import WRITERS
@@ -25,6 +25,7 @@ from kineme.reporting.text import counted, first_names, printable, shortened
 from kineme.runtime.collector import collector_paused
 from kineme.sampling import evenly_spaced
 from kineme.studio.server.records import ChannelOut, MovementKey, Points, numbers, thumbnail
+from kineme.studio.server.refusals import ConflictError
 from kineme.studio.server.studio import Reads, Studio
 
 _VERSIONS = 200  # that are listed, the last ones
@@ -245,10 +246,15 @@ def movements(
     unlabeled: Annotated[bool, Query(description="Those that belong to no symbol.")] = False,
     offset: Annotated[int, Query(ge=0, description="How many to pass over.")] = 0,
     limit: Annotated[int, Query(ge=1, le=500, description="How many at most.")] = 60,
+    version: Annotated[int | None, Query(description="That the client has seen: a symbol gone since has none.")] = None,
 ) -> dict[str, Any]:
     """Those of a symbol, those without one, or all; in the order in which they were learned."""
+    ids: Any
     if symbol is not None:
-        ids = studio.symbol(symbol).members
+        try:
+            ids = studio.symbol(symbol, version).members
+        except ConflictError:  # its client hears of the change, and asks for it no more
+            ids = ()
     else:
         ids = studio.library.unlabeled() if unlabeled else studio.library.ids()
     return {"total": len(ids), "movements": _listed(studio, ids[offset : offset + limit])}

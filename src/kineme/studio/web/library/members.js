@@ -59,7 +59,8 @@ export class Members {
   async load() {
     if (this.loading) return;
     this.loading = true;
-    const answer = await tried(() => get(`/api/library/movements?${this.query}&offset=${this.shown}&limit=${PAGE}`));
+    const part = `offset=${this.shown}&limit=${PAGE}&version=${library().version}`;
+    const answer = await tried(() => get(`/api/library/movements?${this.query}&${part}`));
     this.loading = false;
     if (!answer) return;
     if (this.shown === 0) fill(this.grid);

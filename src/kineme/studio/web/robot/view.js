@@ -96,7 +96,8 @@ function offer() {
 
 async function shown() {
   if (currentView() !== "robot") return;
-  const { symbols } = library();
+  arms ??= await tried(() => get("/api/robots"));
+  const { symbols } = library(); // as it is now: answers may come in another order
   const id = toMove(symbols);
   const movable = symbols.filter((/** @type {any} */ symbol) => symbol.path);
   fill(
@@ -106,7 +107,6 @@ async function shown() {
     ),
   );
   offer();
-  arms ??= await tried(() => get("/api/robots"));
   if (!arms) return;
   const ready = arms.available && movable.length > 0;
   byId("robot-empty").hidden = ready;
