@@ -1,4 +1,4 @@
-"""A movement is described once for each question, whatever is computed from its description: smoothed, and in detail."""
+"""A movement is described once for each question, smoothed and in detail, whatever is computed from that."""
 
 from __future__ import annotations
 

@@ -24,7 +24,8 @@ def test_representations_that_are_none(given):
 )
 def test_weights_that_are_none(weights):
     with pytest.raises(
-        SpecificationError, match="expected weights to be 'auto', 'own', 'equal', 'fitted' or 7 numbers from 0, not all 0"
+        SpecificationError,
+        match="expected weights to be 'auto', 'own', 'equal', 'fitted' or 7 numbers from 0, not all 0",
     ):
         Recognizer(weights=weights).fit(DEMOS)
 
