@@ -15,7 +15,7 @@ from kineme.movements.preparation.resample import Resample
         {"dmp": DMP("bio-inspired", fit="trajectory", n_basis=40, stiffness=250_000)},  # a whole number, no size
         {"dmp": DMP("bio-inspired", fit="trajectory", n_basis=40, preprocessing=(Resample(200_000),))},
         {"recognizer": Recognizer(cutoff=200_000)},
-        {"recognizer": Recognizer(weights=(1_000_000, 1, 0, 0, 0))},
+        {"recognizer": Recognizer(weights=(1_000_000, 1, 0, 0, 0, 0, 0))},
         {"recognizer": Recognizer(max_angle=0)},
     ],
     ids=["stiffness", "resample", "cutoff", "weights", "max_angle"],
