@@ -20,8 +20,8 @@ from node_runtime import NODE, REASON, RUNTIME, ask, question
 import kineme
 from kineme.movements.preparation.pauses import cut_pauses
 from kineme.recognition.answer import LEAST_CONFIDENCE, certainty
-from kineme.studio.snapshot import Snapshot, pause_rule, snapshot_of_recognizer
 from kineme.similarity.specification import DEFAULT_REPRESENTATIONS
+from kineme.studio.snapshot import Snapshot, pause_rule, snapshot_of_recognizer
 from movement_samples import draw_shapes, stepped, turn
 from soaking import SOAK, slow
 
