@@ -25,8 +25,10 @@ from kineme.similarity.similarity import SHARE
 from kineme.similarity.specification import DEFAULT_REPRESENTATIONS, ComparisonSpecification
 
 OWN = tuple(one.weight for one in DEFAULT_REPRESENTATIONS)
-COARSE = OWN[:5]
-WEIGHTS = (OWN, (1.0,) * 7, (*COARSE, 0.0, 0.0), (*COARSE, 2.0, 2.0), (*COARSE, 12.0, 12.0))
+WEIGHTS = (OWN, (1.0,) * 7, (*OWN[:5], 2.0, 2.0), (*OWN[:5], 0.0, 0.0))
+#: Number of the same quantity that is not in detail, for each representation; it gives the width.
+_NUMBERS = {one.quantity: r for r, one in enumerate(DEFAULT_REPRESENTATIONS) if not one.detailed}
+TWINS = [_NUMBERS[one.quantity] for one in DEFAULT_REPRESENTATIONS]
 SHARES = (0.3, SHARE, 0.5)
 CONCENTRATIONS = ((0.03, 0.03), (CONCENTRATION[2], CONCENTRATION[3]), (0.1, 0.1))
 BANDS = (3, ElasticSpec().band, 12)
@@ -98,10 +100,11 @@ def _distances(grid: tuple[Values, ...]) -> list[tuple[tuple[float, float], int]
 
 
 def _squares(one: Movements, copy: int, grid: tuple[Values, ...]) -> Iterator[NDArray[np.floating]]:
-    """Squared distances (R, n, n) for each of `_distances`."""
+    """Squared distances (R, n, n) for each of `_distances`; other concentrations than the default rotate details."""
     demos = one.copies[copy]
     for (plane, space), band in _distances(grid):
-        prior = RotationPrior(plane if demos.n_dims == 2 else space)
+        shipped = (plane, space) == (CONCENTRATION[2], CONCENTRATION[3])
+        prior = RotationPrior() if shipped else RotationPrior(plane if demos.n_dims == 2 else space)
         described = with_band(describe(demos, ComparisonSpecification(prior=prior)), band)
         yield squared_distances(described, described).astype(np.float32)
 
@@ -109,9 +112,12 @@ def _squares(one: Movements, copy: int, grid: tuple[Values, ...]) -> Iterator[ND
 def with_band(described: Described, band: int) -> Described:
     """The same movements, whose elastic paths are compared within another band."""
     assert described.pairs is not None
-    shapes = described.pairs.shapes
-    shapes = replace(shapes, elastic=replace(shapes.elastic, band=band))
-    return replace(described, pairs=replace(described.pairs, shapes=shapes))
+    assert described.pairs.details is not None
+    shapes, details = (
+        replace(one, elastic=replace(one.elastic, band=band))
+        for one in (described.pairs.shapes, described.pairs.details)
+    )
+    return replace(described, pairs=replace(described.pairs, shapes=shapes, details=details))
 
 
 def _right(
@@ -132,7 +138,7 @@ def _right(
         key = numbers[values.concentrations, values.band], values.share
         if key not in kernels:
             every = squares[copy, key[0]][:, :, train]
-            sigma = values.share * _to_impostors(every[:, train], owners)
+            sigma = values.share * _to_impostors(every[:, train], owners)[TWINS]
             logs = every[:, test] / (-2.0 * sigma**2)[:, None, None]
             kernels[key] = np.exp(np.maximum.reduceat(logs, first, axis=2))
         averaged = np.tensordot(values.weights, kernels[key], axes=1)

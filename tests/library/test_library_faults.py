@@ -155,7 +155,10 @@ def test_readers_see_whole_versions_while_another_one_writes(tmp_path):
                 while not done.is_set() or not looks:
                     ids = reader.ids()
                     assert len(ids) % 20 == 0
-                    assert reader.features(ids[-20:]).shape == (20, 400)
+                    assert reader.features(ids[-20:]).shape == (
+                        20,
+                        400 + 134,
+                    )  # those of two representations, and positions in detail
                     assert len(reader["a"]) % 20 == 0
                     looks += 1
             return looks

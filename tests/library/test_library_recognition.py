@@ -96,7 +96,11 @@ def test_a_large_library_answers_as_the_nearest_of_all(make, count, d):
         np.testing.assert_allclose(a.transform.matrix, b.transform.matrix, atol=1e-4)
 
 
-@pytest.mark.parametrize("weights", [(0, 1, 1, 1, 1), (0, 0, 0, 0, 1)], ids=["no positions", "point cloud alone"])
+@pytest.mark.parametrize(
+    "weights",
+    [(0, 1, 1, 1, 1, 1, 1), (0, 0, 0, 0, 1, 0, 0), (0, 0, 0, 0, 0, 1, 0)],
+    ids=["no positions", "point cloud alone", "elastic path in detail alone"],
+)
 def test_a_large_library_without_weight_on_positions_answers_as_the_nearest_of_all(make, weights):
     demos, questions = _kinds([4] * 6), _questions([4] * 6)
     library = make(demos, recognizer=Recognizer(weights=weights, classifier="nearest"))

@@ -308,7 +308,8 @@ def compared(demos: Demonstrations) -> list[dict[str, Any]]:
     comparison, references = recognizer().comparison_, recognizer().references_
     blocks = feature_rows(demos, comparison.specification)
     stored = describe_rows(np.concatenate(blocks, axis=1), demos.n_dims, comparison)
-    reduced = reduce_features(fit_bases((np.eye(200),) * len(blocks), stored.n_dims), blocks, stored.n_dims)
+    by_rows = blocks[: len(comparison.specification.by_rows)]
+    reduced = reduce_features(fit_bases((np.eye(200),) * len(by_rows), stored.n_dims), by_rows, stored.n_dims)
     return each(
         len(demos),
         stored=compare(comparison.similarity, stored, references.described),

@@ -28,9 +28,11 @@ def test_the_transform_is_found_again(d, seed):
     answer = recognizer.recognize(moved)
     assert answer.nearest[0].index == i
     assert answer.nearest[0].name == f"no {i}"
-    assert 0.8 < answer.nearest[0].similarity <= 1  # a rotation costs, the more the more alike the kinds are
+    assert 0.4 < answer.nearest[0].similarity <= 1  # a rotation costs, above all what is compared in detail
     unturned = recognizer.recognize(scale * demos[i].positions + shift)
     assert unturned.nearest[0].similarity == pytest.approx(1, abs=1e-3)
+    free = Recognizer(max_angle=np.pi).fit(demos).recognize(moved)
+    assert (free.nearest[0].index, free.nearest[0].similarity) == (i, pytest.approx(1, abs=2e-3))
     np.testing.assert_allclose(answer.transform.rotation, R, atol=1e-6)
     np.testing.assert_allclose(answer.transform.scale, scale, rtol=1e-6)
     np.testing.assert_allclose(answer.transform.shift, shift, atol=1e-5)
@@ -121,7 +123,7 @@ def test_an_answer_says_its_rule_and_what_it_promises():
     assert [one.rule for one in answers] == ["class", "class", "pooled"]
     once = Recognizer().fit(draw_shapes([1] * 25)).recognize(demos[0])
     assert once.rule == "guess"
-    strange = recognizer.recognize(draw_shapes([25, 25, 4], seed=1, spread=0.3)[28])  # near one class, novel to all
+    strange = recognizer.recognize(draw_shapes([25, 25, 4], spread=0.4)[28])  # near one class, novel to all
     assert (strange.rule, strange.certainty) == ("strangers", "looks like")
     assert {RULES[one.rule] for one in [*answers, once, strange]} == set(RULES.values())
     for one in [*answers, once, strange]:
@@ -135,7 +137,7 @@ def test_shares_of_the_representations_sum_to_one(mean):
     demos = draw_shapes([2] * 4)
     answer = Recognizer(mean=mean).fit(demos).recognize(draw_shapes([1] * 4, spread=0.3)[1])
     assert sum(answer.responsibilities.values()) == pytest.approx(1)
-    assert len(answer.responsibilities) == 5
+    assert len(answer.responsibilities) == 7
 
 
 def test_with_uneven_timing_arc_length_speaks():

@@ -114,13 +114,13 @@ def test_finishing_takes_nothing_back_of_drawings_by_others(strokes):
 def test_what_is_sure_is_right(strokes):
     """By people who showed nothing; less often where a third of the movements are of no known kind."""
     every, of_known_kinds = ({word: [] for word in ("sure", "probably", "looks like", "new")} for _ in range(2))
-    for seed in range(3):
+    for seed in range(6):  # of three, too few are uncertain
         recognizer, known, asked = taught(strokes, 5, seed)
         for answer, label in zip(recognizer.recognize(strokes[0][asked[:200]]), strokes[1][asked[:200]], strict=True):
             every[answer.certainty].append(answer.label == label)
             if label in known:
                 of_known_kinds[answer.certainty].append(answer.label == label)
-    assert len(every["sure"]) > 200
+    assert len(every["sure"]) > 400
     assert np.mean(of_known_kinds["sure"]) >= 0.99
     assert np.mean(every["sure"]) >= 0.93
     assert np.mean(every["sure"]) > np.mean(every["probably"]) > np.mean(every["looks like"])

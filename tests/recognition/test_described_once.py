@@ -1,4 +1,4 @@
-"""A movement is smoothed and described once for each question, whatever is computed from its description."""
+"""A movement is described once for each question, smoothed and in detail, whatever is computed from that."""
 
 from __future__ import annotations
 
@@ -8,21 +8,24 @@ import pytest
 from kineme import Recognizer, Trajectory
 from kineme.anchoring.assignment import assign
 from kineme.similarity import describe
+from kineme.similarity.specification import DEFAULT_REPRESENTATIONS
 from movement_samples import draw_shapes
 
 QUESTIONS = ["predict", "predict_proba", "decision_function", "p_values", "predict_known", "novelty", "describe"]
 
 
 class _Counts:
-    """Movements that were smoothed and described."""
+    """Movements that were smoothed, smoothed in detail, and described."""
 
     def __init__(self, monkeypatch):
-        self.smoothed = self.described = 0
+        self.smoothed = self.detailed = self.described = 0
         smooth, rows = describe.smooth_rows, describe._tile_rows
 
-        def counted_smooth(demos, start, stop, *rest):
-            self.smoothed += stop - start
-            return smooth(demos, start, stop, *rest)
+        def counted_smooth(demos, start, stop, cutoff, *rest):
+            assert cutoff in (10.0, 40.0)
+            self.smoothed += (stop - start) * (cutoff == 10.0)
+            self.detailed += (stop - start) * (cutoff == 40.0)
+            return smooth(demos, start, stop, cutoff, *rest)
 
         def counted_rows(demos, start, stop, *rest):
             self.described += stop - start
@@ -45,17 +48,31 @@ def test_one_description_answers_a_question(question, asked, monkeypatch):
     recognizer, movements = asked
     counts = _Counts(monkeypatch)
     getattr(recognizer, question)(movements)
-    assert (counts.smoothed, counts.described) == (len(movements), len(movements))
+    assert (counts.smoothed, counts.detailed, counts.described) == (len(movements),) * 3
+
+
+def test_what_is_not_compared_in_detail_is_not_smoothed_in_detail(monkeypatch):
+    shapes = draw_shapes([3, 4])
+    weights = [1, 1, 1, 1, 1, 0, 0]
+    for recognizer in (Recognizer(DEFAULT_REPRESENTATIONS[:5]), Recognizer(weights=weights)):
+        recognizer.fit(shapes)
+        counts = _Counts(monkeypatch)
+        recognizer.predict(shapes)
+        assert (counts.smoothed, counts.detailed) == (len(shapes), 0)
 
 
 def test_an_answer_smooths_each_movement_and_each_example_once(asked, monkeypatch):
-    """The map from the nearest demonstration takes the paths that were described; those of examples are made."""
+    """The map from the nearest demonstration takes the paths that were described; those of examples are made.
+
+    Nothing of it needs details.
+    """
     recognizer, movements = asked
     counts = _Counts(monkeypatch)
     answers = recognizer.recognize(movements)
     examples = {one.nearest[0].index for one in answers}
     assert counts.described == len(movements)
     assert counts.smoothed == len(movements) + len(examples)
+    assert counts.detailed == len(movements)
 
 
 def test_movements_that_are_assigned_to_symbols_are_described_once(asked, monkeypatch):
@@ -64,7 +81,7 @@ def test_movements_that_are_assigned_to_symbols_are_described_once(asked, monkey
     both = [one.positions for one in (*movements, *strange)]
     counts = _Counts(monkeypatch)
     assign(both, recognizer)
-    assert (counts.smoothed, counts.described) == (len(both), len(both))
+    assert (counts.smoothed, counts.detailed, counts.described) == (len(both),) * 3
 
 
 def test_a_candidate_in_a_recording_is_described_once(monkeypatch):
@@ -87,4 +104,4 @@ def test_a_candidate_in_a_recording_is_described_once(monkeypatch):
     positions = np.concatenate(pieces)
     recognizer.spot(Trajectory(np.linspace(0.0, 3.0, len(positions)), positions))
     assert asked
-    assert (counts.smoothed, counts.described) == (sum(asked), sum(asked))
+    assert (counts.smoothed, counts.detailed, counts.described) == (sum(asked),) * 3

@@ -76,7 +76,7 @@ def test_speed_at_the_end_and_progress_count_among_the_other_densities(monkeypat
     recognizer = kineme.Recognizer().fit(demos[::7])
     stored = hypotheses(recognizer.comparison_, recognizer.references_, Early())
     paths = smooth_paths(demos[1:2], recognizer.comparison_.cutoff)
-    begun = evidence.describe_begun(stored, paths, demos[1].positions[:1], demos[1:2].durations)
+    begun = evidence.describe_begun(stored, paths, demos[1].positions[:1], demos[1:2].durations, (paths, paths))
 
     def priors(speed):
         return evidence._log_priors(stored, begun._replace(prefixes=begun.prefixes._replace(end_speeds=speed)))[0]
@@ -94,7 +94,9 @@ def test_a_class_of_what_is_over_counts_by_its_most_similar_movement_whatever_it
     recognizer = kineme.Recognizer().fit(demos[[0, 1, 2, 7]])
     stored = hypotheses(recognizer.comparison_, recognizer.references_, Early())
     found = np.full(4 * len(stored.progress), -np.inf)
-    evidence._add_over(stored, smooth_paths(demos[3:4], recognizer.comparison_.cutoff), found, np.zeros(len(found)))
+    how = recognizer.comparison_.specification
+    whole = smooth_paths(demos[3:4], how.cutoff), smooth_paths(demos[3:4], how.detailed_cutoff)
+    evidence._add_over(stored, whole, found, np.zeros(len(found)))
     first, second, _ = stored.log_classes(found[None])[0]
     similar = recognizer.log_similarity(demos[3:4])[0]
     assert first - second == pytest.approx(3.0 * (similar[:3].max() - similar[3]), rel=1e-3)

@@ -31,12 +31,12 @@ def of_people(nested):
 
 
 def test_accuracies_are_those_of_the_recognizer(nested, of_people):
-    far = nested.Values((1.0,) * 5, 0.3, (0.03, 0.3), 6)
+    far = nested.Values((1.0,) * 7, 0.3, (0.03, 0.3), 6)
     found = nested.accuracies(of_people, (nested.GRID[nested.SHIPPED], far))
     expected = {person: [[], []] for person in found}
     demos, labels = of_people.copies[0], of_people.labels
     for _, person, train, test in of_people.splits():
-        expected[person][0].append(Recognizer().fit(demos[train]).score(demos[test], labels[test]))
+        expected[person][0].append(Recognizer(weights="own").fit(demos[train]).score(demos[test], labels[test]))
         with patch.object(widths, "SHARE", 0.3):
             other = Recognizer(weights="equal", rotation_prior=RotationPrior(0.3)).fit(demos[train])
         expected[person][1].append(other.score(demos[test], labels[test]))
@@ -48,13 +48,14 @@ def test_accuracies_are_those_of_the_recognizer(nested, of_people):
 def test_the_shipped_defaults_are_a_point_of_the_grid_and_bands_differ(nested, of_people):
     shipped = nested.GRID[nested.SHIPPED]
     assert (shipped.weights, shipped.share, shipped.concentrations, shipped.band) == (
-        (2.0, 1.0, 2.0, 1.0, 2.0), widths.SHARE, (0.03, 0.1), 6,
+        (2.0, 1.0, 2.0, 1.0, 2.0, 6.0, 6.0), widths.SHARE, (0.03, 0.1), 6,
     )  # fmt: skip
     described = Recognizer().fit(of_people.copies[0]).references_.described
     first, second = (nested.squared_distances(one, one) for one in (described, nested.with_band(described, 3)))
-    np.testing.assert_array_equal(first[[0, 1, 4]], second[[0, 1, 4]])
-    assert (second[2] >= first[2] - 1e-6).all()
-    assert (second[2] > first[2] + 1e-3).any()
+    np.testing.assert_array_equal(first[[0, 1, 4, 6]], second[[0, 1, 4, 6]])
+    for r in (2, 5):
+        assert (second[r] >= first[r] - 1e-6).all()
+        assert (second[r] > first[r] + 1e-3).any()
 
 
 def test_nobody_is_a_template_for_himself_and_nothing_of_the_excluded_is_used(of_people):

@@ -73,7 +73,9 @@ def test_a_typical_impostor_counts_exp_of_minus_three():
     recognizer = Recognizer(weights="equal").fit(draw_shapes([3] * 6, seed=1))
     logs = recognizer.comparison_.similarity.logs(recognizer.references_.described, recognizer.references_.described)
     logs[:, recognizer.references_.labels[:, None] == recognizer.references_.labels] = -np.inf
-    np.testing.assert_allclose(np.median(logs.max(axis=2), axis=1), -3.125, atol=0.05)
+    typical = np.median(logs.max(axis=2), axis=1)
+    np.testing.assert_allclose(typical[:5], -3.125, atol=0.05)
+    assert (np.abs(typical[5:] + 3.125) > 0.5).all()  # in detail the widths are those of the rotated ones
 
 
 def test_representations_keep_half_of_their_own_weight():
@@ -86,7 +88,8 @@ def test_representations_keep_half_of_their_own_weight():
             movements.append(np.column_stack((u**power, bend * np.sin(3 * u**power))))
     recognizer = Recognizer(weights="fitted").fit(movements, np.repeat(["late", "early"], 10))
     share = dict(zip(recognizer.representations_, recognizer.weights_, strict=True))
-    assert all(share[one] >= one.weight / 16 - 1e-12 for one in DEFAULT_REPRESENTATIONS)
+    assert all(share[one] >= one.weight / 40 - 1e-12 for one in DEFAULT_REPRESENTATIONS)
+    assert sum(one.weight for one in DEFAULT_REPRESENTATIONS) == 20
 
 
 def test_shares_that_say_less_than_a_fiftieth_are_left_out_and_larger_ones_kept():
@@ -207,8 +210,8 @@ def _evidence(recognizer, early, size=1.0, slower=1.0, late=0.0):
     first = recognizer.demonstrations_[:1]
     paths, durations = smooth_paths(first, None), first.durations
     start = np.zeros((1, first.n_dims))
-    plain = describe_begun(stored, paths, start, durations)
-    moved = describe_begun(stored, size * paths, start, slower * durations)
+    plain = describe_begun(stored, paths, start, durations, (paths, paths))
+    moved = describe_begun(stored, size * paths, start, slower * durations, (size * paths, size * paths))
     timing = moved.prefixes.timing + late / math.sqrt(moved.prefixes.timing.shape[1])
     moved = moved._replace(prefixes=moved.prefixes._replace(timing=timing))
     whole = len(stored.progress) - 1  # the hypothesis that it is this movement, all of it

@@ -28,8 +28,9 @@ def _two_stages(recognizer, order=None, n_reduced=12, blocks=2):
     order = np.arange(len(demos)) if order is None else order  # row of the features -> movement
     features = feature_rows(demos[order], recognizer.comparison_.specification)
     features = tuple(block.astype(np.float32) for block in features)
-    bases = fit_bases(features, demos.n_dims, n_reduced)
-    reduced = reduce_features(bases, features, demos.n_dims)
+    by_rows = features[: len(recognizer.comparison_.specification.by_rows)]  # details have no bounds
+    bases = fit_bases(by_rows, demos.n_dims, n_reduced)
+    reduced = reduce_features(bases, by_rows, demos.n_dims)
     cuts = np.linspace(0, len(demos), blocks + 1).astype(int)
     parts = tuple(tuple(one.take(slice(a, b)) for one in reduced) for a, b in pairwise(cuts))
     asked = []

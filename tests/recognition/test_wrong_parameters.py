@@ -20,18 +20,19 @@ def test_representations_that_are_none(given):
 
 
 @pytest.mark.parametrize(
-    "weights", [[0] * 5, [1, 1], [-1, 2, 2, 2, 2], [np.nan, 1, 1, 1, 1], [np.inf, 1, 1, 1, 1], {}, ["a"] * 5, 1j]
+    "weights", [[0] * 7, [1] * 5, [-1, *[2] * 6], [np.nan, *[1] * 6], [np.inf, *[1] * 6], {}, ["a"] * 7, 1j]
 )
 def test_weights_that_are_none(weights):
     with pytest.raises(
-        SpecificationError, match="expected weights to be 'auto', 'equal', 'fitted' or 5 numbers from 0, not all 0"
+        SpecificationError,
+        match="expected weights to be 'auto', 'own', 'equal', 'fitted' or 7 numbers from 0, not all 0",
     ):
         Recognizer(weights=weights).fit(DEMOS)
 
 
 def test_only_the_ratio_of_weights_matters_however_large():
-    recognizer = Recognizer(weights=[1e308, 1e308, 0.5e308, 1e308, 1e308]).fit(DEMOS)
-    np.testing.assert_allclose(recognizer.weights_, np.array([2, 2, 1, 2, 2]) / 9)
+    recognizer = Recognizer(weights=[1e308, 1e308, 0.5e308, *[1e308] * 4]).fit(DEMOS)
+    np.testing.assert_allclose(recognizer.weights_, np.array([2, 2, 1, 2, 2, 2, 2]) / 13)
 
 
 @pytest.mark.parametrize("angle", ["wide", [1.0], np.nan, -0.1, 4.0])

@@ -6,6 +6,9 @@ import itertools
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import nnls
 from sklearn.base import clone
 
 from kineme import Recognizer
@@ -13,9 +16,16 @@ from kineme.errors import SpecificationError
 from kineme.kernels.procrustes import Prepared, Procrustes
 from kineme.recognition import Representation
 from kineme.similarity.describe import Described, describe
-from kineme.similarity.similarity import AveragedSimilarity, aligned_weights, fitted_weights, impostor_widths
+from kineme.similarity.similarity import (
+    AveragedSimilarity,
+    _nonnegative_least_squares,
+    aligned_weights,
+    fitted_weights,
+    impostor_widths,
+)
 from kineme.similarity.specification import DEFAULT_REPRESENTATIONS, ROW_REPRESENTATIONS
 from movement_samples import draw_shapes
+from soaking import examples
 
 
 def _timed(n, seed):
@@ -68,14 +78,48 @@ def test_the_weights_are_those_of_largest_centered_alignment():
     assert alignment(weights) >= max(map(alignment, grid)) - 1e-4
 
 
-@pytest.mark.parametrize("counts", [[1, 1, 1], [7, 9], [30], [8, 8]])
-def test_by_default_each_representation_has_its_own_weight(counts):
-    recognizer = Recognizer().fit(draw_shapes(counts))
+OWN = np.array([2, 1, 2, 1, 2, 6, 6]) / 20
+
+
+@pytest.mark.parametrize("counts", [[1], [1, 1, 1], [7, 9], [30], [8, 8]])
+def test_own_weights_are_those_of_the_representations(counts):
+    recognizer = Recognizer(weights="own").fit(draw_shapes(counts))
     assert recognizer.representations_ == DEFAULT_REPRESENTATIONS
-    np.testing.assert_allclose(recognizer.weights_, np.array([2, 1, 2, 1, 2]) / 8)
+    np.testing.assert_allclose(recognizer.weights_, OWN)
 
 
-@pytest.mark.parametrize("weights", ["auto", "equal", "fitted"])
+@pytest.mark.parametrize("counts", [[1], [1, 1, 1], [5], [2, 1], [1, 2, 1], [7, 9]])
+def test_by_default_weights_are_fitted_where_two_classes_are_shown_and_one_of_them_twice(counts):
+    demos = draw_shapes(counts, spread=0.6)
+    weights = Recognizer().fit(demos).weights_
+    is_fitted = len(counts) > 1 and max(counts) > 1
+    expected = Recognizer(weights="fitted" if is_fitted else "own").fit(demos).weights_
+    np.testing.assert_array_equal(weights, expected)
+    assert is_fitted == (np.abs(weights - OWN).max() > 0.01)
+
+
+def test_by_default_other_means_have_equal_weights():
+    """Weights are fitted for the arithmetic one."""
+    for weights in ("auto", "own"):
+        recognizer = Recognizer(mean="geometric", weights=weights).fit(draw_shapes([7, 9]))
+        np.testing.assert_allclose(recognizer.weights_, 1 / 7)
+
+
+def test_own_weights_of_signals_leave_out_what_tells_nothing_of_them():
+    """Turning angles have none even where weights are fitted; equal ones count all."""
+    demos = draw_shapes([4, 5], d=1, spread=0.6)
+    silent = [one.quantity in ("turning", "cloud") for one in DEFAULT_REPRESENTATIONS]
+    own, auto, equal = (Recognizer(weights=weights).fit(demos) for weights in ("own", "auto", "equal"))
+    kept = tuple(one for one, none in zip(DEFAULT_REPRESENTATIONS, silent, strict=True) if not none)
+    assert own.representations_ == kept
+    np.testing.assert_allclose(own.weights_, np.array([2, 1, 2, 6]) / 11)
+    assert "turning" not in {one.quantity for one in auto.representations_}
+    np.testing.assert_allclose(equal.weights_, 1 / 7)
+    alone = Recognizer((DEFAULT_REPRESENTATIONS[0], DEFAULT_REPRESENTATIONS[3]), weights="own").fit(demos)
+    assert [one.quantity for one in alone.representations_] == ["positions"]
+
+
+@pytest.mark.parametrize("weights", ["auto", "own", "equal", "fitted"])
 def test_weights_sum_to_one_and_every_part_has_one(weights):
     recognizer = Recognizer(weights=weights).fit(draw_shapes([8] * 4, spread=0.8))
     assert (recognizer.weights_ > 0).all()
@@ -90,21 +134,23 @@ def test_weights_sum_to_one_and_every_part_has_one(weights):
 def test_given_weights_are_those_of_the_weighted_mean():
     demos, fresh = draw_shapes([3] * 3), draw_shapes([5] * 3, seed=3)
     equal = Recognizer(weights="equal").fit(demos)
-    given = Recognizer(weights=(2.0, 1.0, 1.0, 3.0, 1.0)).fit(demos)
+    given = Recognizer(weights=(2.0, 1.0, 1.0, 3.0, 1.0, 0.5, 1.5)).fit(demos)
     each = np.exp(equal.comparison_.similarity.logs(equal.describe(fresh), equal.references_.described))
-    expected = np.log(np.tensordot(np.array([2.0, 1.0, 1.0, 3.0, 1.0]) / 8.0, each, 1))
+    expected = np.log(np.tensordot(np.array([2.0, 1.0, 1.0, 3.0, 1.0, 0.5, 1.5]) / 10.0, each, 1))
     np.testing.assert_allclose(given.log_similarity(fresh), expected, rtol=1e-4, atol=1e-4)  # single precision
-    one = Recognizer(weights=(0.0, 3.0, 0.0, 0.0, 0.0)).fit(demos)
+    one = Recognizer(weights=(0.0, 3.0, 0.0, 0.0, 0.0, 0.0, 0.0)).fit(demos)
     alone = Recognizer((DEFAULT_REPRESENTATIONS[1],)).fit(demos)
     np.testing.assert_allclose(one.log_similarity(fresh), alone.log_similarity(fresh), rtol=1e-4, atol=1e-4)
 
 
 def test_positions_without_weight_still_give_the_rotation():
     demos, fresh = draw_shapes([3] * 3), draw_shapes([5] * 3, seed=3)
-    whole, clouds = Recognizer().fit(demos), Recognizer(weights=(0, 0, 0, 0, 1)).fit(demos)
+    whole = Recognizer(weights="own").fit(demos)
     logs = whole.comparison_.similarity.logs(whole.describe(fresh), whole.references_.described)
-    np.testing.assert_allclose(clouds.log_similarity(fresh), logs[4] - np.log(5 * 2 / 8), rtol=1e-4, atol=1e-4)
-    assert clouds.recognize(fresh[0]).responsibilities["point cloud"] == pytest.approx(1.0)
+    for r, name in ((4, "point cloud"), (5, "elastic path in detail")):
+        alone = Recognizer(weights=np.eye(7)[r]).fit(demos)
+        np.testing.assert_allclose(alone.log_similarity(fresh), logs[r] - np.log(7 * OWN[r]), rtol=1e-4, atol=1e-4)
+        assert alone.recognize(fresh[0]).responsibilities[name] == pytest.approx(1.0)
 
 
 def test_kernels_that_know_nothing_stay_equal():
@@ -117,20 +163,22 @@ def test_kernels_that_know_nothing_stay_equal():
     np.testing.assert_array_equal(aligned_weights(Blind(), described, np.arange(20) % 2), [0.5, 0.5])
 
 
-@pytest.mark.parametrize("weights", [(1.0, 2.0), (0.0,) * 5, (1.0, -1.0, 1.0, 1.0, 1.0), (1.0, np.nan, 1.0, 1.0, 1.0)])
+@pytest.mark.parametrize(
+    "weights", [(1.0, 2.0), (1.0,) * 5, (0.0,) * 7, (1.0, -1.0, *[1.0] * 5), (1.0, np.nan, *[1.0] * 5)]
+)
 def test_weights_that_cannot_be_are_refused(weights):
-    with pytest.raises(SpecificationError, match="5 numbers from 0, not all 0"):
+    with pytest.raises(SpecificationError, match="7 numbers from 0, not all 0"):
         Recognizer(weights=weights).fit(draw_shapes([1, 1]))
 
 
 def test_weights_need_the_arithmetic_mean():
     with pytest.raises(SpecificationError, match="mean='arithmetic', got them with mean='min'"):
-        Recognizer(mean="min", weights=(1, 1, 1, 1, 1)).fit(draw_shapes([1, 1]))
+        Recognizer(mean="min", weights=(1,) * 7).fit(draw_shapes([1, 1]))
     with pytest.raises(SpecificationError, match=r"weights.*'loud'"):
         Recognizer(weights="loud").fit(draw_shapes([1, 1]))
     with pytest.raises(SpecificationError, match="mean='arithmetic', got it with mean='min'"):
         Recognizer(mean="min", weights="fitted").fit(draw_shapes([8, 8]))
-    np.testing.assert_allclose(Recognizer(mean="min").fit(draw_shapes([8, 8])).weights_, 0.2)
+    np.testing.assert_allclose(Recognizer(mean="min").fit(draw_shapes([8, 8])).weights_, 1 / 7)
 
 
 @pytest.mark.parametrize(
@@ -156,6 +204,28 @@ def test_positions_are_kept_once_and_compared_once():
     whole = Recognizer().fit(draw_shapes([3] * 3)).references_.described
     for part in (whole, whole.take(slice(0, 2)), whole.empty(2), whole.select([0, 2])):
         assert part.pairs.positions is part.blocks[0]
+
+
+@settings(max_examples=examples(60, 500), deadline=None)
+@given(
+    seed=st.integers(0, 10**6), n=st.integers(1, 9), rank=st.integers(1, 9), alike=st.floats(0.0, 0.95),
+    scale=st.sampled_from([1e-6, 1.0, 1e6]),
+)  # fmt: skip
+def test_least_squares_without_negative_weights_are_those_of_scipy(seed, n, rank, alike, scale):
+    """Also where columns are nearly the same, or fewer rows than columns leave the weights open: as good a fit."""
+    rng = np.random.default_rng(seed)
+    A = (1.0 - alike) * rng.normal(size=(rank, n)) + alike * rng.normal(size=(rank, 1))
+    A[:, rng.random(n) < 0.1] = 0.0
+    b = rng.normal(size=rank)
+    A, b = scale * A, scale * b
+    w = _nonnegative_least_squares(A.T @ A, A.T @ b)
+    expected, residual = nnls(A, b)
+    assert (w >= 0).all()
+    assert np.isfinite(w).all()
+    assert not w[~A.any(axis=0)].any()
+    assert np.linalg.norm(A @ w - b) <= residual + 1e-3 * np.linalg.norm(b)
+    if np.linalg.matrix_rank(A) == n and np.linalg.cond(A) < 30:
+        np.testing.assert_allclose(w, expected, rtol=1e-4, atol=1e-6 * max(1.0, expected.max()))
 
 
 def test_half_of_a_fitted_weight_is_the_representations_own():

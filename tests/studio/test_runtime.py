@@ -19,6 +19,7 @@ from node_runtime import NODE, REASON, RUNTIME, ask, in_node, question, unparsed
 import kineme
 from kineme.movements.preparation.pauses import cut_pauses
 from kineme.recognition.answer import LEAST_CONFIDENCE, certainty
+from kineme.similarity.specification import DEFAULT_REPRESENTATIONS
 from kineme.studio.snapshot import Snapshot, pause_rule, snapshot_of_recognizer
 from movement_samples import draw_shapes, stepped, turn
 from soaking import SOAK, slow
@@ -162,10 +163,14 @@ def test_movements_of_people_are_recognized_as_in_python(name):
         ({"scale": "per-dimension"}, 3),
         ({"cutoff": None}, 2),
         ({"weights": "fitted"}, 2),
+        ({"weights": "own"}, 2),
         ({"weights": (0, 1, 1, 0, 2, 0, 3)}, 2),
+        ({"weights": (0, 0, 0, 0, 0, 1, 0)}, 3),
+        ({"representations": DEFAULT_REPRESENTATIONS[:5]}, 2),
         ({"classifier": "nearest"}, 2),
         ({"classifier": "prototype"}, 2),
         ({}, 1),
+        ({"representations": tuple(replace(one, signal=False) for one in DEFAULT_REPRESENTATIONS)}, 1),
         ({}, 5),
         ({"representations": (kineme.recognition.Representation("forcing", arc_share=0.0, n_points=70),)}, 2),
         ({"representations": (kineme.recognition.Representation("positions", arc_share=0.4, n_points=50),)}, 2),
@@ -376,12 +381,13 @@ def some_answers():
 
 @cache
 def some_calibrated_answers():
-    """Of known and of new shapes, where enough movements were left out to keep the rate."""
+    """Of known and of new shapes, turned or as recorded, where enough movements were left out to keep the rate."""
     demos, others = (
         kineme.load_lasa(names) for names in (["CShape", "GShape", "Sine", "WShape"], ["Leaf_1", "Trapezoid"])
     )
     recognizer = kineme.Recognizer().fit(demos[one_in(5, demos)])
-    movements = [*perturbed(demos[one_in(1, demos, 5)]), *perturbed(others[one_in(1, others)])]
+    known = demos[one_in(1, demos, 5)]
+    movements = [*known, *perturbed(known), *perturbed(others[one_in(1, others)])]
     return answers_of(recognizer, movements, 0.05, 0.3)
 
 
@@ -402,6 +408,17 @@ def worst_answers(runtime):
     return compare_answers(some_answers(), runtime) / SIMILAR
 
 
+@cache
+def some_turned_answers():
+    demos = kineme.load_lasa()
+    recognizer = kineme.Recognizer(max_angle=np.pi).fit(demos[one_in(1, demos)])
+    return answers_of(recognizer, perturbed(demos[one_in(1, demos, 3)][::4]))
+
+
+def worst_turned_answers(runtime):
+    return compare_answers(some_turned_answers(), runtime) / SIMILAR
+
+
 def worst_calibrated_answers(runtime):
     return compare_answers(some_calibrated_answers(), runtime) / SIMILAR
 
@@ -415,7 +432,9 @@ def worst_rollouts(runtime):
 
 
 @pytest.mark.filterwarnings("ignore::kineme.errors.ExtrapolationWarning")
-@pytest.mark.parametrize("worst", [worst_answers, worst_calibrated_answers, worst_states, worst_rollouts])
+@pytest.mark.parametrize(
+    "worst", [worst_answers, worst_turned_answers, worst_calibrated_answers, worst_states, worst_rollouts]
+)
 def test_right_constants_are_right(worst):
     assert worst(RUNTIME) <= 1
 
@@ -432,10 +451,14 @@ WRONG = {
     "distances.js": [
         ("how.line_weight ** 0.25", "how.line_weight ** 0.26", worst_answers),
         ("how.turning_weight)", "how.turning_weight * 1.001)", worst_answers),
+        ("how.details.upright ? identity : R", "R", worst_answers),
+        ("how.details.upright ? identity : R", "identity", worst_turned_answers),
     ],
     "description.js": [
         ("N_POINTS = 199", "N_POINTS = 198", worst_answers),
         ("0.5 * (ends", "0.501 * (ends", worst_answers),
+        ("smooth(how.details.cutoff)", "smooth(how.cutoff)", worst_answers),
+        ("how.details.positions)", "{ ...how.details.positions, n_points: 66 })", worst_answers),
     ],
     "rotation.js": [("rule.prior[3]) * norms", "rule.prior[3]) * norms * 1.01", worst_answers)],
     "hypotheses.js": [("/ numbers.last,", "/ (1.05 * numbers.last),", worst_states)],

@@ -125,7 +125,10 @@ class Specification:
 @lru_cache(maxsize=16)  # a library is opened again and again
 def _of_texts(recognizer: str, dmp_text: str) -> Specification:
     parameters, dmp = parsed(recognizer), parsed(dmp_text)
-    # Where it is not said, signals are described as they were when it could not be said.
+    # Before there were signals, all movements were described as paths, and "auto" took the representations' weights.
+    before = any("signal" not in fields for fields in parameters["representations"])
+    if before and parameters.get("weights", "auto") == "auto":
+        parameters["weights"] = "own"
     own = (Representation(**{"signal": False} | fields) for fields in parameters["representations"])
     parameters["representations"] = tuple(own)
     if (prior := parameters.get("rotation_prior")) is not None:
