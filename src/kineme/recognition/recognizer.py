@@ -47,8 +47,8 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     Parameters
     ----------
     representations : tuple of Representation, optional
-        By default positions over arc length, forcing term over time, elastic path, turning angles, and point cloud,
-        elastic path and point cloud once more in detail, see `Representation`; with ``translation=False`` or
+        By default positions over arc length, forcing term over time, elastic path, turning angles, and point cloud;
+        elastic path and point cloud once more, in detail, see `Representation`; with ``translation=False`` or
         ``scale="none"`` positions over arc length, and the forcing term over arc length and over time.
     max_angle : float, optional
         Largest rotation [rad] between movements of one class, instead of the `rotation_prior`; 0 for none. With pi, N
@@ -71,9 +71,10 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     rotation_prior : RotationPrior or None
         How rare rotations between movements of one class are, in two and three dimensions, where there is no
         `max_angle`: one or the other can be given. By default a rotation by a right angle costs 0.06 of the inner
-        product of two equal paths in the plane and 0.2 in space, and none is forbidden. Pass
-        ``RotationPrior(vertical=(0, 0, 1))`` for movements that are turned about the vertical, and rarely tilted. None
-        forbids rotations beyond pi/3 and costs nothing below.
+        product of two equal paths in the plane and 0.2 in space, and none is forbidden; what is compared in detail is
+        not rotated, which any other prior and a `max_angle` change. Pass ``RotationPrior(vertical=(0, 0, 1))`` for
+        movements that are turned about the vertical, and rarely tilted. None forbids rotations beyond pi/3 and costs
+        nothing below.
 
     Attributes
     ----------
