@@ -1,8 +1,8 @@
 """
-Five ways to look at a movement
-===============================
+Seven ways to look at a movement
+================================
 
-A recognizer compares movements in five representations and averages narrow kernels, so that one representation in
+A recognizer compares movements in seven representations and averages narrow kernels, so that one representation in
 which two movements are close suffices. Which one carries the answer depends on what was done to the movement. With
 one demonstration of each shape, what is changed too much counts as unknown.
 """
@@ -40,5 +40,5 @@ drawn.set(aspect="equal", ylim=(-len(answers) + 0.5, 0.5))
 drawn.axis("off")
 axes.set(xlabel="share of each representation in the similarity to the shape that was shown", xlim=(0, 1.0))
 axes.invert_yaxis()
-figure.legend(loc="outside upper center", ncols=5, columnspacing=1.0)
+figure.legend(loc="outside upper center", ncols=4, columnspacing=1.0)
 plt.show()

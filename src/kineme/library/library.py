@@ -236,7 +236,10 @@ class ActionLibrary:
         return read.groups(self.store, self._choose(None, ids))
 
     def features(self, ids: ArrayLike | None = None) -> NDArray[np.float32]:
-        """Return the rows of all representations compared sample by sample, concatenated, shape (k, sum of d * S)."""
+        """Return feature rows, concatenated, shape (k, sum of d * S).
+
+        Those of all representations compared sample by sample and, where others are in detail, positions in detail.
+        """
         return read.features(self.store, self._choose(None, ids))
 
     def primitives(self, symbol: str | None = None, ids: ArrayLike | None = None) -> Primitives:

@@ -48,8 +48,8 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     Parameters
     ----------
     representations : tuple of Representation, optional
-        By default positions over arc length, forcing term over time, elastic path, turning angles, and point cloud,
-        elastic path and point cloud once more in detail, see `Representation`; with ``translation=False`` or
+        By default positions over arc length, forcing term over time, elastic path, turning angles, and point cloud;
+        elastic path and point cloud once more, in detail, see `Representation`; with ``translation=False`` or
         ``scale="none"`` positions over arc length, and the forcing term over arc length and over time.
     max_angle : float, optional
         Largest rotation [rad] between movements of one class, instead of the `rotation_prior`; 0 for none. With pi, N

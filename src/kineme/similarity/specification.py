@@ -79,8 +79,8 @@ class Representation:
     detailed : bool, default False
         For what is compared pair by pair: in detail. The path is smoothed below four times as many cycles, and has
         twice as many segments (66) and more points (32); long movements, such as words, have more detail than ten
-        cycles show. It is not rotated, since some movements differ by their direction alone, unless `max_angle` or a
-        prior of its own says how movements are rotated.
+        cycles show. It is not rotated, since some movements differ by their direction alone, unless a `max_angle` or
+        another prior than the default one says how movements are rotated.
     signal : bool, default True
         Compare movements of one dimension, which are signals, over time whatever `arc_share` says, by slopes where
         others have tangents; turning angles and point clouds, which tell nothing of them, then have no weight of their

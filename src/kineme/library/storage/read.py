@@ -141,7 +141,7 @@ def _times(stamps: dict[int, bytes], offsets: NDArray[np.intp], t0: Array, durat
 
 
 def features(store: Store, ids: Ids) -> NDArray[np.float32]:
-    """Return rows of all representations that are compared sample by sample, concatenated, shape (k, sum of d * S)."""
+    """Return rows of `ComparisonSpecification.stored_rows`, concatenated, shape (k, sum of d * S)."""
     wanted, order = _sorted(ids)
     width, done = sum(store.specification.widths(store.n_dims or 0)), 0
     result = np.empty((len(wanted), width), dtype=np.float32)
