@@ -74,9 +74,10 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     rotation_prior : RotationPrior or None
         How rare rotations between movements of one class are, in two and three dimensions, where there is no
         `max_angle`: one or the other can be given. By default a rotation by a right angle costs 0.06 of the inner
-        product of two equal paths in the plane and 0.2 in space, and none is forbidden. Pass
-        ``RotationPrior(vertical=(0, 0, 1))`` for movements that are turned about the vertical, and rarely tilted. None
-        forbids rotations beyond pi/3 and costs nothing below.
+        product of two equal paths in the plane and 0.2 in space, and none is forbidden; what is compared in detail is
+        not rotated, which any other prior and a `max_angle` change. Pass ``RotationPrior(vertical=(0, 0, 1))`` for
+        movements that are turned about the vertical, and rarely tilted. None forbids rotations beyond pi/3 and costs
+        nothing below.
     points : int, optional
         How many points in the plane or in space the columns are, one after the other: hands, markers, joints of a body.
         They turn and scale as one. By default they are those that the names of columns tell, such as ``left_hand_x,
