@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 import kineme
 from bench.by_person import FOLDER
 from bench.rows import Row
-from kineme.anchoring import proposals as propose
-from kineme.anchoring.proposals import DEFAULT_METHOD
+from kineme.anchoring.proposals import DEFAULT_METHOD, propose
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme_experiments.evaluation.data import load_data
 

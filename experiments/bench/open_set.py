@@ -120,7 +120,10 @@ def splits(one: Recordings, n_shown: int, others: bool, draws: int, known_share:
             rng = np.random.default_rng([draw, n_shown, k])
             known = np.sort(rng.permutation(classes)[: round(known_share * len(classes))])
             pool = np.flatnonzero((one.people != person) if others else (one.people == person))
-            templates = np.concatenate([rng.choice(pool[one.labels[pool] == c], n_shown, replace=False) for c in known])
+            of_class = [pool[one.labels[pool] == c] for c in known]
+            if min(map(len, of_class)) < n_shown:
+                continue  # as where each person wrote each word once
+            templates = np.concatenate([rng.choice(rows, n_shown, replace=False) for rows in of_class])
             asked = np.setdiff1d(np.flatnonzero(one.people == person), templates)
             is_known = np.isin(one.labels[asked], known)
             yield Split(templates, asked[is_known], asked[~is_known])
@@ -153,6 +156,8 @@ def ask(one: Recordings, split: Split, grouped: bool) -> Asked:
 
 def open_set_rows(what: str, asked: list[Asked], n_shown: int) -> list[Row]:
     """Means over the splits."""
+    if not asked:
+        return []
     known, unknown = (100 * np.array([one.rejected[k] for one in asked]) for k in (0, 1))
     area = [
         roc_auc_score(np.repeat([0, 1], [len(n) for n in one.novelty]), np.concatenate(one.novelty)) for one in asked
@@ -179,6 +184,8 @@ def reliability_rows(draws: int) -> list[Row]:
     for one in sets:
         for others in (False, True) if len(np.unique(one.people)) > 1 else (False,):
             found = [ask(one, s, others) for n in (1, 2, 4) for s in splits(one, n, others, draws, 1.0)]
+            if not found:
+                continue
             right = np.concatenate([one.right for one in found])
             confidence = np.concatenate(
                 [class_probabilities(each.similar, each.exponent).max(axis=1) for each in found]

@@ -11,7 +11,7 @@ from kineme.errors import SpecificationError
 from kineme.kernels.pair_distances import pair_distances, shapes_of
 from kineme.kernels.procrustes import Procrustes
 from kineme.movements.channels.channel import Channel
-from kineme.movements.channels.points import count_points
+from kineme.movements.channels.detect import count_points
 from kineme.recognition import RotationPrior
 from kineme.similarity.bounds import fit_bases, log_bounds, reduce_features
 from kineme.similarity.comparison import fit_comparison

@@ -19,10 +19,9 @@ from kineme.cli.learn import learn
 from kineme.cli.library import library
 from kineme.cli.move import move
 from kineme.cli.output import write
-from kineme.cli.recognize import recognize
+from kineme.cli.recognize import recognize, why
 from kineme.cli.segment import segment
 from kineme.cli.studio import page, studio
-from kineme.cli.why import why
 from kineme.errors import KinemeError
 from kineme.reporting.text import printable, printable_lines
 from kineme.runtime.compiled import tell_when_compiling

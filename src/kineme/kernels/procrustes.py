@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -111,7 +111,10 @@ class Procrustes:
 
     def by_points(self, rows: NDArray[Any]) -> NDArray[Any]:
         """The inverse of `by_coordinates`."""
-        return replace(self, n_dims=self.n_points, n_points=self.n_dims, prior=None).by_coordinates(rows)
+        if self.n_points == 1:
+            return rows
+        parts = rows.reshape(len(rows), self.n_dims, self.n_points, -1)
+        return np.ascontiguousarray(parts.transpose(0, 2, 1, 3)).reshape(len(rows), -1)
 
     def mixed(self, paths: NDArray[Any]) -> NDArray[Any]:
         """Paths (n, J d, S) of the q points that are compared pair by pair, (n, q d, S): centered, at size 1."""

@@ -27,7 +27,7 @@ from kineme.kernels.pair_distances import CloudSpec, ElasticSpec
 from kineme.kernels.procrustes import Procrustes
 from kineme.kernels.rotation import RotationPrior
 from kineme.movements.channels.channel import Channels
-from kineme.movements.channels.points import count_points
+from kineme.movements.channels.detect import count_points
 from kineme.movements.preparation.resample import resample_by_arc_length
 from kineme.movements.preparation.smooth import Smooth, spline_matrix
 from kineme.runtime.compiled import compiled_module, use_compiled
