@@ -31,7 +31,7 @@ def asked(tmp_path_factory):
     """A C done elsewhere, smaller, turned and faster; and a shape that the library does not know."""
     path = tmp_path_factory.mktemp("asked")
     c, strange = kineme.load_lasa(["CShape"])[3], kineme.load_lasa(["Sshape"])[2]
-    turn = np.array([[math.cos(0.4), -math.sin(0.4)], [math.sin(0.4), math.cos(0.4)]])
+    turn = np.array([[math.cos(0.1), -math.sin(0.1)], [math.sin(0.1), math.cos(0.1)]])
     write_movement(path / "c.csv", {"times": 0.8 * c.times, "positions": 3 + 0.5 * c.positions @ turn.T})
     write_movement(path / "strange.csv", {"times": strange.times, "positions": strange.positions})
     (path / "bad.csv").write_text("time,x,y\n0,1\n")
@@ -45,7 +45,7 @@ def test_known_and_unknown_in_one_folder(folder, asked):
     assert known["answer"]["nearest"][0]["name"] == "CShape 4"
     change = known["answer"]["transform"]
     assert change["scale"][0] == pytest.approx(0.5, rel=1e-3)
-    assert change["angle"] == pytest.approx(0.4, abs=1e-3)
+    assert change["angle"] == pytest.approx(0.1, abs=1e-3)
     assert change["duration_ratio"] == pytest.approx(0.8, rel=1e-6)
     assert (strange["recording"], strange["answer"]["label"], strange["id"]) == ("strange.csv", None, None)
     assert len(data["problems"]) == 1

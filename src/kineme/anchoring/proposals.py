@@ -8,18 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kineme.anchoring.clustering import (
-    METHODS,
-    Clusters,
-    components,
-    count_by_eigengap,
-    count_clusters,
-    fuse,
-    local_similarities,
-    set_apart,
-    spectral,
-    stabilities,
-)
+from kineme.anchoring import clustering
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.recognition.conformal import check_groups, comparable_groups
@@ -286,7 +275,7 @@ def propose(  # noqa: PLR0913 - what is asked, and how it is compared
     TrajectoryError
         Not one group for each movement.
     """
-    check_choice("method", method, [_SPECTRAL, *METHODS])
+    check_choice("method", method, [_SPECTRAL, *clustering.METHODS])
     check_count("min_members", min_members, 2)
     described = describe(movements, like)
     if n_clusters is not None:
@@ -334,24 +323,24 @@ def _propose(
 
 def _by_neighbors(
     described: Described, n_clusters: int | None, min_members: int, people: NDArray[np.intp] | None
-) -> tuple[Clusters, Array]:
+) -> tuple[clustering.Clusters, Array]:
     """Clusters of movements that are not alone, and how stable each is."""
     described = by_shape(described)
     squares = squared_distances(described, described)
     squares = 0.5 * (squares + squares.transpose(0, 2, 1))
-    component = components(squares)
+    component = clustering.components(squares)
     large = np.flatnonzero(np.bincount(component)[component] >= min_members)
     clusters = np.full(len(described), -1, dtype=np.intp)
     if len(large) < 3:
         return clusters, np.empty(0)
     squares, weights = squares[:, large[:, None], large], described.own_weights
-    similar = fuse(squares, weights)
+    similar = clustering.fuse(squares, weights)
     if people is not None:
-        similar = link_people(similar, local_similarities(squares, weights), people[large])
-    similar = set_apart(similar, component[large])
-    wanted = count_by_eigengap(similar) if n_clusters is None else n_clusters
-    clusters[large] = spectral(similar, wanted, min_members)
-    stable = stabilities(similar, clusters[large], lambda some: spectral(some, wanted))
+        similar = link_people(similar, clustering.local_similarities(squares, weights), people[large])
+    similar = clustering.set_apart(similar, component[large])
+    wanted = clustering.count_by_eigengap(similar) if n_clusters is None else n_clusters
+    clusters[large] = clustering.spectral(similar, wanted, min_members)
+    stable = clustering.stabilities(similar, clusters[large], lambda some: clustering.spectral(some, wanted))
     return clusters, stable
 
 
@@ -369,17 +358,19 @@ def by_shape(described: Described) -> Described:
     return selected if own is None else replace(selected, own_weights=tuple(own[twins[r]] for r in chosen))
 
 
-def _by_distances(distances: Array, method: str, n_clusters: int | None, min_members: int) -> tuple[Clusters, Array]:
+def _by_distances(
+    distances: Array, method: str, n_clusters: int | None, min_members: int
+) -> tuple[clustering.Clusters, Array]:
     """Clusters of all movements, and how stable each is."""
     share = n_clusters or 0
     if method == "agglomerative" and n_clusters is None:
-        share = count_clusters(distances)
+        share = clustering.count_clusters(distances)
 
-    def again(some: Array) -> Clusters:
-        return METHODS[method](some, share, 1 if method == "agglomerative" else min_members)
+    def again(some: Array) -> clustering.Clusters:
+        return clustering.METHODS[method](some, share, 1 if method == "agglomerative" else min_members)
 
-    clusters = METHODS[method](distances, share, min_members)
-    return clusters, stabilities(distances, clusters, again)
+    clusters = clustering.METHODS[method](distances, share, min_members)
+    return clusters, clustering.stabilities(distances, clusters, again)
 
 
 def own_order(K: Array) -> NDArray[np.intp]:
