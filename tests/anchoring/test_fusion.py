@@ -131,7 +131,7 @@ def test_rare_clusters_and_single_movements_are_told_from_a_large_one():
 
 def test_the_forcing_term_is_left_out_where_pairs_are_compared():
     demos = draw_kinds([4, 4])
-    assert by_shape(describe(demos).take([0, 3, 5])).n_representations == 4
+    assert by_shape(describe(demos).take([0, 3, 5])).n_representations == 6
     by_rows = describe(demos, ComparisonSpecification(representations=ROW_REPRESENTATIONS))
     assert by_shape(by_rows) is by_rows
 
@@ -232,7 +232,7 @@ def test_representations_count_by_their_weights():
     first, second = (fuse(squares, weights) for weights in ([1e6, 1.0, 1.0], [1.0, 1e6, 1.0]))
     assert np.abs(first - second).max() > 0.1 * first.max()
     weights = by_shape(describe(draw_kinds([4, 4]))).own_weights
-    assert weights == (2.0, 2.0, 1.0, 2.0)
+    assert weights == (2.0, 2.0, 1.0, 2.0, 2.0, 2.0)  # in detail as their twins
 
 
 @pytest.mark.soak
@@ -246,11 +246,11 @@ def test_solids_of_five_people_are_told_apart_by_who_drew_them(gestures):
 
 
 def test_digits_of_five_people_are_ten_clusters(digits):
-    """By themselves one more or less, 20 to 40 when people are not connected; all right if ten are asked for."""
+    """By themselves one more or less: one digit may be two; all right if ten are asked for."""
     demos, _ = digits
     proposals = propose(demos)
     assert 9 <= len(proposals) <= 11
-    assert recovered(demos.labels, proposals) >= 0.99
+    assert recovered(demos.labels, proposals) >= 0.97
     if SOAK:
         assert recovered(demos.labels, propose(demos, n_clusters=10)) >= 0.99
 

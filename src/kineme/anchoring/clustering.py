@@ -33,6 +33,7 @@ _FAR = 5.0  # times the usual distance to a neighbor
 _APART = 1e-3  # of their similarity is left to movements of components apart
 _NONE = 1e-6  # largest distance, as a share of the typical one, of movements that do not differ
 _LEAST = 1e-30  # similarity, above 0
+_FEW = 0.2  # of the clusters may be small
 _LEAST_GAP = 0.15  # of the largest gap between eigenvalues: numbers of clusters that may be
 
 
@@ -155,14 +156,16 @@ def _diffused(sparse: csr_array, full: Array) -> Array:
     return np.asarray(0.5 * (moved + moved.T))
 
 
-def count_by_eigengap(similar: Array) -> int:
+def count_by_eigengap(similar: Array, min_members: int = 1, people: NDArray[np.intp] | None = None) -> int:
     """The number of clusters c, from 2 to n / 2, by gaps between the c-th and the next eigenvalue.
 
     Of the normalized similarities ``D^-1/2 W D^-1/2``, with W as `fuse` gives it. With c clusters that nothing
     connects, c eigenvalues are 1. It is the c with the largest gap, which is often that between a few groups of similar
     clusters; or, if these are more, the c whose clusters have the best silhouette in ``-log W``, among gaps of at least
     0.15 of it (P. Rousseeuw, "Silhouettes", Journal of Computational and Applied Mathematics 20, 1987): two clusters of
-    one kind are merged at a glance, and kinds that were never divided are not seen.
+    one kind are merged at a glance, and kinds that were never divided are not seen. Not counted are clusterings with
+    more than a fifth of clusters of fewer than `min_members`, or, where `people` (n,) made the movements, with more
+    than half of the movements in clusters of one person: these are people and no kinds.
     """
     from sklearn.metrics import silhouette_score
 
@@ -177,10 +180,19 @@ def count_by_eigengap(similar: Array) -> int:
     scores = [-np.inf]
     for c in (np.flatnonzero(gaps >= _LEAST_GAP * gaps.max()) + 2).tolist():
         clusters = _by_directions(vectors[:, :c], c)
-        if 1 < len(np.unique(clusters)) < n:
+        sizes = np.bincount(clusters)
+        if 1 < len(sizes) < n and (sizes < min_members).mean() <= _FEW and _shared(clusters, people):
             counts.append(c)
             scores.append(float(silhouette_score(distances, clusters, metric="precomputed")))
     return max(counts[0], counts[int(np.argmax(scores))])
+
+
+def _shared(clusters: Clusters, people: NDArray[np.intp] | None) -> bool:
+    """Tell whether half of the movements or more are in clusters of several people, if there are several."""
+    if people is None or len(np.unique(people)) == 1:
+        return True
+    several = np.array([len(np.unique(people[clusters == k])) > 1 for k in range(int(clusters.max()) + 1)])
+    return bool(several[clusters].mean() >= 0.5)
 
 
 def spectral(similar: Array, n_clusters: int, min_members: int = 1) -> Clusters:

@@ -338,7 +338,8 @@ def _by_neighbors(
     if people is not None:
         similar = link_people(similar, clustering.local_similarities(squares, weights), people[large])
     similar = clustering.set_apart(similar, component[large])
-    wanted = clustering.count_by_eigengap(similar) if n_clusters is None else n_clusters
+    who = None if people is None else people[large]
+    wanted = clustering.count_by_eigengap(similar, min_members, who) if n_clusters is None else n_clusters
     clusters[large] = clustering.spectral(similar, wanted, min_members)
     stable = clustering.stabilities(similar, clusters[large], lambda some: clustering.spectral(some, wanted))
     return clusters, stable

@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import matplotlib
 import numpy as np
 from matplotlib.collections import LineCollection
-from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from kineme.errors import SpecificationError
@@ -157,7 +156,8 @@ def _draw_overlay(panel: Any, path: Array, overlay: Panel, axes: Array | None, h
     for movement, _ in curves:
         pieces = np.stack((movement[:-1], movement[1:]), axis=1)
         between = 0.5 * (overlay.differences[:-1] + overlay.differences[1:])
-        colored = LineCollection(list(pieces), array=between, cmap="plasma", norm=Normalize(0.0, highest), linewidth=2)
+        colored = LineCollection(list(pieces), array=between, cmap="plasma", linewidth=2)
+        colored.set_clim(0.0, highest)
         panel.add_collection(colored)
         panel.plot(*movement[0], "o", color=BLUE, markersize=5)
     panel.autoscale_view()
