@@ -56,6 +56,7 @@ EXEMPT = {
     "dmp.pose.pose_controller.PoseState.orientation": "of one movement at one moment",
     "dmp.pose.pose_controller.PoseState.pose": "of one movement at one moment",
     "similarity.bounds.ReducedFeatures.take": "an index into arrays",
+    "kernels.procrustes.Procrustes.by_points": "an order of numbers; see test_points.py",
     "similarity.bounds.log_bounds": "of pairs; see test_bounds.py",
     "similarity.comparison.StoredReferences.bounds": "of pairs; see test_bounds.py",
     "recognition.outliers.find_outliers": "compares each with the others of its label",
