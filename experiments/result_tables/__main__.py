@@ -23,15 +23,20 @@ PAGE = DOCS / "guide" / "recognition.md"
 #: Default -> why, and the other values that were measured.
 DEFAULTS: dict[str, tuple[str, tuple[str, ...]]] = {
     "the defaults": ("", ("defaults",)),
-    "five representations": (
+    "seven representations": (
         "they fail on different movements; in an average of kernels one that succeeds suffices",
         (
             "positions over arc length alone", "f over time alone", "elastic path alone", "turning angles alone",
             "point cloud alone", "without positions over arc length", "without f over time", "without elastic path",
-            "without turning angles", "without point cloud", "with f over arc length",
+            "without turning angles", "without point cloud", "elastic path in detail alone",
+            "point cloud in detail alone", "without elastic path in detail", "without point cloud in detail",
+            "without detail", "with f over arc length",
         ),
     ),
-    "weights 2, 1, 2, 1, 2": ("those that compare the whole shape count twice", ("equal weights",)),
+    "weights 2, 1, 2, 1, 2, 6, 6": (
+        "those that compare the whole shape count twice, in detail six times",
+        ("equal weights", "detail at the weight of the others"),
+    ),
     '`mean="arithmetic"`': (
         "one representation with a high similarity suffices", ("geometric", "harmonic", "min", "quadratic")
     ),
@@ -62,6 +67,7 @@ def tables() -> dict[str, str]:
         "people": table(*evaluated["people"]),
         "lasa": table(*evaluated["shapes"]),
         "open-set": table(*evaluated["unknown"]),
+        "strangers": _strangers(),
         "stream": _stream(),
     }
 
@@ -101,6 +107,29 @@ def _nested() -> str:
             f"| {row['peer']:.3f} | {best:.3f} |"
         )
     return "\n".join(lines)
+
+
+def _strangers() -> str:
+    """A line for each set and number of demonstrations, and a sentence on where a rival is ahead."""
+    *measured, mean = rows("strangers")
+    lines = [
+        "| movements by others | kineme | best of the rivals | lead ± standard error |",
+        "|---|---|---|---|",
+    ]
+    behind = []
+    for row in measured:
+        lead, error = row["details"]["lead"], row["details"]["standard_error"]
+        lines.append(
+            f"| {row['what']} | {row['ours']:.3f} | {row['peer']:.3f}, {row['peer_name']} | {lead:+.3f} ± {error:.3f} |"
+        )
+        if lead < -2 * error:
+            behind.append(row["what"])
+    clearly = "; ".join(behind) or "nowhere"
+    sentence = (
+        f"On average kineme is {mean['ours']:.3f} ahead of the best rival. Behind it by more than two standard errors: "
+        f"{clearly} (`python -m bench --only strangers`)."
+    )
+    return "\n".join([*lines, "", sentence])
 
 
 def _stream() -> str:

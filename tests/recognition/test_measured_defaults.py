@@ -33,7 +33,7 @@ def test_the_whole_is_ahead_of_each_part():
     measured = {what.removesuffix(", by others"): value for what, value in _measured().items() if "by others" in what}
     whole = measured["defaults"]
     assert all(value < whole for name, value in measured.items() if name.endswith("alone"))
-    kept = {"without positions over arc length", "without f over time"}
+    kept = {"without positions over arc length", "without point cloud", "without elastic path in detail"}
     assert all(value < whole for name, value in measured.items() if name.startswith("without") and name not in kept)
 
 
