@@ -105,6 +105,7 @@ def browser():
     if path is None:
         pytest.skip("no chromium is installed")
     with playwright.sync_playwright() as started:
-        browser = started.chromium.launch(executable_path=path, headless=True)
+        # Painted without an emulated graphics card, which takes longer; WebGL has one all the same.
+        browser = started.chromium.launch(executable_path=path, headless=True, args=["--disable-gpu"])
         yield browser
         browser.close()
