@@ -11,7 +11,7 @@ import kineme
 from kineme.dmp.pose.tangent import as_poses
 from kineme.dmp.recorded_as import RecordedAs
 from kineme.movements.channels.channel import Channel
-from kineme.movements.channels.coordinates import as_wxyz, canonical, from_wxyz, learned
+from kineme.movements.channels.coordinates import as_wxyz, canonical, learned
 from kineme.movements.preparation.trim import TrimRest
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import of_channels
@@ -21,6 +21,11 @@ Q = Channel("q", "orientation", ("qx", "qy", "qz", "qw"), None, "xyzw")
 XYZ = tuple(Channel(axis, "position", (axis,)) for axis in "xyz")
 GRIPPER = Channel("gripper", "discrete", ("gripper",))
 POSE = (*XYZ, Q, GRIPPER)
+
+
+def from_wxyz(q, channel):
+    """Quaternions in the order of a channel's columns: the inverse of `as_wxyz`."""
+    return q[..., ["wxyz".index(part) for part in channel.order]]
 
 
 def turning(seed=0, n=80, turns=4.0):
