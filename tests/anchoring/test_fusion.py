@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from sklearn.metrics import adjusted_rand_score
 
 from kineme import Demonstrations
-from kineme.anchoring import clustering
 from kineme.anchoring.clustering import NEIGHBORS, components, count_by_eigengap, fuse, set_apart, spectral
 from kineme.anchoring.proposals import by_shape, link_people, propose
 from kineme.errors import TrajectoryError
@@ -76,57 +75,6 @@ def test_what_is_near_in_one_representation_or_the_other_is_connected():
     assert adjusted_rand_score(ring, spectral(similar, 2)) == 1.0
 
 
-def connected(within, similarities):
-    """Similarities of as many clusters as rows of `similarities`, of 6 movements each: to their own, and to others."""
-    which = np.repeat(np.arange(len(similarities)), 6)
-    noise = np.random.default_rng(0).uniform(0.9, 1.1, (len(which), len(which)))
-    similar = np.where(which[:, None] == which, within, np.asarray(similarities)[which[:, None], which])
-    similar = similar * (noise + noise.T)
-    np.fill_diagonal(similar, 0.0)
-    return which, similar
-
-
-def test_kinds_of_a_few_groups_are_counted_although_the_gap_between_groups_is_the_largest():
-    """Twelve kinds in three groups: the largest gap alone merges them, as it does a hundred words."""
-    group = np.repeat(np.arange(3), 4)
-    which, similar = connected(1.0, np.where(group[:, None] == group, 0.3, 1e-2))
-    values = np.linalg.eigvalsh(similar / np.sqrt(np.outer(similar.sum(axis=1), similar.sum(axis=1))))[::-1]
-    gaps = values[:-1] - values[1:]
-    assert gaps[2] > gaps[11] > 0.1 * gaps[2]
-    assert count_by_eigengap(similar) == 12
-    assert adjusted_rand_score(which, spectral(similar, 12)) == 1.0
-    near_groups = connected(1.0, np.where(group[:, None] == group, 0.7, 1e-2))[1]
-    assert count_by_eigengap(near_groups) == 3
-
-
-def test_of_clusters_as_compact_as_others_those_of_the_larger_gap_are_counted(monkeypatch):
-    """A gap e times as large is worth 0.02 of the silhouette, or 0.3 between linked people; a tenth counts for nothing.
-
-    With gaps of 1, 1/e and 1/20 at 2, 4 and 5 clusters.
-    """
-    gaps, n = {2: 1.0, 4: np.exp(-1.0), 5: 0.05}, 12
-    falling = -np.cumsum([0.0, 0.0, *(gaps.get(c, 0.0) for c in range(2, n))])
-    vectors = np.linalg.qr(np.random.default_rng(0).normal(size=(n, n)))[0]
-    monkeypatch.setattr(clustering, "eigh", lambda *_: (falling[::-1], vectors))
-
-    def counted(worth, linked=False):
-        fits = {2: 0.5, 4: 0.5 + worth, 5: 0.99}
-        monkeypatch.setattr("sklearn.metrics.silhouette_score", lambda _, c, metric: fits[len(np.unique(c))])
-        monkeypatch.setattr(clustering, "_by_directions", lambda _, c: np.arange(n) % c)
-        return count_by_eigengap(np.ones((n, n)), linked)
-
-    assert [counted(worth) for worth in (0.019, 0.021)] == [2, 4]
-    assert [counted(worth, linked=True) for worth in (0.29, 0.31)] == [2, 4]
-
-
-def test_clusters_that_are_counted_and_too_small_are_left_over():
-    """Instead of others that are divided until there are as many."""
-    demos = draw_kinds([6, 2, 2, 7], spread=0.02)
-    proposals = propose(demos)
-    assert [len(one) for one in proposals.proposals] == [7, 6]
-    assert sorted(proposals.left_over.tolist()) == [6, 7, 8, 9]
-
-
 @pytest.mark.parametrize("c", [2, 3, 7])
 def test_as_many_clusters_as_nothing_connects(c):
     which = np.repeat(np.arange(c), 6)
@@ -183,7 +131,7 @@ def test_rare_clusters_and_single_movements_are_told_from_a_large_one():
 
 def test_the_forcing_term_is_left_out_where_pairs_are_compared():
     demos = draw_kinds([4, 4])
-    assert by_shape(describe(demos).take([0, 3, 5])).n_representations == 6
+    assert by_shape(describe(demos).take([0, 3, 5])).n_representations == 4
     by_rows = describe(demos, ComparisonSpecification(representations=ROW_REPRESENTATIONS))
     assert by_shape(by_rows) is by_rows
 
@@ -284,29 +232,27 @@ def test_representations_count_by_their_weights():
     first, second = (fuse(squares, weights) for weights in ([1e6, 1.0, 1.0], [1.0, 1e6, 1.0]))
     assert np.abs(first - second).max() > 0.1 * first.max()
     weights = by_shape(describe(draw_kinds([4, 4]))).own_weights
-    assert weights == (2.0, 2.0, 1.0, 2.0, 6.0, 6.0)
+    assert weights == (2.0, 2.0, 1.0, 2.0)
 
 
 @pytest.mark.soak
 def test_solids_of_five_people_are_told_apart_by_who_drew_them(gestures):
-    """Of ten that are asked for 0.98, and 0.73 unless it is said who drew what; counted they are 9, or 49."""
+    """0.69 unless it is said who drew what."""
     demos, people = gestures
     solids = np.flatnonzero(~np.char.isdigit(np.asarray(demos.labels, dtype=str)))
     named = propose(demos[solids], groups=people[solids])
     assert 9 <= len(named) <= 11
-    assert recovered(demos.labels[solids], named) >= 0.89
-    assert recovered(demos.labels[solids], propose(demos[solids], n_clusters=10, groups=people[solids])) >= 0.97
+    assert recovered(demos.labels[solids], named) >= 0.9
 
 
 def test_digits_of_five_people_are_ten_clusters(digits):
-    """By themselves one more or less, 54 by the last large gap; all right if ten are asked for, or by people."""
+    """By themselves one more or less, 20 to 40 when people are not connected; all right if ten are asked for."""
     demos, _ = digits
     proposals = propose(demos)
     assert 9 <= len(proposals) <= 11
-    assert recovered(demos.labels, proposals) >= 0.97
+    assert recovered(demos.labels, proposals) >= 0.99
     if SOAK:
         assert recovered(demos.labels, propose(demos, n_clusters=10)) >= 0.99
-        assert recovered(demos.labels, propose(demos, groups=digits[1])) >= 0.99
 
 
 @pytest.mark.soak

@@ -49,7 +49,7 @@ def test_handwriting_in_part_and_unequal(n_kinds, seed):
     shapes = rng.choice(np.unique(demos.labels), n_kinds, replace=False)
     chosen = [rng.choice(np.flatnonzero(demos.labels == one), rng.integers(3, 8), replace=False) for one in shapes]
     part = ALL_TOGETHER.apply(demos[np.concatenate(chosen)], seed)
-    assert recovered(part.labels, propose(part)) >= 0.87  # where two of five shapes are one
+    assert recovered(part.labels, propose(part)) >= 0.9
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -201,11 +201,11 @@ def test_movements_that_cannot_be_told_apart():
     with pytest.raises(kineme.errors.SpecificationError, match="got copies of one movement"):
         propose(demos[[0, 0, 0, 0]])
     with pytest.raises(
-        kineme.errors.SpecificationError, match=r"expected widths to be 7 numbers above 0.* got \[1.0, -1.0\]"
+        kineme.errors.SpecificationError, match=r"expected widths to be 5 numbers above 0.* got \[1.0, -1.0\]"
     ):
         similarities(demos, widths=[1.0, -1.0])
     with pytest.raises(
-        kineme.errors.TrajectoryError, match=r"expected feature rows of shape \(n, 534\).* got shape \(8, 5\)"
+        kineme.errors.TrajectoryError, match=r"expected feature rows of shape \(n, 400\).* got shape \(8, 5\)"
     ):
         describe_rows(np.zeros((8, 5)), 2)
     with pytest.raises(IndexError, match="one of 2 proposals, got 2"):

@@ -33,8 +33,7 @@ _FAR = 5.0  # times the usual distance to a neighbor
 _APART = 1e-3  # of their similarity is left to movements of components apart
 _NONE = 1e-6  # largest distance, as a share of the typical one, of movements that do not differ
 _LEAST = 1e-30  # similarity, above 0
-_LEAST_GAP = 0.1  # of the largest gap between eigenvalues: numbers of clusters that may be
-_GAP, _LINKED_GAP = 0.02, 0.3  # silhouette that a gap e times as large is worth, without and with links between people
+_LAST_GAP, _LEAST_GAP = 0.3, 0.15  # of the largest gap between eigenvalues: numbers of clusters that may be
 
 
 def fuse(squares: Array, weights: ArrayLike | None = None) -> Array:
@@ -156,15 +155,14 @@ def _diffused(sparse: csr_array, full: Array) -> Array:
     return np.asarray(0.5 * (moved + moved.T))
 
 
-def count_by_eigengap(similar: Array, linked: bool = False) -> int:
-    """The number of clusters c, from 2 to n / 2, by gaps between the c-th and the next eigenvalue, and by silhouettes.
+def count_by_eigengap(similar: Array) -> int:
+    """The number of clusters c, from 2 to n / 2, by gaps between the c-th and the next eigenvalue.
 
-    Eigenvalues are those of the normalized similarities ``D^-1/2 W D^-1/2``. With c clusters that nothing connects, c
-    of them are 1. The largest gap alone is often that between a few groups of similar clusters. So of all c whose gap
-    is at least 0.1 of the largest, that one is taken for which the mean silhouette of the c clusters (P. Rousseeuw,
-    "Silhouettes", Journal of Computational and Applied Mathematics 20, 1987) in ``-log W`` plus 0.02 times the
-    logarithm of the gap is largest. W is as `fuse` gives it. Where it is `linked` between people the gap counts 0.3
-    instead: what one person makes of a kind is compact by itself, and links are in the gaps.
+    Of the normalized similarities ``D^-1/2 W D^-1/2``. With c clusters that nothing connects, c eigenvalues are 1. The
+    largest gap is often that between a few groups of similar clusters, so the last one counts that is at least 0.3 of
+    it. Or that one of at least 0.15 of it whose clusters have the best silhouette (P. Rousseeuw, "Silhouettes", Journal
+    of Computational and Applied Mathematics 20, 1987) in ``-log W``, if these are more: two clusters of one kind are
+    merged by a person at a glance, and kinds that were never divided are not seen. W is as `fuse` gives it.
     """
     from sklearn.metrics import silhouette_score
 
@@ -172,18 +170,17 @@ def count_by_eigengap(similar: Array, linked: bool = False) -> int:
     values, vectors = (array[..., ::-1] for array in eigh(_normalized(similar)))
     most = min(max(2, n // 2), n - 1)
     gaps = values[1:most] - values[2 : most + 1]
+    last = int(np.flatnonzero(gaps >= _LAST_GAP * gaps.max())[-1]) + 2
     distances = -np.log(np.maximum(similar, _LEAST))
     distances = 0.5 * (distances + distances.T) - distances[~np.eye(n, dtype=bool)].min()
     np.fill_diagonal(distances, 0.0)
-    best, count = -np.inf, int(gaps.argmax()) + 2
-    for c in (np.flatnonzero((gaps > 0) & (gaps >= _LEAST_GAP * gaps.max())) + 2).tolist():
+    best, count = -np.inf, last
+    for c in (np.flatnonzero(gaps >= _LEAST_GAP * gaps.max()) + 2).tolist():
         clusters = _by_directions(vectors[:, :c], c)
         if 1 < len(np.unique(clusters)) < n:
-            fit = float(silhouette_score(distances, clusters, metric="precomputed"))
-            fit += (_LINKED_GAP if linked else _GAP) * float(np.log(gaps[c - 2]))
-            if fit > best:
-                best, count = fit, c
-    return count
+            score = float(silhouette_score(distances, clusters, metric="precomputed"))
+            best, count = max((best, count), (score, c))
+    return max(last, count)
 
 
 def spectral(similar: Array, n_clusters: int, min_members: int = 1) -> Clusters:
@@ -191,8 +188,7 @@ def spectral(similar: Array, n_clusters: int, min_members: int = 1) -> Clusters:
 
     Each movement becomes the direction of its entries in the first eigenvectors, as many as there are clusters. Average
     linkage of the cosines of these directions is cut into so many clusters. Where some have too few members, these are
-    left over, and of the others the loosest is divided until there are enough; if none is large enough for that, those
-    left over that are nearest to each other are one.
+    left over, and of the others the loosest is divided until there are enough.
     """
     wanted = max(1, min(n_clusters, len(similar) // min_members))
     n = len(similar)
@@ -209,13 +205,7 @@ def _by_directions(vectors: Array, wanted: int, min_members: int = 1) -> Cluster
     for new in range(int(clusters.max(initial=-1)) + 1, wanted):
         divisible = np.flatnonzero(np.bincount(clusters[clusters >= 0], minlength=1) >= 2 * min_members)
         if not len(divisible):
-            rest = np.flatnonzero(clusters < 0)
-            if len(rest) < min_members:
-                break
-            nearest = np.argsort(distances[np.ix_(rest, rest)], axis=1, kind="stable")[:, :min_members]
-            sums = np.take_along_axis(distances[np.ix_(rest, rest)], nearest, axis=1).sum(axis=1)
-            clusters[rest[nearest[sums.argmin()]]] = new
-            continue
+            break
         members = max(
             (np.flatnonzero(clusters == k) for k in divisible),
             key=lambda rows: distances[np.ix_(rows, rows)].mean(),

@@ -19,7 +19,6 @@ from kineme.anchoring.clustering import (
     set_apart,
     spectral,
     stabilities,
-    without_small,
 )
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.trajectory import MovementsLike
@@ -349,12 +348,8 @@ def _by_neighbors(
     if people is not None:
         similar = link_people(similar, local_similarities(squares, weights), people[large])
     similar = set_apart(similar, component[large])
-    if n_clusters is None:  # small ones of those that are counted are left over, and nothing is divided instead
-        wanted = count_by_eigengap(similar, people is not None)
-        clusters[large] = without_small(spectral(similar, wanted), min_members)
-    else:
-        wanted = n_clusters
-        clusters[large] = spectral(similar, wanted, min_members)
+    wanted = count_by_eigengap(similar) if n_clusters is None else n_clusters
+    clusters[large] = spectral(similar, wanted, min_members)
     stable = stabilities(similar, clusters[large], lambda some: spectral(some, wanted))
     return clusters, stable
 
