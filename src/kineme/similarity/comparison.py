@@ -22,14 +22,7 @@ from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.runtime.parallel import single_threaded_blas
 from kineme.similarity.bounds import ReducedFeatures, Single, log_bounds
 from kineme.similarity.describe import Described, feature_rows, prepare
-from kineme.similarity.similarity import (
-    ALONE,
-    WEIGHTS,
-    AveragedSimilarity,
-    given_weights,
-    impostor_widths,
-    own_weights,
-)
+from kineme.similarity.similarity import ALONE, WEIGHTS, AveragedSimilarity, given_weights, impostor_widths, own_weights
 from kineme.similarity.specification import ComparisonSpecification, Normalization, Representation, rotating
 from kineme.validation import Array, check_choice
 

@@ -9,14 +9,7 @@ from typing import Any
 import numpy as np
 
 from kineme.errors import TrajectoryError
-from kineme.movements.channels.channel import (
-    Channels,
-    in_words,
-    is_plain,
-    moving_kinds,
-    recorded_names,
-    same_columns,
-)
+from kineme.movements.channels.channel import Channels, in_words, is_plain, moving_kinds, recorded_names, same_columns
 from kineme.movements.channels.column_match import columns_like, columns_recorded, conversion, may_be
 from kineme.movements.channels.coordinates import lever_of
 from kineme.movements.tables.layout import listed
