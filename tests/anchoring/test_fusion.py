@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from sklearn.metrics import adjusted_rand_score
 
 from kineme import Demonstrations
+from kineme.anchoring import clustering
 from kineme.anchoring.clustering import NEIGHBORS, components, count_by_eigengap, fuse, set_apart, spectral
 from kineme.anchoring.proposals import by_shape, link_people, propose
 from kineme.errors import TrajectoryError
@@ -73,6 +74,54 @@ def test_what_is_near_in_one_representation_or_the_other_is_connected():
     second = there[::-1] + 20.0 * np.stack(((k + 1) % 4 // 2, 6 * ring), axis=1)
     similar = fuse(squares_of(first, second))
     assert adjusted_rand_score(ring, spectral(similar, 2)) == 1.0
+
+
+def connected(similarities, sizes):
+    """Similarities of movements of as many clusters as rows: 1 to their own, and those given to others."""
+    which = np.repeat(np.arange(len(sizes)), sizes)
+    noise = np.random.default_rng(0).uniform(0.9, 1.1, (len(which), len(which)))
+    own = which[:, None] == which
+    similar = np.where(own, 1.0, np.asarray(similarities)[which[:, None], which]) * (noise + noise.T)
+    np.fill_diagonal(similar, 0.0)
+    return which, similar
+
+
+def test_kinds_of_a_few_groups_are_counted_although_the_gap_between_groups_is_the_largest():
+    """Twelve kinds in three groups: the largest gap alone merges them, as it does a hundred words."""
+    group = np.repeat(np.arange(3), 4)
+    near = group[:, None] == group
+    which, similar = connected(np.where(near, 0.3, 1e-2), [6] * 12)
+    roots = np.sqrt(similar.sum(axis=1))
+    values = np.linalg.eigvalsh(similar / roots / roots[:, None])[::-1]
+    gaps = values[:-1] - values[1:]
+    assert gaps[2] > gaps[11] > 0.15 * gaps[2]
+    assert count_by_eigengap(similar) == 12
+    assert adjusted_rand_score(which, spectral(similar, 12)) == 1.0
+    assert count_by_eigengap(connected(np.where(near, 0.7, 1e-2), [6] * 12)[1]) == 3
+
+
+def test_gaps_below_a_share_of_the_largest_count_for_nothing(monkeypatch):
+    """However compact their clusters are."""
+    vectors = np.linalg.qr(np.random.default_rng(0).normal(size=(12, 12)))[0]
+    monkeypatch.setattr("sklearn.metrics.silhouette_score", lambda _, c, metric: len(np.unique(c)) / 12)
+    monkeypatch.setattr(clustering, "_by_directions", lambda _, c: np.arange(12) % c)
+    for share, count in ((0.14, 2), (0.16, 4)):
+        gaps = {2: 1.0, 4: share}
+        falling = -np.cumsum([0.0, 0.0, *(gaps.get(c, 0.0) for c in range(2, 12))])
+        monkeypatch.setattr(clustering, "eigh", lambda *_, falling=falling: (falling[::-1], vectors))
+        assert count_by_eigengap(np.ones((12, 12))) == count
+
+
+def test_clusterings_into_small_clusters_or_into_people_are_not_counted():
+    """Twelve of two or of six movements in three groups; of six, made by one person each, or each by two."""
+    group = np.repeat(np.arange(3), 4)
+    similarities = np.where(group[:, None] == group, 0.3, 1e-2)
+    small = connected(similarities, [2] * 12)[1]
+    assert [count_by_eigengap(small, least) for least in (2, 3)] == [12, 3]
+    which, similar = connected(similarities, [6] * 12)
+    assert count_by_eigengap(similar, 3, which % 4) == 3
+    assert count_by_eigengap(similar, 3, np.arange(72) % 2) == 12
+    assert count_by_eigengap(similar, 3, np.zeros(72, dtype=np.intp)) == 12
 
 
 @pytest.mark.parametrize("c", [2, 3, 7])
