@@ -18,6 +18,7 @@ from kineme.errors import SpecificationError, TrajectoryError
 from kineme.sampling import evenly_spaced
 from kineme.similarity.comparison import References
 from kineme.similarity.similarity import AveragedSimilarity
+from kineme.similarity.specification import softmax
 from kineme.validation import Array, check_number
 
 _PRIOR = 4.0  # demonstrations that the common scale counts for beside those of the class
@@ -345,9 +346,7 @@ def class_probabilities(similar: Array, exponent: float = EXPONENT) -> Array:
 
     `similar` (n, C): log similarity to each class, by which its label is chosen.
     """
-    logs = _log_odds(distances(similar), exponent)
-    shares = np.exp(logs)
-    return np.asarray(shares / shares.sum(axis=1, keepdims=True))
+    return softmax(_log_odds(distances(similar), exponent), axis=1)
 
 
 def fit_exponent(away: Array, classes: NDArray[np.intp]) -> float:

@@ -28,6 +28,7 @@ from kineme.similarity.specification import (
     Normalization,
     Representation,
     default_representations,
+    softmax,
 )
 from kineme.validation import Array, check_choice
 
@@ -263,8 +264,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         if isinstance(self.classifier_, Convolutions):
             return self.classifier_.probabilities(scores)
         if isinstance(self.classifier_, SupportVectors):
-            shares = np.exp(scores - scores.max(axis=1, keepdims=True))
-            return np.asarray(shares / shares.sum(axis=1, keepdims=True))
+            return softmax(scores, axis=1)
         return class_probabilities(scores, self.calibration().exponent)
 
     def score(self, X: MovementsLike, y: ArrayLike | None = None, sample_weight: Any = None) -> float:

@@ -208,6 +208,14 @@ def even_paths(demos: Demonstrations, start: int, stop: int, cutoff: float | Non
     return smooth_evenly(*_unpaused(demos, start, stop), cutoff)
 
 
+def detailed_paths(demos: Demonstrations, start: int, stop: int, how: ComparisonSpecification) -> tuple[Array, Array]:
+    """Return `even_paths` below the cutoff, and in detail; twice the same where nothing is compared in detail."""
+    unpaused = _unpaused(demos, start, stop)
+    paths = smooth_evenly(*unpaused, how.cutoff)
+    detailed = how.detailed and how.cutoff is not None
+    return paths, smooth_evenly(*unpaused, how.detailed_cutoff) if detailed else paths
+
+
 def _unpaused(demos: Demonstrations, start: int, stop: int) -> tuple[Demonstrations, int, int]:
     """Return movements start:stop with their pauses cut short, and where they are."""
     shorter = without_pauses(demos, start, stop)
@@ -230,10 +238,7 @@ def _tile_rows(
     demos: Demonstrations, start: int, stop: int, how: ComparisonSpecification, dtype: DTypeLike
 ) -> tuple[Array, tuple[NDArray[Any], ...]]:
     """Return paths of movements start:stop, as `even_paths` gives them, and their feature rows as `dtype`."""
-    unpaused = _unpaused(demos, start, stop)
-    relative = smooth_evenly(*unpaused, how.cutoff)
-    detailed = len(how.stored_rows) > len(how.by_rows) and how.cutoff is not None
-    details = smooth_evenly(*unpaused, how.detailed_cutoff) if detailed else relative
+    relative, details = detailed_paths(demos, start, stop, how)
     if how.normalization.translation:
         return relative, _path_rows(relative, details, how, dtype)
     placed, placed_details = (recorded_paths(demos, paths, start) for paths in (relative, details))

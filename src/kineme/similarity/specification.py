@@ -320,17 +320,18 @@ LOG_MEANS: dict[str, Callable[[Array], Array]] = {
 }
 
 
-def _softmax(logs: Array) -> Array:
-    weights = np.exp(logs - logs.max(axis=0))
-    return np.asarray(weights / weights.sum(axis=0))
+def softmax(logs: Array, axis: int = 0) -> Array:
+    """Return shares along an axis, in proportion to ``exp(logs)``."""
+    weights = np.exp(logs - logs.max(axis=axis, keepdims=True))
+    return np.asarray(weights / weights.sum(axis=axis, keepdims=True))
 
 
 #: Name -> share of each kernel in the average, d log K / d log k_r: none negative, their sum over the first axis 1.
 SHARES: dict[str, Callable[[Array], Array]] = {
-    "arithmetic": _softmax,
+    "arithmetic": softmax,
     "geometric": lambda logs: np.full(logs.shape, 1.0 / len(logs)),
-    "harmonic": lambda logs: _softmax(-logs),
-    "quadratic": lambda logs: _softmax(2.0 * logs),
+    "harmonic": lambda logs: softmax(-logs),
+    "quadratic": lambda logs: softmax(2.0 * logs),
     "min": lambda logs: (np.arange(len(logs))[:, None] == logs.argmin(axis=0)).astype(float),
 }
 
@@ -392,8 +393,12 @@ class ComparisonSpecification:
     @cached_property
     def stored_rows(self) -> tuple[Representation, ...]:
         """What feature rows hold: representations compared sample by sample, then positions in detail, if needed."""
-        detailed = any(representation.detailed for representation in self.representations)
-        return (*self.by_rows, DETAILED_POSITIONS) if detailed else self.by_rows
+        return (*self.by_rows, DETAILED_POSITIONS) if self.detailed else self.by_rows
+
+    @cached_property
+    def detailed(self) -> bool:
+        """True if movements are compared in detail, too."""
+        return any(representation.detailed for representation in self.representations)
 
     @property
     def upright(self) -> bool:

@@ -25,7 +25,7 @@ from kineme.recognition.early.hypotheses import (
     positive,
 )
 from kineme.similarity.comparison import Comparison
-from kineme.similarity.describe import Described, describe_paths, even_paths, smooth_evenly
+from kineme.similarity.describe import Described, describe_paths, detailed_paths, smooth_evenly
 from kineme.similarity.specification import LOG_MEANS
 from kineme.validation import MIN_SAMPLES, Array
 
@@ -170,7 +170,7 @@ def partial_shares(comparison: Comparison, stored: Hypotheses, X: MovementsLike)
 
 def _shares(comparison: Comparison, stored: Hypotheses, demos: Demonstrations) -> Array:
     how = comparison.specification
-    wholes = even_paths(demos, 0, len(demos), how.cutoff), even_paths(demos, 0, len(demos), how.detailed_cutoff)
+    wholes = detailed_paths(demos, 0, len(demos), how)
     demos = without_pauses(demos, 0, len(demos), ALLOWANCE) or demos
     paths = smooth_evenly(demos, 0, len(demos), how.cutoff)
     starts = demos.positions[demos.offsets[:-1]]

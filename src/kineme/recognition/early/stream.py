@@ -128,8 +128,9 @@ class Live:
         times, positions = _without_pauses(samples, ALLOWANCE)
         how, unpaused = self._comparison.specification, _without_pauses(samples)
         even = _smooth(times, positions, how.cutoff)
-        whole = _smooth(*unpaused, how.cutoff), _smooth(*unpaused, how.detailed_cutoff)
-        so_far = describe_begun(self._hypotheses, even, samples[:1, 1:], times[-1:] - times[0], whole)
+        whole = _smooth(*unpaused, how.cutoff)
+        details = _smooth(*unpaused, how.detailed_cutoff) if how.detailed else whole
+        so_far = describe_begun(self._hypotheses, even, samples[:1, 1:], times[-1:] - times[0], (whole, details))
         evidence = log_evidence(self._hypotheses, so_far)
         shares = self._hypotheses.shares(evidence)[0]
         order = np.argsort(-shares[:-1], kind="stable")
