@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from sklearn.linear_model import Ridge, RidgeCV
 
 import kineme
 from kineme.errors import SpecificationError
 from kineme.recognition.classifiers import NearestEach
-from kineme.recognition.convolutions import Convolutions, _weights, fit_kernels, transform
+from kineme.recognition.convolutions import _ALPHAS, Convolutions, _weights, fit_kernels, left_out_values, transform
 from kineme.similarity.specification import ROW_REPRESENTATIONS
 from kineme.studio.snapshot import snapshot_of_recognizer
 
@@ -45,6 +46,21 @@ def test_features_are_shares_and_those_of_each_movement_alone():
     assert features.max() <= 1
     for i in (0, 63, 64, 129):
         np.testing.assert_allclose(transform(series[i : i + 1], kernels)[0], features[i], atol=1e-6)
+
+
+def test_values_left_out_are_those_of_a_fit_without_the_row():
+    """The errors that are kept have lost their signs: one that overshoots its class must not count against it."""
+    rng = np.random.default_rng(0)
+    owners = np.repeat(np.arange(3), 8)
+    X = np.eye(3)[owners] @ rng.normal(size=(3, 40)) + 0.7 * rng.normal(size=(24, 40))
+    targets = np.where(owners[:, None] == np.arange(3), 1.0, -1.0)
+    model = RidgeCV(_ALPHAS, store_cv_results=True).fit(X, targets)
+    found = left_out_values(model, X, targets)
+    assert ((np.abs(found) > 1) & (np.sign(found) == targets)).any()
+    for i in range(24):
+        others = np.arange(24) != i
+        alone = Ridge(model.alpha_).fit(X[others], targets[others]).predict(X[i : i + 1])[0]
+        np.testing.assert_allclose(found[i], alone, atol=1e-6)
 
 
 def test_they_join_where_they_recognize_more_of_what_is_left_out():

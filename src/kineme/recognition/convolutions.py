@@ -18,6 +18,7 @@ from kineme.errors import SpecificationError
 from kineme.similarity.comparison import Comparison, References
 from kineme.similarity.describe import Described
 from kineme.similarity.scores import Compared
+from kineme.similarity.specification import softmax
 from kineme.validation import Array
 
 _LENGTH, _HEAVY = 9, 3  # of a kernel, of which so many weights are 2 and the others -1
@@ -25,6 +26,7 @@ _FEATURES = 2000
 _AT_ONCE = 64  # movements transformed together
 _GOLDEN = (np.sqrt(5) + 1) / 2
 _ALPHAS = np.logspace(-1, 5, 13)
+_TINY = 1e-12  # of a probability
 _SHARPNESS = np.logspace(-1, 2, 61)  # of the softmax of scores, of which the most likely is taken
 
 Single = NDArray[np.float32]
@@ -126,8 +128,7 @@ class Convolutions:
 
     def probabilities(self, scores: Array) -> Array:
         """Return the probability of each class, (n, C): a softmax of the scores."""
-        logs = self.sharpness * (scores - scores.max(axis=1, keepdims=True))
-        return np.asarray(np.exp(logs) / np.exp(logs).sum(axis=1, keepdims=True))
+        return softmax(self.sharpness * scores, axis=1)
 
 
 def fit_convolutions(comparison: Comparison, references: References) -> tuple[Convolutions, float]:
@@ -155,15 +156,19 @@ def fit_convolutions(comparison: Comparison, references: References) -> tuple[Co
     owners = np.searchsorted(references.classes, references.labels)
     targets = np.where(owners[:, None] == np.arange(len(references.classes)), 1.0, -1.0)
     model: Any = RidgeCV(_ALPHAS, store_cv_results=True).fit((features - mean) / scale, targets)
-    errors = model.cv_results_[:, :, int(np.flatnonzero(model.alpha_ == _ALPHAS)[0])]
-    left_out = targets - np.sqrt(errors) * np.where(targets > 0, 1.0, -1.0)
-    fitted = Convolutions(kernels, mean, scale, model.coef_.T, model.intercept_, 1.0)
-    likely = [
-        np.log(Convolutions(kernels, mean, scale, model.coef_.T, model.intercept_, sharp).probabilities(left_out)[
-            np.arange(len(owners)), owners] + 1e-12).sum()
-        for sharp in _SHARPNESS
-    ]  # fmt: skip
-    fitted = Convolutions(
-        kernels, mean, scale, model.coef_.T, model.intercept_, float(_SHARPNESS[int(np.argmax(likely))])
-    )
+    left_out = left_out_values(model, (features - mean) / scale, targets)
+    rows = np.arange(len(owners))
+    likely = [np.log(softmax(sharp * left_out, axis=1)[rows, owners] + _TINY).sum() for sharp in _SHARPNESS]
+    sharpness = float(_SHARPNESS[int(np.argmax(likely))])
+    fitted = Convolutions(kernels, mean, scale, model.coef_.T, model.intercept_, sharpness)
     return fitted, float((left_out.argmax(axis=1) == owners).mean())
+
+
+def left_out_values(model: Any, X: Array, targets: Array) -> Array:
+    """Return what a fitted `RidgeCV` says of each row of X when it is left out, (n, C).
+
+    It keeps the squares of these errors. They are the errors of the fit, divided by ``1 - h`` with h from 0 to 1 the
+    leverage of the row, and so have their signs.
+    """
+    squares = model.cv_results_[:, :, int(np.flatnonzero(model.alpha_ == _ALPHAS)[0])]
+    return np.asarray(targets - np.sqrt(squares) * np.sign(targets - model.predict(X)))
