@@ -162,13 +162,11 @@ def count_by_eigengap(similar: Array, min_members: int = 1, people: NDArray[np.i
     Of the normalized similarities ``D^-1/2 W D^-1/2``, with W as `fuse` gives it. With c clusters that nothing
     connects, c eigenvalues are 1. It is the c with the largest gap, which is often that between a few groups of similar
     clusters; or, if these are more, the c whose clusters have the best silhouette in ``-log W``, among gaps of at least
-    0.15 of it (P. Rousseeuw, "Silhouettes", Journal of Computational and Applied Mathematics 20, 1987): two clusters of
-    one kind are merged at a glance, and kinds that were never divided are not seen. Not counted are clusterings with
-    more than a fifth of clusters of fewer than `min_members`, or, where `people` (n,) made the movements, with more
-    than half of the movements in clusters of one person: these are people and no kinds.
+    0.15 of it, see `mean_silhouettes`: two clusters of one kind are merged at a glance, and kinds that were never
+    divided are not seen. Not counted are clusterings with more than a fifth of clusters of fewer than `min_members`,
+    or, where `people` (n,) made the movements, with more than half of the movements in clusters of one person: these
+    are people and no kinds.
     """
-    from sklearn.metrics import silhouette_score
-
     n = len(similar)
     values, vectors = (array[..., ::-1] for array in eigh(_normalized(similar)))
     most = min(max(2, n // 2), n - 1)
@@ -183,7 +181,7 @@ def count_by_eigengap(similar: Array, min_members: int = 1, people: NDArray[np.i
         sizes = np.bincount(clusters)
         if 1 < len(sizes) < n and (sizes < min_members).mean() <= _FEW and _shared(clusters, people):
             counts.append(c)
-            scores.append(float(silhouette_score(distances, clusters, metric="precomputed")))
+            scores.append(_mean_silhouette(_sums_by(distances, clusters), clusters))
     return max(counts[0], counts[int(np.argmax(scores))])
 
 
