@@ -76,13 +76,11 @@ def groups_of(store: Store, ids: Ids) -> NDArray[np.intp] | None:
 
 def described(store: Store, ids: ArrayLike, comparison: Comparison | None = None) -> Described:
     """Describe movements as the library does, or as a comparison does, from their stored features."""
-    rows, how = read.features(store, np.asarray(ids, dtype=np.int64)), store.specification.comparison
-    if comparison is None:
-        return describe_rows(rows, store.n_dims or 0, how.with_points(store.channels))
-    blocks = np.split(rows, np.cumsum(store.specification.widths(store.n_dims or 0))[:-1], axis=1)
-    return comparison.prepared(
-        tuple(blocks[how.stored_rows.index(representation)] for representation in comparison.specification.stored_rows)
-    )
+    chosen: Ids = np.asarray(ids, dtype=np.int64)
+    if comparison is not None:
+        return comparison.prepared(read.feature_blocks(store, chosen, comparison.specification.stored_rows))
+    how = store.specification.comparison.with_points(store.channels)
+    return describe_rows(read.features(store, chosen), store.n_dims or 0, how)
 
 
 def described_references(store: Store, ids: Ids, labels: NDArray[Any]) -> References:

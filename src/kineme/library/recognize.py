@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from functools import partial
 from threading import Lock
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kineme.library.calibration_cache import calibrated, calibrated_once, sample_comparison
 from kineme.library.members import Members, described_references, members_of, some_of_each
@@ -132,21 +131,14 @@ def two_stages(store: Store, reduced: ReducedMovements, members: Members) -> Two
     """Return the recognizer of a large library."""
     comparison = sample_comparison(store, members)
     how = comparison.specification
-    columns = [store.specification.comparison.stored_rows.index(representation) for representation in how.stored_rows]
-    ends = np.cumsum(store.specification.widths(store.n_dims or 0))
-
-    def features(rows: NDArray[np.intp]) -> tuple[NDArray[Any], ...]:
-        blocks = np.split(read.features(store, reduced.ids[rows]), ends[:-1], axis=1)
-        return tuple(blocks[r] for r in columns)
-
-    by_rows = columns[: len(how.by_rows)]
+    columns = [store.specification.comparison.by_rows.index(representation) for representation in how.by_rows]
     stored = StoredReferences(
-        tuple(reduced.bases[r] for r in by_rows),
-        tuple(tuple(block[r] for r in by_rows) for block in reduced.blocks),
+        tuple(reduced.bases[r] for r in columns),
+        tuple(tuple(block[r] for r in columns) for block in reduced.blocks),
         reduced.rows(members.ids),
         members.first,
         how,
-        features,
+        lambda rows: read.feature_blocks(store, reduced.ids[rows], how.stored_rows),
         lambda rows: read.movements(store, reduced.ids[rows]),
     )
     calibration = calibrated(store, members, comparison.similarity, stored)

@@ -89,9 +89,7 @@ def _ids_after(store: Store, key: int) -> Ids:
 
 def _features(store: Store, ids: Ids) -> tuple[NDArray[np.float32], ...]:
     """Return rows (n, d * S) of each representation that is compared sample by sample."""
-    ends = np.cumsum(store.specification.widths(store.n_dims or 0))
-    blocks = np.split(read.features(store, ids), ends[:-1], axis=1)
-    return tuple(blocks[: len(store.specification.comparison.by_rows)])
+    return read.feature_blocks(store, ids, store.specification.comparison.by_rows)
 
 
 def _layout(store: Store, n: int) -> tuple[list[tuple[type[Any], tuple[int, ...]]], int]:

@@ -21,6 +21,7 @@ from kineme.movements.channels.channel import is_plain
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import label_array
 from kineme.movements.trajectories.movements import Movements
+from kineme.similarity.specification import Representation
 from kineme.validation import Array
 
 Ids = NDArray[np.int64]
@@ -151,6 +152,18 @@ def features(store: Store, ids: Ids) -> NDArray[np.float32]:
         _check_finite("feature", rows, block)
         done += len(rows)
     return result if np.array_equal(wanted, ids) else result[order]
+
+
+def feature_blocks(
+    store: Store, ids: Ids, representations: Sequence[Representation]
+) -> tuple[NDArray[np.float32], ...]:
+    """Return the rows (k, d * S) of some of `ComparisonSpecification.stored_rows`, a block for each."""
+    specification = store.specification
+    ends = np.cumsum(specification.widths(store.n_dims or 0))
+    blocks = dict(
+        zip(specification.comparison.stored_rows, np.split(features(store, ids), ends[:-1], axis=1), strict=True)
+    )
+    return tuple(blocks[representation] for representation in representations)
 
 
 def primitives(store: Store, ids: Ids, labels: Sequence[str | None] | None = None) -> Primitives:
