@@ -113,7 +113,7 @@ class Answer:
     nearest: tuple[Neighbor, ...]
     transform: Transform
     responsibilities: Mapping[str, float]
-    _rests_on: explanation.Compared | None = field(default=None, repr=False)
+    _rests_on: explanation.Rationale | None = field(default=None, repr=False)
 
     @property
     def promise(self) -> str:
@@ -326,7 +326,7 @@ class Verdict(NamedTuple):
     nearest: tuple[Neighbor, ...]
     responsibilities: Mapping[str, float]
     shares: Array
-    examples: tuple[tuple[Label, int, float], ...]  # of `explanation.Compared`
+    examples: tuple[tuple[Label, int, float], ...]  # of `explanation.Rationale`
 
 
 def verdicts_of(
@@ -354,15 +354,12 @@ def verdicts_of(
     else:
         similar = compared.nearest_each if isinstance(classifier, NearestEach) else compared.nearest
         probabilities = class_probabilities(similar, calibration.exponent)
-    others = [next((c for c in ranks[i, :2].tolist() if c != shown[i]), None) for i in range(len(labels))]
-    near = [
-        [
-            (classes[c], _nearest(references, compared.log_average[i], slices[c])[0])
-            for c in (shown[i], others[i])
-            if c is not None
-        ]
-        for i in range(len(labels))
-    ]
+    examples = []  # the nearest of the class that is shown, and of the best-ranked other one
+    for i, best in enumerate(like):
+        others = [c for c in ranks[i, :2].tolist() if c != shown[i]][:1]
+        next_best = [_nearest(references, compared.log_average[i], slices[c])[0] for c in others]
+        pairs = zip([shown[i], *others], [best[0], *next_best], strict=True)
+        examples.append(tuple((classes[c], near.index, near.similarity) for c, near in pairs))
     confidence = np.where(is_known, probabilities[np.arange(len(shown)), shown], 1.0 - p_known).tolist()
     return [
         Verdict(
@@ -377,7 +374,7 @@ def verdicts_of(
             like[i],
             _by_name(names, share[:, i]),
             share[:, i],
-            tuple((label, neighbor.index, neighbor.similarity) for label, neighbor in near[i]),
+            examples[i],
         )
         for i in range(len(labels))
     ]
@@ -398,7 +395,7 @@ def with_transforms(
     for i, (verdict, transform) in enumerate(zip(verdicts, transforms, strict=True)):
         fields = verdict._asdict()
         del fields["shares"]
-        rests_on = explanation.Compared(comparison, references, demos[i : i + 1], fields.pop("examples"))
+        rests_on = explanation.Rationale(comparison, references, demos[i : i + 1], fields.pop("examples"))
         given.append(Answer(**fields, transform=transform, _rests_on=rests_on))
     return given
 

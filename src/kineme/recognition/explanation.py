@@ -150,7 +150,7 @@ class Explanation:
         )
 
 
-class Compared(NamedTuple):
+class Rationale(NamedTuple):
     """What an answer rests on: the movement, and the examples that it is most like."""
 
     comparison: Comparison
@@ -159,20 +159,20 @@ class Compared(NamedTuple):
     examples: tuple[tuple[Label, int, float], ...]  # label, index and similarity: the nearest, and the runner-up
 
 
-def explain(compared: Compared, answer: str, shares: dict[str, float]) -> Explanation:
+def explain(rationale: Rationale, answer: str, shares: dict[str, float]) -> Explanation:
     """Lay the examples over the movement."""
-    comparison = compared.comparison
-    rows = np.array([index for _, index, _ in compared.examples], dtype=np.intp)
+    comparison = rationale.comparison
+    rows = np.array([index for _, index, _ in rationale.examples], dtype=np.intp)
     used, which = np.unique(rows, return_inverse=True)
-    stored = compared.references[used]
-    own, examples = (POSITIONS.along(_smooth(movements, comparison)) for movements in (compared.movement, stored))
+    stored = rationale.references[used]
+    own, examples = (POSITIONS.along(_smooth(movements, comparison)) for movements in (rationale.movement, stored))
     examples = examples[which]
     mapped = fit_maps(examples, own, comparison.normalization, comparison.procrustes).move(examples)
     size = float(np.sqrt(own[0].var(axis=1).sum())) or 1.0
     differences = np.sqrt(((mapped - own) ** 2).sum(axis=1)) / size
     overlays = [
         Overlay(label, similarity, np.ascontiguousarray(path.T), difference)
-        for (label, _, similarity), path, difference in zip(compared.examples, mapped, differences, strict=True)
+        for (label, _, similarity), path, difference in zip(rationale.examples, mapped, differences, strict=True)
     ]
     return Explanation(
         answer, np.ascontiguousarray(own[0].T), overlays[0], overlays[1] if overlays[1:] else None, shares
