@@ -104,17 +104,11 @@ class Procrustes:
 
     def by_coordinates(self, rows: NDArray[Any]) -> NDArray[Any]:
         """Rows (n, J d S), point after point, with the x of all points first: those of one movement of J S samples."""
-        if self.n_points == 1:
-            return rows
-        parts = rows.reshape(len(rows), self.n_points, self.n_dims, -1)
-        return np.ascontiguousarray(parts.transpose(0, 2, 1, 3)).reshape(len(rows), -1)
+        return _exchanged(rows, self.n_points, self.n_dims)
 
     def by_points(self, rows: NDArray[Any]) -> NDArray[Any]:
         """The inverse of `by_coordinates`."""
-        if self.n_points == 1:
-            return rows
-        parts = rows.reshape(len(rows), self.n_dims, self.n_points, -1)
-        return np.ascontiguousarray(parts.transpose(0, 2, 1, 3)).reshape(len(rows), -1)
+        return _exchanged(rows, self.n_dims, self.n_points)
 
     def mixed(self, paths: NDArray[Any]) -> NDArray[Any]:
         """Paths (n, J d, S) of the q points that are compared pair by pair, (n, q d, S): centered, at size 1."""
@@ -249,6 +243,14 @@ class Procrustes:
                 R[:] = soft_rotations(M).reshape(R.shape)
 
         return fill
+
+
+def _exchanged(rows: NDArray[Any], outer: int, inner: int) -> NDArray[Any]:
+    """Rows (n, outer inner S) with the inner parts of all outer ones side by side."""
+    if 1 in (outer, inner):
+        return rows
+    parts = rows.reshape(len(rows), outer, inner, -1)
+    return np.ascontiguousarray(parts.transpose(0, 2, 1, 3)).reshape(len(rows), -1)
 
 
 _PLANE_OPERATIONS = 20  # elementary operations of a pair in the plane

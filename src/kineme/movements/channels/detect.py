@@ -270,9 +270,8 @@ def _order_of(heads: Sequence[str], q: Array, offsets: NDArray[np.intp]) -> str:
     )
 
 
-#: Quantities with three axes that are no places.
-_NO_PLACES = {"acc", "accel", "acceleration", "gyro", "gyroscope", "rate", "omega", "mag", "magnetometer", "force",
-              "torque", "velocity", "vel", "speed", "emg", "euler"}  # fmt: skip
+#: Columns with one of them are no places, though they have three axes.
+_NO_PLACES = _OTHER_QUANTITIES | {"gyroscope", "mag", "magnetometer", "emg", "euler"}
 
 
 def count_points(channels: Channels | None) -> int:
