@@ -184,9 +184,9 @@ def reliability_rows(draws: int) -> list[Row]:
     for one in sets:
         for others in (False, True) if len(np.unique(one.people)) > 1 else (False,):
             found = [ask(one, s, others) for n in (1, 2, 4) for s in splits(one, n, others, draws, 1.0)]
-            if not found:
+            right = np.concatenate([one.right for one in found]) if found else np.empty(0)
+            if not len(right):  # no movement is left to ask for
                 continue
-            right = np.concatenate([one.right for one in found])
             confidence = np.concatenate(
                 [class_probabilities(each.similar, each.exponent).max(axis=1) for each in found]
             )
