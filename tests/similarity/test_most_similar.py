@@ -88,7 +88,7 @@ def test_what_reaches_the_bar_is_known_and_nothing_else_seems_to(d, seed, width,
 
 @pytest.mark.parametrize(("bar", "bounded"), [(0.3, 0), (0.5, 2), (0.9, 0)])
 def test_pairs_are_bounded_only_where_that_may_rule_some_out(bar, bounded, monkeypatch):
-    """Both point clouds have 0.4 of the weights and no bound; what is far by rows has a similarity below 0.85.
+    """Both point clouds have 0.4 of the weights and are not compared for a bound; what is far by rows has a similarity below 0.85.
 
     Where they are bounded, they are so as they are rotated, and in detail.
     """
@@ -97,7 +97,7 @@ def test_pairs_are_bounded_only_where_that_may_rule_some_out(bar, bounded, monke
     widths = np.array([1e-3, 1e-3, 1.0, 1.0, 1.0, 1.0, 1.0])
     similarity = AveragedSimilarity(stored.procrustes, widths, "arithmetic", weights / weights.sum())
     inner, calls = module.pair_bounds, []
-    monkeypatch.setattr(module, "pair_bounds", lambda *given: calls.append(1) or inner(*given))
+    monkeypatch.setattr(module, "pair_bounds", lambda *given, **options: calls.append(1) or inner(*given, **options))
     nearest_above(similarity, asked, stored, np.arange(0, 40, 2), np.full(20, bar))
     assert len(calls) == bounded
 
@@ -121,7 +121,7 @@ def test_few_pairs_are_compared_completely(choice, classifier, monkeypatch):
     np.testing.assert_array_equal(recognizer.predict(others), recognizer.classes_[expected])
     assert pairs[ElasticSpec().n_segments] == pairs[DETAILED_ELASTIC.n_segments]  # each pair once, and once in detail
     for each in pairs.values():
-        assert len(others) <= sum(each) <= 0.2 * len(others) * len(recognizer.classes_)
+        assert len(others) <= sum(each) <= 0.06 * len(others) * len(recognizer.classes_)
 
 
 @pytest.mark.parametrize("d", [1, 2, 3, 4])

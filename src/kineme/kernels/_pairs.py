@@ -111,7 +111,10 @@ def fill_listed(dims, sides, pairs, numbers, rotations, squares):  # type: ignor
 
 @_jit
 def fill_bounds(dims, sides, numbers, rotations, every_segment, squares):  # type: ignore[no-untyped-def]
-    """``squares[:2, i, j]``, the bounds of `elastic.elastic_bounds`, for 16 movements of A at once."""
+    """``squares[:2, i, j]``, the bounds of `elastic_bounds`, and ``squares[2, i, j]``, of clouds, where there is room.
+
+    For 16 movements of A at once.
+    """
     (A, B), (_, sizes) = sides, numbers
     n, m = squares.shape[1], squares.shape[2]
     work, first = new_work(dims, sizes), np.zeros(LANES, np.intp)
@@ -122,7 +125,11 @@ def fill_bounds(dims, sides, numbers, rotations, every_segment, squares):  # typ
             for lane in range(LANES):
                 take_rotation(dims, rotations, first[lane], j, work.rotation, lane)
             _bound(dims, B, j, numbers, every_segment, work)
-            for k in range(2):
+            if len(squares) == 3:
+                pack_everywhere(dims, B, j, numbers, work.b)
+                rotate(dims, sizes, work)
+                _match(dims, sizes, work)
+            for k in range(len(squares)):
                 for lane in range(width):
                     squares[k, start + lane, j] = work.squares[k, lane]
 
