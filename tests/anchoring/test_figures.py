@@ -8,11 +8,11 @@ from matplotlib import image
 
 import kineme
 import kineme.anchoring
-from kineme.anchoring.figures import draw_map, draw_proposal, draw_proposals, flat, principal_axes
+from kineme.anchoring.figures import draw_map, draw_proposal, draw_proposals
 from kineme.anchoring.proposals import propose
 from kineme.anchoring.space import ConceptualSpace, conceptual_space
 from kineme.movements.preparation.perturbations import Perturbation
-from kineme.reporting.figures import save_figure
+from kineme.reporting.figures import flat, principal_axes, save_figure
 from kineme.similarity.describe import paths_of
 from unlabeled_samples import draw_kinds
 

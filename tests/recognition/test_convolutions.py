@@ -89,6 +89,24 @@ def test_with_few_demonstrations_or_where_kernels_suffice_they_do_not():
     assert isinstance(kineme.Recognizer().fit(twice).classifier_, NearestEach)
 
 
+@pytest.mark.parametrize("n_dims", [1, 3, 5])
+def test_the_number_of_columns_does_not_matter(n_dims):
+    """Of one column and of five nothing is rotated anyway; of three columns the details are not."""
+    plane = draw_trembles(16, seed=7)
+    columns = [[0], [0, 1, 0], [0, 1, 1, 0, 1]][(1, 3, 5).index(n_dims)]
+    demos = kineme.Demonstrations.from_arrays([demo.positions[:, columns] for demo in plane], plane.labels)
+    assert isinstance(kineme.Recognizer().fit(demos).classifier_, Convolutions)
+
+
+def test_without_details_there_are_none_that_queries_would_lack():
+    shown = draw_trembles(8, seed=8)
+    weights = [0.0 if each.detailed else 1.0 for each in kineme.Recognizer().fit(shown).specification.representations]
+    assert kineme.Recognizer(weights=weights).fit(shown).references_.described.pairs.details is None
+    assert kineme.Recognizer(weights=weights).fit(shown).score(shown) == 1
+    with pytest.raises(SpecificationError, match="compared in detail"):
+        kineme.Recognizer(classifier="convolutions", weights=weights).fit(shown)
+
+
 @pytest.mark.parametrize("options", [{"max_angle": 1.0}, {"translation": False}, {"scale": "none"}])
 def test_where_rotations_or_places_are_said_they_do_not(options):
     assert isinstance(kineme.Recognizer(**options).fit(draw_trembles(8, seed=4)).classifier_, NearestEach)
@@ -99,7 +117,7 @@ def test_they_can_be_asked_for():
     recognizer = kineme.Recognizer(classifier="convolutions").fit(shown)
     assert isinstance(recognizer.classifier_, Convolutions)
     assert recognizer.score(shown) == 1
-    with pytest.raises(SpecificationError, match="got svm or convolutions, which the page does not have"):
+    with pytest.raises(SpecificationError, match="got convolutions, which the page does not have"):
         snapshot_of_recognizer(recognizer)
     one_class = shown[:4]
     with pytest.raises(SpecificationError, match="expected movements of two or more classes"):

@@ -75,6 +75,16 @@ def test_every_number_of_dimensions_is_drawn(make_movement, n_dims):
     assert [axes.get_title().split(",")[0] for axes in figure.axes[:2]] == ["nearest: a", "next: b"]
 
 
+def test_what_was_written_in_space_is_drawn_as_written(make_movement):
+    """In x and z, as on a wall: x to the right and z up, not mirrored nor on its side."""
+    plane = [make_movement(seed, 2)[1] for seed in (0, 1)]
+    arrays = [np.column_stack((x, 0.01 * np.arange(len(x)) / len(x), z)) for x, z in (path.T for path in plane)]
+    axes = kineme.Recognizer().fit(arrays, ["a", "b"]).recognize(arrays[0]).explain().plot().axes[0]
+    pieces = np.array(axes.collections[0].get_segments())
+    drawn, written = pieces[-1, 1] - pieces[0, 0], plane[0][-1] - plane[0][0]
+    np.testing.assert_allclose(drawn, written, atol=0.02 * np.abs(written).max())
+
+
 def test_an_answer_from_another_process_says_what_it_lacks(shapes):
     demos, labels = shapes
     answer = pickle.loads(pickle.dumps(kineme.Recognizer().fit(demos, labels).recognize(demos[0])))

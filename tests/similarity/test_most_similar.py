@@ -88,7 +88,7 @@ def test_what_reaches_the_bar_is_known_and_nothing_else_seems_to(d, seed, width,
 
 @pytest.mark.parametrize(("bar", "bounded"), [(0.3, 0), (0.5, 2), (0.9, 0)])
 def test_pairs_are_bounded_only_where_that_may_rule_some_out(bar, bounded, monkeypatch):
-    """Both point clouds have 0.4 of the weights and are not compared for a bound; what is far by rows has a similarity below 0.85.
+    """Both point clouds have 0.4 of the weights, and are not compared for a bound; what is far by rows has below 0.85.
 
     Where they are bounded, they are so as they are rotated, and in detail.
     """

@@ -178,6 +178,11 @@ def test_many_points_are_compared_by_four():
     assert described.pairs.shapes.n_dims == 12
     assert described.n_dims == 63
     assert (recognizer.predict(demos) == np.asarray(demos.labels)).all()
+    # Movements that are asked for are compared by the same four points, not by their own:
+    own = [recognizer.log_similarity(demo).max() for demo in recognizer.demonstrations_[:3]]
+    np.testing.assert_allclose(own, 0, atol=1e-4)
+    symbols = kineme.anchoring.assign(demos[:3], recognizer).labels
+    assert list(symbols) == list(demos.labels[:3])
 
 
 def test_many_columns_that_are_no_points_are_compared_by_twelve():

@@ -94,7 +94,7 @@ def assign(
     """
     check_count("min_members", min_members, 2)
     classes = known_classes(symbols)
-    described = describe(classes.comparison.checked(movements), classes.comparison)
+    described = classes.comparison.describe(classes.comparison.checked(movements))
     return assign_described(described, classes, error_rate, min_members)
 
 

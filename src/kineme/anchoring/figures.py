@@ -15,7 +15,7 @@ from kineme.errors import SpecificationError
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.reporting.colors import BLUE, GRAY, ORANGE
-from kineme.reporting.figures import new_figure
+from kineme.reporting.figures import flat, new_figure
 from kineme.reporting.text import drawable
 from kineme.similarity.describe import maps_onto, paths_of
 from kineme.similarity.specification import Compares
@@ -30,28 +30,6 @@ _LEFT_OVER = 24  # of those left over, drawn at most
 _SHOWN = 60  # members drawn at most, evenly spread; more would hide each other
 
 _ABOUT = {1: "position over the share of the duration", 2: ""}
-
-
-def principal_axes(path: Array) -> Array:
-    """Two axes (2, d) of the plane in which a path (d, T) is widest, for movements of three dimensions and more.
-
-    Of the two recorded dimensions that lie most in that plane, the first points right and the second up, as far as both
-    can: what was written is not drawn on its side, nor as if seen from behind.
-    """
-    centered = path - path.mean(axis=1, keepdims=True)
-    plane = np.linalg.svd(centered, full_matrices=False)[0].T[:2]
-    right, up = np.sort(np.argsort(-np.linalg.norm(plane, axis=0), kind="stable")[:2])
-    U, _, Vt = np.linalg.svd(plane[:, [right, up]])
-    return np.asarray((U @ Vt).T @ plane)
-
-
-def flat(paths: Array, like: Array) -> Array:
-    """Paths (n, d, T) as drawn, (n, 2, T): over the phase, as they are, or in the principal axes of the path `like`."""
-    n, d, T = paths.shape
-    if d == 1:
-        phase = np.broadcast_to(np.linspace(0.0, 1.0, T), (n, 1, T))
-        return np.concatenate((phase, paths), axis=1)
-    return paths if d == 2 else np.asarray(principal_axes(like) @ paths)
 
 
 def plot_paths(axes: Any, drawn: Array, color: str, dot: float = 0.0, **style: Any) -> None:

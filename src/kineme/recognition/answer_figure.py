@@ -17,7 +17,7 @@ from kineme.movements.trajectories.labels import Label
 from kineme.movements.trajectories.movements import Samples
 from kineme.movements.trajectories.trajectory import MovementLike, MovementsLike
 from kineme.reporting.colors import BLUE, GRAY
-from kineme.reporting.figures import figure_to_show
+from kineme.reporting.figures import figure_to_show, principal_axes
 from kineme.reporting.text import drawable, shortened
 from kineme.validation import Array
 
@@ -134,10 +134,7 @@ def _drawing_axes(path: Array) -> tuple[Array | None, tuple[str, str]]:
     if d == 2:
         return np.eye(2), ("x", "y")
     if d == 3:
-        return np.linalg.svd(path - path.mean(axis=0), full_matrices=False)[2][:2], (
-            "widest direction",
-            "second widest",
-        )
+        return principal_axes(path.T), ("in the plane where it is widest", "")
     return None, ("share of the path", "coordinates")
 
 

@@ -160,8 +160,9 @@ def fit_best(comparison: Comparison, references: References) -> Classifier:
 
     Considered from eight demonstrations of each class on, of movements that are compared in detail and not rotated.
     """
-    pairs, how = references.described.pairs, comparison.specification
-    able = pairs is not None and pairs.details is not None and how.upright and how.normalization.translation
+    pairs, rotated = references.described.pairs, comparison.procrustes.max_angle > 0
+    in_detail = pairs is not None and pairs.details is not None and (pairs.upright or not rotated)
+    able = in_detail and comparison.normalization.translation
     n_classes = len(references.classes)
     if not able or n_classes < 2 or references.counts.min() < FEWEST or len(references) > MOST:
         return NearestEach()

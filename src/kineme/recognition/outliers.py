@@ -19,7 +19,7 @@ from kineme.reporting.table import Table, to_text
 from kineme.reporting.text import counted, printable
 from kineme.sampling import evenly_spaced
 from kineme.similarity.comparison import Comparison, References, fit_comparison
-from kineme.similarity.describe import Described, Tile, feature_rows, for_described
+from kineme.similarity.describe import Described, Tile, for_described
 from kineme.similarity.specification import ComparisonSpecification
 from kineme.validation import Array
 
@@ -193,7 +193,7 @@ def _fitted(demos: Demonstrations, members: list[NDArray[np.intp]]) -> tuple[Com
 
 
 def _described(comparison: Comparison, demos: Demonstrations, rows: NDArray[np.intp]) -> Described:
-    return comparison.prepared(feature_rows(demos[rows], comparison.specification))
+    return comparison.describe(demos[rows])
 
 
 def _distances(

@@ -21,7 +21,7 @@ from kineme.recognition.conformal import Calibration, calibrate, check_error_rat
 from kineme.recognition.convolutions import Convolutions
 from kineme.runtime.compiled import load_compiled
 from kineme.similarity.comparison import Comparison, References, fit_comparison
-from kineme.similarity.describe import Described, Tile, describe
+from kineme.similarity.describe import Described, Tile
 from kineme.similarity.scores import Compared, Score, for_compared, nearest, score
 from kineme.similarity.specification import (
     ComparisonSpecification,
@@ -225,7 +225,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     def describe(self, X: MovementsLike) -> Described:
         """Return movements described as the stored ones are, ready to be compared with them."""
         comparison, _ = self._fitted
-        return describe(comparison.checked(X), comparison)
+        return comparison.describe(comparison.checked(X))
 
     def log_similarity(self, X: MovementsLike) -> Array:
         """Return the logarithms of the averaged kernel to the stored demonstrations, shape (n, m)."""

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib
+import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
@@ -18,6 +19,7 @@ from kineme.errors import DataError
 from kineme.reporting.atomic import write_atomically
 from kineme.reporting.colors import BLUE, GREEN, ORANGE
 from kineme.reporting.text import printable_lines
+from kineme.validation import Array
 
 SEQUENCE = (BLUE, ORANGE, GREEN)
 LINES = ("-", "--", ":")
@@ -92,3 +94,25 @@ def save_figure(figure: Figure, path: Path) -> Path:
     if kind not in FORMATS:
         raise DataError(f"expected a picture ending in one of {', '.join(FORMATS)}, got {path.suffix or 'none'!r}")
     return write_atomically(path, encode_figure(figure, kind))
+
+
+def principal_axes(path: Array) -> Array:
+    """Two axes (2, d) of the plane in which a path (d, T) is widest, for movements of three dimensions and more.
+
+    Of the two recorded dimensions that lie most in that plane, the first points right and the second up, as far as both
+    can: what was written is not drawn on its side, nor as if seen from behind.
+    """
+    centered = path - path.mean(axis=1, keepdims=True)
+    plane = np.linalg.svd(centered, full_matrices=False)[0].T[:2]
+    right, up = np.sort(np.argsort(-np.linalg.norm(plane, axis=0), kind="stable")[:2])
+    U, _, Vt = np.linalg.svd(plane[:, [right, up]])
+    return np.asarray((U @ Vt).T @ plane)
+
+
+def flat(paths: Array, like: Array) -> Array:
+    """Paths (n, d, T) as drawn, (n, 2, T): over the phase, as they are, or in the principal axes of the path `like`."""
+    n, d, T = paths.shape
+    if d == 1:
+        phase = np.broadcast_to(np.linspace(0.0, 1.0, T), (n, 1, T))
+        return np.concatenate((phase, paths), axis=1)
+    return paths if d == 2 else np.asarray(principal_axes(like) @ paths)

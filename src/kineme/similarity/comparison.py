@@ -84,6 +84,10 @@ class Comparison:
         """
         return as_learned(movements, self.channels, self.n_dims, what)
 
+    def describe(self, movements: Demonstrations) -> Described:
+        """Return movements in the coordinates that were learned, described as the references are."""
+        return self.prepared(feature_rows(movements, self.specification))
+
     def prepared(self, rows: tuple[NDArray[np.floating[Any]], ...]) -> Described:
         """Return feature rows, as from `feature_rows`, ready for comparison."""
         return prepare(rows, self, self.procrustes)

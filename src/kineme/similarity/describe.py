@@ -272,9 +272,8 @@ class Pairs:
 
     positions: Prepared  # positions over arc length, which give the rotation of a pair
     shapes: Shapes
-    measures: tuple[
-        int, ...
-    ]  # which of the distances that `kineme.kernels.pair_distances` gives, those of details last
+    # Which of the distances that `kineme.kernels.pair_distances` gives, those of details last:
+    measures: tuple[int, ...]
     details: Shapes | None = None  # the shapes in detail
     upright: bool = True  # whether these are not rotated
 
@@ -332,10 +331,13 @@ class Described:
         """Return the same movements in some of the representations."""
         chosen, n = list(representations), len(self.blocks)
         measures = tuple(self.pairs.measures[r - n] for r in chosen if r >= n) if self.pairs is not None else ()
+        pairs = replace(self.pairs, measures=measures) if self.pairs is not None and measures else None
+        if pairs is not None and pairs.n_rotated == len(measures):
+            pairs = replace(pairs, details=None)
         return replace(
             self,
             blocks=tuple(self.blocks[r] for r in chosen if r < n),
-            pairs=replace(self.pairs, measures=measures) if self.pairs is not None and measures else None,
+            pairs=pairs,
             own_weights=None if self.own_weights is None else tuple(self.own_weights[r] for r in chosen),
         )
 

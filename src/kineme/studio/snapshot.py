@@ -29,6 +29,7 @@ from kineme.movements.preparation.smooth import spline_matrix
 from kineme.recognition import conformal
 from kineme.recognition.answer import LEAST_CONFIDENCE, FittedRecognizer, KnownClasses, known_classes
 from kineme.recognition.classifiers import Classifier, Nearest, NearestEach, Prototype, fit_prototype
+from kineme.recognition.convolutions import Convolutions
 from kineme.recognition.conformal import GUESSES, RULES, Calibration
 from kineme.recognition.early import evidence
 from kineme.recognition.early import hypotheses as beginnings
@@ -205,8 +206,9 @@ def _classifier(classifier: Classifier) -> dict[str, Any]:
         if isinstance(classifier, kind):
             return {"classifier": name}
     raise SpecificationError(
-        "expected the classifier to be one of auto, nearest-each, nearest and prototype, got svm or convolutions, "
-        f"which the page does not have; {_AGAIN}"
+        "expected the classifier to be nearest-each, nearest or prototype, got "
+        f"{'convolutions' if isinstance(classifier, Convolutions) else 'svm'}, which the page does not have; "
+        "pass classifier='nearest-each'"
     )
 
 
