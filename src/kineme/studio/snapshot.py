@@ -29,8 +29,8 @@ from kineme.movements.preparation.smooth import spline_matrix
 from kineme.recognition import conformal
 from kineme.recognition.answer import LEAST_CONFIDENCE, FittedRecognizer, KnownClasses, known_classes
 from kineme.recognition.classifiers import Classifier, Nearest, NearestEach, Prototype, fit_prototype
-from kineme.recognition.convolutions import Convolutions
 from kineme.recognition.conformal import GUESSES, RULES, Calibration
+from kineme.recognition.convolutions import Convolutions
 from kineme.recognition.early import evidence
 from kineme.recognition.early import hypotheses as beginnings
 from kineme.recognition.early.hypotheses import Early, hypotheses
