@@ -1,0 +1,37 @@
+"""Episodes of robot data: what several sensors and commands said while a task was done once, as it is stored."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from kineme.validation import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Episode:
+    """One execution of a task: signals at common time stamps, as a data set stores them, checked by nobody.
+
+    - `number`: index of the episode in its data set.
+    - `times` (T,): stamps [s] since the beginning of the episode, as they are stored: they may repeat or go back.
+    - `signals`: name of a feature, such as ``observation.state`` or ``action``, -> its values (T, d); NaN where the set
+      has none.
+    - `names`: name of a feature -> the names of its d entries.
+    - `task`: what was done, in words; None if the data set does not say it.
+    - `fps`: declared rate [1/s]; NaN if the data set does not declare one.
+    - `problems`: what could not be read of the episode, or contradicts its declaration, each a sentence.
+    - `place`: where it is stored, relative to the data set.
+    """
+
+    number: int
+    times: Array
+    signals: Mapping[str, Array]
+    names: Mapping[str, tuple[str, ...]]
+    task: str | None = None
+    fps: float = float("nan")
+    problems: tuple[str, ...] = ()
+    place: str = ""
+    videos: Mapping[str, str] = field(default_factory=dict)  # camera -> file, relative to the data set
+
+    def __len__(self) -> int:
+        return len(self.times)
