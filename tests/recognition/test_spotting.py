@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import pickle
 import re
+from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 
@@ -37,6 +38,7 @@ from kineme.recognition.spotting import (
     _left_over,
     best_chain,
     closest_classes,
+    durations_of,
     far,
 )
 from kineme_experiments.evaluation.spotting import Counts, concatenate, count_spotted
@@ -156,6 +158,16 @@ def test_arrays_without_time_stamps_have_no_duration_to_compare():
     assert [one.label for one in found if one.label is not None] == ["WShape", "CShape"]
 
 
+def test_durations_of_even_stamps_that_are_not_kept_sample_by_sample_count():
+    demos = kineme.load_lasa(KNOWN)
+    untimed = replace(demos.movements, times=None)
+    even = replace(untimed, durations=np.full(len(demos), 1.98))
+    fitted = Recognizer().fit(Demonstrations.of_movements(even), demos.labels)
+    np.testing.assert_allclose(durations_of(fitted.references_), 1.98)
+    arrays = Recognizer().fit([one.positions for one in demos], demos.labels)
+    assert durations_of(arrays.references_) is None
+
+
 def _stretched(movements, factor):
     """The movements, slower by a factor, without labels."""
     return Demonstrations([Trajectory(factor * one.times, one.positions) for one in movements])
@@ -265,6 +277,7 @@ def _windows(shapes):
 def test_windows_within_reach_are_compared_completely_and_no_other_seems_to_be(monkeypatch):
     known, windows = _windows([*KNOWN, *UNKNOWN])
     reach = far(0.05)
+    monkeypatch.setattr(compared_windows, "_COMPLETELY", 10**6)
     every = compare_candidates(known, windows.motion, windows.rows, reach)
     assert every.completely.all()
     monkeypatch.setattr(compared_windows, "_COMPLETELY", 100)
@@ -289,6 +302,7 @@ def test_windows_within_reach_are_compared_completely_and_no_other_seems_to_be(m
 @pytest.mark.parametrize("shapes", [KNOWN, [*KNOWN, *UNKNOWN], UNKNOWN])
 def test_movements_are_the_same_where_few_windows_are_compared_completely(shapes, monkeypatch):
     recording, _ = _stream(4, shapes, 0.002)
+    monkeypatch.setattr(compared_windows, "_COMPLETELY", 10**6)
     found = _recognizer().spot(recording)
     monkeypatch.setattr(compared_windows, "_COMPLETELY", 100)
     assert [one[:3] for one in _recognizer().spot(recording)] == [one[:3] for one in found]

@@ -1,7 +1,8 @@
 """Candidate windows of one recording, compared with the demonstrations as far as it can matter.
 
 Nearly all windows of a long recording are far from every class. How far does not matter, except for how common a
-distance is: that is estimated from some windows, which are compared completely.
+distance is: that is estimated from some windows, which are compared completely. The others are compared in the order of
+a coarse distance, until none is within reach any more.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from kineme.movements.segmentation.table import Motion, Rest, Rows, observe
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import Movements
 from kineme.movements.trajectories.trajectory import Trajectory
+from kineme.recognition.coarse_windows import coarse_distances, coarse_references
 from kineme.recognition.conformal import LEAST, Calibration
 from kineme.runtime.compiled import compiled_module, use_compiled
 from kineme.runtime.parallel import for_tiles
@@ -39,7 +41,10 @@ _MOST_REST = 0.6  # share of a window at rest
 _DRIFT = 0.2  # share of the peak speed: a drift that covers less path between boundaries gets none
 
 _TILE, _AT_ONCE = 4096, 256  # windows between two calls of `progress`, and those that a thread describes at a time
-_COMPLETELY = 65_536  # windows that are compared completely, evenly spaced: all those of a few minutes
+_COMPLETELY = 256  # windows that are compared completely, evenly spaced: they tell how common distances are
+#: Windows are compared in steps, those that are coarsely nearest first, until none of a step is within reach.
+_STEPS, _LEAST_TILE = 32, 256  # steps of all windows, at most; windows in a step, at least
+_ABOVE = 1e-6  # share by which the score of a window that is not compared is above the bar
 _RESTING = 0.2  # share of the mean speed of a window below which it rests
 _COMMON = 0.2  # share of the windows of a recording whose distance to a class, or less, is common
 _OPERATIONS_PER_SAMPLE = 8  # of the size of a path
@@ -101,17 +106,41 @@ def compare_candidates(
     """
     completely = np.zeros(len(rows), dtype=bool)
     completely[evenly_spaced(len(rows), _COMPLETELY)] = True
-    share = completely.mean()
-    some = compare_windows(templates, motion, rows[completely], progress=_part(progress, 0.0, share))
-    weights = rarity_weights(some.scores * templates.calibration.scales)
-    if completely.all():
-        return Candidates(some, weights, completely)
-    others = compare_windows(templates, motion, rows[~completely], reach / weights, _part(progress, share, 1.0 - share))
-    order = np.argsort(np.concatenate((np.flatnonzero(completely), np.flatnonzero(~completely))))
-    both = (
-        np.concatenate((getattr(some, attribute.name), getattr(others, attribute.name))) for attribute in fields(some)
-    )
-    return Candidates(ComparedWindows(*both).take(order), weights, completely)
+    sample, others = np.flatnonzero(completely), np.flatnonzero(~completely)
+    parts = [compare_windows(templates, motion, rows[sample], progress=_part(progress, 0.0, completely.mean()))]
+    weights = rarity_weights(parts[0].scores * templates.calibration.scales)
+    if len(others):
+        coarse = coarse_references(templates.comparison, templates.references, RESOLUTION)
+        distances = coarse_distances(templates.comparison, coarse, motion, rows[others])
+        others = others[np.argsort((distances * weights).min(axis=1), kind="stable")]
+    bars, size = reach / weights, int(np.clip(len(rows) // _STEPS, _LEAST_TILE, _TILE))
+    for begin in range(0, len(others), size):
+        some = rows[others[begin : begin + size]]
+        tell = _part(progress, 1.0 - (len(others) - begin) / len(rows), len(some) / len(rows))
+        parts.append(compare_windows(templates, motion, some, bars, tell))
+        if (parts[-1].scores > bars).all():  # none is within reach: of those that are coarsely farther none is, either
+            parts.append(_beyond(motion, rows[others[begin + size :]], bars))
+            break
+    if progress is not None:
+        progress(1.0)
+    order = np.argsort(np.concatenate((sample, others)))
+    columns = (np.concatenate([getattr(part, attribute.name) for part in parts]) for attribute in fields(parts[0]))
+    return Candidates(ComparedWindows(*columns).take(order), weights, completely)
+
+
+def _beyond(motion: Motion, rows: Rows, bars: Array) -> ComparedWindows:
+    """Return windows that are not compared: their scores are just above the bar (C,) of each class."""
+    start, end = motion.times[rows].T
+    sizes, slowness = np.empty((2, len(rows)))
+
+    def fill(first: int, last: int) -> None:
+        tile = slice(first, last)
+        paths = resampled(motion, start[tile], end[tile]).positions.reshape(last - first, N_POINTS, -1)
+        sizes[tile], slowness[tile] = size_and_slowness(paths.transpose(0, 2, 1))
+
+    for_tiles(fill, len(rows), _TILE)
+    scores = np.broadcast_to(bars * (1.0 + _ABOVE), (len(rows), len(bars)))
+    return ComparedWindows(rows, scores, np.log(end - start), sizes, slowness)
 
 
 def _part(progress: Progress | None, begin: float, share: float) -> Progress | None:

@@ -129,7 +129,7 @@ def _as_timed(recording: MovementsLike) -> Trajectory:
     """Return the recording, whose time stamps are known, as those of the references are."""
     if not isinstance(recording, Trajectory):
         recording = Demonstrations.of(recording)
-        if recording.movements.times is None:
+        if not _is_timed(recording):
             raise TrajectoryError(
                 "expected time stamps, as the demonstrations have, got an array, which counts as one second; pass "
                 "kineme.Trajectory(times, positions)"
@@ -273,7 +273,12 @@ class ScoredWindows(NamedTuple):
 def durations_of(references: References) -> Array | None:
     """Return durations of the references; None where their arrays came without time stamps, so that none is known."""
     demos = references.all_movements()
-    return None if demos.movements.times is None else demos.durations
+    return demos.durations if _is_timed(demos) else None
+
+
+def _is_timed(demos: Demonstrations) -> bool:
+    """Tell whether movements have time stamps: arrays without count as one second each; even ones are not kept."""
+    return demos.movements.times is not None or bool((demos.durations != 1.0).any())
 
 
 def expected(references: References) -> Expected:
