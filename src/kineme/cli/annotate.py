@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import click
 
@@ -18,7 +20,7 @@ from kineme.cli.options import (
     library_option,
 )
 from kineme.cli.output import check_new, progress, say, table, write
-from kineme.cli.reading import layout_options, notes_beside, problem_lines, read, recordings_argument
+from kineme.cli.reading import layout_options, notes_beside, pieces, problem_lines, recordings_argument, seconds_of
 from kineme.reporting.text import counted, printable
 
 
@@ -59,11 +61,8 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
     Example: kineme annotate long.csv --library actions/ -o long-labels.csv
     """
     from kineme.io.reading.formats import expanded
-    from kineme.io.reading.recordings import paths_of
-    from kineme.io.writing.annotations import as_row, targets_of, to_csv, write_annotations
-    from kineme.library.annotate import annotate as find
+    from kineme.io.writing.annotations import targets_of, to_csv, write_annotations
     from kineme.library.library import ActionLibrary
-    from kineme.recognition.answer import certainty
 
     as_json, as_csv, force, error_rate = (options.pop(name) for name in ("as_json", "as_csv", "force", "error_rate"))
     if as_csv and (as_json or output is not None):
@@ -71,59 +70,120 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
     if output is None and form is not None:
         raise click.UsageError("expected --output with --format")
     sources = [source for path in recordings for source in expanded(path)]
+
+    def check(movements: list[tuple[str, str]], *read: Path) -> None:
+        for target in targets_of(output, sources, movements, form) if output is not None else ():
+            check_new(target, force, *sources, *read)
+            if target.is_dir() and any(target.iterdir()) and not force:
+                raise click.UsageError(
+                    f"expected a new folder to write, {printable(target)} is there; write over it with --force"
+                )
+
     with ActionLibrary(folder, read_only=True) as library:
-        parsed = read(recordings, options, library)
-        movements = [(source.path, source.place) for source in parsed.sources]
-        if output is not None:
-            for target in targets_of(output, sources, movements, form):
-                check_new(target, force, *sources, *paths_of(recordings, parsed))
-                if target.is_dir() and any(target.iterdir()) and not force:
-                    raise click.UsageError(
-                        f"expected a new folder to write, {printable(target)} is there; write over it with --force"
-                    )
-        total = float(parsed.demonstrations.durations.sum())
-        bar_format = "{l_bar}{bar}| {n:.0f} of {total:.0f} s [{elapsed}<{remaining}]"
-        with progress(total=total, desc="annotating", bar_format=bar_format) as bar:
-            report = find(library.store, parsed, error_rate, lambda done: bar.update(min(done, total) - bar.n))
-        notes = notes_beside(parsed, options, library.channels)
-    written = [] if output is None else write_annotations(output, report.annotations, sources, form, movements)
-    is_guess = not report.calibrated
+        answer = _annotated(library, recordings, options, error_rate, check)
+    if output is not None and answer.streamed:
+        check(answer.movements)
+    written = [] if output is None else write_annotations(output, answer.annotations, sources, form, answer.movements)
+    rows = [] if written and not as_json else _rows(answer)  # a large set would fill the memory once more
     data = {
-        "annotations": [
-            as_row(each) | {"certainty": certainty(each.confidence, is_new=each.unknown, is_guess=is_guess)}
-            for each in report.annotations
-        ],
-        "seconds": total,
-        "calibrated": report.calibrated,
+        "annotations": rows,
+        "seconds": answer.seconds,
+        "calibrated": answer.calibrated,
         "written": list(map(str, written)),
-        "notes": notes,
-        "problems": [str(problem) for problem in (*parsed.problems, *report.problems)],
+        "notes": answer.notes,
+        "problems": [str(problem) for problem in answer.problems],
     }
-    problems = problem_lines((*parsed.problems, *report.problems), "not annotated: ")
+    problems = problem_lines(answer.problems, "not annotated: ")
     if as_csv:
-        write(to_csv(report.annotations).decode().removesuffix("\n"))
+        write(to_csv(answer.annotations).decode().removesuffix("\n"))
         for line in _remarks(data, problems):
             write(line, err=True)
     else:
-        say(as_json, data, lambda: _text(data, problems))
+        say(as_json, data, lambda: _text(data, answer.annotations, problems))
 
 
-def _text(data: dict[str, Any], problems: list[str]) -> str:
+class _Answer(NamedTuple):
+    """Annotations of all recordings, and what to say of them."""
+
+    annotations: list[Any]
+    movements: list[tuple[str, str]]  # path and place of each recording, those without annotations too
+    seconds: float
+    calibrated: bool
+    notes: list[str]
+    problems: list[Any]
+    streamed: bool  # whether recordings were read in several pieces
+
+
+def _annotated(
+    library: Any, recordings: tuple[Path, ...], options: dict[str, Any], error_rate: float, check: Callable[..., None]
+) -> _Answer:
+    """Annotate recordings piece by piece, once `check` has seen what is known of the first one."""
+    from kineme.io.reading.recordings import paths_of
+    from kineme.io.records import Problem
+    from kineme.library.annotate import annotate_by
+    from kineme.library.recognize import some_of_each_symbol
+
+    known = some_of_each_symbol(library.store)
+    answer = _Answer([], [], 0.0, bool(known.calibration.calibrated(error_rate).all()), [], [], False)
+    total = seconds_of(recordings)
+    bar_format = "{l_bar}{bar}| {n:.0f} of {total:.0f} s [{elapsed}<{remaining}]"
+    with progress(total=total, desc="annotating", bar_format=bar_format) as bar:
+        for piece in pieces(recordings, options, library):
+            if isinstance(piece, Problem):
+                answer.problems.append(piece)
+                continue
+            streamed = total is not None
+            if not answer.movements:
+                at_once = [] if streamed else [(source.path, source.place) for source in piece.sources]
+                check(at_once, *paths_of(recordings, piece))
+                answer.notes.extend(notes_beside(piece, options, library.channels))
+            seconds = float(piece.demonstrations.durations.sum())
+            bar.total = bar.total or seconds
+            done = partial(_advance, bar, answer.seconds)
+            report = annotate_by(known, piece, error_rate, done)
+            answer.annotations.extend(report.annotations)
+            answer.movements.extend((source.path, source.place) for source in piece.sources)
+            answer.problems.extend((*piece.problems, *report.problems))
+            answer = answer._replace(seconds=answer.seconds + seconds, streamed=streamed)
+    if not answer.movements:
+        from kineme.errors import DataError
+
+        first = f"; the first: {answer.problems[0]}" if answer.problems else ""
+        raise DataError(f"expected recordings to annotate, found none that can be read{first}")
+    return answer
+
+
+def _advance(bar: Any, before: float, done: float) -> None:
+    bar.update(min(before + done, bar.total) - bar.n)
+
+
+def _rows(answer: _Answer) -> list[dict[str, Any]]:
+    from kineme.io.writing.annotations import as_row
+    from kineme.recognition.answer import certainty
+
+    return [
+        as_row(each) | {"certainty": certainty(each.confidence, is_new=each.unknown, is_guess=not answer.calibrated)}
+        for each in answer.annotations
+    ]
+
+
+def _text(data: dict[str, Any], annotations: list[Any], problems: list[str]) -> str:
     rows, written = data["annotations"], data["written"]
-    symbols = [row["symbol"] for row in rows if not row["unknown"]]
+    counts_of = Counter("unknown" if each.unknown else printable(each.symbol) for each in annotations)
+    symbols = [each.symbol for each in annotations if not each.unknown]
     counts = f"{counted(len(symbols), 'movement')} of {counted(len(set(symbols)), 'symbol')}"
-    lines = [f"{counts}, {len(rows) - len(symbols):,} unknown, in {data['seconds']:,.1f} s"]
-    names = ["unknown" if row["unknown"] else printable(row["symbol"]) for row in rows]
-    if rows and written:
+    lines = [f"{counts}, {len(annotations) - len(symbols):,} unknown, in {data['seconds']:,.1f} s"]
+    if annotations and written:
         seconds: Counter[str] = Counter()
-        for name, row in zip(names, rows, strict=True):
-            seconds[name] += row["end"] - row["start"]
-        totals = [(name, f"{n:,}", f"{seconds[name]:,.1f}") for name, n in Counter(names).most_common()]
+        for each in annotations:
+            seconds["unknown" if each.unknown else printable(each.symbol)] += each.end - each.start
+        totals = [(name, f"{n:,}", f"{seconds[name]:,.1f}") for name, n in counts_of.most_common()]
         lines.append(table(("symbol", "times", "seconds"), totals))
     elif rows:
         heads = ("recording", "start [s]", "end [s]", "symbol", "how sure")
         where = [printable(f"{row['recording']} {row['place']}".strip()) for row in rows]
         spans = [(f"{row['start']:.2f}", f"{row['end']:.2f}") for row in rows]
+        names = ["unknown" if row["unknown"] else printable(row["symbol"]) for row in rows]
         cells = zip(where, spans, names, rows, strict=True)
         lines.append(table(heads, [(of, *span, name, row["certainty"]) for of, span, name, row in cells]))
     return "\n".join([*lines, *_remarks(data, problems), *(f"written to {printable(path)}" for path in written)])

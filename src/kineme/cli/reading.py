@@ -138,13 +138,57 @@ def read(paths: Path | Sequence[Path], options: dict[str, Any], library: Any = N
     Topics of a bag and columns that are not asked for are those of `library`, where a file has them.
     """
     from kineme.io.limits import read_limited
-    from kineme.io.reading.recordings import NameRule, read_paths
+    from kineme.io.reading.recordings import read_paths
+
+    layout, rule, how, join = _how(options, library)
+    several = [paths] if isinstance(paths, Path) else list(paths)
+    files = [path for path in several if str(path) != "-"]
+    given = None if len(files) == len(several) else (STANDARD_INPUT, read_limited(sys.stdin.buffer))
+    return read_paths(
+        files,
+        layout,
+        rule,
+        **how,
+        join=join,
+        progress=lambda paths: progress(paths, desc="reading", unit="file"),
+        standard_input=given,
+    )
+
+
+def pieces(paths: Sequence[Path], options: dict[str, Any], library: Any) -> Any:
+    """Read recordings piece by piece: all at once, unless all are data sets that are read some episodes at a time."""
+    from kineme.io.reading.formats import expanded
+    from kineme.io.reading.pieces import is_episodic, read_pieces
+
+    if not all(is_episodic(path) for given in paths for path in expanded(given)):
+        yield read(paths, options, library)
+        return
+    layout, rule, how, _ = _how(options, library)
+    yield from read_pieces(paths, layout, rule, **how)
+
+
+def seconds_of(paths: Sequence[Path]) -> float | None:
+    """The declared length of data sets that are read some episodes at a time; None of other recordings."""
+    from kineme.io.lerobot.info import read_episodes, read_info
+    from kineme.io.reading.formats import expanded
+    from kineme.io.reading.pieces import is_episodic
+
+    folders = [path for given in paths for path in expanded(given)]
+    if not all(is_episodic(folder) for folder in folders):
+        return None
+    infos = [(folder, read_info(folder)) for folder in folders]
+    return sum(float(read_episodes(folder, info).lengths.sum()) / info.fps for folder, info in infos)
+
+
+def _how(options: dict[str, Any], library: Any) -> tuple[Any, Any, dict[str, bool], bool]:
+    """The layout and the rule of names that the `layout_options` say, the switches, and whether files are joined."""
+    from kineme.io.reading.recordings import NameRule
     from kineme.movements.tables.layout import Layout
 
     layout_options = {name.removesuffix("_column"): value for name, value in options.items()}
     rule = NameRule(layout_options.pop("label_pattern", None), layout_options.pop("label_by", None))
     how = {name: layout_options.pop(name, False) for name in ("follow_links", "trim")}
-    how["join"] = bool(layout_options.pop("join_files", False))
+    join = bool(layout_options.pop("join_files", False))
     for name in ("fill_gaps", "rows"):  # libraries store what was given
         if layout_options.get(name) is None:
             layout_options.pop(name, None)
@@ -153,17 +197,7 @@ def read(paths: Path | Sequence[Path], options: dict[str, Any], library: Any = N
 
         layout_options["reference"] = known_sources(library.store)
     layout_options["kinds"] = dict(layout_options.get("kinds") or ()) or None
-    several = [paths] if isinstance(paths, Path) else list(paths)
-    files = [path for path in several if str(path) != "-"]
-    given = None if len(files) == len(several) else (STANDARD_INPUT, read_limited(sys.stdin.buffer))
-    return read_paths(
-        files,
-        Layout(**layout_options),
-        rule,
-        **how,
-        progress=lambda paths: progress(paths, desc="reading", unit="file"),
-        standard_input=given,
-    )
+    return Layout(**layout_options), rule, how, join
 
 
 def notes_beside(parsed: Any, options: dict[str, Any], learned: Any) -> list[str]:

@@ -11,10 +11,14 @@ from kineme.io.records import Problem
 from kineme.io.writing.annotations import Annotation
 from kineme.library.recognize import some_of_each_symbol
 from kineme.library.storage.store import Store
+from kineme.recognition.answer import KnownClasses
 from kineme.recognition.compared_windows import Templates
 from kineme.recognition.spotting import spot
 
 _MAX_PIECES = 8  # most stretches between rests that a movement may consist of, as in `Recognizer.spot`
+
+
+Progress = Callable[[float], object]  # takes the seconds of recordings that are done
 
 
 class Annotated(NamedTuple):
@@ -26,17 +30,25 @@ class Annotated(NamedTuple):
 
 
 def annotate(
-    store: Store, recordings: Recordings, error_rate: float = 0.05, progress: Callable[[float], object] | None = None
+    store: Store, recordings: Recordings, error_rate: float = 0.05, progress: Progress | None = None
 ) -> Annotated:
     """Find the movements of a library's symbols in long recordings, and unknown motion between them.
 
     Each movement of the recordings is searched on its own, at an error rate as in `Recognizer.spot`. `progress` is
     called now and then with the seconds of recordings that are done.
     """
-    classes = some_of_each_symbol(store)
-    classes.comparison.checked(recordings.demonstrations[:1], "recordings")  # all of them have the same columns
-    templates = Templates(classes.comparison, classes.references, classes.calibration)
-    annotations, problems, done = [], [], 0.0
+    return annotate_by(some_of_each_symbol(store), recordings, error_rate, progress)
+
+
+def annotate_by(
+    known: KnownClasses, recordings: Recordings, error_rate: float = 0.05, progress: Progress | None = None
+) -> Annotated:
+    """Annotate by symbols that are prepared once for many recordings, see `some_of_each_symbol`."""
+    known.comparison.checked(recordings.demonstrations[:1], "recordings")  # all of them have the same columns
+    templates = Templates(known.comparison, known.references, known.calibration)
+    annotations: list[Annotation] = []
+    problems: list[Problem] = []
+    done = 0.0
     for recording, source in zip(recordings.demonstrations, recordings.sources, strict=True):
         before = done
 
@@ -58,4 +70,4 @@ def annotate(
                 annotations.append(Annotation(source.path, source.place, *times, label, *certainty, origin))
         done += recording.duration
         tell(1.0)
-    return Annotated(annotations, problems, bool(classes.calibration.calibrated(error_rate).all()))
+    return Annotated(annotations, problems, bool(known.calibration.calibrated(error_rate).all()))

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import suppress
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import DataError
+from kineme.io.lerobot.episodes import episodes
 from kineme.io.lerobot.frames import Frames, contradictions, joined, shard_frames, task_texts
 from kineme.io.lerobot.info import Episodes, Info, read_episodes, read_info, read_tasks
 from kineme.io.limits import check_expanded
+from kineme.movements.episodes import Episode
 from kineme.movements.tables.columns import choose_roles, column_numbers
 from kineme.movements.tables.layout import Column, Layout, Parsed, listed, no_lines
 from kineme.movements.tables.table import Segments, Table, table_movements
@@ -21,6 +25,7 @@ from kineme.reporting.text import first_names
 from kineme.validation import Array
 
 _SHOWN = 5  # numbers of episodes in one message
+_NUMBERS = 2**22  # of the episodes of a part, at least, unless it is the last one
 
 STATE = "observation.state"
 _STAMP = "timestamp [s]"
@@ -29,7 +34,70 @@ _TOLERANCE = 1e-4  # s between the stored stamps and the frames at the declared 
 
 def lerobot_movements(folder: Path, layout: Layout) -> Parsed:
     """Read a data set of LeRobot, version 2 or 3: ``observation.state``, or what ``columns`` names, of each episode."""
-    # Refuse a choice of times, movements or labels that the data set has already made otherwise.
+    _check_declared(layout)
+    info = read_info(folder)
+    chosen = _chosen(info, layout)
+    declared, (tasks, unsaid) = read_episodes(folder, info), read_tasks(folder)
+    frames, unread = _all_frames(folder, info, declared, chosen.features)
+    frames, offsets, wrong = whole_episodes(frames, declared, unread)
+    left_out = [*declared.problems, *unsaid, *unread.values(), *wrong]
+    if len(offsets) < 2:
+        raise DataError(f"expected episodes in a LeRobot data set, got none that is whole; the first: {left_out[0]}")
+    places = [f"episode {k}" for k in frames.episodes[offsets[:-1]].tolist()]
+    segments = Segments(offsets, places, task_texts(frames, offsets, tasks))
+    stamps = _stamps(frames, offsets, info.fps)
+    parsed = _in_columns(info, layout, chosen, (stamps, frames.values), segments, frames.faults)
+    return parsed._replace(left_out=tuple(left_out))
+
+
+def lerobot_parts(folder: Path, layouts: Sequence[Layout]) -> Iterator[Callable[[Layout], Parsed]]:
+    """Yield parts of a data set, some whole episodes each, as functions from one of `layouts` to its movements.
+
+    A batch of frames and one part are in memory at a time. The features are those of the layouts that the data set can
+    fill. A part whose episodes all are damaged says why in `Parsed.left_out`, and has no movements.
+    """
+    info = read_info(folder)
+    features: dict[str, int] = {}
+    for layout in layouts:
+        _check_declared(layout)
+        with suppress(DataError):
+            features |= _chosen(info, layout).features
+    if not features:
+        _chosen(info, layouts[-1])  # says why
+    part: list[Episode] = []
+    for episode in episodes(folder, list(features)):
+        part.append(episode)
+        if sum(map(len, part)) * sum(features.values()) >= _NUMBERS:
+            yield partial(_of_episodes, info, part)
+            part = []
+    if part:
+        yield partial(_of_episodes, info, part)
+
+
+def _of_episodes(info: Info, part: Sequence[Episode], layout: Layout) -> Parsed:
+    """Return the movements of some episodes in the columns of a layout; those with problems are left out."""
+    chosen = _chosen(info, layout)
+    whole = [episode for episode in part if len(episode) and not episode.problems]
+    left_out = [
+        f"episode {episode.number}: {reason}" if episode.number >= 0 else reason
+        for episode in part
+        for reason in episode.problems
+    ]
+    offsets = np.concatenate(([0], np.cumsum([len(episode) for episode in whole]))).astype(np.intp)
+    values = [np.concatenate([episode.signals[name] for name in chosen.features], axis=1) for episode in whole]
+    even = [np.arange(len(episode)) / info.fps for episode in whole]
+    stamps = [
+        each if (np.abs(episode.times - each) <= _TOLERANCE).all() else episode.times
+        for episode, each in zip(whole, even, strict=True)
+    ]
+    frames = np.concatenate([np.empty((0, sum(chosen.features.values()))), *values])
+    segments = Segments(offsets, [f"episode {episode.number}" for episode in whole], [each.task for each in whole])
+    parsed = _in_columns(info, layout, chosen, (np.concatenate([np.empty(0), *stamps]), frames), segments, {})
+    return parsed._replace(left_out=tuple(left_out))
+
+
+def _check_declared(layout: Layout) -> None:
+    """Refuse a choice of times, movements or labels that the data set has already made otherwise."""
     named = {"label": (layout.label, ("task", "task_index")), "time": (layout.time, ("timestamp",))}
     for what, (given, names) in named.items():
         if given is not None and given not in names:
@@ -38,29 +106,37 @@ def lerobot_movements(folder: Path, layout: Layout) -> Parsed:
         raise DataError(
             f"expected 'episode_index' as movement of a LeRobot data set, got {listed(map(str, layout.keys))}"
         )
-    info = read_info(folder)
-    features, heads, chosen = _chosen(info, layout)
-    declared, (tasks, unsaid) = read_episodes(folder, info), read_tasks(folder)
-    frames, unread = _all_frames(folder, info, declared, features)
-    frames, offsets, wrong = whole_episodes(frames, declared, unread)
-    left_out = [*declared.problems, *unsaid, *unread.values(), *wrong]
-    if len(offsets) < 2:
-        raise DataError(f"expected episodes in a LeRobot data set, got none that is whole; the first: {left_out[0]}")
-    places = [f"episode {k}" for k in frames.episodes[offsets[:-1]].tolist()]
-    columns = [_stamps(frames, offsets, info.fps), *(frames.values[:, k] for k in chosen)]
-    table = Table(
-        (_STAMP, *heads), columns, len(frames.values), no_lines, frames.faults,
-        segments=Segments(offsets, places, task_texts(frames, offsets, tasks)), maker="LeRobot",
-    )  # fmt: skip
+
+
+class _Chosen(NamedTuple):
+    """Columns of features that are read."""
+
+    features: dict[str, int]  # with their widths
+    heads: tuple[str, ...]  # of the coordinates
+    columns: list[int]  # of these among the features, side by side
+
+
+def _in_columns(
+    info: Info,
+    layout: Layout,
+    chosen: _Chosen,
+    samples: tuple[Array, Array],
+    segments: Segments,
+    faults: dict[int, str],
+) -> Parsed:
+    """Return movements by stamps (T,) and features (T, d)."""
+    stamps, values = samples
+    columns = [stamps, *(values[:, k] for k in chosen.columns)]
+    table = Table((_STAMP, *chosen.heads), columns, len(values), no_lines, faults, segments=segments, maker="LeRobot")
     plain = Layout(time=0, columns=range(1, len(columns)), skip=layout.skip)
     roles = choose_roles(table.heads, ("number",) * len(table.heads), plain)
     parsed = table_movements(table, roles, plain, f"v{info.version}")
-    ignored = (*(name for name in info.heads if name not in features), *info.others)
-    return parsed._replace(detected=parsed.detected._replace(ignored=ignored), left_out=tuple(left_out))
+    ignored = (*(name for name in info.heads if name not in chosen.features), *info.others)
+    return parsed._replace(detected=parsed.detected._replace(ignored=ignored))
 
 
-def _chosen(info: Info, layout: Layout) -> tuple[dict[str, int], tuple[str, ...], list[int]]:
-    """Return features that are read with their widths; heads of the coordinates; their columns among those features."""
+def _chosen(info: Info, layout: Layout) -> _Chosen:
+    """Return the columns that a layout names, else those of the feature that is read by default."""
     if not info.heads:
         only = f"only {listed(info.others)}" if info.others else "none"
         raise DataError(f"expected features of numbers in a LeRobot data set, got {only}")
@@ -82,7 +158,7 @@ def _chosen(info: Info, layout: Layout) -> tuple[dict[str, int], tuple[str, ...]
     columns = [starts[owners[k]] + k - owners.index(owners[k]) for k in numbers]
     alone = len(features) == 1
     heads = tuple(entries[k] if alone and entries[k] and not entries[k].isdecimal() else full[k] for k in numbers)
-    return features, heads, columns
+    return _Chosen(features, heads, columns)
 
 
 def _numbers_of(full: Sequence[str], short: Sequence[str], columns: Sequence[Column]) -> list[int]:
@@ -112,7 +188,7 @@ def _all_frames(
     episodes_of: dict[str, list[int]] = {}
     for k, shard in zip(declared.numbers.tolist(), declared.shards, strict=True):
         episodes_of.setdefault(shard, []).append(k)
-    for shard, episodes in episodes_of.items():
+    for shard, numbers in episodes_of.items():
         n_before, n_bytes = len(parts), taken
         try:
             for frames in shard_frames(folder, info, shard, features):
@@ -120,7 +196,7 @@ def _all_frames(
                 n_bytes += 8 * (width + 4) * len(frames.values)
                 check_expanded(n_bytes, f"a data set with the shard {shard}")
         except DataError as error:
-            unread[shard] = f"{error}; left out {episode_names(episodes)}"
+            unread[shard] = f"{error}; left out {episode_names(numbers)}"
             del parts[n_before:]
             continue
         taken = n_bytes

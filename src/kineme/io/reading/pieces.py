@@ -1,0 +1,63 @@
+"""Recordings piece by piece: some episodes of a data set at a time, other files one by one; memory holds one piece."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from kineme.errors import KinemeError
+from kineme.io.lerobot.info import MARKER
+from kineme.io.reading.formats import Entry, Format, data_set_of, entries_of
+from kineme.io.reading.merge_files import Recordings, merge_files
+from kineme.io.reading.read_file import parsed_file
+from kineme.io.reading.recordings import NameRule, read_paths, trimmed
+from kineme.io.records import Problem, needs
+from kineme.movements.tables.layout import Layout
+
+
+def is_episodic(path: Path) -> bool:
+    """Tell whether a path is a data set whose episodes are read some at a time."""
+    data_set = data_set_of(path) if path.is_dir() else None
+    return data_set is not None and data_set.marker == MARKER
+
+
+def read_pieces(
+    paths: Sequence[Path], layout: Layout, rule: NameRule, *, follow_links: bool = False, trim: bool = False
+) -> Iterator[Recordings | Problem]:
+    """Yield recordings of files, folders and patterns, as `read_paths` reads them, or the problem with a file.
+
+    Each piece has the channels of its own samples. A data set that is read some episodes at a time has no checksum.
+    """
+    entries, problems = entries_of(paths, follow_links)
+    yield from problems
+    for entry in entries:
+        try:
+            if is_episodic(entry.path):
+                yield from _of_data_set(entry, layout, rule, trim)
+            else:
+                read = read_paths([entry.path], layout, rule, follow_links=follow_links, trim=trim)
+                yield _renamed(read, entry.name)
+        except (KinemeError, OSError) as error:
+            yield Problem(entry.name, None, str(error), type(error) if isinstance(error, KinemeError) else KinemeError)
+
+
+def _of_data_set(entry: Entry, layout: Layout, rule: NameRule, trim: bool) -> Iterator[Recordings | Problem]:
+    """Yield the whole episodes of a data set, and why others are not."""
+    with needs("pyarrow", "read Parquet", "parquet"):
+        from kineme.io.lerobot.read import lerobot_parts
+    known = layout.reference.columns if layout.reference is not None and layout.coordinates is None else ()
+    for parse in lerobot_parts(entry.path, [replace(layout, columns=known), layout] if known else [layout]):
+        file = rule.apply(parsed_file(parse, Format(), entry.relative, layout), entry.path)
+        file = file._replace(path=entry.name, problems=[each._replace(file=entry.name) for each in file.problems])
+        if not file.block.labels:
+            yield from file.problems
+            continue
+        recordings = merge_files([file], entry.name, (), layout.kinds, layout.skip, layout.by_number)
+        yield trimmed(recordings) if trim else recordings
+
+
+def _renamed(recordings: Recordings, name: str) -> Recordings:
+    sources = tuple(source._replace(path=name) for source in recordings.sources)
+    problems = tuple(problem._replace(file=name) for problem in recordings.problems)
+    return replace(recordings, sources=sources, problems=problems)
