@@ -13,6 +13,7 @@ import click
 from kineme.cli.anchor import anchor
 from kineme.cli.annotate import annotate
 from kineme.cli.evaluate import evaluate, reproduce
+from kineme.cli.find import find
 from kineme.cli.generate import generate
 from kineme.cli.inspect import inspect
 from kineme.cli.learn import learn
@@ -83,7 +84,7 @@ def main() -> None:
 
 
 for command in (
-    anchor, annotate, evaluate, generate, move, inspect, learn, library, page, recognize, reproduce, segment, studio,
-    why,
+    anchor, annotate, evaluate, find, generate, move, inspect, learn, library, page, recognize, reproduce, segment,
+    studio, why,
 ):  # fmt: skip
     main.add_command(command)

@@ -39,7 +39,8 @@ def read_pieces(
                 read = read_paths([entry.path], layout, rule, follow_links=follow_links, trim=trim)
                 yield _renamed(read, entry.name)
         except (KinemeError, OSError) as error:
-            yield Problem(entry.name, None, str(error), type(error) if isinstance(error, KinemeError) else KinemeError)
+            reason = str(error).removeprefix(f"{entry.path}: ")
+            yield Problem(entry.name, None, reason, type(error) if isinstance(error, KinemeError) else KinemeError)
 
 
 def _of_data_set(entry: Entry, layout: Layout, rule: NameRule, trim: bool) -> Iterator[Recordings | Problem]:

@@ -1,0 +1,97 @@
+"""``kineme find``: where recordings show a symbol."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from kineme.cli.options import (
+    FILE,
+    GroupedCommand,
+    error_rate_option,
+    force_option,
+    heading,
+    json_option,
+    library_option,
+)
+from kineme.cli.output import check_new, progress, say, table
+from kineme.cli.reading import files_of, layout_options, problem_lines, recordings_argument
+from kineme.reporting.text import counted, printable
+
+_SHOWN = 20  # hits, and problems, that are listed; --output and --json have all
+
+
+@click.command(cls=GroupedCommand, short_help="Find where recordings show a symbol, the surest first.")
+@click.argument("symbol")
+@recordings_argument
+@library_option
+@click.option("--also", multiple=True, metavar="SYMBOL", help="Another symbol to find; may be repeated.")
+@error_rate_option("The smaller, the more a movement may differ from those of its symbol.")
+@layout_options
+@heading("Output")
+@click.option("--output", "-o", type=FILE, help="A table of all hits to write, .csv or .json.")
+@json_option
+@force_option
+def find(symbol: str, recordings: tuple[Path, ...], folder: Path, also: tuple[str, ...], **options: Any) -> None:
+    """Find where RECORDINGS, files, folders, data sets or patterns of them, show SYMBOL, the surest hits first.
+
+    Each recording is searched for all symbols of the library, as by kineme annotate: a stretch that is more like
+    another one is no hit. Files are read one after the other, and data sets some episodes at a time; what cannot be
+    read, or has other columns than the library, is listed and stops nothing.
+
+    Example: kineme find reach archive/ --library actions/ -o hits.csv
+    """
+    from kineme.io.writing.annotations import as_row, writer_of
+    from kineme.library.find import check_symbols
+    from kineme.library.find import find as occurrences
+    from kineme.library.library import ActionLibrary
+    from kineme.library.recognize import some_of_each_symbol
+    from kineme.recognition.answer import certainty
+
+    as_json, force, error_rate, output = (options.pop(name) for name in ("as_json", "force", "error_rate", "output"))
+    check_new(output, force, *recordings)
+    writer = None if output is None else writer_of(output, None, [])
+    if writer is not None and not writer.several:
+        raise click.UsageError(f"expected a table to write, .csv or .json, got {printable(output)}")
+    symbols = (symbol, *also)
+    with ActionLibrary(folder, read_only=True) as library:
+        check_symbols(library.store, symbols)
+        known = some_of_each_symbol(library.store)
+        with progress(desc="searching", unit=" s of recordings", bar_format="{l_bar}{n:.0f}{unit} [{elapsed}]") as bar:
+            found = occurrences(
+                known, files_of(recordings, options, library), symbols, error_rate, lambda s: bar.update(s - bar.n)
+            )
+    is_guess = not bool(known.calibration.calibrated(error_rate).all())
+    sure = [certainty(hit.confidence, is_new=False, is_guess=is_guess) for hit in found.hits]
+    if writer is not None and output is not None:
+        writer.write(output, found.hits, None)
+    data = {
+        "hits": [as_row(hit) | {"certainty": words} for hit, words in zip(found.hits, sure, strict=True)],
+        "recordings": found.recordings,
+        "seconds": found.seconds,
+        "calibrated": not is_guess,
+        "written": [] if output is None else [str(output)],
+        "problems": [str(problem) for problem in found.problems],
+    }
+    say(as_json, data, lambda: _text(data, problem_lines(found.problems, "not searched: ")))
+
+
+def _text(data: dict[str, Any], problems: list[str]) -> str:
+    hits = data["hits"]
+    lines = [f"{counted(len(hits), 'hit')} in {counted(data['recordings'], 'recording')} of {data['seconds']:,.1f} s"]
+    if hits:
+        cells = [
+            (
+                printable(f"{hit['recording']} {hit['place']}".strip()), f"{hit['start']:.2f}", f"{hit['end']:.2f}",
+                printable(hit["symbol"]), hit["certainty"],
+            )
+            for hit in hits[:_SHOWN]
+        ]  # fmt: skip
+        lines.append(table(("recording", "start [s]", "end [s]", "symbol", "how sure"), cells))
+    for what, all_of in (("hits", hits), ("problems", problems)):
+        lines += problems[:_SHOWN] if what == "problems" else []
+        if len(all_of) > _SHOWN:
+            lines.append(f"and {len(all_of) - _SHOWN:,} more {what}; --json has all")
+    return "\n".join([*lines, *(f"written to {printable(path)}" for path in data["written"])])
