@@ -119,7 +119,7 @@ def shard_frames(
 
 
 def _frames(batch: Any, features: Mapping[str, int], columns: Mapping[str, str]) -> Frames:
-    values: list[Array] = []
+    values: list[Array] = [np.empty((batch.num_rows, 0))]
     faults: dict[int, str] = {}
     for name, width in features.items():
         column = batch.column(columns[name])
