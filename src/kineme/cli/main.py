@@ -12,6 +12,7 @@ import click
 
 from kineme.cli.anchor import anchor
 from kineme.cli.annotate import annotate
+from kineme.cli.correct import correct
 from kineme.cli.evaluate import evaluate, reproduce
 from kineme.cli.find import find
 from kineme.cli.generate import generate
@@ -84,7 +85,7 @@ def main() -> None:
 
 
 for command in (
-    anchor, annotate, evaluate, find, generate, move, inspect, learn, library, page, recognize, reproduce, segment,
-    studio, why,
+    anchor, annotate, correct, evaluate, find, generate, move, inspect, learn, library, page, recognize, reproduce,
+    segment, studio, why,
 ):  # fmt: skip
     main.add_command(command)

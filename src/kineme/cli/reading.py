@@ -155,7 +155,7 @@ def read(paths: Path | Sequence[Path], options: dict[str, Any], library: Any = N
     )
 
 
-def pieces(paths: Sequence[Path], options: dict[str, Any], library: Any) -> Any:
+def pieces(paths: Sequence[Path], options: dict[str, Any], library: Any, places: Any = None) -> Any:
     """Read recordings piece by piece: all at once, unless all are data sets that are read some episodes at a time."""
     from kineme.io.reading.formats import expanded
     from kineme.io.reading.pieces import is_episodic
@@ -163,17 +163,20 @@ def pieces(paths: Sequence[Path], options: dict[str, Any], library: Any) -> Any:
     if not all(is_episodic(path) for given in paths for path in expanded(given)):
         yield read(paths, options, library)
         return
-    yield from files_of(paths, options, library)
+    yield from files_of(paths, options, library, places)
 
 
-def files_of(paths: Sequence[Path], options: dict[str, Any], library: Any) -> Any:
-    """Read recordings file by file, data sets some episodes at a time; what cannot be read is a problem among them."""
+def files_of(paths: Sequence[Path], options: dict[str, Any], library: Any, places: Any = None) -> Any:
+    """Read recordings file by file, data sets some episodes at a time; what cannot be read is a problem among them.
+
+    Of data sets, the episodes at these `places` alone, if there are any.
+    """
     from kineme.io.reading.pieces import read_pieces
 
     if any(str(path) == "-" for path in paths):
         raise click.UsageError("expected files or folders to search, got the standard input")
     layout, rule, how, _ = _how(options, library)
-    return read_pieces(paths, layout, rule, **how)
+    return read_pieces(paths, layout, rule, **how, places=places)
 
 
 def seconds_of(paths: Sequence[Path]) -> float | None:

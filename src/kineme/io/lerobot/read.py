@@ -50,11 +50,14 @@ def lerobot_movements(folder: Path, layout: Layout) -> Parsed:
     return parsed._replace(left_out=tuple(left_out))
 
 
-def lerobot_parts(folder: Path, layouts: Sequence[Layout]) -> Iterator[Callable[[Layout], Parsed]]:
+def lerobot_parts(
+    folder: Path, layouts: Sequence[Layout], numbers: Collection[int] | None = None
+) -> Iterator[Callable[[Layout], Parsed]]:
     """Yield parts of a data set, some whole episodes each, as functions from one of `layouts` to its movements.
 
-    A batch of frames and one part are in memory at a time. The features are those of the layouts that the data set can
-    fill. A part whose episodes all are damaged says why in `Parsed.left_out`, and has no movements.
+    A batch of frames and one part are in memory at a time; episodes with these `numbers` are one part. The features are
+    those of the layouts that the data set can fill. A part whose episodes all are damaged says why in
+    `Parsed.left_out`, and has no movements.
     """
     info = read_info(folder)
     features: dict[str, int] = {}
@@ -65,9 +68,9 @@ def lerobot_parts(folder: Path, layouts: Sequence[Layout]) -> Iterator[Callable[
     if not features:
         _chosen(info, layouts[-1])  # says why
     part: list[Episode] = []
-    for episode in episodes(folder, list(features)):
+    for episode in episodes(folder, list(features), numbers):
         part.append(episode)
-        if sum(map(len, part)) * sum(features.values()) >= _NUMBERS:
+        if numbers is None and sum(map(len, part)) * sum(features.values()) >= _NUMBERS:
             yield partial(_of_episodes, info, part)
             part = []
     if part:

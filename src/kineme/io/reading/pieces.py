@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +15,8 @@ from kineme.io.reading.recordings import NameRule, read_paths, trimmed
 from kineme.io.records import Problem, needs
 from kineme.movements.tables.layout import Layout
 
+EPISODE = "episode "  # a movement's place in a data set begins with it
+
 
 def is_episodic(path: Path) -> bool:
     """Tell whether a path is a data set whose episodes are read some at a time."""
@@ -23,18 +25,25 @@ def is_episodic(path: Path) -> bool:
 
 
 def read_pieces(
-    paths: Sequence[Path], layout: Layout, rule: NameRule, *, follow_links: bool = False, trim: bool = False
+    paths: Sequence[Path],
+    layout: Layout,
+    rule: NameRule,
+    *,
+    follow_links: bool = False,
+    trim: bool = False,
+    places: Collection[str] | None = None,
 ) -> Iterator[Recordings | Problem]:
     """Yield recordings of files, folders and patterns, as `read_paths` reads them, or the problem with a file.
 
-    Each piece has the channels of its own samples. A data set that is read some episodes at a time has no checksum.
+    Each piece has the channels of its own samples. A data set that is read some episodes at a time has no checksum; of
+    it only the episodes at these `places` are read, all at once, if there are any.
     """
     entries, problems = entries_of(paths, follow_links)
     yield from problems
     for entry in entries:
         try:
             if is_episodic(entry.path):
-                yield from _of_data_set(entry, layout, rule, trim)
+                yield from _of_data_set(entry, layout, rule, trim, places)
             else:
                 read = read_paths([entry.path], layout, rule, follow_links=follow_links, trim=trim)
                 yield _renamed(read, entry.name)
@@ -43,12 +52,17 @@ def read_pieces(
             yield Problem(entry.name, None, reason, type(error) if isinstance(error, KinemeError) else KinemeError)
 
 
-def _of_data_set(entry: Entry, layout: Layout, rule: NameRule, trim: bool) -> Iterator[Recordings | Problem]:
+def _of_data_set(
+    entry: Entry, layout: Layout, rule: NameRule, trim: bool, places: Collection[str] | None
+) -> Iterator[Recordings | Problem]:
     """Yield the whole episodes of a data set, and why others are not."""
     with needs("pyarrow", "read Parquet", "parquet"):
         from kineme.io.lerobot.read import lerobot_parts
     known = layout.reference.columns if layout.reference is not None and layout.coordinates is None else ()
-    for parse in lerobot_parts(entry.path, [replace(layout, columns=known), layout] if known else [layout]):
+    layouts = [replace(layout, columns=known), layout] if known else [layout]
+    named = [place.removeprefix(EPISODE) for place in places or ()]
+    numbers = None if places is None else {int(number) for number in named if number.isdecimal()}
+    for parse in lerobot_parts(entry.path, layouts, numbers):
         file = rule.apply(parsed_file(parse, Format(), entry.relative, layout), entry.path)
         file = file._replace(path=entry.name, problems=[each._replace(file=entry.name) for each in file.problems])
         if not file.block.labels:

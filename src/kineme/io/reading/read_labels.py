@@ -237,8 +237,18 @@ def _elan(data: bytes) -> tuple[list[LabelRow], bool]:
     return rows, True
 
 
-def labeled_pieces(recordings: Recordings, table: LabelTable) -> Recordings:
-    """Return the stretches of recordings that a table labels, as movements of their own.
+class Stretch(NamedTuple):
+    """A row of a table of labels in the samples of its recording."""
+
+    recording: int  # index among the recordings
+    # start and stop: first sample, and one past the last
+    start: int
+    stop: int
+    row: LabelRow
+
+
+def stretches_of(recordings: Recordings, table: LabelTable) -> tuple[list[Stretch], list[Problem]]:
+    """Return the stretches of recordings that a table labels, and the problems with its other rows.
 
     A stretch begins and ends at the samples nearest to its times. Those by the recording's clock that all lie outside
     of it, and would fit counted from its first sample, are taken so. A stretch outside of its recording, of fewer than
@@ -250,22 +260,26 @@ def labeled_pieces(recordings: Recordings, table: LabelTable) -> Recordings:
             f"expected labels {table.name} beside one recording, got {len(demos)}; say which row is of which in "
             "columns recording and place"
         )
-    stretches: list[tuple[int, int]] = []
-    sources: list[Source] = []
+    stretches: list[Stretch] = []
     paths = {source.path for source in recordings.sources}
     meant = {name: _paths_of(name, paths) if name else [] for name in dict.fromkeys(row.recording for row in rows)}
     # The rows of which several recordings may be meant, one problem for each name.
     lines_of_names = {row.recording: row.line for row in reversed(table.rows)}
-    problems = [*recordings.problems, *_of_none(table, recordings.sources, meant)]
+    problems = _of_none(table, recordings.sources, meant)
     for name, several in meant.items():
         if len(several) > 1:
             said = (
                 f"expected one recording {name}, got {', '.join(several)}; write its folder in the column recording too"
             )
             problems.append(Problem(table.name, lines_of_names[name], said))
+    by_place: dict[str, list[LabelRow]] = {}
+    for row in rows:
+        if len(meant[row.recording]) < 2:
+            by_place.setdefault(row.place, []).append(row)
     for i, source in enumerate(recordings.sources):
         first, last = demos.offsets[i : i + 2]
-        own = [row for row in rows if len(meant[row.recording]) < 2 and _is_of(row, source, meant)]
+        near = [*by_place.get("", ()), *(by_place.get(source.place, ()) if source.place else ())]
+        own = [row for row in near if _is_of(row, source, meant)]
         times = demos.movements.stamps[first:last]
         since = table.since_start or _counts_from_start(own, times)
         lines: dict[tuple[int, int], int] = {}  # stretch -> line that labels it
@@ -283,16 +297,35 @@ def labeled_pieces(recordings: Recordings, table: LabelTable) -> Recordings:
                 reason = f"expected one label for a stretch, line {line} has it too"
                 problems.append(Problem(table.name, row.line, reason))
             else:
-                stretches.append((int(first) + start, int(first) + stop))
-                sources.append(source._replace(place=_place(source, times, start, stop), label=row.label))
+                stretches.append(Stretch(i, start, stop, row))
+    return stretches, problems
+
+
+def labeled_pieces(recordings: Recordings, table: LabelTable) -> Recordings:
+    """Return the stretches of recordings that a table labels, as movements of their own; see `stretches_of`.
+
+    Rows of none are problems; a `DataError` says that all are.
+    """
+    stretches, problems = stretches_of(recordings, table)
     if not stretches:
         raise DataError(
             f"expected labels {table.name} within {recordings.sources[0].path}, found none"
-            + (f"; the first that is none: {problems[-1]}" if len(problems) > len(recordings.problems) else "")
+            + (f"; the first that is none: {problems[-1]}" if problems else "")
         )
-    return replace(
-        recordings, demonstrations=_cut(demos, stretches, sources), sources=tuple(sources), problems=tuple(problems)
-    )
+    pieces = cut_stretches(recordings, stretches)
+    return replace(pieces, problems=(*recordings.problems, *problems))
+
+
+def cut_stretches(recordings: Recordings, stretches: Sequence[Stretch]) -> Recordings:
+    """Return stretches of recordings as movements with the labels of their rows."""
+    demos, sources, rows = recordings.demonstrations, [], []
+    for stretch in stretches:
+        source, first = recordings.sources[stretch.recording], int(demos.offsets[stretch.recording])
+        times = demos.movements.stamps[first : int(demos.offsets[stretch.recording + 1])]
+        place = _place(source, times, stretch.start, stretch.stop)
+        sources.append(source._replace(place=place, label=stretch.row.label))
+        rows.append((first + stretch.start, first + stretch.stop))
+    return replace(recordings, demonstrations=_cut(demos, rows, sources), sources=tuple(sources))
 
 
 def _of_none(table: LabelTable, sources: Sequence[Source], meant: Mapping[str, Sequence[str]]) -> list[Problem]:

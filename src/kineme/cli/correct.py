@@ -1,0 +1,162 @@
+"""``kineme correct``: what a person corrected of annotations becomes examples of the library."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import click
+
+from kineme.cli.options import FILE, GroupedCommand, error_rate_option, json_option, library_option
+from kineme.cli.output import progress, say, table
+from kineme.cli.reading import layout_options, pieces, problem_lines, recordings_argument
+from kineme.reporting.text import counted, printable
+
+_SHOWN = 20  # changes and problems that are listed; --json has all
+_CORRECTIONS = "-corrections.csv"  # the studio writes demos-corrections.csv beside demos
+
+
+@click.command(cls=GroupedCommand, short_help="Learn what a person corrected of annotations.")
+@recordings_argument
+@library_option
+@click.option(
+    "--labels", "corrected", type=FILE,
+    help="What the person left: a table, or of ELAN or Audacity.  [default: RECORDINGS-corrections.csv of the studio]",
+)  # fmt: skip
+@click.option(
+    "--before", "annotated", type=FILE,
+    help="What kineme annotate wrote.  [default: what it wrote into the data set, else the recordings annotated again]",
+)  # fmt: skip
+@click.option("--dry-run", is_flag=True, help="Say what would be learned, and learn nothing.")
+@error_rate_option("That with which they were annotated.")
+@layout_options
+@json_option
+def correct(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
+    """Learn what a person corrected in annotated RECORDINGS, files, folders or data sets, as examples of symbols.
+
+    Stretches with another symbol or other boundaries than annotated, those that were unknown and have a name, and those
+    that were added, are examples of their symbols, which are made where they are new. What is as kineme annotate left
+    it is not learned. kineme library undo takes back what was learned.
+
+    Example: kineme correct named/ --library actions/
+    """
+    from kineme.io.reading.formats import root_of
+    from kineme.io.reading.read_labels import read_labels
+    from kineme.library.correct import corrections_of, learn_corrections
+    from kineme.library.library import ActionLibrary
+
+    as_json, dry_run, error_rate = (options.pop(name) for name in ("as_json", "dry_run", "error_rate"))
+    corrected, annotated = options.pop("corrected"), options.pop("annotated")
+    table_of = read_labels(corrected or _beside(recordings))
+    with ActionLibrary(folder, read_only=dry_run) as library:
+        parsed = _recordings(recordings, options, library, [row.place for row in table_of.rows])
+        before = (
+            read_labels(annotated) if annotated is not None else _annotated(recordings, parsed, library, error_rate)
+        )
+        corrections = corrections_of(parsed, table_of, before)
+        symbols = {symbol.name for symbol in library.symbols()}
+        report = None
+        if not dry_run:
+            report = learn_corrections(library.store, parsed, corrections, options, root_of(*recordings))
+        learned = [change for change in corrections.changes if change.learned]
+        data = {
+            "changes": [
+                {
+                    "kind": change.kind, "recording": parsed.sources[change.stretch.recording].path,
+                    "place": parsed.sources[change.stretch.recording].place, "start": change.stretch.row.start,
+                    "end": change.stretch.row.end, "symbol": change.stretch.row.label, "was": change.was,
+                    "learned": change.learned,
+                }
+                for change in corrections.changes
+            ],
+            "unchanged": corrections.unchanged,
+            "learned": 0 if report is None else report.added,
+            "duplicates": 0 if report is None else report.duplicates,
+            "symbols": sorted({str(change.stretch.row.label) for change in learned} - symbols),
+            "version": library.version,
+            "dry_run": dry_run,
+            "problems": [str(problem) for problem in (*parsed.problems, *corrections.problems)],
+        }  # fmt: skip
+    problems = problem_lines((*parsed.problems, *corrections.problems), "not read: ")
+    say(as_json, data, lambda: _text(data, folder, problems))
+
+
+def _beside(recordings: tuple[Path, ...]) -> Path:
+    """The table of corrections that the studio writes beside what it opened."""
+    place = recordings[0].resolve()
+    path = place.with_name(f"{place.name if place.is_dir() else place.stem}{_CORRECTIONS}")
+    if len(recordings) > 1 or not path.is_file():
+        raise click.UsageError(f"expected --labels, or the corrections of the studio in {printable(path)}, got neither")
+    return path
+
+
+def _recordings(paths: tuple[Path, ...], options: dict[str, Any], library: Any, places: list[str]) -> Any:
+    """What is corrected; of data sets the episodes that have corrections alone."""
+    from kineme.errors import DataError
+    from kineme.io.records import Problem
+
+    several = list(pieces(paths, options, library, places))
+    read = [piece for piece in several if not isinstance(piece, Problem)]
+    if len(read) != 1:
+        raise DataError(
+            f"expected one data set, or files, to correct, got {len(read)} data sets that can be read"
+            + "".join(f"; {piece}" for piece in several if isinstance(piece, Problem))
+        )
+    return read[0]
+
+
+def _annotated(paths: tuple[Path, ...], parsed: Any, library: Any, error_rate: float) -> Any:
+    """What was annotated: as it stands in the data set, else found again."""
+    from kineme.io.reading.pieces import EPISODE, is_episodic
+    from kineme.io.writing.annotations import Annotation
+    from kineme.library.annotate import annotate
+    from kineme.library.correct import as_labels
+
+    if len(paths) == 1 and is_episodic(paths[0]):
+        from kineme.io.lerobot.motions import read_motions
+
+        motions = [motion for motion in read_motions(paths[0]) if motion.annotator == "kineme"]
+        if motions:
+            return as_labels(
+                [
+                    Annotation("", f"{EPISODE}{motion.episode}", *motion[1:4], motion.p_value, motion.confidence)
+                    for motion in motions
+                ]
+            )
+    total = float(parsed.demonstrations.durations.sum())
+    with progress(total=total, desc="annotating as before", unit="s") as bar:
+        report = annotate(library.store, parsed, error_rate, lambda done: bar.update(min(done, total) - bar.n))
+    return as_labels(report.annotations)
+
+
+def _text(data: dict[str, Any], folder: Path, problems: list[str]) -> str:
+    from kineme.library.correct import CHANGES
+
+    changes = data["changes"]
+    counts = Counter(change["kind"] for change in changes)
+    new = f", {counted(len(data['symbols']), 'new symbol')}" if data["symbols"] else ""
+    stored = f", {data['duplicates']:,} stored already" if data["duplicates"] else ""
+    learned = sum(change["learned"] for change in changes)
+    verb = f"would learn {counted(learned, 'movement')}" if data["dry_run"] else (
+        f"learned {counted(data['learned'], 'movement')}{stored}"
+    )  # fmt: skip
+    lines = [f"{verb}{new}; {data['unchanged']:,} as annotated, not learned"]
+    lines += [f"{n:,} {kind}: {CHANGES[kind]}" for kind, n in counts.items()]
+    if changes:
+        cells = [
+            (
+                printable(f"{change['recording']} {change['place']}".strip()), f"{change['start']:.2f}",
+                f"{change['end']:.2f}", printable(change["symbol"] or "unknown"), printable(change["was"] or "-"),
+                change["kind"],
+            )
+            for change in changes[:_SHOWN]
+        ]  # fmt: skip
+        lines.append(table(("recording", "start [s]", "end [s]", "symbol", "was", "change"), cells))
+    lines += problems[:_SHOWN]
+    for what, all_of in (("changes", changes), ("problems", problems)):
+        if len(all_of) > _SHOWN:
+            lines.append(f"and {len(all_of) - _SHOWN:,} more {what}; --json has all")
+    if data["learned"]:
+        lines.append(f"take it back: kineme library undo --library {printable(folder)}")
+    return "\n".join(lines)

@@ -1,0 +1,146 @@
+"""Corrections of annotations by a person, as examples: what was changed is learned, what was left as it was is not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import PurePath
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from kineme.errors import DataError
+from kineme.io.reading.merge_files import Recordings
+from kineme.io.reading.read_labels import LabelRow, LabelTable, Stretch, cut_stretches, stretches_of
+from kineme.io.records import Problem
+from kineme.io.writing.annotations import Annotation
+from kineme.library.learn import LearnReport, learn_recordings
+from kineme.library.storage import changes as storage
+from kineme.library.storage.read import names_of
+from kineme.library.storage.store import Store
+
+_SAME = 1  # samples by which both ends of a stretch may differ from those annotated: files round times
+_MOVED = 0.3  # intersection over union from which a stretch is one that was annotated, with other boundaries
+
+#: Kind of change -> what a person did.
+CHANGES = {
+    "named": "unknown motion has a name",
+    "renamed": "another symbol",
+    "moved": "the same symbol, with other boundaries",
+    "added": "a movement where none was annotated",
+    "removed": "annotated, and not there any more",
+    "unnamed": "a symbol that became unknown",
+}
+_LEARNED = ("named", "renamed", "moved", "added")
+
+
+class Change(NamedTuple):
+    """A stretch of a recording that a person changed."""
+
+    kind: str  # one of `CHANGES`
+    stretch: Stretch  # as it is now; of a removed one, as it was
+    was: str | None  # symbol before, None if it was unknown or not there
+
+    @property
+    def learned(self) -> bool:
+        """True if it is an example of a symbol."""
+        return self.kind in _LEARNED
+
+
+class Corrections(NamedTuple):
+    """All changes in the recordings that a person looked at."""
+
+    changes: list[Change]  # in the order of recordings and time
+    unchanged: int  # stretches that are as annotated
+    problems: list[Problem]  # rows that are no stretch of the recordings
+
+    @property
+    def examples(self) -> list[Stretch]:
+        """Stretches to learn."""
+        return [change.stretch for change in self.changes if change.learned]
+
+
+def as_labels(annotations: Sequence[Annotation]) -> LabelTable:
+    """Return annotations as a table of labels, by the clock of the recordings."""
+    rows = [
+        LabelRow(note.start, note.end, note.symbol, note.recording, note.place, line)
+        for line, note in enumerate(annotations, 1)
+    ]
+    return LabelTable("annotations", tuple(rows), since_start=False)
+
+
+def corrections_of(recordings: Recordings, corrected: LabelTable, annotated: LabelTable) -> Corrections:
+    """Compare what a person left with what was annotated, in the recordings that `corrected` has rows of.
+
+    A stretch is as annotated if symbol and both ends are the same, to one sample. Others are compared with the
+    annotated one that shares most of the union with them. A `DataError` says that no row is of these recordings.
+    """
+    after, problems = stretches_of(recordings, corrected)
+    if not after:
+        first = f"; the first: {problems[0]}" if problems else ""
+        raise DataError(f"expected corrections {corrected.name} of the recordings, got none{first}")
+    before = stretches_of(recordings, annotated)[0] if annotated.rows else []
+    changes: list[Change] = []
+    unchanged = 0
+    for recording in sorted({stretch.recording for stretch in after}):
+        old = [stretch for stretch in before if stretch.recording == recording]
+        replaced: set[int] = set()
+        for new in sorted(stretch for stretch in after if stretch.recording == recording):
+            shares = [_shared(new, stretch) for stretch in old]
+            best = max(range(len(old)), key=shares.__getitem__, default=-1)
+            near = old[best] if best >= 0 and shares[best] >= _MOVED else None
+            if near is not None:
+                replaced.add(best)
+            if near is not None and near.row.label == new.row.label and _same_ends(near, new):
+                unchanged += 1
+            elif (kind := _kind(near, new)) is not None:
+                changes.append(Change(kind, new, None if near is None else near.row.label))
+        changes += [
+            Change("removed", stretch, stretch.row.label)
+            for k, stretch in enumerate(old)
+            if k not in replaced and stretch.row.label is not None
+        ]
+    return Corrections(changes, unchanged, problems)
+
+
+def _shared(a: Stretch, b: Stretch) -> float:
+    """Return intersection over union."""
+    both = min(a.stop, b.stop) - max(a.start, b.start)
+    return max(both, 0) / (max(a.stop, b.stop) - min(a.start, b.start))
+
+
+def _same_ends(a: Stretch, b: Stretch) -> bool:
+    return abs(a.start - b.start) <= _SAME and abs(a.stop - b.stop) <= _SAME
+
+
+def _kind(near: Stretch | None, new: Stretch) -> str | None:
+    """Return the kind of a change; None for motion that was unknown, or not annotated, and has no name still."""
+    was, now = None if near is None else near.row.label, new.row.label
+    if now is None:
+        return None if was is None else "unnamed"
+    if near is None:
+        return "added"
+    return "named" if was is None else "moved" if was == now else "renamed"
+
+
+def learn_corrections(
+    store: Store,
+    recordings: Recordings,
+    corrections: Corrections,
+    options: Mapping[str, Any] | None = None,
+    root: str | PurePath = "",
+) -> LearnReport | None:
+    """Learn the examples of corrections; None if there are none.
+
+    All new ones are one version of the library, which an undo takes back. Examples that it holds under another symbol,
+    since they were corrected before, join the symbol that they have now: each symbol that gains some is one more.
+    """
+    examples = corrections.examples
+    if not examples:
+        return None
+    pieces = cut_stretches(recordings, examples)
+    report = learn_recordings(store, pieces, options, root=root)
+    labels = np.array([stretch.row.label for stretch in examples], dtype=object)
+    others = np.array(names_of(store, report.ids), dtype=object) != labels
+    for symbol in dict.fromkeys(labels[others].tolist()):
+        storage.assign(store, report.ids[others & (labels == symbol)], symbol, "label")
+    return report
