@@ -35,7 +35,7 @@ def find(
     """Search recordings for all symbols that are known, and return where they show one of `symbols`.
 
     All symbols compete for a stretch, as in `annotate`, so that its certainty is calibrated; only the hits are held.
-    `progress` is called now and then with the seconds of recordings that are done.
+    `progress` is called after each piece with the seconds of recordings that are done.
     """
     hits: list[Annotation] = []
     problems: list[Problem] = []
@@ -44,11 +44,8 @@ def find(
         if isinstance(piece, Problem):
             problems.append(piece)
             continue
-        before = seconds
         try:
-            report = annotate_by(
-                known, piece, error_rate, None if progress is None else lambda done, t=before: progress(t + done)
-            )
+            report = annotate_by(known, piece, error_rate)
         except KinemeError as error:  # other columns than those of the library, most likely
             paths = dict.fromkeys(source.path for source in piece.sources)
             problems += [Problem(path, None, str(error), type(error)) for path in paths]
@@ -56,6 +53,8 @@ def find(
         hits += [annotation for annotation in report.annotations if annotation.symbol in symbols]
         problems += [*piece.problems, *report.problems]
         n, seconds = n + len(piece), seconds + float(piece.demonstrations.durations.sum())
+        if progress is not None:
+            progress(seconds)
     hits.sort(key=lambda hit: (-hit.confidence, -hit.p_value))
     return Occurrences(hits, n, seconds, problems)
 

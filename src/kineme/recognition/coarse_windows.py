@@ -6,7 +6,7 @@ the same rotations as in full. Nearly all windows that are near in full are amon
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,7 +78,7 @@ def coarse_distances(comparison: Comparison, coarse: CoarseReferences, motion: M
     return np.asarray(np.sqrt(distances) / coarse.scales)
 
 
-def _coarse_rows(comparison: Comparison, motion: Motion, rows: Rows) -> NDArray[np.float32]:
+def _coarse_rows(comparison: Comparison, motion: Motion, rows: Rows) -> NDArray[Any]:
     """Return normalized paths at even values of the phase, rows (n, d * S): arc length, or time if that is compared."""
     x = motion.positions
     by_time = x.shape[1] == 1 or all(item.arc_share == 0 for item in comparison.representations)

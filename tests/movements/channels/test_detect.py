@@ -291,3 +291,16 @@ def test_what_several_heads_begin_with_names_them_all(given):
     assert [(one.kind, one.order) for one in channels] == [("position", ""), ("orientation", "xyzw")]
     joints = find_channels(["arm.a", "arm.b", "x"], np.column_stack([U] * 3), np.array([0, T]), {"arm": "angle"})
     assert [one.kind for one in joints] == ["angle", "angle", "position"]
+
+
+@pytest.mark.parametrize(
+    ("largest", "kind"), [(3.0, "angle"), (100.0, "position"), (55.0, "position"), (150.0, "angle")]
+)
+def test_positions_of_motors_in_percent_are_no_angles(largest, kind):
+    """What a driver calls wrist_roll.pos is in degrees, radians or percent of the range; percent do not wrap."""
+    values = np.column_stack((np.linspace(-largest, largest, 50), np.linspace(0.0, 1.0, 50)))
+    for head in ("wrist_roll.pos", "left_wrist_roll.pos"):
+        channels = find_channels((head, "x"), values, np.array([0, 50]), {})
+        assert channels[0].kind == kind
+    (channel, _) = find_channels(("wrist_roll.pos [deg]", "x"), values, np.array([0, 50]), {})
+    assert channel.kind == "angle"

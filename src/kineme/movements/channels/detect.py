@@ -59,6 +59,8 @@ _OTHER_QUANTITIES = frozenset(
     }
 )  # fmt: skip
 _PER_TIME = frozenset({"s", "sec", "second", "seconds", "per"})
+#: Drivers of motors call a position so, ``wrist_roll.pos``, in degrees, radians or percent of the range alike.
+_OF_MOTOR, _PERCENT, _TURN = "pos", 100.0, 2.0 * np.pi
 _LEVELS = 8  # different values of a discrete channel, at most
 #: Words of heads that are units: ``x_mm``, ``yaw_deg``. Others, as in and turn, are too often something else there.
 _UNIT_WORDS = {
@@ -169,9 +171,17 @@ def _kind(head: str, unit: str | None, values: Array, offsets: NDArray[np.intp],
     rate = "/" in (unit or "") or (words & _PER_TIME and words & set(_UNIT_WORDS))
     if rate or words & _OTHER_QUANTITIES or (measure is not None and measure.quantity != "angle"):
         return "position"
-    if is_joint or words & ANGLE_WORDS or measure is not None or wrap_period(values, offsets) is not None:
+    wraps = wrap_period(values, offsets) is not None
+    named = words & ANGLE_WORDS and not (_OF_MOTOR in words and unit is None and _may_be_percent(values))
+    if is_joint or named or measure is not None or wraps:
         return "angle"
     return "position"
+
+
+def _may_be_percent(values: Array) -> bool:
+    """Tell whether values may be shares of a range, -100 to 100: too large for radians, and of no turn in degrees."""
+    largest = float(np.abs(values).max(initial=0.0))
+    return _TURN < largest <= _PERCENT
 
 
 def find_numbered_joints(heads: Sequence[str], free: Sequence[int], columns: Array) -> set[int]:

@@ -1,0 +1,172 @@
+"""``kineme annotate``, ``find`` and ``correct`` on data sets of an arm."""
+
+from __future__ import annotations
+
+import csv
+
+import pytest
+from commands import answer, run, start
+
+import kineme
+from kineme.io.lerobot import read as lerobot_read
+from robot_work import SYMBOLS, write_episodes, write_library
+
+
+@pytest.fixture(scope="module")
+def work(tmp_path_factory):
+    """Folder with a data set and a library, and what is when in the set."""
+    folder = tmp_path_factory.mktemp("work")
+    truth = write_episodes(folder / "set", 6)
+    write_library(folder / "actions")
+    return folder, truth
+
+
+@pytest.fixture
+def annotated(work, tmp_path):
+    """A copy of the library that may change, and the rows of ``kineme annotate``."""
+    folder, _ = work
+    write_library(tmp_path / "actions")
+    run("annotate", folder / "set", "-l", tmp_path / "actions", "-o", tmp_path / "set.csv")
+    with (tmp_path / "set.csv").open(newline="", encoding="utf-8") as file:
+        return folder / "set", tmp_path / "actions", list(csv.DictReader(file))
+
+
+def _write(path, rows):
+    with path.open("w", newline="", encoding="utf-8") as file:
+        table = csv.DictWriter(file, list(rows[0]))
+        table.writeheader()
+        table.writerows(rows)
+    return path
+
+
+def _rounded(said):
+    """An answer whose numbers are rounded: similarities are computed in single precision."""
+    rows = [
+        {name: round(value, 4) if isinstance(value, float) else value for name, value in row.items()}
+        for row in said["annotations"]
+    ]
+    return said | {"annotations": rows, "seconds": round(said["seconds"], 6)}
+
+
+def _named(truth, rows):
+    """The share of true movements whose middle is annotated with their name; of unknown kinds, with none."""
+    right = []
+    for number, movements in enumerate(truth):
+        own = [row for row in rows if row["place"] == f"episode {number}"]
+        for start_time, end, name in movements:
+            middle = 0.5 * (start_time + end)
+            given = [row["symbol"] for row in own if row["start"] <= middle <= row["end"]]
+            right.append((given[0] if given else None) == (name if name in SYMBOLS else None))
+    return sum(right) / len(right)
+
+
+def test_a_data_set_is_annotated_the_same_whole_or_in_parts(work, monkeypatch):
+    folder, truth = work
+    whole = answer("annotate", folder / "set", "-l", folder / "actions")
+    assert _named(truth, whole["annotations"]) >= 0.9
+    monkeypatch.setattr(lerobot_read, "_NUMBERS", 1000)  # each episode alone
+    parts = answer("annotate", folder / "set", "-l", folder / "actions")
+    assert _rounded(parts) == _rounded(whole)
+    assert whole["seconds"] == pytest.approx(kineme.read_recordings(folder / "set").demonstrations.durations.sum())
+
+
+def test_an_episode_that_is_damaged_is_said_and_the_others_are_annotated(work, tmp_path):
+    import shutil
+
+    import pandas
+
+    folder, _ = work
+    shutil.copytree(folder / "set", tmp_path / "set")
+    shard = tmp_path / "set" / "data" / "chunk-000" / "file-000.parquet"
+    frames = pandas.read_parquet(shard)
+    lost = frames.index[(frames["episode_index"] == 2) & (frames["frame_index"] == 7)]
+    frames.drop(lost).to_parquet(shard)
+    said = answer("annotate", tmp_path / "set", "-l", folder / "actions")
+    assert any("episode 2" in problem for problem in said["problems"])
+    assert {row["place"] for row in said["annotations"]} == {f"episode {k}" for k in (0, 1, 3, 4, 5)}
+
+
+def test_hits_are_where_the_symbol_is_the_surest_first(work, tmp_path):
+    folder, truth = work
+    (folder / "junk.csv").write_text("a,b\nthis is,no recording\n")
+    out = tmp_path / "hits.csv"
+    said = answer("find", "stir", folder, "-l", folder / "actions", "-o", out)
+    hits = said["hits"]
+    assert {hit["symbol"] for hit in hits} == {"stir"}
+    sure = [(hit["confidence"], hit["p_value"]) for hit in hits]
+    assert sure == sorted(sure, reverse=True)
+    in_set = [hit for hit in hits if hit["recording"] == "set"]
+    for number, movements in enumerate(truth):
+        ((start_time, end),) = [row[:2] for row in movements if row[2] == "stir"]
+        ((a, b),) = [(hit["start"], hit["end"]) for hit in in_set if hit["place"] == f"episode {number}"]
+        assert a == pytest.approx(start_time, abs=0.25)
+        assert b == pytest.approx(end, abs=0.25)
+    assert len([hit for hit in hits if "actions-shown" in hit["recording"]]) == 3  # the library's own, found again
+    assert any(problem.startswith("junk.csv: ") for problem in said["problems"])
+    with out.open(newline="", encoding="utf-8") as file:
+        assert [float(row["start"]) for row in csv.DictReader(file)] == [hit["start"] for hit in hits]
+    both = answer("find", "stir", folder / "set", "--also", "tap", "-l", folder / "actions")["hits"]
+    assert [hit for hit in both if hit["symbol"] == "stir"] == [{**hit, "recording": "set"} for hit in in_set]
+    assert {hit["symbol"] for hit in both} == {"stir", "tap"}
+
+
+def test_the_command_names_near_symbols_and_shows_a_table(work):
+    folder, _ = work
+    refused = run("find", "stirr", folder / "set", "-l", folder / "actions")
+    assert refused.returncode == 1
+    assert "there are stir" in refused.stderr
+    shown = start("find", "tap", folder / "set", "-l", folder / "actions")
+    assert shown.returncode == 0
+    assert shown.stdout.startswith("6 hits in 6 recordings of")
+    assert "set episode 3" in shown.stdout
+
+
+def test_what_a_person_changed_is_learned_and_nothing_else(annotated, tmp_path):
+    source, library, rows = annotated
+    rows = [row for row in rows if row["place"] in ("episode 1", "episode 4")]
+    unknown = next(row for row in rows if not row["symbol"])
+    unknown["symbol"] = "wave"
+    known = [row for row in rows if row["symbol"] in SYMBOLS]
+    known[0]["symbol"], was = "tap" if known[0]["symbol"] != "tap" else "reach", known[0]["symbol"]
+    known[1]["end"] = str(float(known[1]["end"]) - 0.2)
+    rows.remove(known[2])
+    for row in rows:  # as a person's program writes times
+        row["start"], row["end"] = (f"{float(row[name]):.3f}" for name in ("start", "end"))
+    table = _write(tmp_path / "corrected.csv", rows)
+    arguments = ("correct", source, "--labels", table, "-l", library)
+    would = answer(*arguments, "--dry-run")
+    assert kineme.ActionLibrary(library, read_only=True).version == 1
+    assert (would["learned"], would["symbols"]) == (0, ["wave"])
+    said = answer(*arguments)
+    assert sorted(change["kind"] for change in said["changes"]) == ["moved", "named", "removed", "renamed"]
+    assert said["learned"] == 3
+    assert said["unchanged"] == len(rows) - 3
+    assert next(change["was"] for change in said["changes"] if change["kind"] == "renamed") == was
+    with kineme.ActionLibrary(library, read_only=True) as actions:
+        assert {symbol.name: len(symbol) for symbol in actions.symbols()}["wave"] == 1
+        assert len(actions) == 12
+    again = answer(*arguments, "--before", tmp_path / "set.csv")
+    assert (again["learned"], again["duplicates"]) == (0, 3)
+    run("library", "undo", "--library", library)
+    assert len(kineme.ActionLibrary(library, read_only=True)) == 9
+
+
+def test_a_named_data_set_says_itself_what_was_annotated(annotated, tmp_path):
+    source, library, rows = annotated
+    run("annotate", source, "-l", library, "-o", tmp_path / "named")
+    rows = [row | {"recording": ""} for row in rows if row["place"] == "episode 0"]
+    next(row for row in rows if not row["symbol"])["symbol"] = "wave"
+    _write(tmp_path / "named-corrections.csv", rows)  # as the studio writes it beside what it opened
+    with kineme.ActionLibrary(library) as actions:  # annotated now, other stretches would be found
+        actions.delete("stir")
+    said = run("correct", tmp_path / "named", "-l", library)
+    assert said.returncode == 0, said.stderr
+    assert said.stdout.startswith(f"learned 1 movement, 1 new symbol; {len(rows) - 1} as annotated, not learned")
+    assert "kineme library undo" in said.stdout
+
+
+def test_without_corrections_the_command_says_what_it_looked_for(work):
+    folder, _ = work
+    refused = run("correct", folder / "set", "-l", folder / "actions")
+    assert refused.returncode == 2
+    assert "set-corrections.csv" in refused.stderr.replace("\n", "")
