@@ -23,6 +23,7 @@ from kineme.movements.trajectories.movements import Movements
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.recognition.coarse_windows import coarse_distances, coarse_references
 from kineme.recognition.conformal import LEAST, Calibration
+from kineme.recognition.levels import Levels, gripper_levels, level_scores
 from kineme.runtime.compiled import compiled_module, use_compiled
 from kineme.runtime.parallel import for_tiles
 from kineme.sampling import evenly_spaced
@@ -59,6 +60,20 @@ class Templates(NamedTuple):
     comparison: Comparison
     references: References
     calibration: Calibration
+
+    @property
+    def levels(self) -> Levels | None:
+        """Levels of grippers of the references; kept with them."""
+        held = vars(self.references)
+        if "_levels" not in held:
+            held["_levels"] = gripper_levels(self.references, self.comparison.channels, RESOLUTION)
+        levels: Levels | None = held["_levels"]
+        return levels
+
+    def scores(self, nearest: Array, motion: Motion, rows: Rows) -> Array:
+        """Return the nonconformity (n, C) of windows with these log similarities: by their paths, and by levels."""
+        scores = self.calibration.scores(nearest)
+        return scores if self.levels is None else np.hypot(scores, level_scores(self.levels, motion, rows))
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +127,8 @@ def compare_candidates(
     if len(others):
         coarse = coarse_references(templates.comparison, templates.references, RESOLUTION)
         distances = coarse_distances(templates.comparison, coarse, motion, rows[others])
+        if templates.levels is not None:
+            distances = np.hypot(distances, level_scores(templates.levels, motion, rows[others]))
         others = others[np.argsort((distances * weights).min(axis=1), kind="stable")]
     bars, size = reach / weights, int(np.clip(len(rows) // _STEPS, _LEAST_TILE, _TILE))
     for begin in range(0, len(others), size):
@@ -165,7 +182,8 @@ def compare_windows(
         demos = Demonstrations.of_movements(resampled(motion, start[tile], end[tile]))
         paths = demos.positions.reshape(len(demos), N_POINTS, -1).transpose(0, 2, 1)
         sizes[tile], slowness[tile] = size_and_slowness(paths)
-        scores[tile] = templates.calibration.scores(score(templates.comparison, templates.references, demos, by)[0])
+        logs = score(templates.comparison, templates.references, demos, by)[0]
+        scores[tile] = templates.scores(logs, motion, rows[tile])
 
     for begin in range(0, len(rows), _TILE):
         n = min(_TILE, len(rows) - begin)
