@@ -54,10 +54,12 @@ class _Shard(NamedTuple):
 def _parquet(path: Path) -> Iterator[_Shard]:
     # Pages are read as they are needed: a group of rows may be larger than the memory.
     with parquet.ParquetFile(path, buffer_size=_READ, pre_buffer=False) as file:
-        yield _Shard(
-            file.schema_arrow.names,
-            lambda columns, rows, numbers: file.iter_batches(rows, columns=list(columns), use_threads=False),
-        )
+
+        def batches(columns: Sequence[str], rows: int, numbers: Sequence[int] | None) -> Iterator[Any]:
+            for group in range(file.num_row_groups):  # so that damage costs one group
+                yield from file.iter_batches(rows, row_groups=[group], columns=list(columns), use_threads=False)
+
+        yield _Shard(file.schema_arrow.names, batches)
 
 
 @contextmanager
