@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from kineme.errors import DataError
-from kineme.io.lerobot.frames import Frames, contradictions, runs, shard_frames, task_texts
+from kineme.io.lerobot.frames import Frames, check_storage, contradictions, runs, shard_frames, task_texts
 from kineme.io.lerobot.info import read_episodes, read_info, read_tasks, read_videos
 from kineme.movements.episodes import Episode
 
@@ -29,6 +29,7 @@ def episodes(
     """
     folder = Path(folder)
     info = read_info(folder)
+    check_storage(info)
     names = list(info.heads) if features is None else list(dict.fromkeys(features))
     if not names or (unknown := [name for name in names if name not in info.heads]):
         there, got = ", ".join(info.heads) or "there are none", repr(unknown[0]) if names else "none"

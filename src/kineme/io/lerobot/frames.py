@@ -64,8 +64,7 @@ def _parquet(path: Path) -> Iterator[_Shard]:
 
 @contextmanager
 def _lance(path: Path) -> Iterator[_Shard]:
-    with needs("pylance", "read a LeRobot data set in Lance", "lance"):
-        import lance
+    import lance
 
     def batches(table: Any, columns: Sequence[str], rows: int, numbers: Sequence[int] | None) -> Iterator[Any]:
         few = numbers is not None and len(numbers) <= _MOST_NUMBERS
@@ -82,6 +81,13 @@ def _lance(path: Path) -> Iterator[_Shard]:
         if type(error).__name__ != "PanicException":  # of Rust, on damaged bytes; no Exception of Python
             raise
         raise OSError(str(error)) from error
+
+
+def check_storage(info: Info) -> None:
+    """Raise a `DataError` that names the extra to install, where the package that reads the frames is not there."""
+    if info.storage == "lance":
+        with needs("pylance", "read a LeRobot data set in Lance", "lance"):
+            import lance  # noqa: F401 - so that its absence is not taken for damage
 
 
 class Storage(NamedTuple):
