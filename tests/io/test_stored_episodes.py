@@ -9,10 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import kineme.io.lerobot.frames
 from kineme.errors import DataError
-from kineme.io.lerobot.episodes import episodes
-from kineme.io.lerobot.frames import Frames, runs
+from kineme.io.lerobot.episodes import Frames, episodes, runs
 from kineme.io.lerobot.info import read_info, read_videos
 from kineme.io.reading.episodes import read_episodes
 from lerobot_sets import CAMERA, FILM, NAMES, TASKS, add_videos, episode_rows, write_lance, write_v2, write_v3
@@ -58,7 +56,7 @@ def test_all_that_is_stored_of_numbers_comes_as_it_is(folder):
 def test_batches_may_end_anywhere(folder, monkeypatch):
     expected = list(episodes(folder))
     for rows in (1, 7, 20):
-        monkeypatch.setattr(kineme.io.lerobot.frames, "_ROWS", rows)
+        monkeypatch.setattr("kineme.io.lerobot.episodes._ROWS", rows)
         for got, episode in zip(episodes(folder), expected, strict=True):
             assert (got.number, got.task, got.problems) == (episode.number, episode.task, ())
             np.testing.assert_array_equal(got.times, episode.times)
