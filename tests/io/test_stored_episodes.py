@@ -208,6 +208,22 @@ def test_damaged_descriptions_come_first(tmp_path):
         next(episodes(folder))
 
 
+@pytest.mark.parametrize(
+    ("file", "name", "numbers"),
+    [("meta/tasks.parquet", b"task_index", [-1, 0, 1, 2]), ("data/chunk-000/file-000.parquet", b"action", [0, 1, 2])],
+)
+def test_names_that_are_no_text_are_damage(tmp_path, file, name, numbers):
+    """Not an error of Python: pyarrow decodes the names of columns when it opens a file."""
+    folder = write_v3(tmp_path / "set")
+    data = (folder / file).read_bytes()
+    (folder / file).write_bytes(data.replace(name, b"\xff" + name[1:]))
+    assert [episode.number for episode in episodes(folder)] == numbers
+    episodes_file = folder / "meta/episodes/chunk-000/file-000.parquet"
+    episodes_file.write_bytes(episodes_file.read_bytes().replace(b"length", b"\xffength"))
+    with pytest.raises(DataError, match="expected episodes in a LeRobot data set, got none"):
+        next(episodes(folder))
+
+
 V2_VIDEOS = "videos/chunk-{episode_chunk:03d}/{video_key}/episode_{episode_index:06d}.mp4"
 V3_VIDEOS = "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4"
 
