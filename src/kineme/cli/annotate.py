@@ -61,7 +61,7 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
     Example: kineme annotate long.csv --library actions/ -o long-labels.csv
     """
     from kineme.io.reading.formats import expanded
-    from kineme.io.writing.annotations import targets_of, to_csv, write_annotations
+    from kineme.io.writing.annotations import is_in_place, targets_of, to_csv, write_annotations
     from kineme.library.library import ActionLibrary
 
     as_json, as_csv, force, error_rate = (options.pop(name) for name in ("as_json", "as_csv", "force", "error_rate"))
@@ -73,7 +73,8 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
 
     def check(movements: list[tuple[str, str]], *read: Path) -> None:
         for target in targets_of(output, sources, movements, form) if output is not None else ():
-            check_new(target, force, *sources, *read)
+            if not is_in_place(target, sources):
+                check_new(target, force, *sources, *read)
             if target.is_dir() and any(target.iterdir()) and not force:
                 raise click.UsageError(
                     f"expected a new folder to write, {printable(target)} is there; write over it with --force"

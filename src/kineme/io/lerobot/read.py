@@ -13,8 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import DataError
-from kineme.io.lerobot.episodes import episodes
-from kineme.io.lerobot.frames import Frames, contradictions, joined, shard_frames, task_texts
+from kineme.io.lerobot.episodes import (
+    Frames,
+    check_storage,
+    contradictions,
+    episodes,
+    joined,
+    shard_frames,
+    task_texts,
+)
 from kineme.io.lerobot.info import Episodes, Info, read_episodes, read_info, read_tasks
 from kineme.io.limits import check_expanded
 from kineme.movements.episodes import Episode
@@ -36,6 +43,7 @@ def lerobot_movements(folder: Path, layout: Layout) -> Parsed:
     """Read a data set of LeRobot, version 2 or 3: ``observation.state``, or what ``columns`` names, of each episode."""
     _check_declared(layout)
     info = read_info(folder)
+    check_storage(info)
     chosen = _chosen(info, layout)
     declared, (tasks, unsaid) = read_episodes(folder, info), read_tasks(folder)
     frames, unread = _all_frames(folder, info, declared, chosen.features)

@@ -1,0 +1,95 @@
+"""What an arm holds tells movements of one path apart: levels of a gripper are evidence in long recordings."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kineme import Demonstrations, Recognizer, Trajectory
+from kineme.movements.channels.channel import Channel
+from kineme.movements.segmentation.table import observe
+from kineme.movements.trajectories.movements import of_channels
+from kineme.recognition.levels import gripper_levels, level_scores
+
+RATE = 50.0
+
+
+def _channels(last="gripper.pos"):
+    heads = ("x", "y", "z", last)
+    return tuple(Channel(head, "position", (head,)) for head in heads)
+
+
+def _way(opening, rng, start=(0.0, 0.0, 0.0)):
+    """From a place to another one, in an arc, with the fingers open by `opening`."""
+    u = np.linspace(0.0, 1.0, 60)
+    s = (u**3 * (10.0 - 15.0 * u + 6.0 * u**2))[:, None]
+    goal = np.array([0.5, 0.3, 0.0]) + rng.normal(scale=0.02, size=3)
+    path = start + goal * s + np.array([0.0, 0.0, 0.2]) * np.sin(np.pi * s)
+    return np.column_stack((path, opening + rng.normal(scale=0.01, size=60)))
+
+
+def _demonstrations(channels):
+    rng = np.random.default_rng(0)
+    kinds = [("reach", 0.9), ("carry", 0.35)]
+    paths = [_way(opening, rng) for _, opening in kinds for _ in range(3)]
+    shown = Demonstrations([Trajectory(np.arange(60) / RATE, path) for path in paths])
+    labels = [name for name, _ in kinds for _ in range(3)]
+    return Demonstrations.of_movements(of_channels(shown.movements, channels)), labels
+
+
+def _recording(channels, openings):
+    rng, parts = np.random.default_rng(1), []
+    at = np.zeros(3)
+    for opening in openings:
+        way = _way(opening, rng, at)
+        at = way[-1, :3]
+        rest = np.tile(way[-1], (25, 1))
+        parts += [np.repeat(way[:1], 25, axis=0), way, rest]
+    positions = np.concatenate(parts)
+    recording = Demonstrations([Trajectory(np.arange(len(positions)) / RATE, positions)])
+    return Demonstrations.of_movements(of_channels(recording.movements, channels))
+
+
+def test_open_and_closed_fingers_tell_a_reach_from_a_carry():
+    channels = _channels()
+    demos, labels = _demonstrations(channels)
+    recognizer = Recognizer().fit(demos, labels)
+    openings = [0.9, 0.35, 0.35, 0.9, 0.9]
+    spotted = [one for one in recognizer.spot(_recording(channels, openings)) if one.end - one.start > 0.6]
+    assert [one.label for one in spotted] == ["reach" if opening > 0.5 else "carry" for opening in openings]
+    assert min(one.confidence for one in spotted) > 0.9  # the path alone leaves it at even odds
+
+
+def test_levels_are_those_of_columns_that_are_called_so():
+    demos, labels = _demonstrations(_channels())
+    references = Recognizer().fit(demos, labels).references_
+    levels = gripper_levels(references, _channels(), 0.04)
+    assert levels is not None
+    assert levels.columns == (3,)
+    assert levels.levels.shape == (6, 3)
+    assert gripper_levels(references, _channels("torque"), 0.04) is None
+    assert gripper_levels(references, None, 0.04) is None
+
+
+def test_distances_of_levels_are_small_for_the_same_and_large_for_others():
+    demos, labels = _demonstrations(_channels())
+    references = Recognizer().fit(demos, labels).references_  # carry, reach
+    levels = gripper_levels(references, _channels(), 0.04)
+    opened = observe(_recording(_channels(), [0.9])[0], 0.04)
+    scores = level_scores(levels, opened, np.array([[25, 84], [40, 70]]))
+    assert scores.shape == (2, 2)
+    assert (scores[:, 1] < 0.3).all()
+    assert scores[:, 0] == pytest.approx(np.sqrt(3.0) / 0.35, rel=0.1)
+
+
+def test_a_gripper_that_never_moves_beside_one_that_does_is_no_evidence():
+    rng = np.random.default_rng(0)
+    paths = [np.column_stack((_way(opening, rng), rng.normal(scale=0.01, size=60))) for opening in (0.9, 0.9, 0.3, 0.3)]
+    heads = ("x", "y", "z", "right_gripper.pos", "left_gripper.pos")
+    channels = tuple(Channel(head, "position", (head,)) for head in heads)
+    shown = Demonstrations([Trajectory(np.arange(60) / RATE, path) for path in paths])
+    demos = Demonstrations.of_movements(of_channels(shown.movements, channels))
+    references = Recognizer().fit(demos, ["reach", "reach", "carry", "carry"]).references_
+    levels = gripper_levels(references, channels, 0.04)
+    assert levels is not None
+    assert levels.columns == (3,)
