@@ -45,7 +45,7 @@ _REACH = 0.975  # nonconformity at which a window counts as far, in that which m
 #: The same where levels of a gripper tell movements apart: an arm at work moves elsewhere each time, and few examples
 #: show little of it. Of simulated work, three examples of each of six kinds, 0.6 of the movements are named right at
 #: 0.975, 0.9 at 1.7; of movements of a kind that was not shown, 0.9 and 0.8 are unknown.
-_REACH_AT_WORK = 1.7
+_REACH_AT_WORK = 1.9
 _TEMPO, _SIZE = 0.4, 0.2  # cost of a duration, or a size, e times what is expected
 _DEAD = 0.1  # logarithm of a ratio of durations that costs nothing while the tempo of the recording is unknown
 _EDGE, _FAR_FROM_REST, _SPANNED = 0.14, 0.03, 0.02  # costs of what surrounds a window
