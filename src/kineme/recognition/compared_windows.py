@@ -45,6 +45,7 @@ _TILE, _AT_ONCE = 4096, 256  # windows between two calls of `progress`, and thos
 _COMPLETELY = 256  # windows that are compared completely, evenly spaced: they tell how common distances are
 #: Windows are compared in steps, those that are coarsely nearest first, until none of a step is within reach.
 _STEPS, _LEAST_TILE = 32, 256  # steps of all windows, at most; windows in a step, at least
+_CELL, _NEAR = 0.5, 0.2  # width of cells of windows, in their duration, and the share of each that is compared
 _ABOVE = 1e-6  # share by which the score of a window that is not compared is above the bar
 _RESTING = 0.2  # share of the mean speed of a window below which it rests
 _COMMON = 0.2  # share of the windows of a recording whose distance to a class, or less, is common
@@ -124,25 +125,50 @@ def compare_candidates(
     sample, others = np.flatnonzero(completely), np.flatnonzero(~completely)
     parts = [compare_windows(templates, motion, rows[sample], progress=_part(progress, 0.0, completely.mean()))]
     weights = rarity_weights(parts[0].scores * templates.calibration.scales)
-    if len(others):
-        coarse = coarse_references(templates.comparison, templates.references, RESOLUTION)
-        distances = coarse_distances(templates.comparison, coarse, motion, rows[others])
-        if templates.levels is not None:
-            distances = np.hypot(distances, level_scores(templates.levels, motion, rows[others]))
-        others = others[np.argsort((distances * weights).min(axis=1), kind="stable")]
+    order, near = _by_coarse_distance(templates, motion, rows[others], weights)
+    others = others[order]
     bars, size = reach / weights, int(np.clip(len(rows) // _STEPS, _LEAST_TILE, _TILE))
-    for begin in range(0, len(others), size):
-        some = rows[others[begin : begin + size]]
+    for begin in range(0, near, size):
+        some = rows[others[begin : min(begin + size, near)]]
         tell = _part(progress, 1.0 - (len(others) - begin) / len(rows), len(some) / len(rows))
         parts.append(compare_windows(templates, motion, some, bars, tell))
         if (parts[-1].scores > bars).all():  # none is within reach: of those that are coarsely farther none is, either
-            parts.append(_beyond(motion, rows[others[begin + size :]], bars))
+            near = begin + len(some)
             break
+    parts.append(_beyond(motion, rows[others[near:]], bars))
     if progress is not None:
         progress(1.0)
     order = np.argsort(np.concatenate((sample, others)))
     columns = (np.concatenate([getattr(part, attribute.name) for part in parts]) for attribute in fields(parts[0]))
     return Candidates(ComparedWindows(*columns).take(order), weights, completely)
+
+
+def _by_coarse_distance(
+    templates: Templates, motion: Motion, rows: Rows, weights: Array
+) -> tuple[NDArray[np.intp], int]:
+    """Return the order of windows, coarsely nearest first, and how many of them are to be compared.
+
+    That is all of them, unless levels are evidence too. The reach is wide then, and holds many windows: only those that
+    are among the nearest of the windows of about the same time and duration can be chosen before others.
+    """
+    if not len(rows):
+        return np.empty(0, dtype=np.intp), 0
+    coarse = coarse_references(templates.comparison, templates.references, RESOLUTION)
+    distances = coarse_distances(templates.comparison, coarse, motion, rows)
+    if templates.levels is None:
+        return np.argsort((distances * weights).min(axis=1), kind="stable"), len(rows)
+    distances = np.hypot(distances, level_scores(templates.levels, motion, rows)) * weights
+    times = motion.times[rows]
+    lasting = times[:, 1] - times[:, 0]
+    octave = np.floor(np.log2(lasting / lasting.min())).astype(np.intp)
+    cell = np.floor(times.mean(axis=1) / (_CELL * lasting.min() * 2.0**octave)).astype(np.intp)
+    far = np.ones(len(rows), dtype=bool)
+    for of_class in distances.T:
+        by_cell = np.lexsort((of_class, cell, octave))
+        first = np.flatnonzero(np.diff(octave[by_cell], prepend=-1) | np.diff(cell[by_cell], prepend=-1))
+        counts = np.diff(first, append=len(rows))
+        far[by_cell] &= np.arange(len(rows)) - np.repeat(first, counts) >= np.repeat(np.ceil(_NEAR * counts), counts)
+    return np.lexsort((distances.min(axis=1), far)), int(len(rows) - far.sum())
 
 
 def _beyond(motion: Motion, rows: Rows, bars: Array) -> ComparedWindows:

@@ -119,7 +119,8 @@ def spot(
         return []
     logs, similar = score(comparison, references, pieces_of(timed, rows), nearest, nearest_each)
     if templates.levels is not None:
-        away = level_scores(templates.levels, windows.motion, rows - [0, 1]) * calibration.scales
+        ends = np.column_stack((rows[:, 0], rows[:, 1] - 1))
+        away = level_scores(templates.levels, windows.motion, ends) * calibration.scales
         logs, similar = (each - 0.5 * away**2 for each in (logs, similar))
     p_known = calibration.known_p_values(logs, error_rate)
     confidence = 1.0 - p_known
