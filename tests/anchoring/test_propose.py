@@ -200,6 +200,9 @@ def test_movements_that_cannot_be_told_apart():
         propose(demos[:2])
     with pytest.raises(kineme.errors.SpecificationError, match="got copies of one movement"):
         propose(demos[[0, 0, 0, 0]])
+    for movement in range(len(demos)):  # also where rounding tells copies apart
+        with pytest.raises(kineme.errors.SpecificationError, match="got copies of one movement"):
+            propose(demos[[movement] * 20])
     with pytest.raises(
         kineme.errors.SpecificationError, match=r"expected widths to be 7 numbers above 0.* got \[1.0, -1.0\]"
     ):

@@ -48,6 +48,17 @@ def test_features_are_shares_and_those_of_each_movement_alone():
         np.testing.assert_allclose(transform(series[i : i + 1], kernels)[0], features[i], atol=1e-6)
 
 
+def test_order_and_names_of_demonstrations_change_nothing():
+    shown, fresh = draw_trembles(8, seed=9), draw_trembles(4, seed=10)
+    order = np.random.default_rng(0).permutation(len(shown))
+    names = {"0": "z", "1": "y", "2": "x"}
+    recognizer, other = (kineme.Recognizer(classifier="convolutions") for _ in range(2))
+    recognizer.fit(shown)
+    other.fit(shown[order], [names[label] for label in shown[order].labels])
+    scores, others = recognizer.decision_function(fresh), other.decision_function(fresh)
+    np.testing.assert_allclose(others[:, ::-1], scores, atol=1e-6)
+
+
 def test_values_left_out_are_those_of_a_fit_without_the_row():
     """The errors that are kept have lost their signs: one that overshoots its class must not count against it."""
     rng = np.random.default_rng(0)

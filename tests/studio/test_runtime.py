@@ -171,6 +171,8 @@ def test_movements_of_people_are_recognized_as_in_python(name):
         ({"classifier": "prototype"}, 2),
         ({}, 1),
         ({"representations": tuple(replace(one, signal=False) for one in DEFAULT_REPRESENTATIONS)}, 1),
+        ({"representations": (*DEFAULT_REPRESENTATIONS[:4], replace(DEFAULT_REPRESENTATIONS[0], signal=False))}, 1),
+        ({"representations": (kineme.recognition.Representation("forcing", arc_share=1.0, n_points=51),)}, 1),
         ({}, 5),
         ({"representations": (kineme.recognition.Representation("forcing", arc_share=0.0, n_points=70),)}, 2),
         ({"representations": (kineme.recognition.Representation("positions", arc_share=0.4, n_points=50),)}, 2),

@@ -57,8 +57,12 @@ def series_of(described: Described) -> Single:
 
 
 def fit_kernels(series: Single, seed: int = 0) -> Kernels:
-    """Draw the channels of the kernels, and thresholds from quantiles of what they make of movements drawn."""
+    """Draw the channels of the kernels, and thresholds from quantiles of what they make of movements drawn.
+
+    Movements are drawn from them in the order of their values, so that neither their order nor names change a kernel.
+    """
     rng, (n, c, T) = np.random.default_rng(seed), series.shape
+    series = series[np.lexsort(series.reshape(n, -1)[:, :: max(1, c * T // 32)].T)]
     dilations = tuple(range(1, (T - 1) // (_LENGTH - 1) + 1))
     n_thresholds = max(1, _FEATURES // (84 * len(dilations)))
     channels, thresholds = [], []

@@ -249,10 +249,10 @@ def _path_rows(
     paths: Array, details: Array, how: ComparisonSpecification, dtype: DTypeLike
 ) -> tuple[NDArray[Any], ...]:
     """Return feature rows of paths (n, d, T), and of the same paths in detail, as `dtype`."""
-    normalized: dict[tuple[float, int], NDArray[Any]] = {}  # representations of equal phase share it
+    normalized: dict[tuple[float, int, bool], NDArray[Any]] = {}  # representations of equal phase share it
     rows = []
     for representation in how.by_rows:
-        phase = (representation.arc_share, representation.n_points)
+        phase = (representation.arc_share, representation.n_points, representation.signal)
         if phase not in normalized:
             normalized[phase] = how.normalization.apply(representation.along(paths), dtype)
         rows.append(representation.describe(normalized[phase], how.normalization.translation))

@@ -154,8 +154,7 @@ SHARE = 0.4
 #: median over eight sets of handwriting, gestures in space, signs, words and exercises.
 ALONE = {"positions": 0.2, "forcing": 0.3, "elastic": 0.16, "turning": 0.045, "cloud": 0.15}
 _LEAST = 0.01  # share of the typical size; smallest distance that is used
-_SAME = 1e-3  # share of the size; smaller distances are rounding errors of single precision
-_COPIES = 1e-4  # share of the size; unlabeled movements at smaller distances are copies
+_SAME = 1e-3  # share of the size; smaller distances are rounding errors of single precision, movements there copies
 _ROWS = 500  # movements that widths are estimated from, at most
 _BEGUN_MOVEMENTS = 60  # the same, where each has many beginnings
 _NO_IMPOSTOR = 0.1  # width where no two beginnings differ
@@ -339,7 +338,7 @@ def gap_widths(described: Described) -> Array:
     chosen = evenly_spaced(n, _ROWS)
     widths = []
     for squares, same in zip(
-        squared_distances(described.take(chosen), described), _COPIES * described.sizes(), strict=True
+        squared_distances(described.take(chosen), described), _SAME * described.sizes(), strict=True
     ):
         squares[np.arange(len(chosen)), chosen] = -1.0  # itself first
         ordered = np.sqrt(np.maximum(np.sort(squares, axis=1)[:, 1:], 0.0))

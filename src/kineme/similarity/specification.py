@@ -212,6 +212,12 @@ def check_representations(representations: Any) -> tuple[Representation, ...]:
             "expected Representation('positions', arc_share=1.0) beside those that are compared pair by pair, whose "
             "rotation it gives; add it"
         )
+    in_pairs = [item for item in given if item.in_pairs]
+    if in_pairs and len({item.signal for item in (*in_pairs, given[rotating(given)])}) > 1:
+        raise SpecificationError(
+            "expected one value of signal in positions over arc length and all that are compared pair by pair, which "
+            "are made from these, got True and False; pass the same to each"
+        )
     return tuple(sorted(given, key=lambda item: (item.in_pairs, item.detailed)))  # the order within each sort stays
 
 
@@ -393,7 +399,12 @@ class ComparisonSpecification:
     @cached_property
     def stored_rows(self) -> tuple[Representation, ...]:
         """What feature rows hold: representations compared sample by sample, then positions in detail, if needed."""
-        return (*self.by_rows, DETAILED_POSITIONS) if self.detailed else self.by_rows
+        return (*self.by_rows, self.detailed_positions) if self.detailed else self.by_rows
+
+    @property
+    def detailed_positions(self) -> Representation:
+        """The positions that are compared pair by pair in detail."""
+        return replace(DETAILED_POSITIONS, signal=self.representations[rotating(self.representations)].signal)
 
     @cached_property
     def detailed(self) -> bool:
