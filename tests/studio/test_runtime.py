@@ -306,6 +306,15 @@ def test_movements_under_way_are_recognized_as_in_python(space, settings):
     assert compare_states(states_of(recognizer, every_tenth(some))) <= 2 * SIMILAR
 
 
+@pytest.mark.parametrize("signal", [True, False])
+def test_signals_under_way_are_recognized_as_in_python(signal, monkeypatch):
+    monkeypatch.setenv("KINEME_COMPILED", "never")
+    how = tuple(replace(representation, signal=signal) for representation in DEFAULT_REPRESENTATIONS)
+    recognizer = kineme.Recognizer(how).fit(draw_shapes([2, 3, 2], 1, seed=4))
+    fresh = draw_shapes([1] * 3, 1, seed=4, spread=0.3)
+    assert compare_states(states_of(recognizer, list(fresh))) <= 5 * SIMILAR
+
+
 def rollouts_of(demos, formulation):
     """Of stored primitives, and of movements learned in the runtime: to new starts and goals, through via points."""
     snapshot = snapshot_of_recognizer(kineme.Recognizer().fit(demos))

@@ -253,6 +253,7 @@ def early_parts(classes: KnownClasses, early: Early | None = None) -> Snapshot:
         "n_progress": described.early.n_progress,
         **{name: None if math.isinf(value) else value for name, value in spreads.items()},
         "own_rotations": described.early.max_angle is not None,
+        "signals": described.are_signals,
         "pauses": pause_rule(beginnings.ALLOWANCE),
         "rule": rotation_rule(described.procrustes),
         "shapes": pair_rule(described.described.pairs.shapes),
