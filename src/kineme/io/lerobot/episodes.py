@@ -46,9 +46,8 @@ def episodes(
     def episode(frames: Frames, number: int, place: str, problems: Sequence[str], task: str | None = None) -> Episode:
         columns = np.split(frames.values, np.cumsum(list(widths.values()))[:-1], axis=1)
         signals = dict(zip(names, columns, strict=True))
-        return Episode(
-            number, frames.stamps, signals, entries, task, info.fps, tuple(problems), place, videos.get(number, {})
-        )
+        files = {camera: video.file for camera, video in videos.get(number, {}).items()}
+        return Episode(number, frames.stamps, signals, entries, task, info.fps, tuple(problems), place, files)
 
     if wanted is None and (problems := (*declared.problems, *unsaid)):
         yield episode(_no_frames(sum(widths.values())), -1, "meta", problems)
