@@ -176,6 +176,17 @@ def test_what_is_wrong_with_an_episode_stands_in_its_problems(tmp_path):
     assert (len(empty), empty.problems) == (0, ("expected arrays of numbers with rows, got none",))
 
 
+def test_a_damaged_demonstration_does_not_hide_the_others(tmp_path):
+    path = write_robomimic(tmp_path / "a.hdf5")
+    data = bytearray(path.read_bytes())
+    at = data.index(b"robot0_gripper_qpos")  # in the heap of names of one group
+    data[at : at + 4] = b"\xff\xfe\xff\xfe"
+    path.write_bytes(data)
+    problems = [episode.problems for episode in robot_episodes(path)]
+    assert sorted(map(bool, problems)) == [False, False, True]
+    assert any("expected the group data/demo_" in text for texts in problems for text in texts)
+
+
 def test_a_damaged_file_among_others_is_an_episode_with_a_problem(tmp_path):
     folder = write_aloha(tmp_path / "sets")
     damaged = folder / "episode_1.hdf5"

@@ -18,6 +18,9 @@ from kineme.io.limits import check_expanded
 from kineme.io.records import damaged_as, needs
 from kineme.movements.tables.layout import Layout, Parsed
 
+#: Errors of h5py on damaged files.
+DAMAGE = (OSError, RuntimeError, KeyError, ValueError, TypeError)
+
 _SMALL, _CHUNKS = 2**20, 1000  # bytes and chunks that need not be written
 _EXPANDED = 1100  # times as many bytes gzip, which packs best, gives at most
 _LARGE, _PACKED = 2**26, 200  # bytes from which on packing is looked at; times as many as movements pack to at most
@@ -40,7 +43,7 @@ def hdf5_file(path: Path) -> Iterator[Any]:
     with needs("h5py", "read HDF5", "hdf5"):
         import h5py
     damaged = "expected an HDF5 file, got something foreign, truncated or damaged"
-    with damaged_as(damaged, OSError, RuntimeError, KeyError), h5py.File(os.fspath(path), "r") as file:
+    with damaged_as(damaged, *DAMAGE), h5py.File(os.fspath(path), "r") as file:
         yield file
 
 

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kineme.errors import DataError
-from kineme.io.arrays.hdf5 import hdf5_file, hdf5_group, hdf5_tree, texts_of
+from kineme.io.arrays.hdf5 import DAMAGE, hdf5_file, hdf5_group, hdf5_tree, texts_of
 from kineme.io.arrays.tree_movements import tree_movements
 from kineme.io.arrays.trees import GROUPS, flat, rate_of
 from kineme.io.arrays.zarr_arrays import ZarrArray, zarr_arrays
@@ -89,6 +89,7 @@ class _Part(NamedTuple):
     task: str | None = None
     notes: tuple[str, ...] = ()
     length: int | None = None  # as it is declared
+    problems: tuple[str, ...] = ()
 
 
 def robot_layout(path: Path) -> RobotLayout | None:
@@ -157,16 +158,26 @@ def _in_hdf5(file: Any, row: RobotLayout) -> Iterator[_Part]:
     task = _described(data, "problem_info", "language_instruction") or _described(data, "env_args", "env_name")
     subsets = {name: {*texts_of(masks[name])} for name in masks if getattr(masks[name], "ndim", 0) == 1}
     for name in sorted((name for name in data if _NUMBER.search(name)), key=_in_order):
-        demo = hdf5_group(data, name)
-        length = demo.attrs.get("num_samples") if demo else None
-        yield _Part(
+        part = _Part(
             f"data/{name}",
-            dict(flat(hdf5_tree(demo), "/")) if demo else {},
+            {},
             hertz if isinstance(hertz, int | float) and 0 < hertz < math.inf else math.nan,
-            _text((demo and _described(demo, "ep_meta", "lang")) or task),
+            _text(task),
             tuple(f"in the subset {subset}" for subset, names in subsets.items() if name in names),
-            int(length) if isinstance(length, int | np.integer) else None,
         )
+        try:
+            with damaged_as(f"expected the group data/{name}, got a damaged one", *DAMAGE):
+                demo = hdf5_group(data, name)
+                task_of_demo = _text(_described(demo, "ep_meta", "lang")) if demo else None
+                length = demo.attrs.get("num_samples") if demo else None
+                part = part._replace(
+                    arrays=dict(flat(hdf5_tree(demo), "/")) if demo else {},
+                    task=task_of_demo or part.task,
+                    length=int(length) if isinstance(length, int | np.integer) else None,
+                )
+        except DataError as error:
+            part = part._replace(problems=(str(error),))
+        yield part
 
 
 class _Rows:
@@ -196,12 +207,12 @@ def _episode(
     """Read an episode; `known` are its number, its place and the rate that is asked for."""
     number, place, rate = known
     arrays = _features(row, part.arrays, features)
-    if features is not None and (unknown := [name for name in features if name not in arrays]):
+    if features is not None and not part.problems and (unknown := [name for name in features if name not in arrays]):
         there = listed([*_features(row, part.arrays, None), *part.arrays])
         raise DataError(f"expected features of {place} ({there}), got {unknown[0]!r}")
     lengths = Counter(array.shape[0] for array in arrays.values())
     length = lengths.most_common(1)[0][0] if lengths else 0
-    problems = [] if length else ["expected arrays of numbers with rows, got none"]
+    problems = [*part.problems] if length or part.problems else ["expected arrays of numbers with rows, got none"]
     if part.length not in (None, length):
         problems.append(f"expected {part.length} rows as declared, got {length}")
     check_expanded(8 * sum(math.prod(array.shape) for array in arrays.values()), "an episode")
@@ -211,7 +222,7 @@ def _episode(
             problems.append(f"expected {length} rows of {name} as of others, got {array.shape[0]}")
             continue
         try:
-            with damaged_as(f"expected numbers in {name}, got damaged ones", OSError, RuntimeError, ValueError):
+            with damaged_as(f"expected numbers in {name}, got damaged ones", *DAMAGE):
                 signals[name] = np.asarray(array, np.float64).reshape(length, math.prod(array.shape[1:]))
         except DataError as error:
             problems.append(str(error))
@@ -370,7 +381,7 @@ def _marked(names: Sequence[str], rows: Sequence[RobotLayout]) -> RobotLayout | 
 
 def _described(stored: Any, name: str, *keys: str) -> Any:
     """Return an entry of the JSON in an attribute, by its keys; None where there is none."""
-    with suppress(ValueError, RecursionError, OSError):
+    with suppress(RecursionError, *DAMAGE):
         value = json.loads(_text(stored.attrs.get(name)) or "null")
         for key in keys:
             value = value.get(key) if isinstance(value, dict) else None
