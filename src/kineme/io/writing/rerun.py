@@ -146,7 +146,6 @@ def write_rerun(path: Path, scenes: Iterable[Scene], *, replace: bool = False) -
         raise DataError(f"expected a file ending in {ENDING} for Rerun, got {path.suffix or 'no ending'!r}")
     with needs("rerun-sdk", "write for the viewer of Rerun", "rerun"):
         import rerun as rr
-        import rerun.blueprint as rrb
     views: list[Any] = []
     colors: dict[str, int] = {UNKNOWN: _rgba(GRAY)}
     names: set[str] = set()
@@ -166,11 +165,11 @@ def write_rerun(path: Path, scenes: Iterable[Scene], *, replace: bool = False) -
                 branch = f"/{rr.escape_entity_path_part(printable(name))}"
                 _log_scene(rr, recording, branch, scene, colors)
                 if len(views) < _TABS:
-                    views.append(_view(rrb, rr.escape_entity_path_part, branch, printable(name), scene))
+                    views.append(_view(rr, branch, printable(name), scene))
             if not views:
                 raise DataError("expected movements or episodes to write for Rerun, got none")
-            shown = views[0] if len(views) == 1 else rrb.Tabs(*views)
-            recording.send_blueprint(rrb.Blueprint(shown, rrb.TimePanel(timeline=TIMELINE)))
+            shown = views[0] if len(views) == 1 else rr.blueprint.Tabs(*views)
+            recording.send_blueprint(rr.blueprint.Blueprint(shown, rr.blueprint.TimePanel(timeline=TIMELINE)))
             recording.flush()
         finally:
             recording.disconnect()
@@ -243,9 +242,10 @@ def _rgba(color: str, lighter: float = 0.0) -> int:
     return red << 24 | green << 16 | blue << 8 | 0xFF
 
 
-def _view(rrb: Any, as_part: Any, branch: str, name: str, scene: Scene) -> Any:
+def _view(rr: Any, branch: str, name: str, scene: Scene) -> Any:
     """Lay a scene out: points at the left, curves over lanes at the right."""
-    plots = [(plot, f"{branch}/signals/{as_part(plot)}") for plot in scene.signals]
+    rrb = rr.blueprint
+    plots = [(plot, f"{branch}/signals/{rr.escape_entity_path_part(plot)}") for plot in scene.signals]
     if len(plots) > _PLOTS:
         plots = [("signals", f"{branch}/signals")]
     rows = [rrb.TimeSeriesView(origin=origin, name=printable(plot)) for plot, origin in plots]
