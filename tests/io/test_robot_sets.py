@@ -69,6 +69,7 @@ def test_robomimic_says_its_rate_its_task_and_its_subsets(tmp_path):
     recordings = kineme.read_recordings(path)
     assert recordings.demonstrations.dimensions == tuple(f"obs/robot0_eef_pos.{axis}" for axis in "xyz")
     assert {channel.unit for channel in recordings.demonstrations.channels} == {"m"}
+    assert {source.label for source in recordings.sources} == {"Lift"}
     assert recordings.detected[0][0].units_from == "head"
     chosen = kineme.read_recordings(path, columns=["obs/object", "actions"])
     assert (chosen.demonstrations.n_dims, chosen.demonstrations.durations[0]) == (17, pytest.approx(29 / 25))
@@ -83,6 +84,8 @@ def test_demonstrations_come_by_their_numbers_and_in_the_words_of_others(tmp_pat
     episodes = list(robot_episodes(path))
     assert [episode.number for episode in episodes] == list(range(12))
     assert (episodes[3].task, episodes[10].task) == ("lift the cube", "open the drawer")
+    labels = {source.place: source.label for source in kineme.read_recordings(path).sources}
+    assert (labels["data/demo_3"], labels["data/demo_10"]) == ("lift the cube", "open the drawer")
     assert episodes[0].notes[0] == "20 Hz assumed, the control rate of robosuite"
     assert np.isnan(episodes[0].fps)
     assert episodes[0].times[1] == 0.05

@@ -270,7 +270,12 @@ def hdf5_or_robot_movements(path: Path, layout: Layout) -> Parsed:
         first = None if row is None else next(_in_hdf5(file, row), None)
         if row is None or first is None:
             return tree_movements(tree, layout, "HDF5", GROUPS)
-        return _movements(tree, tree["data"] if row is ROBOMIMIC else tree, (row, first), layout, "HDF5")
+        if row is ALOHA:
+            return _movements(tree, tree, (row, first), layout, "HDF5")
+        for name in (name for name, demo in tree["data"].items() if isinstance(demo, dict)):
+            demo = hdf5_group(hdf5_group(file, "data"), name)
+            tree["data"][name]["task"] = _text(_described(demo, "ep_meta", "lang")) or first.task
+        return _movements(tree, tree["data"], (row, first), layout, "HDF5")
 
 
 def zarr_movements(path: Path, layout: Layout) -> Parsed:
