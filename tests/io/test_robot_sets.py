@@ -13,10 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import kineme
-from kineme.errors import DataError
+from kineme.errors import DataError, SpecificationError
 from kineme.io.arrays.robot_sets import LAYOUTS, robot_episodes, robot_layout
 from kineme.io.arrays.zarr_arrays import zarr_arrays
 from kineme.io.reading.episodes import read_episodes
+from lerobot_sets import write_v3
 from robot_array_sets import LENGTHS, motion, write_aloha, write_buffer, write_robomimic, write_umi
 
 h5py = pytest.importorskip("h5py", reason="h5py reads and writes HDF5")
@@ -101,7 +102,7 @@ def test_aloha_is_read_at_the_rate_that_is_assumed_or_given(tmp_path):
     assert episodes[0].names["action"] == episodes[0].names["observation.state"]
     assert episodes[0].names["action"][6:9] == ("left_gripper", "right_waist", "right_shoulder")
     assert list(episodes[0].signals) == ["action", "observation.state", "observation.velocity"]
-    given_rate = next(robot_episodes(folder, rate=25.0))
+    given_rate = next(read_episodes(folder, rate=25.0))
     assert (given_rate.fps, given_rate.times[1], given_rate.notes) == (25.0, 0.04, ())
     recordings = kineme.read_recordings(folder / "episode_0.hdf5")
     assert recordings.demonstrations.dimensions == episodes[0].names["action"]
@@ -111,6 +112,13 @@ def test_aloha_is_read_at_the_rate_that_is_assumed_or_given(tmp_path):
     assert one_joint.demonstrations.dimensions == ("left_waist",)
     assert one_joint.demonstrations.durations[0] == pytest.approx(1.9)
     assert "assumed" not in one_joint.detected[0][0].units_from
+
+
+def test_a_rate_is_a_number_and_for_sets_without_stamps(tmp_path):
+    with pytest.raises(SpecificationError, match="rate"):
+        list(read_episodes(write_aloha(tmp_path / "sets"), rate=0))
+    with pytest.raises(SpecificationError, match="expected no rate for a data set of LeRobot"):
+        read_episodes(write_v3(tmp_path / "lerobot"), rate=25.0)
 
 
 def test_umi_is_read_from_a_folder_and_from_an_archive(tmp_path):

@@ -29,7 +29,7 @@ from kineme.io.records import damaged_as
 from kineme.movements.episodes import Episode
 from kineme.movements.tables.layout import Layout, Parsed, listed
 from kineme.movements.tables.time_stamps import words_of
-from kineme.validation import Array
+from kineme.validation import Array, check_number
 
 HDF5, ZARR = (".hdf5", ".h5"), (".zarr", ".zip")
 ENDS = "meta/episode_ends"  # of Zarr: the number of rows up to the end of each episode
@@ -111,6 +111,8 @@ def robot_episodes(path: Path, features: Sequence[str] | None = None, rate: floa
     stamps are even: by `rate` [1/s], else by what the file says, else by the custom of the layout, which `notes` say.
     What cannot be read of an episode is among its `problems`. A `DataError` says why a set cannot be read at all.
     """
+    if rate is not None:
+        check_number("rate", rate, above=0)
     sources, number = _sources(path), 0
     if not sources:
         raise DataError(f"expected HDF5 files of a robot in {path.name}, got none")

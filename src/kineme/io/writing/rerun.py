@@ -34,6 +34,7 @@ _LIGHTER = 0.4  # of the way to white, when all colors are taken, once or twice
 _POINTS = 5000  # of a drawn path, at most
 _DOT = 6.0  # radius of a moving point, on the screen
 _ABOVE = 1.5  # of the extent of paths in a plane: height from which they are seen
+_LEAST = 1e-6  # extent, where nothing moves
 _PLOTS = 6  # plots of one scene; features beyond share one
 _TABS = 50  # scenes with a view of their own; the tree of the viewer has all
 _AXIS = re.compile(r"(?:(.*)[._/ -])?([xyz])", re.IGNORECASE)
@@ -259,7 +260,7 @@ def _view(rr: Any, branch: str, name: str, scene: Scene) -> Any:
     if planar and len(planar) == len(scene.paths):  # as paths in the plane are drawn: seen from above, y upwards
         low, high = np.nanmin(np.concatenate(planar), axis=0), np.nanmax(np.concatenate(planar), axis=0)
         x, y = (low + high) / 2
-        height = _ABOVE * max(float((high - low).max()), np.finfo(np.float32).tiny)
+        height = _ABOVE * max(float((high - low).max()), _LEAST)
         eye = rrb.EyeControls3D(position=(x, y, height), look_target=(x, y, 0.0), eye_up=(0.0, 1.0, 0.0))
     points = [rrb.Spatial3DView(origin=f"{branch}/points", name="paths", eye_controls=eye)] if scene.paths else []
     return rrb.Horizontal(*points, *over_time, name=name)
