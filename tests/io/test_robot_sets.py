@@ -248,7 +248,10 @@ def test_what_could_run_code_is_refused_and_never_read(change, words, tmp_path):
     meta.write_text(json.dumps(json.loads(meta.read_text()) | change))
     with zarr_arrays(path) as arrays:
         assert words in str(arrays["data/robot0_eef_pos"])
-    assert all("observation.robot0_eef_pos" not in episode.signals for episode in robot_episodes(path))
+    for episode in robot_episodes(path):
+        assert "observation.robot0_eef_pos" not in episode.signals
+        assert (len(episode.signals), len(episode.problems)) == (2, 1)
+        assert words in episode.problems[0]
 
 
 def test_small_files_that_would_take_much_memory_are_refused(tmp_path):
