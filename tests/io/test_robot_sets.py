@@ -114,6 +114,14 @@ def test_aloha_is_read_at_the_rate_that_is_assumed_or_given(tmp_path):
     assert "assumed" not in one_joint.detected[0][0].units_from
 
 
+def test_joints_of_other_arms_are_numbered_and_have_no_unit(tmp_path):
+    folder = write_aloha(tmp_path / "sets", n_joints=6)
+    demonstrations = kineme.read_recordings(folder).demonstrations
+    assert demonstrations.dimensions == tuple(f"observations/qpos.{k}" for k in range(6))
+    assert {channel.unit for channel in demonstrations.channels or ()} <= {None}
+    assert next(robot_episodes(folder)).names["action"] == tuple("012345")
+
+
 def test_a_rate_is_a_number_and_for_sets_without_stamps(tmp_path):
     with pytest.raises(SpecificationError, match="rate"):
         list(read_episodes(write_aloha(tmp_path / "sets"), rate=0))

@@ -322,22 +322,24 @@ def _movements(
         name: array for name, array in _features(row, first.arrays, None).items() if re.fullmatch(row.coordinates, name)
     }
     arrays = [paths[id(array)] for array in named.values()]
-    heads = {  # of the file -> by the names of the joints
+    joints = {  # head in the file -> name of the joint
         f"{path}.{k}": entry
         for path, (name, array) in zip(arrays, named.items(), strict=True)
         if row is ALOHA and len(array.shape) == 2
         for k, entry in enumerate(_entries(row, name, array.shape[1]))
+        if not entry.isdecimal()
     }
-    of_file = {entry: head for head, entry in heads.items() if not entry.isdecimal()}
+    of_file = {entry: head for head, entry in joints.items()}
     columns = [of_file.get(str(column), column) for column in layout.coordinates or arrays]
     parsed = tree_movements(tree, replace(layout, columns=columns or None), kind, GROUPS)
-    own = [
-        row.unit if head.startswith(tuple(f"{path}." for path in arrays)) else "" for head in parsed.detected.columns
-    ]
-    names = tuple(head if heads.get(head, "0").isdecimal() else heads[head] for head in parsed.detected.columns)
-    units = parsed.detected.measured_in or tuple(
-        "" if name.endswith("gripper") else unit for name, unit in zip(names, own, strict=True)
-    )
+    heads = parsed.detected.columns
+    names = tuple(joints.get(head, head) for head in heads)
+    starts = tuple(f"{path}." for path in arrays)
+    measured = {  # those whose unit is that of the coordinates: of a gripper it is another
+        head: head in joints and not joints[head].endswith("gripper") if row is ALOHA else head.startswith(starts)
+        for head in heads
+    }
+    units = parsed.detected.measured_in or tuple(row.unit if measured[head] else "" for head in heads)
     parsed = parsed._replace(detected=parsed.detected._replace(columns=names, measured_in=units))
     detected = parsed.detected._replace(layout=row.name)
     if not rated and not isinstance(layout.units, int | float):
