@@ -224,6 +224,24 @@ def test_names_that_are_no_text_are_damage(tmp_path, file, name, numbers):
         next(episodes(folder))
 
 
+def test_damaged_numbers_are_handed_on_without_a_warning(tmp_path):
+    """NaN whose bits signal, in a vector and in the stamps."""
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    folder = write_v3(tmp_path / "set")
+    path = shard_of(folder)
+    table = parquet.read_table(path)
+    bad = np.full(3 * len(table), 0x7FA00000, dtype=np.uint32).view(np.float32)
+    action = pa.FixedSizeListArray.from_arrays(pa.array(bad, from_pandas=False), 3)
+    for name, column in (("action", action), ("timestamp", pa.array(bad[: len(table)], from_pandas=False))):
+        table = table.set_column(table.schema.get_field_index(name), name, column)
+    parquet.write_table(table, path)
+    first = next(episodes(folder))
+    assert np.isnan(first.signals["action"]).all()
+    assert np.isnan(first.times).all()
+
+
 V2_VIDEOS = "videos/chunk-{episode_chunk:03d}/{video_key}/episode_{episode_index:06d}.mp4"
 V3_VIDEOS = "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4"
 

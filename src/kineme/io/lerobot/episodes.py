@@ -160,7 +160,8 @@ def _numbers(column: Any, name: str) -> Array:
     """Return numbers, NaN where there is none; truth values are 0 and 1."""
     try:
         values = column.cast(pa.uint8()) if pa.types.is_boolean(column.type) else column
-        return np.asarray(values.to_numpy(zero_copy_only=False), dtype=np.float64)
+        with np.errstate(invalid="ignore"):  # of NaN that signal, as damaged bytes may be
+            return np.asarray(values.to_numpy(zero_copy_only=False), dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise DataError(f"expected numbers in {name!r}, got {column.type}") from error
 
