@@ -7,7 +7,7 @@ samples above them. Here the series are midpoints and tangents of the detailed s
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Any, NamedTuple
 
@@ -110,11 +110,11 @@ class Convolutions:
         Factor of the scores in probabilities, the most likely one for demonstrations left out.
     """
 
-    kernels: Kernels
-    mean: Array
-    scale: Array
-    coefficients: Array
-    intercept: Array
+    kernels: Kernels = field(repr=False)
+    mean: Array = field(repr=False)
+    scale: Array = field(repr=False)
+    coefficients: Array = field(repr=False)
+    intercept: Array = field(repr=False)
     sharpness: float
 
     def scores(self, compared: Compared) -> Array:

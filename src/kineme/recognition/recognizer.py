@@ -71,7 +71,8 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         "nearest" stored movement, "nearest-each", where each representation has its own nearest stored movement of a
         class, nearest class "prototype" (its medoid), an "svm" on the averaged kernel, or a ridge regression on random
         "convolutions" of the path. "auto" is "nearest-each", or from eight demonstrations of each class on
-        "convolutions" where these recognize more of them when they are left out.
+        "convolutions" where these recognize more of them when they are left out. Whether a movement is known is told by
+        the kernels, and the convolutions then name it: see `kineme.recognition.answer.known_labels`.
     rotation_prior : RotationPrior or None
         How rare rotations between movements of one class are, in two and three dimensions, where there is no
         `max_angle`: one or the other can be given. By default a rotation by a right angle costs 0.06 of the inner
@@ -257,8 +258,8 @@ class Recognizer(ClassifierMixin, BaseEstimator):
 
         The largest is that of `predict`. By the classifiers "nearest" and "nearest-each" they are those of
         `Answer.probabilities`, see `class_probabilities`; by "prototype" they follow in the same way from the distances
-        to the prototypes; by "svm" they are a softmax of its scores, which nothing calibrates. Whether a movement is of
-        a known class at all is what `recognize` tells.
+        to the prototypes; by "svm" they are a softmax of its scores, which nothing calibrates; by "convolutions" one as sharp
+        as makes demonstrations that are left out most likely. `recognize` tells whether a movement is of a known class.
         """
         scores = self._scores(X)
         if isinstance(self.classifier_, Convolutions):
@@ -309,13 +310,15 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         return self.calibration().p_values(self._score(X, nearest)[0], error_rate)
 
     def predict_known(self, X: MovementsLike, error_rate: float = 0.05) -> NDArray[Any]:
-        """Return labels as from `predict`, among the classes whose p-value is above `error_rate`.
+        """Return labels as from `predict`, by kernels among the classes whose p-value is above `error_rate`.
 
         None, for unknown, if the movement is more novel than all but `error_rate` of the known ones, see `Calibration`.
         """
         check_error_rate(error_rate)
         similarities, scores = self._score(X, nearest, self._classifier_scores)
-        return known_labels(self.classes_, scores, similarities, self.calibration(), error_rate)
+        calibration = self.calibration()
+        p, p_known = (give(similarities, error_rate) for give in (calibration.p_values, calibration.known_p_values))
+        return known_labels(self.classifier_, self.classes_, scores, p, p_known, error_rate)
 
     def novelty(self, X: MovementsLike) -> Array:
         """Return the smallest nonconformity to any class, shape (n,): the larger, the less it is any known movement."""
