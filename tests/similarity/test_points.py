@@ -151,7 +151,7 @@ def test_hands_with_names_turn_as_one_without_an_option(tmp_path):
     shown, fresh = written(demos[::4], tmp_path / "shown"), written(demos, tmp_path / "fresh")
     labels = np.asarray(demos.labels)
     recognizer = kineme.Recognizer().fit(shown, labels[::4])
-    assert recognizer.comparison_.procrustes.n_points == 2
+    assert recognizer.n_points_ == 2
     assert (recognizer.predict(fresh) == labels).mean() >= 0.95
     with kineme.ActionLibrary(tmp_path / "actions", create=True) as library:
         library.learn(shown, labels[::4])
@@ -203,7 +203,16 @@ def test_many_columns_that_are_no_points_are_compared_by_twelve():
 
 
 @pytest.mark.parametrize(("points", "n_dims"), [(2, 5), (4, 6), (3, 3)])
-def test_columns_that_are_no_points_are_refused(points, n_dims):
+def test_columns_that_are_no_points_are_refused(points, n_dims, tmp_path):
     demos = draw_points(1, n_dims, seed=11)
     with pytest.raises(SpecificationError, match=rf"expected {2 * points} or {3 * points} columns, .* got {n_dims}"):
         kineme.Recognizer(points=points).fit(demos)
+    words, recognizer = rf"expected {2 * points} or {3 * points} columns", kineme.Recognizer(points=points)
+    library = kineme.ActionLibrary(tmp_path / "actions", create=True, recognizer=recognizer)
+    with library, pytest.raises(SpecificationError, match=words):
+        library.learn(demos)
+
+
+def test_points_are_a_number_and_names_tell_them_by_themselves():
+    with pytest.raises(SpecificationError, match=r"points to be a number, got .*names tell the points by themselves"):
+        kineme.Recognizer(points=["left_hand", "right_hand"]).fit(draw_points(2, 3, seed=14))

@@ -15,6 +15,7 @@ from kineme.movements.trajectories.labels import label_array
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.recognition.answer import FittedRecognizer, KnownClasses, known_classes, open_set_labels
 from kineme.recognition.conformal import distances as in_widths
+from kineme.reporting.text import counted
 from kineme.sampling import evenly_spaced
 from kineme.similarity.comparison import Comparison, References
 from kineme.similarity.describe import Described, describe
@@ -56,8 +57,8 @@ class Assignment:
     def __repr__(self) -> str:
         n_assigned = sum(label is not None for label in self.labels)
         return (
-            f"Assignment({n_assigned} of {len(self.labels)} to a symbol, {len(self.proposals)} new clusters proposed, "
-            f"{len(self.unknown)} unknown)"
+            f"Assignment({n_assigned} of {len(self.labels)} to a symbol, {counted(len(self.proposals), 'new cluster')} "
+            f"proposed, {len(self.unknown)} unknown)"
         )
 
 

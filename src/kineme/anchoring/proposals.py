@@ -12,6 +12,7 @@ from kineme.anchoring import clustering
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.recognition.conformal import check_groups, comparable_groups
+from kineme.reporting.text import counted
 from kineme.similarity.describe import Described, describe, squared_distances
 from kineme.similarity.similarity import AveragedSimilarity, averaged, compare, similarities
 from kineme.similarity.specification import Compares
@@ -101,7 +102,8 @@ class Proposals:
         return self.proposals[index]
 
     def __repr__(self) -> str:
-        return f"Proposals({len(self)} clusters among {len(self.clusters)} movements, {len(self.left_over)} left over)"
+        clusters, n = counted(len(self), "cluster"), len(self.clusters)
+        return f"Proposals({clusters} among {n} movements, {len(self.left_over)} left over)"
 
 
 def describe_clusters(K: Array, clusters: NDArray[np.intp], stabilities: Array, widths: Array) -> Proposals:

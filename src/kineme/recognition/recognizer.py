@@ -99,6 +99,8 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         Their kernel widths.
     n_dims_ : int
         Dimensions of the movements.
+    n_points_ : int
+        Points that turn together, by `points` or by the names of columns; 1 of other movements.
     channels_ : tuple of Channel or None
         What was recorded of the movements; None if that is not known. Movements to be recognized are converted by them.
     comparison_ : Comparison
@@ -195,7 +197,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
 
     @property
     def demonstrations_(self) -> Demonstrations:
-        """The training movements, ordered by class."""
+        """The training movements with their labels, ordered by class."""
         return self._fitted[1].all_movements()
 
     @property
@@ -217,6 +219,11 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     def n_dims_(self) -> int:
         """Number of dimensions of the movements."""
         return self._fitted[0].n_dims
+
+    @property
+    def n_points_(self) -> int:
+        """Number of points that turn together, J."""
+        return self._fitted[0].procrustes.n_points
 
     @property
     def channels_(self) -> Channels | None:
@@ -258,8 +265,8 @@ class Recognizer(ClassifierMixin, BaseEstimator):
 
         The largest is that of `predict`. By the classifiers "nearest" and "nearest-each" they are those of
         `Answer.probabilities`, see `class_probabilities`; by "prototype" they follow in the same way from the distances
-        to the prototypes; by "svm" they are a softmax of its scores, which nothing calibrates; by "convolutions" one as sharp
-        as makes demonstrations that are left out most likely. `recognize` tells whether a movement is of a known class.
+        to the prototypes; by "svm" they are a softmax of its scores, which nothing calibrates; by "convolutions" one as
+        sharp as makes demonstrations that are left out most likely. `recognize` tells if a movement is known at all.
         """
         scores = self._scores(X)
         if isinstance(self.classifier_, Convolutions):

@@ -361,6 +361,11 @@ class ComparisonSpecification:
     points: int | None = None  # J points that turn together; None: those that channels name, see `with_points`
 
     def __post_init__(self) -> None:
+        if isinstance(self.points, (str, list, tuple)):
+            raise SpecificationError(
+                f"expected points to be a number, got {self.points!r}; leave it out where columns have these names, as "
+                "left_hand_x: names tell the points by themselves"
+            )
         if self.points is not None:
             check_count("points", self.points, 1)
         check_choice("mean", self.mean, list(LOG_MEANS))

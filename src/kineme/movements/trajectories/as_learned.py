@@ -18,7 +18,7 @@ from kineme.movements.trajectories.movements import in_coordinates, of_channels
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.units import converted
 
-_SELECT = "select the dimensions by columns= of read_recordings, in the shell --columns"
+_SELECT = "select the dimensions by --columns in the shell, by columns= of read_recordings in Python"
 _SAY = (
     "choose the columns by columns= and say what they are by kinds= of read_recordings, in the shell --columns and "
     "--kind"
@@ -92,7 +92,7 @@ def _of_width(demos: Demonstrations, learned: Channels | None, n_dims: int, what
     """Say what is wrong with movements of another width."""
     if learned is None or is_plain(learned):
         learned_of = "" if learned is None else f", where those that were learned are {in_words(learned)}"
-        return f"expected {what} of {n_dims} dimensions as in fit, got {demos.n_dims}{learned_of}; {_SELECT}"
+        return f"expected {what} of {n_dims} dimensions as learned, got {demos.n_dims}{learned_of}; {_SELECT}"
     return (
         f"expected {what} of {len(recorded_names(learned))} columns, {in_words(learned)}, or of the {n_dims} "
         f"coordinates that are learned of them, got {demos.n_dims} columns; {_SELECT}"
