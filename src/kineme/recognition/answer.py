@@ -17,7 +17,8 @@ from kineme.movements.trajectories.demonstrations import Demonstrations, check_l
 from kineme.movements.trajectories.labels import Label
 from kineme.movements.trajectories.trajectory import MovementLike, MovementsLike, Trajectory
 from kineme.recognition import explanation
-from kineme.recognition.classifiers import Classifier, NearestEach, fit_classifier
+from kineme.recognition.classifier import Classifier
+from kineme.recognition.classifiers import NearestEach, fit_classifier
 from kineme.recognition.conformal import GUESSES, RULES, Calibration, calibrate, check_error_rate, class_probabilities
 from kineme.recognition.convolutions import Convolutions
 from kineme.reporting.table import Table, data_frame, to_html
@@ -284,27 +285,6 @@ def known_labels(
     return np.asarray(labels)
 
 
-def answers(
-    comparison: Comparison,
-    references: References,
-    classifier: Classifier,
-    calibration: Calibration,
-    demos: Demonstrations,
-    error_rate: float,
-) -> list[Answer]:
-    """Return an answer for each movement."""
-    parts: dict[int, list[Answer]] = {}
-
-    def answer(tile: Tile, compared: Compared) -> None:
-        some = demos if len(compared) == len(demos) else demos[tile.start : tile.stop]
-        paths = recorded_paths(some, tile.paths)
-        verdicts = verdicts_of(compared, classifier, calibration, error_rate)
-        parts[tile.start] = with_transforms(verdicts, comparison, references.demonstrations, some, paths)
-
-    for_compared(comparison, references, demos, answer)
-    return [each for start in sorted(parts) for each in parts[start]]
-
-
 class Verdict(NamedTuple):
     """An `Answer` without its transform, and the `shares` (R,) of the representations."""
 
@@ -457,8 +437,29 @@ class KnownClasses:
     def recognize(self, movements: MovementsLike, error_rate: float = 0.05) -> list[Answer]:
         """Return an answer for each movement, see `kineme.Recognizer.recognize`."""
         check_error_rate(error_rate)
-        demos = self.comparison.checked(movements)
-        return answers(self.comparison, self.references, self.classifier, self.calibration, demos, error_rate)
+        comparison, references = self.comparison, self.references
+        demos = comparison.checked(movements)
+        parts: dict[int, list[Answer]] = {}
+
+        def answer(tile: Tile, compared: Compared) -> None:
+            some = demos if len(compared) == len(demos) else demos[tile.start : tile.stop]
+            paths = recorded_paths(some, tile.paths)
+            verdicts = verdicts_of(compared, self.classifier, self.calibration, error_rate)
+            parts[tile.start] = with_transforms(verdicts, comparison, references.demonstrations, some, paths)
+
+        for_compared(comparison, references, demos, answer)
+        return [each for start in sorted(parts) for each in parts[start]]
+
+    def labels(
+        self, movements: Demonstrations | Described, error_rate: float = 0.05
+    ) -> tuple[NDArray[np.object_], Array]:
+        """Return labels (n,) as from `known_labels`, and p-values (n, C) of movements in the coordinates learned."""
+        check_error_rate(error_rate)
+        similarities, scores = score(self.comparison, self.references, movements, nearest, self.classifier.scores)
+        p_values = self.calibration.p_values(similarities, error_rate)
+        p_known = self.calibration.known_p_values(similarities, error_rate)
+        classes = self.references.classes
+        return known_labels(self.classifier, classes, scores, p_values, p_known, error_rate), p_values
 
 
 def known_classes(symbols: FittedRecognizer | MovementsLike) -> KnownClasses:
@@ -509,16 +510,8 @@ def _known(
 def open_set_labels(
     classes: KnownClasses, described: Described, error_rate: float = 0.05
 ) -> tuple[NDArray[np.object_], Array]:
-    """Return the class of each described movement by those who showed some, and its p-values.
-
-    Returns `labels` as from `known_labels`, and `p_values` (n, C).
-    """
-    check_error_rate(error_rate)
-    similarities, scores = score(classes.comparison, classes.references, described, nearest, classes.classifier.scores)
-    p_values = classes.calibration.p_values(similarities, error_rate)
-    p_known = classes.calibration.of_those_shown().known_p_values(similarities, error_rate)
-    labels = known_labels(classes.classifier, classes.references.classes, scores, p_values, p_known, error_rate)
-    return labels, p_values
+    """Return `KnownClasses.labels` by those who showed some."""
+    return replace(classes, calibration=classes.calibration.of_those_shown()).labels(described, error_rate)
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
+from kineme.recognition.classifier import Classifier
 from kineme.similarity.comparison import Comparison, References
 from kineme.similarity.describe import Described
 from kineme.similarity.scores import Compared
@@ -56,9 +57,9 @@ def series_of(described: Described) -> Single:
     return np.concatenate((shapes.midpoints, shapes.tangents), axis=2).transpose(0, 2, 1)
 
 
-def fit_kernels(series: Single, seed: int = 0) -> Kernels:
+def fit_kernels(series: Single) -> Kernels:
     """Draw the channels of the kernels, and thresholds from quantiles of what they make of movements drawn."""
-    rng, (n, c, T) = np.random.default_rng(seed), series.shape
+    rng, (n, c, T) = np.random.default_rng(0), series.shape
     dilations = tuple(range(1, (T - 1) // (_LENGTH - 1) + 1))
     n_thresholds = max(1, _FEATURES // (84 * len(dilations)))
     channels, thresholds = [], []
@@ -96,7 +97,7 @@ def transform(series: Single, kernels: Kernels) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Convolutions:
+class Convolutions(Classifier):
     """A ridge regression of the classes on features of random convolutions, `transform`.
 
     Attributes
@@ -121,10 +122,6 @@ class Convolutions:
         """Return the values of the regression, (n, C)."""
         features = transform(series_of(compared.described), self.kernels)
         return np.asarray((features - self.mean) / self.scale @ self.coefficients + self.intercept)
-
-    def best(self, compared: Compared) -> NDArray[np.intp]:
-        """Return the index (n,) of the class with the largest value."""
-        return self.scores(compared).argmax(axis=1)
 
     def probabilities(self, scores: Array) -> Array:
         """Return the probability of each class, (n, C): a softmax of the scores."""

@@ -196,10 +196,10 @@ def explain(rationale: Rationale, answer: str, shares: dict[str, float]) -> Expl
     rows = np.array([index for _, index, _ in rationale.examples], dtype=np.intp)
     used, which = np.unique(rows, return_inverse=True)
     stored = rationale.references[used]
-    own, examples = (_ALONG.along(_smooth(movements, comparison)) for movements in (rationale.movement, stored))
+    target, examples = (_ALONG.along(_smooth(movements, comparison)) for movements in (rationale.movement, stored))
     examples = examples[which]
-    mapped = fit_maps(examples, own, comparison.normalization, comparison.procrustes).move(examples)
-    path, columns = np.ascontiguousarray(own[0].T), rationale.movement._samples.axis_names
+    mapped = fit_maps(examples, target, comparison.normalization, comparison.procrustes).move(examples)
+    path, columns = np.ascontiguousarray(target[0].T), rationale.movement._samples.axis_names
     parts, overlays = _parts(rationale, columns), []
     for (label, _, similarity), moved in zip(rationale.examples, mapped, strict=True):
         example = np.ascontiguousarray(moved.T)

@@ -15,7 +15,7 @@ from kineme.kernels.rotation import RotationPrior
 from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
 from kineme.movements.trajectories.trajectory import HasDemonstrations, MovementLike, MovementsLike, Trajectory
-from kineme.recognition.answer import Answer, answers, is_one, known_labels
+from kineme.recognition.answer import Answer, is_one, known_classes
 from kineme.recognition.classifiers import CLASSIFIERS, SupportVectors, fit_best
 from kineme.recognition.conformal import Calibration, calibrate, check_error_rate, check_groups, class_probabilities
 from kineme.recognition.convolutions import Convolutions
@@ -301,10 +301,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         -------
         Answer, or list of Answer for many movements
         """
-        check_error_rate(error_rate)
-        comparison, references = self._fitted
-        demos = comparison.checked([X] if is_one(X) else X)
-        every = answers(comparison, references, self.classifier_, self.calibration(), demos, error_rate)
+        every = known_classes(self).recognize([X] if is_one(X) else X, error_rate)
         return every[0] if is_one(X) else every
 
     def p_values(self, X: MovementsLike, error_rate: float = 0.05) -> Array:
@@ -314,22 +311,19 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         classes the rate holds, see `Calibration`.
         """
         check_error_rate(error_rate)
-        return self.calibration().p_values(self._score(X, nearest)[0], error_rate)
+        return self.calibration().p_values(self._score(X, nearest), error_rate)
 
     def predict_known(self, X: MovementsLike, error_rate: float = 0.05) -> NDArray[Any]:
         """Return labels as from `predict`, by kernels among the classes whose p-value is above `error_rate`.
 
         None, for unknown, if the movement is more novel than all but `error_rate` of the known ones, see `Calibration`.
         """
-        check_error_rate(error_rate)
-        similarities, scores = self._score(X, nearest, self._classifier_scores)
-        calibration = self.calibration()
-        p, p_known = (give(similarities, error_rate) for give in (calibration.p_values, calibration.known_p_values))
-        return known_labels(self.classifier_, self.classes_, scores, p, p_known, error_rate)
+        known = known_classes(self)
+        return known.labels(known.comparison.checked(X), error_rate)[0]
 
     def novelty(self, X: MovementsLike) -> Array:
         """Return the smallest nonconformity to any class, shape (n,): the larger, the less it is any known movement."""
-        return np.asarray(self.calibration().scores(self._score(X, nearest)[0]).min(axis=1))
+        return np.asarray(self.calibration().scores(self._score(X, nearest)).min(axis=1))
 
     def calibration(self) -> Calibration:
         """Return the calibration of the p-values; computed on first use, since it compares all demonstrations."""
@@ -413,15 +407,12 @@ class Recognizer(ClassifierMixin, BaseEstimator):
 
     def _scores(self, X: MovementsLike) -> Array:
         """Return the score of each class by the classifier, shape (n, C)."""
-        return self._score(X, self._classifier_scores)[0]
+        return self._score(X, lambda compared: self.classifier_.scores(compared))
 
-    def _classifier_scores(self, compared: Compared) -> Array:
-        return self.classifier_.scores(compared)
-
-    def _score(self, X: MovementsLike, *scores: Score) -> tuple[Array, ...]:
-        """Return scores (n, C) by each function; every movement is described once."""
+    def _score(self, X: MovementsLike, by: Score) -> Array:
+        """Return scores (n, C) by a function of what is compared."""
         comparison, references = self._fitted
-        return score(comparison, references, comparison.checked(X), *scores)
+        return score(comparison, references, comparison.checked(X), by)[0]
 
     def _beginnings(self, early: Early | None) -> Hypotheses:
         """Return the beginnings of the demonstrations, kept from the last time that the same ones were asked for."""

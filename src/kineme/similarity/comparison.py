@@ -155,7 +155,7 @@ def fit_to_references(
         if isinstance(weights, str):
             check_choice("weights", weights, list(WEIGHTS))
             chosen = own_weights if alone else WEIGHTS[weights]  # nothing to fit to
-            values = chosen(similarity, described, labels, representations)
+            values = chosen(similarity, described, labels)
         else:
             if specification.mean != "arithmetic":
                 raise SpecificationError(

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,14 +89,8 @@ class Compared:
 Score = Callable[[Compared], Array]
 
 
-def nearest(compared: Compared) -> Array:
-    """Return log similarity to the nearest reference of each class, (n, C)."""
-    return compared.nearest
-
-
-def nearest_each(compared: Compared) -> Array:
-    """Return log similarity to each class, in each representation to its own nearest reference of the class, (n, C)."""
-    return compared.nearest_each
+nearest: Score = attrgetter("nearest")
+nearest_each: Score = attrgetter("nearest_each")
 
 
 def score(

@@ -28,7 +28,8 @@ from kineme.movements.preparation import pauses
 from kineme.movements.preparation.smooth import spline_matrix
 from kineme.recognition import conformal
 from kineme.recognition.answer import LEAST_CONFIDENCE, FittedRecognizer, KnownClasses, known_classes
-from kineme.recognition.classifiers import Classifier, Nearest, NearestEach, Prototype, fit_prototype
+from kineme.recognition.classifier import Classifier
+from kineme.recognition.classifiers import Nearest, NearestEach, Prototype, fit_prototype
 from kineme.recognition.conformal import GUESSES, RULES, Calibration
 from kineme.recognition.convolutions import Convolutions
 from kineme.recognition.early import evidence
