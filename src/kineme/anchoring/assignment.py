@@ -234,7 +234,9 @@ def suggest_merges(
     described, member, names = _labeled(movements, labels, like)
     if len(names) < 2:
         return ()
-    chosen = _some_of_each(member, max(3, _LARGEST // len(names)))
+    of_symbols = np.split(np.argsort(member, kind="stable"), np.cumsum(np.bincount(member))[:-1])
+    most = max(3, _LARGEST // len(names))
+    chosen = np.sort(np.concatenate([own[evenly_spaced(len(own), most)] for own in of_symbols]))
     means, counts = _mean_similarities(similarities(described.take(chosen), widths=widths), member[chosen])
     several = counts > 1
     typical = float(np.median(np.diag(means)[several])) if several.any() else 1.0
@@ -326,9 +328,3 @@ def _labeled(
         )
     names, member = np.unique(label_values, return_inverse=True)
     return described, np.asarray(member, dtype=np.intp), names.tolist()
-
-
-def _some_of_each(member: NDArray[np.intp], most: int) -> NDArray[np.intp]:
-    """At most so many evenly spaced movements of each symbol."""
-    of_symbols = np.split(np.argsort(member, kind="stable"), np.cumsum(np.bincount(member))[:-1])
-    return np.sort(np.concatenate([own[evenly_spaced(len(own), most)] for own in of_symbols]))

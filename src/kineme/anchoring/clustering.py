@@ -217,8 +217,7 @@ def _by_directions(vectors: Array, wanted: int, min_members: int = 1) -> Cluster
         if not len(divisible):
             break
         members = max(
-            (np.flatnonzero(clusters == k) for k in divisible),
-            key=lambda rows: distances[np.ix_(rows, rows)].mean(),
+            (np.flatnonzero(clusters == k) for k in divisible), key=lambda rows: distances[np.ix_(rows, rows)].mean()
         )
         clusters[members[_half(distances[np.ix_(members, members)], min_members)]] = new
     return clusters

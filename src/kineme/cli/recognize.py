@@ -79,11 +79,14 @@ def _text(data: dict[str, Any], error_rate: float, problems: list[str]) -> str:
     for movement in data["movements"]:
         answer, name = movement["answer"], f"{movement['recording']} {movement['place']}".strip()
         label, nearest = answer["label"], answer["nearest"][0]
+        transform, relative = answer["transform"], ""
+        if label is not None:
+            degrees = round(math.degrees(transform["angle"])) + 0
+            relative = f"×{transform['scale'][0]:.2g}, {degrees:+d}°, {transform['duration_ratio']:.2g} × as long"
         others = ", ".join(printable(candidate["label"]) for candidate in answer["ranked"])
         rows.append(
             (printable(name), "unknown" if label is None else printable(label), answer["certainty"], others,
-             printable(nearest["name"] or nearest["index"]),
-             "" if label is None else _relative(answer["transform"]))
+             printable(nearest["name"] or nearest["index"]), relative)
         )  # fmt: skip
     heads = ("recording", "symbol", "how sure", "ranked", "most like", "relative to it")
     lines = [table(heads, rows), *map(printable, data["notes"])]
@@ -95,12 +98,6 @@ def _text(data: dict[str, Any], error_rate: float, problems: list[str]) -> str:
             f"{needed} in all, to keep --error-rate {error_rate:g}"
         )
     return "\n".join(lines + problems)
-
-
-def _relative(transform: dict[str, Any]) -> str:
-    """Size, direction and duration relative to the most similar stored movement."""
-    degrees = round(math.degrees(transform["angle"])) + 0
-    return f"×{transform['scale'][0]:.2g}, {degrees:+d}°, {transform['duration_ratio']:.2g} × as long"
 
 
 @click.command(cls=GroupedCommand, short_help="Explain what a movement is recognized as.")

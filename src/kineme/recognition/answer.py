@@ -17,7 +17,6 @@ from kineme.movements.trajectories.demonstrations import Demonstrations, check_l
 from kineme.movements.trajectories.labels import Label
 from kineme.movements.trajectories.trajectory import MovementLike, MovementsLike, Trajectory
 from kineme.recognition import explanation
-from kineme.recognition.classifier import Classifier
 from kineme.recognition.classifiers import NearestEach, fit_classifier
 from kineme.recognition.conformal import GUESSES, RULES, Calibration, calibrate, check_error_rate, class_probabilities
 from kineme.recognition.convolutions import Convolutions
@@ -25,7 +24,7 @@ from kineme.reporting.table import Table, data_frame, to_html
 from kineme.runtime.parallel import single_threaded_blas
 from kineme.similarity.comparison import Comparison, IndexedMovements, References, fit_comparison, fit_to_references
 from kineme.similarity.describe import Described, Tile, even_paths, fit_maps, recorded_paths
-from kineme.similarity.scores import Compared, for_compared, nearest, score
+from kineme.similarity.scores import Classifier, Compared, for_compared, nearest, score
 from kineme.similarity.similarity import AveragedSimilarity
 from kineme.similarity.specification import POSITIONS, ComparisonSpecification
 from kineme.validation import Array
@@ -163,11 +162,7 @@ class Answer:
             "promise": self.promise,
             "calibrated": self.calibrated,
             "ranked": [
-                {
-                    "label": str(label),
-                    "probability": self.probabilities.get(label),
-                    "p_value": self.p_values.get(label),
-                }
+                {"label": str(label), "probability": self.probabilities.get(label), "p_value": self.p_values.get(label)}
                 for label in self.ranked[:top]
             ],
             "nearest": [
@@ -321,8 +316,9 @@ def verdicts_of(
     slices = list(references.slices())
     like = [_nearest(references, compared.log_average[i], slices[c]) for i, c in enumerate(shown.tolist())]
     share = compared.shares(np.array([near[0].index for near in like], dtype=np.intp))
-    names = [representation.name for representation in compared.comparison.representations]
-    is_known = np.array([label is not None for label in labels])
+    rows_of: dict[str, list[int]] = {}  # those of one name differ in resolution only
+    for r, representation in enumerate(compared.comparison.representations):
+        rows_of.setdefault(representation.name, []).append(r)
     if isinstance(classifier, Convolutions):
         probabilities = classifier.probabilities(scores)
     else:
@@ -334,7 +330,7 @@ def verdicts_of(
         next_best = [_nearest(references, compared.log_average[i], slices[c])[0] for c in others]
         pairs = zip([shown[i], *others], [best[0], *next_best], strict=True)
         examples.append(tuple((classes[c], near.index, near.similarity) for c, near in pairs))
-    confidence = np.where(is_known, probabilities[np.arange(len(shown)), shown], 1.0 - p_known).tolist()
+    confidence = np.where(p_known > error_rate, probabilities[np.arange(len(shown)), shown], 1.0 - p_known).tolist()
     return [
         Verdict(
             labels[i],
@@ -346,7 +342,7 @@ def verdicts_of(
             calibrated,
             tuple(classes[c] for c in ranks[i].tolist()),
             like[i],
-            _by_name(names, share[:, i]),
+            {name: float(share[rows, i].sum()) for name, rows in rows_of.items()},
             share[:, i],
             examples[i],
             isinstance(classifier, Convolutions),
@@ -374,14 +370,6 @@ def with_transforms(
         rests_on = explanation.Rationale(comparison, references, movement, fields.pop("examples"), by_convolutions)
         given.append(Answer(**fields, transform=transform, _rests_on=rests_on))
     return given
-
-
-def _by_name(names: Sequence[str], share: Array) -> dict[str, float]:
-    """Return shares of the representations (R,); those of one name, which differ in resolution only, together."""
-    by_name = dict.fromkeys(names, 0.0)
-    for name, value in zip(names, share.tolist(), strict=True):
-        by_name[name] += value
-    return by_name
 
 
 def _nearest(references: References, logs: Array, rows: slice) -> tuple[Neighbor, ...]:
@@ -450,9 +438,7 @@ class KnownClasses:
         for_compared(comparison, references, demos, answer)
         return [each for start in sorted(parts) for each in parts[start]]
 
-    def labels(
-        self, movements: Demonstrations | Described, error_rate: float = 0.05
-    ) -> tuple[NDArray[np.object_], Array]:
+    def labels(self, movements: Demonstrations | Described, error_rate: float) -> tuple[NDArray[Any], Array]:
         """Return labels (n,) as from `known_labels`, and p-values (n, C) of movements in the coordinates learned."""
         check_error_rate(error_rate)
         similarities, scores = score(self.comparison, self.references, movements, nearest, self.classifier.scores)
@@ -473,8 +459,7 @@ def known_classes(symbols: FittedRecognizer | MovementsLike) -> KnownClasses:
         calibration = fitted.calibration()  # first: it refuses a recognizer that is not fitted
         return KnownClasses(fitted.comparison_, fitted.references_, fitted.classifier_, calibration)
     demos = Demonstrations.of(symbols)
-    labels = check_labels(demos, None)
-    return _known(*fit_comparison(ComparisonSpecification(), demos, labels), "auto")
+    return _known(*fit_comparison(ComparisonSpecification(), demos, check_labels(demos, None)), "auto")
 
 
 def fit_known_classes(  # noqa: PLR0913, PLR0917 - what a recognizer is made of
@@ -507,9 +492,7 @@ def _known(
     return KnownClasses(comparison, references, fitted, calibration)
 
 
-def open_set_labels(
-    classes: KnownClasses, described: Described, error_rate: float = 0.05
-) -> tuple[NDArray[np.object_], Array]:
+def open_set_labels(classes: KnownClasses, described: Described, error_rate: float) -> tuple[NDArray[Any], Array]:
     """Return `KnownClasses.labels` by those who showed some."""
     return replace(classes, calibration=classes.calibration.of_those_shown()).labels(described, error_rate)
 

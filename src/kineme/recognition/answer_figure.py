@@ -124,15 +124,15 @@ class View(NamedTuple):
 
 
 def draw_explanation(
-    title: str, notes: Sequence[str], path: Array, columns: Sequence[str], parts: Sequence[Any], overlays: list[Panel]
+    title: Sequence[str], path: Array, columns: Sequence[str], parts: Sequence[Any], overlays: Sequence[Panel]
 ) -> Figure:
-    """Draw a movement (T, d) over each of the examples, part by part; see `Explanation.plot`."""
+    """Draw a movement (T, d) over each of the examples, part by part, below lines of a title."""
     largest = np.max([overlay.differences.max(axis=1) for overlay in overlays], axis=0)
     most, noun = (_POINTS, "points") if len(parts[0].columns) > 1 else (_COLUMNS, "columns")
     rows = np.sort(np.argsort(-largest, kind="stable")[:most]).tolist()
     views = [_view(path, parts[r].columns, columns) for r in rows]
     if len(rows) < len(parts):
-        notes = [*notes, f"{len(rows)} of {len(parts)} {noun}: those that differ most"]
+        title = [*title, f"{len(rows)} of {len(parts)} {noun}: those that differ most"]
     heights = [1.6 if view.axes is None and parts[1:] else 3.0 for view in views]
     with matplotlib.rc_context():
         figure = figure_to_show(4.0 * len(overlays) + 0.6, 1.3 + sum(heights))
@@ -149,7 +149,7 @@ def draw_explanation(
         panels[0, 0].plot([], [], "o", color=BLUE, markersize=5, label="start of the movement")
         figure.legend(loc="outside lower center", ncols=2)
         figure.colorbar(colored, ax=panels, label="distance from it, in sizes of the movement", shrink=0.8)
-        figure.suptitle("\n".join(drawable(shortened(line, 80)) for line in (title, *notes)))
+        figure.suptitle("\n".join(drawable(shortened(line, 80)) for line in title))
     return figure
 
 

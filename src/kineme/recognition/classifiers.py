@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
-from kineme.recognition.classifier import Classifier
 from kineme.recognition.convolutions import fit_convolutions
 from kineme.sampling import evenly_spaced
 from kineme.similarity.comparison import Comparison, References
 from kineme.similarity.describe import Described
-from kineme.similarity.scores import Compared, most_similar
+from kineme.similarity.scores import Classifier, Compared, most_similar
 from kineme.similarity.similarity import AveragedSimilarity
 from kineme.similarity.specification import LOG_MEANS
 from kineme.validation import Array

@@ -15,10 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
-from kineme.recognition.classifier import Classifier
 from kineme.similarity.comparison import Comparison, References
 from kineme.similarity.describe import Described
-from kineme.similarity.scores import Compared
+from kineme.similarity.scores import Classifier, Compared
 from kineme.similarity.specification import softmax
 from kineme.validation import Array
 

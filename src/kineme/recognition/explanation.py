@@ -176,8 +176,8 @@ class Explanation:
             for role, overlay in overlays.items()
             if overlay is not None
         ]
-        notes = [_CONVOLUTIONS] * self.by_convolutions
-        return draw_explanation(self.answer, notes, self.path, self.columns, self.parts, panels)
+        title = [self.answer, *[_CONVOLUTIONS] * self.by_convolutions]
+        return draw_explanation(title, self.path, self.columns, self.parts, panels)
 
 
 class Rationale(NamedTuple):

@@ -311,7 +311,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         classes the rate holds, see `Calibration`.
         """
         check_error_rate(error_rate)
-        return self.calibration().p_values(self._score(X, nearest), error_rate)
+        return self.calibration().p_values(self._scores(X, nearest), error_rate)
 
     def predict_known(self, X: MovementsLike, error_rate: float = 0.05) -> NDArray[Any]:
         """Return labels as from `predict`, by kernels among the classes whose p-value is above `error_rate`.
@@ -323,7 +323,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
 
     def novelty(self, X: MovementsLike) -> Array:
         """Return the smallest nonconformity to any class, shape (n,): the larger, the less it is any known movement."""
-        return np.asarray(self.calibration().scores(self._score(X, nearest)).min(axis=1))
+        return np.asarray(self.calibration().scores(self._scores(X, nearest)).min(axis=1))
 
     def calibration(self) -> Calibration:
         """Return the calibration of the p-values; computed on first use, since it compares all demonstrations."""
@@ -405,14 +405,10 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         check_is_fitted(self, "comparison_")
         return self.comparison_, self.references_
 
-    def _scores(self, X: MovementsLike) -> Array:
-        """Return the score of each class by the classifier, shape (n, C)."""
-        return self._score(X, lambda compared: self.classifier_.scores(compared))
-
-    def _score(self, X: MovementsLike, by: Score) -> Array:
-        """Return scores (n, C) by a function of what is compared."""
+    def _scores(self, X: MovementsLike, by: Score | None = None) -> Array:
+        """Return the score of each class, shape (n, C), by the classifier or by a function of what is compared."""
         comparison, references = self._fitted
-        return score(comparison, references, comparison.checked(X), by)[0]
+        return score(comparison, references, comparison.checked(X), by or self.classifier_.scores)[0]
 
     def _beginnings(self, early: Early | None) -> Hypotheses:
         """Return the beginnings of the demonstrations, kept from the last time that the same ones were asked for."""

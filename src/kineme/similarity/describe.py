@@ -160,11 +160,7 @@ class Tile(NamedTuple):
 
 
 def for_described(
-    demos: Demonstrations,
-    like: Compares,
-    procrustes: Procrustes,
-    work: Callable[[Tile], None],
-    most: int | None = None,
+    demos: Demonstrations, like: Compares, procrustes: Procrustes, work: Callable[[Tile], None], most: int | None = None
 ) -> None:
     """Describe movements tile by tile, in threads, and call `work` with each tile of at most `most` movements.
 

@@ -15,6 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from operator import attrgetter
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,6 +85,18 @@ class Compared:
     def shares(self, chosen: NDArray[np.intp]) -> Array:
         """Return the share of each representation in the similarity to one chosen (n,) reference each, (R, n)."""
         return SHARES[self.comparison.mean](self.logs[:, np.arange(len(self)), chosen])
+
+
+class Classifier(Protocol):
+    """A fitted classifier: scores of each class."""
+
+    def scores(self, compared: Compared) -> Array:
+        """Return a score per class, shape (n, C): larger is more like it."""
+        ...
+
+    def best(self, compared: Compared) -> NDArray[np.intp]:
+        """Return the index (n,) of the class with the largest score."""
+        return self.scores(compared).argmax(axis=1)
 
 
 Score = Callable[[Compared], Array]

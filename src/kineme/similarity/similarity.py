@@ -277,16 +277,9 @@ def impostor_widths(described: Described, labels: NDArray[np.generic]) -> Array:
             "expected training movements that differ, got one movement or all the same; add demonstrations"
         )
     # Movements that do not differ in one representation have a similarity of 1 there.
-    return _as_coarse(some, np.maximum([np.inf if width is None else width for width in widths], _LEAST * sizes))
-
-
-def _as_coarse(described: Described, widths: Array) -> Array:
-    """Return widths (R,), those in detail as of the same quantities that are rotated.
-
-    In detail movements of one class are farther apart than after a rotation; with wider kernels of their own they would
-    count where only the rotated ones tell.
-    """
-    return widths[described.coarse()]
+    # In detail they are as wide as of the same quantity that is rotated: without a rotation movements of one class are
+    # farther apart, and wider kernels would count where only the rotated ones tell.
+    return np.maximum([np.inf if width is None else width for width in widths], _LEAST * sizes)[some.coarse()]
 
 
 def beginning_widths(beginnings: Described, labels: NDArray[np.generic]) -> Array:
@@ -335,7 +328,7 @@ def gap_widths(described: Described) -> Array:
         widths.append(_share_of_median(_beyond_the_gap(ordered, same), same))
     if all(width is None for width in widths):
         raise SpecificationError("expected movements that differ, got copies of one movement; add other movements")
-    return _as_coarse(described, np.array([np.inf if width is None else width for width in widths]))
+    return np.array([np.inf if width is None else width for width in widths])[described.coarse()]
 
 
 def median_distances(described: Described) -> Array:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -41,12 +40,14 @@ def as_learned(
 
     `what` they are called in messages.
     """
-    if isinstance(movements, (list, tuple)) and _of_several_channels(movements):
+    several = movements if isinstance(movements, (list, tuple)) else ()
+    every = {id(channels): channels for channels in (getattr(movement, "channels", None) for movement in several)}
+    if len({*every.values()}) > 1:  # of all movements together nothing would be known
 
         def convert(movement: Any) -> Demonstrations:
             return as_learned(movement if hasattr(movement, "demonstrations") else [movement], learned, n_dims, what)
 
-        return Demonstrations(one_by_one(movements, convert))
+        return Demonstrations(one_by_one(several, convert))
     demos = Demonstrations.of(movements)
     if demos.channels is not None:
         return _of_kinds(demos, learned, n_dims, what)
@@ -55,12 +56,6 @@ def as_learned(
     if demos.n_dims != n_dims:
         raise TrajectoryError(_of_width(demos, learned, n_dims, what))
     return demos
-
-
-def _of_several_channels(movements: Sequence[Any]) -> bool:
-    """Tell whether channels differ in a list: of all its movements together nothing would be known."""
-    every = {id(channels): channels for channels in (getattr(movement, "channels", None) for movement in movements)}
-    return len(every) > 1 and len({*every.values()}) > 1
 
 
 def _of_kinds(demos: Demonstrations, learned: Channels | None, n_dims: int, what: str) -> Demonstrations:
