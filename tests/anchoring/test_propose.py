@@ -125,6 +125,7 @@ def test_a_strange_movement_is_left_over():
     proposals = propose(demos)
     assert proposals.left_over.tolist() == [11, 19]
     assert repr(proposals) == "Proposals(3 clusters among 20 movements, 2 left over)"
+    assert repr(propose(demos[:5], n_clusters=1)) == "Proposals(1 cluster among 5 movements, 0 left over)"
     assert repr(proposals[0]).startswith("Proposal(7 movements, medoid 1")
 
 

@@ -91,6 +91,32 @@ def test_they_join_where_they_recognize_more_of_what_is_left_out():
     assert (recognizer.predict(fresh) == labels).mean() == recognizer.score(fresh)
 
 
+def test_kernels_tell_what_is_known_and_convolutions_name_it():
+    """The best-ranked class is the label, also where the kernels find another one alone possible."""
+    shown, fresh = draw_trembles(16, seed=1), draw_trembles(20, seed=2)
+    recognizer = kineme.Recognizer().fit(shown)
+    answers, predicted = recognizer.recognize(fresh, 0.3), recognizer.predict(fresh)
+    labels = [label if answer.p_known > 0.3 else None for label, answer in zip(predicted, answers, strict=True)]
+    assert [answer.label for answer in answers] == labels
+    assert recognizer.predict_known(fresh, 0.3).tolist() == labels
+    named = [answer for answer in answers if answer.label is not None]
+    assert any(answer.p_values[answer.label] <= 0.3 < max(answer.p_values.values()) for answer in named)
+    assert min(answer.confidence for answer in named) > 1 / 3
+    assigned = kineme.anchoring.assign(fresh, recognizer, 0.3).labels
+    assert all(label in {None, best} for label, best in zip(assigned, predicted, strict=True))
+
+
+def test_an_explanation_says_that_the_kernels_chose_its_examples():
+    recognizer = kineme.Recognizer().fit(draw_trembles(16, seed=1))
+    explained = recognizer.recognize(draw_trembles(3, seed=5))[4].explain()
+    assert explained.by_convolutions
+    assert "(ranked by random convolutions; example and shares are those of the kernels)" in explained.in_words
+    assert "random convolutions" in explained.plot().get_suptitle()
+    assert len(repr(explained)) < 300
+    assert repr(recognizer.classifier_).startswith("Convolutions(sharpness=")
+    assert len(repr(recognizer.classifier_)) < 60
+
+
 def test_with_few_demonstrations_or_where_kernels_suffice_they_do_not():
     assert isinstance(kineme.Recognizer().fit(draw_trembles(7, seed=3)).classifier_, NearestEach)
     demos = kineme.load_lasa(["CShape", "NShape"])

@@ -155,7 +155,7 @@ def test_wishes_out_of_range_are_refused(options, message):
 def test_wrong_inputs_are_refused():
     train, test = _split(_spirals(2))
     recognizer = kineme.Recognizer().fit(train)
-    with pytest.raises(TrajectoryError, match="expected movements of 2 dimensions as in fit, got 3"):
+    with pytest.raises(TrajectoryError, match="expected movements of 2 dimensions as learned, got 3"):
         recognizer.predict_partial(np.zeros((1, 10, 3)))
     with pytest.raises(SpecificationError, match=r"expected a fraction above 0 and at most 1, got 1\.5"):
         cut(test, 1.5)

@@ -160,11 +160,7 @@ class Tile(NamedTuple):
 
 
 def for_described(
-    demos: Demonstrations,
-    like: Compares,
-    procrustes: Procrustes,
-    work: Callable[[Tile], None],
-    most: int | None = None,
+    demos: Demonstrations, like: Compares, procrustes: Procrustes, work: Callable[[Tile], None], most: int | None = None
 ) -> None:
     """Describe movements tile by tile, in threads, and call `work` with each tile of at most `most` movements.
 
@@ -355,15 +351,15 @@ class Described:
             self, blocks=blocks, pairs=replace(self.pairs, positions=positions, shapes=shapes, details=details)
         )
 
-    def twins(self) -> list[int]:
+    def coarse(self) -> list[int]:
         """Return for each representation, (R,), that of the same quantity which is not in detail, or itself."""
-        twins = list(range(self.n_representations))
+        coarse = list(range(self.n_representations))
         if self.pairs is not None:
             first = len(self.blocks)
             number = {measure: first + k for k, measure in enumerate(self.pairs.measures)}
             for measure, r in number.items():
-                twins[r] = number.get(measure - len(PAIR_QUANTITIES), r)
-        return twins
+                coarse[r] = number.get(measure - len(PAIR_QUANTITIES), r)
+        return coarse
 
     def sizes(self) -> np.ndarray[Any, np.dtype[np.float64]]:
         """Return typical sizes in each representation, (R,): median norms of rows, or distances of opposite tangents.

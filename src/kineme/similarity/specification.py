@@ -27,7 +27,7 @@ from kineme.kernels.pair_distances import CloudSpec, ElasticSpec
 from kineme.kernels.procrustes import Procrustes
 from kineme.kernels.rotation import RotationPrior
 from kineme.movements.channels.channel import Channels
-from kineme.movements.channels.detect import count_points
+from kineme.movements.channels.detect import point_names
 from kineme.movements.preparation.resample import resample_by_arc_length
 from kineme.movements.preparation.smooth import Smooth, spline_matrix
 from kineme.runtime.compiled import compiled_module, use_compiled
@@ -367,6 +367,11 @@ class ComparisonSpecification:
     points: int | None = None  # J points that turn together; None: those that channels name, see `with_points`
 
     def __post_init__(self) -> None:
+        if isinstance(self.points, (str, list, tuple)):
+            raise SpecificationError(
+                f"expected points to be a number, got {self.points!r}; leave it out where columns have these names, as "
+                "left_hand_x: names tell the points by themselves"
+            )
         if self.points is not None:
             check_count("points", self.points, 1)
         check_choice("mean", self.mean, list(LOG_MEANS))
@@ -445,7 +450,7 @@ class ComparisonSpecification:
 
     def with_points(self, channels: Channels | None) -> ComparisonSpecification:
         """Return the specification with the number of points, which are told by the names of columns if at all."""
-        return self if self.points is not None else replace(self, points=count_points(channels))
+        return self if self.points is not None else replace(self, points=len(point_names(channels)) or 1)
 
 
 class Compares(Protocol):

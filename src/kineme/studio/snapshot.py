@@ -28,7 +28,7 @@ from kineme.movements.preparation import pauses
 from kineme.movements.preparation.smooth import spline_matrix
 from kineme.recognition import conformal
 from kineme.recognition.answer import LEAST_CONFIDENCE, FittedRecognizer, KnownClasses, known_classes
-from kineme.recognition.classifiers import Classifier, Nearest, NearestEach, Prototype, fit_prototype
+from kineme.recognition.classifiers import Nearest, NearestEach, Prototype, fit_prototype
 from kineme.recognition.conformal import GUESSES, RULES, Calibration
 from kineme.recognition.convolutions import Convolutions
 from kineme.recognition.early import evidence
@@ -37,6 +37,7 @@ from kineme.recognition.early.hypotheses import Early, hypotheses
 from kineme.sampling import evenly_spaced
 from kineme.similarity.comparison import Comparison
 from kineme.similarity.describe import N_POINTS, Pairs, even_paths, feature_rows
+from kineme.similarity.scores import Classifier
 from kineme.similarity.specification import DETAILED_POSITIONS, Representation, forcing_operator, rotating
 
 #: Numbers of the stored paths, those of early recognition included, at most: 1.3 MB in base64, so that a page with all
