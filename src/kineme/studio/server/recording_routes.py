@@ -16,8 +16,8 @@ from kineme.library.annotate import annotate
 from kineme.library.learn import learn_recordings
 from kineme.movements.channels.channel import recorded_names
 from kineme.movements.trajectories.movements import axis_names
-from kineme.sampling import evenly_spaced
 from kineme.studio.server import records
+from kineme.studio.server.plots import plot
 from kineme.studio.server.refusals import in_studio_words
 from kineme.studio.server.studio import Reads, Studio, Work, Writes, while_wanted
 from kineme.studio.server.uploads import go_on
@@ -58,7 +58,7 @@ class ColumnOut(BaseModel):
 
 
 class PlotOut(BaseModel):
-    """Columns over time, at most 1,000 samples of each."""
+    """Columns over time, thinned: of each stretch the least and the greatest value."""
 
     times: list[float]
     columns: list[ColumnOut]
@@ -96,6 +96,7 @@ class SpannedOut(RestOut):
 
     label: str | None
     p: float | None
+    confidence: float | None
 
 
 class SpottedOut(BaseModel):
@@ -113,7 +114,7 @@ class SearchedOut(BaseModel):
 
 router = APIRouter(prefix="/api/recordings", tags=["recordings"])
 
-_PLOTTED = 1000  # samples of a column
+_PLOTTED = 1000  # samples of a column, at most
 
 
 @router.post(
@@ -136,9 +137,9 @@ async def send(
         read = await while_wanted(request, studio.long, work, lambda: studio.uploads.recordings(key, check=work.check))
     return {
         "recording": key,
-        "tables": [_table(read, k) for k in range(len(read))],
+        "tables": [table_of(read, k) for k in range(len(read))],
         "problems": [in_studio_words(str(problem)) for problem in read.problems],
-        "plots": [_plot(read, k) for k in range(len(read))],
+        "plots": [plot_of(read, k) for k in range(len(read))],
     }
 
 
@@ -158,7 +159,10 @@ async def spotted(studio: Reads, request: Request, key: records.RecordingKey, bo
         if report.problems:
             raise SpecificationError(report.problems[0].what)
         spans = [
-            {"begin": each.span[0], "end": each.span[1], "label": each.symbol, "p": records.numbers(each.p_value)}
+            {
+                **{"begin": each.span[0], "end": each.span[1], "label": each.symbol},
+                **{"p": records.numbers(each.p_value), "confidence": records.numbers(each.confidence)},
+            }
             for each in report.annotations
         ]
         ends = [0.0, *(span["end"] for span in spans)]
@@ -189,18 +193,18 @@ def learn(studio: Writes, key: records.RecordingKey, body: LearnRequest) -> dict
     else:
         rows = (LabelRow(span.begin, span.end, span.label, "", "", k + 1) for k, span in enumerate(body.spans))
         pieces = labeled_pieces(_one(studio, key, body), LabelTable("of the spans", tuple(rows), True))
-    columns = _columns_of(studio.uploads.recordings(key), body.channels) if body.channels else None
+    columns = _columns_of(studio.recordings(key), body.channels) if body.channels else None
     report = learn_recordings(studio.library.store, pieces, {"columns": columns})
     return {"ids": report.ids.tolist(), "version": report.version}
 
 
 def _in_columns(studio: Studio, key: str, body: ChannelChoice, check: Callable[[], object] = go_on) -> Recordings:
     """Read all tables of a file, in the columns that are asked for, or those of the library where it has them."""
-    read = studio.uploads.recordings(key, check=check)
+    read = studio.recordings(key, check=check)
     ours = () if studio.library.channels is None else recorded_names(studio.library.channels)
     wanted = _columns_of(read, body.channels) if body.channels else list(ours)
     if wanted != _columns(read) and (body.channels or (ours and set(ours) <= set(_columns(read)))):
-        read = studio.uploads.recordings(key, wanted, check)
+        read = studio.recordings(key, wanted, check)
     return read
 
 
@@ -229,7 +233,8 @@ def _columns_of(read: Recordings, names: Sequence[str]) -> list[str]:
     return [column for name in names for column in columns.get(name, (name,))]
 
 
-def _table(read: Recordings, k: int) -> dict[str, Any]:
+def table_of(read: Recordings, k: int) -> dict[str, Any]:
+    """Describe a recording of a file."""
     demos, duration = read.demonstrations, float(read.demonstrations.durations[k])
     n = int(demos.offsets[k + 1] - demos.offsets[k])
     channels = [
@@ -247,12 +252,9 @@ def _table(read: Recordings, k: int) -> dict[str, Any]:
     }
 
 
-def _plot(read: Recordings, k: int) -> dict[str, Any]:
-    """Take at most 1,000 samples of each column, over seconds since the first one."""
+def plot_of(read: Recordings, k: int, width: int = _PLOTTED // 2) -> dict[str, Any]:
+    """Return its columns over seconds since the first sample, at most 2 `width` samples of each."""
     demos = read.demonstrations
     rows = slice(demos.offsets[k], demos.offsets[k + 1])
     values = (demos.positions if demos.channels is None else demos.recorded)[rows]
-    times = demos.movements.stamps[rows]
-    shown = evenly_spaced(len(times), _PLOTTED)
-    columns = [{"name": name, "values": records.numbers(values[shown, j])} for j, name in enumerate(_columns(read))]
-    return {"times": records.numbers(times[shown] - times[0]), "columns": columns}
+    return plot(demos.movements.stamps[rows], values, _columns(read), width)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 import sqlite3
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
@@ -16,11 +16,13 @@ from fastapi import Depends, Request
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from kineme.errors import KinemeError
+from kineme.io.reading.merge_files import Recordings
 from kineme.library.library import ActionLibrary
 from kineme.library.storage.symbols import Symbol
 from kineme.recognition.early.stream import Live
+from kineme.studio.server.opened import KEY, OpenedRecordings
 from kineme.studio.server.refusals import ConflictError, MissingError, StoppedError
-from kineme.studio.server.uploads import Uploads
+from kineme.studio.server.uploads import Uploads, go_on
 from kineme.studio.snapshot import DRAWN
 
 PERIOD = 0.2  # seconds between looks whether the client is there
@@ -45,11 +47,13 @@ class LibraryView(NamedTuple):
 class Studio:
     """An open library and what its clients share; any thread may use it.
 
-    The folder is that of the library, which is made where there is none; read only, every change is refused.
+    The folder is that of the library, which is made where there is none; read only, every change is refused. Of other
+    files than the library's only those below the path `recordings` are read, which no client names.
     """
 
-    def __init__(self, folder: Path, read_only: bool = False) -> None:
+    def __init__(self, folder: Path, read_only: bool = False, recordings: Path | None = None) -> None:
         self.read_only = read_only
+        self.opened = None if recordings is None else OpenedRecordings(recordings)
         self.library = ActionLibrary(folder, create=not read_only, read_only=read_only)
         self.uploads = Uploads()
         self.writers = asyncio.Semaphore(_WRITERS)
@@ -70,6 +74,15 @@ class Studio:
             pool.shutdown(wait=False, cancel_futures=True)
         self.library.close()
         self.uploads.close()
+        if self.opened is not None:
+            self.opened.close()
+
+    def recordings(self, key: str, columns: Sequence[str] = (), check: Callable[[], object] = go_on) -> Recordings:
+        """Read a file that was sent, or an episode of what was opened, in these columns or in those that are found."""
+        if self.opened is not None and key.startswith(KEY):
+            check()
+            return self.opened.recordings(key, columns)
+        return self.uploads.recordings(key, columns, check)
 
     def join(self) -> None:
         """Wait for what its threads still compute, after it is closed; the threads that they share end with them."""

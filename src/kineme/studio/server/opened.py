@@ -1,0 +1,199 @@
+"""Recordings that the studio was started with: episodes, read when they are looked at and let go again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+from threading import Lock
+from typing import NamedTuple
+
+import numpy as np
+
+from kineme.errors import DataError, KinemeError
+from kineme.io.lerobot.info import MARKER, read_info
+from kineme.io.lerobot.info import read_episodes as read_declared
+from kineme.io.lerobot.videos import video_starts
+from kineme.io.reading.episode_recordings import episode_recordings
+from kineme.io.reading.episodes import EPISODE_LAYOUTS, read_episodes
+from kineme.io.reading.formats import entries_of, name_of
+from kineme.io.reading.merge_files import Recordings
+from kineme.io.reading.recordings import read_recordings
+from kineme.io.records import needs
+from kineme.movements.channels.channel import recorded_names
+from kineme.movements.episodes import Episode
+from kineme.movements.trajectories.movements import axis_names
+from kineme.studio.server.corrections import Corrections
+from kineme.studio.server.refusals import MissingError
+
+KEY = "episode-"  # what the key of an episode begins with; its position follows
+HELD = 2**28  # bytes of the episodes that are kept in memory
+
+_NOTHING = np.zeros(0)
+
+
+class Opened(NamedTuple):
+    """A movement of what was opened."""
+
+    episode: Episode
+    recording: str  # it and the place as in `kineme.io.writing.annotations.Annotation`
+    place: str
+    file: Path | None = None  # which file it is a movement of; None: of a data set of episodes
+
+    @property
+    def movement(self) -> tuple[str, str]:
+        """The name under which its symbols are kept."""
+        return self.recording, self.place
+
+    @property
+    def origin(self) -> float:
+        """Time stamp of the first sample [s]."""
+        return float(self.episode.times[0]) if len(self.episode) else 0.0
+
+    @property
+    def duration(self) -> float:
+        """Time from the first sample to the last [s]."""
+        return float(self.episode.times[-1]) - self.origin if len(self.episode) else 0.0
+
+
+class OpenedRecordings:
+    """The episodes of a path, by their position, with what was found in them; any thread may use it.
+
+    Of a data set of LeRobot only the episodes that are asked for are read, where its description says that they lie.
+    Anything else is read from its beginning up to them, and again where they were let go.
+    """
+
+    def __init__(self, path: Path, held: int = HELD) -> None:
+        self.path, self.held = path, held
+        self.name = str(name_of(path))
+        self.reader = ThreadPoolExecutor(1, "kineme-episodes")  # those who wait for the disk hold no other thread
+        self.corrections = Corrections(path)
+        self.total: int | None = None  # None until all of it has been read
+        self._numbers: list[int] | None = None
+        if not path.exists():
+            raise DataError(f"expected a file or folder of recordings, found nothing at {str(path)!r}")
+        if (path / MARKER).is_file():
+            self._numbers = read_declared(path, read_info(path)).numbers.tolist()
+            self.total = len(self._numbers)
+        self._episodes: dict[int, Opened] = {}
+        self._stream, self._next = opened_at(path), 0
+        self._starts: dict[str, dict[int, float]] = {}  # of the episodes in the video of each camera
+        self._turn = Lock()
+
+    def close(self) -> None:
+        """Read no more."""
+        self.reader.shutdown(wait=False, cancel_futures=True)
+
+    def episode(self, key: str) -> Opened:
+        """Return the episode of a key."""
+        position = key.removeprefix(KEY)
+        page = self.page(int(position), 1) if position.isdecimal() and len(position) < 10 else []
+        if not page:
+            raise MissingError(f"expected an episode of {self.name}, got {key[:40]!r}")
+        return page[0]
+
+    def page(self, offset: int, limit: int) -> list[Opened]:
+        """Return some episodes in their order; behind the last there are none."""
+        with self._turn:
+            wanted = range(offset, offset + limit if self.total is None else min(offset + limit, self.total))
+            if not all(k in self._episodes for k in wanted):
+                if self._numbers is None:
+                    self._stream_to(wanted)
+                else:
+                    self._read(self._numbers, [k for k in wanted if k not in self._episodes])
+            page = [self._episodes[k] for k in wanted if k in self._episodes]
+            for k in wanted:  # those asked for last are let go last
+                if k in self._episodes:
+                    self._episodes[k] = self._episodes.pop(k)
+            sizes = {k: _size(item.episode) for k, item in self._episodes.items()}
+            total = sum(sizes.values())
+            for k in [k for k in self._episodes if k not in wanted]:
+                if total <= self.held:
+                    break
+                total -= sizes[k]
+                del self._episodes[k]
+        return page
+
+    def _read(self, numbers: Sequence[int], positions: Sequence[int]) -> None:
+        """Read the episodes at these positions; one that cannot be read is there with its problem."""
+        where = {numbers[k]: k for k in positions}
+        reason = "expected frames of the episode, got none"
+        try:
+            with needs("pyarrow", "read LeRobot", "parquet"):
+                from kineme.io.lerobot.episodes import episodes
+            for episode in episodes(self.path, None, where):
+                self._episodes[where[episode.number]] = Opened(episode, self.name, f"episode {episode.number}")
+        except KinemeError as error:
+            reason = str(error)
+        for number, k in where.items():
+            if k not in self._episodes:
+                lost = Episode(number, _NOTHING, {}, {}, problems=(reason,), place=f"episode {number}")
+                self._episodes[k] = Opened(lost, self.name, lost.place)
+
+    def _stream_to(self, wanted: range) -> None:
+        """Read on until these episodes are there, and one more says that there are others."""
+        if any(k < self._next for k in wanted if k not in self._episodes):
+            self._stream, self._next = opened_at(self.path), 0
+        end = wanted.stop + (self.total is None)
+        while self._next < end:
+            episode = next(self._stream, None)
+            if episode is None:
+                self.total = self._next
+                break
+            self._episodes[self._next] = episode
+            self._next += 1
+
+    def video_start(self, camera: str, number: int) -> float:
+        """Return the time at which an episode begins in the video of a camera [s]."""
+        if camera not in self._starts:
+            self._starts[camera] = video_starts(self.path, camera)
+        return self._starts[camera].get(number, 0.0)
+
+    def recordings(self, key: str, columns: Sequence[str] = ()) -> Recordings:
+        """Read one episode as a recording, in these columns or in all that are found."""
+        opened = self.episode(key)
+        if opened.file is None:
+            return episode_recordings(opened.episode, opened.recording, columns)
+        read = read_recordings(opened.file, columns=list(columns) or None)
+        sources = [source._replace(path=opened.recording) for source in read.sources]
+        if opened.place not in (places := [source.place for source in sources]):
+            raise DataError(f"expected the movement {opened.place!r} in {opened.recording} in these columns, got none")
+        k = places.index(opened.place)
+        return replace(read, demonstrations=read.demonstrations[k : k + 1], sources=(sources[k],), problems=())
+
+
+def opened_at(path: Path) -> Iterator[Opened]:
+    """Yield the movements of a data set of episodes, or of files; a file that cannot be read is one with a problem."""
+    if any(layout.fits(path) for layout in EPISODE_LAYOUTS):
+        for episode in read_episodes(path):
+            yield Opened(episode, str(name_of(path)), episode.place)
+        return
+    number = 0
+    for entry in entries_of([path])[0]:
+        try:
+            read = read_recordings(entry.path)
+        except KinemeError as error:
+            lost = Episode(number, _NOTHING, {}, {}, problems=(str(error),), place=entry.name)
+            yield Opened(lost, entry.name, "", entry.path)
+            number += 1
+            continue
+        demos = read.demonstrations
+        names = axis_names(demos.n_dims) if demos.channels is None else recorded_names(demos.channels)
+        values, stamps = demos.positions if demos.channels is None else demos.recorded, demos.movements.stamps
+        for k, source in enumerate(read.sources):
+            rows = slice(demos.offsets[k], demos.offsets[k + 1])
+            where = " ".join(filter(None, (entry.name, source.place)))
+            label = source.label or entry.relative.parent.name or None
+            yield Opened(
+                Episode(number, stamps[rows].copy(), {"": values[rows].copy()}, {"": tuple(names)}, label, place=where),
+                entry.name,
+                source.place,
+                entry.path,
+            )
+            number += 1
+
+
+def _size(episode: Episode) -> int:
+    """Bytes of the arrays of an episode."""
+    return episode.times.nbytes + sum(values.nbytes for values in episode.signals.values())
