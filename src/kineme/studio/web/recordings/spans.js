@@ -13,7 +13,7 @@ export function showSpans(spans, chosen, page) {
     });
     field.value = span[which].toFixed(2);
     field.addEventListener("change", () => {
-      if (Number.isFinite(field.valueAsNumber)) span[which] = field.valueAsNumber;
+      if (Number.isFinite(field.valueAsNumber)) Object.assign(span, { [which]: field.valueAsNumber, p: null });
       page.changed();
     });
     return field;
@@ -30,7 +30,7 @@ export function showSpans(spans, chosen, page) {
     });
     field.value = span.label ?? "";
     field.addEventListener("change", () => {
-      span.label = field.value.trim() || null;
+      Object.assign(span, { label: field.value.trim() || null, p: null });
       page.changed();
     });
     return field;
