@@ -60,13 +60,14 @@ class EpisodeOut(BaseModel):
 class EpisodesOut(BaseModel):
     """Some of `total` episodes; the total is null until the last one has been read."""
 
-    name: str | None = Field(description="Of what was opened; null if nothing was.")
-    total: int | None
+    name: str | None = Field(None, description="Of what was opened; null if nothing was.")
+    total: int | None = 0
     offset: int
     episodes: list[EpisodeOut]
-    file: str | None = Field(description="The table of corrections, beside what was opened.")
-    saved: bool = Field(description="Whether it holds all corrections.")
-    problem: str | None
+    file: str | None = Field(None, description="The table of corrections, beside what was opened.")
+    n_corrected: int = Field(0, description="Stretches in the episodes that a person corrected.")
+    saved: bool = Field(True, description="Whether the table holds them all.")
+    problem: str | None = None
 
 
 class EpisodeDetail(UploadOut):
@@ -126,24 +127,17 @@ async def episodes(
 ) -> dict[str, Any]:
     """Those of the data set or the files that the studio was started with, read when they are asked for."""
     opened = studio.opened
-    nothing: dict[str, Any] = {
-        "name": None,
-        "total": 0,
-        "offset": offset,
-        "episodes": [],
-        "file": None,
-        "saved": True,
-        "problem": None,
-    }
     if opened is None:
-        return nothing
+        return {"offset": 0, "episodes": []}
     page = await _reading(opened, lambda: opened.page(offset, limit))
     corrections = opened.corrections
-    return nothing | {
+    return {
         "name": opened.name,
         "total": opened.total,
+        "offset": offset,
         "episodes": [_episode(opened, episode, offset + k) for k, episode in enumerate(page)],
         "file": corrections.path.name,
+        "n_corrected": len(corrections.corrected),
         "saved": corrections.saved,
         "problem": corrections.problem,
     }

@@ -42,7 +42,7 @@ export class Episodes {
     byId("save-corrections").addEventListener("click", () => tried(() => this.save()));
     byId("strips").addEventListener("keydown", (event) => this.key(event));
     onLibrary(() => {
-      for (const strip of this.strips) strip.board.draw();
+      for (const strip of this.strips) strip.recolor();
     });
   }
 
@@ -59,6 +59,7 @@ export class Episodes {
     this.answer = answer;
     this.offset = answer.offset;
     this.saved = answer.saved;
+    byId("download-corrections").hidden = !answer.n_corrected;
     if (!this.strips.length) {
       this.strips = Array.from({ length: PAGE }, () => new Strip((strip) => this.open(strip)));
       byId("drop").classList.add("small-drop");
@@ -112,7 +113,10 @@ export class Episodes {
       spans: spans.map(({ begin, end, label, p = null, confidence = null }) => ({ begin, end, label, p, confidence })),
       corrected,
     };
-    if (corrected) this.saved = false;
+    if (corrected) {
+      this.saved = false;
+      byId("download-corrections").hidden = false;
+    }
     this.sending = this.sending.then(() => tried(() => post(`${of(key)}/spans`, body)));
     const strip = this.strips.find(({ episode }) => episode?.key === key);
     if (strip) {

@@ -1,7 +1,7 @@
 // An episode in the list: its signals as thin lines, the lane of its symbols below, and words about it.
 import { get } from "../parts/api.js";
 import { Board, color } from "../parts/canvas.js";
-import { counted, fill, make, write } from "../parts/elements.js";
+import { counted, fill, make } from "../parts/elements.js";
 import { COLORS, lookOf, symbolNamed } from "../parts/library_state.js";
 import { signal } from "./signal.js";
 
@@ -65,12 +65,24 @@ export class Strip {
     const counts = new Map();
     for (const { label } of spans) counts.set(label ?? "unknown", (counts.get(label ?? "unknown") ?? 0) + 1);
     const names = [...counts].sort((a, b) => b[1] - a[1]);
-    const words = names.slice(0, NAMED).map(([name, n]) => (n > 1 ? `${name} ×${n}` : name));
+    const words = [];
     if (names.length > NAMED) words.push(`${names.length - NAMED} more`);
     if (corrected) words.push("corrected");
     if (problems.length) words.push(counted(problems.length, "problem"));
-    write(this.symbols, words.join(", "));
+    const shown = names.slice(0, NAMED).map(([name, n]) => {
+      const key = make("span", { class: "strip-key" });
+      key.style.background = colorOf(name);
+      return make("span", { class: "strip-symbol" }, key, n > 1 ? `${name} ×${n}` : name);
+    });
+    const rest = make("span", { class: "soft" }, words.join(", "));
+    fill(this.symbols, ...shown.flatMap((symbol) => [symbol, " "]), rest);
     this.symbols.title = problems.join("\n");
+  }
+
+  /** Symbols have other names, and so colors. */
+  recolor() {
+    if (this.episode) this.say();
+    this.board.draw();
   }
 
   /** Ask for the signals once the strip is on the screen. */

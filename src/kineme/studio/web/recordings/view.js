@@ -81,6 +81,7 @@ class Recordings {
         make("option", { value: String(k) }, table.name),
       ),
     );
+    byId("tables-part").hidden = recording.tables.length < 2;
     const labeled = recording.tables.filter((/** @type {any} */ table) => table.label !== null);
     const labels = [...new Set(labeled.map((/** @type {any} */ table) => table.label))].slice(0, 8).join(", ");
     byId("learn-file").hidden = recording.tables.length < 2 || !labeled.length;
