@@ -33,13 +33,22 @@ def write_drawings(folder, *episodes, tasks=("Draw", "Wave"), video=None, codec=
     vector = {"dtype": "float32", "shape": [2], "names": ["x", "y"]}
     counter = {"dtype": "int64", "shape": [1], "names": None}
     features = {
-        **{"observation.state": vector, "action": vector, "timestamp": {"dtype": "float32", "shape": [1], "names": None}},
+        **{
+            "observation.state": vector,
+            "action": vector,
+            "timestamp": {"dtype": "float32", "shape": [1], "names": None},
+        },
         **dict.fromkeys(("frame_index", "episode_index", "index", "task_index"), counter),
     }
     video_path = None
     if video is not None:
         about = {"video.codec": codec, "video.height": 48, "video.width": 64}
-        features[CAMERA] = {"dtype": "video", "shape": [48, 64, 3], "names": ["height", "width", "channels"], "info": about}
+        features[CAMERA] = {
+            "dtype": "video",
+            "shape": [48, 64, 3],
+            "names": ["height", "width", "channels"],
+            "info": about,
+        }
         video_path = "videos/chunk-{episode_chunk:03d}/{video_key}/episode_{episode_index:06d}.mp4"
     lengths, first = [], 0
     for number, kinds in enumerate(episodes):
@@ -69,9 +78,7 @@ def write_drawings(folder, *episodes, tasks=("Draw", "Wave"), video=None, codec=
         "data_path": "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet", "video_path": video_path,
         "features": features,
     }  # fmt: skip
-    rows = [
-        {"episode_index": k, "tasks": [tasks[k % len(tasks)]], "length": n} for k, n in enumerate(lengths)
-    ]
+    rows = [{"episode_index": k, "tasks": [tasks[k % len(tasks)]], "length": n} for k, n in enumerate(lengths)]
     texts = {
         "info.json": json.dumps(info),
         "episodes.jsonl": "\n".join(map(json.dumps, rows)),

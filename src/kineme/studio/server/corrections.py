@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from threading import Lock
@@ -57,16 +57,22 @@ class Corrections:
         else:
             self._lanes = {key: Lane(tuple(notes), corrected=True) for key, notes in lanes.items()}
 
+    def add(self, annotations: Iterable[Annotation]) -> None:
+        """Add what is known of movements from elsewhere, but for those that a person corrected."""
+        lanes: dict[Movement, list[Annotation]] = {}
+        for note in annotations:
+            lanes.setdefault((note.recording, note.place), []).append(note)
+        self._lanes = {key: Lane(tuple(notes)) for key, notes in lanes.items()} | self._lanes
+
     def lane(self, movement: Movement) -> Lane:
         """Return what was found in a movement, or corrected."""
         return self._lanes.get(movement, Lane())
 
     def put(self, movement: Movement, lane: Lane) -> None:
-        """Replace it; what a person has corrected stays corrected."""
+        """Replace it."""
         with self._turn:
-            corrected = lane.corrected or self.lane(movement).corrected
-            self.saved = self.saved and not corrected
-            self._lanes[movement] = lane._replace(corrected=corrected)
+            self.saved = self.saved and not (lane.corrected or self.lane(movement).corrected)
+            self._lanes[movement] = lane
 
     @property
     def corrected(self) -> Sequence[Annotation]:

@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from threading import Lock
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -21,11 +21,15 @@ from kineme.io.reading.formats import entries_of, name_of
 from kineme.io.reading.merge_files import Recordings
 from kineme.io.reading.recordings import read_recordings
 from kineme.io.records import needs
+from kineme.io.writing.annotations import Annotation
 from kineme.movements.channels.channel import recorded_names
 from kineme.movements.episodes import Episode
 from kineme.movements.trajectories.movements import axis_names
 from kineme.studio.server.corrections import Corrections
 from kineme.studio.server.refusals import MissingError
+
+if TYPE_CHECKING:
+    from kineme.io.lerobot.motions import Motion
 
 KEY = "episode-"  # what the key of an episode begins with; its position follows
 HELD = 2**28  # bytes of the episodes that are kept in memory
@@ -76,6 +80,12 @@ class OpenedRecordings:
         if (path / MARKER).is_file():
             self._numbers = read_declared(path, read_info(path)).numbers.tolist()
             self.total = len(self._numbers)
+            with needs("pyarrow", "read LeRobot", "parquet"):
+                from kineme.io.lerobot.motions import read_motions
+            try:
+                self.corrections.add(_annotation(motion, self.name) for motion in read_motions(path))
+            except DataError as error:
+                self.corrections.problem = str(error)
         self._episodes: dict[int, Opened] = {}
         self._stream, self._next = opened_at(path), 0
         self._starts: dict[str, dict[int, float]] = {}  # of the episodes in the video of each camera
@@ -122,8 +132,9 @@ class OpenedRecordings:
         try:
             with needs("pyarrow", "read LeRobot", "parquet"):
                 from kineme.io.lerobot.episodes import episodes
-            for episode in episodes(self.path, None, where):
-                self._episodes[where[episode.number]] = Opened(episode, self.name, f"episode {episode.number}")
+            for episode in episodes(self.path, None, where):  # of one whose frames lie in two places, the first
+                opened = Opened(episode, self.name, f"episode {episode.number}")
+                self._episodes.setdefault(where[episode.number], opened)
         except KinemeError as error:
             reason = str(error)
         for number, k in where.items():
@@ -161,6 +172,12 @@ class OpenedRecordings:
             raise DataError(f"expected the movement {opened.place!r} in {opened.recording} in these columns, got none")
         k = places.index(opened.place)
         return replace(read, demonstrations=read.demonstrations[k : k + 1], sources=(sources[k],), problems=())
+
+
+def _annotation(motion: Motion, recording: str) -> Annotation:
+    """Return what an annotator wrote into a data set of LeRobot."""
+    place = f"episode {motion.episode}"
+    return Annotation(recording, place, motion.start, motion.end, motion.symbol, motion.p_value, motion.confidence)
 
 
 def opened_at(path: Path) -> Iterator[Opened]:
