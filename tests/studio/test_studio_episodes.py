@@ -18,7 +18,7 @@ from kineme.io.writing.annotations import Annotation, write_annotations
 from kineme.movements.episodes import Episode
 from kineme.studio.server import opened as opened_module
 from kineme.studio.server.opened import OpenedRecordings, opened_at
-from kineme.studio.server.plots import envelope, plot
+from kineme.studio.server.records import envelope, plot
 
 KINDS = [(0, 1), (2,), (1, 3, 0), (0,), (3, 2)]
 WEBM = b"\x1a\x45\xdf\xa3" + bytes(range(256)) * 40

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 import numpy as np
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Query, Response
 from fastapi import Path as PathPart
 from fastapi.responses import FileResponse
 from pydantic import BaseModel, Field
@@ -21,7 +21,6 @@ from kineme.io.writing.annotations import Annotation, to_csv
 from kineme.studio.server import records
 from kineme.studio.server.corrections import Lane
 from kineme.studio.server.opened import KEY, Opened, OpenedRecordings
-from kineme.studio.server.plots import plot
 from kineme.studio.server.recording_routes import PlotOut, Span, SpannedOut, UploadOut, plot_of, table_of
 from kineme.studio.server.refusals import MissingError, in_studio_words
 from kineme.studio.server.studio import Reads, Studio, Writes
@@ -32,6 +31,7 @@ _VIDEOS = ((4, b"ftyp", "video/mp4"), (0, b"\x1a\x45\xdf\xa3", "video/webm"))
 Result = TypeVar("Result")
 
 EpisodeKey = Annotated[str, PathPart(description="Key of an episode, as in `/api/episodes`.")]
+CameraName = Annotated[str, PathPart(description="Camera of the episode, as in `/api/episodes/{key}`.")]
 Width = Annotated[int, Query(ge=16, le=8192, description="Of the picture in pixels; at most two samples for each.")]
 
 
@@ -143,7 +143,12 @@ async def episodes(
     }
 
 
-@router.get("/corrections.csv", summary="Corrections as a file")
+@router.get(
+    "/corrections.csv",
+    summary="Corrections as a file",
+    response_class=Response,
+    responses={200: {"content": {"text/csv": {}}}},
+)
 def corrections(studio: Reads) -> Response:
     """Annotations of the episodes that a person corrected, as `kineme annotate` writes them."""
     opened = _opened(studio)
@@ -193,8 +198,13 @@ async def put_spans(studio: Reads, key: EpisodeKey, body: SpansRequest) -> dict[
     return _episode(opened, item, int(key.removeprefix(KEY)))
 
 
-@router.get("/{key}/videos/{camera}", summary="The video of a camera", response_class=FileResponse)
-async def video(studio: Reads, request: Request, key: EpisodeKey, camera: str) -> FileResponse:
+@router.get(
+    "/{key}/videos/{camera}",
+    summary="The video of a camera",
+    response_class=FileResponse,
+    responses={200: {"content": {"video/mp4": {}, "video/webm": {}}}},
+)
+async def video(studio: Reads, key: EpisodeKey, camera: CameraName) -> FileResponse:
     """The file as the data set has it, also in parts (``Range``)."""
     opened = _opened(studio)
     item = await _reading(opened, lambda: opened.episode(key))
@@ -258,7 +268,7 @@ def _strip(item: Opened, width: int) -> dict[str, Any]:
     heads = heads_of(item.episode)
     feature = next(iter(heads), None)
     values = np.empty((len(item.episode), 0)) if feature is None else item.episode.signals[feature]
-    return plot(item.episode.times, values, heads.get(feature or "", ()), width)
+    return records.plot(item.episode.times, values, heads.get(feature or "", ()), width)
 
 
 def _detail(opened: OpenedRecordings, key: str, width: int) -> dict[str, Any]:

@@ -7,13 +7,12 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from threading import Lock
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from kineme.errors import DataError, KinemeError
-from kineme.io.lerobot.info import MARKER, read_info
-from kineme.io.lerobot.info import read_episodes as read_declared
+from kineme.io.lerobot import info
 from kineme.io.lerobot.videos import video_starts
 from kineme.io.reading.episode_recordings import episode_recordings
 from kineme.io.reading.episodes import EPISODE_LAYOUTS, read_episodes
@@ -27,9 +26,6 @@ from kineme.movements.episodes import Episode
 from kineme.movements.trajectories.movements import axis_names
 from kineme.studio.server.corrections import Corrections
 from kineme.studio.server.refusals import MissingError
-
-if TYPE_CHECKING:
-    from kineme.io.lerobot.motions import Motion
 
 KEY = "episode-"  # what the key of an episode begins with; its position follows
 HELD = 2**28  # bytes of the episodes that are kept in memory
@@ -77,13 +73,15 @@ class OpenedRecordings:
         self._numbers: list[int] | None = None
         if not path.exists():
             raise DataError(f"expected a file or folder of recordings, found nothing at {str(path)!r}")
-        if (path / MARKER).is_file():
-            self._numbers = read_declared(path, read_info(path)).numbers.tolist()
+        if (path / info.MARKER).is_file():
+            self._numbers = info.read_episodes(path, info.read_info(path)).numbers.tolist()
             self.total = len(self._numbers)
             with needs("pyarrow", "read LeRobot", "parquet"):
                 from kineme.io.lerobot.motions import read_motions
             try:
-                self.corrections.add(_annotation(motion, self.name) for motion in read_motions(path))
+                self.corrections.add(
+                    Annotation(self.name, f"episode {motion.episode}", *motion[1:6]) for motion in read_motions(path)
+                )
             except DataError as error:
                 self.corrections.problem = str(error)
         self._episodes: dict[int, Opened] = {}
@@ -172,12 +170,6 @@ class OpenedRecordings:
             raise DataError(f"expected the movement {opened.place!r} in {opened.recording} in these columns, got none")
         k = places.index(opened.place)
         return replace(read, demonstrations=read.demonstrations[k : k + 1], sources=(sources[k],), problems=())
-
-
-def _annotation(motion: Motion, recording: str) -> Annotation:
-    """Return what an annotator wrote into a data set of LeRobot."""
-    place = f"episode {motion.episode}"
-    return Annotation(recording, place, motion.start, motion.end, motion.symbol, motion.p_value, motion.confidence)
 
 
 def opened_at(path: Path) -> Iterator[Opened]:

@@ -17,7 +17,6 @@ from kineme.library.learn import learn_recordings
 from kineme.movements.channels.channel import recorded_names
 from kineme.movements.trajectories.movements import axis_names
 from kineme.studio.server import records
-from kineme.studio.server.plots import plot
 from kineme.studio.server.refusals import in_studio_words
 from kineme.studio.server.studio import Reads, Studio, Work, Writes, while_wanted
 from kineme.studio.server.uploads import go_on
@@ -257,4 +256,4 @@ def plot_of(read: Recordings, k: int, width: int = _PLOTTED // 2) -> dict[str, A
     demos = read.demonstrations
     rows = slice(demos.offsets[k], demos.offsets[k + 1])
     values = (demos.positions if demos.channels is None else demos.recorded)[rows]
-    return plot(demos.movements.stamps[rows], values, _columns(read), width)
+    return records.plot(demos.movements.stamps[rows], values, _columns(read), width)
