@@ -24,8 +24,13 @@ def drawn(*kinds, rest=0.6, seed=50):
     return np.concatenate([*rows, np.repeat(at[None], round(rest * FPS), axis=0)]), spans
 
 
-def write_drawings(folder, *episodes, tasks=("Draw", "Wave"), video=None, codec="vp9"):
-    """Write a data set of version 2.1, an episode for each sequence of kinds; `video` are the bytes of each video."""
+def write_drawings(folder, *episodes, **options):
+    """Write a data set with an episode for each sequence of kinds."""
+    return write_episodes(folder, [drawn(*kinds)[0] for kinds in episodes], **options)
+
+
+def write_episodes(folder, episodes, tasks=("Draw", "Wave"), video=None, codec="vp9"):
+    """Write a data set of version 2.1 with these positions (T, 2); `video` are the bytes of each video."""
     import pyarrow as pa
     from pyarrow import parquet
 
@@ -51,8 +56,7 @@ def write_drawings(folder, *episodes, tasks=("Draw", "Wave"), video=None, codec=
         }
         video_path = "videos/chunk-{episode_chunk:03d}/{video_key}/episode_{episode_index:06d}.mp4"
     lengths, first = [], 0
-    for number, kinds in enumerate(episodes):
-        x, _ = drawn(*kinds)
+    for number, x in enumerate(episodes):
         n = len(x)
         table = {
             "observation.state": list(x.astype(np.float32)),

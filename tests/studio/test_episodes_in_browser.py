@@ -175,6 +175,21 @@ def test_a_page_of_episodes_is_looked_through_and_what_was_corrected_stays(opene
     assert page.evaluate("document.activeElement.dataset.key") == "episode-1"
 
 
+def test_episodes_that_cannot_be_searched_stop_no_others(opened, tmp_path):
+    demos = write_drawings(tmp_path / "demos", (0,), (1,), (2,))
+    page = opened(make_library(tmp_path / "actions"), demos, tolerated=("400",))
+    refusal = {"status": 400, "content_type": "application/json", "body": '{"error": "expected other stamps"}'}
+    page.route("**/recordings/episode-1/spotted", lambda route: route.fulfill(**refusal))
+    page.click("#spot-page")
+    wait_for_text(page, "#episodes-state", "Looked through 2 episodes.")
+    assert "Episode 1: expected other stamps" in page.inner_text("#toasts")
+    page.route("**/spotted", lambda route: None)  # one that takes long
+    page.click("#spot-page")
+    wait_for_text(page, "#spot-page", "Cancel")
+    page.click("#spot-page")
+    wait_for_text(page, "#episodes-state", "Canceled after 0 episodes.")
+
+
 def test_a_table_that_others_wrote_is_replaced_when_that_is_said(opened, tmp_path):
     demos = write_drawings(tmp_path / "demos", (0,))
     page = opened(make_library(tmp_path / "actions"), demos, tolerated=("409",))

@@ -210,6 +210,12 @@ def test_videos_are_sent_in_parts(client):
     assert client.get("/api/episodes/episode-1/videos/other").status_code == 404
 
 
+def test_an_episode_begins_within_the_video_of_many(client, monkeypatch):
+    monkeypatch.setattr(opened_module, "video_starts", lambda folder, camera: {1: 2.5})
+    starts = [client.get(f"/api/episodes/episode-{k}").json()["videos"][0]["start"] for k in (0, 1)]
+    assert starts == [0.0, 2.5]
+
+
 def test_nothing_but_videos_within_the_data_set_is_sent(demos, client):
     address = f"/api/episodes/episode-1/videos/{CAMERA}"
     file = demos / f"videos/chunk-000/{CAMERA}/episode_000001.mp4"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -35,7 +36,7 @@ class Corrections:
     """
 
     def __init__(self, opened: Path) -> None:
-        place = opened.resolve()
+        place = Path(os.path.abspath(opened))  # beside a link, not what it leads to
         self.path = place.with_name(f"{place.name if place.is_dir() else place.stem}{_ENDING}")
         self.problem: str | None = None
         self.saved = True  # whether the table holds all that was corrected

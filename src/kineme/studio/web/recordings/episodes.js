@@ -42,6 +42,7 @@ export class Episodes {
     byId("save-corrections").addEventListener("click", () => tried(() => this.save()));
     byId("strips").addEventListener("keydown", (event) => this.key(event));
     onLibrary(() => {
+      this.channels = null; // it may hold others now
       for (const strip of this.strips) strip.recolor();
     });
   }
@@ -134,18 +135,24 @@ export class Episodes {
     this.search = search;
     const strips = this.strips.filter(({ episode }) => episode?.n_samples && !episode.corrected);
     let done = 0;
+    /** @type {string[]} Why others could not be. */
+    const refused = [];
     this.say();
     try {
       for (const { episode } of strips) {
         write(byId("episodes-state"), `Looking … ${done} of ${counted(strips.length, "episode")}`);
-        this.channels ??= this.page.channels(await get(of(episode.key)));
-        const path = `/api/recordings/${encodeURIComponent(episode.key)}/spotted`;
-        const answer = await post(path, { channels: this.channels }, search.signal);
-        await this.put(episode.key, answer.spans, false);
-        this.page.spotted(episode.key, answer.spans);
+        const spans = await this.find(episode.key, search.signal).catch((error) => {
+          if (error.status !== 400) throw error;
+          refused.push(`Episode ${episode.number}: ${error.message}`);
+        });
+        if (!spans) continue;
+        await this.put(episode.key, spans, false);
+        this.page.spotted(episode.key, spans);
         done += 1;
       }
       write(byId("episodes-state"), `Looked through ${counted(done, "episode")}.`);
+      if (refused.length)
+        say(`${counted(refused.length, "episode")} not looked through. ${refused[0]}`, { failed: true });
     } catch (error) {
       write(byId("episodes-state"), search.signal.aborted ? `Canceled after ${counted(done, "episode")}.` : "");
       if (!search.signal.aborted) say(error.message, { failed: true });
@@ -153,6 +160,13 @@ export class Episodes {
       if (this.search === search) this.search = null;
       this.say();
     }
+  }
+
+  /** What happens when in an episode. @param {string} key @param {AbortSignal} signal @returns {Promise<any[]>} */
+  async find(key, signal) {
+    this.channels ??= this.page.channels(await get(of(key)));
+    const path = `/api/recordings/${encodeURIComponent(key)}/spotted`;
+    return (await post(path, { channels: this.channels }, signal)).spans;
   }
 
   /** Write the table of corrections beside what was opened. */

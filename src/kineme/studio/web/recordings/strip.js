@@ -3,9 +3,10 @@ import { get } from "../parts/api.js";
 import { Board, color } from "../parts/canvas.js";
 import { counted, fill, make } from "../parts/elements.js";
 import { COLORS, lookOf, symbolNamed } from "../parts/library_state.js";
+import { readableOn } from "../parts/lines.js";
 import { signal } from "./signal.js";
 
-const LANE = 14; // height of the symbols [px]
+const LANE = 16; // height of the symbols [px]
 const NAMED = 4; // symbols that are written out
 
 /** The color of a name: that of the symbol, gray where there is none. @param {string|null} label */
@@ -33,6 +34,7 @@ export class Strip {
     );
     this.element = make("li", {}, this.button);
     this.board = new Board(this.canvas, () => this.paint());
+    this.board.resized = () => this.load();
     this.seen = false;
     new IntersectionObserver(([entry]) => {
       this.seen = entry.isIntersecting;
@@ -108,10 +110,13 @@ export class Strip {
         color: color(COLORS[k % COLORS.length]),
         width: 1,
       });
+    Object.assign(context, { font: `600 11px ${color("--font")}`, textAlign: "center" });
     for (const { begin, end, label } of spans) {
-      Object.assign(context, { fillStyle: colorOf(label), globalAlpha: label === null ? 0.35 : 1 });
-      context.fillRect(x(begin), height - LANE, Math.max(x(end) - x(begin) - 1, 2), LANE);
+      const [paint, name, wide] = [colorOf(label), label ?? "unknown", Math.max(x(end) - x(begin) - 1, 2)];
+      Object.assign(context, { fillStyle: paint, globalAlpha: label === null ? 0.25 : 1 });
+      context.fillRect(x(begin), height - LANE, wide, LANE);
+      Object.assign(context, { fillStyle: label === null ? color("--text") : readableOn(paint), globalAlpha: 1 });
+      if (context.measureText(name).width < wide - 6) context.fillText(name, x(begin) + wide / 2, height - 4);
     }
-    context.globalAlpha = 1;
   }
 }
