@@ -104,6 +104,7 @@ def add_videos(folder, path):
 
         table = pd.read_parquet(episodes)
         table[f"videos/{CAMERA}/chunk_index"] = table[f"videos/{CAMERA}/file_index"] = 0
+        table[f"videos/{CAMERA}/from_timestamp"] = table["dataset_from_index"] / 50
         table.to_parquet(episodes)
     for file in files:
         (folder / file).parent.mkdir(parents=True, exist_ok=True)

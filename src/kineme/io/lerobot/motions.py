@@ -27,7 +27,7 @@ REST = "rest"  # content where no movement holds
 DETAILS = "meta/kineme/motions.parquet"
 PENDING = "meta/kineme/motions.pending.parquet"  # details of rows that are about to be written in place
 
-_CLOSEST = 0.2  # s; LeRobot's `emitted_at` takes rows within 0.1 s of a frame, and refuses to choose between two
+_CLOSEST = 0.2001  # s; LeRobot's `emitted_at` takes rows within 0.1 s of a frame, and refuses to choose between two
 _AT_ONCE = 2**16  # records
 _A_ROW = 200  # bytes that a record takes once it is read
 
@@ -93,7 +93,10 @@ def rows_of(stamps: Array, motions: Sequence[Motion], taken: Collection[float] =
     begun: set[int] = set()
     for frame in frames[lasting].tolist():
         k, stamp = int(owner[frame]), float(np.float32(stamps[frame]))
-        if k == before or stamp in seen or not math.isfinite(stamp):
+        if k == before or not math.isfinite(stamp):
+            continue
+        if stamp in seen:
+            before = None  # what another said holds now, so that the next row is needed in any case
             continue
         motion = ordered[k] if k >= 0 else None
         content = REST if motion is None else UNKNOWN if motion.symbol is None else motion.symbol

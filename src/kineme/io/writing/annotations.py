@@ -193,13 +193,23 @@ def write_lerobot(path: Path, annotations: Sequence[Annotation], source: Path | 
             raise DataError(f"expected annotations of episodes, got one of {note.place!r}")
         motion = Motion(int(number), note.start, note.end, note.symbol, note.p_value, note.confidence)
         motions.setdefault(int(number), []).append(motion)
-    if path.resolve() == source.resolve():
+    if is_in_place(path, [source]):
         name_in_place(source, motions)
         return path
     copy = copy_in_lance if read_info(source).storage == "lance" else copy_with_motions
     with whole_folder(path) as beside:
         copy(source, beside, motions)
     return path
+
+
+def is_in_place(path: Path, sources: Sequence[Path]) -> bool:
+    """Tell whether annotations to write to `path` become a version of the only recording: of a data set in Lance."""
+    return (
+        len(sources) == 1
+        and path.resolve() == sources[0].resolve()
+        and is_lerobot(sources[0])
+        and read_info(sources[0]).storage == "lance"
+    )
 
 
 def check_bag(path: Path, source: Path) -> None:
@@ -216,8 +226,9 @@ def check_bag(path: Path, source: Path) -> None:
 
 def check_lerobot(path: Path, source: Path) -> None:
     """Refuse a path where no copy of that data set can be written, or a data set that is damaged."""
-    if read_info(source).storage == "lance" and path.resolve() == source.resolve():
+    if is_in_place(path, [source]):
         return
+    read_info(source)
     _check_apart(path, source)
     _check_new_folder(path, source)
 
