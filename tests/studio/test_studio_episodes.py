@@ -19,6 +19,7 @@ from kineme.movements.episodes import Episode
 from kineme.studio.server import opened as opened_module
 from kineme.studio.server.opened import OpenedRecordings, opened_at
 from kineme.studio.server.records import envelope, plot
+from lerobot_sets import write_lance
 
 KINDS = [(0, 1), (2,), (1, 3, 0), (0,), (3, 2)]
 WEBM = b"\x1a\x45\xdf\xa3" + bytes(range(256)) * 40
@@ -344,6 +345,35 @@ def test_a_path_without_recordings_is_refused(tmp_path):
     with pytest.raises(DataError, match="found nothing"):
         OpenedRecordings(tmp_path / "none")
     assert list(opened_at(tmp_path)) == []
+
+
+def test_a_feature_that_is_no_movement_hides_no_other(client):
+    opened = client.app.state.studio.opened
+    item = opened.page(0, 1)[0]
+    signals = {**item.episode.signals, "pose": np.full((len(item.episode), 4), 2.0)}
+    names = {**item.episode.names, "pose": ("qw", "qx", "qy", "qz")}  # of no orientation
+    opened._episodes[0] = item._replace(episode=Episode(0, item.episode.times, signals, names))
+    detail = client.get("/api/episodes/episode-0").json()
+    assert [channel["name"] for channel in detail["tables"][0]["channels"]] == ["x", "y"]
+    spans = client.post("/api/recordings/episode-0/spotted", json={"channels": ["x", "y"]}).json()["spans"]
+    assert [span["label"] for span in spans] == ["kind 0", "kind 1"]
+
+
+def test_episodes_that_are_files_of_their_own_are_named_so(tmp_path, monkeypatch):
+    layout = opened_module.EPISODE_LAYOUTS[0]._replace(fits=lambda path: True)
+    monkeypatch.setattr(opened_module, "EPISODE_LAYOUTS", (layout,))
+    episodes = [Episode(k, np.arange(9.0), {"a": np.zeros((9, 2))}, {"a": ("x", "y")}, place=f"{k}.h5") for k in (0, 1)]
+    monkeypatch.setattr(opened_module, "read_episodes", lambda path: iter(episodes))
+    (tmp_path / "0.h5").write_bytes(b"")
+    assert [item.movement for item in opened_at(tmp_path)] == [("0.h5", ""), (tmp_path.name, "1.h5")]
+
+
+def test_a_data_set_in_lance_is_opened_too(folder, open_studio, tmp_path):
+    pytest.importorskip("lance", reason="pylance is not installed")
+    client = open_studio(folder, recordings=write_lance(tmp_path / "demos"))
+    page = client.get("/api/episodes?offset=1").json()
+    assert (page["total"], [item["place"] for item in page["episodes"]]) == (3, ["episode 1", "episode 2"])
+    assert client.get("/api/episodes/episode-1").json()["videos"] == []
 
 
 def test_episodes_with_stamps_that_go_back_are_drawn_and_are_no_recording(client):

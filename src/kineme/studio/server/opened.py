@@ -14,7 +14,7 @@ import numpy as np
 from kineme.errors import DataError, KinemeError
 from kineme.io.lerobot import info
 from kineme.io.lerobot.videos import video_starts
-from kineme.io.reading.episode_recordings import episode_recordings
+from kineme.io.reading.episode_recordings import episode_recordings, heads_of
 from kineme.io.reading.episodes import EPISODE_LAYOUTS, read_episodes
 from kineme.io.reading.formats import entries_of, name_of
 from kineme.io.reading.merge_files import Recordings
@@ -160,10 +160,19 @@ class OpenedRecordings:
         return self._starts[camera].get(number, 0.0)
 
     def recordings(self, key: str, columns: Sequence[str] = ()) -> Recordings:
-        """Read one episode as a recording, in these columns or in all that are found."""
+        """Read one episode as a recording, in these columns or in all that are found.
+
+        Where these are no movement together, it is read in those of the feature that is read by default.
+        """
         opened = self.episode(key)
         if opened.file is None:
-            return episode_recordings(opened.episode, opened.recording, columns)
+            try:
+                return episode_recordings(opened.episode, opened.recording, columns)
+            except KinemeError:
+                default = next(iter(heads_of(opened.episode).values()), ())
+                if columns or not default:
+                    raise
+                return episode_recordings(opened.episode, opened.recording, default)
         read = read_recordings(opened.file, columns=list(columns) or None)
         sources = [source._replace(path=opened.recording) for source in read.sources]
         if opened.place not in (places := [source.place for source in sources]):
@@ -176,7 +185,8 @@ def opened_at(path: Path) -> Iterator[Opened]:
     """Yield the movements of a data set of episodes, or of files; a file that cannot be read is one with a problem."""
     if any(layout.fits(path) for layout in EPISODE_LAYOUTS):
         for episode in read_episodes(path):
-            yield Opened(episode, str(name_of(path)), episode.place)
+            is_file = bool(episode.place) and path.is_dir() and (path / episode.place).is_file()
+            yield Opened(episode, *((episode.place, "") if is_file else (str(name_of(path)), episode.place)))
         return
     number = 0
     for entry in entries_of([path])[0]:
