@@ -58,8 +58,8 @@ def killed(source, target, module, step):
         (write_v3, "copy", "_write_shard"),
         (write_v2, "copy", "declare"),
         (write_v3, "copy", "declare"),
-        (write_lance, "lance_motions", "_commit"),
-        (write_lance, "lance_motions", "declare"),
+        (write_lance, "copy", "_commit"),
+        (write_lance, "copy", "declare"),
     ],
 )
 def test_a_copy_that_is_killed_leaves_the_source_and_no_target(tmp_path, write, module, step):
@@ -81,7 +81,7 @@ def test_a_copy_that_is_killed_leaves_the_source_and_no_target(tmp_path, write, 
 def test_names_in_place_that_are_killed_leave_the_frames_whole(tmp_path, step):
     pytest.importorskip("lance")
     source = write_lance(tmp_path / "set", fps=10)
-    killed(source, source, "lance_motions", step)
+    killed(source, source, "copy", step)
     read = list(read_episodes(source))
     assert [(len(episode), episode.problems) for episode in read] == [(20, ()), (30, ()), (25, ())]
     write_annotations(source, notes(1), [source])

@@ -9,8 +9,8 @@ import pytest
 
 import kineme
 from kineme.errors import DataError
-from kineme.io.lerobot import lance_motions
-from kineme.io.lerobot.lance_motions import copy_in_lance, name_in_place
+from kineme.io.lerobot import copy
+from kineme.io.lerobot.copy import copy_in_lance, name_in_place
 from kineme.io.lerobot.motions import DETAILS, PENDING, Motion, read_motions
 from kineme.io.reading.episodes import read_episodes
 from lerobot_sets import TASKS, write_lance, write_v3
@@ -144,7 +144,7 @@ def test_writers_who_are_always_faster_are_named_and_nothing_is_written(source, 
 
 @pytest.mark.skipif(os.name != "posix", reason="no locks of files")
 def test_two_runs_do_not_name_the_same_set_at_once(source):
-    with lance_motions._alone(source), pytest.raises(DataError, match="expected no other program that names motions"):
+    with copy._alone(source), pytest.raises(DataError, match="expected no other program that names motions"):
         name_in_place(source, WAVE)
     assert name_in_place(source, WAVE) == 2
 
@@ -155,7 +155,7 @@ def test_a_run_that_ended_behind_its_version_is_known_to_the_next_one(source, mo
 
     def killed(at, motions):
         with monkeypatch.context() as patch:
-            patch.setattr(lance_motions, at, lambda *arguments: (_ for _ in ()).throw(KeyboardInterrupt))
+            patch.setattr(copy, at, lambda *arguments: (_ for _ in ()).throw(KeyboardInterrupt))
             with pytest.raises(KeyboardInterrupt):
                 name_in_place(source, motions)
 

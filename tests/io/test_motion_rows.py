@@ -9,11 +9,9 @@ from hypothesis import strategies as st
 from kineme.io.lerobot.motions import (
     DETAILS,
     Motion,
-    Record,
     Row,
     own_rows,
     read_motions,
-    records_of,
     rows_of,
     write_details,
 )
@@ -102,12 +100,9 @@ def test_stamps_in_any_order_do_no_harm(motions):
 def test_details_are_a_table_of_any_length(tmp_path, monkeypatch):
     monkeypatch.setattr("kineme.io.lerobot.motions._AT_ONCE", 3)
     motions = [Motion(k // 4, k % 4, k % 4 + 0.5, None if k % 3 else "wave", 0.1 * k) for k in range(11)]
-    records = [
-        record
-        for motion in motions
-        for record in records_of(motion.episode, [motion], [Row(motion.start, "x", motion)])
-    ]
-    write_details(tmp_path / DETAILS, [*records, Record(7, None, Row(0.5, "rest"))])
+    rows = [Row(motion.start, "x", motion) for motion in motions]
+    details = [(row.motion.episode, [row.motion], [row]) for row in rows]
+    write_details(tmp_path / DETAILS, [*details, (7, [], [Row(0.5, "rest")])])
     read = read_motions(tmp_path)
     assert [motion[:5] for motion in read] == [motion[:5] for motion in motions]
     assert all(math.isnan(motion.confidence) for motion in read)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import DataError
-from kineme.io.lerobot.frames import Frames, check_storage, contradictions, joined, shard_frames, task_texts
+from kineme.io.lerobot.episodes import Frames, check_storage, contradictions, joined, shard_frames, task_texts
 from kineme.io.lerobot.info import Episodes, Info, read_episodes, read_info, read_tasks
 from kineme.io.limits import check_expanded
 from kineme.movements.tables.columns import choose_roles, column_numbers
