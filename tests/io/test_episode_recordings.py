@@ -1,21 +1,16 @@
-"""An episode of robot data as a recording, and where it begins in its videos."""
+"""An episode of robot data as a recording, in the columns of its features."""
 
 from __future__ import annotations
-
-import json
 
 import numpy as np
 import pytest
 
 from kineme import read_recordings
 from kineme.errors import DataError
-from kineme.io.lerobot.videos import video_codec, video_starts
 from kineme.io.reading.episode_recordings import episode_recordings, heads_of
 from kineme.io.reading.episodes import read_episodes
 from kineme.movements.episodes import Episode
 from lerobot_sets import NAMES, TASKS, write_v2, write_v3
-
-CAMERA = "observation.images.top"
 
 
 @pytest.mark.parametrize("write", [write_v2, write_v3])
@@ -58,38 +53,3 @@ def test_stamps_that_go_back_are_refused(tmp_path):
     odd = Episode(7, episode.times[::-1].copy(), episode.signals, episode.names)
     with pytest.raises(DataError, match="episode 7"):
         episode_recordings(odd, "demos")
-
-
-def _with_videos(folder, starts):
-    """Say in meta/episodes where each episode begins in the video of the camera."""
-    import pyarrow as pa
-    from pyarrow import parquet
-
-    (path,) = (folder / "meta" / "episodes").glob("*/*.parquet")
-    table = parquet.read_table(path, partitioning=None)
-    parquet.write_table(table.append_column(f"videos/{CAMERA}/from_timestamp", pa.array(starts, pa.float64())), path)
-
-
-def test_an_episode_begins_in_its_video_where_the_data_set_says_so(tmp_path):
-    folder = write_v3(tmp_path / "demos")
-    assert video_starts(folder, CAMERA) == {}
-    _with_videos(folder, [0.0, 0.4, None])
-    assert video_starts(folder, CAMERA) == {0: 0.0, 1: 0.4}
-    assert video_starts(folder, "another") == {}
-    (path,) = (folder / "meta" / "episodes").glob("*/*.parquet")
-    path.write_bytes(b"PAR1")
-    assert video_starts(folder, CAMERA) == {}
-    assert video_starts(write_v2(tmp_path / "two"), CAMERA) == {}
-
-
-@pytest.mark.parametrize("key", ["info", "video_info"])
-def test_the_codec_is_what_the_data_set_says(tmp_path, key):
-    folder = write_v3(tmp_path / "demos")
-    assert video_codec(folder, CAMERA) is None
-    path = folder / "meta" / "info.json"
-    info = json.loads(path.read_text())
-    info["features"][CAMERA][key] = {"video.codec": "av1"}
-    path.write_text(json.dumps(info))
-    assert (video_codec(folder, CAMERA), video_codec(folder, "another")) == ("av1", None)
-    path.write_text("{")
-    assert video_codec(folder, CAMERA) is None

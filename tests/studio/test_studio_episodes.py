@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from kineme.movements.episodes import Episode
 from kineme.studio.server import opened as opened_module
 from kineme.studio.server.opened import OpenedRecordings, opened_at
 from kineme.studio.server.records import envelope, plot
-from lerobot_sets import write_lance
+from lerobot_sets import add_videos, write_lance, write_v3
 
 KINDS = [(0, 1), (2,), (1, 3, 0), (0,), (3, 2)]
 WEBM = b"\x1a\x45\xdf\xa3" + bytes(range(256)) * 40
@@ -211,10 +212,17 @@ def test_videos_are_sent_in_parts(client):
     assert client.get("/api/episodes/episode-1/videos/other").status_code == 404
 
 
-def test_an_episode_begins_within_the_video_of_many(client, monkeypatch):
-    monkeypatch.setattr(opened_module, "video_starts", lambda folder, camera: {1: 2.5})
-    starts = [client.get(f"/api/episodes/episode-{k}").json()["videos"][0]["start"] for k in (0, 1)]
-    assert starts == [0.0, 2.5]
+@pytest.mark.parametrize("key", ["info", "video_info"])
+def test_an_episode_begins_within_the_video_of_many(folder, open_studio, tmp_path, key):
+    demos = write_v3(tmp_path / "demos")
+    add_videos(demos, "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4")
+    path = demos / "meta" / "info.json"
+    info = json.loads(path.read_text())
+    info["features"][CAMERA][key] = {"video.codec": "av1"}
+    path.write_text(json.dumps(info))
+    client = open_studio(folder, recordings=demos)
+    videos = [client.get(f"/api/episodes/episode-{k}").json()["videos"] for k in range(3)]
+    assert videos == [[{"camera": CAMERA, "start": start, "codec": "av1"}] for start in (0, 0.4, 1.0)]
 
 
 def test_nothing_but_videos_within_the_data_set_is_sent(demos, client):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterable, Sequence
-from contextlib import suppress
 from pathlib import Path
 from threading import Lock
 from typing import NamedTuple
@@ -83,9 +82,7 @@ class Corrections:
     def save(self, *, replace: bool = False) -> Path:
         """Write the table; a ConflictError if it was written by others since, unless that is to be replaced."""
         with self._turn:
-            now: bytes | None = None
-            with suppress(FileNotFoundError):
-                now = self.path.read_bytes()
+            now = self.path.read_bytes() if self.path.is_file() else None
             if now is not None and now != self._bytes and not replace:
                 raise ConflictError(
                     f"expected {self.path.name} as this studio left it, others wrote it; replace it, or download yours"

@@ -3,19 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-import math
-from collections.abc import Callable
-from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any
 
-import numpy as np
-from fastapi import APIRouter, Query, Response
-from fastapi import Path as PathPart
+from fastapi import APIRouter, Path, Query, Response
 from fastapi.responses import FileResponse
 from pydantic import BaseModel, Field
 
 from kineme.errors import KinemeError
-from kineme.io.lerobot.videos import video_codec
 from kineme.io.reading.episode_recordings import heads_of
 from kineme.io.writing.annotations import Annotation, to_csv
 from kineme.studio.server import records
@@ -25,13 +19,8 @@ from kineme.studio.server.recording_routes import PlotOut, Span, SpannedOut, Upl
 from kineme.studio.server.refusals import MissingError, in_studio_words
 from kineme.studio.server.studio import Reads, Studio, Writes
 
-#: First bytes of files that are videos, where they begin, and their kinds: nothing else is sent as one.
-_VIDEOS = ((4, b"ftyp", "video/mp4"), (0, b"\x1a\x45\xdf\xa3", "video/webm"))
-
-Result = TypeVar("Result")
-
-EpisodeKey = Annotated[str, PathPart(description="Key of an episode, as in `/api/episodes`.")]
-CameraName = Annotated[str, PathPart(description="Camera of the episode, as in `/api/episodes/{key}`.")]
+EpisodeKey = Annotated[str, Path(description="Key of an episode, as in `/api/episodes`.")]
+CameraName = Annotated[str, Path(description="Camera of the episode, as in `/api/episodes/{key}`.")]
 Width = Annotated[int, Query(ge=16, le=8192, description="Of the picture in pixels; at most two samples for each.")]
 
 
@@ -114,9 +103,9 @@ def _opened(studio: Studio) -> OpenedRecordings:
     return studio.opened
 
 
-async def _reading(opened: OpenedRecordings, act: Callable[[], Result]) -> Result:
+async def _reading(opened: OpenedRecordings, act: Any, *arguments: Any) -> Any:
     """Return the result of `act`, which reads; those who wait for it hold no thread of the requests."""
-    return await asyncio.get_running_loop().run_in_executor(opened.reader, act)
+    return await asyncio.get_running_loop().run_in_executor(opened.reader, act, *arguments)
 
 
 @router.get("", response_model=EpisodesOut, summary="Episodes, some at a time")
@@ -129,7 +118,7 @@ async def episodes(
     opened = studio.opened
     if opened is None:
         return {"offset": 0, "episodes": []}
-    page = await _reading(opened, lambda: opened.page(offset, limit))
+    page = await _reading(opened, opened.page, offset, limit)
     corrections = opened.corrections
     return {
         "name": opened.name,
@@ -170,14 +159,14 @@ def save(studio: Writes, body: SaveRequest) -> dict[str, Any]:
 async def episode(studio: Reads, key: EpisodeKey, width: Width = 1000) -> dict[str, Any]:
     """Its signals, thinned to a width, its channels and videos; `/api/recordings/{key}` searches and learns it."""
     opened = _opened(studio)
-    return await _reading(opened, lambda: _detail(opened, key, width))
+    return await _reading(opened, _detail, opened, key, width)
 
 
 @router.get("/{key}/strip", response_model=PlotOut, summary="The signals of an episode as a strip")
 async def strip(studio: Reads, key: EpisodeKey, width: Width = 600) -> dict[str, Any]:
     """The feature that is read by default, thinned to a width: every peak is there."""
     opened = _opened(studio)
-    item = await _reading(opened, lambda: opened.episode(key))
+    item: Opened = await _reading(opened, opened.episode, key)
     return await asyncio.to_thread(_strip, item, width)
 
 
@@ -185,12 +174,12 @@ async def strip(studio: Reads, key: EpisodeKey, width: Width = 600) -> dict[str,
 async def put_spans(studio: Reads, key: EpisodeKey, body: SpansRequest) -> dict[str, Any]:
     """Until the studio ends, or they are saved: what a person corrected is in the table of corrections."""
     opened = _opened(studio)
-    item = await _reading(opened, lambda: opened.episode(key))
+    item: Opened = await _reading(opened, opened.episode, key)
     annotations = []
     for span in sorted(body.spans, key=lambda span: span.begin):
         if span.end > span.begin:
             times = item.origin + span.begin, item.origin + span.end
-            p_value = math.nan if span.p is None else span.p
+            p_value = float("nan") if span.p is None else span.p
             confidence = 1.0 if span.confidence is None else span.confidence
             note = Annotation(*item.movement, *times, span.label, p_value, confidence, item.origin)
             annotations.append(note)
@@ -207,35 +196,9 @@ async def put_spans(studio: Reads, key: EpisodeKey, body: SpansRequest) -> dict[
 async def video(studio: Reads, key: EpisodeKey, camera: CameraName) -> FileResponse:
     """The file as the data set has it, also in parts (``Range``)."""
     opened = _opened(studio)
-    item = await _reading(opened, lambda: opened.episode(key))
-    if camera not in item.episode.videos:
-        raise MissingError(
-            f"expected a camera of {item.place}, one of {list(item.episode.videos)}, got {camera[:80]!r}"
-        )
-    path = _inside(opened.path, item.episode.videos[camera])
-    kind = await asyncio.to_thread(_kind_of, path)
+    item: Opened = await _reading(opened, opened.episode, key)
+    path, kind = await _reading(opened, opened.video, item, camera)
     return FileResponse(path, media_type=kind, headers={"Cache-Control": "private, max-age=3600"})
-
-
-def _inside(folder: Path, name: str) -> Path:
-    """Return the path of a file that a data set names; one that leads out of its folder is not there."""
-    relative = Path(name)
-    if relative.is_absolute() or ".." in relative.parts:
-        raise MissingError(f"expected a video within the data set, got {name[:80]!r}")
-    return folder / relative
-
-
-def _kind_of(path: Path) -> str:
-    """Return the kind of a video by its first bytes; what is none is not sent, wherever a link leads."""
-    try:
-        with path.open("rb") as file:
-            head = file.read(16)
-    except OSError as error:
-        raise MissingError(f"expected the video {path.name}, got: {error.strerror or error}") from error
-    for at, mark, kind in _VIDEOS:
-        if head[at : at + len(mark)] == mark:
-            return kind
-    raise MissingError(f"expected a video (MP4, WebM) in {path.name}, got something else")
 
 
 def _episode(opened: OpenedRecordings, item: Opened, position: int) -> dict[str, Any]:
@@ -265,20 +228,15 @@ def _episode(opened: OpenedRecordings, item: Opened, position: int) -> dict[str,
 
 def _strip(item: Opened, width: int) -> dict[str, Any]:
     """Thin the feature that is read by default."""
-    heads = heads_of(item.episode)
-    feature = next(iter(heads), None)
-    values = np.empty((len(item.episode), 0)) if feature is None else item.episode.signals[feature]
-    return records.plot(item.episode.times, values, heads.get(feature or "", ()), width)
+    for feature, heads in heads_of(item.episode).items():
+        return records.plot(item.episode.times, item.episode.signals[feature], heads, width)
+    return {"times": [], "columns": []}
 
 
 def _detail(opened: OpenedRecordings, key: str, width: int) -> dict[str, Any]:
     item = opened.episode(key)
     shown = _episode(opened, item, int(key.removeprefix(KEY)))
-    starts = {camera: opened.video_start(camera, item.episode.number) for camera in item.episode.videos}
-    videos = [
-        {"camera": camera, "start": start, "codec": video_codec(opened.path, camera)}
-        for camera, start in starts.items()
-    ]
+    videos = [{"camera": camera, **opened.about_video(item, camera)} for camera in item.episode.videos]
     heads = heads_of(item.episode)
     default = set(next(iter(heads.values()), ()))
     try:

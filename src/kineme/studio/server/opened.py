@@ -7,13 +7,12 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from threading import Lock
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from kineme.errors import DataError, KinemeError
 from kineme.io.lerobot import info
-from kineme.io.lerobot.videos import video_starts
 from kineme.io.reading.episode_recordings import episode_recordings, heads_of
 from kineme.io.reading.episodes import EPISODE_LAYOUTS, read_episodes
 from kineme.io.reading.formats import entries_of, name_of
@@ -29,6 +28,10 @@ from kineme.studio.server.refusals import MissingError
 
 KEY = "episode-"  # what the key of an episode begins with; its position follows
 HELD = 2**28  # bytes of the episodes that are kept in memory
+
+#: First bytes of files that are videos, where they begin, and their kinds: nothing else is sent as one.
+_VIDEOS = ((4, b"ftyp", "video/mp4"), (0, b"\x1a\x45\xdf\xa3", "video/webm"))
+_HEAD = 16  # bytes that are read to know them
 
 _NOTHING = np.zeros(0)
 
@@ -77,16 +80,18 @@ class OpenedRecordings:
             self._numbers = info.read_episodes(path, info.read_info(path)).numbers.tolist()
             self.total = len(self._numbers)
             with needs("pyarrow", "read LeRobot", "parquet"):
-                from kineme.io.lerobot.motions import read_motions
+                from kineme.io.lerobot import episodes, motions
+            self._lerobot = episodes
             try:
                 self.corrections.add(
-                    Annotation(self.name, f"episode {motion.episode}", *motion[1:6]) for motion in read_motions(path)
+                    Annotation(self.name, f"episode {motion.episode}", *motion[1:6])
+                    for motion in motions.read_motions(path)
                 )
             except DataError as error:
                 self.corrections.problem = str(error)
         self._episodes: dict[int, Opened] = {}
         self._stream, self._next = opened_at(path), 0
-        self._starts: dict[str, dict[int, float]] = {}  # of the episodes in the video of each camera
+        self._videos: dict[int, dict[str, info.Video]] | None = None  # by number and camera
         self._turn = Lock()
 
     def close(self) -> None:
@@ -128,9 +133,9 @@ class OpenedRecordings:
         where = {numbers[k]: k for k in positions}
         reason = "expected frames of the episode, got none"
         try:
-            with needs("pyarrow", "read LeRobot", "parquet"):
-                from kineme.io.lerobot.episodes import episodes
-            for episode in episodes(self.path, None, where):  # of one whose frames lie in two places, the first
+            for episode in self._lerobot.episodes(
+                self.path, None, where
+            ):  # of one whose frames lie in two places, the first
                 opened = Opened(episode, self.name, f"episode {episode.number}")
                 self._episodes.setdefault(where[episode.number], opened)
         except KinemeError as error:
@@ -153,11 +158,37 @@ class OpenedRecordings:
             self._episodes[self._next] = episode
             self._next += 1
 
-    def video_start(self, camera: str, number: int) -> float:
-        """Return the time at which an episode begins in the video of a camera [s]."""
-        if camera not in self._starts:
-            self._starts[camera] = video_starts(self.path, camera)
-        return self._starts[camera].get(number, 0.0)
+    def about_video(self, opened: Opened, camera: str) -> dict[str, Any]:
+        """Return when an episode begins in the video of a camera [s], and its codec, None if no file says it."""
+        if self._numbers is None:
+            return {"start": 0.0, "codec": None}
+        if self._videos is None:
+            self._videos = info.read_videos(self.path, info.read_info(self.path))
+        feature = info.read_json(self.path / info.MARKER, info.MARKER)["features"].get(camera)
+        declared = feature.get("info", feature.get("video_info")) if isinstance(feature, dict) else None
+        codec = declared.get("video.codec") if isinstance(declared, dict) else None
+        video = self._videos.get(opened.episode.number, {}).get(camera)
+        return {"start": 0.0 if video is None else video.start, "codec": codec if isinstance(codec, str) else None}
+
+    def video(self, opened: Opened, camera: str) -> tuple[Path, str]:
+        """Return the file of a camera's video and its kind, by its first bytes; a MissingError if there is none.
+
+        A path that leads out of the data set is none, and so is a link to anything else than a video.
+        """
+        name = opened.episode.videos.get(camera)
+        if name is None or Path(name).is_absolute() or ".." in Path(name).parts:
+            cameras = list(opened.episode.videos)
+            raise MissingError(f"expected a video of {opened.place}, of one of {cameras}, got {camera[:80]!r}")
+        path = self.path / name
+        try:
+            with path.open("rb") as file:
+                head = file.read(_HEAD)
+        except OSError as error:
+            raise MissingError(f"expected the video {path.name}, got: {error.strerror or error}") from error
+        for at, mark, kind in _VIDEOS:
+            if head[at : at + len(mark)] == mark:
+                return path, kind
+        raise MissingError(f"expected a video (MP4, WebM) in {path.name}, got something else")
 
     def recordings(self, key: str, columns: Sequence[str] = ()) -> Recordings:
         """Read one episode as a recording, in these columns or in all that are found.
