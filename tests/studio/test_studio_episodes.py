@@ -275,7 +275,6 @@ def test_a_page_reads_its_own_episodes_alone(demos, monkeypatch):
     assert [item.episode.number for item in opened.page(4, 20)] == [4]
     opened.page(1, 2)  # they were let go
     assert asked == [[1, 2], [4], [1, 2]]
-    opened.close()
 
 
 def test_an_episode_that_cannot_be_read_is_there_with_its_problem(client, demos):
@@ -337,7 +336,6 @@ def test_of_files_only_those_up_to_the_page_are_read(files, monkeypatch):
     assert [item.episode.number for item in opened.page(3, 5)] == [3, 4]
     assert opened.total == 5
     assert [item.recording for item in opened.page(0, 2)] == ["a.csv", "damaged.csv"]  # read again
-    opened.close()
 
 
 def test_one_file_is_opened_too(files, folder, open_studio):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -49,7 +48,7 @@ class Corrections:
         lanes: dict[Movement, list[Annotation]] = {}
         try:
             for row in read_labels(self.path).rows:
-                note = Annotation(row.recording, row.place, row.start, row.end, row.label, math.nan, 1.0)
+                note = Annotation(row.recording, row.place, row.start, row.end, row.label, float("nan"), 1.0)
                 lanes.setdefault((row.recording, row.place), []).append(note)
             self._bytes = self.path.read_bytes()
         except (DataError, OSError) as error:
@@ -79,6 +78,10 @@ class Corrections:
         """All annotations of movements that a person corrected, in the order in which they were first looked at."""
         return [note for lane in list(self._lanes.values()) if lane.corrected for note in lane.annotations]
 
+    def table(self) -> bytes:
+        """Return `corrected` as `kineme annotate` writes annotations."""
+        return to_csv(self.corrected)
+
     def save(self, *, replace: bool = False) -> Path:
         """Write the table; a ConflictError if it was written by others since, unless that is to be replaced."""
         with self._turn:
@@ -87,7 +90,7 @@ class Corrections:
                 raise ConflictError(
                     f"expected {self.path.name} as this studio left it, others wrote it; replace it, or download yours"
                 )
-            table = to_csv(self.corrected)
+            table = self.table()
             try:
                 write_atomically(self.path, table)
             except OSError as error:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Response
@@ -10,8 +9,6 @@ from fastapi.responses import FileResponse
 from pydantic import BaseModel, Field
 
 from kineme.errors import KinemeError
-from kineme.io.reading.episode_recordings import heads_of
-from kineme.io.writing.annotations import Annotation, to_csv
 from kineme.studio.server import records
 from kineme.studio.server.corrections import Lane
 from kineme.studio.server.opened import KEY, Opened, OpenedRecordings
@@ -103,11 +100,6 @@ def _opened(studio: Studio) -> OpenedRecordings:
     return studio.opened
 
 
-async def _reading(opened: OpenedRecordings, act: Any, *arguments: Any) -> Any:
-    """Return the result of `act`, which reads; those who wait for it hold no thread of the requests."""
-    return await asyncio.get_running_loop().run_in_executor(opened.reader, act, *arguments)
-
-
 @router.get("", response_model=EpisodesOut, summary="Episodes, some at a time")
 async def episodes(
     studio: Reads,
@@ -118,7 +110,7 @@ async def episodes(
     opened = studio.opened
     if opened is None:
         return {"offset": 0, "episodes": []}
-    page = await _reading(opened, opened.page, offset, limit)
+    page = await studio.reading(opened.page, offset, limit)
     corrections = opened.corrections
     return {
         "name": opened.name,
@@ -145,7 +137,7 @@ def corrections(studio: Reads) -> Response:
         mark if mark.isascii() and (mark.isalnum() or mark in "-_.") else "_" for mark in opened.corrections.path.name
     )
     headers = {"Content-Disposition": f'attachment; filename="{name}"'}
-    return Response(to_csv(opened.corrections.corrected), headers=headers, media_type="text/csv; charset=utf-8")
+    return Response(opened.corrections.table(), headers=headers, media_type="text/csv; charset=utf-8")
 
 
 @router.post("/corrections", response_model=SavedOut, summary="Save corrections")
@@ -159,30 +151,27 @@ def save(studio: Writes, body: SaveRequest) -> dict[str, Any]:
 async def episode(studio: Reads, key: EpisodeKey, width: Width = 1000) -> dict[str, Any]:
     """Its signals, thinned to a width, its channels and videos; `/api/recordings/{key}` searches and learns it."""
     opened = _opened(studio)
-    return await _reading(opened, _detail, opened, key, width)
+    return await studio.reading(_detail, opened, key, width)
 
 
 @router.get("/{key}/strip", response_model=PlotOut, summary="The signals of an episode as a strip")
 async def strip(studio: Reads, key: EpisodeKey, width: Width = 600) -> dict[str, Any]:
     """The feature that is read by default, thinned to a width: every peak is there."""
     opened = _opened(studio)
-    item: Opened = await _reading(opened, opened.episode, key)
-    return await asyncio.to_thread(_strip, item, width)
+    item = await studio.reading(opened.episode, key)
+    return await studio.reading(_strip, item, width)
 
 
 @router.post("/{key}/spans", response_model=EpisodeOut, summary="Keep what an episode shows")
 async def put_spans(studio: Reads, key: EpisodeKey, body: SpansRequest) -> dict[str, Any]:
     """Until the studio ends, or they are saved: what a person corrected is in the table of corrections."""
     opened = _opened(studio)
-    item: Opened = await _reading(opened, opened.episode, key)
-    annotations = []
-    for span in sorted(body.spans, key=lambda span: span.begin):
-        if span.end > span.begin:
-            times = item.origin + span.begin, item.origin + span.end
-            p_value = float("nan") if span.p is None else span.p
-            confidence = 1.0 if span.confidence is None else span.confidence
-            note = Annotation(*item.movement, *times, span.label, p_value, confidence, item.origin)
-            annotations.append(note)
+    item = await studio.reading(opened.episode, key)
+    annotations = [
+        item.annotation((span.begin, span.end), span.label, span.p, span.confidence)
+        for span in sorted(body.spans, key=lambda span: span.begin)
+        if span.end > span.begin
+    ]
     opened.corrections.put(item.movement, Lane(tuple(annotations), body.corrected))
     return _episode(opened, item, int(key.removeprefix(KEY)))
 
@@ -196,8 +185,8 @@ async def put_spans(studio: Reads, key: EpisodeKey, body: SpansRequest) -> dict[
 async def video(studio: Reads, key: EpisodeKey, camera: CameraName) -> FileResponse:
     """The file as the data set has it, also in parts (``Range``)."""
     opened = _opened(studio)
-    item: Opened = await _reading(opened, opened.episode, key)
-    path, kind = await _reading(opened, opened.video, item, camera)
+    item = await studio.reading(opened.episode, key)
+    path, kind = await studio.reading(opened.video, item, camera)
     return FileResponse(path, media_type=kind, headers={"Cache-Control": "private, max-age=3600"})
 
 
@@ -228,7 +217,7 @@ def _episode(opened: OpenedRecordings, item: Opened, position: int) -> dict[str,
 
 def _strip(item: Opened, width: int) -> dict[str, Any]:
     """Thin the feature that is read by default."""
-    for feature, heads in heads_of(item.episode).items():
+    for feature, heads in item.heads.items():
         return records.plot(item.episode.times, item.episode.signals[feature], heads, width)
     return {"times": [], "columns": []}
 
@@ -237,7 +226,7 @@ def _detail(opened: OpenedRecordings, key: str, width: int) -> dict[str, Any]:
     item = opened.episode(key)
     shown = _episode(opened, item, int(key.removeprefix(KEY)))
     videos = [{"camera": camera, **opened.about_video(item, camera)} for camera in item.episode.videos]
-    heads = heads_of(item.episode)
+    heads = item.heads
     default = set(next(iter(heads.values()), ()))
     try:
         read = opened.recordings(key)

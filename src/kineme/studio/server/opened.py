@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from threading import Lock
@@ -55,6 +54,19 @@ class Opened(NamedTuple):
         return float(self.episode.times[0]) if len(self.episode) else 0.0
 
     @property
+    def heads(self) -> dict[str, tuple[str, ...]]:
+        """Names of the columns of each feature; the one that is read by default comes first."""
+        return heads_of(self.episode)
+
+    def annotation(
+        self, span: tuple[float, float], symbol: str | None, p_value: float | None, confidence: float | None
+    ) -> Annotation:
+        """Return what a stretch shows, in seconds since the first sample; without a p-value, a person said it."""
+        start, end = (self.origin + time for time in span)
+        certainty = float("nan") if p_value is None else p_value, 1.0 if confidence is None else confidence
+        return Annotation(self.recording, self.place, start, end, symbol, *certainty, self.origin)
+
+    @property
     def duration(self) -> float:
         """Time from the first sample to the last [s]."""
         return float(self.episode.times[-1]) - self.origin if len(self.episode) else 0.0
@@ -70,18 +82,17 @@ class OpenedRecordings:
     def __init__(self, path: Path, held: int = HELD) -> None:
         self.path, self.held = path, held
         self.name = str(name_of(path))
-        self.reader = ThreadPoolExecutor(1, "kineme-episodes")  # those who wait for the disk hold no other thread
         self.corrections = Corrections(path)
         self.total: int | None = None  # None until all of it has been read
         self._numbers: list[int] | None = None
         if not path.exists():
             raise DataError(f"expected a file or folder of recordings, found nothing at {str(path)!r}")
         if (path / info.MARKER).is_file():
-            self._numbers = info.read_episodes(path, info.read_info(path)).numbers.tolist()
-            self.total = len(self._numbers)
             with needs("pyarrow", "read LeRobot", "parquet"):
                 from kineme.io.lerobot import episodes, motions
             self._lerobot = episodes
+            self._numbers = info.read_episodes(path, info.read_info(path)).numbers.tolist()
+            self.total = len(self._numbers)
             try:
                 self.corrections.add(
                     Annotation(self.name, f"episode {motion.episode}", *motion[1:6])
@@ -94,9 +105,9 @@ class OpenedRecordings:
         self._videos: dict[int, dict[str, info.Video]] | None = None  # by number and camera
         self._turn = Lock()
 
-    def close(self) -> None:
-        """Read no more."""
-        self.reader.shutdown(wait=False, cancel_futures=True)
+    def __contains__(self, key: str) -> bool:
+        """Tell whether a key is of an episode, rather than of a file that was sent."""
+        return key.startswith(KEY)
 
     def episode(self, key: str) -> Opened:
         """Return the episode of a key."""
@@ -200,7 +211,7 @@ class OpenedRecordings:
             try:
                 return episode_recordings(opened.episode, opened.recording, columns)
             except KinemeError:
-                default = next(iter(heads_of(opened.episode).values()), ())
+                default = next(iter(opened.heads.values()), ())
                 if columns or not default:
                     raise
                 return episode_recordings(opened.episode, opened.recording, default)

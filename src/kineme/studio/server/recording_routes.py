@@ -192,18 +192,25 @@ def learn(studio: Writes, key: records.RecordingKey, body: LearnRequest) -> dict
     else:
         rows = (LabelRow(span.begin, span.end, span.label, "", "", k + 1) for k, span in enumerate(body.spans))
         pieces = labeled_pieces(_one(studio, key, body), LabelTable("of the spans", tuple(rows), True))
-    columns = _columns_of(studio.recordings(key), body.channels) if body.channels else None
+    columns = _columns_of(_read(studio, key), body.channels) if body.channels else None
     report = learn_recordings(studio.library.store, pieces, {"columns": columns})
     return {"ids": report.ids.tolist(), "version": report.version}
 
 
+def _read(studio: Studio, key: str, columns: Sequence[str] = (), check: Callable[[], object] = go_on) -> Recordings:
+    """Read a file that was sent, or an episode of what was opened, in these columns or in those that are found."""
+    if studio.opened is not None and key in studio.opened:
+        return studio.opened.recordings(key, columns)
+    return studio.uploads.recordings(key, columns, check)
+
+
 def _in_columns(studio: Studio, key: str, body: ChannelChoice, check: Callable[[], object] = go_on) -> Recordings:
     """Read all tables of a file, in the columns that are asked for, or those of the library where it has them."""
-    read = studio.recordings(key, check=check)
+    read = _read(studio, key, check=check)
     ours = () if studio.library.channels is None else recorded_names(studio.library.channels)
     wanted = _columns_of(read, body.channels) if body.channels else list(ours)
     if wanted != _columns(read) and (body.channels or (ours and set(ours) <= set(_columns(read)))):
-        read = studio.recordings(key, wanted, check)
+        read = _read(studio, key, wanted, check)
     return read
 
 

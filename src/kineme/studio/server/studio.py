@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 import sqlite3
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
@@ -16,13 +16,12 @@ from fastapi import Depends, Request
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from kineme.errors import KinemeError
-from kineme.io.reading.merge_files import Recordings
 from kineme.library.library import ActionLibrary
 from kineme.library.storage.symbols import Symbol
 from kineme.recognition.early.stream import Live
-from kineme.studio.server.opened import KEY, OpenedRecordings
+from kineme.studio.server.opened import OpenedRecordings
 from kineme.studio.server.refusals import ConflictError, MissingError, StoppedError
-from kineme.studio.server.uploads import Uploads, go_on
+from kineme.studio.server.uploads import Uploads
 from kineme.studio.snapshot import DRAWN
 
 PERIOD = 0.2  # seconds between looks whether the client is there
@@ -59,6 +58,7 @@ class Studio:
         self.writers = asyncio.Semaphore(_WRITERS)
         self.live = ThreadPoolExecutor(max(2, os.cpu_count() or 1), "kineme-live")
         self.long = ThreadPoolExecutor(_LONG, "kineme-long")
+        self.reader = ThreadPoolExecutor(1, "kineme-episodes")
         self.works = Works()
         self.warm = -1  # the version of the library that recognition is prepared for
         self._warming: list[Thread] = []
@@ -70,23 +70,18 @@ class Studio:
     def close(self) -> None:
         """Close the library, once no thread reads or writes it, and delete what was sent."""
         self.works.close()
-        for pool in (self.live, self.long):
+        for pool in (self.live, self.long, self.reader):
             pool.shutdown(wait=False, cancel_futures=True)
         self.library.close()
         self.uploads.close()
-        if self.opened is not None:
-            self.opened.close()
 
-    def recordings(self, key: str, columns: Sequence[str] = (), check: Callable[[], object] = go_on) -> Recordings:
-        """Read a file that was sent, or an episode of what was opened, in these columns or in those that are found."""
-        if self.opened is not None and key.startswith(KEY):
-            check()
-            return self.opened.recordings(key, columns)
-        return self.uploads.recordings(key, columns, check)
+    async def reading(self, act: Callable[..., Result], *arguments: object) -> Result:
+        """Return the result of `act`, which reads episodes; those who wait for the disk hold no thread of requests."""
+        return await asyncio.get_running_loop().run_in_executor(self.reader, act, *arguments)
 
     def join(self) -> None:
         """Wait for what its threads still compute, after it is closed; the threads that they share end with them."""
-        for pool in (self.live, self.long):
+        for pool in (self.live, self.long, self.reader):
             pool.shutdown()
         for thread in self._warming:
             thread.join()
