@@ -32,6 +32,8 @@ FILM = """async () => {
   return btoa([...bytes].map((byte) => String.fromCharCode(byte)).join(""));
 }"""
 
+#: The last span of the second episode, as the server has it.
+KEPT = "async () => (await (await fetch('/api/episodes')).json()).episodes[1].spans.at(-1)"
 NAMED = "document.querySelectorAll('#spans tbody tr').length"
 ROW = "#spans tbody tr:nth-child({}) {}"
 
@@ -90,6 +92,9 @@ def test_episodes_are_found_corrected_played_and_saved(opened, film, tmp_path):
     page.fill(ROW.format(3, "input[type=text]"), "a new one")  # unknown is named
     page.locator(ROW.format(3, "input[type=text]")).press("Tab")
     assert page.inner_text(ROW.format(3, "td:nth-child(4)")) == "–"
+    settle(page)
+    span = page.evaluate(KEPT)
+    assert (span["label"], span["p"], span["confidence"]) == ("a new one", None, 1)
     before = float(page.input_value(ROW.format(3, "td:nth-child(2) input")))
     x, y = center(page, "[data-key='edge end']")
     page.mouse.move(x, y)
