@@ -193,7 +193,6 @@ def name_in_place(folder: Path, motions: Motions) -> int:
     with _alone(folder):
         version = _name_frames(folder, info, motions, lance)
         declare(folder, info)
-        bring_to_disk(folder / PENDING)
         os.replace(folder / PENDING, folder / DETAILS)
         if (folder / _META).is_dir():
             paths = [Path(name).relative_to("meta").as_posix() for name in (MARKER, DETAILS)]
@@ -230,6 +229,7 @@ def _name_frames(folder: Path, info: Info, motions: Motions, lance: Any) -> int:
         rows = new_rows(folder, info, info.data_path, motions, own)
         beside = folder / f"{PENDING}.new"
         write_details(beside, [*((k, motions[k], rows[k]) for k in rows), *leftover])
+        bring_to_disk(beside)
         os.replace(beside, folder / PENDING)
         try:
             return _commit(folder / info.data_path, rows, own, lance)
