@@ -183,7 +183,7 @@ def test_where_nothing_can_be_written_it_says_so(client, monkeypatch):
     def full(path, data):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("kineme.studio.server.corrections.write_atomically", full)
+    monkeypatch.setattr("kineme.studio.server.opened.write_atomically", full)
     refused = client.post("/api/episodes/corrections", json={})
     assert (refused.status_code, "download it instead" in refused.json()["error"]) == (400, True)
     assert client.get("/api/episodes").json()["saved"] is False

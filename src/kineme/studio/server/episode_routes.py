@@ -10,8 +10,7 @@ from pydantic import BaseModel, Field
 
 from kineme.errors import KinemeError
 from kineme.studio.server import records
-from kineme.studio.server.corrections import Lane
-from kineme.studio.server.opened import KEY, Opened, OpenedRecordings
+from kineme.studio.server.opened import KEY, Lane, Opened, OpenedRecordings
 from kineme.studio.server.recording_routes import PlotOut, Span, SpannedOut, UploadOut, plot_of, table_of
 from kineme.studio.server.refusals import MissingError, in_studio_words
 from kineme.studio.server.studio import Reads, Studio, Writes

@@ -1,8 +1,8 @@
-"""Recordings that the studio was started with: episodes, read when they are looked at and let go again."""
+"""Recordings that the studio was started with: episodes, read when they are looked at, and what was found in them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from threading import Lock
@@ -16,14 +16,15 @@ from kineme.io.reading.episode_recordings import episode_recordings, heads_of
 from kineme.io.reading.episodes import EPISODE_LAYOUTS, read_episodes
 from kineme.io.reading.formats import entries_of, name_of
 from kineme.io.reading.merge_files import Recordings
+from kineme.io.reading.read_labels import read_labels
 from kineme.io.reading.recordings import read_recordings
 from kineme.io.records import needs
-from kineme.io.writing.annotations import Annotation
+from kineme.io.writing.annotations import Annotation, to_csv
 from kineme.movements.channels.channel import recorded_names
 from kineme.movements.episodes import Episode
 from kineme.movements.trajectories.movements import axis_names
-from kineme.studio.server.corrections import Corrections
-from kineme.studio.server.refusals import MissingError
+from kineme.reporting.atomic import write_atomically
+from kineme.studio.server.refusals import ConflictError, MissingError
 
 KEY = "episode-"  # what the key of an episode begins with; its position follows
 HELD = 2**28  # bytes of the episodes that are kept in memory
@@ -33,6 +34,95 @@ _VIDEOS = ((4, b"ftyp", "video/mp4"), (0, b"\x1a\x45\xdf\xa3", "video/webm"))
 _HEAD = 16  # bytes that are read to know them
 
 _NOTHING = np.zeros(0)
+
+
+_ENDING = "-corrections.csv"
+
+Movement = tuple[str, str]  # recording and place, as in `Annotation`
+
+
+class Lane(NamedTuple):
+    """The symbols of one movement."""
+
+    annotations: tuple[Annotation, ...] = ()
+    corrected: bool = False  # whether a person has changed any, and so has looked at all of them
+
+
+class Corrections:
+    """The lanes of all movements that were looked at, and a table of those that a person corrected.
+
+    The table lies beside what was opened, ``demos-corrections.csv`` beside ``demos``; one that is there is read, so
+    that work goes on where it ended. A table that is none is left as it is, and is a problem.
+    """
+
+    def __init__(self, opened: Path) -> None:
+        # Beside a link, not what it leads to; two dots and nothing are no names.
+        place = opened.resolve() if opened.name in {"", ".."} else opened.absolute()
+        self.path = place.with_name(f"{place.name if place.is_dir() else place.stem}{_ENDING}")
+        self.problem: str | None = None
+        self.saved = True  # whether the table holds all that was corrected
+        self._lanes: dict[Movement, Lane] = {}
+        self._bytes: bytes | None = None  # of the table as it was read or written last; None: there was none
+        self._turn = Lock()
+        if self.path.is_file():
+            self._read()
+
+    def _read(self) -> None:
+        lanes: dict[Movement, list[Annotation]] = {}
+        try:
+            for row in read_labels(self.path).rows:
+                note = Annotation(row.recording, row.place, row.start, row.end, row.label, float("nan"), 1.0)
+                lanes.setdefault((row.recording, row.place), []).append(note)
+            self._bytes = self.path.read_bytes()
+        except (DataError, OSError) as error:
+            self.problem = f"{self.path.name} was not read: {error}"
+        else:
+            self._lanes = {key: Lane(tuple(notes), corrected=True) for key, notes in lanes.items()}
+
+    def add(self, annotations: Iterable[Annotation]) -> None:
+        """Add what is known of movements from elsewhere, but for those that a person corrected."""
+        lanes: dict[Movement, list[Annotation]] = {}
+        for note in annotations:
+            lanes.setdefault((note.recording, note.place), []).append(note)
+        self._lanes = {key: Lane(tuple(notes)) for key, notes in lanes.items()} | self._lanes
+
+    def lane(self, movement: Movement) -> Lane:
+        """Return what was found in a movement, or corrected."""
+        return self._lanes.get(movement, Lane())
+
+    def put(self, movement: Movement, lane: Lane) -> None:
+        """Replace it."""
+        with self._turn:
+            self.saved = self.saved and not (lane.corrected or self.lane(movement).corrected)
+            self._lanes[movement] = lane
+
+    @property
+    def corrected(self) -> Sequence[Annotation]:
+        """All annotations of movements that a person corrected, in the order in which they were first looked at."""
+        return [note for lane in list(self._lanes.values()) if lane.corrected for note in lane.annotations]
+
+    def table(self) -> bytes:
+        """Return `corrected` as `kineme annotate` writes annotations."""
+        return to_csv(self.corrected)
+
+    def save(self, *, replace: bool = False) -> Path:
+        """Write the table; a ConflictError if it was written by others since, unless that is to be replaced."""
+        with self._turn:
+            now = self.path.read_bytes() if self.path.is_file() else None
+            if now is not None and now != self._bytes and not replace:
+                raise ConflictError(
+                    f"expected {self.path.name} as this studio left it, others wrote it; replace it, or download yours"
+                )
+            table = self.table()
+            try:
+                write_atomically(self.path, table)
+            except OSError as error:
+                raise DataError(
+                    f"expected to write {self.path.name} beside the recordings, got: {error.strerror or error}; "
+                    "download it instead"
+                ) from error
+            self._bytes, self.saved = table, True
+        return self.path
 
 
 class Opened(NamedTuple):
@@ -219,8 +309,18 @@ class OpenedRecordings:
         sources = [source._replace(path=opened.recording) for source in read.sources]
         if opened.place not in (places := [source.place for source in sources]):
             raise DataError(f"expected the movement {opened.place!r} in {opened.recording} in these columns, got none")
-        k = places.index(opened.place)
-        return replace(read, demonstrations=read.demonstrations[k : k + 1], sources=(sources[k],), problems=())
+        return movement_of(replace(read, sources=tuple(sources), problems=()), places.index(opened.place))
+
+
+def movement_of(read: Recordings, k: int) -> Recordings:
+    """Return one of the movements that were read."""
+    return replace(read, demonstrations=read.demonstrations[k : k + 1], sources=read.sources[k : k + 1])
+
+
+def columns_of(read: Recordings) -> list[str]:
+    """Return the names of the columns, as they were recorded."""
+    demos = read.demonstrations
+    return list(axis_names(demos.n_dims) if demos.channels is None else recorded_names(demos.channels))
 
 
 def opened_at(path: Path) -> Iterator[Opened]:
@@ -240,7 +340,7 @@ def opened_at(path: Path) -> Iterator[Opened]:
             number += 1
             continue
         demos = read.demonstrations
-        names = axis_names(demos.n_dims) if demos.channels is None else recorded_names(demos.channels)
+        names = columns_of(read)
         values, stamps = demos.positions if demos.channels is None else demos.recorded, demos.movements.stamps
         for k, source in enumerate(read.sources):
             rows = slice(demos.offsets[k], demos.offsets[k + 1])

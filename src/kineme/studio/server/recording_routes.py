@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Header, Request
@@ -14,9 +13,8 @@ from kineme.io.reading.merge_files import Recordings
 from kineme.io.reading.read_labels import LabelRow, LabelTable, labeled_pieces
 from kineme.library.annotate import annotate
 from kineme.library.learn import learn_recordings
-from kineme.movements.channels.channel import recorded_names
-from kineme.movements.trajectories.movements import axis_names
 from kineme.studio.server import records
+from kineme.studio.server.opened import columns_of, movement_of
 from kineme.studio.server.refusals import in_studio_words
 from kineme.studio.server.studio import Reads, Studio, Work, Writes, while_wanted
 from kineme.studio.server.uploads import go_on
@@ -207,9 +205,9 @@ def _read(studio: Studio, key: str, columns: Sequence[str] = (), check: Callable
 def _in_columns(studio: Studio, key: str, body: ChannelChoice, check: Callable[[], object] = go_on) -> Recordings:
     """Read all tables of a file, in the columns that are asked for, or those of the library where it has them."""
     read = _read(studio, key, check=check)
-    ours = () if studio.library.channels is None else recorded_names(studio.library.channels)
-    wanted = _columns_of(read, body.channels) if body.channels else list(ours)
-    if wanted != _columns(read) and (body.channels or (ours and set(ours) <= set(_columns(read)))):
+    ours = [column for channel in studio.library.channels or () for column in channel.columns]
+    wanted = _columns_of(read, body.channels) if body.channels else ours
+    if wanted != columns_of(read) and (body.channels or (ours and set(ours) <= set(columns_of(read)))):
         read = _read(studio, key, wanted, check)
     return read
 
@@ -221,16 +219,11 @@ def _one(studio: Studio, key: str, body: ChannelChoice, check: Callable[[], obje
     k = 0 if table is None else names.index(table) if table in names else -1
     if k < 0:
         raise SpecificationError(f"expected one of the tables {', '.join(names[:20])}, got {table!r}")
-    return replace(read, demonstrations=read.demonstrations[k : k + 1], sources=read.sources[k : k + 1])
+    return movement_of(read, k)
 
 
 def _name(read: Recordings, k: int) -> str:
     return read.sources[k].place or read.sources[k].path
-
-
-def _columns(read: Recordings) -> list[str]:
-    demos = read.demonstrations
-    return list(axis_names(demos.n_dims) if demos.channels is None else recorded_names(demos.channels))
 
 
 def _columns_of(read: Recordings, names: Sequence[str]) -> list[str]:
@@ -243,9 +236,7 @@ def table_of(read: Recordings, k: int) -> dict[str, Any]:
     """Describe a recording of a file."""
     demos, duration = read.demonstrations, float(read.demonstrations.durations[k])
     n = int(demos.offsets[k + 1] - demos.offsets[k])
-    channels = [
-        {"name": name, "kind": "position", "columns": [name], "unit": None} for name in axis_names(demos.n_dims)
-    ]
+    channels = [{"name": name, "kind": "position", "columns": [name], "unit": None} for name in columns_of(read)]
     if demos.channels is not None:
         channels = [channel._asdict() for channel in demos.channels]
     return {
@@ -263,4 +254,4 @@ def plot_of(read: Recordings, k: int, width: int = _PLOTTED // 2) -> dict[str, A
     demos = read.demonstrations
     rows = slice(demos.offsets[k], demos.offsets[k + 1])
     values = (demos.positions if demos.channels is None else demos.recorded)[rows]
-    return records.plot(demos.movements.stamps[rows], values, _columns(read), width)
+    return records.plot(demos.movements.stamps[rows], values, columns_of(read), width)
