@@ -23,6 +23,7 @@ _TESTS = Path(__file__).parents[1] / "tests"
 sys.path += [str(_TESTS), str(_TESTS / "studio")]  # the hand of the tests draws, on the studio that they start
 
 from browser_samples import UNANSWERED, center, draw, letters, settle  # noqa: E402
+from episode_samples import FPS, write_episodes  # noqa: E402
 from studio_samples import running  # noqa: E402
 
 from browsing import wait_until  # noqa: E402
@@ -145,7 +146,44 @@ def pictures(folder: Path) -> None:
                 page.wait_for_timeout(1000)
                 save(page, folder / f"studio-{view}.png")
                 page.close()
+        picture_of_episodes(browser, actions, folder / "studio-episodes.png")
         picture_of_page(browser, actions, folder / "page.png")
+
+
+def episodes_of_letters() -> list[Any]:
+    """Positions (T, 2) of episodes of two to four letters, one of no known name, with rests between them."""
+    names = ["GShape", "Zshape", "Sine", "Angle", "Worm", "PShape", "CShape"]
+    episodes = []
+    for k in range(12):
+        parts = [np.zeros((FPS // 2, 2))]
+        for shape in (names[(k * 3 + j) % len(names)] for j in range(2 + k % 3)):
+            movement = letters(shape)[5 + k % 2]
+            times = np.arange(movement.times[0], movement.times[-1], 1 / FPS)
+            path = np.column_stack([np.interp(times, movement.times, x) for x in movement.positions.T])
+            parts.append(path - path[0] + parts[-1][-1])
+            parts.append(np.repeat(parts[-1][-1:], FPS // 2, axis=0))
+        episodes.append(np.concatenate(parts))
+    return episodes
+
+
+def picture_of_episodes(browser: Any, actions: Path, path: Path) -> None:
+    """Episodes of a data set as strips, one of them open, a span of no known name chosen."""
+    demos = write_episodes(actions.parent / "letters", episodes_of_letters(), tasks=("Write a word", "Write another"))
+    with running(actions, "--recordings", demos) as studio:
+        page = browser.new_page(viewport={**SIZE, "height": 1050})
+        page.add_init_script(UNANSWERED)
+        page.goto(f"{studio.address}/?token={studio.token}#recordings")
+        wait_until(page, "!document.getElementById('episodes').hidden")
+        page.click("#spot-page")
+        wait_until(page, "document.getElementById('episodes-state').textContent.startsWith('Looked')")
+        page.locator(".strip").nth(4).click()
+        wait_until(page, "document.querySelectorAll('#spans tbody tr').length > 0")
+        page.locator("[data-key='span 0 name']").evaluate("field => field.focus({ preventScroll: true })")
+        page.locator("#playhead").evaluate("field => { field.value = 3; field.dispatchEvent(new Event('input')); }")
+        settle(page)
+        page.wait_for_timeout(1000)
+        save(page, path)
+        page.close()
 
 
 def picture_of_page(browser: Any, actions: Path, path: Path) -> None:

@@ -72,7 +72,7 @@ def read_file(path: Path, relative: Path, layout: Layout, follow_links: bool = F
     if form.read_path is None:
         return read_bytes(data, relative, layout, statuses[0].st_mtime)
     size, mtime = sum(status.st_size for status in statuses), max(status.st_mtime for status in statuses)
-    read = _parsed(partial(form.read_path, path), form, relative, layout)
+    read = parsed_file(partial(form.read_path, path), form, relative, layout)
     try:
         checksum = _sha256(parts, path) if read.block.labels else ""
     except OSError as error:  # it was there a moment ago
@@ -87,7 +87,7 @@ def read_bytes(data: bytes, relative: Path, layout: Layout, mtime: float = 0.0) 
         reason = f"expected the path of a {relative.suffix} file, got its bytes alone; write them to a file"
         read = FileRead(as_text(relative), []).without_movements(reason)
     else:
-        read = _parsed(partial(_expanded, form.read_bytes, data), form, relative, layout)
+        read = parsed_file(partial(_expanded, form.read_bytes, data), form, relative, layout)
     return read._replace(sha256=hashlib.sha256(data).hexdigest(), size=len(data), mtime=mtime)
 
 
@@ -96,7 +96,7 @@ def _expanded(read: Callable[[bytes, Layout], Parsed], data: bytes, layout: Layo
     return read(data, layout)
 
 
-def _parsed(parse: Callable[[Layout], Parsed], form: Format, relative: Path, layout: Layout) -> FileRead:
+def parsed_file(parse: Callable[[Layout], Parsed], form: Format, relative: Path, layout: Layout) -> FileRead:
     """Check what a reader returns, or return the problem with it."""
     name = as_text(relative)
     try:
