@@ -1,19 +1,21 @@
-"""Simulated arms at work with known truth: episodes of reach, grasp, carry, pour, wipe and press, as teleoperation records them.
+"""Simulated arms at work with known truth: reach, grasp, carry, pour, wipe and press, as teleoperation records them.
 
-The path of the tip is composed of movements of least jerk and followed by kineme's Panda in MuJoCo kinematically: resolved rates
-(one step of damped least squares in each sample) from the forward kinematics and Jacobians of MuJoCo, no dynamics, so that an
-hour of one arm takes some 20 s. The third joint is held, as the arm has six joints and a gripper: seven channels. What a real
-arm adds is put on top: the follower's lag (two first orders), offset and quantization, the tremor and drift of the operator's hand,
-hesitations, pauses and overshoot. Of two arms, the right one works and the left one steadies: it drifts, and moves a little along.
+The path of the tip is composed of movements of least jerk. kineme's Panda follows it in MuJoCo kinematically: resolved
+rates (one step of damped least squares in each sample) from MuJoCo's forward kinematics and Jacobians, no dynamics, so
+that an hour of one arm takes some 20 s. The third joint is held: six joints and a gripper are seven channels. What a
+real arm adds is put on top: the follower's lag (two first orders), offset and quantization, tremor and drift of the
+operator's hand, hesitations, pauses and overshoot. Of two arms the right one works; the left one steadies: it drifts,
+and moves a little along.
 
-Truth is what the script says, in the time of the follower: (start, end, name). Between movements the arm rests or opens its fingers,
-which has no name. A reach goes to a thing, or back home, with empty fingers.
+Truth is what the script says, in the time of the follower: (start, end, name). Between movements the arm rests or opens
+its fingers, which has no name. A reach goes to a thing, or back home, with empty fingers.
 """
 
 from __future__ import annotations
 
 import csv
 import json
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -116,13 +118,17 @@ def work_episodes(
 
 
 def examples(works: Iterable[Work], each: int = 3) -> list[tuple[int, float, float, str]]:
-    """List (episode, start, end, name) of the first movements of each kind, one of an episode while there are enough."""
-    truth = [(work.episode.number, *row) for work in works for row in work.truth]
+    """List (episode, start, end, name) of some movements of each kind, by different operators while there are enough."""
+    rows = [(work.operator, (work.episode.number, *row)) for work in works for row in work.truth]
     chosen: list[tuple[int, float, float, str]] = []
     for kind in KINDS:
-        rows = [row for row in truth if row[3] == kind]
-        first = [row for i, row in enumerate(rows) if row[0] not in {other[0] for other in rows[:i]}]
-        chosen += (first + [row for row in rows if row not in first])[:each]
+        seen: Counter[int] = Counter()
+        turns = []
+        for person, row in rows:
+            if row[3] == kind:
+                turns.append((seen[person], row))
+                seen[person] += 1
+        chosen += [row for _, row in sorted(turns)[:each]]
     return sorted(chosen)
 
 
@@ -341,14 +347,11 @@ def _episode(number: int, task: str, person: int, setup: Rig, arms: int, rng: np
     script.hold(rng.uniform(0.3, 1.0))
     path = np.concatenate(script.parts)
     joints = _followed(path)
-    leader = [np.column_stack((joints + _shaken(joints.shape, style.tremor, rng), path[:, 5]))]
+    ways = [np.column_stack((joints, path[:, 5]))]
     if arms == 2:
-        along = 0.06 * _delayed(joints - joints[0], 0.6)
-        leader.append(
-            np.column_stack(
-                (_READY[_MOVED] + along + _shaken(joints.shape, style.tremor, rng), np.full(len(path), 0.5))
-            )
-        )
+        along = _READY[_MOVED] + 0.06 * _delayed(joints - joints[0], 0.6)
+        ways.append(np.column_stack((along, np.full(len(path), 0.5))))
+    leader = [way + _shaken(way.shape, style.tremor, rng) for way in ways]
     offset = np.append(setup.offset, 0.01)
     state = np.column_stack([_delayed(side, setup.lag) + offset for side in leader])
     state, action = np.round(state / _STEP) * _STEP, np.round(np.column_stack(leader) / _STEP) * _STEP
