@@ -1,0 +1,490 @@
+"""Checks of an episode of robot data: one table of what each measures, what that means, and what to do about it.
+
+A check is a pure function of a `Motion`. It returns some values, of the whole episode, of each channel, or of its
+beginning and its end, each with the stretch of time that it is about. Values of checks whose `side` is "exact" count
+contradictions; all others say nothing before they are compared with those of other episodes, see
+`kineme.audit.calibrate`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.movements.episodes import Episode
+from kineme.movements.preparation.resample import resample_by_arc_length
+from kineme.validation import Array
+
+#: Samples of the path that stands for an episode, evenly spaced by arc length.
+PATH = 64
+FEWEST_FRAMES = 8
+_MOST_CHANNELS = 64
+_SET_ASIDE = re.compile(r"(^|[./])(next|reward|done|success|timestamp|mask|\w*index)([./]|$)")  # no motion
+_ACTION = re.compile(r"(^|[./])actions?([./]|$)")
+_WINDOW = 0.4  # [s], over which an arm that stays within the next two rests
+_NOISE, _REST = 5.0, 0.01  # of the standard deviation of the noise, and of the channel's range
+_TREMBLING = 2.0  # of the extent of the quietest windows
+_LONGEST_LAG = 0.5  # [s]
+_LEAST_CORRELATION = 0.3  # below, the action is not what the state follows
+_EDGE = 0.1  # [s], of the beginning and of the end
+_REPEATED = 12  # frames: longer runs of equal ones are rests
+_JERK_WINDOW = 1.0  # [s]
+
+
+class Motion(NamedTuple):
+    """An episode, prepared for all checks: what moves in it, free of gaps."""
+
+    episode: Episode
+    times: Array  # (T,) [s], from 0; counted by the rate where the stamps do not increase
+    step: float  # [s]
+    state: Array  # (T, d), missing values replaced by those before
+    names: tuple[str, ...]  # of the channels
+    scale: Array  # (d,), range of the channel from its 5 % to its 95 % quantile, at least 20 times the noise
+    noise: Array  # (d,), standard deviation of what changes from frame to frame without being motion, at least 1/2 step
+    lead: Array | None  # (T, d), the action, where it commands the channels of the state
+    late: float  # frames by which the state follows the action; NaN where it does not
+
+    @property
+    def seconds(self) -> float:
+        """Duration [s]."""
+        return len(self.state) * self.step
+
+    def frames(self, seconds: float) -> int:
+        """Return a number of frames, at least 1 and at most half of the episode."""
+        return max(1, min(round(seconds / self.step), len(self.state) // 2))
+
+
+class Measure(NamedTuple):
+    """Values of a check (k,), and the stretches [s] that they are about (k, 2)."""
+
+    values: Array
+    spans: Array
+
+
+class Check(NamedTuple):
+    """A row of `CHECKS`."""
+
+    name: str
+    measure: Callable[[Motion], Measure]
+    side: str  # which values tell of a fault: "upper", "both" for either side, "exact" for all above 0
+    least: float  # difference between values that means nothing; of the channel's range if relative
+    columns: tuple[str, ...]  # of the values, each repeated for all channels where there are more values
+    relative: bool  # values are in the unit of their channel, and compared in multiples of its usual range
+    shown: Callable[[float], float]  # a value as it is shown
+    words: str  # of the finding, with {channel}, {value}, {usual} and {column}
+    meaning: str
+    remedy: str
+
+
+def features_of(episode: Episode) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the features that say how the robot moved, and those that say how it was commanded."""
+    names = [name for name, values in episode.signals.items() if values.ndim == 2 and not _SET_ASIDE.search(name)]
+    actions = tuple(name for name in names if _ACTION.search(name))
+    others = [name for name in names if name not in actions]
+    states = [name for name in others if re.search(r"(^|[./])(state|qpos)$", name)] or others
+    return tuple(states) or actions, actions
+
+
+def motion_of(episode: Episode) -> Motion | None:
+    """Prepare an episode for its checks; None if it has too few frames, or no feature of numbers."""
+    states, actions = features_of(episode)
+    if len(episode) < FEWEST_FRAMES or not states:
+        return None
+    state = _filled(np.concatenate([episode.signals[name] for name in states], axis=1)[:, :_MOST_CHANNELS])
+    names = [entry or name for name in states for entry in episode.names.get(name, ()) or (name,)]
+    steps = np.diff(episode.times)
+    step = float(np.median(steps)) if np.isfinite(steps).all() else np.nan
+    if not step > 0:
+        step = 1 / episode.fps if episode.fps > 0 else 1.0
+    even = not (np.isfinite(steps).all() and (steps > 0).all())
+    times = np.arange(len(episode)) * step if even else episode.times - episode.times[0]
+    changes = np.abs(np.diff(state, axis=0))
+    least = np.where(changes > 0, changes, np.inf).min(axis=0)  # that the sensor resolves; infinite if it never changes
+    noise = np.median(np.abs(np.diff(state, 3, axis=0)), axis=0) * 1.4826 / np.sqrt(20)
+    noise = np.maximum(noise, np.where(np.isinf(least), 0.0, 0.5 * least))
+    low, high = np.quantile(state, [0.05, 0.95], axis=0)
+    scale = np.maximum(high - low, 20 * noise)
+    lead = None
+    for name in actions:
+        if state.shape == episode.signals[name].shape and name not in states:
+            lead = _filled(episode.signals[name])
+            break
+    scale = np.where(scale > 0, scale, np.inf)
+    late = np.nan if lead is None else frames_behind(lead / scale, state / scale, round(_LONGEST_LAG / step))
+    return Motion(episode, times, step, state, tuple(names[: state.shape[1]]), scale, noise, lead, late)
+
+
+def path_of(motion: Motion) -> NDArray[np.float32]:
+    """Return (d, 64) values of the channels at even shares of the way: independent of tempo and of pauses."""
+    smooth = _smoothed(motion.state / np.where(np.isinf(motion.scale), 1.0, motion.scale), motion.frames(0.2))
+    shifts = np.where(np.isinf(motion.scale), 1.0, motion.scale)[:, None]
+    return np.asarray(resample_by_arc_length(smooth.T[None].copy(), PATH)[0] * shifts, dtype=np.float32)
+
+
+def _filled(values: Array) -> Array:
+    """Replace what is not finite by the value before, at the beginning by the first finite one, else by 0."""
+    finite = np.isfinite(values)
+    if finite.all():
+        return np.asarray(values, dtype=np.float64)
+    rows = np.maximum.accumulate(np.where(finite, np.arange(len(values))[:, None], -1), axis=0)
+    rows = np.where(rows < 0, finite.argmax(axis=0), rows)
+    return np.nan_to_num(np.take_along_axis(values, rows, axis=0), nan=0.0, posinf=0.0, neginf=0.0)
+
+
+def _smoothed(values: Array, width: int) -> Array:
+    """Average (T, d) over windows of `width` frames, shorter at the ends."""
+    sums = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
+    centers = np.arange(len(values))
+    first, last = np.maximum(centers - width // 2, 0), np.minimum(centers + width // 2 + 1, len(values))
+    return np.asarray((sums[last] - sums[first]) / (last - first)[:, None])
+
+
+def runs(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Return (n, 2) first indices of the runs of True, and those behind them."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
+    return np.asarray(edges.reshape(-1, 2))
+
+
+def _longest_runs(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Return (d, 2) first and last of the longest run of True in each column of (T, d); 0, 0 without one."""
+    length = len(mask) + 1
+    ends = runs(np.concatenate([mask, np.zeros((1, mask.shape[1]), dtype=np.bool_)]).T.ravel())
+    columns, longest = ends[:, 0] // length, np.zeros((mask.shape[1], 2), dtype=np.intp)
+    order = np.argsort(ends[:, 1] - ends[:, 0], kind="stable")  # the longest is written last
+    longest[columns[order]] = (ends - columns[:, None] * length)[order]
+    return longest
+
+
+def _over_all(motion: Motion, *values: float) -> Measure:
+    """Return values of the whole episode."""
+    return Measure(np.array(values, dtype=float), np.tile([0.0, motion.times[-1]], (len(values), 1)))
+
+
+def _at(motion: Motion, values: Array, first: NDArray[np.intp], last: NDArray[np.intp]) -> Measure:
+    """Return values with their stretches as indices of frames, the last one included."""
+    ends = np.clip(np.stack([first, last], axis=1), 0, len(motion.times) - 1)
+    return Measure(np.asarray(values, dtype=float), motion.times[ends])
+
+
+def _counted(motion: Motion, mask: NDArray[np.bool_], count: float | None = None) -> Measure:
+    """Return how many frames a mask names, or another count of them, from the first to the last of these."""
+    rows = np.flatnonzero(mask)
+    if not len(rows):
+        return _over_all(motion, 0.0)
+    return _at(motion, np.array([len(rows) if count is None else count]), rows[:1], rows[-1:])
+
+
+def problems(motion: Motion) -> Measure:
+    """Count what the reader of the data set could not read or reconcile."""
+    return _over_all(motion, len(motion.episode.problems))
+
+
+def values(motion: Motion) -> Measure:
+    """Count frames in which some feature is not a finite number."""
+    columns = [motion.episode.signals[name] for names in features_of(motion.episode) for name in names]
+    return _counted(motion, ~np.isfinite(np.concatenate(columns, axis=1)).all(axis=1))
+
+
+def rate(motion: Motion) -> Measure:
+    """Return the stored rate [1/s], from the median step, where it differs from the declared one by 5 %; else 0."""
+    declared = motion.episode.fps
+    wrong = declared > 0 and abs(np.log(motion.step * declared)) > np.log(1.05)
+    return _over_all(motion, 1 / motion.step if wrong else 0.0)
+
+
+def stamps(motion: Motion) -> Measure:
+    """Count stamps that are missing, repeat the one before, or go back."""
+    return _counted(motion, np.append(False, ~(np.diff(motion.episode.times) > 0)))
+
+
+def gaps(motion: Motion) -> Measure:
+    """Count missing frames: ``sum(round(step / median step) - 1)`` over steps of more than 1.5 median ones.
+
+    Where steps vary by themselves, as of a busy computer, only steps beyond six of their standard deviations count.
+    """
+    steps = np.diff(motion.episode.times)
+    spread = 1.4826 * np.median(np.abs(steps - motion.step))
+    long = np.nan_to_num(steps) > max(1.5 * motion.step, motion.step + 6 * spread)
+    missing = float((np.round(steps[long] / motion.step) - 1).sum()) if long.any() else 0.0
+    return _counted(motion, np.append(False, long) | np.append(long, False), missing)
+
+
+def repeats(motion: Motion) -> Measure:
+    """Count frames in which no channel changes at all although the arm moves before and after, log(1 + n)."""
+    change = np.abs(np.diff(motion.state, axis=0))
+    speed = (change / motion.scale).max(axis=1)
+    ends = runs(~change.any(axis=1))
+    ends = ends[(ends[:, 0] > 0) & (ends[:, 1] < len(speed)) & (ends[:, 1] - ends[:, 0] <= _REPEATED)]
+    moving = 0.3 * np.median(speed[speed > 0]) if speed.any() else np.inf
+    ends = ends[np.minimum(speed[ends[:, 0] - 1], speed[np.minimum(ends[:, 1], len(speed) - 1)]) > moving]
+    if not len(ends):
+        return _over_all(motion, 0.0)
+    count = np.log1p((ends[:, 1] - ends[:, 0]).sum())
+    return _at(motion, np.array([count]), ends[:1, 0], ends[-1:, 1])
+
+
+def spikes(motion: Motion) -> Measure:
+    """Return log of the largest step of each channel beyond the median of five around it, over its usual difference.
+
+    A spike has two such steps, a jump one; of an onset of motion, the median follows. The usual difference is the
+    noise, at least 0.002 of the channel's range.
+    """
+    steps = np.diff(motion.state, axis=0)
+    beyond = np.abs(steps[2:-2] - _median_of_five(steps))
+    rows = beyond.argmax(axis=0)
+    usual = np.where(np.isinf(motion.scale), 1.0, np.maximum(motion.noise * np.sqrt(2), 0.002 * motion.scale))
+    return _at(motion, np.log(1 + beyond.max(axis=0) / usual), rows + 2, rows + 3)
+
+
+def _median_of_five(steps: Array) -> Array:
+    """Return medians (T - 4, d) of five rows around each, by a network of comparisons: ten times as fast as sorting."""
+    a, b, c, d, e = (steps[k : len(steps) - 4 + k] for k in range(5))
+    low, high = np.maximum(np.minimum(a, b), np.minimum(c, d)), np.minimum(np.maximum(a, b), np.maximum(c, d))
+    return np.asarray(np.maximum(np.minimum(low, high), np.minimum(np.maximum(low, high), e)))
+
+
+def jerk(motion: Motion) -> Measure:
+    """Return ``log(rms jerk / rms velocity)`` [1/s^2] of the whole, and of the second in which it is largest.
+
+    All channels together, each in multiples of its range. Duration, amplitude and rests do not count, as they do in the
+    dimensionless jerk: N. Hogan, D. Sternad, "Sensitivity of smoothness measures to movement duration, amplitude, and
+    arrests", J. Motor Behavior 41(6), 2009.
+    """
+    smooth = _smoothed(motion.state / motion.scale, 3)
+    power = (np.diff(smooth, 3, axis=0) ** 2).sum(axis=1, keepdims=True)
+    speed = (np.diff(smooth, axis=0) ** 2).sum(axis=1).mean()
+    if not speed > 0:
+        return _over_all(motion, np.nan, np.nan)
+    width = motion.frames(_JERK_WINDOW)
+    windows = _smoothed(power, width)[:, 0]
+    worst = int(windows.argmax())
+    ratios = np.log(np.maximum(np.array([power.mean(), windows[worst]]) / speed, 1e-30)) / 2 - 2 * np.log(motion.step)
+    return _at(motion, ratios, np.array([0, worst - width // 2]), np.array([len(smooth), worst + width // 2]))
+
+
+def _doubled(width: int) -> list[int]:
+    """Return shifts by which the extremes of neighbors become those of windows of `width` + 1 frames."""
+    shifts = [1 << k for k in range((width + 1).bit_length() - 1)]
+    return [*shifts, width - sum(shifts)] if width > sum(shifts) else shifts
+
+
+def idle(motion: Motion) -> Measure:
+    """Return log of the longest rest [s] at the beginning, in between, and at the end, plus half a second.
+
+    The arm rests where each channel stays, for 0.4 s, within five standard deviations of its noise, a hundredth of its
+    range, or twice the extent that it exceeds in 95 % of such windows, whichever is the most: hands tremble at rest.
+    """
+    width = motion.frames(_WINDOW)
+    high, low = motion.state, motion.state
+    for shift in _doubled(width):
+        high, low = np.maximum(high[shift:], high[:-shift]), np.minimum(low[shift:], low[:-shift])
+    extents = high - low
+    limit = np.maximum(_NOISE * motion.noise, _REST * np.where(np.isinf(motion.scale), 0.0, motion.scale))
+    limit = np.maximum(limit, _TREMBLING * np.quantile(extents, 0.05, axis=0))
+    ends = runs((extents <= limit).all(axis=1)) + [0, width]
+    at_start, at_end = ends[:, 0] == 0, ends[:, 1] >= len(motion.state)
+    spans = np.zeros((3, 2), dtype=np.intp)
+    for k, chosen in enumerate((ends[at_start], ends[~at_start & ~at_end], ends[at_end & ~at_start])):
+        if len(chosen):
+            spans[k] = chosen[np.diff(chosen, axis=1)[:, 0].argmax()]
+    return _at(motion, np.log(0.5 + (spans[:, 1] - spans[:, 0]) * motion.step), *spans.T)
+
+
+def frozen(motion: Motion) -> Measure:
+    """Return log of the longest time [s] in which each channel does not change at all, plus 0.2 s."""
+    ends = _longest_runs(np.diff(motion.state, axis=0) == 0)
+    return _at(motion, np.log(0.2 + (ends[:, 1] - ends[:, 0]) * motion.step), *ends.T)
+
+
+def still(motion: Motion) -> Measure:
+    """Return minus log of each channel's extent, largest minus smallest value."""
+    return _over_all(motion, *-np.log(np.ptp(motion.state, axis=0) + 1e-9))
+
+
+def extremes(motion: Motion) -> Measure:
+    """Return the largest value of each channel, and minus the smallest."""
+    both = np.concatenate([motion.state, -motion.state], axis=1)
+    rows = both.argmax(axis=0)
+    return _at(motion, both.max(axis=0), rows, rows)
+
+
+def ends(motion: Motion) -> Measure:
+    """Return where each channel is at the beginning, and where at the end: means over a tenth of a second."""
+    n = motion.frames(_EDGE)
+    first, last = np.zeros(motion.state.shape[1], dtype=np.intp), np.full(motion.state.shape[1], len(motion.state))
+    places = np.concatenate([motion.state[:n].mean(axis=0), motion.state[-n:].mean(axis=0)])
+    return _at(motion, places, np.concatenate([first, last - n]), np.concatenate([first + n, last]))
+
+
+def cut(motion: Motion) -> Measure:
+    """Return log of the speed in the first and in the last tenth of a second, in the mean speed, plus 0.05."""
+    n = motion.frames(_EDGE)
+    moved = np.array([motion.state[n] - motion.state[0], motion.state[-1] - motion.state[-1 - n]]) / motion.scale / n
+    mean = np.linalg.norm(np.diff(motion.state[::n], axis=0) / motion.scale / n, axis=1).mean()
+    if not mean > 0:
+        return _over_all(motion, np.nan, np.nan)
+    length = len(motion.state)
+    spans = np.array([[0, length - n], [n, length]])
+    return _at(motion, np.log(0.05 + np.linalg.norm(moved, axis=1) / mean), *spans)
+
+
+def duration(motion: Motion) -> Measure:
+    """Return log of the duration [s]."""
+    return _over_all(motion, np.log(motion.seconds))
+
+
+def speed(motion: Motion) -> Measure:
+    """Return log of the speed that is exceeded a tenth of the time, in ranges of the channels per second."""
+    n = motion.frames(_EDGE)
+    moved = np.linalg.norm((motion.state[n:] - motion.state[:-n]) / motion.scale, axis=1)
+    return _over_all(motion, np.log(np.quantile(moved, 0.9) / (n * motion.step) + 1e-6))
+
+
+def frames_behind(leader: Array, follower: Array, most: int) -> float:
+    """Return frames by which one motion (T, d) follows another: argmax of the correlation of velocities, by a parabola.
+
+    NaN where velocities correlate by less than 0.3, or most at a lag of `most` frames.
+    """
+    lead, follow = np.diff(leader, axis=0), np.diff(follower, axis=0)
+    most = max(1, min(most, len(lead) // 2))
+    size = 1 << (len(lead) + most).bit_length()
+    spectrum = (np.fft.rfft(lead, size, axis=0).conj() * np.fft.rfft(follow, size, axis=0)).sum(axis=1)
+    products = np.roll(np.fft.irfft(spectrum, size), most)[: 2 * most + 1]
+    energy = np.sqrt((lead**2).sum() * (follow**2).sum())
+    top = int(products.argmax())
+    if not energy > 0 or products[top] < _LEAST_CORRELATION * energy or top in (0, 2 * most):
+        return np.nan
+    before, peak, after = products[top - 1 : top + 2]
+    return top - most + 0.5 * float((before - after) / (before - 2 * peak + after))
+
+
+def lag(motion: Motion) -> Measure:
+    """Return the time [s] by which the state follows the action, see `frames_behind`."""
+    return _over_all(motion, motion.late * motion.step)
+
+
+def offset(motion: Motion) -> Measure:
+    """Return for each channel the median of state minus action at their lag."""
+    behind = _behind(motion)
+    return _over_all(motion, *(np.full(motion.state.shape[1], np.nan) if behind is None else np.median(behind, axis=0)))
+
+
+def following(motion: Motion) -> Measure:
+    """Return log of the largest mean distance over a second of state and action at their lag and offset, in ranges."""
+    behind = _behind(motion)
+    if behind is None:
+        return _over_all(motion, np.nan)
+    away = np.abs(behind - np.median(behind, axis=0)) / motion.scale
+    width = motion.frames(_JERK_WINDOW)
+    windows = _smoothed(away, width).max(axis=1)
+    worst = np.array([windows.argmax()])
+    return _at(motion, np.log(1e-3 + windows.max(keepdims=True)), worst - width // 2, worst + width // 2)
+
+
+def _behind(motion: Motion) -> Array | None:
+    """Return state minus action (n, d) at their lag; None where they have none."""
+    if motion.lead is None or np.isnan(motion.late):
+        return None
+    k, n = round(motion.late), len(motion.state)
+    return motion.state[max(k, 0) : n + min(k, 0)] - motion.lead[max(-k, 0) : n - max(k, 0)]
+
+
+def _is(value: float) -> float:
+    return value
+
+
+#: All checks of one episode; what compares it with others, `unlike`, is in `kineme.audit.calibrate`.
+CHECKS: tuple[Check, ...] = (
+    Check(
+        "problems", problems, "exact", 0.0, ("",), False, _is, "{problems}",
+        "The files contradict themselves.", "Record the episode again, or leave it out.",
+    ),
+    Check(
+        "values", values, "exact", 0.0, ("",), False, _is, "{value:.0f} frames hold values that are no finite numbers",
+        "A sensor or a conversion failed.", "Leave the episode out; most training code spreads one NaN over all weights.",
+    ),
+    Check(
+        "rate", rate, "exact", 0.0, ("",), False, _is,
+        "frames come at {value:.4g} per second, the data set declares {fps:.4g}",
+        "Velocities and horizons of actions are wrong by the ratio.", "Declare the true rate, or resample the episode.",
+    ),
+    Check(
+        "stamps", stamps, "exact", 0.0, ("",), False, _is, "{value:.0f} stamps are missing, repeat, or go back",
+        "Frames were stored twice or in another order.", "Drop the repeated frames, or leave the episode out.",
+    ),
+    Check(
+        "gaps", gaps, "exact", 0.0, ("",), False, _is, "{value:.0f} frames are missing between stamps",
+        "The recorder lost frames.", "Leave the episode out, or interpolate short gaps.",
+    ),
+    Check(
+        "repeats", repeats, "upper", 0.7, ("",), False, np.expm1, "{value:.0f} frames repeat the one before in mid motion",
+        "A slow sensor was stored at a higher rate, or frames were stored twice.", "Drop them, or lower the rate.",
+    ),
+    Check(
+        "spikes", spikes, "upper", 0.3, ("",), False, lambda value: np.expm1(value),
+        "{channel} jumps within one frame, {value:.0f} times its noise (usual: {usual:.0f})",
+        "A glitch of a sensor, or frames that are missing although stamps go on.",
+        "Leave the episode out, or repair the samples.",
+    ),
+    Check(
+        "jerk", jerk, "upper", 0.1, ("over all", "at its worst"), False, np.exp,
+        "{value:.0f} times as much jerk as speed [1/s^2], {column} (usual: {usual:.0f})",
+        "Shaky teleoperation, collisions, or a controller that oscillates.", "Look at the stretch; record it again.",
+    ),
+    Check(
+        "idle", idle, "upper", 0.2, ("at the beginning", "in between", "at the end"), False,
+        lambda value: np.exp(value) - 0.5, "rests for {value:.1f} s {column} (usual: {usual:.1f} s)",
+        "A policy learns to wait.", "Trim the beginning and the end; split the episode, or leave it out.",
+    ),
+    Check(
+        "frozen", frozen, "upper", 0.3, ("",), False, lambda value: np.exp(value) - 0.2,
+        "{channel} keeps one value for {value:.1f} s (usual: {usual:.1f} s)",
+        "The sensor or its bus stood still while the arm went on.", "Leave the episode out; check the cable.",
+    ),
+    Check(
+        "still", still, "upper", 0.3, ("",), False, lambda value: np.exp(-value),
+        "{channel} moves by {value:.3g} in all (usual: {usual:.3g})",
+        "A gripper that never closes, or a joint that was not connected.", "See if the task was done at all.",
+    ),
+    Check(
+        "range", extremes, "upper", 0.05, ("high", "low"), True, np.abs,
+        "{channel} reaches {value:.3g}, far from where others turn ({usual:.3g})",
+        "Another calibration, channels in another order, or a collision.", "Compare the calibration of that day.",
+    ),
+    Check(
+        "place", ends, "both", 0.05, ("begins", "ends"), True, _is, "{channel} {column} at {value:.3g} (usual: {usual:.3g})",
+        "The episode begins or ends elsewhere: cut off, or not brought to its end.", "See if the task was finished.",
+    ),
+    Check(
+        "cut", cut, "upper", 0.3, ("first", "last"), False, lambda value: np.exp(value) - 0.05,
+        "in its {column} tenth of a second the arm moves at {value:.1f} times its mean speed (usual: {usual:.1f})",
+        "The recording began late or was stopped early.", "Leave the episode out if the task is not finished.",
+    ),
+    Check(
+        "duration", duration, "both", 0.1, ("",), False, np.exp, "lasts {value:.1f} s (usual: {usual:.1f} s)",
+        "Cut off, forgotten to stop, another task, or another rate.", "Look at its end.",
+    ),
+    Check(
+        "speed", speed, "both", 0.05, ("",), False, np.exp,
+        "moves {value:.2g} ranges of its channels in a second (usual: {usual:.2g})",
+        "Another rate than declared, or another manner.", "Compare stamps with a clock; record in one tempo.",
+    ),
+    Check(
+        "lag", lag, "both", 0.005, ("",), False, _is, "the state follows the action after {value:.3f} s (usual: {usual:.3f} s)",
+        "Clocks or buffers differ: actions are paired with the wrong observations.", "Shift the action, or leave it out.",
+    ),
+    Check(
+        "offset", offset, "both", 0.01, ("",), True, _is,
+        "{channel} is {value:+.3g} from its action all the time (usual: {usual:+.3g})",
+        "Leader and follower were calibrated differently.", "Calibrate again; subtract the offset.",
+    ),
+    Check(
+        "following", following, "upper", 0.2, ("",), False, lambda value: np.exp(value) - 1e-3,
+        "a channel is {value:.0%} of its range from its action for a second (usual: {usual:.0%})",
+        "The follower was held, lost its load, or ran into something.", "Look at the stretch.",
+    ),
+)  # fmt: skip
