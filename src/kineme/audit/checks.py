@@ -69,7 +69,7 @@ class Check(NamedTuple):
     """A row of `CHECKS`."""
 
     name: str
-    measure: Callable[[Motion], Measure]
+    measure: Callable[[Motion], Measure] | None  # None: of its way among others, `kineme.audit.calibrate.unlike`
     side: str  # which values tell of a fault: "upper", "both" for either side, "exact" for all above 0
     least: float  # difference between values that means nothing; of the channel's range if relative
     columns: tuple[str, ...]  # of the values, each repeated for all channels where there are more values
@@ -397,7 +397,7 @@ def _is(value: float) -> float:
     return value
 
 
-#: All checks of one episode; what compares it with others, `unlike`, is in `kineme.audit.calibrate`.
+#: All checks. The first contradict what the data set declares; the others are compared.
 CHECKS: tuple[Check, ...] = (
     Check(
         "problems", problems, "exact", 0.0, ("",), False, _is, "{problems}",
@@ -486,5 +486,15 @@ CHECKS: tuple[Check, ...] = (
         "following", following, "upper", 0.2, ("",), False, lambda value: np.exp(value) - 1e-3,
         "a channel is {value:.0%} of its range from its action for a second (usual: {usual:.0%})",
         "The follower was held, lost its load, or ran into something.", "Look at the stretch.",
+    ),
+    Check(
+        "unlike", None, "upper", 0.05, ("",), False, np.exp,
+        "its way is {value:.2g} ranges from the nearest of its task (usual: {usual:.2g})",
+        "Another task than it says, a failed attempt, or a manner of its own.", "See what was done; correct the task.",
+    ),
+    Check(
+        "task", None, "upper", 0.05, ("",), False, np.exp,
+        "its way is {value:.2g} times as far from its own task as from another (usual: {usual:.2g})",
+        "It carries the name of another task.", "See what was done; correct the task.",
     ),
 )  # fmt: skip
