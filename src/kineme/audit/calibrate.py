@@ -29,7 +29,7 @@ from kineme.sampling import evenly_spaced
 from kineme.validation import Array
 
 FEWEST_OF_TASK = 5  # episodes: with fewer, nobody can tell what is usual for the task
-_MIDDLE, _UPPER = 0.5, 0.8  # quantiles that tell the law
+_MIDDLE, _UPPER = 0.5, (0.8, 0.9)  # quantiles that tell the law
 _NEAREST = 3  # others whose distance counts: with one, two episodes that are wrong alike would vouch for each other
 _COMPARED = 200  # episodes of a task that each is compared with, at most, evenly spaced
 _ELSEWHERE = 20  # episodes of each other task, at most
@@ -78,8 +78,11 @@ def evidence_of(values: Array, groups: Groups, least: float = 0.0) -> Array:
     """
     result = np.zeros(values.shape)
     for rows in groups:
-        middle, upper = _quantiles(values[rows], _MIDDLE), _quantiles(values[rows], _UPPER)
-        step = np.maximum(upper - middle, least) / math.log((1 - _MIDDLE) / (1 - _UPPER)) * (1 + len(rows) ** -0.5)
+        middle, slopes = _quantiles(values[rows], _MIDDLE), []
+        for upper in _UPPER:
+            away = np.maximum(_quantiles(values[rows], upper) - middle, least)
+            slopes.append(away / math.log((1 - _MIDDLE) / (1 - upper)))
+        step = np.maximum(*slopes) * (1 + len(rows) ** -0.5)
         with np.errstate(invalid="ignore", divide="ignore"):
             ratio = np.where(values[rows] > middle, (values[rows] - middle) / np.maximum(step, 1e-12), 0.0)
         result[rows] = np.where(ratio > 0, math.log(2) + ratio, 0.0)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.movements.episodes import Episode
-from kineme.movements.preparation.resample import resample_by_arc_length
+from kineme.movements.preparation.resample import arc_length_phase, resample_by_phase
 from kineme.validation import Array
 
 #: Samples of the path that stands for an episode, evenly spaced by arc length.
@@ -26,6 +26,7 @@ _MOST_CHANNELS = 64
 _SET_ASIDE = re.compile(r"(^|[./])(next|reward|done|success|timestamp|mask|\w*index)([./]|$)")  # no motion
 _ACTION = re.compile(r"(^|[./])actions?([./]|$)")
 _WINDOW = 0.4  # [s], over which an arm that stays within the next two rests
+_MOVING = 30.0  # standard deviations of the noise: a channel whose range is less does not move
 _NOISE, _REST = 5.0, 0.01  # of the standard deviation of the noise, and of the channel's range
 _TREMBLING = 2.0  # of the extent of the quietest windows
 _LONGEST_LAG = 0.5  # [s]
@@ -43,7 +44,7 @@ class Motion(NamedTuple):
     step: float  # [s]
     state: Array  # (T, d), missing values replaced by those before
     names: tuple[str, ...]  # of the channels
-    scale: Array  # (d,), range of the channel from its 5 % to its 95 % quantile, at least 20 times the noise
+    scale: Array  # (d,), range of the channel from its 5 % to its 95 % quantile; infinite below 30 times the noise
     noise: Array  # (d,), standard deviation of what changes from frame to frame without being motion, at least 1/2 step
     lead: Array | None  # (T, d), the action, where it commands the channels of the state
     late: float  # frames by which the state follows the action; NaN where it does not
@@ -107,22 +108,21 @@ def motion_of(episode: Episode) -> Motion | None:
     noise = np.median(np.abs(np.diff(state, 3, axis=0)), axis=0) * 1.4826 / np.sqrt(20)
     noise = np.maximum(noise, np.where(np.isinf(least), 0.0, 0.5 * least))
     low, high = np.quantile(state, [0.05, 0.95], axis=0)
-    scale = np.maximum(high - low, 20 * noise)
+    scale = np.where(high - low > _MOVING * noise, high - low, np.inf)
     lead = None
     for name in actions:
         if state.shape == episode.signals[name].shape and name not in states:
             lead = _filled(episode.signals[name])
             break
-    scale = np.where(scale > 0, scale, np.inf)
     late = np.nan if lead is None else frames_behind(lead / scale, state / scale, round(_LONGEST_LAG / step))
     return Motion(episode, times, step, state, tuple(names[: state.shape[1]]), scale, noise, lead, late)
 
 
 def path_of(motion: Motion) -> NDArray[np.float32]:
     """Return (d, 64) values of the channels at even shares of the way: independent of tempo and of pauses."""
-    smooth = _smoothed(motion.state / np.where(np.isinf(motion.scale), 1.0, motion.scale), motion.frames(0.2))
-    shifts = np.where(np.isinf(motion.scale), 1.0, motion.scale)[:, None]
-    return np.asarray(resample_by_arc_length(smooth.T[None].copy(), PATH)[0] * shifts, dtype=np.float32)
+    smooth = _smoothed(motion.state, motion.frames(0.2)).T[None]
+    phase = arc_length_phase(smooth / motion.scale[:, None])
+    return np.asarray(resample_by_phase(smooth, phase, PATH)[0], dtype=np.float32)
 
 
 def _filled(values: Array) -> Array:
@@ -236,7 +236,7 @@ def spikes(motion: Motion) -> Measure:
     steps = np.diff(motion.state, axis=0)
     beyond = np.abs(steps[2:-2] - _median_of_five(steps))
     rows = beyond.argmax(axis=0)
-    usual = np.where(np.isinf(motion.scale), 1.0, np.maximum(motion.noise * np.sqrt(2), 0.002 * motion.scale))
+    usual = np.maximum(motion.noise * np.sqrt(2), np.where(np.isinf(motion.scale), 1e-9, 0.002 * motion.scale))
     return _at(motion, np.log(1 + beyond.max(axis=0) / usual), rows + 2, rows + 3)
 
 
@@ -273,7 +273,7 @@ def _doubled(width: int) -> list[int]:
 
 
 def idle(motion: Motion) -> Measure:
-    """Return log of the longest rest [s] at the beginning, in between, and at the end, plus half a second.
+    """Return log of the longest rest [s] at the beginning, in between, and at the end, plus a second.
 
     The arm rests where each channel stays, for 0.4 s, within five standard deviations of its noise, a hundredth of its
     range, or twice the extent that it exceeds in 95 % of such windows, whichever is the most: hands tremble at rest.
@@ -291,7 +291,7 @@ def idle(motion: Motion) -> Measure:
     for k, chosen in enumerate((ends[at_start], ends[~at_start & ~at_end], ends[at_end & ~at_start])):
         if len(chosen):
             spans[k] = chosen[np.diff(chosen, axis=1)[:, 0].argmax()]
-    return _at(motion, np.log(0.5 + (spans[:, 1] - spans[:, 0]) * motion.step), *spans.T)
+    return _at(motion, np.log1p((spans[:, 1] - spans[:, 0]) * motion.step), *spans.T)
 
 
 def frozen(motion: Motion) -> Measure:
@@ -436,8 +436,8 @@ CHECKS: tuple[Check, ...] = (
         "Shaky teleoperation, collisions, or a controller that oscillates.", "Look at the stretch; record it again.",
     ),
     Check(
-        "idle", idle, "upper", 0.2, ("at the beginning", "in between", "at the end"), False,
-        lambda value: np.exp(value) - 0.5, "rests for {value:.1f} s {column} (usual: {usual:.1f} s)",
+        "idle", idle, "upper", 0.35, ("at the beginning", "in between", "at the end"), False, np.expm1,
+        "rests for {value:.1f} s {column} (usual: {usual:.1f} s)",
         "A policy learns to wait.", "Trim the beginning and the end; split the episode, or leave it out.",
     ),
     Check(
