@@ -21,10 +21,16 @@ _V2 = "meta/episodes.jsonl"
 _V3 = "meta/episodes/*/*.parquet"
 _TASKS = ("meta/tasks.parquet", "meta/tasks.jsonl")
 _SHARD = ("data/chunk_index", "data/file_index")
+_OF_FILE = ("chunk_index", "file_index")  # which a data_path of version 3 names
+_FRAMES = "frames.lance"  # the only shard of a data set in Lance
 _LARGEST = 2**62
 _AN_EPISODE, _A_TASK = 200, 100  # bytes that one takes once it is read
 _AT_ONCE = 2**16  # rows
 _DAMAGED = "expected {} in the meta folder of a LeRobot data set, got a damaged file"
+
+_EXAMPLES = {
+    "data_path": "data/chunk-000/file-000.parquet", "video_path": "videos/top/chunk-000/file-000.mp4",
+}  # fmt: skip
 
 MARKER = "meta/info.json"
 COUNTERS = ("timestamp", "frame_index", "episode_index", "index", "task_index")  # features of every data set
@@ -32,7 +38,7 @@ _NUMBERS = ("float", "int", "uint", "bool")
 _WIDEST = 1000  # numbers in a frame; images have more
 _MOST_BYTES = 100_000_000
 _LONGEST_PATH = 1000  # characters
-_WIDE_FIELD = re.compile(r"\{[^}]*(\d{3}|\{)")  # in a data_path: {chunk_index:300000000} would be a text of 300 MB
+_WIDE_FIELD = re.compile(r"\{[^}]*(\d{3}|\{)")  # in a path: {chunk_index:300000000} would be a text of 300 MB
 
 
 class Info(NamedTuple):
@@ -44,6 +50,9 @@ class Info(NamedTuple):
     heads: dict[str, tuple[str, ...]]
     others: tuple[str, ...]  # features that cannot be coordinates: images, texts
     data_path: str  # where the shards are, in the syntax of `str.format`
+    video_path: str | None  # where the videos are, likewise; None where there are no files of videos
+    cameras: tuple[str, ...]  # features that are videos
+    storage: str  # "parquet" or "lance"
     episodes: int | None  # how many it says that there are
     chunk: int  # episodes in a chunk, for version 2
 
@@ -66,25 +75,41 @@ def read_info(folder: Path) -> Info:
     major = said.lstrip("v").partition(".")[0]
     if major not in ("2", "3"):
         raise DataError(f"expected a LeRobot data set of version 2 or 3, got {said}; convert it with LeRobot")
-    fps, path = description.get("fps"), description.get("data_path")
+    storage = description.get("storage_format", "parquet")
+    if storage not in ("parquet", "lance") or (storage, major) == ("lance", "2"):
+        raise DataError(f"expected a LeRobot data set in Parquet, or of version 3 in Lance, got {said} in {storage!r}")
+    fps = description.get("fps")
+    path = _FRAMES if storage == "lance" else description.get("data_path")
     if isinstance(fps, bool) or not isinstance(fps, (int, float)) or not 0 < fps < math.inf:
         raise DataError(f"expected fps above 0 in {MARKER}, got {fps!r}")
-    if not isinstance(path, str) or len(path) > _LONGEST_PATH:
-        raise DataError(f"expected a data_path of at most {_LONGEST_PATH} characters in {MARKER}, got {path!r:.80}")
-    if Path(path).is_absolute() or ".." in Path(path).parts or _WIDE_FIELD.search(path):
-        raise DataError(f"expected a data_path within the data set in {MARKER}, got {path!r}")
+    _check_path(path, "data_path")
+    videos = None if storage == "lance" else description.get("video_path")
+    if videos is not None:
+        _check_path(videos, "video_path")
     total, chunk = description.get("total_episodes"), description.get("chunks_size")
     heads = {name: entries for name, feature in features.items() if (entries := _entries(name, feature))}
     others = tuple(name for name in features if name not in heads and name not in COUNTERS)
+    cameras = tuple(name for name in others if _dtype(features[name]) == "video")
     return Info(
-        int(major), float(fps), heads, others, path, total if isinstance(total, int) else None,
-        chunk if isinstance(chunk, int) and chunk > 0 else 1000,
+        int(major), float(fps), heads, others, str(path), videos, cameras, storage,
+        total if isinstance(total, int) else None, chunk if isinstance(chunk, int) and chunk > 0 else 1000,
     )  # fmt: skip
+
+
+def _check_path(path: Any, key: str) -> None:
+    if not isinstance(path, str) or len(path) > _LONGEST_PATH:
+        raise DataError(f"expected a {key} of at most {_LONGEST_PATH} characters in {MARKER}, got {path!r:.80}")
+    if Path(path).is_absolute() or ".." in Path(path).parts or _WIDE_FIELD.search(path):
+        raise DataError(f"expected a {key} within the data set in {MARKER}, got {path!r}")
+
+
+def _dtype(feature: Any) -> str:
+    return str(feature.get("dtype")) if isinstance(feature, Mapping) else ""
 
 
 def _entries(name: str, feature: Any) -> tuple[str, ...]:
     """Name a feature's entries, with their units where it says them; none for images, texts and counters."""
-    if name in COUNTERS or not isinstance(feature, Mapping) or not str(feature.get("dtype")).startswith(_NUMBERS):
+    if name in COUNTERS or not _dtype(feature).startswith(_NUMBERS):
         return ()
     shape = feature.get("shape")
     if not isinstance(shape, list) or not all(isinstance(size, int) and size > 0 for size in shape):
@@ -113,7 +138,7 @@ class Episodes(NamedTuple):
 
     numbers: NDArray[np.int64]  # shape (n,)
     lengths: NDArray[np.int64]  # shape (n,)
-    shards: list[str]  # the file that holds each, relative to the data set
+    shards: list[str]  # the file or table that holds each, relative to the data set
     problems: list[str]  # what of meta/episodes could not be read
 
 
@@ -127,28 +152,59 @@ def read_episodes(folder: Path, info: Info) -> Episodes:
         numbers, lengths = columns
         names, places = ("episode_chunk", "episode_index"), (numbers // info.chunk, numbers)
     else:
-        numbers, lengths, *chunks_and_files = _table(folder, ("episode_index", "length", *_SHARD), problems)
-        names, places = ("chunk_index", "file_index"), tuple(chunks_and_files)
+        in_files = _SHARD if info.storage == "parquet" else ()
+        numbers, lengths, *chunks_and_files = _table(folder, ("episode_index", "length", *in_files), problems)
+        names, places = _OF_FILE, tuple(chunks_and_files)
     if not len(numbers):
         first = f"; the first problem: {problems[0]}" if problems else ""
         raise DataError(f"expected episodes in a LeRobot data set, got none in its meta folder{first}")
     order = np.argsort(numbers, kind="stable")
-    # The file of each episode; several episodes of one file share its text.
+    if info.storage == "lance":
+        return Episodes(numbers[order], lengths[order], [info.data_path] * len(numbers), problems)
+    fields = dict(zip(names, (place[order] for place in places), strict=True))
+    return Episodes(numbers[order], lengths[order], _paths(info.data_path, fields, "data_path"), problems)
+
+
+def _paths(template: str, fields: Mapping[str, NDArray[np.int64]], key: str) -> list[str]:
+    """Return the file of each episode from the numbers that a template names; episodes of one file share its text."""
     paths: dict[tuple[int, ...], str] = {}
     n_bytes = 0
-    shards = []
-    for place in zip(*(column.tolist() for column in [place[order] for place in places]), strict=True):
+    files = []
+    for place in zip(*(column.tolist() for column in fields.values()), strict=True):
         if place not in paths:
             try:
-                paths[place] = info.data_path.format(**dict(zip(names, place, strict=True)))
+                paths[place] = template.format(**dict(zip(fields, place, strict=True)))
             except (KeyError, IndexError, ValueError, AttributeError) as error:
-                raise DataError(
-                    f"expected a data_path such as data/chunk-000/file-000.parquet, got {info.data_path!r}"
-                ) from error
+                raise DataError(f"expected a {key} such as {_EXAMPLES[key]}, got {template!r}") from error
             n_bytes += len(paths[place])
             check_expanded(n_bytes, "a set of names of shards")
-        shards.append(paths[place])
-    return Episodes(numbers[order], lengths[order], shards, problems)
+        files.append(paths[place])
+    return files
+
+
+def read_videos(folder: Path, info: Info) -> dict[int, dict[str, str]]:
+    """Return number of an episode -> camera -> its file, relative to the data set, whether it is there or not.
+
+    Empty where the data set has no files of videos, or does not say which.
+    """
+    files: dict[int, dict[str, str]] = {}
+    for camera in info.cameras if info.video_path else ():
+        # The name of the camera goes in first: its braces, if it has any, must not count as fields.
+        template = str(info.video_path).replace("{video_key}", camera.replace("{", "{{").replace("}", "}}"))
+        with suppress(DataError):
+            if info.version == 2:
+                numbers = np.array(
+                    [row["episode_index"] for row in _lines(folder / _V2, ("episode_index",), [])], dtype=np.int64
+                )
+                fields = {"episode_chunk": numbers // info.chunk, "episode_index": numbers}
+            else:
+                columns = (f"videos/{camera}/chunk_index", f"videos/{camera}/file_index")
+                numbers, *places = _table(folder, ("episode_index", *columns), [])
+                fields = dict(zip(_OF_FILE, places, strict=True))
+            for number, path in zip(numbers.tolist(), _paths(template, fields, "video_path"), strict=True):
+                if ".." not in Path(path).parts and not Path(path).is_absolute():
+                    files.setdefault(number, {})[camera] = path
+    return files
 
 
 def read_tasks(folder: Path) -> tuple[dict[int, str], list[str]]:
