@@ -16,6 +16,7 @@ from kineme.cli.options import (
     heading,
     json_option,
     library_option,
+    rerun_option,
 )
 from kineme.cli.output import check_new, progress, say, table, write
 from kineme.cli.reading import layout_options, notes_beside, problem_lines, read, recordings_argument
@@ -47,6 +48,7 @@ def _format(text: str) -> str:
 )
 @json_option
 @click.option("--csv", "as_csv", is_flag=True, help="Answer in CSV.")
+@rerun_option
 @force_option
 def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, form: str | None, **options: Any) -> None:
     """Annotate RECORDINGS, files, folders or patterns of them, or - for CSV from the standard input: what happens when.
@@ -61,11 +63,14 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
     from kineme.io.reading.formats import expanded
     from kineme.io.reading.recordings import paths_of
     from kineme.io.writing.annotations import as_row, targets_of, to_csv, write_annotations
+    from kineme.io.writing.rerun import recording_scenes, write_rerun
     from kineme.library.annotate import annotate as find
     from kineme.library.library import ActionLibrary
     from kineme.recognition.answer import certainty
 
-    as_json, as_csv, force, error_rate = (options.pop(name) for name in ("as_json", "as_csv", "force", "error_rate"))
+    as_json, as_csv, force, rerun, error_rate = (
+        options.pop(name) for name in ("as_json", "as_csv", "force", "rerun", "error_rate")
+    )
     if as_csv and (as_json or output is not None):
         raise click.UsageError("expected --csv alone, or --json, or --output")
     if output is None and form is not None:
@@ -74,6 +79,7 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
     with ActionLibrary(folder, read_only=True) as library:
         parsed = read(recordings, options, library)
         movements = [(source.path, source.place) for source in parsed.sources]
+        check_new(rerun, force, *sources, *paths_of(recordings, parsed))
         if output is not None:
             for target in targets_of(output, sources, movements, form):
                 check_new(target, force, *sources, *paths_of(recordings, parsed))
@@ -87,6 +93,8 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
             report = find(library.store, parsed, error_rate, lambda done: bar.update(min(done, total) - bar.n))
         notes = notes_beside(parsed, options, library.channels)
     written = [] if output is None else write_annotations(output, report.annotations, sources, form, movements)
+    if rerun is not None:
+        written.append(write_rerun(rerun, recording_scenes(parsed, report.annotations), replace=force))
     is_guess = not report.calibrated
     data = {
         "annotations": [
