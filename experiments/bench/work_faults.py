@@ -1,7 +1,7 @@
-"""Faults planted in clean episodes of robot data, one function each; `severity` 1 is what should be found, 0.3 is slight.
+"""Faults planted in clean episodes of robot data, one function each; severity 1 is what should be found, 0.3 is slight.
 
-Every fault takes an episode, a random generator and a severity, and returns another episode with the same number: signals
-and time stamps as a data set would store them. Where truth moves with the frames, it is of no use afterwards.
+Every fault takes an episode, a random generator and a severity, and returns another episode with the same number:
+signals and time stamps as a data set would store them. The truth of its movements is of no use afterwards.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def wrong_fps_silently(episode: Episode, rng: np.random.Generator, severity: flo
 
 
 def jerk(episode: Episode, rng: np.random.Generator, severity: float = 1.0) -> Episode:
-    """Shake: jolts of the operator's hand, of 0.02 rad rms in 2 to 8 Hz, in a third of the episode; follower and leader."""
+    """Shake leader and follower: jolts of the hand, 0.02 rad rms of 2 to 8 Hz, in a third of the episode."""
     from scipy.signal import butter, sosfiltfilt
 
     n, d = episode.signals[STATE].shape
@@ -142,8 +142,8 @@ def swapped(episode: Episode, rng: np.random.Generator, severity: float = 1.0) -
 FAULTS: Mapping[str, Fault] = {
     fault.__name__: fault
     for fault in (
-        frozen, spike, dropped, dropped_silently, repeated, wrong_fps, wrong_fps_silently, jerk, idle, offset, lag, unlike,
-        truncated, swapped,
+        frozen, spike, dropped, dropped_silently, repeated, wrong_fps, wrong_fps_silently,
+        jerk, idle, offset, lag, unlike, truncated, swapped,
     )
 }  # fmt: skip
 
@@ -152,10 +152,8 @@ def plant(
     works: Sequence[Work], share: float, seed: int, faults: Sequence[str] = tuple(FAULTS), severity: float = 1.0
 ) -> Iterator[Planted]:
     """Yield the episodes of a set, a share of them with one fault each, the faults in turn."""
-    rng = np.random.default_rng([79, seed])
-    chosen = {
-        int(k): faults[i % len(faults)] for i, k in enumerate(rng.permutation(len(works))[: round(share * len(works))])
-    }
+    drawn = np.random.default_rng([79, seed]).permutation(len(works))[: round(share * len(works))]
+    chosen = {int(k): faults[i % len(faults)] for i, k in enumerate(drawn)}
     for k, work in enumerate(works):
         name = chosen.get(k)
         own = np.random.default_rng([80, seed, k])

@@ -30,12 +30,18 @@ class Boundaries(NamedTuple):
 
 
 class Names(NamedTuple):
-    """Segments of the truth: how many are overlapped best by a segment of at least half of the union, and named right."""
+    """Counts of segments of the truth, each beside the found one that shares most of the union with it."""
 
-    matched: int
-    right: int
     true: int
+    right: int  # the name is right
+    matched: int  # half of the union or more is shared
+    matched_right: int
     confused: Counter[tuple[str, str]]  # (true, given) -> how often; "unknown" for None, "missed" where none overlaps
+
+    @property
+    def accuracy(self) -> float:
+        """Share of all true segments that are named right."""
+        return self.right / max(1, self.true)
 
 
 def boundaries_of(segments: Iterable[Segment]) -> NDArray[np.float64]:
@@ -67,7 +73,7 @@ def score_boundaries(
 
 def score_names(truth: Sequence[Sequence[Segment]], found: Sequence[Sequence[Segment]]) -> Names:
     """Compare the name of each true segment with that of the found one that shares most of the union with it."""
-    matched = right = total = 0
+    matched = right = matched_right = total = 0
     confused: Counter[tuple[str, str]] = Counter()
     for true, segments in zip(truth, found, strict=True):
         for start, end, name in true:
@@ -81,7 +87,8 @@ def score_names(truth: Sequence[Sequence[Segment]], found: Sequence[Sequence[Seg
             confused[str(name), given] += 1
             right += given == name
             matched += shares[best] >= 0.5
-    return Names(matched, right, total, confused)
+            matched_right += shares[best] >= 0.5 and given == name
+    return Names(total, right, matched, matched_right, confused)
 
 
 def auroc(scores: Sequence[float], bad: Sequence[bool]) -> float:

@@ -118,7 +118,7 @@ def work_episodes(
 
 
 def examples(works: Iterable[Work], each: int = 3) -> list[tuple[int, float, float, str]]:
-    """List (episode, start, end, name) of some movements of each kind, by different operators while there are enough."""
+    """List (episode, start, end, name) of some movements of each kind, operators in turn."""
     rows = [(work.operator, (work.episode.number, *row)) for work in works for row in work.truth]
     chosen: list[tuple[int, float, float, str]] = []
     for kind in KINDS:
