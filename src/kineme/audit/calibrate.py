@@ -34,6 +34,7 @@ _NEAREST = 3  # others whose distance counts: with one, two episodes that are wr
 _COMPARED = 200  # episodes of a task that each is compared with, at most, evenly spaced
 _ELSEWHERE = 20  # episodes of each other task, at most
 _BLOCK = 256  # episodes that are compared at once
+_TIES = 1e-4  # of the sum of evidence: counts are often equal, and equal ones are all flagged or none
 _ROUNDED = 1e-9  # evidence
 
 Groups = list[NDArray[np.intp]]
@@ -95,7 +96,7 @@ def rank(evidence: Array, comparable: NDArray[np.bool_], groups: Groups, error_r
     Not `comparable` are those that contradict themselves: they are no measure of others, and have p = 1 here.
     """
     n = len(evidence)
-    largest = evidence.max(axis=1, initial=0.0)
+    largest = evidence.max(axis=1, initial=0.0) + _TIES * evidence.sum(axis=1)
     p_values, outlying = np.ones(n), np.zeros(n, dtype=np.bool_)
     rows = np.flatnonzero(comparable)
     if len(rows):

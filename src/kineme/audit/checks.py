@@ -34,6 +34,7 @@ _LEAST_CORRELATION = 0.3  # below, the action is not what the state follows
 _EDGE = 0.1  # [s], of the beginning and of the end
 _REPEATED = 12  # frames: longer runs of equal ones are rests
 _JERK_WINDOW = 1.0  # [s]
+_STEADY = 0.98  # share of the samples that spikes are not among
 
 
 class Motion(NamedTuple):
@@ -250,12 +251,13 @@ def _median_of_five(steps: Array) -> Array:
 def jerk(motion: Motion) -> Measure:
     """Return ``log(rms jerk / rms velocity)`` [1/s^2] of the whole, and of the second in which it is largest.
 
-    All channels together, each in multiples of its range. Duration, amplitude and rests do not count, as they do in the
+    All channels together, each in multiples of its range, without the largest 2 %, which are spikes. Duration, amplitude and rests do not count, as they do in the
     dimensionless jerk: N. Hogan, D. Sternad, "Sensitivity of smoothness measures to movement duration, amplitude, and
     arrests", J. Motor Behavior 41(6), 2009.
     """
     smooth = _smoothed(motion.state / motion.scale, 3)
     power = (np.diff(smooth, 3, axis=0) ** 2).sum(axis=1, keepdims=True)
+    power = np.minimum(power, np.quantile(power, _STEADY))
     speed = (np.diff(smooth, axis=0) ** 2).sum(axis=1).mean()
     if not speed > 0:
         return _over_all(motion, np.nan, np.nan)
@@ -347,9 +349,12 @@ def speed(motion: Motion) -> Measure:
 def frames_behind(leader: Array, follower: Array, most: int) -> float:
     """Return frames by which one motion (T, d) follows another: argmax of the correlation of velocities, by a parabola.
 
-    NaN where velocities correlate by less than 0.3, or most at a lag of `most` frames.
+    Velocities are cut at what 2 % exceed, so that spikes do not count. NaN where they correlate by less than 0.3, or
+    most at a lag of `most` frames.
     """
     lead, follow = np.diff(leader, axis=0), np.diff(follower, axis=0)
+    largest = np.quantile(np.abs(np.concatenate([lead, follow])), _STEADY, axis=0)
+    lead, follow = np.clip(lead, -largest, largest), np.clip(follow, -largest, largest)
     most = max(1, min(most, len(lead) // 2))
     size = 1 << (len(lead) + most).bit_length()
     spectrum = (np.fft.rfft(lead, size, axis=0).conj() * np.fft.rfft(follow, size, axis=0)).sum(axis=1)
@@ -421,7 +426,7 @@ CHECKS: tuple[Check, ...] = (
         "The recorder lost frames.", "Leave the episode out, or interpolate short gaps.",
     ),
     Check(
-        "repeats", repeats, "upper", 0.7, ("",), False, np.expm1, "{value:.0f} frames repeat the one before in mid motion",
+        "repeats", repeats, "upper", 1.4, ("",), False, np.expm1, "{value:.0f} frames repeat the one before in mid motion",
         "A slow sensor was stored at a higher rate, or frames were stored twice.", "Drop them, or lower the rate.",
     ),
     Check(

@@ -53,6 +53,7 @@ class Reason(NamedTuple):
 
     check: str
     words: str
+    channel: str  # that it is about; empty of all
     start: float  # [s]
     end: float
     evidence: float  # minus the log of the share of good episodes, about; infinite of a contradiction
@@ -76,8 +77,8 @@ class Audit:
     """Result of `audit_episodes`.
 
     - `numbers` (n,): indices of all episodes; `p_values`, `evidence`, `flagged` (n,) are in the same order.
-    - `error_rate`: the stated share of good episodes that are flagged by chance; `attained` is what so many episodes
-      allow, at most that. 0 where there are too few to calibrate anything.
+    - `error_rate`: the stated share of good episodes that are flagged by chance; `by_chance` is the number of episodes
+      that this makes here, at most. 0 where there are too few to calibrate anything.
     - `findings`: those flagged, contradictions first, then the most unusual; where nothing is calibrated, also the
       ten most unusual, of the kind "ranked", which are not flagged.
     - `of_the_set`: contradictions that more than half of the episodes share, each a sentence; they flag none.
@@ -87,7 +88,7 @@ class Audit:
     seconds: float
     tasks: int
     error_rate: float
-    attained: float
+    by_chance: int
     p_values: Array
     evidence: Array
     flagged: NDArray[np.bool_]
@@ -97,7 +98,7 @@ class Audit:
     @property
     def calibrated(self) -> bool:
         """Tell if there are enough episodes for the stated rate."""
-        return self.attained > 0
+        return self.by_chance > 0
 
 
 class _Spool:
@@ -125,13 +126,18 @@ class _Measured:
         self.places: list[str] = []
         self.rates: list[float] = []
         self.problems: dict[int, str] = {}
+        self.unusable: list[int] = []  # episodes without motion that can be compared
+        self.notes: list[str] = []  # on the set
         self.names: tuple[str, ...] | None = None  # of the channels, those of the first episode that has some
         self.sizes: list[int] = []  # values of each check
         self.rows = bytearray()  # float32, of `sizes` values each
         self.spool: _Spool | None = None
 
     def add(self, episode: Episode) -> None:
-        """Measure an episode."""
+        """Measure an episode; of what belongs to none, which has a negative number, keep the problems."""
+        if episode.number < 0:
+            self.notes += [shortened(problem, _LONGEST) for problem in episode.problems]
+            return
         at, motion, problem = len(self.numbers), motion_of(episode), "; ".join(episode.problems)
         if motion is None:
             problem = problem or f"has {counted(len(episode), 'frame')} of motion; at least {FEWEST_FRAMES} are needed"
@@ -142,6 +148,8 @@ class _Measured:
             motion = None
         if problem:
             self.problems[at] = shortened(problem, _LONGEST)
+        if motion is None:
+            self.unusable.append(at)
         self.numbers.append(episode.number)
         self.seconds.append(motion.seconds if motion else len(episode) / episode.fps if episode.fps > 0 else 0.0)
         self.tasks.append(episode.task)
@@ -233,16 +241,12 @@ def audit_episodes(
     soft = [row.evidence for row in compared if row.check.side != "exact"]
     evidence = np.stack(soft, axis=1) if soft else np.zeros((len(broken), 0))
     ranking = rank(evidence, ~broken, groups, error_rate)
-    usable = int((~broken & ~ranking.outlying).sum())
-    attained = sum(
-        np.floor(error_rate * len(rows) + 1e-9) for rows in ([row[~broken[row]] for row in groups])
-    ) / max(usable, 1)  # fmt: skip
-    enough = attained > 0
-    flagged = broken | (((ranking.p_values <= error_rate + 1e-12) | ranking.outlying) & enough)
-    findings = _findings(measured, compared, broken, ranking, tasks, flagged)
+    by_chance = sum(int(error_rate * (~broken & ~ranking.outlying)[rows].sum() + 1e-9) for rows in groups)
+    flagged = broken | ((ranking.p_values <= error_rate + 1e-12) | ranking.outlying) & (by_chance > 0)
     return Audit(
-        np.array(measured.numbers), sum(measured.seconds), len(tasks), error_rate, min(attained, error_rate),
-        np.where(broken, 0.0, ranking.p_values), ranking.evidence, flagged, findings, of_the_set,
+        np.array(measured.numbers), sum(measured.seconds), len(tasks), error_rate, by_chance,
+        np.where(broken, 0.0, ranking.p_values), ranking.evidence, flagged,
+        _findings(measured, compared, broken, ranking, tasks, flagged), of_the_set,
     )  # fmt: skip
 
 
@@ -272,18 +276,22 @@ def _compared(
 
 def _contradictions(measured: _Measured, compared: list[_Compared]) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
     """Return which episodes contradict themselves (n,), and what more than half of the set does, which flags none."""
-    broken = np.zeros(len(measured.numbers), dtype=np.bool_)
-    broken[list(measured.problems)] = True
-    of_the_set = []
+    n = len(measured.numbers)
+    broken, of_the_set = np.zeros(n, dtype=np.bool_), list(measured.notes)
     for row in compared:
-        if row.check.side == "exact" and row.check.name != "problems":
-            wrong = np.isinf(row.evidence)
-            if wrong.mean() > _SHARED and len(wrong) > 1:
-                usual = float(np.median(row.values[wrong, 0]))
-                words = row.check.words.format(value=usual, fps=measured.rates[int(wrong.argmax())])
-                of_the_set.append(f"{row.check.name}: in {wrong.sum():,} of {counted(len(wrong), 'episode')}, {words}")
-                row.evidence[:] = 0.0
-            broken |= np.isinf(row.evidence)
+        if row.check.side != "exact":
+            continue
+        wrong = np.isinf(row.evidence)
+        if wrong.mean() > _SHARED and n > 1:
+            first = int(wrong.argmax())
+            words = row.check.words.format(
+                value=float(np.median(row.values[wrong, 0])), fps=measured.rates[first],
+                problems=measured.problems.get(first, ""),
+            )  # fmt: skip
+            of_the_set.append(f"{row.check.name}: in {wrong.sum():,} of {counted(n, 'episode')}, {words}")
+            row.evidence[:] = 0.0
+        broken |= np.isinf(row.evidence)
+    broken[list(measured.unusable)] = True
     return broken, tuple(of_the_set)
 
 
@@ -309,19 +317,20 @@ def _findings(
             usual[row.check.name, rows[0]] = np.nanmedian(row.values[rows], axis=0)
         names, heads = measured.names or ("",), row.check.columns
         size = max(1, row.values.shape[1] // len(heads))
+        channel = names[column % len(names)] if "{channel}" in row.check.words else ""
         words = row.check.words.format(
             value=row.check.shown(float(row.values[at, column])), problems=measured.problems.get(at, ""),
             usual=row.check.shown(float(usual[row.check.name, rows[0]][column])),
-            channel=names[column % len(names)], column=heads[column // size], fps=measured.rates[at],
+            channel=channel, column=heads[column // size], fps=measured.rates[at],
         )  # fmt: skip
         start, end = (0.0, measured.seconds[at]) if row.first < 0 else measured.stretch(at, row.first + column)
-        return Reason(row.check.name, words, start, end, float(row.evidence[at]))
+        return Reason(row.check.name, words, channel, start, end, float(row.evidence[at]))
 
     def finding(at: int) -> Finding:
         by_evidence = sorted(compared, key=lambda row: -row.evidence[at])
         reasons = [reason(row, at) for row in by_evidence if row.evidence[at] >= limit and row.evidence[at] > 0]
-        if at in measured.problems:
-            reasons = [Reason("problems", measured.problems[at], 0.0, measured.seconds[at], np.inf), *reasons]
+        if at in measured.problems and not any(reason.check == "problems" for reason in reasons):
+            reasons = [Reason("problems", measured.problems[at], "", 0.0, measured.seconds[at], np.inf), *reasons]
         kind = "contradiction" if broken[at] else "outlying" if ranking.outlying[at] else "unusual"
         return Finding(
             measured.numbers[at], measured.tasks[at], measured.places[at], measured.seconds[at],
