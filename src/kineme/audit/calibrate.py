@@ -5,8 +5,8 @@
    exponentially: the evidence ``e = log 2 + (v - m) / t`` is minus the logarithm of their share, with ``t`` from the
    value q that a fifth exceeds, ``t = (1 + 1 / sqrt(n)) (q - m) / log(5 / 2)``. Up to a fifth of the episodes may be
    bad before that changes much.
-2. The evidence of a check is its largest one over channels, and that of an episode its largest one over checks, each put
-   on this scale again: how many of them there are, and how they depend on each other, makes no difference.
+2. The evidence of a check is its largest one over channels, and that of an episode its largest one over checks, each
+   put on this scale again: how many there are, and how they depend on each other, makes no difference.
 3. Episodes that the procedure of Benjamini and Hochberg lists are "outlying", and compared with nobody. Among the n
    others, an episode has ``p = #{evidence >= its own} / n``: that of conformal prediction, with itself left out. Good
    episodes have p <= e in a share of at most e, whatever their law: it holds where the exponential does not.

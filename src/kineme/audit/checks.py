@@ -8,56 +8,21 @@ contradictions; all others say nothing before they are compared with those of ot
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.movements.episodes import Episode
-from kineme.movements.preparation.resample import arc_length_phase, resample_by_phase
+from kineme.audit.motion import STEADY, Motion, features_of, longest_runs, runs, smoothed
 from kineme.validation import Array
 
-#: Samples of the path that stands for an episode, evenly spaced by arc length.
-PATH = 64
-FEWEST_FRAMES = 8
-_MOST_CHANNELS = 64
-_SET_ASIDE = re.compile(r"(^|[./])(next|reward|done|success|timestamp|mask|\w*index)([./]|$)")  # no motion
-_ACTION = re.compile(r"(^|[./])actions?([./]|$)")
 _WINDOW = 0.4  # [s], over which an arm that stays within the next two rests
-_MOVING = 30.0  # standard deviations of the noise: a channel whose range is less does not move
 _NOISE, _REST = 5.0, 0.01  # of the standard deviation of the noise, and of the channel's range
 _TREMBLING = 2.0  # of the extent of the quietest windows
-_LONGEST_LAG = 0.5  # [s]
-_LEAST_CORRELATION = 0.3  # below, the action is not what the state follows
 _EDGE = 0.1  # [s], of the beginning and of the end
 _REPEATED = 12  # frames: longer runs of equal ones are rests
-_JERK_WINDOW = 1.0  # [s]
-_STEADY = 0.98  # share of the samples that spikes are not among
-
-
-class Motion(NamedTuple):
-    """An episode, prepared for all checks: what moves in it, free of gaps."""
-
-    episode: Episode
-    times: Array  # (T,) [s], from 0; counted by the rate where the stamps do not increase
-    step: float  # [s]
-    state: Array  # (T, d), missing values replaced by those before
-    names: tuple[str, ...]  # of the channels
-    scale: Array  # (d,), range of the channel from its 5 % to its 95 % quantile; infinite below 30 times the noise
-    noise: Array  # (d,), standard deviation of what changes from frame to frame without being motion, at least 1/2 step
-    lead: Array | None  # (T, d), the action, where it commands the channels of the state
-    late: float  # frames by which the state follows the action; NaN where it does not
-
-    @property
-    def seconds(self) -> float:
-        """Duration [s]."""
-        return len(self.state) * self.step
-
-    def frames(self, seconds: float) -> int:
-        """Return a number of frames, at least 1 and at most half of the episode."""
-        return max(1, min(round(seconds / self.step), len(self.state) // 2))
+_SECOND = 1.0  # [s]
 
 
 class Measure(NamedTuple):
@@ -72,92 +37,14 @@ class Check(NamedTuple):
 
     name: str
     measure: Callable[[Motion], Measure] | None  # None: of its way among others, `kineme.audit.calibrate.unlike`
-    side: str  # which values tell of a fault: "upper", "both" for either side, "exact" for all above 0
+    side: str  # which values tell of a fault: "upper", "lower", "both", or "exact" for all above 0
     least: float  # difference between values that means nothing; of the channel's range if relative
-    columns: tuple[str, ...]  # of the values, each repeated for all channels where there are more values
-    relative: bool  # values are in the unit of their channel, and compared in multiples of its usual range
-    shown: Callable[[float], float]  # a value as it is shown
     words: str  # of the finding, with {channel}, {value}, {usual} and {column}
     meaning: str
     remedy: str
-
-
-def features_of(episode: Episode) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the features that say how the robot moved, and those that say how it was commanded."""
-    names = [name for name, values in episode.signals.items() if values.ndim == 2 and not _SET_ASIDE.search(name)]
-    actions = tuple(name for name in names if _ACTION.search(name))
-    others = [name for name in names if name not in actions]
-    states = [name for name in others if re.search(r"(^|[./])(state|qpos)$", name)] or others
-    return tuple(states) or actions, actions
-
-
-def motion_of(episode: Episode) -> Motion | None:
-    """Prepare an episode for its checks; None if it has too few frames, or no feature of numbers."""
-    states, actions = features_of(episode)
-    if len(episode) < FEWEST_FRAMES or not states:
-        return None
-    state = _filled(np.concatenate([episode.signals[name] for name in states], axis=1)[:, :_MOST_CHANNELS])
-    names = [entry or name for name in states for entry in episode.names.get(name, ()) or (name,)]
-    steps = np.diff(episode.times)
-    step = float(np.median(steps)) if np.isfinite(steps).all() else np.nan
-    if not step > 0:
-        step = 1 / episode.fps if episode.fps > 0 else 1.0
-    even = not (np.isfinite(steps).all() and (steps > 0).all())
-    times = np.arange(len(episode)) * step if even else episode.times - episode.times[0]
-    changes = np.abs(np.diff(state, axis=0))
-    least = np.where(changes > 0, changes, np.inf).min(axis=0)  # that the sensor resolves; infinite if it never changes
-    noise = np.median(np.abs(np.diff(state, 3, axis=0)), axis=0) * 1.4826 / np.sqrt(20)
-    noise = np.maximum(noise, np.where(np.isinf(least), 0.0, 0.5 * least))
-    low, high = np.quantile(state, [0.05, 0.95], axis=0)
-    scale = np.where(high - low > _MOVING * noise, high - low, np.inf)
-    lead = None
-    for name in actions:
-        if state.shape == episode.signals[name].shape and name not in states:
-            lead = _filled(episode.signals[name])
-            break
-    late = np.nan if lead is None else frames_behind(lead / scale, state / scale, round(_LONGEST_LAG / step))
-    return Motion(episode, times, step, state, tuple(names[: state.shape[1]]), scale, noise, lead, late)
-
-
-def path_of(motion: Motion) -> NDArray[np.float32]:
-    """Return (d, 64) values of the channels at even shares of the way: independent of tempo and of pauses."""
-    smooth = _smoothed(motion.state, motion.frames(0.2)).T[None]
-    phase = arc_length_phase(smooth / motion.scale[:, None])
-    return np.asarray(resample_by_phase(smooth, phase, PATH)[0], dtype=np.float32)
-
-
-def _filled(values: Array) -> Array:
-    """Replace what is not finite by the value before, at the beginning by the first finite one, else by 0."""
-    finite = np.isfinite(values)
-    if finite.all():
-        return np.asarray(values, dtype=np.float64)
-    rows = np.maximum.accumulate(np.where(finite, np.arange(len(values))[:, None], -1), axis=0)
-    rows = np.where(rows < 0, finite.argmax(axis=0), rows)
-    return np.nan_to_num(np.take_along_axis(values, rows, axis=0), nan=0.0, posinf=0.0, neginf=0.0)
-
-
-def _smoothed(values: Array, width: int) -> Array:
-    """Average (T, d) over windows of `width` frames, shorter at the ends."""
-    sums = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
-    centers = np.arange(len(values))
-    first, last = np.maximum(centers - width // 2, 0), np.minimum(centers + width // 2 + 1, len(values))
-    return np.asarray((sums[last] - sums[first]) / (last - first)[:, None])
-
-
-def runs(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """Return (n, 2) first indices of the runs of True, and those behind them."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
-    return np.asarray(edges.reshape(-1, 2))
-
-
-def _longest_runs(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """Return (d, 2) first and last of the longest run of True in each column of (T, d); 0, 0 without one."""
-    length = len(mask) + 1
-    ends = runs(np.concatenate([mask, np.zeros((1, mask.shape[1]), dtype=np.bool_)]).T.ravel())
-    columns, longest = ends[:, 0] // length, np.zeros((mask.shape[1], 2), dtype=np.intp)
-    order = np.argsort(ends[:, 1] - ends[:, 0], kind="stable")  # the longest is written last
-    longest[columns[order]] = (ends - columns[:, None] * length)[order]
-    return longest
+    shown: Callable[[float], float] = float  # a value as it is shown
+    columns: tuple[str, ...] = ("",)  # of the values, each repeated for all channels where there are more values
+    relative: bool = False  # values are in the unit of their channel, and compared in multiples of its usual range
 
 
 def _over_all(motion: Motion, *values: float) -> Measure:
@@ -187,7 +74,7 @@ def problems(motion: Motion) -> Measure:
 def values(motion: Motion) -> Measure:
     """Count frames in which some feature is not a finite number."""
     columns = [motion.episode.signals[name] for names in features_of(motion.episode) for name in names]
-    return _counted(motion, ~np.isfinite(np.concatenate(columns, axis=1)).all(axis=1))
+    return _counted(motion, np.asarray(~np.isfinite(np.concatenate(columns, axis=1)).all(axis=1)))
 
 
 def rate(motion: Motion) -> Measure:
@@ -218,7 +105,7 @@ def repeats(motion: Motion) -> Measure:
     """Count frames in which no channel changes at all although the arm moves before and after, log(1 + n)."""
     change = np.abs(np.diff(motion.state, axis=0))
     speed = (change / motion.scale).max(axis=1)
-    ends = runs(~change.any(axis=1))
+    ends = runs(np.asarray(~change.any(axis=1)))
     ends = ends[(ends[:, 0] > 0) & (ends[:, 1] < len(speed)) & (ends[:, 1] - ends[:, 0] <= _REPEATED)]
     moving = 0.3 * np.median(speed[speed > 0]) if speed.any() else np.inf
     ends = ends[np.minimum(speed[ends[:, 0] - 1], speed[np.minimum(ends[:, 1], len(speed) - 1)]) > moving]
@@ -251,18 +138,18 @@ def _median_of_five(steps: Array) -> Array:
 def jerk(motion: Motion) -> Measure:
     """Return ``log(rms jerk / rms velocity)`` [1/s^2] of the whole, and of the second in which it is largest.
 
-    All channels together, each in multiples of its range, without the largest 2 %, which are spikes. Duration, amplitude and rests do not count, as they do in the
-    dimensionless jerk: N. Hogan, D. Sternad, "Sensitivity of smoothness measures to movement duration, amplitude, and
-    arrests", J. Motor Behavior 41(6), 2009.
+    All channels together, each in multiples of its range, without the largest 2 %, which are spikes. Duration,
+    amplitude and rests do not count, as they do in the dimensionless jerk: N. Hogan, D. Sternad, "Sensitivity of
+    smoothness measures to movement duration, amplitude, and arrests", J. Motor Behavior 41(6), 2009.
     """
-    smooth = _smoothed(motion.state / motion.scale, 3)
+    smooth = smoothed(motion.state / motion.scale, 3)
     power = (np.diff(smooth, 3, axis=0) ** 2).sum(axis=1, keepdims=True)
-    power = np.minimum(power, np.quantile(power, _STEADY))
+    power = np.minimum(power, np.quantile(power, STEADY))
     speed = (np.diff(smooth, axis=0) ** 2).sum(axis=1).mean()
     if not speed > 0:
         return _over_all(motion, np.nan, np.nan)
-    width = motion.frames(_JERK_WINDOW)
-    windows = _smoothed(power, width)[:, 0]
+    width = motion.frames(_SECOND)
+    windows = smoothed(power, width)[:, 0]
     worst = int(windows.argmax())
     ratios = np.log(np.maximum(np.array([power.mean(), windows[worst]]) / speed, 1e-30)) / 2 - 2 * np.log(motion.step)
     return _at(motion, ratios, np.array([0, worst - width // 2]), np.array([len(smooth), worst + width // 2]))
@@ -287,7 +174,7 @@ def idle(motion: Motion) -> Measure:
     extents = high - low
     limit = np.maximum(_NOISE * motion.noise, _REST * np.where(np.isinf(motion.scale), 0.0, motion.scale))
     limit = np.maximum(limit, _TREMBLING * np.quantile(extents, 0.05, axis=0))
-    ends = runs((extents <= limit).all(axis=1)) + [0, width]
+    ends = runs(np.asarray((extents <= limit).all(axis=1))) + np.array([0, width])
     at_start, at_end = ends[:, 0] == 0, ends[:, 1] >= len(motion.state)
     spans = np.zeros((3, 2), dtype=np.intp)
     for k, chosen in enumerate((ends[at_start], ends[~at_start & ~at_end], ends[at_end & ~at_start])):
@@ -298,7 +185,7 @@ def idle(motion: Motion) -> Measure:
 
 def frozen(motion: Motion) -> Measure:
     """Return log of the longest time [s] in which each channel does not change at all, plus 0.2 s."""
-    ends = _longest_runs(np.diff(motion.state, axis=0) == 0)
+    ends = longest_runs(np.diff(motion.state, axis=0) == 0)
     return _at(motion, np.log(0.2 + (ends[:, 1] - ends[:, 0]) * motion.step), *ends.T)
 
 
@@ -307,11 +194,16 @@ def still(motion: Motion) -> Measure:
     return _over_all(motion, *-np.log(np.ptp(motion.state, axis=0) + 1e-9))
 
 
-def extremes(motion: Motion) -> Measure:
-    """Return the largest value of each channel, and minus the smallest."""
-    both = np.concatenate([motion.state, -motion.state], axis=1)
-    rows = both.argmax(axis=0)
-    return _at(motion, both.max(axis=0), rows, rows)
+def highest(motion: Motion) -> Measure:
+    """Return the largest value of each channel."""
+    rows = motion.state.argmax(axis=0)
+    return _at(motion, motion.state.max(axis=0), rows, rows)
+
+
+def lowest(motion: Motion) -> Measure:
+    """Return the smallest value of each channel."""
+    rows = motion.state.argmin(axis=0)
+    return _at(motion, motion.state.min(axis=0), rows, rows)
 
 
 def ends(motion: Motion) -> Measure:
@@ -346,27 +238,6 @@ def speed(motion: Motion) -> Measure:
     return _over_all(motion, np.log(np.quantile(moved, 0.9) / (n * motion.step) + 1e-6))
 
 
-def frames_behind(leader: Array, follower: Array, most: int) -> float:
-    """Return frames by which one motion (T, d) follows another: argmax of the correlation of velocities, by a parabola.
-
-    Velocities are cut at what 2 % exceed, so that spikes do not count. NaN where they correlate by less than 0.3, or
-    most at a lag of `most` frames.
-    """
-    lead, follow = np.diff(leader, axis=0), np.diff(follower, axis=0)
-    largest = np.quantile(np.abs(np.concatenate([lead, follow])), _STEADY, axis=0)
-    lead, follow = np.clip(lead, -largest, largest), np.clip(follow, -largest, largest)
-    most = max(1, min(most, len(lead) // 2))
-    size = 1 << (len(lead) + most).bit_length()
-    spectrum = (np.fft.rfft(lead, size, axis=0).conj() * np.fft.rfft(follow, size, axis=0)).sum(axis=1)
-    products = np.roll(np.fft.irfft(spectrum, size), most)[: 2 * most + 1]
-    energy = np.sqrt((lead**2).sum() * (follow**2).sum())
-    top = int(products.argmax())
-    if not energy > 0 or products[top] < _LEAST_CORRELATION * energy or top in (0, 2 * most):
-        return np.nan
-    before, peak, after = products[top - 1 : top + 2]
-    return top - most + 0.5 * float((before - after) / (before - 2 * peak + after))
-
-
 def lag(motion: Motion) -> Measure:
     """Return the time [s] by which the state follows the action, see `frames_behind`."""
     return _over_all(motion, motion.late * motion.step)
@@ -384,8 +255,8 @@ def following(motion: Motion) -> Measure:
     if behind is None:
         return _over_all(motion, np.nan)
     away = np.abs(behind - np.median(behind, axis=0)) / motion.scale
-    width = motion.frames(_JERK_WINDOW)
-    windows = _smoothed(away, width).max(axis=1)
+    width = motion.frames(_SECOND)
+    windows = smoothed(away, width).max(axis=1)
     worst = np.array([windows.argmax()])
     return _at(motion, np.log(1e-3 + windows.max(keepdims=True)), worst - width // 2, worst + width // 2)
 
@@ -398,108 +269,112 @@ def _behind(motion: Motion) -> Array | None:
     return motion.state[max(k, 0) : n + min(k, 0)] - motion.lead[max(-k, 0) : n - max(k, 0)]
 
 
-def _is(value: float) -> float:
-    return value
-
-
 #: All checks. The first contradict what the data set declares; the others are compared.
 CHECKS: tuple[Check, ...] = (
     Check(
-        "problems", problems, "exact", 0.0, ("",), False, _is, "{problems}",
+        "problems", problems, "exact", 0.0, "{problems}",
         "The files contradict themselves.", "Record the episode again, or leave it out.",
     ),
     Check(
-        "values", values, "exact", 0.0, ("",), False, _is, "{value:.0f} frames hold values that are no finite numbers",
-        "A sensor or a conversion failed.", "Leave the episode out; most training code spreads one NaN over all weights.",
+        "values", values, "exact", 0.0, "{value:.0f} frames hold values that are no finite numbers",
+        "A sensor or a conversion failed.", "Leave it out: in training, one NaN spreads over all weights.",
     ),
     Check(
-        "rate", rate, "exact", 0.0, ("",), False, _is,
-        "frames come at {value:.4g} per second, the data set declares {fps:.4g}",
+        "rate", rate, "exact", 0.0, "frames come at {value:.4g} per second, the data set declares {fps:.4g}",
         "Velocities and horizons of actions are wrong by the ratio.", "Declare the true rate, or resample the episode.",
     ),
     Check(
-        "stamps", stamps, "exact", 0.0, ("",), False, _is, "{value:.0f} stamps are missing, repeat, or go back",
+        "stamps", stamps, "exact", 0.0, "{value:.0f} stamps are missing, repeat, or go back",
         "Frames were stored twice or in another order.", "Drop the repeated frames, or leave the episode out.",
     ),
     Check(
-        "gaps", gaps, "exact", 0.0, ("",), False, _is, "{value:.0f} frames are missing between stamps",
+        "gaps", gaps, "exact", 0.0, "{value:.0f} frames are missing between stamps",
         "The recorder lost frames.", "Leave the episode out, or interpolate short gaps.",
     ),
     Check(
-        "repeats", repeats, "upper", 1.4, ("",), False, np.expm1, "{value:.0f} frames repeat the one before in mid motion",
+        "repeats", repeats, "upper", 1.4, "{value:.0f} frames repeat the one before in mid motion (usual: {usual:.0f})",
         "A slow sensor was stored at a higher rate, or frames were stored twice.", "Drop them, or lower the rate.",
+        np.expm1,
     ),
     Check(
-        "spikes", spikes, "upper", 0.3, ("",), False, lambda value: np.expm1(value),
+        "spikes", spikes, "upper", 0.3,
         "{channel} jumps within one frame, {value:.0f} times its noise (usual: {usual:.0f})",
         "A glitch of a sensor, or frames that are missing although stamps go on.",
-        "Leave the episode out, or repair the samples.",
+        "Leave the episode out, or repair the samples.", np.expm1,
     ),
     Check(
-        "jerk", jerk, "upper", 0.1, ("over all", "at its worst"), False, np.exp,
-        "{value:.0f} times as much jerk as speed [1/s^2], {column} (usual: {usual:.0f})",
+        "jerk", jerk, "upper", 0.1, "{value:.0f} times as much jerk as speed [1/s^2], {column} (usual: {usual:.0f})",
         "Shaky teleoperation, collisions, or a controller that oscillates.", "Look at the stretch; record it again.",
+        np.exp, ("over all", "at its worst"),
     ),
     Check(
-        "idle", idle, "upper", 0.35, ("at the beginning", "in between", "at the end"), False, np.expm1,
-        "rests for {value:.1f} s {column} (usual: {usual:.1f} s)",
+        "idle", idle, "upper", 0.35, "rests for {value:.1f} s {column} (usual: {usual:.1f} s)",
         "A policy learns to wait.", "Trim the beginning and the end; split the episode, or leave it out.",
+        np.expm1, ("at the beginning", "in between", "at the end"),
     ),
     Check(
-        "frozen", frozen, "upper", 0.3, ("",), False, lambda value: np.exp(value) - 0.2,
-        "{channel} keeps one value for {value:.1f} s (usual: {usual:.1f} s)",
+        "frozen", frozen, "upper", 0.3, "{channel} keeps one value for {value:.1f} s (usual: {usual:.1f} s)",
         "The sensor or its bus stood still while the arm went on.", "Leave the episode out; check the cable.",
+        lambda value: float(np.exp(value)) - 0.2,
     ),
     Check(
-        "still", still, "upper", 0.3, ("",), False, lambda value: np.exp(-value),
-        "{channel} moves by {value:.3g} in all (usual: {usual:.3g})",
+        "still", still, "upper", 0.3, "{channel} moves by {value:.3g} in all (usual: {usual:.3g})",
         "A gripper that never closes, or a joint that was not connected.", "See if the task was done at all.",
+        lambda value: float(np.exp(-value)),
     ),
     Check(
-        "range", extremes, "upper", 0.05, ("high", "low"), True, np.abs,
-        "{channel} reaches {value:.3g}, far from where others turn ({usual:.3g})",
+        "above", highest, "upper", 0.05, "{channel} goes up to {value:.3g} (usual: {usual:.3g})",
         "Another calibration, channels in another order, or a collision.", "Compare the calibration of that day.",
+        relative=True,
     ),
     Check(
-        "place", ends, "both", 0.05, ("begins", "ends"), True, _is, "{channel} {column} at {value:.3g} (usual: {usual:.3g})",
+        "below", lowest, "lower", 0.05, "{channel} goes down to {value:.3g} (usual: {usual:.3g})",
+        "Another calibration, channels in another order, or a collision.", "Compare the calibration of that day.",
+        relative=True,
+    ),
+    Check(
+        "place", ends, "both", 0.05, "{channel} {column} at {value:.3g} (usual: {usual:.3g})",
         "The episode begins or ends elsewhere: cut off, or not brought to its end.", "See if the task was finished.",
+        columns=("begins", "ends"), relative=True,
     ),
     Check(
-        "cut", cut, "upper", 0.3, ("first", "last"), False, lambda value: np.exp(value) - 0.05,
+        "cut", cut, "upper", 0.3,
         "in its {column} tenth of a second the arm moves at {value:.1f} times its mean speed (usual: {usual:.1f})",
         "The recording began late or was stopped early.", "Leave the episode out if the task is not finished.",
+        lambda value: float(np.exp(value)) - 0.05, ("first", "last"),
     ),
     Check(
-        "duration", duration, "both", 0.1, ("",), False, np.exp, "lasts {value:.1f} s (usual: {usual:.1f} s)",
-        "Cut off, forgotten to stop, another task, or another rate.", "Look at its end.",
+        "duration", duration, "both", 0.1, "lasts {value:.1f} s (usual: {usual:.1f} s)",
+        "Cut off, forgotten to stop, another task, or another rate.", "Look at its end.", np.exp,
     ),
     Check(
-        "speed", speed, "both", 0.05, ("",), False, np.exp,
-        "moves {value:.2g} ranges of its channels in a second (usual: {usual:.2g})",
-        "Another rate than declared, or another manner.", "Compare stamps with a clock; record in one tempo.",
+        "speed", speed, "both", 0.05, "moves {value:.2g} ranges of its channels in a second (usual: {usual:.2g})",
+        "Another rate than declared, or another manner.", "Compare stamps with a clock; record in one tempo.", np.exp,
     ),
     Check(
-        "lag", lag, "both", 0.005, ("",), False, _is, "the state follows the action after {value:.3f} s (usual: {usual:.3f} s)",
-        "Clocks or buffers differ: actions are paired with the wrong observations.", "Shift the action, or leave it out.",
+        "lag", lag, "both", 0.005, "the state follows the action after {value:.3f} s (usual: {usual:.3f} s)",
+        "Clocks or buffers differ: observations are paired with the actions of another time.",
+        "Shift the action, or leave the episode out.",
     ),
     Check(
-        "offset", offset, "both", 0.01, ("",), True, _is,
-        "{channel} is {value:+.3g} from its action all the time (usual: {usual:+.3g})",
-        "Leader and follower were calibrated differently.", "Calibrate again; subtract the offset.",
+        "offset", offset, "both", 0.01, "{channel} is {value:+.3g} from its action all the time (usual: {usual:+.3g})",
+        "Leader and follower were calibrated differently.", "Calibrate again; subtract the offset.", relative=True,
     ),
     Check(
-        "following", following, "upper", 0.2, ("",), False, lambda value: np.exp(value) - 1e-3,
+        "following", following, "upper", 0.2,
         "a channel is {value:.0%} of its range from its action for a second (usual: {usual:.0%})",
         "The follower was held, lost its load, or ran into something.", "Look at the stretch.",
+        lambda value: float(np.exp(value)) - 1e-3,
     ),
     Check(
-        "unlike", None, "upper", 0.05, ("",), False, np.exp,
+        "unlike", None, "upper", 0.05,
         "its way is {value:.2g} ranges from the nearest of its task (usual: {usual:.2g})",
         "Another task than it says, a failed attempt, or a manner of its own.", "See what was done; correct the task.",
+        np.exp,
     ),
     Check(
-        "task", None, "upper", 0.05, ("",), False, np.exp,
+        "task", None, "upper", 0.05,
         "its way is {value:.2g} times as far from its own task as from another (usual: {usual:.2g})",
-        "It carries the name of another task.", "See what was done; correct the task.",
+        "It carries the name of another task.", "See what was done; correct the task.", np.exp,
     ),
 )  # fmt: skip

@@ -37,13 +37,12 @@ def verdict(audit: Audit) -> str:
         listed = f": {parts[0]}" if parts else ""
         return (
             f"{hours}. {counted(int(audit.flagged.sum()), 'episode')} flagged{listed}. Uncalibrated: it takes "
-            f"{needed} episodes without contradictions to state that {100 * audit.error_rate:.2g} % of the good ones are "
-            "flagged; the others are ranked only."
+            f"{needed} episodes without contradictions to state that {100 * audit.error_rate:.2g} % of the good ones "
+            "are flagged; the others are ranked only."
         )
     stand_out = kinds["contradiction"] + kinds["outlying"]
-    return (
-        f"{hours}. {audit.flagged.sum():,} flagged: {', '.join(parts) or 'none'}. {_chance(audit)} "
-        + ("See those first that contradict or lie beyond." if stand_out else "Nothing stands out.")
+    return f"{hours}. {audit.flagged.sum():,} flagged: {', '.join(parts) or 'none'}. {_chance(audit)} " + (
+        "See those first that contradict or lie beyond." if stand_out else "Nothing stands out."
     )
 
 
@@ -65,9 +64,9 @@ def stretch_of(reason: Reason, seconds: float) -> str:
 
 def reasons_of(finding: Finding) -> list[str]:
     """Return the reasons of a finding, each with its check and its stretch of time."""
-    return [
-        f"{reason.check}: {reason.words}{stretch_of(reason, finding.seconds)}" for reason in finding.reasons
-    ] or ["nothing by itself, but taken together"]
+    return [f"{reason.check}: {reason.words}{stretch_of(reason, finding.seconds)}" for reason in finding.reasons] or [
+        "nothing by itself, but taken together"
+    ]
 
 
 def checks_as_rows(audit: Audit) -> list[tuple[str, str, str, str]]:
@@ -83,8 +82,8 @@ def audit_as_words(audit: Audit) -> str:
     parts = [verdict(audit), *(f"of the whole set: {note}" for note in audit.of_the_set)]
     rows = [
         (
-            f"{finding.episode}", printable(finding.task or ""), finding.kind,
-            "0" if finding.kind == "contradiction" else f"{finding.p_value:.2g}", "; ".join(reasons_of(finding)[:_SAID]),
+            f"{finding.episode}", printable(finding.task or ""), finding.kind, f"{finding.p_value:.2g}",
+            "; ".join(reasons_of(finding)[:_SAID]),
         )
         for finding in audit.findings[:_SHOWN]
     ]  # fmt: skip
@@ -161,4 +160,4 @@ def lerobot_arguments(audit: Audit, path: Path | None = None) -> list[str]:
             f'lerobot-train --dataset.episodes "{numbers}" ...', f"LeRobotDataset(repo_id, episodes={numbers})",
         ]  # fmt: skip
     name = path if path is not None and path.suffix.lower() == ".json" else Path("keep.json")
-    return [f'LeRobotDataset(repo_id, episodes=json.load(open("{name}")))', f'with --train-mask {name}']
+    return [f'LeRobotDataset(repo_id, episodes=json.load(open("{name}")))', f"with --train-mask {name}"]

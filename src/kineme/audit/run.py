@@ -14,18 +14,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.audit.calibrate import (
-    FEWEST_OF_TASK,
-    Groups,
-    Ranking,
-    centered,
-    evidence_of,
-    groups_of,
-    rank,
-    tasks_of,
-    unlike,
-)
-from kineme.audit.checks import CHECKS, FEWEST_FRAMES, PATH, Check, Motion, motion_of, path_of
+from kineme.audit import calibrate
+from kineme.audit.checks import CHECKS, Check
+from kineme.audit.motion import FEWEST_FRAMES, PATH, Motion, motion_of, path_of
 from kineme.errors import DataError
 from kineme.movements.episodes import Episode
 from kineme.recognition.conformal import check_error_rate
@@ -37,6 +28,7 @@ _REASONS = 4  # of an episode, at most
 _RANKED = 10  # episodes that are listed although nothing calibrates them
 _LONGEST = 300  # letters that are kept of the problems of an episode
 _LEAST_EVIDENCE = 0.3
+_SIDES: dict[str, Callable[[Array], Array]] = {"upper": np.positive, "lower": np.negative, "both": np.abs}
 _SHARED = 0.5  # share of the episodes beyond which a contradiction is one of the set
 
 #: Why an episode is listed -> what that promises.
@@ -176,14 +168,16 @@ class _Measured:
 
     def ways(self, rows: NDArray[np.intp]) -> Array:
         """Return the ways (m, d, 64) of some episodes."""
-        assert self.spool is not None and self.names is not None
+        assert self.spool is not None
+        assert self.names is not None
         size = len(self.names) * PATH
         chosen = [self.spool.read(int(row))[:size] for row in rows]
         return np.array(chosen, dtype=np.float64).reshape(len(rows), len(self.names), PATH)
 
     def stretch(self, row: int, value: int) -> tuple[float, float]:
         """Return the stretch [s] of a value of an episode."""
-        assert self.spool is not None and self.names is not None
+        assert self.spool is not None
+        assert self.names is not None
         first = len(self.names) * PATH + 2 * value
         start, end = self.spool.read(row)[first : first + 2].tolist()
         return start, end
@@ -234,13 +228,13 @@ def audit_episodes(
         say(1)
     if not measured.numbers:
         raise DataError("expected a data set with episodes, got one without; see if its download is complete")
-    tasks = tasks_of(measured.tasks)
-    groups = groups_of(tasks, round(2 / error_rate))
+    tasks = calibrate.tasks_of(measured.tasks)
+    groups = calibrate.groups_of(tasks, round(2 / error_rate))
     compared = list(_compared(measured, tasks, groups, say)) if measured.names else []
     broken, of_the_set = _contradictions(measured, compared)
     soft = [row.evidence for row in compared if row.check.side != "exact"]
     evidence = np.stack(soft, axis=1) if soft else np.zeros((len(broken), 0))
-    ranking = rank(evidence, ~broken, groups, error_rate)
+    ranking = calibrate.rank(evidence, ~broken, groups, error_rate)
     by_chance = sum(int(error_rate * (~broken & ~ranking.outlying)[rows].sum() + 1e-9) for rows in groups)
     flagged = broken | ((ranking.p_values <= error_rate + 1e-12) | ranking.outlying) & (by_chance > 0)
     return Audit(
@@ -251,14 +245,13 @@ def audit_episodes(
 
 
 def _compared(
-    measured: _Measured, tasks: Groups, groups: Groups, say: Callable[[int], object]
+    measured: _Measured, tasks: calibrate.Groups, groups: calibrate.Groups, say: Callable[[int], object]
 ) -> Iterator[_Compared]:
     """Yield the checks with their evidence."""
     alone = [check for check in CHECKS if check.measure is not None]
     values = dict(zip([check.name for check in alone], measured.values(), strict=True))
-    high, low = np.split(values["range"], 2, axis=1)
-    extents = np.nanmedian(high + low, axis=0).astype(np.float64)
-    ways = unlike(measured.ways, extents, tasks, say)
+    extents = np.nanmedian(values["above"] - values["below"], axis=0).astype(np.float64)
+    ways = calibrate.unlike(measured.ways, extents, tasks, say)
     values |= {"unlike": ways[:, :1], "task": ways[:, 1:]}
     unit, stretch = np.where(extents > 0, extents, 1.0), 0
     for check in CHECKS:
@@ -268,9 +261,9 @@ def _compared(
             wrong = np.where(own[:, 0] > 0, np.inf, 0.0)
             yield _Compared(check, own, np.zeros(len(own), dtype=np.intp), wrong, first)
             continue
-        scaled = centered(own / np.tile(unit, own.shape[1] // len(unit)) if check.relative else own, tasks)
-        columns = evidence_of(np.abs(scaled) if check.side == "both" else scaled, groups, check.least)
-        evidence = evidence_of(columns.max(axis=1, keepdims=True), groups, _LEAST_EVIDENCE)[:, 0]
+        scaled = calibrate.centered(own / np.tile(unit, own.shape[1] // len(unit)) if check.relative else own, tasks)
+        columns = calibrate.evidence_of(_SIDES[check.side](scaled), groups, check.least)
+        evidence = calibrate.evidence_of(columns.max(axis=1, keepdims=True), groups, _LEAST_EVIDENCE)[:, 0]
         yield _Compared(check, own, columns.argmax(axis=1), evidence, first)
 
 
@@ -296,7 +289,7 @@ def _contradictions(measured: _Measured, compared: list[_Compared]) -> tuple[NDA
 
 
 def _findings(
-    measured: _Measured, compared: list[_Compared], broken: NDArray[np.bool_], ranking: Ranking, tasks: Groups,
+    measured: _Measured, compared: list[_Compared], broken: NDArray[np.bool_], ranking: calibrate.Ranking, tasks: calibrate.Groups,
     flagged: NDArray[np.bool_],
 ) -> tuple[Finding, ...]:  # fmt: skip
     """Return the findings, in their order."""
@@ -311,7 +304,7 @@ def _findings(
 
     def reason(row: _Compared, at: int) -> Reason:
         column, rows = int(row.columns[at]), task_of[at]
-        if len(rows) < FEWEST_OF_TASK:
+        if len(rows) < calibrate.FEWEST_OF_TASK:
             rows = np.arange(len(broken))
         if (row.check.name, rows[0]) not in usual:
             usual[row.check.name, rows[0]] = np.nanmedian(row.values[rows], axis=0)
@@ -328,7 +321,7 @@ def _findings(
 
     def finding(at: int) -> Finding:
         by_evidence = sorted(compared, key=lambda row: -row.evidence[at])
-        reasons = [reason(row, at) for row in by_evidence if row.evidence[at] >= limit and row.evidence[at] > 0]
+        reasons = [reason(row, at) for row in by_evidence if row.evidence[at] >= 0.95 * limit and row.evidence[at] > 0]
         if at in measured.problems and not any(reason.check == "problems" for reason in reasons):
             reasons = [Reason("problems", measured.problems[at], "", 0.0, measured.seconds[at], np.inf), *reasons]
         kind = "contradiction" if broken[at] else "outlying" if ranking.outlying[at] else "unusual"
