@@ -184,9 +184,17 @@ def idle(motion: Motion) -> Measure:
 
 
 def frozen(motion: Motion) -> Measure:
-    """Return log of the longest time [s] in which each channel does not change at all, plus 0.2 s."""
-    ends = longest_runs(np.diff(motion.state, axis=0) == 0)
-    return _at(motion, np.log(0.2 + (ends[:, 1] - ends[:, 0]) * motion.step), *ends.T)
+    """Return log of the longest time [s] in which a channel does not change at all while another moves, plus 0.2 s.
+
+    One value for each channel. A channel moves where it changes by more than three standard deviations of its noise;
+    frames in which none does are left out.
+    """
+    changes = np.abs(np.diff(motion.state, axis=0))
+    rows = np.flatnonzero((changes > 3 * motion.noise).any(axis=1))
+    ends = longest_runs(changes[rows] == 0)
+    seconds = (ends[:, 1] - ends[:, 0]) * motion.step
+    frames = np.append(rows, len(motion.state))
+    return _at(motion, np.log(0.2 + seconds), frames[ends[:, 0]], frames[np.maximum(ends[:, 1] - 1, 0)])
 
 
 def still(motion: Motion) -> Measure:
@@ -215,7 +223,7 @@ def ends(motion: Motion) -> Measure:
 
 
 def cut(motion: Motion) -> Measure:
-    """Return log of the speed in the first and in the last tenth of a second, in the mean speed, plus 0.05."""
+    """Return log of the speed in the first and in the last tenth of a second, in the mean speed, plus 0.3."""
     n = motion.frames(_EDGE)
     moved = np.array([motion.state[n] - motion.state[0], motion.state[-1] - motion.state[-1 - n]]) / motion.scale / n
     mean = np.linalg.norm(np.diff(motion.state[::n], axis=0) / motion.scale / n, axis=1).mean()
@@ -223,7 +231,7 @@ def cut(motion: Motion) -> Measure:
         return _over_all(motion, np.nan, np.nan)
     length = len(motion.state)
     spans = np.array([[0, length - n], [n, length]])
-    return _at(motion, np.log(0.05 + np.linalg.norm(moved, axis=1) / mean), *spans)
+    return _at(motion, np.log(0.3 + np.linalg.norm(moved, axis=1) / mean), *spans)
 
 
 def duration(motion: Motion) -> Measure:
@@ -313,7 +321,7 @@ CHECKS: tuple[Check, ...] = (
         np.expm1, ("at the beginning", "in between", "at the end"),
     ),
     Check(
-        "frozen", frozen, "upper", 0.3, "{channel} keeps one value for {value:.1f} s (usual: {usual:.1f} s)",
+        "frozen", frozen, "upper", 0.3, "{channel} keeps one value for {value:.1f} s of motion (usual: {usual:.1f} s)",
         "The sensor or its bus stood still while the arm went on.", "Leave the episode out; check the cable.",
         lambda value: float(np.exp(value)) - 0.2,
     ),
@@ -341,7 +349,7 @@ CHECKS: tuple[Check, ...] = (
         "cut", cut, "upper", 0.3,
         "in its {column} tenth of a second the arm moves at {value:.1f} times its mean speed (usual: {usual:.1f})",
         "The recording began late or was stopped early.", "Leave the episode out if the task is not finished.",
-        lambda value: float(np.exp(value)) - 0.05, ("first", "last"),
+        lambda value: float(np.exp(value)) - 0.3, ("first", "last"),
     ),
     Check(
         "duration", duration, "both", 0.1, "lasts {value:.1f} s (usual: {usual:.1f} s)",
@@ -352,7 +360,7 @@ CHECKS: tuple[Check, ...] = (
         "Another rate than declared, or another manner.", "Compare stamps with a clock; record in one tempo.", np.exp,
     ),
     Check(
-        "lag", lag, "both", 0.005, "the state follows the action after {value:.3f} s (usual: {usual:.3f} s)",
+        "lag", lag, "both", 0.01, "the state follows the action after {value:.3f} s (usual: {usual:.3f} s)",
         "Clocks or buffers differ: observations are paired with the actions of another time.",
         "Shift the action, or leave the episode out.",
     ),

@@ -139,6 +139,7 @@ def frames_behind(leader: Array, follower: Array, most: int) -> float:
     size = 1 << (len(lead) + most).bit_length()
     spectrum = (np.fft.rfft(lead, size, axis=0).conj() * np.fft.rfft(follow, size, axis=0)).sum(axis=1)
     products = np.roll(np.fft.irfft(spectrum, size), most)[: 2 * most + 1]
+    products *= len(lead) / (len(lead) - np.abs(np.arange(-most, most + 1)))  # else lags near 0 win by their overlap
     energy = np.sqrt((lead**2).sum() * (follow**2).sum())
     top = int(products.argmax())
     if not energy > 0 or products[top] < _LEAST_CORRELATION * energy or top in (0, 2 * most):

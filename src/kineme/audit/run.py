@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import closing
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -24,7 +25,8 @@ from kineme.reporting.text import counted, first_names, shortened
 from kineme.validation import Array
 
 _IN_MEMORY = 256 * 2**20  # bytes of ways and stretches, beyond which they go to the disk
-_REASONS = 4  # of an episode, at most
+_REASONS = 6  # of an episode, at most
+_LEAST_REASON = 3.0  # evidence: one good episode in twenty has as much, of each check
 _RANKED = 10  # episodes that are listed although nothing calibrates them
 _LONGEST = 300  # letters that are kept of the problems of an episode
 _LEAST_EVIDENCE = 0.3
@@ -149,6 +151,11 @@ class _Measured:
         self.rates.append(episode.fps)
         self._keep(motion, at)
 
+    def close(self) -> None:
+        """Remove the temporary file."""
+        if self.spool is not None:
+            self.spool.file.close()
+
     def _keep(self, motion: Motion | None, at: int) -> None:
         if motion is None:
             if self.spool is not None:
@@ -221,16 +228,21 @@ def audit_episodes(
         An error rate that is not between 0 and 1.
     """
     check_error_rate(error_rate)
-    say = progress or (lambda done: None)
-    measured = _Measured()
-    for episode in episodes:
-        measured.add(episode)
-        say(1)
-    if not measured.numbers:
-        raise DataError("expected a data set with episodes, got one without; see if its download is complete")
+    with closing(_Measured()) as measured:
+        for episode in episodes:
+            measured.add(episode)
+            if progress is not None:
+                progress(1)
+        if not measured.numbers:
+            raise DataError("expected a data set with episodes, got one without; see if its download is complete")
+        return _audited(measured, error_rate, progress or (lambda done: None))
+
+
+def _audited(measured: _Measured, error_rate: float, progress: Callable[[int], object]) -> Audit:
+    """Compare what was measured, and list what is unusual."""
     tasks = calibrate.tasks_of(measured.tasks)
     groups = calibrate.groups_of(tasks, round(2 / error_rate))
-    compared = list(_compared(measured, tasks, groups, say)) if measured.names else []
+    compared = list(_compared(measured, tasks, groups, progress)) if measured.names else []
     broken, of_the_set = _contradictions(measured, compared)
     soft = [row.evidence for row in compared if row.check.side != "exact"]
     evidence = np.stack(soft, axis=1) if soft else np.zeros((len(broken), 0))
@@ -240,7 +252,7 @@ def audit_episodes(
     return Audit(
         np.array(measured.numbers), sum(measured.seconds), len(tasks), error_rate, by_chance,
         np.where(broken, 0.0, ranking.p_values), ranking.evidence, flagged,
-        _findings(measured, compared, broken, ranking, tasks, flagged), of_the_set,
+        _findings(measured, compared, broken, ranking, flagged), of_the_set,
     )  # fmt: skip
 
 
@@ -251,7 +263,9 @@ def _compared(
     alone = [check for check in CHECKS if check.measure is not None]
     values = dict(zip([check.name for check in alone], measured.values(), strict=True))
     extents = np.nanmedian(values["above"] - values["below"], axis=0).astype(np.float64)
-    ways = calibrate.unlike(measured.ways, extents, tasks, say)
+    usable = np.ones(len(measured.numbers), dtype=np.bool_)
+    usable[measured.unusable] = False
+    ways = calibrate.unlike(measured.ways, extents, [rows[usable[rows]] for rows in tasks], len(usable), say)
     values |= {"unlike": ways[:, :1], "task": ways[:, 1:]}
     unit, stretch = np.where(extents > 0, extents, 1.0), 0
     for check in CHECKS:
@@ -289,21 +303,25 @@ def _contradictions(measured: _Measured, compared: list[_Compared]) -> tuple[NDA
 
 
 def _findings(
-    measured: _Measured, compared: list[_Compared], broken: NDArray[np.bool_], ranking: calibrate.Ranking, tasks: calibrate.Groups,
+    measured: _Measured,
+    compared: list[_Compared],
+    broken: NDArray[np.bool_],
+    ranking: calibrate.Ranking,
     flagged: NDArray[np.bool_],
-) -> tuple[Finding, ...]:  # fmt: skip
+) -> tuple[Finding, ...]:
     """Return the findings, in their order."""
+    tasks = calibrate.tasks_of(measured.tasks)
     order = np.lexsort((-ranking.evidence, ~broken))
     listed = order[flagged[order]]
     if not (flagged & ~broken).any():
         listed = np.concatenate([listed, order[~flagged[order] & (ranking.evidence[order] > 0)][:_RANKED]])
-    soft = ranking.evidence[flagged & ~broken]
-    limit = float(soft.min()) if len(soft) else 0.0
-    task_of = {int(row): rows for rows in tasks for row in rows}
+    task_of = np.empty(len(broken), dtype=np.intp)
+    for task, rows in enumerate(tasks):
+        task_of[rows] = task
     usual: dict[tuple[str, int], Array] = {}
 
     def reason(row: _Compared, at: int) -> Reason:
-        column, rows = int(row.columns[at]), task_of[at]
+        column, rows = int(row.columns[at]), tasks[task_of[at]]
         if len(rows) < calibrate.FEWEST_OF_TASK:
             rows = np.arange(len(broken))
         if (row.check.name, rows[0]) not in usual:
@@ -321,7 +339,8 @@ def _findings(
 
     def finding(at: int) -> Finding:
         by_evidence = sorted(compared, key=lambda row: -row.evidence[at])
-        reasons = [reason(row, at) for row in by_evidence if row.evidence[at] >= 0.95 * limit and row.evidence[at] > 0]
+        least = min(_LEAST_REASON, by_evidence[0].evidence[at]) if by_evidence else 0.0
+        reasons = [reason(row, at) for row in by_evidence if row.evidence[at] >= least > 0]
         if at in measured.problems and not any(reason.check == "problems" for reason in reasons):
             reasons = [Reason("problems", measured.problems[at], "", 0.0, measured.seconds[at], np.inf), *reasons]
         kind = "contradiction" if broken[at] else "outlying" if ranking.outlying[at] else "unusual"
