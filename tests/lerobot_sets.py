@@ -1,13 +1,16 @@
-"""Data sets of LeRobot as its source describes versions 2.1 and 3.0, written by pandas and pyarrow."""
+"""Data sets of LeRobot as its source describes versions 2.1 and 3.0, written by pandas, pyarrow and Lance."""
 
 from __future__ import annotations
 
 import json
+import shutil
 
 import numpy as np
 
 NAMES = ["shoulder_pan.pos", "elbow_flex.pos", "gripper.pos"]
 TASKS = ["Pick up the cube", "Wave"]
+CAMERA = "observation.images.top"
+FILM = b"film"  # in place of a video
 
 
 def episode_rows(k, length, start=0, fps=50):
@@ -32,7 +35,7 @@ def features(names=NAMES):
     return {
         "observation.state": vector,
         "action": vector,
-        "observation.images.top": {"dtype": "video", "shape": [480, 640, 3], "names": ["height", "width", "channels"]},
+        CAMERA: {"dtype": "video", "shape": [480, 640, 3], "names": ["height", "width", "channels"]},
         "next.done": {"dtype": "bool", "shape": [1], "names": None},
         "timestamp": {"dtype": "float32", "shape": [1], "names": None},
         **dict.fromkeys(("frame_index", "episode_index", "index", "task_index"), counter),
@@ -87,17 +90,61 @@ def write_v3(folder, lengths=(20, 30, 25), per_shard=2, fixed=True, fps=50):
     return folder
 
 
-def write_v2(folder, lengths=(20, 30, 25)):
+def add_videos(folder, path):
+    """Declare the videos of a camera in meta/info.json, and write a file for each."""
+    place = folder / "meta" / "info.json"
+    place.write_text(json.dumps(json.loads(place.read_text()) | {"video_path": path}))
+    numbers = {"chunk_index": 0, "file_index": 0, "episode_chunk": 0, "video_key": CAMERA}
+    if "episode_index" in path:
+        files = [path.format(**numbers, episode_index=k) for k in range(3)]
+    else:
+        files = [path.format(**numbers)]
+        episodes = folder / "meta" / "episodes" / "chunk-000" / "file-000.parquet"
+        import pandas as pd
+
+        table = pd.read_parquet(episodes)
+        table[f"videos/{CAMERA}/chunk_index"] = table[f"videos/{CAMERA}/file_index"] = 0
+        table[f"videos/{CAMERA}/from_timestamp"] = table["dataset_from_index"] / 50
+        table.to_parquet(episodes)
+    for file in files:
+        (folder / file).parent.mkdir(parents=True, exist_ok=True)
+        (folder / file).write_bytes(FILM)
+    return folder
+
+
+def write_lance(folder, lengths=(20, 30, 25), per_fragment=40, fps=50):
+    """Version 3.0 in Lance: all frames in one table, dots of names as underscores, and the meta folder as a table."""
+    import lance
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    write_v3(folder, lengths, fps=fps)
+    frames = pa.concat_tables([parquet.read_table(path) for path in sorted((folder / "data").glob("*/*.parquet"))])
+    frames = frames.rename_columns([name.replace(".", "_") for name in frames.column_names])
+    lance.write_dataset(
+        frames.replace_schema_metadata(None), str(folder / "frames.lance"), max_rows_per_file=per_fragment
+    )
+    shutil.rmtree(folder / "data")
+    path = folder / "meta" / "info.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"storage_format": "lance"}, indent=4))
+    files = sorted(path for path in (folder / "meta").rglob("*") if path.is_file())
+    schema = pa.schema([("path", pa.string()), ("data", pa.large_binary())])
+    rows = [{"path": path.relative_to(folder / "meta").as_posix(), "data": path.read_bytes()} for path in files]
+    lance.write_dataset(pa.Table.from_pylist(rows, schema=schema), str(folder / "meta.lance"))
+    return folder
+
+
+def write_v2(folder, lengths=(20, 30, 25), fps=50):
     """Version 2.1: a shard for each episode; what is known of them in JSON lines."""
     import pandas as pd
 
     path = "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet"
-    write_info(folder, "v2.1", lengths, path)
+    write_info(folder, "v2.1", lengths, path, fps)
     start = 0
     for k, length in enumerate(lengths):
         target = folder / path.format(episode_chunk=0, episode_index=k)
         target.parent.mkdir(parents=True, exist_ok=True)
-        pd.DataFrame(episode_rows(k, length, start)).to_parquet(target)
+        pd.DataFrame(episode_rows(k, length, start, fps)).to_parquet(target)
         start += length
     rows = [{"episode_index": k, "tasks": [TASKS[k % 2]], "length": n} for k, n in enumerate(lengths)]
     (folder / "meta" / "episodes.jsonl").write_text("\n".join(map(json.dumps, rows)))

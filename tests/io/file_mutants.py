@@ -17,7 +17,9 @@ import numpy as np
 
 import kineme
 from kineme.dmp.rhythmic.rhythmic_dmp import RhythmicPrimitives
-from kineme.io.lerobot.copy import OWN, Motion, copy_with_motions
+from kineme.io.lerobot.copy import copy_with_motions
+from kineme.io.lerobot.motions import Motion
+from kineme.io.reading.episodes import read_episodes
 from kineme.io.reading.read_labels import labeled_pieces, read_labels
 from kineme.orientation import PosePrimitives
 from lerobot_sets import write_v2, write_v3
@@ -454,7 +456,7 @@ def read_mutant(name, data):
 
 
 def _read_lerobot(folder, data):
-    """Read the data set, and copy it with a text about an episode."""
+    """Read the data set and its episodes, and copy it with the name of a motion."""
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         for member in archive.infolist():
             path = folder / member.filename
@@ -462,11 +464,17 @@ def _read_lerobot(folder, data):
                 if folder.resolve() in path.resolve().parents:
                     path.parent.mkdir(parents=True, exist_ok=True)
                     path.write_bytes(archive.read(member))
+    with contextlib.suppress(kineme.errors.KinemeError):
+        for episode in read_episodes(folder):
+            assert {len(values) for values in episode.signals.values()} == {len(episode)}
+            assert {name: len(entries) for name, entries in episode.names.items()} == {
+                name: values.shape[1] for name, values in episode.signals.items()
+            }
     n = check_recordings(kineme.read_recordings(folder))
     target = folder.parent / "copy"
     target.mkdir()
     with contextlib.suppress(kineme.errors.KinemeError):
-        copy_with_motions(folder, target, {0: [Motion(0.0, OWN + "}")]})
+        copy_with_motions(folder, target, {0: [Motion(0, 0.0, 1.0, "wave")]})
         check_recordings(kineme.read_recordings(target))
     return n
 

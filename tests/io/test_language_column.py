@@ -1,4 +1,4 @@
-"""A copy of a data set of LeRobot with texts about movements: pandas and pyarrow read it, all else is as it was."""
+"""A copy of a data set of LeRobot whose frames name motions: pandas and pyarrow read it, all else is as it was."""
 
 import hashlib
 import json
@@ -7,14 +7,21 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme.io.lerobot.copy import LANGUAGE, MOTION_TEXTS, OWN, Motion, copy_with_motions
+from kineme.io.lerobot.copy import copy_with_motions
+from kineme.io.lerobot.language import LANGUAGE, MOTION_TEXTS
+from kineme.io.lerobot.motions import DETAILS, OWN, Motion, read_motions
 from lerobot_sets import write_v2, write_v3
 
 pa = pytest.importorskip("pyarrow")
 pd = pytest.importorskip("pandas")
 parquet = pytest.importorskip("pyarrow.parquet")
 
-MOTIONS = {0: [Motion(0.301, "later"), Motion(0.0, '{"symbol": "né"}')], 2: [Motion(0.111, "one")]}
+FPS = 10
+MOTIONS = {
+    0: [Motion(0, 1.01, 1.5, "later", 0.25, 0.75), Motion(0, 0.0, 0.6, 'né "x"')],
+    2: [Motion(2, 0.31, 2.4, None, uncertainty=0.1)],
+}
+CONTENTS = ['né "x"', "rest", "later", "rest"]
 SHARDS = ("data/chunk-000/file-000.parquet", "data/chunk-000/file-001.parquet")
 
 
@@ -24,7 +31,11 @@ def row(timestamp, content):
     return {**plain, "camera": None, "tool_calls": None}
 
 
-EXPECTED = {0: [row(0.0, '{"symbol": "né"}'), row(0.3, "later")], 1: [], 2: [row(0.12, "one")]}
+EXPECTED = {
+    0: [row(0.0, 'né "x"'), row(0.7, "rest"), row(1.0, "later"), row(1.6, "rest")],
+    1: [],
+    2: [row(0.0, "rest"), row(0.3, "unknown")],
+}
 
 
 def copied(source, target, motions=MOTIONS):
@@ -49,7 +60,7 @@ def digests(folder):
 
 @pytest.fixture
 def source(tmp_path):
-    folder = write_v3(tmp_path / "set")
+    folder = write_v3(tmp_path / "set", fps=FPS)
     video = folder / "videos" / "observation.images.top" / "chunk-000" / "file-000.mp4"
     video.parent.mkdir(parents=True)
     video.write_bytes(b"film")
@@ -88,7 +99,7 @@ def test_all_other_columns_and_files_are_as_they_were(tmp_path, source):
     after = digests(target)
     assert digests(source) == before
     changed = {name for name in before if after[name] != before[name]}
-    assert set(after) == set(before)
+    assert set(after) == {*before, DETAILS}
     assert changed == {*SHARDS, "meta/info.json"}
     for shard in SHARDS:
         old, new = (parquet.ParquetFile(folder / shard) for folder in (source, target))
@@ -150,7 +161,7 @@ def test_a_column_as_another_program_infers_it(tmp_path, source):
     with_rows(source, lambda k: [{**SUBTASK, "tool_calls": None}])
     new = parquet.read_table(copied(source, tmp_path / "named") / SHARDS[0]).column(LANGUAGE)
     assert new.type == parquet.read_schema(source / SHARDS[0]).field(LANGUAGE).type
-    assert [row["content"] for row in new[0].as_py()] == ["reach", '{"symbol": "né"}', "later"]
+    assert [row["content"] for row in new[0].as_py()] == ["reach", *CONTENTS]
 
 
 @pytest.mark.skipif(not hasattr(pa, "json_"), reason="pyarrow before 19 has no type for JSON")
@@ -171,8 +182,8 @@ def test_a_column_of_json(tmp_path, source):
     column = pa.ListArray.from_arrays(pa.array([0, 1] + [1] * (len(table) - 1), pa.int32()), row_, type=kind)
     parquet.write_table(table.append_column(LANGUAGE, column), source / SHARDS[0])
     new = parquet.read_table(copied(source, tmp_path / "named") / SHARDS[0]).column(LANGUAGE)
-    assert [row["content"] for row in new[0].as_py()] == ["reach", '{"symbol": "né"}', "later"]
-    assert [row["content"] for row in new[1].as_py()] == ['{"symbol": "né"}', "later"]
+    assert [row["content"] for row in new[0].as_py()] == ["reach", *CONTENTS]
+    assert [row["content"] for row in new[1].as_py()] == CONTENTS
 
 
 def test_another_column_of_that_name_is_refused(tmp_path, source):
@@ -203,22 +214,47 @@ def test_a_folder_of_links_as_a_cache_has_them(tmp_path, source):
     assert all(rows == EXPECTED[k] for k, rows in lists(target))
 
 
-def ours(symbol):
-    return f'{OWN}, "symbol": "{symbol}"}}'
-
-
-def test_a_second_copy_replaces_the_texts_of_the_first_and_keeps_those_of_others(tmp_path, source):
-    alien = {**SUBTASK, "style": "motion", "content": "to the left", "tool_calls": None}
+def test_a_second_copy_replaces_the_rows_of_the_first_and_keeps_those_of_others(tmp_path, source):
+    alien = {
+        **SUBTASK,
+        "style": "motion",
+        "content": "to the left",
+        "timestamp": float(np.float32(0.4)),
+        "tool_calls": None,
+    }
+    old = {**alien, "content": f'{OWN}, "symbol": "wave"}}'}  # as a version of kineme before the table of details
     empty = {**SUBTASK, "content": None, "tool_calls": None}
-    with_rows(source, lambda k: [alien, empty] if k % 2 else None)
-    first = copied(source, tmp_path / "first", {0: [Motion(0.0, ours("wave"))], 1: [Motion(0.1, ours("nod"))]})
-    both = copied(first, tmp_path / "second", {0: [Motion(0.2, ours("bow"))], 2: [Motion(0.0, ours("nod"))]})
-    assert [len(rows) for _, rows in lists(first)] == [1, 3] * 25 + [0] * 25
+    with_rows(source, lambda k: [alien, empty, old] if k % 2 else None)
+    first = copied(source, tmp_path / "first", {0: [Motion(0, 0, 9, "wave")], 1: [Motion(1, 0, 1, "nod")]})
+    second = {0: [Motion(0, 0.6, 9, "bow")], 2: [Motion(2, 0, 9, "nod")]}
+    both = copied(first, tmp_path / "second", second)
+    assert [len(rows) for _, rows in lists(first)] == [1, 3] * 10 + [2, 4] * 15 + [0] * 25
     for k, (episode, rows) in enumerate(lists(both)):
-        said = {0: [row(0.2, ours("bow"))], 1: [], 2: [row(0.0, ours("nod"))]}[episode]
+        said = {0: [row(0, "rest"), row(0.6, "bow")], 1: [], 2: [row(0, "nod")]}[episode]
         assert rows == ([alien, empty] if k % 2 and episode < 2 else []) + said
-    again = copied(both, tmp_path / "third", {0: [Motion(0.2, ours("bow"))], 2: [Motion(0.0, ours("nod"))]})
-    assert lists(again) == lists(both)
+    assert lists(copied(both, tmp_path / "third", second)) == lists(both)
+    assert [(motion.episode, motion.symbol) for motion in read_motions(both)] == [(0, "bow"), (2, "nod")]
+
+
+def test_where_others_name_a_motion_no_second_row_stands(tmp_path, source):
+    """Of two rows of one stamp, style and role LeRobot cannot choose."""
+    alien = {**SUBTASK, "style": "motion", "content": 'né "x"', "timestamp": float(np.float32(0.0)), "tool_calls": None}
+    with_rows(source, lambda k: [alien])
+    first = copied(source, tmp_path / "first")
+    assert {tuple(each["content"] for each in rows) for k, rows in lists(first) if k == 0} == {tuple(CONTENTS)}
+    # Nor is the row of others taken for one of ours later.
+    second = copied(first, tmp_path / "second", {})
+    assert [rows for _, rows in lists(second)] == [[alien]] * 50 + [[]] * 25
+
+
+def test_the_details_are_read_back(tmp_path, source):
+    target = copied(source, tmp_path / "named")
+    motions = read_motions(target)
+    assert str(motions) == str([MOTIONS[0][1], MOTIONS[0][0], MOTIONS[2][0]])
+    assert read_motions(source) == []
+    (target / DETAILS).write_bytes(b"PAR1")
+    with pytest.raises(kineme.errors.DataError, match=r"expected motions\.parquet as kineme writes it"):
+        read_motions(target)
 
 
 def texts_of(folder, k):
@@ -227,7 +263,7 @@ def texts_of(folder, k):
 
 def test_version_2_takes_texts_in_json(tmp_path):
     """Its programs fail on lists of rows: a frame with them could not be loaded."""
-    source = write_v2(tmp_path / "set")
+    source = write_v2(tmp_path / "set", fps=FPS)
     before = digests(source)
     target = copied(source, tmp_path / "named")
     for k, expected in EXPECTED.items():
@@ -236,7 +272,7 @@ def test_version_2_takes_texts_in_json(tmp_path):
     after = digests(target)
     same = {name for name in before if after[name] == before[name]}
     assert digests(source) == before
-    assert set(after) == set(before)
+    assert set(after) == {*before, DETAILS}
     assert {"meta/episodes.jsonl", "meta/tasks.jsonl"} == same
     old, new = (parquet.read_table(folder / "data/chunk-000/episode_000001.parquet") for folder in (source, target))
     assert new.drop_columns([MOTION_TEXTS]).equals(old, check_metadata=True)
@@ -247,11 +283,17 @@ def test_version_2_takes_texts_in_json(tmp_path):
 
 
 def test_a_second_copy_of_version_2_replaces_the_texts_of_the_first(tmp_path):
-    source = write_v2(tmp_path / "set")
-    target = copied(source, tmp_path / "one", {0: [Motion(0.0, ours("wave"))], 1: [Motion(0.0, "of another")]})
-    target = copied(target, tmp_path / "two", {0: [Motion(0.1, ours("bow"))], 1: [Motion(0.0, ours("nod"))]})
-    assert [json.loads(text) for text in set(texts_of(target, 0))] == [[row(0.1, ours("bow"))]]
-    assert json.loads(texts_of(target, 1)[0]) == [row(0.0, "of another"), row(0.0, ours("nod"))]
+    source = write_v2(tmp_path / "set", fps=FPS)
+    alien = row(0.5, "of another")
+    path = source / "data/chunk-000/episode_000001.parquet"
+    table = parquet.read_table(path)
+    texts = pa.array([json.dumps([alien, "a text", row(0.0, OWN)])] * len(table))
+    parquet.write_table(table.append_column(MOTION_TEXTS, texts), path)
+    target = copied(source, tmp_path / "one", {0: [Motion(0, 0, 9, "wave")], 1: [Motion(1, 0, 0.4, "nod")]})
+    assert json.loads(texts_of(target, 1)[0]) == [alien, "a text", row(0, "nod")]  # the rest is said by another
+    target = copied(target, tmp_path / "two", {0: [Motion(0, 0.5, 9, "bow")], 1: [Motion(1, 0, 9, "nod")]})
+    assert [json.loads(text) for text in set(texts_of(target, 0))] == [[row(0, "rest"), row(0.5, "bow")]]
+    assert json.loads(texts_of(target, 1)[0]) == [alien, "a text", row(0, "nod")]
     assert set(texts_of(target, 2)) == {"[]"}
 
 
@@ -259,7 +301,7 @@ def test_a_second_copy_of_version_2_replaces_the_texts_of_the_first(tmp_path):
     ("values", "words"), [(["["], "lists in JSON"), (['{"a": 1}'], "lists in JSON"), ([1], "texts in")]
 )
 def test_another_column_of_that_name_in_version_2_is_refused(tmp_path, values, words):
-    source = write_v2(tmp_path / "set")
+    source = write_v2(tmp_path / "set", fps=FPS)
     path = source / "data/chunk-000/episode_000001.parquet"
     table = parquet.read_table(path)
     parquet.write_table(table.append_column(MOTION_TEXTS, pa.array(values * len(table))), path)
@@ -269,12 +311,14 @@ def test_another_column_of_that_name_in_version_2_is_refused(tmp_path, values, w
 
 def test_an_episode_that_is_not_there(tmp_path, source):
     with pytest.raises(kineme.errors.DataError, match="expected an episode of the data set, got 7"):
-        copied(source, tmp_path / "named", {7: [Motion(0.0, "a")]})
+        copied(source, tmp_path / "named", {7: [Motion(7, 0, 1, "a")]})
 
 
 def test_a_damaged_description_is_not_copied(tmp_path, source):
     (source / "meta" / "episodes" / "chunk-000" / "file-001.parquet").write_bytes(b"cut")
-    with pytest.raises(kineme.errors.DataError, match=r"expected a whole data set to copy: expected file-001\.parquet"):
+    with pytest.raises(
+        kineme.errors.DataError, match=r"expected a whole data set to name motions in: expected file-001\.parquet"
+    ):
         copied(source, tmp_path / "named")
 
 

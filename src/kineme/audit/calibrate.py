@@ -30,8 +30,9 @@ from kineme.validation import Array
 
 FEWEST_OF_TASK = 5  # episodes: with fewer, nobody can tell what is usual for the task
 _MIDDLE, _UPPER = 0.5, (0.8, 0.9)  # quantiles that tell the law
-_NEAREST, _MOST_NEAREST = 0.1, 10  # share of the others whose distance counts, three at least: fewer that are wrong
-# alike would vouch for each other
+#: Share of the others whose distance counts, and how many at least and at most: fewer that are wrong alike would vouch
+#: for each other.
+_NEAREST, _FEWEST_NEAREST, _MOST_NEAREST = 0.1, 3, 10
 _COMPARED = 200  # episodes of a task that each is compared with, at most, evenly spaced
 _ELSEWHERE = 20  # episodes of each other task, at most
 _BLOCK = 256  # episodes that are compared at once
@@ -117,8 +118,8 @@ def unlike(
 
     The distance of two ways is the root of the mean square, over samples and channels, of their difference in
     multiples of the channel's usual `extents` (d,). The first column is the log of the mean distance to the nearest, a
-    tenth, three to ten, of up to 200 others of the task; the second is this, less the log of that to the nearest of up to 20 of each
-    other task. NaN where there are too few. `read` returns the ways (m, d, 64) of some episodes.
+    tenth, three to ten, of up to 200 others of the task; the second is this, less the log of that to the nearest of up
+    to 20 of each other task. NaN where there are too few. `read` returns the ways (m, d, 64) of some episodes.
     """
     result = np.full((n, 2), np.nan)
     weights = np.where(extents > 0, 1 / np.where(extents > 0, extents, 1.0), 0.0)[:, None]
@@ -133,7 +134,7 @@ def unlike(
         if len(rows) >= FEWEST_OF_TASK:
             own = rows[evenly_spaced(len(rows), _COMPARED)]
             ways, others = flat(own), foreign[~np.isin(elsewhere, rows)]
-            k = min(max(3, min(_MOST_NEAREST, int(_NEAREST * len(own)))), len(own) - 1)
+            k = min(max(_FEWEST_NEAREST, min(_MOST_NEAREST, int(_NEAREST * len(own)))), len(own) - 1)
             for first in range(0, len(rows), _BLOCK):
                 some = rows[first : first + _BLOCK]
                 compared = flat(some)

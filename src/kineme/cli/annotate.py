@@ -62,7 +62,7 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
     """
     from kineme.io.reading.formats import expanded
     from kineme.io.reading.recordings import paths_of
-    from kineme.io.writing.annotations import as_row, targets_of, to_csv, write_annotations
+    from kineme.io.writing.annotations import as_row, is_in_place, targets_of, to_csv, write_annotations
     from kineme.io.writing.rerun import recording_scenes, write_rerun
     from kineme.library.annotate import annotate as find
     from kineme.library.library import ActionLibrary
@@ -82,7 +82,8 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
         check_new(rerun, force, *sources, *paths_of(recordings, parsed))
         if output is not None:
             for target in targets_of(output, sources, movements, form):
-                check_new(target, force, *sources, *paths_of(recordings, parsed))
+                if not is_in_place(target, sources):
+                    check_new(target, force, *sources, *paths_of(recordings, parsed))
                 if target.is_dir() and any(target.iterdir()) and not force:
                     raise click.UsageError(
                         f"expected a new folder to write, {printable(target)} is there; write over it with --force"

@@ -7,8 +7,9 @@ import pytest
 
 import kineme
 from bag_files import SECOND, START, Maker, pose_rows, stamps, store, write_bag
+from kineme.io.lerobot.motions import read_motions
 from kineme.io.writing.annotations import Annotation, write_annotations
-from lerobot_sets import write_v2, write_v3
+from lerobot_sets import write_lance, write_v2, write_v3
 
 pytest.importorskip("rosbags")
 
@@ -112,21 +113,44 @@ def test_a_folder_with_files_is_never_written_over(tmp_path):
 
 def test_a_lerobot_set_says_it_on_the_frames(tmp_path):
     pandas = pytest.importorskip("pandas")
-    source = write_v3(tmp_path / "set")
-    annotations = [one(0.1, 0.38, "wave", "episode 0", 0.0), one(0.0, 0.48, None, "episode 2", 0.0)]
+    source = write_v3(tmp_path / "set", fps=10)
+    annotations = [one(0.5, 1.1, "wave", "episode 0", 0.0), one(0.0, 2.4, None, "episode 2", 0.0)]
     (tmp_path / "named").mkdir()  # an empty folder is as good as none
     assert write_annotations(tmp_path / "named", annotations, [source]) == [tmp_path / "named"]
     frames = pandas.read_parquet(tmp_path / "named" / "data" / "chunk-000" / "file-000.parquet")
     for episode, rows in zip(frames.episode_index, frames.language_persistent, strict=True):
-        assert [json.loads(row["content"])["symbol"] for row in rows] == (["wave"] if episode == 0 else [])
+        assert [row["content"] for row in rows] == (["rest", "wave", "rest"] if episode == 0 else [])
         assert [(row["style"], row["camera"]) for row in rows] == [("motion", None)] * len(rows)
+    assert [motion[:6] for motion in read_motions(tmp_path / "named")] == [
+        (0, 0.5, 1.1, "wave", 0.25, 0.75), (2, 0.0, 2.4, None, 0.25, 0.75),
+    ]  # fmt: skip
     assert len(kineme.read_recordings(tmp_path / "named").demonstrations) == 3
     again = write_annotations(tmp_path / "again", annotations[:1], [tmp_path / "named"])[0]
     frames = pandas.read_parquet(again / "data" / "chunk-000" / "file-000.parquet")
-    assert [len(rows) for rows in frames.language_persistent] == [1] * 20 + [0] * 30
-    two = write_annotations(tmp_path / "two", annotations, [write_v2(tmp_path / "old")])[0]
+    assert [len(rows) for rows in frames.language_persistent] == [3] * 20 + [0] * 30
+    two = write_annotations(tmp_path / "two", annotations, [write_v2(tmp_path / "old", fps=10)])[0]
     frames = pandas.read_parquet(two / "data" / "chunk-000" / "episode_000000.parquet")
     (text,) = set(frames["annotation.motion"])
-    assert [json.loads(row["content"])["symbol"] for row in json.loads(text)] == ["wave"]
+    assert [row["content"] for row in json.loads(text)] == ["rest", "wave", "rest"]
     with pytest.raises(kineme.errors.DataError, match="expected annotations of episodes, got one of 'run 3'"):
         write_annotations(tmp_path / "three", [one(0, 1, "a", "run 3")], [source])
+
+
+def test_a_lerobot_set_in_lance_is_copied_or_named_in_place(tmp_path):
+    lance = pytest.importorskip("lance")
+    source = write_lance(tmp_path / "set", fps=10)
+    wave = [one(0.5, 1.1, "wave", "episode 0", 0.0)]
+
+    def contents(folder):
+        frames = lance.dataset(str(folder / "frames.lance"))
+        return [row["content"] for row in frames.to_table(limit=1)["language_persistent"][0].as_py()]
+
+    write_annotations(tmp_path / "named", wave, [source])
+    assert contents(tmp_path / "named") == ["rest", "wave", "rest"]
+    assert read_motions(source) == []
+    assert lance.dataset(str(source / "frames.lance")).version == 1
+    assert write_annotations(source, [one(0, 9, "bow", "episode 0", 0.0)], [source]) == [source]
+    assert contents(source) == ["bow"]
+    assert contents(tmp_path / "named") == ["rest", "wave", "rest"]
+    with pytest.raises(kineme.errors.DataError, match="expected another path for the copy"):
+        write_annotations(source / "named", wave, [source])

@@ -31,10 +31,8 @@ def episodes(
     info = read_info(folder)
     names = list(info.heads) if features is None else list(dict.fromkeys(features))
     if not names or (unknown := [name for name in names if name not in info.heads]):
-        got = repr(unknown[0]) if names else "none"
-        raise DataError(
-            f"expected features of numbers, of {', '.join(info.heads) or 'which there are none'}, got {got}"
-        )
+        there, got = ", ".join(info.heads) or "there are none", repr(unknown[0]) if names else "none"
+        raise DataError(f"expected features of numbers ({there}), got {got}")
     widths = {name: len(info.heads[name]) for name in names}
     declared, (tasks, unsaid) = read_episodes(folder, info), read_tasks(folder)
     wanted = None if numbers is None else {int(number) for number in numbers}
@@ -46,9 +44,8 @@ def episodes(
     def episode(frames: Frames, number: int, place: str, problems: Sequence[str], task: str | None = None) -> Episode:
         columns = np.split(frames.values, np.cumsum(list(widths.values()))[:-1], axis=1)
         signals = dict(zip(names, columns, strict=True))
-        return Episode(
-            number, frames.stamps, signals, entries, task, info.fps, tuple(problems), place, videos.get(number, {})
-        )
+        files = {camera: video.file for camera, video in videos.get(number, {}).items()}
+        return Episode(number, frames.stamps, signals, entries, task, info.fps, tuple(problems), place, files)
 
     if wanted is None and (problems := (*declared.problems, *unsaid)):
         yield episode(_no_frames(sum(widths.values())), -1, "meta", problems)

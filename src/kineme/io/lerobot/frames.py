@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -53,27 +54,34 @@ class _Shard(NamedTuple):
 def _parquet(path: Path) -> Iterator[_Shard]:
     # Pages are read as they are needed: a group of rows may be larger than the memory.
     with parquet.ParquetFile(path, buffer_size=_READ, pre_buffer=False) as file:
-        yield _Shard(
-            file.schema_arrow.names,
-            lambda columns, rows, numbers: file.iter_batches(rows, columns=list(columns), use_threads=False),
-        )
+
+        def batches(columns: Sequence[str], rows: int, numbers: Sequence[int] | None) -> Iterator[Any]:
+            for group in range(file.num_row_groups):  # so that damage costs one group
+                yield from file.iter_batches(rows, row_groups=[group], columns=list(columns), use_threads=False)
+
+        yield _Shard(file.schema_arrow.names, batches)
 
 
 @contextmanager
 def _lance(path: Path) -> Iterator[_Shard]:
     with needs("pylance", "read a LeRobot data set in Lance", "lance"):
         import lance
-    table = lance.dataset(str(path))
 
-    def batches(columns: Sequence[str], rows: int, numbers: Sequence[int] | None) -> Iterator[Any]:
+    def batches(table: Any, columns: Sequence[str], rows: int, numbers: Sequence[int] | None) -> Iterator[Any]:
         few = numbers is not None and len(numbers) <= _MOST_NUMBERS
         where = f"episode_index IN ({', '.join(map(str, numbers))})" if few and numbers else None
-        return table.to_batches(
+        yield from table.to_batches(
             columns=list(columns), batch_size=rows, filter=where, scan_in_order=True, batch_readahead=1,
             fragment_readahead=1,
         )  # fmt: skip
 
-    yield _Shard(table.schema.names, batches)
+    try:
+        table = lance.dataset(str(path))
+        yield _Shard(table.schema.names, partial(batches, table))
+    except BaseException as error:
+        if type(error).__name__ != "PanicException":  # of Rust, on damaged bytes; no Exception of Python
+            raise
+        raise OSError(str(error)) from error
 
 
 class Storage(NamedTuple):
@@ -115,11 +123,12 @@ def shard_frames(
     except DataError as error:
         raise DataError(f"the shard {shard}: {error}") from error
     except (pa.ArrowException, OSError, ValueError, RuntimeError) as error:
-        raise DataError(f"expected the shard {shard} to be {storage.name}, got a damaged one ({error})") from error
+        reason = str(error).partition(", /")[0]  # Lance names places in its sources, too
+        raise DataError(f"expected the shard {shard} to be {storage.name}, got a damaged one ({reason})") from error
 
 
 def _frames(batch: Any, features: Mapping[str, int], columns: Mapping[str, str]) -> Frames:
-    values: list[Array] = []
+    values: list[Array] = [np.empty((batch.num_rows, 0))]
     faults: dict[int, str] = {}
     for name, width in features.items():
         column = batch.column(columns[name])

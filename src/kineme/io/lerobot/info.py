@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -182,29 +182,34 @@ def _paths(template: str, fields: Mapping[str, NDArray[np.int64]], key: str) -> 
     return files
 
 
-def read_videos(folder: Path, info: Info) -> dict[int, dict[str, str]]:
-    """Return number of an episode -> camera -> its file, relative to the data set, whether it is there or not.
+class Video(NamedTuple):
+    """The part of a file of video that shows an episode."""
 
-    Empty where the data set has no files of videos, or does not say which.
-    """
-    files: dict[int, dict[str, str]] = {}
+    file: str  # relative to the data set, whether it is there or not
+    start: float  # of the episode within it [s]
+
+
+def read_videos(folder: Path, info: Info) -> dict[int, dict[str, Video]]:
+    """Return number of an episode -> camera -> its video; empty where a data set has no files of videos."""
+    videos: dict[int, dict[str, Video]] = {}
     for camera in info.cameras if info.video_path else ():
         # The name of the camera goes in first: its braces, if it has any, must not count as fields.
         template = str(info.video_path).replace("{video_key}", camera.replace("{", "{{").replace("}", "}}"))
         with suppress(DataError):
             if info.version == 2:
-                numbers = np.array(
-                    [row["episode_index"] for row in _lines(folder / _V2, ("episode_index",), [])], dtype=np.int64
-                )
+                rows = _lines(folder / _V2, ("episode_index",), [])
+                numbers = np.array([row["episode_index"] for row in rows], dtype=np.int64)
                 fields = {"episode_chunk": numbers // info.chunk, "episode_index": numbers}
+                starts = np.zeros(len(numbers))
             else:
-                columns = (f"videos/{camera}/chunk_index", f"videos/{camera}/file_index")
-                numbers, *places = _table(folder, ("episode_index", *columns), [])
+                columns = [f"videos/{camera}/{name}" for name in (*_OF_FILE, "from_timestamp")]
+                numbers, *places, starts = _table(folder, ("episode_index", *columns), [], columns[-1:])
                 fields = dict(zip(_OF_FILE, places, strict=True))
-            for number, path in zip(numbers.tolist(), _paths(template, fields, "video_path"), strict=True):
-                if ".." not in Path(path).parts and not Path(path).is_absolute():
-                    files.setdefault(number, {})[camera] = path
-    return files
+            files = _paths(template, fields, "video_path")
+            for number, file, start in zip(numbers.tolist(), files, starts.tolist(), strict=True):
+                if ".." not in Path(file).parts and not Path(file).is_absolute():
+                    videos.setdefault(number, {})[camera] = Video(file, start)
+    return videos
 
 
 def read_tasks(folder: Path) -> tuple[dict[int, str], list[str]]:
@@ -244,27 +249,31 @@ def _lines(path: Path, integers: Sequence[str], problems: list[str], text: str =
             problems.append(f"meta/{path.name}, line {k}: expected an object with {wanted}, got {line[:40]!r}")
 
 
-def _table(folder: Path, names: Sequence[str], problems: list[str]) -> list[NDArray[np.int64]]:
+def _table(folder: Path, names: Sequence[str], problems: list[str], floats: Collection[str] = ()) -> list[NDArray[Any]]:
+    """Return columns of all files of meta/episodes, whole numbers but for some; files that lack them are problems."""
     import pyarrow as pa
 
     files = sorted(folder.glob(_V3))
     if not files:
         raise DataError(f"expected {_V3} of a LeRobot data set of version 3, found none")
-    parts = [[np.empty(0, np.int64)] for _ in names]
+    kinds = [np.float64 if name in floats else np.int64 for name in names]
+    parts = [[np.empty(0, kind)] for kind in kinds]
     n_rows = 0
     for file in files:
         try:
             table = _rows(file, names, _AN_EPISODE, n_rows)
             for name in names:
                 column = table.column(name)
-                if not pa.types.is_integer(column.type) or column.null_count:
-                    raise DataError(f"expected whole numbers as {name} in {file.name}, got {column.type}")
+                is_number = pa.types.is_floating if name in floats else pa.types.is_integer
+                if not is_number(column.type) or column.null_count:
+                    said = "numbers" if name in floats else "whole numbers"
+                    raise DataError(f"expected {said} as {name} in {file.name}, got {column.type}")
         except DataError as error:
             problems.append(str(error))
             continue
         n_rows += table.num_rows
-        for part, name in zip(parts, names, strict=True):
-            part.append(table.column(name).to_numpy().astype(np.int64))
+        for part, name, kind in zip(parts, names, kinds, strict=True):
+            part.append(table.column(name).to_numpy().astype(kind))
     return [np.concatenate(part) for part in parts]
 
 

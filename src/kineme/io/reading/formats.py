@@ -141,8 +141,8 @@ _HEAD = 4096  # bytes of a marker that are read to know it
 DATA_SETS: tuple[DataSet, ...] = (
     DataSet(
         MARKER,
-        ("data",),
-        ("meta/*.jsonl", "meta/*.parquet", "meta/episodes/*/*.parquet", "data/*/*.parquet"),
+        ("data", "frames.lance"),
+        ("meta/*.jsonl", "meta/*.parquet", "meta/episodes/*/*.parquet", "data/*/*.parquet", "frames.lance/data/*"),
         Format(read_path=_read_lerobot),
     ),
     DataSet("metadata.yaml", ("*.db3*", "*.mcap*"), ("*.db3*", "*.mcap*"), _BAG, b"rosbag2_bagfile_information"),

@@ -177,19 +177,39 @@ def write_bag(path: Path, annotations: Sequence[Annotation], source: Path | None
 
 
 def write_lerobot(path: Path, annotations: Sequence[Annotation], source: Path | None) -> Path:
-    """Write a copy of a data set of LeRobot whose frames carry the annotations of their episode as JSON."""
+    """Write a copy of a data set of LeRobot whose frames name the motions of their episode; in Lance, itself, too.
+
+    Where `path` is the data set itself, and it is stored in Lance, the names are a new version of its frames.
+    """
     with needs("pyarrow", "write Parquet", "parquet"):
-        from kineme.io.lerobot.copy import OWN, Motion, copy_with_motions
+        from kineme.io.lerobot.copy import copy_with_motions
+        from kineme.io.lerobot.lance_motions import copy_in_lance, name_in_place
+        from kineme.io.lerobot.motions import Motion
     assert source is not None  # see `writer_of`
     motions: dict[int, list[Motion]] = {}
-    for annotation in annotations:
-        number = annotation.place.removeprefix(_EPISODE)
+    for note in annotations:
+        number = note.place.removeprefix(_EPISODE)
         if not number.isdecimal():
-            raise DataError(f"expected annotations of episodes, got one of {annotation.place!r}")
-        motions.setdefault(int(number), []).append(Motion(annotation.start, OWN + ", " + _json(annotation)[1:]))
+            raise DataError(f"expected annotations of episodes, got one of {note.place!r}")
+        motion = Motion(int(number), note.start, note.end, note.symbol, note.p_value, note.confidence)
+        motions.setdefault(int(number), []).append(motion)
+    if is_in_place(path, [source]):
+        name_in_place(source, motions)
+        return path
+    copy = copy_in_lance if read_info(source).storage == "lance" else copy_with_motions
     with whole_folder(path) as beside:
-        copy_with_motions(source, beside, motions)
+        copy(source, beside, motions)
     return path
+
+
+def is_in_place(path: Path, sources: Sequence[Path]) -> bool:
+    """Tell whether annotations to write to `path` become a version of the only recording: of a data set in Lance."""
+    return (
+        len(sources) == 1
+        and path.resolve() == sources[0].resolve()
+        and is_lerobot(sources[0])
+        and read_info(sources[0]).storage == "lance"
+    )
 
 
 def check_bag(path: Path, source: Path) -> None:
@@ -206,9 +226,11 @@ def check_bag(path: Path, source: Path) -> None:
 
 def check_lerobot(path: Path, source: Path) -> None:
     """Refuse a path where no copy of that data set can be written, or a data set that is damaged."""
+    if is_in_place(path, [source]):
+        return
+    read_info(source)
     _check_apart(path, source)
     _check_new_folder(path, source)
-    read_info(source)
 
 
 def _check_apart(path: Path, source: Path) -> None:
