@@ -29,6 +29,9 @@ from kineme.sampling import evenly_spaced
 from kineme.validation import Array
 
 FEWEST_OF_TASK = 5  # episodes: with fewer, nobody can tell what is usual for the task
+#: Episodes of a task, with fewer of which the spread of values is taken from all such tasks: where it depends on what
+#: is done, as ranges do, and where it is one of sensors and hands.
+ENOUGH = {True: 40, False: 100}
 _MIDDLE, _UPPER = 0.5, (0.8, 0.9)  # quantiles that tell the law
 #: Share of the others whose distance counts, and how many at least and at most: fewer that are wrong alike would vouch
 #: for each other.

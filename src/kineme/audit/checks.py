@@ -44,6 +44,7 @@ class Check(NamedTuple):
     remedy: str
     shown: Callable[[float], float] = float  # a value as it is shown
     columns: tuple[str, ...] = ("",)  # of the values, each repeated for all channels where there are more values
+    by_task: bool = False  # how values spread depends on what is done, not on sensors and hands alone
     relative: bool = False  # values are in the unit of their channel, and compared in multiples of its usual range
 
 
@@ -328,22 +329,22 @@ CHECKS: tuple[Check, ...] = (
     Check(
         "still", still, "upper", 0.3, "{channel} moves by {value:.3g} in all (usual: {usual:.3g})",
         "A gripper that never closes, or a joint that was not connected.", "See if the task was done at all.",
-        lambda value: float(np.exp(-value)),
+        lambda value: float(np.exp(-value)), by_task=True,
     ),
     Check(
         "above", highest, "upper", 0.05, "{channel} goes up to {value:.3g} (usual: {usual:.3g})",
         "Another calibration, channels in another order, or a collision.", "Compare the calibration of that day.",
-        relative=True,
+        by_task=True, relative=True,
     ),
     Check(
         "below", lowest, "lower", 0.05, "{channel} goes down to {value:.3g} (usual: {usual:.3g})",
         "Another calibration, channels in another order, or a collision.", "Compare the calibration of that day.",
-        relative=True,
+        by_task=True, relative=True,
     ),
     Check(
         "place", ends, "both", 0.05, "{channel} {column} at {value:.3g} (usual: {usual:.3g})",
         "The episode begins or ends elsewhere: cut off, or not brought to its end.", "See if the task was finished.",
-        columns=("begins", "ends"), relative=True,
+        columns=("begins", "ends"), by_task=True, relative=True,
     ),
     Check(
         "cut", cut, "upper", 0.3,
@@ -353,7 +354,7 @@ CHECKS: tuple[Check, ...] = (
     ),
     Check(
         "duration", duration, "both", 0.1, "lasts {value:.1f} s (usual: {usual:.1f} s)",
-        "Cut off, forgotten to stop, another task, or another rate.", "Look at its end.", np.exp,
+        "Cut off, forgotten to stop, another task, or another rate.", "Look at its end.", np.exp, by_task=True,
     ),
     Check(
         "speed", speed, "both", 0.05, "moves {value:.2g} ranges of its channels in a second (usual: {usual:.2g})",
@@ -366,7 +367,7 @@ CHECKS: tuple[Check, ...] = (
     ),
     Check(
         "offset", offset, "both", 0.01, "{channel} is {value:+.3g} from its action all the time (usual: {usual:+.3g})",
-        "Leader and follower were calibrated differently.", "Calibrate again; subtract the offset.", relative=True,
+        "Leader and follower were calibrated differently.", "Calibrate again; subtract the offset.", by_task=True, relative=True,
     ),
     Check(
         "following", following, "upper", 0.2,
@@ -378,11 +379,11 @@ CHECKS: tuple[Check, ...] = (
         "unlike", None, "upper", 0.05,
         "its way is {value:.2g} ranges from the nearest of its task (usual: {usual:.2g})",
         "Another task than it says, a failed attempt, or a manner of its own.", "See what was done; correct the task.",
-        np.exp,
+        np.exp, by_task=True,
     ),
     Check(
         "task", None, "upper", 0.05,
         "its way is {value:.2g} times as far from its own task as from another (usual: {usual:.2g})",
-        "It carries the name of another task.", "See what was done; correct the task.", np.exp,
+        "It carries the name of another task.", "See what was done; correct the task.", np.exp, by_task=True,
     ),
 )  # fmt: skip

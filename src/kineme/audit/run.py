@@ -242,7 +242,7 @@ def _audited(measured: _Measured, error_rate: float, progress: Callable[[int], o
     """Compare what was measured, and list what is unusual."""
     tasks = calibrate.tasks_of(measured.tasks)
     groups = calibrate.groups_of(tasks, round(2 / error_rate))
-    compared = list(_compared(measured, tasks, groups, progress)) if measured.names else []
+    compared = list(_compared(measured, tasks, progress)) if measured.names else []
     broken, of_the_set = _contradictions(measured, compared)
     soft = [row.evidence for row in compared if row.check.side != "exact"]
     evidence = np.stack(soft, axis=1) if soft else np.zeros((len(broken), 0))
@@ -256,15 +256,14 @@ def _audited(measured: _Measured, error_rate: float, progress: Callable[[int], o
     )  # fmt: skip
 
 
-def _compared(
-    measured: _Measured, tasks: calibrate.Groups, groups: calibrate.Groups, say: Callable[[int], object]
-) -> Iterator[_Compared]:
+def _compared(measured: _Measured, tasks: calibrate.Groups, say: Callable[[int], object]) -> Iterator[_Compared]:
     """Yield the checks with their evidence."""
     alone = [check for check in CHECKS if check.measure is not None]
     values = dict(zip([check.name for check in alone], measured.values(), strict=True))
     extents = np.nanmedian(values["above"] - values["below"], axis=0).astype(np.float64)
     usable = np.ones(len(measured.numbers), dtype=np.bool_)
     usable[measured.unusable] = False
+    groups = {by_task: calibrate.groups_of(tasks, fewest) for by_task, fewest in calibrate.ENOUGH.items()}
     ways = calibrate.unlike(measured.ways, extents, [rows[usable[rows]] for rows in tasks], len(usable), say)
     values |= {"unlike": ways[:, :1], "task": ways[:, 1:]}
     unit, stretch = np.where(extents > 0, extents, 1.0), 0
@@ -276,8 +275,9 @@ def _compared(
             yield _Compared(check, own, np.zeros(len(own), dtype=np.intp), wrong, first)
             continue
         scaled = calibrate.centered(own / np.tile(unit, own.shape[1] // len(unit)) if check.relative else own, tasks)
-        columns = calibrate.evidence_of(_SIDES[check.side](scaled), groups, check.least)
-        evidence = calibrate.evidence_of(columns.max(axis=1, keepdims=True), groups, _LEAST_EVIDENCE)[:, 0]
+        among = groups[check.by_task]
+        columns = calibrate.evidence_of(_SIDES[check.side](scaled), among, check.least)
+        evidence = calibrate.evidence_of(columns.max(axis=1, keepdims=True), among, _LEAST_EVIDENCE)[:, 0]
         yield _Compared(check, own, columns.argmax(axis=1), evidence, first)
 
 
