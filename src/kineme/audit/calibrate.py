@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.recognition.outliers import listed, tail_p_values
+from kineme.recognition.outliers import listed
 from kineme.sampling import evenly_spaced
 from kineme.validation import Array
 
@@ -33,6 +33,8 @@ FEWEST_OF_TASK = 5  # episodes: with fewer, nobody can tell what is usual for th
 #: is done, as ranges do, and where it is one of sensors and hands.
 ENOUGH = {True: 40, False: 100}
 _MIDDLE, _UPPER = 0.5, (0.8, 0.9)  # quantiles that tell the law
+_TOGETHER = 0.8  # of all checks together
+_UNIT = math.log((1 - _MIDDLE) / (1 - _TOGETHER))  # difference of these, where the slope is 1
 #: Share of the others whose distance counts, and how many at least and at most: fewer that are wrong alike would vouch
 #: for each other.
 _NEAREST, _FEWEST_NEAREST, _MOST_NEAREST = 0.1, 3, 10
@@ -77,18 +79,18 @@ def centered(values: Array, tasks: Groups) -> Array:
     return result
 
 
-def evidence_of(values: Array, groups: Groups, least: float = 0.0) -> Array:
+def evidence_of(values: Array, groups: Groups, least: float, upper: tuple[float, ...] = _UPPER) -> Array:
     """Return the evidence (n, k) of values, the larger the more unusual; 0 where there is no value.
 
-    `least` is a difference that means nothing, whatever the spread.
+    `least` is a difference that means nothing, whatever the spread; `upper` are the quantiles that tell this.
     """
     result = np.zeros(values.shape)
     for rows in groups:
         middle, slopes = _quantiles(values[rows], _MIDDLE), []
-        for upper in _UPPER:
-            away = np.maximum(_quantiles(values[rows], upper) - middle, least)
-            slopes.append(away / math.log((1 - _MIDDLE) / (1 - upper)))
-        step = np.maximum(*slopes) * (1 + len(rows) ** -0.5)
+        for share in upper:
+            away = np.maximum(_quantiles(values[rows], share) - middle, least)
+            slopes.append(away / math.log((1 - _MIDDLE) / (1 - share)))
+        step = np.max(slopes, axis=0) * (1 + len(rows) ** -0.5)
         with np.errstate(invalid="ignore", divide="ignore"):
             ratio = np.where(values[rows] > middle, (values[rows] - middle) / np.maximum(step, 1e-12), 0.0)
         result[rows] = np.where(ratio > 0, math.log(2) + ratio, 0.0)
@@ -105,7 +107,9 @@ def rank(evidence: Array, comparable: NDArray[np.bool_], groups: Groups, error_r
     p_values, outlying = np.ones(n), np.zeros(n, dtype=np.bool_)
     rows = np.flatnonzero(comparable)
     if len(rows):
-        outlying[rows[listed(tail_p_values(largest[rows]), error_rate)]] = True
+        # Many episodes may be bad together, though few by each check; its slope is 1 where each check's law holds.
+        law = evidence_of(largest[rows, None], [np.arange(len(rows))], _UNIT, (_TOGETHER,))[:, 0]
+        outlying[rows[listed(np.exp(-law), error_rate)]] = True
     for members in groups:
         own = members[comparable[members]]
         among = np.sort(largest[own[~outlying[own]]])

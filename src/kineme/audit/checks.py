@@ -367,7 +367,8 @@ CHECKS: tuple[Check, ...] = (
     ),
     Check(
         "offset", offset, "both", 0.01, "{channel} is {value:+.3g} from its action all the time (usual: {usual:+.3g})",
-        "Leader and follower were calibrated differently.", "Calibrate again; subtract the offset.", by_task=True, relative=True,
+        "Leader and follower were calibrated differently.", "Calibrate again; subtract the offset.",
+        by_task=True, relative=True,
     ),
     Check(
         "following", following, "upper", 0.2,
