@@ -26,7 +26,7 @@ from kineme.audit.run import KINDS, Reason, audit_episodes
 
 @pytest.fixture(scope="module")
 def mixed():
-    some = episodes(60)
+    some = episodes(100)
     some[5], some[17], some[30] = spike(some[5]), slow_clock(some[17]), shift(some[30])
     return some
 
@@ -39,7 +39,7 @@ def audit(mixed):
 def test_words_say_which_why_where_and_what_to_do(audit):
     words = audit_as_words(audit)
     flat = " ".join(words.split())
-    assert "60 episodes of 1 task" in flat
+    assert "100 episodes of 1 task" in flat
     assert "1 contradict what the set declares, 2 lie far beyond the others" in flat
     assert "frames come at 25 per second, the data set declares 50" in flat
     assert re.search(r"lift.pos jumps within one frame, \d+ times its noise", flat)
@@ -117,7 +117,7 @@ def test_the_page_draws_each_flagged_episode_with_its_stretches(audit, mixed):
     drawings = strips(text)
     assert len(drawings) == 1 + audit.flagged.sum()
     labels = [drawing.get("aria-label") for drawing in drawings]
-    assert labels[0] == f"{audit.flagged.sum()} of 60 episodes are flagged"
+    assert labels[0] == f"{audit.flagged.sum()} of 100 episodes are flagged"
     spiked = next(drawing for drawing, label in zip(drawings, labels, strict=True) if " episode 5 " in label)
     titled = {
         box.find("title").text: float(box.get("x")) for box in spiked.iter("rect") if box.find("title") is not None

@@ -7,9 +7,11 @@
    bad before that changes much.
 2. The evidence of a check is its largest one over channels, and that of an episode its largest one over checks, each
    put on this scale again: how many there are, and how they depend on each other, makes no difference.
-3. Episodes that the procedure of Benjamini and Hochberg lists are "outlying", and compared with nobody. Among the n
-   others, an episode has ``p = #{evidence >= its own} / n``: that of conformal prediction, with itself left out. Good
-   episodes have p <= e in a share of at most e, whatever their law: it holds where the exponential does not.
+3. An episode has ``p = #{evidence >= its own} / n`` among the n that do not contradict themselves: that of conformal
+   prediction, with itself left out. Good episodes have p <= e in a share of at most e, whatever their law: it holds
+   where the exponential does not. "Outlying" are those that the procedure of Benjamini and Hochberg lists by that law.
+   Where these are more than the share e, good episodes cannot be all of them: they are set aside, and the rest is
+   ranked, so that bad episodes do not hide each other.
 
 Sources: Y. Benjamini, Y. Hochberg, "Controlling the False Discovery Rate", J. R. Stat. Soc. B 57(1), 1995; V. Vovk,
 A. Gammerman, G. Shafer, "Algorithmic Learning in a Random World", Springer 2005.
@@ -53,6 +55,7 @@ class Ranking(NamedTuple):
     evidence: Array  # (n,), minus the logarithm of the share of good episodes that are as unusual, about
     p_values: Array  # (n,), 1 where nothing could be compared
     outlying: NDArray[np.bool_]  # (n,), beyond what good episodes do
+    by_chance: int  # good episodes that are flagged by rank, at most
 
 
 def tasks_of(tasks: Sequence[str | None]) -> Groups:
@@ -97,25 +100,25 @@ def evidence_of(values: Array, groups: Groups, least: float, upper: tuple[float,
     return np.nan_to_num(result, nan=0.0, posinf=1e12)
 
 
-def rank(evidence: Array, comparable: NDArray[np.bool_], groups: Groups, error_rate: float) -> Ranking:
+def rank(evidence: Array, comparable: NDArray[np.bool_], error_rate: float) -> Ranking:
     """Rank episodes by their evidence (n, checks), see 2. and 3. of this file.
 
     Not `comparable` are those that contradict themselves: they are no measure of others, and have p = 1 here.
     """
     n = len(evidence)
     largest = evidence.max(axis=1, initial=0.0) + _TIES * evidence.sum(axis=1)
-    p_values, outlying = np.ones(n), np.zeros(n, dtype=np.bool_)
-    rows = np.flatnonzero(comparable)
+    p_values, outlying, rows = np.ones(n), np.zeros(n, dtype=np.bool_), np.flatnonzero(comparable)
+    by_chance = 0
     if len(rows):
         # Many episodes may be bad together, though few by each check; its slope is 1 where each check's law holds.
         law = evidence_of(largest[rows, None], [np.arange(len(rows))], _UNIT, (_TOGETHER,))[:, 0]
         outlying[rows[listed(np.exp(-law), error_rate)]] = True
-    for members in groups:
-        own = members[comparable[members]]
-        among = np.sort(largest[own[~outlying[own]]])
-        as_large = len(among) - np.searchsorted(among, largest[own] - _ROUNDED)
-        p_values[own] = np.maximum(as_large, 1) / max(len(among), 1)
-    return Ranking(largest, p_values, outlying)
+        aside = outlying.sum() > error_rate * len(rows)
+        among = np.sort(largest[rows[~outlying[rows]]] if aside else largest[rows])
+        as_large = len(among) - np.searchsorted(among, largest[rows] - _ROUNDED)
+        p_values[rows] = np.maximum(as_large, 1) / max(len(among), 1)
+        by_chance = int(error_rate * len(among) + 1e-9)
+    return Ranking(largest, p_values, outlying, by_chance)
 
 
 def unlike(

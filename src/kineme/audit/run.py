@@ -216,7 +216,7 @@ def audit_episodes(
         Read once, one at a time.
     error_rate : float, default 0.05
         Share of good episodes that may be flagged. It takes ``1 / error_rate`` episodes; with fewer, only
-        contradictions are flagged, and the others ranked. Tasks with ``2 / error_rate`` are compared by themselves.
+        contradictions are flagged, and the others ranked.
     progress : callable, optional
         Called with the number of episodes that are done since the last call, twice for each: measured, compared.
 
@@ -241,16 +241,14 @@ def audit_episodes(
 def _audited(measured: _Measured, error_rate: float, progress: Callable[[int], object]) -> Audit:
     """Compare what was measured, and list what is unusual."""
     tasks = calibrate.tasks_of(measured.tasks)
-    groups = calibrate.groups_of(tasks, round(2 / error_rate))
     compared = list(_compared(measured, tasks, progress)) if measured.names else []
     broken, of_the_set = _contradictions(measured, compared)
     soft = [row.evidence for row in compared if row.check.side != "exact"]
     evidence = np.stack(soft, axis=1) if soft else np.zeros((len(broken), 0))
-    ranking = calibrate.rank(evidence, ~broken, groups, error_rate)
-    by_chance = sum(int(error_rate * (~broken & ~ranking.outlying)[rows].sum() + 1e-9) for rows in groups)
-    flagged = broken | ((ranking.p_values <= error_rate + 1e-12) | ranking.outlying) & (by_chance > 0)
+    ranking = calibrate.rank(evidence, ~broken, error_rate)
+    flagged = broken | ((ranking.p_values <= error_rate + 1e-12) | ranking.outlying) & (ranking.by_chance > 0)
     return Audit(
-        np.array(measured.numbers), sum(measured.seconds), len(tasks), error_rate, by_chance,
+        np.array(measured.numbers), sum(measured.seconds), len(tasks), error_rate, ranking.by_chance,
         np.where(broken, 0.0, ranking.p_values), ranking.evidence, flagged,
         _findings(measured, compared, broken, ranking, flagged), of_the_set,
     )  # fmt: skip
