@@ -38,7 +38,7 @@ _FOLDERS = {
 _ANNOTATIONS = {
     "csv": "a table that pandas reads", "json": "an object for programs", "elan": "ELAN",
     "audacity": "label tracks of Audacity",
-    "bag": "a copy of the bag with one more topic", "lerobot": "a copy of the data set with subtasks",
+    "bag": "a copy of the bag with one more topic", "lerobot": "a copy of the data set whose frames name motions",
 }  # fmt: skip
 _WRITTEN = {
     ".csv": "a table with `t` and the columns of the recording", ".npz": "arrays of NumPy",

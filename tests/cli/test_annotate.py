@@ -174,11 +174,11 @@ def test_what_was_annotated_is_learned_with_the_unknown_left_without_symbol(reco
         assert 0 < len(actions.unlabeled()) < len(actions)
 
 
-def test_a_lerobot_set_is_copied_with_its_annotations(demos, library, tmp_path):
-    """Written by pandas; each frame says what its episode shows."""
+def _lerobot(demos, source):
+    """Write a data set of one episode with pandas, and return its frames."""
     times, positions, _ = _long(demos)
     positions = positions.astype(np.float32)
-    names, source = ["x", "y"], tmp_path / "set"
+    names = ["x", "y"]
     counter = {"dtype": "int64", "shape": [1], "names": None}
     features = {"observation.state": {"dtype": "float32", "shape": [2], "names": names}}
     features |= dict.fromkeys(("timestamp", "frame_index", "episode_index", "index", "task_index"), counter)
@@ -192,6 +192,13 @@ def test_a_lerobot_set_is_copied_with_its_annotations(demos, library, tmp_path):
         (source / path).parent.mkdir(parents=True)
         pandas.DataFrame(table).to_parquet(source / f"{path}.parquet")
     (source / "meta" / "info.json").write_text(json.dumps(info))
+    return frames
+
+
+def test_a_lerobot_set_is_copied_with_its_annotations(demos, library, tmp_path):
+    """Each frame says what its episode shows."""
+    source = tmp_path / "set"
+    _lerobot(demos, source)
     said = answer("annotate", source, "-l", library, "-o", tmp_path / "named")
     assert said["written"] == [str(tmp_path / "named")]
     new = pandas.read_parquet(tmp_path / "named" / "data" / "chunk-000" / "file-000.parquet")
@@ -202,3 +209,23 @@ def test_a_lerobot_set_is_copied_with_its_annotations(demos, library, tmp_path):
     again = run("annotate", source, "-l", library, "-o", tmp_path / "named", "--force")
     assert again.returncode
     assert "is there; name another, or remove it" in " ".join(again.stderr.split())
+
+
+def test_a_lerobot_set_in_lance_is_annotated_in_place(demos, library, tmp_path):
+    lance = pytest.importorskip("lance")
+    source = tmp_path / "set"
+    frames = pandas.DataFrame(_lerobot(demos, source))
+    frames["observation.state"] = frames["observation.state"].map(list)
+    lance.write_dataset(frames.rename(columns={"observation.state": "observation_state"}), str(source / "frames.lance"))
+    info = json.loads((source / "meta" / "info.json").read_text()) | {"storage_format": "lance"}
+    (source / "meta" / "info.json").write_text(json.dumps(info))
+    refused = run("annotate", source, "-l", library, "-o", source)
+    assert refused.returncode
+    assert "write over it with --force" in " ".join(refused.stderr.split())
+    assert lance.dataset(str(source / "frames.lance")).version == 1
+    said = answer("annotate", source, "-l", library, "-o", source, "--force")
+    assert said["written"] == [str(source)]
+    table = lance.dataset(str(source / "frames.lance")).to_table(columns=["language_persistent"], limit=3)
+    for rows in table["language_persistent"].to_pylist():
+        named = [row["content"] for row in rows if row["content"] != "rest"]
+        assert named == [one["symbol"] or "unknown" for one in said["annotations"]]

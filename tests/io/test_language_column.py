@@ -8,8 +8,7 @@ import pytest
 
 import kineme
 from kineme.io.lerobot.copy import copy_with_motions
-from kineme.io.lerobot.language import LANGUAGE, MOTION_TEXTS
-from kineme.io.lerobot.motions import DETAILS, OWN, Motion, read_motions
+from kineme.io.lerobot.motions import DETAILS, LANGUAGE, MOTION_TEXTS, OWN, Motion, read_motions
 from lerobot_sets import write_v2, write_v3
 
 pa = pytest.importorskip("pyarrow")

@@ -9,10 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import kineme.io.lerobot.frames
 from kineme.errors import DataError
-from kineme.io.lerobot.episodes import episodes
-from kineme.io.lerobot.frames import Frames, runs
+from kineme.io.lerobot.episodes import Frames, episodes, runs
 from kineme.io.lerobot.info import read_info, read_videos
 from kineme.io.reading.episodes import read_episodes
 from lerobot_sets import CAMERA, FILM, NAMES, TASKS, add_videos, episode_rows, write_lance, write_v2, write_v3
@@ -58,7 +56,7 @@ def test_all_that_is_stored_of_numbers_comes_as_it_is(folder):
 def test_batches_may_end_anywhere(folder, monkeypatch):
     expected = list(episodes(folder))
     for rows in (1, 7, 20):
-        monkeypatch.setattr(kineme.io.lerobot.frames, "_ROWS", rows)
+        monkeypatch.setattr("kineme.io.lerobot.episodes._ROWS", rows)
         for got, episode in zip(episodes(folder), expected, strict=True):
             assert (got.number, got.task, got.problems) == (episode.number, episode.task, ())
             np.testing.assert_array_equal(got.times, episode.times)
@@ -208,6 +206,40 @@ def test_damaged_descriptions_come_first(tmp_path):
     (folder / "meta/episodes/chunk-000/file-000.parquet").write_bytes(b"PAR1")
     with pytest.raises(DataError, match="expected episodes in a LeRobot data set, got none"):
         next(episodes(folder))
+
+
+@pytest.mark.parametrize(
+    ("file", "name", "numbers"),
+    [("meta/tasks.parquet", b"task_index", [-1, 0, 1, 2]), ("data/chunk-000/file-000.parquet", b"action", [0, 1, 2])],
+)
+def test_names_that_are_no_text_are_damage(tmp_path, file, name, numbers):
+    """Not an error of Python: pyarrow decodes the names of columns when it opens a file."""
+    folder = write_v3(tmp_path / "set")
+    data = (folder / file).read_bytes()
+    (folder / file).write_bytes(data.replace(name, b"\xff" + name[1:]))
+    assert [episode.number for episode in episodes(folder)] == numbers
+    episodes_file = folder / "meta/episodes/chunk-000/file-000.parquet"
+    episodes_file.write_bytes(episodes_file.read_bytes().replace(b"length", b"\xffength"))
+    with pytest.raises(DataError, match="expected episodes in a LeRobot data set, got none"):
+        next(episodes(folder))
+
+
+def test_damaged_numbers_are_handed_on_without_a_warning(tmp_path):
+    """NaN whose bits signal, in a vector and in the stamps."""
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    folder = write_v3(tmp_path / "set")
+    path = shard_of(folder)
+    table = parquet.read_table(path)
+    bad = np.full(3 * len(table), 0x7FA00000, dtype=np.uint32).view(np.float32)
+    action = pa.FixedSizeListArray.from_arrays(pa.array(bad, from_pandas=False), 3)
+    for name, column in (("action", action), ("timestamp", pa.array(bad[: len(table)], from_pandas=False))):
+        table = table.set_column(table.schema.get_field_index(name), name, column)
+    parquet.write_table(table, path)
+    first = next(episodes(folder))
+    assert np.isnan(first.signals["action"]).all()
+    assert np.isnan(first.times).all()
 
 
 V2_VIDEOS = "videos/chunk-{episode_chunk:03d}/{video_key}/episode_{episode_index:06d}.mp4"

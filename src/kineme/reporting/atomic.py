@@ -150,9 +150,14 @@ def whole_folder(path: Path) -> Iterator[Path]:
         with _named(path, beside):
             beside.mkdir()
             yield beside
-        if empty:
-            path.rmdir()
-        beside.rename(path)
+        try:
+            if empty:
+                path.rmdir()
+            beside.rename(path)
+        except OSError as error:
+            if not path.exists():
+                raise
+            raise FileExistsError(f"expected a new folder to write, another program wrote {path} meanwhile") from error
     finally:
         if beside.exists():
             shutil.rmtree(beside)

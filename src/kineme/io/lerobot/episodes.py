@@ -1,18 +1,242 @@
-"""Episodes of a data set of LeRobot as they are stored, one after the other, and what is wrong with each."""
+"""Episodes of a data set of LeRobot as they are stored, and the frames that they are cut from, some rows at a time.
+
+Frames come from shards of Parquet or from a table of Lance, in batches that fit into little memory.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from itertools import pairwise
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+from pyarrow import parquet
 
 from kineme.errors import DataError
-from kineme.io.lerobot.frames import Frames, contradictions, runs, shard_frames, task_texts
-from kineme.io.lerobot.info import read_episodes, read_info, read_tasks, read_videos
+from kineme.io.lerobot.info import Episodes, Info, read_episodes, read_info, read_tasks, read_videos
+from kineme.io.limits import check_expanded
+from kineme.io.records import needs
+from kineme.io.tables.parquet import is_list, rows_of_lists
 from kineme.movements.episodes import Episode
+from kineme.reporting.text import counted
+from kineme.validation import Array
 
+_ROWS = 2**16  # rows that are decompressed at a time
+_BYTES = 2**24  # of the numbers in them
+_READ = 2**20  # bytes of a file of Parquet that are read at a time
+_COUNTERS = ("episode_index", "frame_index", "timestamp", "task_index")
 _SHOWN = 5  # frames of an episode whose faults are named
+_MOST_NUMBERS = 1000  # episodes that a filter of Lance names; of more, all frames are read
+
+
+class Frames(NamedTuple):
+    """Consecutive frames: their features side by side, and what tells them apart."""
+
+    values: Array  # shape (T, d)
+    # episodes, frames, tasks: shape (T,)
+    episodes: NDArray[np.int64]
+    frames: NDArray[np.int64]
+    tasks: NDArray[np.int64]
+    stamps: Array  # shape (T,); seconds since the beginning of the episode, as they are stored
+    faults: dict[int, str]  # row -> what is wrong there
+
+
+class _Shard(NamedTuple):
+    """An open file or table of frames."""
+
+    columns: Sequence[str]
+    # Names of columns, the most rows of a batch, and numbers of episodes, None for all, -> batches in order, which may
+    # hold other episodes too.
+    batches: Callable[[Sequence[str], int, Sequence[int] | None], Iterator[Any]]
+
+
+@contextmanager
+def _parquet(path: Path) -> Iterator[_Shard]:
+    # Pages are read as they are needed: a group of rows may be larger than the memory.
+    with parquet.ParquetFile(path, buffer_size=_READ, pre_buffer=False) as file:
+
+        def batches(columns: Sequence[str], rows: int, numbers: Sequence[int] | None) -> Iterator[Any]:
+            for group in range(file.num_row_groups):  # so that damage costs one group
+                yield from file.iter_batches(rows, row_groups=[group], columns=list(columns), use_threads=False)
+
+        yield _Shard(file.schema_arrow.names, batches)
+
+
+@contextmanager
+def _lance(path: Path) -> Iterator[_Shard]:
+    import lance
+
+    def batches(columns: Sequence[str], rows: int, numbers: Sequence[int] | None) -> Iterator[Any]:
+        few = numbers is not None and len(numbers) <= _MOST_NUMBERS
+        where = f"episode_index IN ({', '.join(map(str, numbers))})" if few and numbers else None
+        yield from table.to_batches(
+            columns=list(columns), batch_size=rows, filter=where, scan_in_order=True, batch_readahead=1,
+            fragment_readahead=1,
+        )  # fmt: skip
+
+    try:
+        table = lance.dataset(str(path))
+        yield _Shard(table.schema.names, batches)
+    except BaseException as error:
+        if type(error).__name__ != "PanicException":  # of Rust, on damaged bytes; no Exception of Python
+            raise
+        raise OSError(str(error)) from error
+
+
+def check_storage(info: Info) -> None:
+    """Raise a `DataError` that names the extra to install, where the package that reads the frames is not there."""
+    if info.storage == "lance":
+        with needs("pylance", "read a LeRobot data set in Lance", "lance"):
+            import lance  # noqa: F401 - so that its absence is not taken for damage
+
+
+class Storage(NamedTuple):
+    """A format of the frames of a data set."""
+
+    name: str  # in messages
+    open: Callable[[Path], AbstractContextManager[_Shard]]
+    column: Callable[[str], str]  # name of a feature -> that of its column
+
+
+#: ``storage_format`` of meta/info.json -> the format.
+STORAGES: dict[str, Storage] = {
+    "parquet": Storage("a Parquet file", _parquet, str),
+    "lance": Storage("a table of Lance", _lance, lambda feature: feature.replace(".", "_")),
+}
+
+
+def shard_frames(
+    folder: Path, info: Info, shard: str, features: Mapping[str, int], numbers: Sequence[int] | None = None
+) -> Iterator[Frames]:
+    """Yield the frames of a shard in parts, with features by their widths; at least those of some episodes, or all.
+
+    A `DataError` says that the shard is not there, is damaged, at its beginning or after some parts, or lacks a column.
+    """
+    path, storage = folder / shard, STORAGES[info.storage]
+    if not path.exists():
+        raise DataError(f"expected the shard {shard}, found none")
+    columns = {name: storage.column(name) for name in (*features, *_COUNTERS)}
+    rows = max(1, min(_ROWS, _BYTES // (8 * (sum(features.values()) + len(_COUNTERS)))))
+    try:
+        with storage.open(path) as table:
+            names = set(table.columns)
+            if missing := [name for name in columns if columns[name] not in names and name != "task_index"]:
+                raise DataError(f"expected the column {columns[missing[0]]!r}, got none")
+            wanted = [column for column in columns.values() if column in names]
+            for batch in table.batches(wanted, rows, numbers):
+                if batch.num_rows:
+                    yield _frames(batch, features, columns)
+    except DataError as error:
+        raise DataError(f"the shard {shard}: {error}") from error
+    except (pa.ArrowException, OSError, ValueError, RuntimeError) as error:
+        reason = str(error).partition(", /")[0]  # Lance names places in its sources, too
+        raise DataError(f"expected the shard {shard} to be {storage.name}, got a damaged one ({reason})") from error
+
+
+def _frames(batch: Any, features: Mapping[str, int], columns: Mapping[str, str]) -> Frames:
+    values: list[Array] = [np.empty((batch.num_rows, 0))]
+    faults: dict[int, str] = {}
+    for name, width in features.items():
+        column = batch.column(columns[name])
+        if is_list(column.type):
+            rows, wrong = rows_of_lists(column, width, name)
+            faults |= wrong
+        else:
+            rows = _numbers(column, name)[:, None]
+        values.append(rows)
+    has_tasks = columns["task_index"] in batch.schema.names
+    tasks = _integers(batch.column(columns["task_index"])) if has_tasks else np.full(batch.num_rows, -1, np.int64)
+    return Frames(
+        np.concatenate(values, axis=1), _integers(batch.column("episode_index")),
+        _integers(batch.column("frame_index")), tasks, _numbers(batch.column("timestamp"), "timestamp"), faults,
+    )  # fmt: skip
+
+
+def _numbers(column: Any, name: str) -> Array:
+    """Return numbers, NaN where there is none; truth values are 0 and 1."""
+    try:
+        values = column.cast(pa.uint8()) if pa.types.is_boolean(column.type) else column
+        with np.errstate(invalid="ignore"):  # of NaN that signal, as damaged bytes may be
+            return np.asarray(values.to_numpy(zero_copy_only=False), dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise DataError(f"expected numbers in {name!r}, got {column.type}") from error
+
+
+def _integers(column: Any) -> NDArray[np.int64]:
+    """Return whole numbers, -1 where there is none."""
+    return np.asarray(column.fill_null(-1).to_numpy(zero_copy_only=False), dtype=np.int64)
+
+
+def joined(parts: Sequence[Frames]) -> Frames:
+    """Return consecutive frames as one."""
+    if len(parts) == 1:
+        return parts[0]
+    starts = np.concatenate(([0], np.cumsum([len(part.values) for part in parts]))).tolist()
+    faults = {
+        start + row: reason for start, part in zip(starts, parts, strict=False) for row, reason in part.faults.items()
+    }
+    return Frames._make([*(np.concatenate([part[k] for part in parts]) for k in range(5)), faults])
+
+
+def runs(parts: Iterator[Frames], problems: list[str]) -> Iterator[Frames]:
+    """Yield frames that belong together, those in a row of one episode; what ends the parts too early is a problem."""
+    run: list[Frames] = []
+    n_rows = 0
+    try:
+        for part in parts:
+            bounds = [0, *(np.flatnonzero(np.diff(part.episodes)) + 1).tolist(), len(part.episodes)]
+            for first, end in pairwise(bounds):
+                faults = {k - first: reason for k, reason in part.faults.items() if first <= k < end}
+                piece = Frames._make([*(column[first:end] for column in part[:5]), faults])
+                if run and run[-1].episodes[0] != piece.episodes[0]:
+                    yield joined(run)
+                    run, n_rows = [], 0
+                run.append(piece)
+                n_rows += end - first
+                check_expanded(8 * n_rows * (piece.values.shape[1] + len(_COUNTERS)), "an episode")
+    except DataError as error:
+        problems.append(str(error))
+    if run:
+        yield joined(run)
+
+
+def contradictions(frames: Frames, offsets: NDArray[np.intp], declared: Episodes) -> list[dict[int, str]]:
+    """Return what is wrong with runs of frames that begin and end at `offsets`, number of the episode -> reason.
+
+    Frames count from 0 in steps of 1; an episode is declared, with its length; its frames stand in one place.
+    """
+    numbers, lengths = frames.episodes[offsets[:-1]], np.diff(offsets)
+    where = np.searchsorted(declared.numbers, numbers).clip(max=len(declared.numbers) - 1)
+    is_declared = declared.numbers[where] == numbers
+    miscounted = dict.fromkeys(numbers[~is_declared].tolist(), "expected an episode that the meta folder declares")
+    for i in np.flatnonzero(is_declared & (declared.lengths[where] != lengths)).tolist():
+        length = counted(int(declared.lengths[where[i]]), "frame")
+        miscounted[int(numbers[i])] = f"expected {length} as declared, got {lengths[i]}"
+    expected = np.arange(len(frames.frames)) - np.repeat(offsets[:-1], lengths)
+    odd = np.flatnonzero(frames.frames != expected)
+    places, firsts = np.unique(np.searchsorted(offsets, odd, side="right") - 1, return_index=True)
+    disordered = {
+        int(numbers[place]): f"expected frame {expected[k]} next, got frame {frames.frames[k]}"
+        for place, k in zip(places.tolist(), odd[firsts].tolist(), strict=True)
+    }
+    episodes, counts = np.unique(numbers, return_counts=True)
+    pairs = zip(episodes.tolist(), counts.tolist(), strict=True)
+    divided = {k: f"expected its frames in one place, got them in {count} places" for k, count in pairs if count > 1}
+    return [miscounted, disordered, divided]
+
+
+def task_texts(frames: Frames, offsets: NDArray[np.intp], tasks: Mapping[int, str]) -> list[str | None]:
+    """Return the task of each run of frames, the most frequent one where there are several."""
+    first = frames.tasks[offsets[:-1]]
+    mixed = np.add.reduceat(frames.tasks != np.repeat(first, np.diff(offsets)), offsets[:-1]) > 0
+    for i in np.flatnonzero(mixed).tolist():
+        numbers, counts = np.unique(frames.tasks[offsets[i] : offsets[i + 1]], return_counts=True)
+        first[i] = numbers[counts.argmax()]
+    return [tasks.get(k) or None for k in first.tolist()]
 
 
 def episodes(
@@ -29,6 +253,7 @@ def episodes(
     """
     folder = Path(folder)
     info = read_info(folder)
+    check_storage(info)
     names = list(info.heads) if features is None else list(dict.fromkeys(features))
     if not names or (unknown := [name for name in names if name not in info.heads]):
         there, got = ", ".join(info.heads) or "there are none", repr(unknown[0]) if names else "none"

@@ -282,7 +282,7 @@ def _texts_of_tasks(path: Path) -> dict[int, str]:
     import pyarrow as pa
     from pyarrow import parquet
 
-    with damaged_as(_DAMAGED.format(path.name), pa.ArrowException, OSError):
+    with damaged_as(_DAMAGED.format(path.name), pa.ArrowException, OSError, ValueError):
         schema = parquet.read_schema(path)
     values = [
         (field.name, field.type.value_type if pa.types.is_dictionary(field.type) else field.type) for field in schema
@@ -305,7 +305,7 @@ def _rows(path: Path, names: Sequence[str], a_row: int, before: int = 0, texts: 
     import pyarrow as pa
     from pyarrow import parquet
 
-    damaged = damaged_as(_DAMAGED.format(path.name), pa.ArrowException, OSError)
+    damaged = damaged_as(_DAMAGED.format(path.name), pa.ArrowException, OSError, ValueError)
     with damaged, parquet.ParquetFile(path, read_dictionary=list(texts)) as file:
         missing = {*names} - {*file.schema_arrow.names}
         if missing:

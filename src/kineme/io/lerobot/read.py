@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import DataError
-from kineme.io.lerobot.frames import Frames, contradictions, joined, shard_frames, task_texts
+from kineme.io.lerobot.episodes import Frames, check_storage, contradictions, joined, shard_frames, task_texts
 from kineme.io.lerobot.info import Episodes, Info, read_episodes, read_info, read_tasks
 from kineme.io.limits import check_expanded
 from kineme.movements.tables.columns import choose_roles, column_numbers
@@ -39,6 +39,7 @@ def lerobot_movements(folder: Path, layout: Layout) -> Parsed:
             f"expected 'episode_index' as movement of a LeRobot data set, got {listed(map(str, layout.keys))}"
         )
     info = read_info(folder)
+    check_storage(info)
     features, heads, chosen = _chosen(info, layout)
     declared, (tasks, unsaid) = read_episodes(folder, info), read_tasks(folder)
     frames, unread = _all_frames(folder, info, declared, features)

@@ -211,7 +211,8 @@ def _rows(array: Any, width: int, head: str) -> tuple[Array, dict[int, str]]:
     flat = array
     while is_list(flat.type):
         flat = compute.list_flatten(flat)
-    values = flat.to_numpy(zero_copy_only=False).astype(np.float64)
+    with np.errstate(invalid="ignore"):  # NaN that signal, as damaged bytes may be, stay NaN
+        values = flat.to_numpy(zero_copy_only=False).astype(np.float64)
     inner = len(values) // max(int(lengths[valid].sum()), 1)  # numbers in each entry of the outer list
     good = valid & (lengths * inner == width)
     numbers = values if good.all() else values[np.repeat(good, np.where(valid, lengths, 0) * inner)[: len(values)]]

@@ -182,8 +182,7 @@ def write_lerobot(path: Path, annotations: Sequence[Annotation], source: Path | 
     Where `path` is the data set itself, and it is stored in Lance, the names are a new version of its frames.
     """
     with needs("pyarrow", "write Parquet", "parquet"):
-        from kineme.io.lerobot.copy import copy_with_motions
-        from kineme.io.lerobot.lance_motions import copy_in_lance, name_in_place
+        from kineme.io.lerobot.copy import copy_in_lance, copy_with_motions, name_in_place
         from kineme.io.lerobot.motions import Motion
     assert source is not None  # see `writer_of`
     motions: dict[int, list[Motion]] = {}
