@@ -85,6 +85,22 @@ def test_a_blueprint_lays_out_a_tab_for_each_scene(tmp_path):
     assert all(text.count(f"['episode {k}']") == 1 for k in range(3))
 
 
+def test_paths_in_the_plane_are_looked_at_from_above(tmp_path):
+    from rerun.chunk import RrdReader
+
+    eyes = []
+    for k, path in enumerate((X[:, :2], X)):
+        read = RrdReader(str(write_rerun(tmp_path / f"{k}.rrd", [scene(paths={"hand": path})])))
+        batches = [chunk.to_record_batch().to_pydict() for chunk in read.stream(store=read.blueprints()[0])]
+        eyes.append([batch for batch in batches if "EyeControls3D:position" in batch])
+    (eye,), nothing = eyes
+    assert nothing == []
+    x, y, z = eye["EyeControls3D:position"][0][0]
+    np.testing.assert_allclose([x, y], (X.min(axis=0) + X.max(axis=0))[:2] / 2)
+    assert z > np.ptp(X[:, 1])
+    assert eye["EyeControls3D:eye_up"][0][0] == [0, 1, 0]
+
+
 def test_names_are_text_in_the_tree_and_none_is_there_twice(tmp_path):
     odd = scene("a/b\n", signals={"x/y": X}, names={}, paths={"": X[:, :2]}, lanes={"m/n": [Stretch(5, 6, "\x1b[2J")]})
     over_time, _ = columns_in(write_rerun(tmp_path / "a.rrd", [odd, odd]))

@@ -13,10 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import kineme
-from kineme.errors import DataError
+from kineme.errors import DataError, SpecificationError
 from kineme.io.arrays.robot_sets import LAYOUTS, robot_episodes, robot_layout
 from kineme.io.arrays.zarr_arrays import zarr_arrays
 from kineme.io.reading.episodes import read_episodes
+from lerobot_sets import write_v3
 from robot_array_sets import LENGTHS, motion, write_aloha, write_buffer, write_robomimic, write_umi
 
 h5py = pytest.importorskip("h5py", reason="h5py reads and writes HDF5")
@@ -69,6 +70,7 @@ def test_robomimic_says_its_rate_its_task_and_its_subsets(tmp_path):
     recordings = kineme.read_recordings(path)
     assert recordings.demonstrations.dimensions == tuple(f"obs/robot0_eef_pos.{axis}" for axis in "xyz")
     assert {channel.unit for channel in recordings.demonstrations.channels} == {"m"}
+    assert {source.label for source in recordings.sources} == {"Lift"}
     assert recordings.detected[0][0].units_from == "head"
     chosen = kineme.read_recordings(path, columns=["obs/object", "actions"])
     assert (chosen.demonstrations.n_dims, chosen.demonstrations.durations[0]) == (17, pytest.approx(29 / 25))
@@ -83,6 +85,8 @@ def test_demonstrations_come_by_their_numbers_and_in_the_words_of_others(tmp_pat
     episodes = list(robot_episodes(path))
     assert [episode.number for episode in episodes] == list(range(12))
     assert (episodes[3].task, episodes[10].task) == ("lift the cube", "open the drawer")
+    labels = {source.place: source.label for source in kineme.read_recordings(path).sources}
+    assert (labels["data/demo_3"], labels["data/demo_10"]) == ("lift the cube", "open the drawer")
     assert episodes[0].notes[0] == "20 Hz assumed, the control rate of robosuite"
     assert np.isnan(episodes[0].fps)
     assert episodes[0].times[1] == 0.05
@@ -98,7 +102,7 @@ def test_aloha_is_read_at_the_rate_that_is_assumed_or_given(tmp_path):
     assert episodes[0].names["action"] == episodes[0].names["observation.state"]
     assert episodes[0].names["action"][6:9] == ("left_gripper", "right_waist", "right_shoulder")
     assert list(episodes[0].signals) == ["action", "observation.state", "observation.velocity"]
-    given_rate = next(robot_episodes(folder, rate=25.0))
+    given_rate = next(read_episodes(folder, rate=25.0))
     assert (given_rate.fps, given_rate.times[1], given_rate.notes) == (25.0, 0.04, ())
     recordings = kineme.read_recordings(folder / "episode_0.hdf5")
     assert recordings.demonstrations.dimensions == episodes[0].names["action"]
@@ -108,6 +112,21 @@ def test_aloha_is_read_at_the_rate_that_is_assumed_or_given(tmp_path):
     assert one_joint.demonstrations.dimensions == ("left_waist",)
     assert one_joint.demonstrations.durations[0] == pytest.approx(1.9)
     assert "assumed" not in one_joint.detected[0][0].units_from
+
+
+def test_joints_of_other_arms_are_numbered_and_have_no_unit(tmp_path):
+    folder = write_aloha(tmp_path / "sets", n_joints=6)
+    demonstrations = kineme.read_recordings(folder).demonstrations
+    assert demonstrations.dimensions == tuple(f"observations/qpos.{k}" for k in range(6))
+    assert {channel.unit for channel in demonstrations.channels or ()} <= {None}
+    assert next(robot_episodes(folder)).names["action"] == tuple("012345")
+
+
+def test_a_rate_is_a_number_and_for_sets_without_stamps(tmp_path):
+    with pytest.raises(SpecificationError, match="rate"):
+        list(read_episodes(write_aloha(tmp_path / "sets"), rate=0))
+    with pytest.raises(SpecificationError, match="expected no rate for a data set of LeRobot"):
+        read_episodes(write_v3(tmp_path / "lerobot"), rate=25.0)
 
 
 def test_umi_is_read_from_a_folder_and_from_an_archive(tmp_path):
@@ -237,7 +256,10 @@ def test_what_could_run_code_is_refused_and_never_read(change, words, tmp_path):
     meta.write_text(json.dumps(json.loads(meta.read_text()) | change))
     with zarr_arrays(path) as arrays:
         assert words in str(arrays["data/robot0_eef_pos"])
-    assert all("observation.robot0_eef_pos" not in episode.signals for episode in robot_episodes(path))
+    for episode in robot_episodes(path):
+        assert "observation.robot0_eef_pos" not in episode.signals
+        assert (len(episode.signals), len(episode.problems)) == (2, 1)
+        assert words in episode.problems[0]
 
 
 def test_small_files_that_would_take_much_memory_are_refused(tmp_path):

@@ -91,7 +91,7 @@ def write_files(movement: Any, options: dict[str, Any]) -> None:
         save_figure(draw_robot_movement(movement), options["plot"])
     if options["rerun"]:
         from kineme.io.writing.rerun import write_rerun
-        from kineme.robots.view.scene import robot_scene
+        from kineme.robots.view.figure import robot_scene
 
         scene = robot_scene(movement, name_of_source(options))
         write_rerun(options["rerun"], [scene], replace=options["overwrite"] or options["force"])

@@ -29,7 +29,7 @@ from kineme.io.records import damaged_as
 from kineme.movements.episodes import Episode
 from kineme.movements.tables.layout import Layout, Parsed, listed
 from kineme.movements.tables.time_stamps import words_of
-from kineme.validation import Array
+from kineme.validation import Array, check_number
 
 HDF5, ZARR = (".hdf5", ".h5"), (".zarr", ".zip")
 ENDS = "meta/episode_ends"  # of Zarr: the number of rows up to the end of each episode
@@ -111,6 +111,8 @@ def robot_episodes(path: Path, features: Sequence[str] | None = None, rate: floa
     stamps are even: by `rate` [1/s], else by what the file says, else by the custom of the layout, which `notes` say.
     What cannot be read of an episode is among its `problems`. A `DataError` says why a set cannot be read at all.
     """
+    if rate is not None:
+        check_number("rate", rate, above=0)
     sources, number = _sources(path), 0
     if not sources:
         raise DataError(f"expected HDF5 files of a robot in {path.name}, got none")
@@ -122,7 +124,7 @@ def robot_episodes(path: Path, features: Sequence[str] | None = None, rate: floa
                 # Numbers in several files of many episodes would repeat.
                 own = _NUMBER.search(part.place or source.stem) if row is ALOHA or not beside else None
                 number = int(own[1]) if own else number
-                yield _episode(row, part, features, (number, place, rate))
+                yield _episode(row, part, features, number, place, rate)
                 number += 1
         except DataError as error:
             if not beside or features is not None:
@@ -184,7 +186,7 @@ class _Rows:
     """Rows of an array in Zarr, from `start` to before `end`, or why it is not read."""
 
     def __init__(self, array: ZarrArray | DataError, start: int, end: int) -> None:
-        self._array = array
+        self._array, self.fault = array, str(array) if isinstance(array, DataError) else ""
         shape = (0,) if isinstance(array, DataError) else array.shape
         self.dtype = np.dtype(np.float64 if isinstance(array, DataError) else array.dtype)
         self._first, self._last = max(0, start), max(0, start, min(end, shape[0]))
@@ -202,15 +204,15 @@ class _Rows:
 
 
 def _episode(
-    row: RobotLayout, part: _Part, features: Sequence[str] | None, known: tuple[int, str, float | None]
+    row: RobotLayout, part: _Part, features: Sequence[str] | None, number: int, place: str, rate: float | None
 ) -> Episode:
-    """Read an episode; `known` are its number, its place and the rate that is asked for."""
-    number, place, rate = known
+    """Read an episode, at the rate that is asked for [1/s], if one is."""
     arrays = _features(row, part.arrays, features)
     if features is not None and not part.problems and (unknown := [name for name in features if name not in arrays]):
         there = listed([*_features(row, part.arrays, None), *part.arrays])
         raise DataError(f"expected features of {place} ({there}), got {unknown[0]!r}")
-    lengths = Counter(array.shape[0] for array in arrays.values())
+    faults = {name: array.fault for name, array in arrays.items() if getattr(array, "fault", "")}
+    lengths = Counter(array.shape[0] for name, array in arrays.items() if name not in faults)
     length = lengths.most_common(1)[0][0] if lengths else 0
     problems = [*part.problems] if length or part.problems else ["expected arrays of numbers with rows, got none"]
     if part.length not in (None, length):
@@ -218,6 +220,9 @@ def _episode(
     check_expanded(8 * sum(math.prod(array.shape) for array in arrays.values()), "an episode")
     signals: dict[str, Array] = {}
     for name, array in arrays.items():
+        if name in faults:
+            problems.append(faults[name])
+            continue
         if array.shape[0] != length:
             problems.append(f"expected {length} rows of {name} as of others, got {array.shape[0]}")
             continue
@@ -270,7 +275,12 @@ def hdf5_or_robot_movements(path: Path, layout: Layout) -> Parsed:
         first = None if row is None else next(_in_hdf5(file, row), None)
         if row is None or first is None:
             return tree_movements(tree, layout, "HDF5", GROUPS)
-        return _movements(tree, tree["data"] if row is ROBOMIMIC else tree, (row, first), layout, "HDF5")
+        if row is ALOHA:
+            return _movements(tree, tree, row, first, layout, "HDF5")
+        for name in (name for name, demo in tree["data"].items() if isinstance(demo, dict)):
+            demo = hdf5_group(hdf5_group(file, "data"), name)
+            tree["data"][name]["task"] = _text(_described(demo, "ep_meta", "lang")) or first.task
+        return _movements(tree, tree["data"], row, first, layout, "HDF5")
 
 
 def zarr_movements(path: Path, layout: Layout) -> Parsed:
@@ -296,15 +306,14 @@ def zarr_movements(path: Path, layout: Layout) -> Parsed:
             if start < end <= n_rows
         }
         first = _Part("", next(iter(tree.values()), {}))
-        parsed = _movements(tree, tree, (row, first), layout, "Zarr")
+        parsed = _movements(tree, tree, row, first, layout, "Zarr")
         return parsed._replace(left_out=(*parsed.left_out, *left_out))
 
 
 def _movements(
-    tree: dict[str, Any], group: dict[str, Any], known: tuple[RobotLayout, _Part], layout: Layout, kind: str
+    tree: dict[str, Any], group: dict[str, Any], row: RobotLayout, first: _Part, layout: Layout, kind: str
 ) -> Parsed:
-    """Read the movements of a tree in a layout, of which an episode is known: by its coordinates, and by its rate."""
-    row, first = known
+    """Read the movements of a tree, all in one group of it, by the coordinates and the rate of the first."""
     rated = first.hertz > 0 or rate_of(group) is not None or rate_of(tree) is not None
     if rate_of(group) is None and rate_of(tree) is None:
         group["rate"] = first.hertz if rated else row.hertz
@@ -313,22 +322,24 @@ def _movements(
         name: array for name, array in _features(row, first.arrays, None).items() if re.fullmatch(row.coordinates, name)
     }
     arrays = [paths[id(array)] for array in named.values()]
-    heads = {  # of the file -> by the names of the joints
+    joints = {  # head in the file -> name of the joint
         f"{path}.{k}": entry
         for path, (name, array) in zip(arrays, named.items(), strict=True)
         if row is ALOHA and len(array.shape) == 2
         for k, entry in enumerate(_entries(row, name, array.shape[1]))
+        if not entry.isdecimal()
     }
-    of_file = {entry: head for head, entry in heads.items() if not entry.isdecimal()}
+    of_file = {entry: head for head, entry in joints.items()}
     columns = [of_file.get(str(column), column) for column in layout.coordinates or arrays]
     parsed = tree_movements(tree, replace(layout, columns=columns or None), kind, GROUPS)
-    own = [
-        row.unit if head.startswith(tuple(f"{path}." for path in arrays)) else "" for head in parsed.detected.columns
-    ]
-    names = tuple(head if heads.get(head, "0").isdecimal() else heads[head] for head in parsed.detected.columns)
-    units = parsed.detected.measured_in or tuple(
-        "" if name.endswith("gripper") else unit for name, unit in zip(names, own, strict=True)
-    )
+    heads = parsed.detected.columns
+    names = tuple(joints.get(head, head) for head in heads)
+    starts = tuple(f"{path}." for path in arrays)
+    measured = {  # those whose unit is that of the coordinates: of a gripper it is another
+        head: head in joints and not joints[head].endswith("gripper") if row is ALOHA else head.startswith(starts)
+        for head in heads
+    }
+    units = parsed.detected.measured_in or tuple(row.unit if measured[head] else "" for head in heads)
     parsed = parsed._replace(detected=parsed.detected._replace(columns=names, measured_in=units))
     detected = parsed.detected._replace(layout=row.name)
     if not rated and not isinstance(layout.units, int | float):

@@ -33,6 +33,8 @@ _PALETTE = (BLUE, ORANGE, GREEN, PURPLE)
 _LIGHTER = 0.4  # of the way to white, when all colors are taken, once or twice
 _POINTS = 5000  # of a drawn path, at most
 _DOT = 6.0  # radius of a moving point, on the screen
+_ABOVE = 1.5  # of the extent of paths in a plane: height from which they are seen
+_LEAST = 1e-6  # extent, where nothing moves
 _PLOTS = 6  # plots of one scene; features beyond share one
 _TABS = 50  # scenes with a view of their own; the tree of the viewer has all
 _AXIS = re.compile(r"(?:(.*)[._/ -])?([xyz])", re.IGNORECASE)
@@ -146,7 +148,6 @@ def write_rerun(path: Path, scenes: Iterable[Scene], *, replace: bool = False) -
         raise DataError(f"expected a file ending in {ENDING} for Rerun, got {path.suffix or 'no ending'!r}")
     with needs("rerun-sdk", "write for the viewer of Rerun", "rerun"):
         import rerun as rr
-        import rerun.blueprint as rrb
     views: list[Any] = []
     colors: dict[str, int] = {UNKNOWN: _rgba(GRAY)}
     names: set[str] = set()
@@ -166,11 +167,11 @@ def write_rerun(path: Path, scenes: Iterable[Scene], *, replace: bool = False) -
                 branch = f"/{rr.escape_entity_path_part(printable(name))}"
                 _log_scene(rr, recording, branch, scene, colors)
                 if len(views) < _TABS:
-                    views.append(_view(rrb, rr.escape_entity_path_part, branch, printable(name), scene))
+                    views.append(_view(rr, branch, printable(name), scene))
             if not views:
                 raise DataError("expected movements or episodes to write for Rerun, got none")
-            shown = views[0] if len(views) == 1 else rrb.Tabs(*views)
-            recording.send_blueprint(rrb.Blueprint(shown, rrb.TimePanel(timeline=TIMELINE)))
+            shown = views[0] if len(views) == 1 else rr.blueprint.Tabs(*views)
+            recording.send_blueprint(rr.blueprint.Blueprint(shown, rr.blueprint.TimePanel(timeline=TIMELINE)))
             recording.flush()
         finally:
             recording.disconnect()
@@ -243,9 +244,10 @@ def _rgba(color: str, lighter: float = 0.0) -> int:
     return red << 24 | green << 16 | blue << 8 | 0xFF
 
 
-def _view(rrb: Any, as_part: Any, branch: str, name: str, scene: Scene) -> Any:
+def _view(rr: Any, branch: str, name: str, scene: Scene) -> Any:
     """Lay a scene out: points at the left, curves over lanes at the right."""
-    plots = [(plot, f"{branch}/signals/{as_part(plot)}") for plot in scene.signals]
+    rrb = rr.blueprint
+    plots = [(plot, f"{branch}/signals/{rr.escape_entity_path_part(plot)}") for plot in scene.signals]
     if len(plots) > _PLOTS:
         plots = [("signals", f"{branch}/signals")]
     rows = [rrb.TimeSeriesView(origin=origin, name=printable(plot)) for plot, origin in plots]
@@ -254,5 +256,11 @@ def _view(rrb: Any, as_part: Any, branch: str, name: str, scene: Scene) -> Any:
         rows.append(rrb.StateTimelineView(origin=f"{branch}/symbols", name="symbols"))
         shares.append(1.0)
     over_time = [rrb.Vertical(*rows, row_shares=shares)] if rows else []
-    points = [rrb.Spatial3DView(origin=f"{branch}/points", name="paths")] if scene.paths else []
+    eye, planar = None, [xy for xy in scene.paths.values() if xy.shape[1] == 2 and np.isfinite(xy).any()]
+    if planar and len(planar) == len(scene.paths):  # as paths in the plane are drawn: seen from above, y upwards
+        low, high = np.nanmin(np.concatenate(planar), axis=0), np.nanmax(np.concatenate(planar), axis=0)
+        x, y = (low + high) / 2
+        height = _ABOVE * max(float((high - low).max()), _LEAST)
+        eye = rrb.EyeControls3D(position=(x, y, height), look_target=(x, y, 0.0), eye_up=(0.0, 1.0, 0.0))
+    points = [rrb.Spatial3DView(origin=f"{branch}/points", name="paths", eye_controls=eye)] if scene.paths else []
     return rrb.Horizontal(*points, *over_time, name=name)
