@@ -112,6 +112,25 @@ def test_a_viewer_of_rerun_is_given_the_flagged_episodes(data_set, tmp_path):
     assert "--force" in run("audit", data_set, "--rerun", tmp_path / "audit.rrd").stderr
 
 
+def test_a_set_without_stamps_is_audited_too(tmp_path):
+    """Of ALOHA: a file for each episode; its rate is the custom until --rate says it."""
+    h5py = pytest.importorskip("h5py")
+    rng = np.random.default_rng(0)
+    (tmp_path / "aloha").mkdir()
+    for k in range(24):
+        reach = np.linspace(0, 1, 200)[:, None] ** 2 * rng.normal(1, 0.1, 14)
+        joints = reach + rng.normal(scale=1e-3, size=reach.shape)
+        if k == 6:
+            joints[100, 3] += 0.5
+        with h5py.File(tmp_path / "aloha" / f"episode_{k}.hdf5", "w") as file:
+            file["observations/qpos"], file["action"] = joints, reach
+    data = json.loads(run("audit", tmp_path / "aloha", "--json").stdout)
+    assert data["findings"][0]["episode"] == 6
+    assert any("50 Hz assumed" in note for note in data["of_the_set"])
+    slower = json.loads(run("audit", tmp_path / "aloha", "--json", "--rate", "25").stdout)
+    assert slower["seconds"] == pytest.approx(2 * data["seconds"])
+
+
 def test_the_command_runs_as_a_program(data_set):
     command = [sys.executable, "-m", "kineme", "audit", data_set]
     done = subprocess.run(command, capture_output=True, text=True, check=False)

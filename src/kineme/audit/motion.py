@@ -63,7 +63,11 @@ def motion_of(episode: Episode) -> Motion | None:
     if len(episode) < FEWEST_FRAMES or not states:
         return None
     state = _filled(np.concatenate([episode.signals[name] for name in states], axis=1)[:, :_MOST_CHANNELS])
-    names = [entry or name for name in states for entry in episode.names.get(name, ()) or (name,)]
+    names = [
+        entry if len(states) == 1 else f"{name} {entry}".strip()
+        for name in states
+        for entry in episode.names.get(name, map(str, range(episode.signals[name].shape[1])))
+    ]
     steps = np.diff(episode.times)
     step = float(np.median(steps)) if np.isfinite(steps).all() else np.nan
     if not step > 0:

@@ -7,6 +7,7 @@ are spooled to a temporary file.
 from __future__ import annotations
 
 import tempfile
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
 from dataclasses import dataclass
@@ -75,7 +76,8 @@ class Audit:
       that this makes here, at most. 0 where there are too few to calibrate anything.
     - `findings`: those flagged, contradictions first, then the most unusual; where nothing is calibrated, also the
       ten most unusual, of the kind "ranked", which are not flagged.
-    - `of_the_set`: contradictions that more than half of the episodes share, each a sentence; they flag none.
+    - `of_the_set`: contradictions, and remarks of the reader, that more than half of the episodes share, each a
+      sentence; they flag none.
     """
 
     numbers: NDArray[np.int64]
@@ -122,6 +124,7 @@ class _Measured:
         self.problems: dict[int, str] = {}
         self.unusable: list[int] = []  # episodes without motion that can be compared
         self.notes: list[str] = []  # on the set
+        self.remarks: Counter[str] = Counter()  # of the reader, on single episodes
         self.names: tuple[str, ...] | None = None  # of the channels, those of the first episode that has some
         self.sizes: list[int] = []  # values of each check
         self.rows = bytearray()  # float32, of `sizes` values each
@@ -144,6 +147,7 @@ class _Measured:
             self.problems[at] = shortened(problem, _LONGEST)
         if motion is None:
             self.unusable.append(at)
+        self.remarks.update(episode.notes)
         self.numbers.append(episode.number)
         self.seconds.append(motion.seconds if motion else len(episode) / episode.fps if episode.fps > 0 else 0.0)
         self.tasks.append(episode.task)
@@ -283,6 +287,7 @@ def _contradictions(measured: _Measured, compared: list[_Compared]) -> tuple[NDA
     """Return which episodes contradict themselves (n,), and what more than half of the set does, which flags none."""
     n = len(measured.numbers)
     broken, of_the_set = np.zeros(n, dtype=np.bool_), list(measured.notes)
+    of_the_set += [remark for remark, count in measured.remarks.items() if count > _SHARED * n]
     for row in compared:
         if row.check.side != "exact":
             continue

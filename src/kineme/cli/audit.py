@@ -7,7 +7,16 @@ from typing import Any
 
 import click
 
-from kineme.cli.options import FILE, GroupedCommand, error_rate_option, force_option, json_option, rerun_option, under
+from kineme.cli.options import (
+    FILE,
+    Finite,
+    GroupedCommand,
+    error_rate_option,
+    force_option,
+    json_option,
+    rerun_option,
+    under,
+)
 from kineme.cli.output import check_new, progress, say
 from kineme.reporting.text import printable
 
@@ -15,6 +24,7 @@ from kineme.reporting.text import printable
 @click.command(cls=GroupedCommand, short_help="Find the bad episodes of a set of robot data.")
 @click.argument("dataset", type=click.Path(path_type=Path))
 @error_rate_option("Share of good episodes that may be flagged.")
+@click.option("--rate", type=Finite(0, min_open=True), help="Samples per second, where the data set does not say it.")
 @under(
     "Output",
     click.option("--output", "-o", type=FILE, help="One HTML page: the verdict, and a strip of each flagged episode."),
@@ -52,13 +62,17 @@ def audit(dataset: Path, error_rate: float, output: Path | None, mask: Path | No
             if not path.parent.is_dir():
                 raise click.UsageError(f"expected a folder to write into, there is none at {printable(path.parent)}")
     with progress(desc="auditing", unit="episode") as bar:
-        result = audit_episodes(read_episodes(dataset), error_rate, bar.update)
+        result = audit_episodes(read_episodes(dataset, rate=options["rate"]), error_rate, bar.update)
     written = []
     if mask is not None:
         written.append(write_kept(mask, result, replace=force))
     if output is not None or rerun is not None:
         drawn = drawn_episodes(result)
-        episodes = [episode for episode in read_episodes(dataset) if episode.number in drawn] if drawn else []
+        episodes = (
+            [episode for episode in read_episodes(dataset, rate=options["rate"]) if episode.number in drawn]
+            if drawn
+            else []
+        )
         if output is not None:
             facts = {"data set": dataset, "error rate": error_rate, "episodes": len(result.numbers)}
             text = audit_page(result, dataset.resolve().name, episodes, facts)
