@@ -1,5 +1,6 @@
 """The stated share of good episodes that are flagged, whatever their law; ranks, tasks, orders and units."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -10,8 +11,11 @@ from hypothesis import strategies as st
 
 from kineme.audit import calibrate
 from kineme.audit import run as run_module
+from kineme.audit.page import audit_page
+from kineme.audit.report import audit_as_data, audit_as_words
 from kineme.audit.run import audit_episodes
 from kineme.errors import DataError, SpecificationError
+from kineme.movements.episodes import Episode
 from soaking import examples as drawn
 
 LAWS = {
@@ -157,3 +161,32 @@ def test_centered_values_of_few_are_about_the_median_of_all():
     assert centered[4:].tolist() == [-2, -1, 0, 1, 2]
     assert centered[0] == 1 - np.nanmedian(values)
     assert np.isnan(centered[3])
+
+
+def _odd_episode(rng, number):
+    """An episode with whatever a data set may hold: constants, huge and missing values, no frames, mad stamps."""
+    n, d = int(rng.choice([0, 1, 7, 8, 9, 40, 200])), 3
+    kinds = [
+        np.zeros((n, d)), rng.normal(size=(n, d)), rng.normal(size=(n, d)) * 1e200, np.full((n, d), np.nan),
+        np.where(rng.random((n, d)) < 0.3, np.inf, 1.0), np.cumsum(rng.normal(size=(n, d)), axis=0),
+        np.full((n, d), 1e308),
+    ]  # fmt: skip
+    times = [np.arange(n) / 50, np.full(n, np.nan), np.zeros(n), -np.arange(n) * 1.0, rng.normal(size=n) * 1e300]
+    state, action = (kinds[int(rng.integers(len(kinds)))] for _ in range(2))
+    stamps = times[int(rng.integers(len(times)))]
+    fps = float(rng.choice([50, np.nan, 1e-9]))
+    names = {"observation.state": ("a", "b", "c"), "action": ("a", "b", "c")}
+    return Episode(number, stamps, {"observation.state": state, "action": action}, names, "odd", fps)
+
+
+@settings(max_examples=drawn(30), deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), n=st.integers(1, 40))
+def test_whatever_a_set_holds_is_audited_without_a_warning(seed, n):
+    rng = np.random.default_rng(seed)
+    odd = [_odd_episode(rng, k) for k in range(n)]
+    audit = audit_episodes(odd)
+    assert np.isfinite(audit.evidence).all()
+    assert ((audit.p_values >= 0) & (audit.p_values <= 1)).all()
+    audit_as_words(audit)
+    json.dumps(audit_as_data(audit), allow_nan=False)
+    audit_page(audit, "odd", odd, {})

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.audit.motion import STEADY, Motion, features_of, longest_runs, runs, smoothed
+from kineme.audit.motion import LARGEST, STEADY, Motion, features_of, longest_runs, runs, smoothed, steps_of
 from kineme.validation import Array
 
 _WINDOW = 0.4  # [s], over which an arm that stays within the next two rests
@@ -75,7 +75,7 @@ def problems(motion: Motion) -> Measure:
 def values(motion: Motion) -> Measure:
     """Count frames in which some feature is not a finite number."""
     columns = [motion.episode.signals[name] for names in features_of(motion.episode) for name in names]
-    return _counted(motion, np.asarray(~np.isfinite(np.concatenate(columns, axis=1)).all(axis=1)))
+    return _counted(motion, np.asarray((~(np.abs(np.concatenate(columns, axis=1)) <= LARGEST)).any(axis=1)))
 
 
 def rate(motion: Motion) -> Measure:
@@ -87,7 +87,7 @@ def rate(motion: Motion) -> Measure:
 
 def stamps(motion: Motion) -> Measure:
     """Count stamps that are missing, repeat the one before, or go back."""
-    return _counted(motion, np.append(False, ~(np.diff(motion.episode.times) > 0)))
+    return _counted(motion, np.append(False, ~(steps_of(motion.episode) > 0)))
 
 
 def gaps(motion: Motion) -> Measure:
@@ -95,7 +95,7 @@ def gaps(motion: Motion) -> Measure:
 
     Where steps vary by themselves, as of a busy computer, only steps beyond six of their standard deviations count.
     """
-    steps = np.diff(motion.episode.times)
+    steps = steps_of(motion.episode)
     spread = 1.4826 * np.median(np.abs(steps - motion.step))
     long = np.nan_to_num(steps) > max(1.5 * motion.step, motion.step + 6 * spread)
     missing = float((np.round(steps[long] / motion.step) - 1).sum()) if long.any() else 0.0

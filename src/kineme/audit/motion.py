@@ -16,6 +16,7 @@ from kineme.validation import Array
 PATH = 64
 FEWEST_FRAMES = 8
 STEADY = 0.98  # share of the samples that spikes are not among
+LARGEST, LATEST = 1e30, 1e10  # a value, and a stamp [s]: what is beyond is a fault, and no number
 _MOST_CHANNELS = 64
 _SET_ASIDE = re.compile(r"(^|[./])(next|reward|done|success|timestamp|mask|\w*index)([./]|$)")  # no motion
 _ACTION = re.compile(r"(^|[./])actions?([./]|$)")
@@ -68,12 +69,12 @@ def motion_of(episode: Episode) -> Motion | None:
         for name in states
         for entry in episode.names.get(name, map(str, range(episode.signals[name].shape[1])))
     ]
-    steps = np.diff(episode.times)
+    steps = steps_of(episode)
     step = float(np.median(steps)) if np.isfinite(steps).all() else np.nan
     if not step > 0:
-        step = 1 / episode.fps if episode.fps > 0 else 1.0
-    even = not (np.isfinite(steps).all() and (steps > 0).all())
-    times = np.arange(float(len(episode))) * step if even else np.asarray(episode.times - episode.times[0])
+        step = 1 / episode.fps if episode.fps > 1 / LATEST else 1.0
+    increasing = bool((steps > 0).all())
+    times = episode.times - episode.times[0] if increasing else np.arange(float(len(episode))) * step
     changes = np.abs(np.diff(state, axis=0))
     least = np.where(changes > 0, changes, np.inf).min(axis=0)  # that the sensor resolves; infinite if it never changes
     noise = np.median(np.abs(np.diff(state, 3, axis=0)), axis=0) * 1.4826 / np.sqrt(20)
@@ -89,6 +90,11 @@ def motion_of(episode: Episode) -> Motion | None:
     return Motion(episode, times, step, state, tuple(names[: state.shape[1]]), scale, noise, lead, late)
 
 
+def steps_of(episode: Episode) -> Array:
+    """Return the steps between stamps (T - 1,) [s]; NaN beside one that is none."""
+    return np.diff(np.where(np.abs(episode.times) <= LATEST, episode.times, np.nan))
+
+
 def path_of(motion: Motion) -> NDArray[np.float32]:
     """Return (d, 64) values of the channels at even shares of the way: independent of tempo and of pauses."""
     smooth = smoothed(motion.state, motion.frames(0.2)).T[None]
@@ -98,12 +104,13 @@ def path_of(motion: Motion) -> NDArray[np.float32]:
 
 def _filled(values: Array) -> Array:
     """Replace what is not finite by the value before, at the beginning by the first finite one, else by 0."""
-    finite = np.isfinite(values)
+    finite = np.abs(values) <= LARGEST
     if finite.all():
         return np.asarray(values, dtype=np.float64)
     rows = np.maximum.accumulate(np.where(finite, np.arange(len(values))[:, None], -1), axis=0)
     rows = np.where(rows < 0, finite.argmax(axis=0), rows)
-    return np.nan_to_num(np.take_along_axis(values, rows, axis=0), nan=0.0, posinf=0.0, neginf=0.0)
+    filled = np.take_along_axis(values, rows, axis=0)
+    return np.asarray(np.where(np.abs(filled) <= LARGEST, filled, 0.0))
 
 
 def smoothed(values: Array, width: int) -> Array:
