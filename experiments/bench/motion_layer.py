@@ -79,7 +79,7 @@ def _taught(folder: Path, seed: int, arms: int) -> Path:
     """Learn examples by other operators into a library."""
     works = list(work_episodes(30, seed + 5000, _TAUGHT, arms))
     write_set(folder / "taught", (work.episode for work in works))
-    write_labels(folder / "taught.csv", examples(works, _SHOTS))
+    write_labels(folder / "taught.csv", examples(works, _SHOTS, seed))
     _run("learn", folder / "taught", "--labels", folder / "taught.csv", "--library", folder / "library")
     return folder / "library"
 
