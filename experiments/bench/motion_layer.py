@@ -137,9 +137,9 @@ def _audited(first_seed: int, sets: int, count: int) -> Iterator[Row]:
         works = list(work_episodes(count, seed, _TESTED))
         for share in (0.0, _SHARE):
             planted = list(plant(works, share, seed))
-            faults.append([one.fault for one in planted])
+            faults.append([row.fault for row in planted])
             for name, rule in {"kineme": ours, **RIVALS}.items():
-                verdicts[name].append(rule([one.episode for one in planted]))
+                verdicts[name].append(rule([row.episode for row in planted]))
     for name, of_sets in verdicts.items():
         yield from _of_audit(name, of_sets, faults)
 
