@@ -4,7 +4,8 @@ Examples come from other operators than those who are tested. Sets with planted 
 fault each. The rivals of the audit are rules written anew from descriptions, see `bench.work_rivals`. The programs
 themselves, run once on a hundred episodes with 28 faults (seed 100): robot-data-audit 0.11.0 excluded 2 of the 28 and
 no good one, and its count of jumps has an AUROC of .63; lerobot-doctor 0.2.0 listed 5 of the 28, would drop 2 others by
-its score, and no good one; the score has .55. Values are chosen on seeds from 100 on; those that are reported begin at 200.
+its score, and no good one; the score has .55. The rules written anew list the same episodes of that set. Values are
+chosen on seeds from 100 on; those that are reported begin at 200.
 """
 
 from __future__ import annotations

@@ -94,7 +94,7 @@ def lerobot_doctor(episodes: Sequence[Episode]) -> Verdicts:
 
 
 def robot_data_audit(episodes: Sequence[Episode]) -> Verdicts:
-    """Flag gaps of 2.5 steps, missing values, stamps out of order, and episodes that stand still.
+    """Flag gaps of 2.5 steps, missing values, stamps that go back, and episodes that stand still.
 
     What leads to EXCLUDE in robot-data-audit 0.11.0, as far as no camera and no limits of joints are needed. Episodes
     are ranked by that and by its count of jumps of the action: second differences beyond five median deviations.
@@ -106,7 +106,7 @@ def robot_data_audit(episodes: Sequence[Episode]) -> Verdicts:
         spread = 1.4826 * np.median(np.abs(second - np.median(second, axis=0)), axis=0)
         missing = any(not np.isfinite(values).all() for values in episode.signals.values())
         still = (np.abs(np.diff(action, axis=0)).max(axis=1) > 1e-6).mean() < 0.02
-        wrong.append(missing or still or bool((gaps <= 0).any() or (gaps > 2.5 * np.median(gaps)).any()))
+        wrong.append(missing or still or bool((gaps < 0).any() or (gaps > 2.5 * np.median(gaps)).any()))
         jumps.append((second > np.median(second, axis=0) + 5.0 * np.maximum(spread, 1e-6)).mean())
     return Verdicts(np.array(wrong) + np.array(jumps), np.array(wrong))
 
