@@ -27,8 +27,8 @@ def jerk_and_fences(episodes: Sequence[Episode]) -> Verdicts:
 
     What threads about RDT-1B and lingbot-vla-v2 describe, and what `is_time_outlier` of score_lerobot_episodes does.
     """
-    jerks = np.log([np.abs(np.diff(one.signals[STATE], 3, axis=0)).mean() * one.fps**3 for one in episodes])
-    seconds = np.array([one.times[-1] - one.times[0] for one in episodes])
+    jerks = np.log([np.abs(np.diff(episode.signals[STATE], 3, axis=0)).mean() * episode.fps**3 for episode in episodes])
+    seconds = np.array([episode.times[-1] - episode.times[0] for episode in episodes])
     z = np.abs(jerks - jerks.mean()) / jerks.std()
     low, high = np.quantile(seconds, (0.25, 0.75))
     beyond = np.maximum(low - seconds, seconds - high) / (high - low)
@@ -42,7 +42,7 @@ def score_lerobot_episodes(episodes: Sequence[Episode]) -> Verdicts:
     exp(-rms acceleration / 1000); straight line over path; share of frames whose acceleration is below 15 medians;
     exp(-standard deviation in the last 2 s / 0.05); 1 within Tukey's fences of the duration, else 0.
     """
-    seconds = np.array([one.times[-1] - one.times[0] for one in episodes])
+    seconds = np.array([episode.times[-1] - episode.times[0] for episode in episodes])
     low, high = np.quantile(seconds, (0.25, 0.75))
     beyond = np.maximum(low - seconds, seconds - high) > 1.5 * (high - low)
     scores = []
@@ -64,11 +64,11 @@ def lerobot_doctor(episodes: Sequence[Episode]) -> Verdicts:
     The checks of each episode and the score of lerobot-doctor 0.2.0. Bad is what it lists, or scores below 30 of 100
     or two standard deviations under the mean.
     """
-    steps = [np.diff(one.signals[ACTION], axis=0) for one in episodes]
+    steps = [np.diff(episode.signals[ACTION], axis=0) for episode in episodes]
     spread = np.concatenate(steps).std(axis=0)
     spread[spread == 0.0] = 1.0
-    means = np.array([one.signals[ACTION].mean(axis=0) for one in episodes])
-    usual = np.median([len(one) for one in episodes])
+    means = np.array([episode.signals[ACTION].mean(axis=0) for episode in episodes])
+    usual = np.median([len(episode) for episode in episodes])
     z = np.abs((means - means.mean(axis=0)) / np.maximum(means.std(axis=0), 1e-6)).mean(axis=1)
     listed, scores = [], []
     for episode, step, away in zip(episodes, steps, z.tolist(), strict=True):
@@ -88,13 +88,13 @@ def lerobot_doctor(episodes: Sequence[Episode]) -> Verdicts:
         smooth = 100.0 * np.exp(-30.0 * np.abs(np.diff(step, axis=0)).mean())
         coverage = min(200.0 * episode.signals[ACTION].std(axis=0).mean(), 100.0)
         scores.append(0.3 * smooth + 0.25 * coverage + 0.25 * 100.0 * np.exp(-away) + 0.2 * fit)
-    quality, found = np.array(scores), np.array(listed)
+    quality, faults = np.array(scores), np.array(listed)
     low = (quality < 30.0) | (quality < quality.mean() - 2.0 * quality.std())
-    return Verdicts(found - quality / 100.0, (found > 0) | low)
+    return Verdicts(faults - quality / 100.0, (faults > 0) | low)
 
 
 def robot_data_audit(episodes: Sequence[Episode]) -> Verdicts:
-    """Flag gaps of 2.5 steps, missing values, stamps out of order, and episodes that stand still.
+    """Flag gaps of 2.5 steps, missing values, stamps that go back, and episodes that stand still.
 
     What leads to EXCLUDE in robot-data-audit 0.11.0, as far as no camera and no limits of joints are needed. Episodes
     are ranked by that and by its count of jumps of the action: second differences beyond five median deviations.
@@ -106,7 +106,7 @@ def robot_data_audit(episodes: Sequence[Episode]) -> Verdicts:
         spread = 1.4826 * np.median(np.abs(second - np.median(second, axis=0)), axis=0)
         missing = any(not np.isfinite(values).all() for values in episode.signals.values())
         still = (np.abs(np.diff(action, axis=0)).max(axis=1) > 1e-6).mean() < 0.02
-        wrong.append(missing or still or bool((gaps <= 0).any() or (gaps > 2.5 * np.median(gaps)).any()))
+        wrong.append(missing or still or bool((gaps < 0).any() or (gaps > 2.5 * np.median(gaps)).any()))
         jumps.append((second > np.median(second, axis=0) + 5.0 * np.maximum(spread, 1e-6)).mean())
     return Verdicts(np.array(wrong) + np.array(jumps), np.array(wrong))
 
