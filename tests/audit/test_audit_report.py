@@ -78,6 +78,11 @@ def test_the_mask_keeps_what_is_not_flagged(audit, tmp_path):
     assert json.loads(write_kept(tmp_path / "keep.json", audit).read_text()) == kept_episodes(audit)
 
 
+def test_of_an_episode_that_is_there_twice_neither_is_kept_where_one_is_flagged(audit):
+    doubled = replace(audit, numbers=np.array([3, 4, 3, 5]), flagged=np.array([False, False, True, False]))
+    assert kept_episodes(doubled) == [4, 5]
+
+
 def test_the_mask_writes_over_nothing(audit, tmp_path):
     path = tmp_path / "keep.csv"
     path.write_text("mine")

@@ -10,6 +10,8 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from kineme.audit.checks import CHECKS
 from kineme.audit.run import KINDS, Audit, Finding, Reason
 from kineme.reporting.atomic import whole_file
@@ -126,8 +128,8 @@ def _finite(evidence: float) -> float | None:
 
 
 def kept_episodes(audit: Audit) -> list[int]:
-    """Return the numbers of the episodes that are not flagged, in rising order."""
-    return sorted(audit.numbers[~audit.flagged].tolist())
+    """Return the numbers of the episodes that are not flagged, in rising order; of doubled ones, if neither is."""
+    return np.setdiff1d(audit.numbers, audit.numbers[audit.flagged]).tolist()
 
 
 def write_kept(path: Path, audit: Audit, *, replace: bool = False) -> Path:
