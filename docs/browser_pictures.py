@@ -17,6 +17,10 @@ from PIL import Image
 from playwright.sync_api import Page, sync_playwright
 
 import kineme
+from bench.work_faults import plant
+from bench.work_sets import TASKS, work_episodes
+from kineme.audit.page import audit_page
+from kineme.audit.run import audit_episodes
 from kineme.studio.page.write_page import write_page
 
 _TESTS = Path(__file__).parents[1] / "tests"
@@ -131,7 +135,7 @@ def save(page: Page, path: Path) -> None:
 
 
 def pictures(folder: Path) -> None:
-    """Write studio-VIEW.png of each view, and page.png."""
+    """Write studio-VIEW.png of each view, page.png and audit.png."""
     with TemporaryDirectory() as place, chromium() as browser:
         actions = library_of(Path(place) / "actions", SHAPES)
         with running(actions) as studio:
@@ -148,6 +152,7 @@ def pictures(folder: Path) -> None:
                 page.close()
         picture_of_episodes(browser, actions, folder / "studio-episodes.png")
         picture_of_page(browser, actions, folder / "page.png")
+        picture_of_audit(browser, folder / "audit.png")
 
 
 def episodes_of_letters() -> list[Any]:
@@ -202,6 +207,18 @@ def picture_of_page(browser: Any, actions: Path, path: Path) -> None:
     page.mouse.down()
     page.mouse.move(box["x"] + x + 130, box["y"] + y - 40, steps=8)
     page.mouse.up()
+    save(page, path)
+
+
+def picture_of_audit(browser: Any, path: Path) -> None:
+    """The page on simulated episodes of an arm that puts cubes into a box, of which a tenth has a planted fault."""
+    faults = ("idle", "frozen", "jerk", "spike", "offset", "truncated")
+    works = list(work_episodes(60, 7, tasks=list(TASKS)[:1]))
+    episodes = [planted.episode for planted in plant(works, 0.1, 7, faults)]
+    text = audit_page(audit_episodes(episodes), "cubes", episodes, {})
+    shown = text.replace("<h2>Reasons</h2><table>", "<h2 hidden></h2><table hidden>")  # strips are more of a picture
+    page = browser.new_page(viewport={"width": 1150, "height": 1240})
+    page.set_content(shown)
     save(page, path)
 
 
