@@ -17,12 +17,17 @@ from PIL import Image
 from playwright.sync_api import Page, sync_playwright
 
 import kineme
+from bench.work_faults import plant
+from bench.work_sets import TASKS, work_episodes
+from kineme.audit.page import audit_page
+from kineme.audit.run import audit_episodes
 from kineme.studio.page.write_page import write_page
 
 _TESTS = Path(__file__).parents[1] / "tests"
 sys.path += [str(_TESTS), str(_TESTS / "studio")]  # the hand of the tests draws, on the studio that they start
 
 from browser_samples import UNANSWERED, center, draw, letters, settle  # noqa: E402
+from episode_samples import FPS, write_episodes  # noqa: E402
 from studio_samples import running  # noqa: E402
 
 from browsing import wait_until  # noqa: E402
@@ -130,7 +135,7 @@ def save(page: Page, path: Path) -> None:
 
 
 def pictures(folder: Path) -> None:
-    """Write studio-VIEW.png of each view, and page.png."""
+    """Write studio-VIEW.png of each view, page.png and audit.png."""
     with TemporaryDirectory() as place, chromium() as browser:
         actions = library_of(Path(place) / "actions", SHAPES)
         with running(actions) as studio:
@@ -145,7 +150,45 @@ def pictures(folder: Path) -> None:
                 page.wait_for_timeout(1000)
                 save(page, folder / f"studio-{view}.png")
                 page.close()
+        picture_of_episodes(browser, actions, folder / "studio-episodes.png")
         picture_of_page(browser, actions, folder / "page.png")
+        picture_of_audit(browser, folder / "audit.png")
+
+
+def episodes_of_letters() -> list[Any]:
+    """Positions (T, 2) of episodes of two to four letters, one of no known name, with rests between them."""
+    names = ["GShape", "Zshape", "Sine", "Angle", "Worm", "PShape", "CShape"]
+    episodes = []
+    for k in range(12):
+        parts = [np.zeros((FPS // 2, 2))]
+        for shape in (names[(k * 3 + j) % len(names)] for j in range(2 + k % 3)):
+            movement = letters(shape)[5 + k % 2]
+            times = np.arange(movement.times[0], movement.times[-1], 1 / FPS)
+            path = np.column_stack([np.interp(times, movement.times, x) for x in movement.positions.T])
+            parts.append(path - path[0] + parts[-1][-1])
+            parts.append(np.repeat(parts[-1][-1:], FPS // 2, axis=0))
+        episodes.append(np.concatenate(parts))
+    return episodes
+
+
+def picture_of_episodes(browser: Any, actions: Path, path: Path) -> None:
+    """Episodes of a data set as strips, one of them open, a span of no known name chosen."""
+    demos = write_episodes(actions.parent / "letters", episodes_of_letters(), tasks=("Write a word", "Write another"))
+    with running(actions, "--recordings", demos) as studio:
+        page = browser.new_page(viewport={**SIZE, "height": 1050})
+        page.add_init_script(UNANSWERED)
+        page.goto(f"{studio.address}/?token={studio.token}#recordings")
+        wait_until(page, "!document.getElementById('episodes').hidden")
+        page.click("#spot-page")
+        wait_until(page, "document.getElementById('episodes-state').textContent.startsWith('Looked')")
+        page.locator(".strip").nth(4).click()
+        wait_until(page, "document.querySelectorAll('#spans tbody tr').length > 0")
+        page.locator("[data-key='span 0 name']").evaluate("field => field.focus({ preventScroll: true })")
+        page.locator("#playhead").evaluate("field => { field.value = 3; field.dispatchEvent(new Event('input')); }")
+        settle(page)
+        page.wait_for_timeout(1000)
+        save(page, path)
+        page.close()
 
 
 def picture_of_page(browser: Any, actions: Path, path: Path) -> None:
@@ -164,6 +207,18 @@ def picture_of_page(browser: Any, actions: Path, path: Path) -> None:
     page.mouse.down()
     page.mouse.move(box["x"] + x + 130, box["y"] + y - 40, steps=8)
     page.mouse.up()
+    save(page, path)
+
+
+def picture_of_audit(browser: Any, path: Path) -> None:
+    """The page on simulated episodes of an arm that puts cubes into a box, of which a tenth has a planted fault."""
+    faults = ("idle", "frozen", "jerk", "spike", "offset", "truncated")
+    works = list(work_episodes(60, 7, tasks=list(TASKS)[:1]))
+    episodes = [planted.episode for planted in plant(works, 0.1, 7, faults)]
+    text = audit_page(audit_episodes(episodes), "cubes", episodes, {})
+    shown = text.replace("<h2>Reasons</h2><table>", "<h2 hidden></h2><table hidden>")  # strips are more of a picture
+    page = browser.new_page(viewport={"width": 1150, "height": 1240})
+    page.set_content(shown)
     save(page, path)
 
 

@@ -22,6 +22,7 @@ _READ = {
     ".json .jsonl .ndjson": ("objects with positions, or one on a line; trees by name", ""),
     ".mat": ("MATLAB up to version 7.2; the name of the file is the label", ""),
     ".h5 .hdf5": ("HDF5, a data set or group for each movement; MATLAB from 7.3", "hdf5"),
+    ".zip": ("replay buffers in Zarr, as of UMI and Diffusion Policy", "zarr"),
     ".bvh": ("skeletons in motion: positions and rotations of joints", ""),
     ".c3d": ("markers of motion capture, or rotations of segments, binary", "mocap"),
     ".trc": ("markers of motion capture, text", ""),
@@ -29,7 +30,11 @@ _READ = {
     ".mvnx": ("segments and joints of Xsens MVN", ""),
     ".bag .db3 .mcap": ("bags of ROS 1 and ROS 2, by topic or by frame", "ros"),
 }  # fmt: skip
-_FOLDERS = {"meta/info.json": ("data sets of LeRobot", "parquet"), "metadata.yaml": ("bags of ROS 2", "ros")}
+_FOLDERS = {
+    "meta/info.json": ("data sets of LeRobot", "parquet"),
+    "meta/episode_ends/.zarray": ("replay buffers in Zarr, as of UMI and Diffusion Policy", "zarr"),
+    "metadata.yaml": ("bags of ROS 2", "ros"),
+}
 _ANNOTATIONS = {
     "csv": "a table that pandas reads", "json": "an object for programs", "elan": "ELAN",
     "audacity": "label tracks of Audacity",

@@ -42,6 +42,7 @@ SUBJECTS = (
     "binning",
     "anchoring",
     "annotate",
+    "motion_layer",
     "page",
     "migrating",
     "studio",

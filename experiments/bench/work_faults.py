@@ -55,8 +55,8 @@ def dropped(episode: Episode, rng: np.random.Generator, severity: float = 1.0) -
 
 def dropped_silently(episode: Episode, rng: np.random.Generator, severity: float = 1.0) -> Episode:
     """Lose frames as `dropped` does; stamps are counted on, so that only the path jumps."""
-    found = dropped(episode, rng, severity)
-    return replace(found, times=episode.times[: len(found)])
+    rest = dropped(episode, rng, severity)
+    return replace(rest, times=episode.times[: len(rest)])
 
 
 def repeated(episode: Episode, rng: np.random.Generator, severity: float = 1.0) -> Episode:
@@ -72,8 +72,8 @@ def wrong_fps(episode: Episode, rng: np.random.Generator, severity: float = 1.0)
 
 def wrong_fps_silently(episode: Episode, rng: np.random.Generator, severity: float = 1.0) -> Episode:
     """Store every other frame as if it were the next: all is twice as fast, and half as long, with regular stamps."""
-    found = _taken(episode, np.arange(0, len(episode), 2))
-    return replace(found, times=episode.times[: len(found)])
+    half = _taken(episode, np.arange(0, len(episode), 2))
+    return replace(half, times=episode.times[: len(half)])
 
 
 def jerk(episode: Episode, rng: np.random.Generator, severity: float = 1.0) -> Episode:

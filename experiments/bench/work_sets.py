@@ -19,6 +19,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -46,6 +47,7 @@ _MOVED = np.array([0, 1, 3, 4, 5, 6])
 _READY = np.array([0.0, -0.6, 0.0, -2.2, 0.0, 1.6, 0.785])  # [rad]
 _HOME = np.array([0.40, 0.0, 0.32, 0.0, 0.0, 0.9])  # x, y, z [m], yaw, tilt [rad], opening of the gripper [1]
 _ABOVE, _TABLE, _POURED = 0.11, 0.03, 0.24  # heights of the tip [m]
+_FLIPPED = 0.6  # [rad], between the joints at the end and those at the beginning
 _STEP = 2.0 * np.pi / 4096  # quantization of joint sensors [rad]
 _N_OBJECTS = 3
 _PER_SHARD = 50_000  # frames
@@ -117,9 +119,10 @@ def work_episodes(
         yield _episode(number, task, person, setup, arms, rng)
 
 
-def examples(works: Iterable[Work], each: int = 3) -> list[tuple[int, float, float, str]]:
-    """List (episode, start, end, name) of some movements of each kind, operators in turn."""
+def examples(works: Iterable[Work], each: int = 3, seed: int = 0) -> list[tuple[int, float, float, str]]:
+    """List (episode, start, end, name) of some movements of each kind, drawn at random, operators in turn."""
     rows = [(work.operator, (work.episode.number, *row)) for work in works for row in work.truth]
+    np.random.default_rng([81, seed]).shuffle(rows)
     chosen: list[tuple[int, float, float, str]] = []
     for kind in KINDS:
         seen: Counter[int] = Counter()
@@ -128,7 +131,7 @@ def examples(works: Iterable[Work], each: int = 3) -> list[tuple[int, float, flo
             if row[3] == kind:
                 turns.append((seen[person], row))
                 seen[person] += 1
-        chosen += [row for _, row in sorted(turns)[:each]]
+        chosen += [row for _, row in sorted(turns, key=itemgetter(0))[:each]]
     return sorted(chosen)
 
 
@@ -336,8 +339,8 @@ class _Script:
     next = "release"
 
 
-def _episode(number: int, task: str, person: int, setup: Rig, arms: int, rng: np.random.Generator) -> Work:
-    style = operator(person)
+def _script(task: str, style: Operator, rng: np.random.Generator) -> _Script:
+    """Compose an episode, from home to home."""
     before, again, (least, most), after = TASKS[task]
     words = [*before.split(), *again.split() * int(rng.integers(least, most + 1)), *after.split()]
     script = _Script(style, rng)
@@ -345,8 +348,18 @@ def _episode(number: int, task: str, person: int, setup: Rig, arms: int, rng: np
         script.next = following
         script.do(word)
     script.hold(rng.uniform(0.3, 1.0))
+    return script
+
+
+def _episode(number: int, task: str, person: int, setup: Rig, arms: int, rng: np.random.Generator) -> Work:
+    style = operator(person)
+    script = _script(task, style, rng)
     path = np.concatenate(script.parts)
     joints = _followed(path)
+    while np.abs(joints[-1] - joints[0]).max() > _FLIPPED:  # beyond a singularity of the wrist: nobody works so
+        script = _script(task, style, rng)
+        path = np.concatenate(script.parts)
+        joints = _followed(path)
     ways = [np.column_stack((joints, path[:, 5]))]
     if arms == 2:
         along = _READY[_MOVED] + 0.06 * _delayed(joints - joints[0], 0.6)

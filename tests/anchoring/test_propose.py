@@ -125,6 +125,7 @@ def test_a_strange_movement_is_left_over():
     proposals = propose(demos)
     assert proposals.left_over.tolist() == [11, 19]
     assert repr(proposals) == "Proposals(3 clusters among 20 movements, 2 left over)"
+    assert repr(propose(demos[:5], n_clusters=1)) == "Proposals(1 cluster among 5 movements, 0 left over)"
     assert repr(proposals[0]).startswith("Proposal(7 movements, medoid 1")
 
 
@@ -200,6 +201,9 @@ def test_movements_that_cannot_be_told_apart():
         propose(demos[:2])
     with pytest.raises(kineme.errors.SpecificationError, match="got copies of one movement"):
         propose(demos[[0, 0, 0, 0]])
+    for movement in range(len(demos)):  # also where rounding tells copies apart
+        with pytest.raises(kineme.errors.SpecificationError, match="got copies of one movement"):
+            propose(demos[[movement] * 20])
     with pytest.raises(
         kineme.errors.SpecificationError, match=r"expected widths to be 7 numbers above 0.* got \[1.0, -1.0\]"
     ):

@@ -43,6 +43,12 @@ def test_without_a_choice_it_only_lists(folder, tmp_path):
     assert len(answer("library", "history", "-l", folder)) == 1
 
 
+def test_without_unlabeled_movements_it_says_so(tmp_path):
+    with kineme.ActionLibrary(tmp_path / "actions", create=True) as library:
+        library.learn(kineme.load_lasa(["CShape"]))
+    assert run("anchor", "-l", tmp_path / "actions").stdout == "no unlabeled movements\n"
+
+
 def test_accepted_proposals_become_symbols_with_a_prototype(folder, tmp_path):
     (tmp_path / "names.json").write_text('{"1": "first/../kind", "3": "third"}')
     options = ("--accept", "all", "--names", tmp_path / "names.json", "--pictures", tmp_path / "p")

@@ -123,6 +123,7 @@ def test_what_files_last_together_switch_and_lack_is_that_of_the_recording(tmp_p
     ("starts", "seconds", "heads", "joined"),
     [
         ((5, 5, 5), (2, 2, 2), ("x,y", "a,b", "c,d"), True),
+        ((0, 0, 0), (2, 2, 2), ("x,y", "a,b", "c,d"), False),
         ((5, 5, 5), (2, 1.6, 1.8), ("x,y", "a,b", "c,d"), False),
         ((5, 5, 5), (2, 2, 2), ("x,y", "x,y", "x,y"), False),
         ((BEGIN,) * 3, (2, 1.6, 1.8), ("x,y", "a,b", "c,d"), True),

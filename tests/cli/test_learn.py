@@ -97,6 +97,15 @@ def test_a_gripper_beside_which_joints_hardly_count_is_said(tmp_path):
     assert answer(*command[:-1], tmp_path / "others", "--kind", "gripper=discrete")["notes"] == []
 
 
+def test_points_that_columns_name_are_said(tmp_path):
+    heads = [f"{side}_hand_{axis}" for side in ("left", "right") for axis in "xyz"]
+    rows = np.column_stack((np.arange(40) / 20, np.sin(np.arange(40)[:, None] * np.arange(1, 7) / 20)))
+    np.savetxt(tmp_path / "wave.csv", rows, delimiter=",", header=",".join(["time", *heads]), comments="")
+    words = "2 points that turn together: left_hand, right_hand"
+    assert words in run("inspect", tmp_path / "wave.csv").stdout
+    assert f"note: {words}" in run("learn", tmp_path / "wave.csv", "-l", tmp_path / "actions").stdout
+
+
 def test_labels_can_be_given_or_left_out(recordings, tmp_path):
     library = tmp_path / "actions"
     assert answer("learn", recordings / "CShape", "--no-labels", "-l", library)["symbols"] == []

@@ -32,8 +32,10 @@ def recording(tmp_path_factory):
 def test_a_picture_and_a_sentence(folder, recording, tmp_path):
     done = run("why", recording, "-l", folder, "-o", tmp_path / "why.png")
     assert done.returncode == 0, done.stderr
-    assert done.stdout.startswith("two.csv#0: ")
+    assert done.stdout.startswith("two.csv 0: ")  # as `kineme recognize` calls it
     assert "CShape" in done.stdout
+    assert "This is the first of 2 movements; choose another with --index" in done.stdout
+    assert "the first of" not in run("why", recording, "-l", folder, "--index", 0).stdout
     assert (tmp_path / "why.png").read_bytes().startswith(b"\x89PNG")
     again = run("why", recording, "-l", folder, "-o", tmp_path / "why.png")
     assert again.returncode == 2
@@ -47,6 +49,12 @@ def test_the_second_movement_says_where_its_dent_is(folder, recording):
     assert data["nearest"]["to"] < 0.8
     assert data["nearest"]["largest_difference"] > data["nearest"]["similarity"] * 0.1
     assert data["in_words"].startswith(data["answer"])
+
+
+def test_arrays_of_numbers_are_one_line_each(folder, recording):
+    lines = run("why", recording, "-l", folder, "--json").stdout.splitlines()
+    assert len(lines) < 700  # a pair of numbers each, of three paths
+    assert max(map(len, lines)) > 2000  # all differences
 
 
 def test_a_movement_that_is_not_there_is_refused(folder, recording):

@@ -23,6 +23,7 @@ from kineme.io.reading.episodes import read_episodes
 from kineme.io.reading.read_labels import labeled_pieces, read_labels
 from kineme.orientation import PosePrimitives
 from lerobot_sets import write_v2, write_v3
+from robot_array_sets import write_aloha, write_robomimic, write_umi
 
 N_SAMPLES = 12
 WORDS = (
@@ -157,6 +158,13 @@ def _hdf5():
             file[f"data/demo_{k}/t"], file[f"data/demo_{k}/obs/pos"] = t, x
             file.create_dataset(f"data/demo_{k}/packed", data=t, compression="gzip")
     return buffer.getvalue()
+
+
+def _robot(write, name):
+    """A set of a robot; of several files the first."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = write(Path(folder) / name, lengths=(8, 9, 10))
+        return (path if path.is_file() else path / "episode_0.hdf5").read_bytes()
 
 
 def _c3d():
@@ -318,6 +326,11 @@ def samples():
         "suit.mvnx": _mvnx(),
         "units.csv": b"time,x\nms,mm\n" + b"".join(b"%d,%d\n" % (10 * k, k * k) for k in range(N_SAMPLES)),
         **_optional(("robomimic.hdf5", _hdf5), ("points.c3d", _c3d)),
+        **_optional(
+            ("robot.demos.hdf5", lambda: _robot(write_robomimic, "a.hdf5")),
+            ("aloha.demos.hdf5", lambda: _robot(write_aloha, "sets")),
+            ("umi.demos.zip", lambda: _robot(functools.partial(write_umi, tall=4), "a.zarr.zip")),
+        ),
         "vectors.parquet": _vectors(),
         "cells.mat": _mat(False, trials=_cells(), fs=100.0),
         "wide.parquet": _parquet(time=t, x=x[:, 0], y=x[:, 1]),
@@ -346,7 +359,7 @@ def mutant(rng, data, name):
     """The bytes with one to four kinds of damage; inside what is compressed too."""
     if name.endswith(".lerobot"):
         return _zip_mutant(rng, data)
-    if name.endswith((".npz", ".kineme")) and rng.random() < 0.6:
+    if name.endswith((".npz", ".kineme", ".zip")) and rng.random() < 0.6:
         data = _zip_mutant(rng, data)
         return data if rng.random() < 0.8 else _damaged(rng, data)
     if "compressed.mat" in name and rng.random() < 0.7:
@@ -452,7 +465,19 @@ def read_mutant(name, data):
         if name in _SAVED:
             _check_saved(_SAVED[name].load(path))
             return 0
+        if ".demos." in name:
+            with contextlib.suppress(kineme.errors.KinemeError):
+                for episode in read_episodes(path):
+                    _check_episode(episode)
         return check_recordings(kineme.read_recordings(path))
+
+
+def _check_episode(episode):
+    assert all(values.shape[0] == len(episode) for values in episode.signals.values())
+    assert all(values.shape[1] == len(episode.names[name]) for name, values in episode.signals.items())
+    assert all(isinstance(problem, str) for problem in episode.problems)
+    assert episode.problems or len(episode)
+    assert np.isfinite(episode.times).all()
 
 
 def _read_lerobot(folder, data):

@@ -149,8 +149,7 @@ def test_two_runs_do_not_name_the_same_set_at_once(source):
     assert name_in_place(source, WAVE) == 2
 
 
-@pytest.mark.parametrize("step", ["declare", "bring_to_disk"])
-def test_a_run_that_ended_behind_its_version_is_known_to_the_next_one(source, monkeypatch, step):
+def test_a_run_that_ended_behind_its_version_is_known_to_the_next_one(source, monkeypatch):
     """As if it had been killed there: its rows are replaced, though their details were not yet in place."""
 
     def killed(at, motions):
@@ -159,7 +158,7 @@ def test_a_run_that_ended_behind_its_version_is_known_to_the_next_one(source, mo
             with pytest.raises(KeyboardInterrupt):
                 name_in_place(source, motions)
 
-    killed(step, WAVE)
+    killed("declare", WAVE)
     assert contents(source) == NAMED
     assert read_motions(source) == []
     killed("_commit", {2: [Motion(2, 0, 9, "tap")]})  # and once more, before its version

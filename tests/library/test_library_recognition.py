@@ -302,5 +302,5 @@ def test_what_cannot_be_answered_says_why(make):
         library.recognize(_questions([1]))
     for exhaustive in (0, 1000):
         recognizing = LibraryRecognizer(make(_kinds([2, 2]), f"two {exhaustive}").store, exhaustive)
-        with pytest.raises(TrajectoryError, match=r"expected movements of 2 dimensions as in fit, got 3"):
+        with pytest.raises(TrajectoryError, match=r"expected movements of 2 dimensions as learned, got 3"):
             recognizing.recognize(_questions([1], d=3))

@@ -48,6 +48,17 @@ def test_features_are_shares_and_those_of_each_movement_alone():
         np.testing.assert_allclose(transform(series[i : i + 1], kernels)[0], features[i], atol=1e-6)
 
 
+def test_order_and_names_of_demonstrations_change_nothing():
+    shown, fresh = draw_trembles(8, seed=9), draw_trembles(4, seed=10)
+    order = np.random.default_rng(0).permutation(len(shown))
+    names = {"0": "z", "1": "y", "2": "x"}
+    recognizer, other = (kineme.Recognizer(classifier="convolutions") for _ in range(2))
+    recognizer.fit(shown)
+    other.fit(shown[order], [names[label] for label in shown[order].labels])
+    scores, others = recognizer.decision_function(fresh), other.decision_function(fresh)
+    np.testing.assert_allclose(others[:, ::-1], scores, atol=1e-6)
+
+
 def test_values_left_out_are_those_of_a_fit_without_the_row():
     """The errors that are kept have lost their signs: one that overshoots its class must not count against it."""
     rng = np.random.default_rng(0)
@@ -78,6 +89,32 @@ def test_they_join_where_they_recognize_more_of_what_is_left_out():
     assert [answer.ranked[0] for answer in answers] == recognizer.predict(fresh).tolist()
     assert answers[0].probabilities[answers[0].ranked[0]] == pytest.approx(shares[0].max())
     assert (recognizer.predict(fresh) == labels).mean() == recognizer.score(fresh)
+
+
+def test_kernels_tell_what_is_known_and_convolutions_name_it():
+    """The best-ranked class is the label, also where the kernels find another one alone possible."""
+    shown, fresh = draw_trembles(16, seed=1), draw_trembles(20, seed=2)
+    recognizer = kineme.Recognizer().fit(shown)
+    answers, predicted = recognizer.recognize(fresh, 0.3), recognizer.predict(fresh)
+    labels = [label if answer.p_known > 0.3 else None for label, answer in zip(predicted, answers, strict=True)]
+    assert [answer.label for answer in answers] == labels
+    assert recognizer.predict_known(fresh, 0.3).tolist() == labels
+    named = [answer for answer in answers if answer.label is not None]
+    assert any(answer.p_values[answer.label] <= 0.3 < max(answer.p_values.values()) for answer in named)
+    assert min(answer.confidence for answer in named) > 1 / 3
+    assigned = kineme.anchoring.assign(fresh, recognizer, 0.3).labels
+    assert all(label in {None, best} for label, best in zip(assigned, predicted, strict=True))
+
+
+def test_an_explanation_says_that_the_kernels_chose_its_examples():
+    recognizer = kineme.Recognizer().fit(draw_trembles(16, seed=1))
+    explained = recognizer.recognize(draw_trembles(3, seed=5))[4].explain()
+    assert explained.by_convolutions
+    assert "(ranked by random convolutions; example and shares are those of the kernels)" in explained.in_words
+    assert "random convolutions" in explained.plot().get_suptitle()
+    assert len(repr(explained)) < 300
+    assert repr(recognizer.classifier_).startswith("Convolutions(sharpness=")
+    assert len(repr(recognizer.classifier_)) < 60
 
 
 def test_with_few_demonstrations_or_where_kernels_suffice_they_do_not():

@@ -56,7 +56,7 @@ def test_the_runner_up_is_the_next_class_and_less_alike(shapes):
     assert explained.nearest.similarity == answer.nearest[0].similarity > explained.runner_up.similarity
     data = json.loads(json.dumps(explained.to_dict()))
     assert data["nearest"]["label"] == answer.ranked[0]
-    assert len(data["runner_up"]["differences"]) == len(data["path"]) == 100
+    assert len(data["runner_up"]["differences"]) == len(data["path"]) == 199
 
 
 def test_of_one_class_there_is_no_runner_up(shapes):
@@ -72,7 +72,59 @@ def test_every_number_of_dimensions_is_drawn(make_movement, n_dims):
     arrays = [make_movement(seed, n_dims)[1] for seed in (0, 1, 0, 1)]
     recognizer = kineme.Recognizer().fit(arrays[:2], ["a", "b"])
     figure = recognizer.recognize(arrays[2]).explain().plot()
-    assert [axes.get_title().split(",")[0] for axes in figure.axes[:2]] == ["nearest: a", "next: b"]
+    assert [axes.get_title().split(",")[0] for axes in figure.axes[:2]] == ["nearest: a", "next in rank: b"]
+
+
+def read_columns(folder, heads, arrays):
+    """Recordings with these columns, as they are read from files."""
+    folder.mkdir()
+    for i, x in enumerate(arrays):
+        table = np.column_stack((np.linspace(0, 2, len(x)), x))
+        np.savetxt(folder / f"{i}.csv", table, delimiter=",", header=",".join(["time", *heads]), comments="")
+    return kineme.read_recordings(folder).demonstrations
+
+
+def test_each_point_is_drawn_apart_and_the_farthest_is_named(make_movement, tmp_path):
+    heads = [f"{side}_hand_{axis} [m]" for side in ("left", "right") for axis in "xyz"]
+    arrays = [make_movement(seed, 6)[1] for seed in (0, 1)]
+    u = np.linspace(0, 1, len(arrays[0]))[:, None]
+    dent = 0.4 * np.ptp(arrays[0]) * np.exp(-0.5 * ((u - 0.5) / 0.1) ** 2) * [0, 0, 0, 0, 0, 1]
+    demos = read_columns(tmp_path / "hands", heads, [*arrays, arrays[0] + dent])
+    explained = kineme.Recognizer().fit(demos[:2], ["a", "b"]).recognize(demos[2]).explain()
+    assert explained.nearest.part == "right_hand"
+    assert "of its size, most in right_hand; " in explained.in_words
+    assert explained.to_dict()["nearest"]["part"] == "right_hand"
+    assert explained.to_dict()["columns"] == heads
+    figure = explained.plot()
+    panels = figure.axes[:4]
+    assert [axes.get_title().split("\n")[-1] for axes in panels] == ["left_hand"] * 2 + ["right_hand"] * 2
+    assert all(axes.get_xlabel().startswith("mostly ") and axes.get_ylabel() in {f"mostly {h}" for h in heads}
+               for axes in panels)  # fmt: skip
+    for left, right in (panels[:2], panels[2:]):
+        assert (left.get_xlim(), left.get_ylim()) == (right.get_xlim(), right.get_ylim())
+    assert np.ptp(panels[0].get_xlim()) == pytest.approx(np.ptp(panels[2].get_xlim()))
+    figure.canvas.draw()
+    (legend,) = figure.legends
+    assert legend.get_window_extent().y1 <= min(axes.get_window_extent().y0 for axes in panels)
+
+
+def test_columns_that_are_no_points_are_curves_with_their_names(make_movement, tmp_path):
+    heads = [f"joint{k} [deg]" for k in range(8)]
+    demos = read_columns(tmp_path / "joints", heads, [10 * make_movement(seed, 8)[1] for seed in (0, 1, 2)])
+    explained = kineme.Recognizer().fit(demos[:2], ["a", "b"]).recognize(demos[2]).explain()
+    figure = explained.plot()
+    assert "6 of 8 columns" in figure.get_suptitle()
+    assert {axes.get_ylabel() for axes in figure.axes[:12]} < {*explained.columns}
+    assert explained.nearest.part in explained.columns
+
+
+def test_a_signal_is_drawn_over_time_with_its_name(make_movement, tmp_path):
+    demos = read_columns(tmp_path / "signals", ["force [N]"], [make_movement(seed, 1)[1] for seed in (0, 1)])
+    explained = kineme.Recognizer().fit(demos, ["a", "b"]).recognize(demos[0]).explain()
+    axes = explained.plot().axes[0]
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("share of the time", "force [N]")
+    assert "% of the time, " in explained.in_words
+    assert explained.nearest.part is None
 
 
 def test_what_was_written_in_space_is_drawn_as_written(make_movement):

@@ -199,7 +199,7 @@ def test_another_width_is_refused_with_what_was_expected(of_poses, of_angles):
         TrajectoryError, match=r"8 columns, gripper \(discrete\), .* or of the 6 coord.*, got 5 columns"
     ):
         of_poses.predict([walk])
-    with pytest.raises(TrajectoryError, match=r"of 3 dimensions as in fit, got 5, .* joint1 \(angle\)"):
+    with pytest.raises(TrajectoryError, match=r"of 3 dimensions as learned, got 5, .* joint1 \(angle\)"):
         of_angles.predict([walk])
     bad = poses()[0].recorded.copy()
     bad[7, 4:] *= 2

@@ -73,7 +73,7 @@ def test_p_values_are_shares_that_fall_with_strangeness(counts, seed):
     assert p.shape == (len(fresh), len(counts))
     assert (p >= 0).all()
     assert (p <= 1).all()
-    nearest = recognizer._score(fresh, nearest_of_each)[0]
+    nearest = recognizer._scores(fresh, nearest_of_each)
     for c in range(len(counts)):
         order = np.argsort(nearest[:, c])
         assert (np.diff(p[order, c]) >= 0).all()

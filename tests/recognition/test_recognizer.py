@@ -14,7 +14,7 @@ from sklearn.neighbors import KNeighborsClassifier
 from sklearn.svm import SVC
 
 import kineme
-from kineme import Demonstrations, Recognizer, Trajectory
+from kineme import ActionLibrary, Demonstrations, Recognizer, Trajectory
 from kineme.datasets.lasa import PAPER_LETTERS
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.kernels.rotation import RotationPrior
@@ -235,9 +235,22 @@ def test_one_shape_alone_is_known_and_most_others_are_not():
     assert known[~own].mean() <= 0.2
 
 
-def test_one_movement_at_rest_is_refused():
-    with pytest.raises(SpecificationError, match="expected a training movement that moves"):
-        Recognizer().fit([np.zeros((20, 2))], ["a"])
+@pytest.mark.parametrize("n_moving", [0, 1, 3])
+def test_a_movement_at_rest_is_refused_as_by_a_library(n_moving, tmp_path):
+    arrays = [demo.positions for demo in draw_shapes([1] * n_moving)] if n_moving else []
+    arrays, labels = [*arrays, np.ones((20, 2))], [*"abc"[:n_moving], "z"]
+    words = rf"trajectory {n_moving}: expected a movement, got 20 samples at the same place \(1 of {n_moving + 1} "
+    with pytest.raises(TrajectoryError, match=words):
+        Recognizer().fit(arrays, labels)
+    with ActionLibrary(tmp_path / "actions", create=True) as library, pytest.raises(TrajectoryError, match=words):
+        library.learn(arrays, labels)
+
+
+def test_demonstrations_have_the_labels_that_they_were_fitted_with():
+    demos = draw_shapes([1, 1, 1])
+    recognizer = Recognizer().fit(demos, ["c", "a", "b"])
+    assert list(recognizer.demonstrations_.labels) == ["a", "b", "c"]
+    np.testing.assert_array_equal(recognizer.demonstrations_[0].positions, demos[1].positions)
 
 
 def test_classes_of_unequal_size():
@@ -247,7 +260,7 @@ def test_classes_of_unequal_size():
 
 @pytest.mark.parametrize("ask", ["predict", "recognize", "p_values", "log_similarity"])
 def test_movements_of_another_dimension(ask):
-    with pytest.raises(TrajectoryError, match="movements of 2 dimensions as in fit, got 3"):
+    with pytest.raises(TrajectoryError, match="movements of 2 dimensions as learned, got 3"):
         getattr(Recognizer().fit(draw_shapes([1, 1])), ask)(draw_shapes([1, 1], 3))
 
 

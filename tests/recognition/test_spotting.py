@@ -381,7 +381,7 @@ def test_what_is_left_over_is_from_one_stretch_of_motion_and_long_enough():
 
 
 BAD = {
-    "dimensions": ((Trajectory(np.arange(20.0), np.zeros((20, 3))),), TrajectoryError, "expected a recording of 2 dimensions as in fit, got 3; select the dimensions"),
+    "dimensions": ((Trajectory(np.arange(20.0), np.zeros((20, 3))),), TrajectoryError, "expected a recording of 2 dimensions as learned, got 3; select the dimensions"),
     "rest": ((Trajectory(np.arange(20.0), np.zeros((20, 2))),), TrajectoryError, "expected some movement, got 19 s at rest"),
     "error rate 1": ((np.zeros((20, 2)), 1.0), SpecificationError, "expected error_rate below 1, got 1.0; 0.05 is one member in twenty"),
     "error rate 0": ((np.zeros((20, 2)), 0.0), SpecificationError, "expected error_rate to be a number above 0, got 0.0"),

@@ -11,7 +11,7 @@ from kineme.errors import SpecificationError
 from kineme.kernels.pair_distances import pair_distances, shapes_of
 from kineme.kernels.procrustes import Procrustes
 from kineme.movements.channels.channel import Channel
-from kineme.movements.channels.detect import count_points
+from kineme.movements.channels.detect import point_names
 from kineme.recognition import RotationPrior
 from kineme.similarity.bounds import fit_bases, log_bounds, reduce_features
 from kineme.similarity.comparison import fit_comparison
@@ -124,15 +124,14 @@ def test_names_of_columns_tell_the_points():
     def channels(*names):
         return tuple(Channel(name, "position", (name,)) for name in names)
 
-    assert count_points(channels(*HANDS)) == 2
-    assert count_points(channels("Wrist.X", "Wrist.Y", "Elbow.X", "Elbow.Y", "Tip.X", "Tip.Y")) == 3
-    assert count_points(channels("x1", "y1", "x2", "y2")) in (1, 2)  # numbers may be counted, or not be names
-    assert count_points(channels("x", "y", "z")) == 1
-    assert count_points(None) == 1
+    assert point_names(channels(*HANDS)) == ("left_hand", "right_hand")
+    joints = ("Wrist.X", "Wrist.Y", "Elbow.X", "Elbow.Y", "Tip.X", "Tip.Y")
+    assert point_names(channels(*joints)) == ("wrist", "elbow", "tip")
+    assert point_names(channels("x", "y", "z")) == point_names(None) == ()
     sensors = [f"{kind}_{axis}" for kind in ("acc", "gyro") for axis in "xyz"]
-    assert count_points(channels(*sensors)) == 1
-    assert count_points(channels(*HANDS[:4], HANDS[5], HANDS[4])) == 1
-    assert count_points(channels(*[f"joint{k}" for k in range(6)])) == 1
+    assert point_names(channels(*sensors)) == ()
+    assert point_names(channels(*HANDS[:4], HANDS[5], HANDS[4])) == ()
+    assert point_names(channels(*[f"joint{k}" for k in range(6)])) == ()
 
 
 def test_hands_with_names_turn_as_one_without_an_option(tmp_path):
@@ -152,7 +151,7 @@ def test_hands_with_names_turn_as_one_without_an_option(tmp_path):
     shown, fresh = written(demos[::4], tmp_path / "shown"), written(demos, tmp_path / "fresh")
     labels = np.asarray(demos.labels)
     recognizer = kineme.Recognizer().fit(shown, labels[::4])
-    assert recognizer.comparison_.procrustes.n_points == 2
+    assert recognizer.n_points_ == 2
     assert (recognizer.predict(fresh) == labels).mean() >= 0.95
     with kineme.ActionLibrary(tmp_path / "actions", create=True) as library:
         library.learn(shown, labels[::4])
@@ -169,6 +168,17 @@ def test_movements_turned_about_the_vertical_are_recognized():
     prior = RotationPrior(vertical=(0, 0, 1))
     recognizer = kineme.Recognizer(points=2, rotation_prior=prior).fit(demos[::3])
     assert (recognizer.predict(fresh) == np.asarray(demos.labels)).mean() >= 0.95
+
+
+@pytest.mark.parametrize("n_dims", [2, 3])
+def test_the_angle_of_points_is_that_of_their_common_rotation(n_dims):
+    demos = draw_points(2, n_dims, seed=13, n_classes=2, each=1)
+    R = np.eye(n_dims)
+    R[:2, :2] = [[np.cos(0.4), -np.sin(0.4)], [np.sin(0.4), np.cos(0.4)]]
+    moved = demos[0].positions @ np.kron(np.eye(2), R).T
+    transform = kineme.Recognizer(points=2).fit(demos).recognize(moved).transform
+    assert transform.angle == pytest.approx(0.4, abs=1e-3)
+    np.testing.assert_allclose(transform.rotation, np.kron(np.eye(2), R), atol=1e-3)
 
 
 def test_many_points_are_compared_by_four():
@@ -193,7 +203,16 @@ def test_many_columns_that_are_no_points_are_compared_by_twelve():
 
 
 @pytest.mark.parametrize(("points", "n_dims"), [(2, 5), (4, 6), (3, 3)])
-def test_columns_that_are_no_points_are_refused(points, n_dims):
+def test_columns_that_are_no_points_are_refused(points, n_dims, tmp_path):
     demos = draw_points(1, n_dims, seed=11)
     with pytest.raises(SpecificationError, match=rf"expected {2 * points} or {3 * points} columns, .* got {n_dims}"):
         kineme.Recognizer(points=points).fit(demos)
+    words, recognizer = rf"expected {2 * points} or {3 * points} columns", kineme.Recognizer(points=points)
+    library = kineme.ActionLibrary(tmp_path / "actions", create=True, recognizer=recognizer)
+    with library, pytest.raises(SpecificationError, match=words):
+        library.learn(demos)
+
+
+def test_points_are_a_number_and_names_tell_them_by_themselves():
+    with pytest.raises(SpecificationError, match=r"points to be a number, got .*names tell the points by themselves"):
+        kineme.Recognizer(points=["left_hand", "right_hand"]).fit(draw_points(2, 3, seed=14))

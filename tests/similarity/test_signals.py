@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kineme import Demonstrations, Recognizer
+from kineme.errors import SpecificationError
 from kineme.kernels.pair_distances import ElasticSpec, pair_distances, shapes_of
 from kineme.similarity.describe import describe, feature_rows, squared_distances
 from kineme.similarity.specification import DEFAULT_REPRESENTATIONS, ComparisonSpecification, Representation
@@ -119,3 +120,23 @@ def test_signals_of_any_company_are_the_same():
     alone = [describe(Demonstrations([one])) for one in demos]
     squares = np.stack([squared_distances(one, described)[:, 0] for one in alone], axis=1)
     np.testing.assert_allclose(squares[2:], squared_distances(described, described)[2:], rtol=1e-5, atol=1e-6)
+
+
+def test_a_signal_and_a_path_of_one_movement_are_two_descriptions():
+    demos, both = draw_shapes([3] * 3, d=1, seed=6), (True, False)
+    how = {signal: ComparisonSpecification((Representation("positions", signal=signal),)) for signal in both}
+    mixed = ComparisonSpecification(tuple(Representation("positions", signal=signal) for signal in both))
+    for row, signal in zip(feature_rows(demos, mixed), both, strict=True):
+        np.testing.assert_array_equal(row, feature_rows(demos, how[signal])[0])
+    assert mixed.representations[0] != mixed.representations[1]
+
+
+def test_what_is_compared_pair_by_pair_is_a_signal_if_its_positions_are():
+    mixture = (Representation("positions"), Representation("elastic", signal=False))
+    with pytest.raises(SpecificationError, match="expected one value of signal in positions over arc length and all"):
+        ComparisonSpecification(mixture)
+    as_path, as_signal = (
+        feature_rows(draw_shapes([3], d=1), ComparisonSpecification(AS_PATHS)),
+        feature_rows(draw_shapes([3], d=1), ComparisonSpecification()),
+    )
+    assert not np.allclose(as_path[-1], as_signal[-1])  # the positions in detail, too

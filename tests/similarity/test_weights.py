@@ -234,6 +234,6 @@ def test_half_of_a_fitted_weight_is_the_representations_own():
     similarity = AveragedSimilarity(described.procrustes, impostor_widths(described, labels))
     aligned = aligned_weights(similarity, described, labels)
     own = np.array([one.weight for one in DEFAULT_REPRESENTATIONS])
-    found = fitted_weights(similarity, described, labels, DEFAULT_REPRESENTATIONS)
+    found = fitted_weights(similarity, described, labels)
     assert np.abs(aligned - own / own.sum()).max() > 0.05
     np.testing.assert_allclose(found, 0.5 * aligned + 0.5 * own / own.sum())

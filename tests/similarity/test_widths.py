@@ -19,7 +19,7 @@ from kineme.similarity.specification import (
 from movement_samples import draw_shapes
 
 
-def as_twins(widths):
+def as_coarse(widths):
     """Those in detail as of the same quantities that are rotated: elastic path and point cloud."""
     return np.append(widths[:5], widths[[2, 4]])
 
@@ -34,15 +34,15 @@ def test_a_width_is_the_share_of_the_median_distance_to_an_impostor_among_hundre
     described, labels = shapes
     other = np.sqrt(np.where(labels[:, None] == labels, np.inf, squared_distances(described, described)))
     each = SHARE * np.median(other.min(axis=2), axis=1)
-    np.testing.assert_allclose(impostor_widths(described, labels), as_twins(each))
+    np.testing.assert_allclose(impostor_widths(described, labels), as_coarse(each))
 
 
 def test_widths_in_detail_are_those_of_the_same_quantity_that_is_rotated(shapes):
     """Also where some are left out; without a twin it is a width of their own."""
     described, labels = shapes[0].take(slice(30, 80)), shapes[1][30:80]
-    assert described.twins() == [0, 1, 2, 3, 4, 2, 4]
-    assert described.select([0, 4, 5, 6]).twins() == [0, 1, 2, 1]
-    assert described.select([0, 1]).twins() == [0, 1]
+    assert described.coarse() == [0, 1, 2, 3, 4, 2, 4]
+    assert described.select([0, 4, 5, 6]).coarse() == [0, 1, 2, 1]
+    assert described.select([0, 1]).coarse() == [0, 1]
     widths = impostor_widths(described, labels)
     alone = impostor_widths(described.select([0, 5, 6]), labels)
     np.testing.assert_array_equal(widths[5:], widths[[2, 4]])
@@ -57,7 +57,7 @@ def test_of_one_class_every_other_movement_is_an_impostor(shapes):
     squares = squared_distances(described, described)
     squares[:, np.arange(20), np.arange(20)] = np.inf
     expected = SHARE * np.sqrt(np.median(squares.min(axis=2), axis=1))
-    np.testing.assert_allclose(impostor_widths(described, np.zeros(20)), as_twins(expected), rtol=0.05)
+    np.testing.assert_allclose(impostor_widths(described, np.zeros(20)), as_coarse(expected), rtol=0.05)
 
 
 def test_without_labels_it_is_the_first_distance_beyond_the_largest_ratio(shapes):
@@ -68,7 +68,7 @@ def test_without_labels_it_is_the_first_distance_beyond_the_largest_ratio(shapes
         ordered = np.sort(np.sqrt(squares), axis=1)[:, 1:]
         at = np.diff(np.log(np.maximum(ordered[:, :15], 1e-9)), axis=1).argmax(axis=1)
         widths.append(SHARE * np.median(ordered[np.arange(30), at + 1]))
-    np.testing.assert_allclose(gap_widths(described), as_twins(np.array(widths)), rtol=1e-6)
+    np.testing.assert_allclose(gap_widths(described), as_coarse(np.array(widths)), rtol=1e-6)
 
 
 def test_many_pairs_are_compared_as_few_are(shapes, monkeypatch):

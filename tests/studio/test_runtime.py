@@ -171,6 +171,8 @@ def test_movements_of_people_are_recognized_as_in_python(name):
         ({"classifier": "prototype"}, 2),
         ({}, 1),
         ({"representations": tuple(replace(one, signal=False) for one in DEFAULT_REPRESENTATIONS)}, 1),
+        ({"representations": (*DEFAULT_REPRESENTATIONS[:4], replace(DEFAULT_REPRESENTATIONS[0], signal=False))}, 1),
+        ({"representations": (kineme.recognition.Representation("forcing", arc_share=1.0, n_points=51),)}, 1),
         ({}, 5),
         ({"representations": (kineme.recognition.Representation("forcing", arc_share=0.0, n_points=70),)}, 2),
         ({"representations": (kineme.recognition.Representation("positions", arc_share=0.4, n_points=50),)}, 2),
@@ -302,6 +304,15 @@ def test_movements_under_way_are_recognized_as_in_python(space, settings):
     recognizer = kineme.Recognizer(**settings).fit(demos[one_in(2, demos)])
     some = demos[one_in(1, demos, 4)][:: 1 if SOAK else 7]
     assert compare_states(states_of(recognizer, every_tenth(some))) <= 2 * SIMILAR
+
+
+@pytest.mark.parametrize("signal", [True, False])
+def test_signals_under_way_are_recognized_as_in_python(signal, monkeypatch):
+    monkeypatch.setenv("KINEME_COMPILED", "never")
+    how = tuple(replace(representation, signal=signal) for representation in DEFAULT_REPRESENTATIONS)
+    recognizer = kineme.Recognizer(how).fit(draw_shapes([2, 3, 2], 1, seed=4))
+    fresh = draw_shapes([1] * 3, 1, seed=4, spread=0.3)
+    assert compare_states(states_of(recognizer, list(fresh))) <= 5 * SIMILAR
 
 
 def rollouts_of(demos, formulation):

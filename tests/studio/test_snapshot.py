@@ -128,6 +128,8 @@ def test_of_unequal_symbols_the_large_ones_are_cut(tmp_path):
         ({"classifier": "svm"}, 2, "svm"),
         ({"max_angle": 0.5}, 3, "rotation prior"),
         ({"rotation_prior": None}, 3, "rotation prior"),
+        ({"points": 2}, 6, r"points that turn together.*recognizer=Recognizer\(points=1\)"),
+        ({}, 13, "at most 12 columns, got 13"),
     ],
 )
 def test_what_the_runtime_lacks_is_refused(settings, d, message):

@@ -321,7 +321,7 @@ def test_for_reading_only_every_change_is_refused(folder, open_studio):
 
 
 READING = {f"/{path}" for path in ("recognize", "rollout", "primitive", "export", "robots/move", "recordings")}
-READING.add("/recordings/{key}/spotted")
+READING |= {"/recordings/{key}/spotted", "/episodes/{key}/spans"}
 
 
 def test_every_other_route_that_does_not_only_read_is_refused_too(folder, open_studio):
@@ -329,7 +329,7 @@ def test_every_other_route_that_does_not_only_read_is_refused_too(folder, open_s
     for path, methods in client.get("/api/openapi.json").json()["paths"].items():
         if path.removeprefix("/api") not in READING:
             writing |= {(method, path) for method in methods if method != "get"}
-    assert len(writing) == len(WRITES) + 3  # of proposals and recordings
+    assert len(writing) == len(WRITES) + 4  # of proposals, recordings and corrections
     for method, path in writing:
         assert client.request(method, path.replace("{key}", "x")).status_code == 403, path
 

@@ -17,6 +17,7 @@ from pathlib import Path
 import httpx
 import pytest
 from click.testing import CliRunner
+from episode_samples import write_drawings
 from studio_samples import BEARER, ROOT, TOKEN, Running, drawing, make_library, request_of, running, samples
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
@@ -208,6 +209,7 @@ REFUSED = [
     (["--read-only"], 1, "expected a library in"),
     (["--port", "0"], 2, "0 is not in the range"),
     (["--host", "nowhere.invalid"], 1, "correct --host and --port"),
+    (["--recordings", "nowhere"], 2, "'nowhere' does not exist"),
 ]
 
 
@@ -224,6 +226,20 @@ def test_what_cannot_be_served_is_refused_in_one_line(tmp_path, options, code, w
     assert exit_code == code
     assert words in said
     assert "Traceback" not in said
+
+
+def test_a_damaged_data_set_is_refused_before_a_library_is_made(tmp_path):
+    demos = write_drawings(tmp_path / "demos", (0,))
+    (demos / "meta" / "info.json").write_text("{")
+    code, said = _refused(tmp_path / "actions", "--recordings", demos)
+    assert (code, "meta/info.json" in said, (tmp_path / "actions").exists()) == (1, True, False)
+
+
+def test_recordings_are_opened_by_a_path_of_the_command_line(folder, tmp_path):
+    demos = write_drawings(tmp_path / "demos", (0, 1), (2,))
+    with running(folder, "--recordings", demos) as studio:
+        page = _get(studio, "/api/episodes")
+    assert (page["name"], [item["task"] for item in page["episodes"]]) == ("demos", ["Draw", "Wave"])
 
 
 def test_a_port_that_is_taken_is_refused(folder):

@@ -15,6 +15,7 @@ from kineme.movements.trajectories.labels import label_array
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.recognition.answer import FittedRecognizer, KnownClasses, known_classes, open_set_labels
 from kineme.recognition.conformal import distances as in_widths
+from kineme.reporting.text import counted
 from kineme.sampling import evenly_spaced
 from kineme.similarity.comparison import Comparison, References
 from kineme.similarity.describe import Described, describe
@@ -56,8 +57,8 @@ class Assignment:
     def __repr__(self) -> str:
         n_assigned = sum(label is not None for label in self.labels)
         return (
-            f"Assignment({n_assigned} of {len(self.labels)} to a symbol, {len(self.proposals)} new clusters proposed, "
-            f"{len(self.unknown)} unknown)"
+            f"Assignment({n_assigned} of {len(self.labels)} to a symbol, {counted(len(self.proposals), 'new cluster')} "
+            f"proposed, {len(self.unknown)} unknown)"
         )
 
 
@@ -233,7 +234,9 @@ def suggest_merges(
     described, member, names = _labeled(movements, labels, like)
     if len(names) < 2:
         return ()
-    chosen = _some_of_each(member, max(3, _LARGEST // len(names)))
+    of_symbols = np.split(np.argsort(member, kind="stable"), np.cumsum(np.bincount(member))[:-1])
+    most = max(3, _LARGEST // len(names))
+    chosen = np.sort(np.concatenate([own[evenly_spaced(len(own), most)] for own in of_symbols]))
     means, counts = _mean_similarities(similarities(described.take(chosen), widths=widths), member[chosen])
     several = counts > 1
     typical = float(np.median(np.diag(means)[several])) if several.any() else 1.0
@@ -325,9 +328,3 @@ def _labeled(
         )
     names, member = np.unique(label_values, return_inverse=True)
     return described, np.asarray(member, dtype=np.intp), names.tolist()
-
-
-def _some_of_each(member: NDArray[np.intp], most: int) -> NDArray[np.intp]:
-    """At most so many evenly spaced movements of each symbol."""
-    of_symbols = np.split(np.argsort(member, kind="stable"), np.cumsum(np.bincount(member))[:-1])
-    return np.sort(np.concatenate([own[evenly_spaced(len(own), most)] for own in of_symbols]))

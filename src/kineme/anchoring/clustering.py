@@ -160,12 +160,12 @@ def count_by_eigengap(similar: Array, min_members: int = 1, people: NDArray[np.i
     """The number of clusters c, from 2 to n / 2, by gaps between the c-th and the next eigenvalue.
 
     Of the normalized similarities ``D^-1/2 W D^-1/2``, with W as `fuse` gives it. With c clusters that nothing
-    connects, c eigenvalues are 1. It is the c with the largest gap, which is often that between a few groups of similar
-    clusters; or, if these are more, the c whose clusters have the best silhouette in ``-log W``, among gaps of at least
-    0.15 of it, see `mean_silhouettes`: two clusters of one kind are merged at a glance, and kinds that were never
-    divided are not seen. Not counted are clusterings with more than a fifth of clusters of fewer than `min_members`,
-    or, where `people` (n,) made the movements, with more than half of the movements in clusters of one person: these
-    are people and no kinds.
+    connects, c eigenvalues are 1. Candidates are all c whose gap is at least 0.15 of the largest. The result is the
+    larger of the c with the largest gap, which is often that between a few groups of similar clusters, and the
+    candidate with the best mean silhouette in ``-log W``, see `mean_silhouettes`: two clusters of one kind are merged
+    at a glance, and kinds that were never divided are not seen. No candidates are clusterings with more than a fifth of
+    clusters of fewer than `min_members`, or, where `people` (n,) made the movements, with more than half of the
+    movements in clusters of one person: these are people and no kinds.
     """
     n = len(similar)
     values, vectors = (array[..., ::-1] for array in eigh(_normalized(similar)))
@@ -217,8 +217,7 @@ def _by_directions(vectors: Array, wanted: int, min_members: int = 1) -> Cluster
         if not len(divisible):
             break
         members = max(
-            (np.flatnonzero(clusters == k) for k in divisible),
-            key=lambda rows: distances[np.ix_(rows, rows)].mean(),
+            (np.flatnonzero(clusters == k) for k in divisible), key=lambda rows: distances[np.ix_(rows, rows)].mean()
         )
         clusters[members[_half(distances[np.ix_(members, members)], min_members)]] = new
     return clusters

@@ -16,7 +16,7 @@ from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.reporting.colors import BLUE, GRAY, ORANGE
 from kineme.reporting.figures import flat, new_figure
-from kineme.reporting.text import drawable
+from kineme.reporting.text import counted, drawable
 from kineme.similarity.describe import maps_onto, paths_of
 from kineme.similarity.specification import Compares
 from kineme.validation import Array
@@ -141,7 +141,7 @@ def draw_proposals(movements: MovementsLike, proposals: Proposals, like: Compare
         cells[n - 1].set_title(f"left over: {len(alone)}", fontsize=7, color=GRAY, pad=2)
     for empty in cells[n:]:
         empty.set_axis_off()
-    head = f"{len(proposals)} clusters among {len(demos)} movements"
+    head = f"{counted(len(proposals), 'cluster')} among {counted(len(demos), 'movement')}"
     key = ["number: size, stability", "bold: most typical; dot: start"]
     if columns > 4:
         figure.suptitle(f"{head} ({'; '.join(key)})", fontsize=8)

@@ -12,6 +12,7 @@ from kineme.anchoring import clustering
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.recognition.conformal import check_groups, comparable_groups
+from kineme.reporting.text import counted
 from kineme.similarity.describe import Described, describe, squared_distances
 from kineme.similarity.similarity import AveragedSimilarity, averaged, compare, similarities
 from kineme.similarity.specification import Compares
@@ -101,7 +102,8 @@ class Proposals:
         return self.proposals[index]
 
     def __repr__(self) -> str:
-        return f"Proposals({len(self)} clusters among {len(self.clusters)} movements, {len(self.left_over)} left over)"
+        clusters, n = counted(len(self), "cluster"), len(self.clusters)
+        return f"Proposals({clusters} among {n} movements, {len(self.left_over)} left over)"
 
 
 def describe_clusters(K: Array, clusters: NDArray[np.intp], stabilities: Array, widths: Array) -> Proposals:
@@ -348,29 +350,29 @@ def _by_neighbors(
 def by_shape(described: Described) -> Described:
     """Without the forcing term, if movements are also compared pair by pair: across people it tells little.
 
-    What is compared in detail counts as its twins that are rotated: with more weight clusters are those of people.
+    What is compared in detail counts as the coarse ones, which are rotated: with more, clusters are those of people.
     """
     if described.pairs is None:
         return described
-    n, own, twins = len(described.blocks), described.own_weights, described.twins()
+    n, own, coarse = len(described.blocks), described.own_weights, described.coarse()
     chosen = [r for r, block in enumerate(described.blocks) if block is described.pairs.positions]
     chosen += [r for r in range(n, described.n_representations) if own is None or own[r] > 0]
     selected = described.select(chosen)
-    return selected if own is None else replace(selected, own_weights=tuple(own[twins[r]] for r in chosen))
+    return selected if own is None else replace(selected, own_weights=tuple(own[coarse[r]] for r in chosen))
 
 
 def _by_distances(
     distances: Array, method: str, n_clusters: int | None, min_members: int
 ) -> tuple[clustering.Clusters, Array]:
     """Clusters of all movements, and how stable each is."""
-    share = n_clusters or 0
+    count = n_clusters or 0
     if method == "agglomerative" and n_clusters is None:
-        share = clustering.count_clusters(distances)
+        count = clustering.count_clusters(distances)
 
     def again(some: Array) -> clustering.Clusters:
-        return clustering.METHODS[method](some, share, 1 if method == "agglomerative" else min_members)
+        return clustering.METHODS[method](some, count, 1 if method == "agglomerative" else min_members)
 
-    clusters = clustering.METHODS[method](distances, share, min_members)
+    clusters = clustering.METHODS[method](distances, count, min_members)
     return clusters, clustering.stabilities(distances, clusters, again)
 
 

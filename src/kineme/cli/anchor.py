@@ -190,6 +190,8 @@ def _text(data: dict[str, Any], alone: str) -> str:
         for proposal in proposals
     ]  # fmt: skip
     title = f"{counted(len(proposals), 'proposal')}, {counted(len(data['left_over']), 'movement')} left over{alone}"
+    if not (lines or rows or data["left_over"]):
+        title = "no unlabeled movements"
     lines.append(table(("number", "movements", "stability", "cohesion", "most like"), rows, title) if rows else title)
     if data["pictures"]:
         lines.append(f"pictures: {printable(data['pictures'][0])}")

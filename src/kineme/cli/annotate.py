@@ -18,6 +18,7 @@ from kineme.cli.options import (
     heading,
     json_option,
     library_option,
+    rerun_option,
 )
 from kineme.cli.output import check_new, progress, say, table, write
 from kineme.cli.reading import layout_options, notes_beside, pieces, problem_lines, recordings_argument, seconds_of
@@ -49,6 +50,7 @@ def _format(text: str) -> str:
 )
 @json_option
 @click.option("--csv", "as_csv", is_flag=True, help="Answer in CSV.")
+@rerun_option
 @force_option
 def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, form: str | None, **options: Any) -> None:
     """Annotate RECORDINGS, files, folders or patterns of them, or - for CSV from the standard input: what happens when.
@@ -62,9 +64,12 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
     """
     from kineme.io.reading.formats import expanded
     from kineme.io.writing.annotations import is_in_place, targets_of, to_csv, write_annotations
+    from kineme.io.writing.rerun import recording_scenes, write_rerun
     from kineme.library.library import ActionLibrary
 
-    as_json, as_csv, force, error_rate = (options.pop(name) for name in ("as_json", "as_csv", "force", "error_rate"))
+    as_json, as_csv, force, rerun, error_rate = (
+        options.pop(name) for name in ("as_json", "as_csv", "force", "rerun", "error_rate")
+    )
     if as_csv and (as_json or output is not None):
         raise click.UsageError("expected --csv alone, or --json, or --output")
     if output is None and form is not None:
@@ -72,6 +77,7 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
     sources = [source for path in recordings for source in expanded(path)]
 
     def check(movements: list[tuple[str, str]], *read: Path) -> None:
+        check_new(rerun, force, *sources, *read)
         for target in targets_of(output, sources, movements, form) if output is not None else ():
             if not is_in_place(target, sources):
                 check_new(target, force, *sources, *read)
@@ -81,10 +87,14 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
                 )
 
     with ActionLibrary(folder, read_only=True) as library:
-        answer = _annotated(library, recordings, options, error_rate, check)
+        held: list[Any] | None = None if rerun is None else []
+        answer = _annotated(library, recordings, options, error_rate, check, held)
     if output is not None and answer.streamed:
         check(answer.movements)
     written = [] if output is None else write_annotations(output, answer.annotations, sources, form, answer.movements)
+    if rerun is not None:
+        scenes = (scene for piece, notes in held or () for scene in recording_scenes(piece, notes))
+        written.append(write_rerun(rerun, scenes, replace=force))
     rows = [] if written and not as_json else _rows(answer)  # a large set would fill the memory once more
     data = {
         "annotations": rows,
@@ -116,11 +126,18 @@ class _Answer(NamedTuple):
 
 
 def _annotated(
-    library: Any, recordings: tuple[Path, ...], options: dict[str, Any], error_rate: float, check: Callable[..., None]
+    library: Any,
+    recordings: tuple[Path, ...],
+    options: dict[str, Any],
+    error_rate: float,
+    check: Callable[..., None],
+    held: list[Any] | None,
 ) -> _Answer:
-    """Annotate recordings piece by piece, once `check` has seen what is known of the first one."""
+    """Annotate recordings piece by piece, once `check` has seen what is known of the first one.
+
+    Pieces are kept with their annotations in `held`, for a picture of them, unless it is None.
+    """
     from kineme.io.reading.recordings import paths_of
-    from kineme.io.records import Problem
     from kineme.library.annotate import annotate_by
     from kineme.library.recognize import some_of_each_symbol
 
@@ -130,7 +147,7 @@ def _annotated(
     bar_format = "{l_bar}{bar}| {n:.0f} of {total:.0f} s [{elapsed}<{remaining}]"
     with progress(total=total, desc="annotating", bar_format=bar_format) as bar:
         for piece in pieces(recordings, options, library):
-            if isinstance(piece, Problem):
+            if not hasattr(piece, "sources"):  # a problem
                 answer.problems.append(piece)
                 continue
             streamed = total is not None
@@ -143,14 +160,14 @@ def _annotated(
             done = partial(_advance, bar, answer.seconds)
             report = annotate_by(known, piece, error_rate, done)
             answer.annotations.extend(report.annotations)
+            if held is not None:
+                held.append((piece, report.annotations))
             answer.movements.extend((source.path, source.place) for source in piece.sources)
             answer.problems.extend((*piece.problems, *report.problems))
             answer = answer._replace(seconds=answer.seconds + seconds, streamed=streamed)
     if not answer.movements:
-        from kineme.errors import DataError
-
         first = f"; the first: {answer.problems[0]}" if answer.problems else ""
-        raise DataError(f"expected recordings to annotate, found none that can be read{first}")
+        raise FileNotFoundError(f"expected recordings to annotate, found none that can be read{first}")
     return answer
 
 

@@ -94,36 +94,25 @@ def _beside(recordings: tuple[Path, ...]) -> Path:
 def _recordings(paths: tuple[Path, ...], options: dict[str, Any], library: Any, places: list[str]) -> Any:
     """What is corrected; of data sets the episodes that have corrections alone."""
     from kineme.errors import DataError
-    from kineme.io.records import Problem
 
     several = list(pieces(paths, options, library, places))
-    read = [piece for piece in several if not isinstance(piece, Problem)]
+    read = [piece for piece in several if hasattr(piece, "sources")]  # others are problems
     if len(read) != 1:
         raise DataError(
             f"expected one data set, or files, to correct, got {len(read)} data sets that can be read"
-            + "".join(f"; {piece}" for piece in several if isinstance(piece, Problem))
+            + "".join(f"; {piece}" for piece in several if piece not in read)
         )
     return read[0]
 
 
 def _annotated(paths: tuple[Path, ...], parsed: Any, library: Any, error_rate: float) -> Any:
     """What was annotated: as it stands in the data set, else found again."""
-    from kineme.io.reading.pieces import EPISODE, is_episodic
-    from kineme.io.writing.annotations import Annotation
     from kineme.library.annotate import annotate
-    from kineme.library.correct import as_labels
+    from kineme.library.correct import as_labels, motions_in
 
-    if len(paths) == 1 and is_episodic(paths[0]):
-        from kineme.io.lerobot.motions import read_motions
-
-        motions = [motion for motion in read_motions(paths[0]) if motion.annotator == "kineme"]
-        if motions:
-            return as_labels(
-                [
-                    Annotation("", f"{EPISODE}{motion.episode}", *motion[1:4], motion.p_value, motion.confidence)
-                    for motion in motions
-                ]
-            )
+    motions = motions_in(paths[0]) if len(paths) == 1 else []
+    if motions:
+        return as_labels(motions)
     total = float(parsed.demonstrations.durations.sum())
     with progress(total=total, desc="annotating as before", unit="s") as bar:
         report = annotate(library.store, parsed, error_rate, lambda done: bar.update(min(done, total) - bar.n))

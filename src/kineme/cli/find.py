@@ -44,10 +44,8 @@ def find(symbol: str, recordings: tuple[Path, ...], folder: Path, also: tuple[st
     Example: kineme find reach archive/ --library actions/ -o hits.csv
     """
     from kineme.io.writing.annotations import as_row, writer_of
-    from kineme.library.find import check_symbols
-    from kineme.library.find import find as occurrences
+    from kineme.library import annotate as search
     from kineme.library.library import ActionLibrary
-    from kineme.library.recognize import some_of_each_symbol
     from kineme.recognition.answer import certainty
 
     as_json, force, error_rate, output = (options.pop(name) for name in ("as_json", "force", "error_rate", "output"))
@@ -57,21 +55,23 @@ def find(symbol: str, recordings: tuple[Path, ...], folder: Path, also: tuple[st
         raise click.UsageError(f"expected a table to write, .csv or .json, got {printable(output)}")
     symbols = (symbol, *also)
     with ActionLibrary(folder, read_only=True) as library:
-        check_symbols(library.store, symbols)
-        known = some_of_each_symbol(library.store)
+        search.check_symbols(library.store, symbols)
         with progress(desc="searching", unit=" s of recordings", bar_format="{l_bar}{n:.0f}{unit} [{elapsed}]") as bar:
-            found = occurrences(
-                known, files_of(recordings, options, library), symbols, error_rate, lambda s: bar.update(s - bar.n)
+            found = search.find(
+                library.store,
+                files_of(recordings, options, library),
+                symbols,
+                error_rate,
+                lambda seconds: bar.update(seconds - bar.n),
             )
-    is_guess = not bool(known.calibration.calibrated(error_rate).all())
-    sure = [certainty(hit.confidence, is_new=False, is_guess=is_guess) for hit in found.hits]
+    sure = [certainty(hit.confidence, is_new=False, is_guess=not found.calibrated) for hit in found.hits]
     if writer is not None and output is not None:
         writer.write(output, found.hits, None)
     data = {
         "hits": [as_row(hit) | {"certainty": words} for hit, words in zip(found.hits, sure, strict=True)],
         "recordings": found.recordings,
         "seconds": found.seconds,
-        "calibrated": not is_guess,
+        "calibrated": found.calibrated,
         "written": [] if output is None else [str(output)],
         "problems": [str(problem) for problem in found.problems],
     }

@@ -15,11 +15,12 @@ from kineme.cli.options import (
     heading,
     json_option,
     plot_option,
+    rerun_option,
     source_options,
     specification_options,
 )
 from kineme.cli.output import check_new, write, write_bytes
-from kineme.cli.reading import layout_options, read_source
+from kineme.cli.reading import layout_options, name_of_source, read_source
 from kineme.reporting.text import printable
 
 _BAD_FIT = 0.05  # of the extent of the recording
@@ -45,6 +46,7 @@ _MISSED = 0.01  # of the extent of a column
               help="A .csv, .npz, .json or .parquet file; - for the screen, as CSV or --json.")  # fmt: skip
 @json_option
 @plot_option
+@rerun_option
 @force_option
 def generate(**options: Any) -> None:
     """Generate a movement from SOURCE: a symbol of a library, a recording, or a saved primitive (.kineme).
@@ -64,7 +66,7 @@ def generate(**options: Any) -> None:
     from kineme.dmp.generation.generate import generate as make
     from kineme.io.writing.write_movement import encode_movement, write_movement
 
-    for name in ("output", "save", "plot"):
+    for name in ("output", "save", "plot", "rerun"):
         check_new(options[name], options["force"], options["source"])
     learned = read_source(options)
     obstacles = options["obstacles"]
@@ -98,6 +100,11 @@ def generate(**options: Any) -> None:
         from kineme.reporting.figures import save_figure
 
         save_figure(draw_movement(learned, movement.columns, movement_options.obstacles), options["plot"])
+    if options["rerun"]:
+        from kineme.io.writing.rerun import movement_scene, write_rerun
+
+        scene = movement_scene(name_of_source(options), movement.columns, movement.names)
+        write_rerun(options["rerun"], [scene], replace=options["force"])
     if str(options["output"]) == "-":
         ending = ".json" if options["as_json"] else ".csv"
         write_bytes(encode_movement(movement.columns, ending, movement.names))

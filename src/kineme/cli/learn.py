@@ -91,7 +91,7 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
 
 def _notes(recordings: Any) -> list[str]:
     """List what a person should know of how recordings were read, before they rely on what is learned."""
-    from kineme.io.inspection.inspect import notes_on_extents, notes_on_sizes
+    from kineme.io.inspection.inspect import notes_on_extents, notes_on_points, notes_on_sizes
     from kineme.io.reading.column_order import notes_on_aside, notes_on_order
     from kineme.io.reading.merge_files import notes_on_gaps, notes_on_sampling
     from kineme.movements.channels.column_match import columns_recorded
@@ -100,7 +100,8 @@ def _notes(recordings: Any) -> list[str]:
     aside = notes_on_aside(how for how, _ in recordings.detected)
     ordered = notes_on_order((how for how, _ in recordings.detected), columns_recorded(demos.channels or ()))
     repaired = [*notes_on_gaps(recordings), *notes_on_sampling(recordings)]
-    return [*recordings.notes, *aside, *ordered, *repaired, *notes_on_sizes(demos), *notes_on_extents(demos)]
+    of_columns = [*notes_on_points(demos), *notes_on_sizes(demos), *notes_on_extents(demos)]
+    return [*recordings.notes, *aside, *ordered, *repaired, *of_columns]
 
 
 def _people(root: Path, recordings: Any, person: str | None, by_person: bool) -> list[str | None] | None:

@@ -12,6 +12,7 @@ import click
 
 from kineme.cli.anchor import anchor
 from kineme.cli.annotate import annotate
+from kineme.cli.audit import audit
 from kineme.cli.correct import correct
 from kineme.cli.evaluate import evaluate, reproduce
 from kineme.cli.find import find
@@ -85,7 +86,7 @@ def main() -> None:
 
 
 for command in (
-    anchor, annotate, correct, evaluate, find, generate, move, inspect, learn, library, page, recognize, reproduce,
-    segment, studio, why,
+    anchor, annotate, audit, correct, evaluate, find, generate, move, inspect, learn, library, page, recognize,
+    reproduce, segment, studio, why,
 ):  # fmt: skip
     main.add_command(command)

@@ -10,6 +10,7 @@ import click
 from kineme.cli.options import (
     FOLDER,
     NUMBERS,
+    RERUN,
     Finite,
     GroupedCommand,
     flag_of,
@@ -34,6 +35,7 @@ _FILES = {
     "ros2": (None, (".mcap", ""), "A .mcap, or a folder, of ROS 2 with the same."),
     "action_goal": (None, (".yaml", ".yml", ".json"), "A .yaml or .json file for ros2 action send_goal."),
     "plot": (None, (".png", ".svg", ".pdf"), "Path and joints beside their limits: a .png, .svg or .pdf file."),
+    "rerun": (None, (".rrd",), RERUN),
     "view": (None, (".html", ".htm"), "An .html page in which the arm moves; opens in a browser, needs no network."),
 }
 
@@ -87,6 +89,12 @@ def write_files(movement: Any, options: dict[str, Any]) -> None:
         from kineme.robots.view.figure import draw_robot_movement
 
         save_figure(draw_robot_movement(movement), options["plot"])
+    if options["rerun"]:
+        from kineme.io.writing.rerun import write_rerun
+        from kineme.robots.view.figure import robot_scene
+
+        scene = robot_scene(movement, name_of_source(options))
+        write_rerun(options["rerun"], [scene], replace=options["overwrite"] or options["force"])
     if options["lerobot"]:
         task, units = name_of_source(options), "percent" if options["joint_units"] == "percent" else "deg"
         export_files.write_lerobot(options["lerobot"], trajectory, task, options["fps"], movement.robot, units)

@@ -179,6 +179,10 @@ force_option = under(
 json_option = under("Output", click.option("--json", "as_json", is_flag=True, help="Answer in JSON."))
 plot_option = under("Output", click.option("--plot", type=FILE, help="A drawing of it: a .png, .svg or .pdf file."))
 
+#: Meaning of the option ``--rerun``.
+RERUN = "An .rrd file for the viewer of Rerun: paths, curves, and symbols over time."
+rerun_option = under("Output", click.option("--rerun", type=FILE, help=RERUN))
+
 
 def error_rate_option(words: str) -> Callable[[Any], Any]:
     """The option ``--error-rate``, with what it says of itself."""

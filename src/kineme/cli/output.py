@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -14,6 +15,7 @@ import click
 from kineme.reporting.text import printable, printable_lines
 
 _LISTED = 12  # items of a list that are printed; more are counted
+_NUMBERS = re.compile(r"\[\n[^\[\]{}\"]*\]")  # an indented array in JSON; no text has a line break there
 
 
 def say(as_json: bool, data: Any, text: Callable[[], str]) -> None:
@@ -66,13 +68,20 @@ def confirm(question: str, **options: Any) -> bool:
 
 
 def to_json(data: Any, encoding: str = "utf-8") -> str:
-    """One JSON document; in ASCII if it has control characters, or characters that the encoding lacks."""
-    text = json.dumps(data, ensure_ascii=False, allow_nan=False, indent=1)
+    """One JSON document; in ASCII if it has control characters, or characters that the encoding lacks.
+
+    Arrays of numbers stand on one line.
+    """
+    text = _NUMBERS.sub(_on_one_line, json.dumps(data, ensure_ascii=False, allow_nan=False, indent=1))
     with suppress(UnicodeEncodeError):
         text.encode(encoding)
         if printable_lines(text) == text:
             return text
-    return json.dumps(data, allow_nan=False, indent=1)
+    return _NUMBERS.sub(_on_one_line, json.dumps(data, allow_nan=False, indent=1))
+
+
+def _on_one_line(array: re.Match[str]) -> str:
+    return f"[{' '.join(array[0][1:-1].split())}]"
 
 
 def in_words(detail: Mapping[str, Any]) -> str:

@@ -79,11 +79,14 @@ def _text(data: dict[str, Any], error_rate: float, problems: list[str]) -> str:
     for movement in data["movements"]:
         answer, name = movement["answer"], f"{movement['recording']} {movement['place']}".strip()
         label, nearest = answer["label"], answer["nearest"][0]
+        transform, relative = answer["transform"], ""
+        if label is not None:
+            degrees = round(math.degrees(transform["angle"])) + 0
+            relative = f"×{transform['scale'][0]:.2g}, {degrees:+d}°, {transform['duration_ratio']:.2g} × as long"
         others = ", ".join(printable(candidate["label"]) for candidate in answer["ranked"])
         rows.append(
             (printable(name), "unknown" if label is None else printable(label), answer["certainty"], others,
-             printable(nearest["name"] or nearest["index"]),
-             "" if label is None else _relative(answer["transform"]))
+             printable(nearest["name"] or nearest["index"]), relative)
         )  # fmt: skip
     heads = ("recording", "symbol", "how sure", "ranked", "most like", "relative to it")
     lines = [table(heads, rows), *map(printable, data["notes"])]
@@ -97,28 +100,23 @@ def _text(data: dict[str, Any], error_rate: float, problems: list[str]) -> str:
     return "\n".join(lines + problems)
 
 
-def _relative(transform: dict[str, Any]) -> str:
-    """Size, direction and duration relative to the most similar stored movement."""
-    degrees = round(math.degrees(transform["angle"])) + 0
-    return f"×{transform['scale'][0]:.2g}, {degrees:+d}°, {transform['duration_ratio']:.2g} × as long"
-
-
 @click.command(cls=GroupedCommand, short_help="Explain what a movement is recognized as.")
 @recordings_argument
 @library_option
-@click.option("--index", type=whole(0), default=0, help="Number of the movement in a file with several, from 0.")
+@click.option("--index", type=whole(0), help="Number of the movement among several, from 0.  [default: the first]")
 @error_rate_option("Share of true movements that may be called unknown.")
 @layout_options
 @click.option("--output", "-o", type=FILE, help="The picture: a .png, .svg or .pdf file.")
 @json_option
 @force_option
 def why(
-    recordings: tuple[Path, ...], folder: Path, index: int, error_rate: float, as_json: bool, **options: Any
+    recordings: tuple[Path, ...], folder: Path, index: int | None, error_rate: float, as_json: bool, **options: Any
 ) -> None:
     """Explain what a movement in RECORDINGS is recognized as.
 
     The picture shows the movement over the most similar example of the library, and over that of the runner-up: moved,
-    turned and sized as the library allows, and colored by how far the movement is from them.
+    turned and sized as the library allows, and colored by how far the movement is from them. Of points, such as two
+    hands, each is drawn apart, and each column where these are no points; of many those that differ most.
 
     Example: kineme why new.csv --library actions/ -o why.png
     """
@@ -130,16 +128,16 @@ def why(
     with ActionLibrary(folder, read_only=True) as library:
         parsed = read(recordings, options, library)
         movements = parsed.demonstrations
-        if index >= len(movements):
-            raise click.BadParameter(
-                f"expected less than {len(movements)} movements, got {index}", param_hint="--index"
-            )
-        answer = library.recognize(movements[index : index + 1], error_rate)[0]
-        explained = answer.explain()
+        n, i = len(movements), index or 0
+        if i >= n:
+            raise click.BadParameter(f"expected less than {n} movements, got {i}", param_hint="--index")
+        explained = library.recognize(movements[i : i + 1], error_rate)[0].explain()
         notes = notes_beside(parsed, options, library.channels)
+    if index is None and n > 1:
+        notes = [f"This is the first of {n} movements; choose another with --index, or pass one file", *notes]
     if output is not None:
         save_figure(explained.plot(), output)
-    name = parsed.sources[index].name
-    data = {"recording": name, "explanation": explained.to_dict(), "notes": notes}
-    lines = [f"{name}: {explained.in_words}", *notes]
+    source = parsed.sources[i]
+    data = {"recording": source.path, "place": source.place, "explanation": explained.to_dict(), "notes": notes}
+    lines = [f"{source.path} {source.place}".strip() + f": {explained.in_words}", *notes]
     say(as_json, data, lambda: "\n".join([*map(printable, lines), *problem_lines(parsed.problems)]))

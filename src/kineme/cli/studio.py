@@ -19,12 +19,14 @@ _PORTS = click.IntRange(1, 65535)
 
 @click.command(short_help="Show, name and move it in the browser.")
 @library_option_of(required=True, words="Folder of the action library; made if there is none.")
+@click.option("--recordings", type=click.Path(path_type=Path, exists=True),
+              help="Data set of LeRobot, folder or file whose episodes are shown, named and corrected.")  # fmt: skip
 @click.option("--port", type=_PORTS, help="Port to serve at.  [default: 8420, or any that is free]")
 @click.option("--no-open", is_flag=True, help="Print the address, and open no browser.")
 @click.option("--read-only", is_flag=True, help="Show the library, and refuse every change.")
 @click.option("--host", default="127.0.0.1", show_default=True,
               help="Address to listen at. Another one lets others on the network in who know the token.")  # fmt: skip
-def studio(folder: Path, port: int | None, no_open: bool, read_only: bool, host: str) -> None:
+def studio(folder: Path, recordings: Path | None, port: int | None, no_open: bool, read_only: bool, host: str) -> None:
     """Draw movements and be told what they are, name them, move them, in the browser.
 
     Only this machine reaches the studio, and only who knows the token in the address, which is new each time (or taken
@@ -35,6 +37,7 @@ def studio(folder: Path, port: int | None, no_open: bool, read_only: bool, host:
 
     \b
     kineme studio --library actions/
+    kineme studio --library actions/ --recordings lerobot_dataset/
     """  # noqa: D301 - a backspace tells click to keep the lines
     from kineme.studio.server.serve import Options, is_loopback, serve
 
@@ -52,7 +55,7 @@ def studio(folder: Path, port: int | None, no_open: bool, read_only: bool, host:
         ):
             webbrowser.open(once)  # without the token, which others on this machine would see
 
-    serve(Options(folder, host, port, read_only), ready)
+    serve(Options(folder, host, port, read_only, recordings), ready)
 
 
 @click.command(short_help="A library as one HTML page: draw, recognize, drag.")

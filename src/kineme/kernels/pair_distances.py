@@ -359,10 +359,7 @@ def pair_bounds(A: Shapes, B: Shapes, rotations: NDArray[Any] | None = None, *, 
 
     That of the point cloud is the distance itself, or 0 without `clouds`: then all take a quarter of the time.
     """
-    fillers = (
-        lambda *tile: _bound_compiled(*tile, clouds=clouds),
-        lambda *tile: _bound_plain(*tile, clouds=clouds),
-    )
+    fillers = (lambda *tile: _bound_compiled(*tile, clouds=clouds), lambda *tile: _bound_plain(*tile, clouds=clouds))
     return _grid(A, B, rotations, fillers, _TILE_BOUNDS)
 
 

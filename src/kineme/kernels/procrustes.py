@@ -52,7 +52,7 @@ class Procrustes:
 
     ``d(A, B)^2 = min_R |A - R B|^2 = |A|^2 + |B|^2 - 2 max_R <A, R B>`` over rotations R (no mirror images) by
     at most `max_angle`. With a `prior`, any rotation is allowed and a large one costs: ``<A, R B>`` is replaced by
-    ``<A, R B> + |A| |B| (tr(R^T F) - tr F)``, see `kernels.soft_rotation`. In the plane, with ``z = x + i y``,
+    ``<A, R B> + |A| |B| (tr(R^T F) - tr F)``, see `kernels.rotation`. In the plane, with ``z = x + i y``,
     ``<A, R B> = Re(exp(-i angle) sum_t a_t conj(b_t))``: one complex matrix product for all pairs. In space, one real
     matrix product for all pairs, and a small problem for each: a quadratic form of unit quaternions with a limit, see
     `kernels.rotation`, the root of a quartic with a prior. In one dimension, and with ``max_angle = 0``, it is the

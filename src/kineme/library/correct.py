@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import PurePath
+from pathlib import Path, PurePath
 from typing import Any, NamedTuple
-
-import numpy as np
 
 from kineme.errors import DataError
 from kineme.io.reading.merge_files import Recordings
+from kineme.io.reading.pieces import EPISODE, is_episodic
 from kineme.io.reading.read_labels import LabelRow, LabelTable, Stretch, cut_stretches, stretches_of
 from kineme.io.records import Problem
 from kineme.io.writing.annotations import Annotation
@@ -66,6 +65,19 @@ def as_labels(annotations: Sequence[Annotation]) -> LabelTable:
         for line, note in enumerate(annotations, 1)
     ]
     return LabelTable("annotations", tuple(rows), since_start=False)
+
+
+def motions_in(path: Path) -> list[Annotation]:
+    """Return what `kineme annotate` wrote into a data set, by the places of its episodes; [] for all else."""
+    if not is_episodic(path):
+        return []
+    from kineme.io.lerobot.motions import read_motions
+
+    return [
+        Annotation("", f"{EPISODE}{motion.episode}", *motion[1:4], motion.p_value, motion.confidence)
+        for motion in read_motions(path)
+        if motion.annotator == "kineme"
+    ]
 
 
 def corrections_of(recordings: Recordings, corrected: LabelTable, annotated: LabelTable) -> Corrections:
@@ -139,8 +151,8 @@ def learn_corrections(
         return None
     pieces = cut_stretches(recordings, examples)
     report = learn_recordings(store, pieces, options, root=root)
-    labels = np.array([stretch.row.label for stretch in examples], dtype=object)
-    others = np.array(names_of(store, report.ids), dtype=object) != labels
-    for symbol in dict.fromkeys(labels[others].tolist()):
-        storage.assign(store, report.ids[others & (labels == symbol)], symbol, "label")
+    labels, names = [str(stretch.row.label) for stretch in examples], names_of(store, report.ids)
+    for symbol in dict.fromkeys(label for label, name in zip(labels, names, strict=True) if label != name):
+        others = [label == symbol != name for label, name in zip(labels, names, strict=True)]
+        storage.assign(store, report.ids[others], symbol, "label")
     return report

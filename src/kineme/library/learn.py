@@ -168,6 +168,7 @@ def _check_channels(store: Store, demos: Demonstrations) -> None:
             f"expected movements of {n_dims} dimensions as {_others(store)} of the library in {store.folder}, "
             f"got {demos.n_dims}; choose the columns, in the shell with --columns, or make another library"
         )
+    store.specification.comparison.procrustes(demos.n_dims)  # refuses columns that cannot be its points
     ours = store.channels
     if (
         n_dims is None

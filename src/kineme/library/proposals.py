@@ -18,6 +18,7 @@ from kineme.library.storage import changes, read
 from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store, history
 from kineme.recognition.answer import KnownClasses, open_set_labels
+from kineme.reporting.text import counted
 
 _MOST = 3000  # movements that are compared at most, equally many of each symbol
 
@@ -57,7 +58,7 @@ class LibraryProposals:
         return self.ids[self.by_position.left_over]
 
     def __repr__(self) -> str:
-        clusters = "1 cluster" if len(self) == 1 else f"{len(self)} clusters"
+        clusters = counted(len(self), "cluster")
         return f"LibraryProposals({clusters} among {len(self.ids)} movements, {len(self.left_over)} left over)"
 
 

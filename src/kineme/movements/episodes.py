@@ -21,6 +21,7 @@ class Episode:
     - `fps`: declared rate [1/s]; NaN if the data set does not declare one.
     - `problems`: what could not be read of the episode, or contradicts its declaration, each a sentence.
     - `place`: where it is stored, relative to the data set.
+    - `notes`: what its reader took for granted, such as a rate, or knows besides, such as a subset that it belongs to.
     """
 
     number: int
@@ -32,6 +33,7 @@ class Episode:
     problems: tuple[str, ...] = ()
     place: str = ""
     videos: Mapping[str, str] = field(default_factory=dict)  # camera -> file, relative to the data set
+    notes: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.times)

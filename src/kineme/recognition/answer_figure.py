@@ -23,6 +23,7 @@ from kineme.validation import Array
 
 _CLASSES = 10  # that are drawn, best first
 _NAME = 28  # letters of a name beside its bar
+_POINTS, _COLUMNS = 4, 6  # of an explanation, at most
 
 
 class Shares(NamedTuple):
@@ -102,62 +103,90 @@ def _beside(example: Example, movement: Demonstrations, demonstrations: Demonstr
 
 
 class Panel(NamedTuple):
-    """An example that is laid over a movement: its path (T, d), and its distance (T,) from the movement."""
+    """An example that is laid over a movement: its path (T, d), and distances (P, T) from the movement in each part."""
 
     title: str
     path: Array
     differences: Array
 
 
-def draw_explanation(title: str, path: Array, overlays: Sequence[Panel]) -> Figure:
-    """Draw a movement (T, d) over each of the examples; see `Explanation.plot`."""
-    highest = max(float(overlay.differences.max()) for overlay in overlays)
+class View(NamedTuple):
+    """A part of a movement as it is drawn: paths (T, d) times `axes` (2, d), or over their phase where that is None."""
+
+    columns: tuple[int, ...]
+    axes: Array | None
+    names: tuple[str, str]
+
+    def points(self, path: Array) -> Array:
+        """Return the points (T, 2) of a path (T, d)."""
+        part = path[:, self.columns]
+        return np.column_stack((np.linspace(0.0, 1.0, len(path)), part)) if self.axes is None else part @ self.axes.T
+
+
+def draw_explanation(
+    title: Sequence[str], path: Array, columns: Sequence[str], parts: Sequence[Any], overlays: Sequence[Panel]
+) -> Figure:
+    """Draw a movement (T, d) over each of the examples, part by part, below lines of a title."""
+    largest = np.max([overlay.differences.max(axis=1) for overlay in overlays], axis=0)
+    most, noun = (_POINTS, "points") if len(parts[0].columns) > 1 else (_COLUMNS, "columns")
+    rows = np.sort(np.argsort(-largest, kind="stable")[:most]).tolist()
+    views = [_view(path, parts[r].columns, columns) for r in rows]
+    if len(rows) < len(parts):
+        title = [*title, f"{len(rows)} of {len(parts)} {noun}: those that differ most"]
+    heights = [1.6 if view.axes is None and parts[1:] else 3.0 for view in views]
     with matplotlib.rc_context():
-        figure = figure_to_show(4.0 * len(overlays) + 0.6, 4.2)
-        panels = figure.subplots(1, len(overlays), squeeze=False)[0]
-        axes, names = _drawing_axes(path)
-        for panel, overlay in zip(panels, overlays, strict=True):
-            colored = _draw_overlay(panel, path, overlay, axes, max(highest, 1e-9))
-            panel.set_title(drawable(shortened(overlay.title, 40)))
-            panel.set(xlabel=names[0], ylabel=names[1])
-        panels[0].plot([], [], color=GRAY, linewidth=4, alpha=0.45, label="example, laid over it")
-        panels[0].plot([], [], "o", color=BLUE, markersize=5, label="start of the movement")
-        panels[0].legend(loc="best")
-        figure.colorbar(colored, ax=list(panels), label="distance from it, in sizes of the movement", shrink=0.8)
-        figure.suptitle(drawable(shortened(title, 60)))
+        figure = figure_to_show(4.0 * len(overlays) + 0.6, 1.3 + sum(heights))
+        panels = figure.subplots(len(rows), len(overlays), squeeze=False)
+        for r, view, row in zip(rows, views, panels, strict=True):
+            for panel, overlay in zip(row, overlays, strict=True):
+                shown = view.points(path), view.points(overlay.path)
+                colored = _draw_overlay(panel, *shown, overlay.differences[r], max(float(largest.max()), 1e-9))
+                panel.set(xlabel=drawable(view.names[0]), ylabel=drawable(view.names[1]))
+                lines = [overlay.title] * (r == rows[0]) + [parts[r].name] * (len(view.columns) > 1 < len(parts))
+                panel.set_title("\n".join(drawable(shortened(line, 40)) for line in lines))
+        _set_equal_limits(panels, views, [path, *(overlay.path for overlay in overlays)])
+        panels[0, 0].plot([], [], color=GRAY, linewidth=4, alpha=0.45, label="example, laid over it")
+        panels[0, 0].plot([], [], "o", color=BLUE, markersize=5, label="start of the movement")
+        figure.legend(loc="outside lower center", ncols=2)
+        figure.colorbar(colored, ax=panels, label="distance from it, in sizes of the movement", shrink=0.8)
+        figure.suptitle("\n".join(drawable(shortened(line, 80)) for line in title))
     return figure
 
 
-def _drawing_axes(path: Array) -> tuple[Array | None, tuple[str, str]]:
-    """Return the two directions that a path (T, d) is drawn along, with their names; None for its columns over time."""
-    d = path.shape[1]
-    if d == 2:
-        return np.eye(2), ("x", "y")
-    if d == 3:
-        return principal_axes(path.T), ("in the plane where it is widest", "")
-    return None, ("share of the path", "coordinates")
+def _view(path: Array, columns: tuple[int, ...], names: Sequence[str]) -> View:
+    """Return the view of a column over the phase, of two in their plane, of three in the plane where they are widest.
+
+    The axes of that plane have the names of the columns that they are nearest to.
+    """
+    if len(columns) == 1:
+        return View(columns, None, (f"share of the {'time' if path.shape[1] == 1 else 'path'}", names[columns[0]]))
+    axes = np.eye(2) if len(columns) == 2 else principal_axes(path[:, columns].T)
+    x, y = (names[columns[k]] for k in np.abs(axes).argmax(axis=1))
+    return View(columns, axes, (x, y) if len(columns) == 2 else (f"mostly {x}", f"mostly {y}"))
 
 
-def _draw_overlay(panel: Any, path: Array, overlay: Panel, axes: Array | None, highest: float) -> Any:
+def _set_equal_limits(panels: Any, views: Sequence[View], paths: Sequence[Array]) -> None:
+    """Give the panels of a part the same limits, and all points the same scale."""
+    shown = [np.concatenate([view.points(path) for path in paths]) for view in views]
+    halves = [0.54 * np.ptp(points, axis=0) for points in shown]
+    widest = np.max(halves, axis=0)
+    widest = np.maximum(widest, 0.2 * widest.max() or 1.0)  # so that a straight movement has some room
+    for row, view, points, half in zip(panels, views, shown, halves, strict=True):
+        center = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        (x, y), (width, height) = center, widest if view.axes is not None else (half[0], half[1] or 1.0)
+        for panel in row:
+            panel.set(xlim=(x - width, x + width), ylim=(y - height, y + height))
+            if view.axes is not None:
+                panel.set_aspect("equal")
+
+
+def _draw_overlay(panel: Any, movement: Array, example: Array, differences: Array, highest: float) -> Any:
     """Draw the example in gray and the movement over it, colored by their distance; return what has the colors."""
-    if axes is None:
-        share = np.linspace(0.0, 1.0, len(path))
-        curves = [
-            (np.column_stack((share, x)), np.column_stack((share, y)))
-            for x, y in zip(path.T, overlay.path.T, strict=True)
-        ]
-    else:
-        curves = [(path @ axes.T, overlay.path @ axes.T)]
-    for _, example in curves:
-        panel.plot(*example.T, color=GRAY, linewidth=4, alpha=0.45, solid_capstyle="round")
-    for movement, _ in curves:
-        pieces = np.stack((movement[:-1], movement[1:]), axis=1)
-        between = 0.5 * (overlay.differences[:-1] + overlay.differences[1:])
-        colored = LineCollection(list(pieces), array=between, cmap="plasma", linewidth=2)
-        colored.set_clim(0.0, highest)
-        panel.add_collection(colored)
-        panel.plot(*movement[0], "o", color=BLUE, markersize=5)
-    panel.autoscale_view()
-    if axes is not None:
-        panel.set_aspect("equal", adjustable="datalim")
+    panel.plot(*example.T, color=GRAY, linewidth=4, alpha=0.45, solid_capstyle="round")
+    pieces = np.stack((movement[:-1], movement[1:]), axis=1)
+    between = 0.5 * (differences[:-1] + differences[1:])
+    colored = LineCollection(list(pieces), array=between, cmap="plasma", linewidth=2)
+    colored.set_clim(0.0, highest)
+    panel.add_collection(colored)
+    panel.plot(*movement[0], "o", color=BLUE, markersize=5)
     return colored

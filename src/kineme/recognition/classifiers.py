@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from kineme.recognition.convolutions import fit_convolutions
 from kineme.sampling import evenly_spaced
 from kineme.similarity.comparison import Comparison, References
 from kineme.similarity.describe import Described
-from kineme.similarity.scores import Compared, most_similar
+from kineme.similarity.scores import Classifier, Compared, most_similar
 from kineme.similarity.similarity import AveragedSimilarity
 from kineme.similarity.specification import LOG_MEANS
 from kineme.validation import Array
@@ -30,20 +30,8 @@ _ENOUGH, _AHEAD = 0.97, 0.01
 _ROUNDING = 1e-4  # of the mean of log similarities, as single precision leaves it: nearer ones are equal
 
 
-class Classifier(Protocol):
-    """A fitted classifier: scores of each class."""
-
-    def scores(self, compared: Compared) -> Array:
-        """Return a score per class, shape (n, C): larger is more like it."""
-        ...
-
-    def best(self, compared: Compared) -> NDArray[np.intp]:
-        """Return the index (n,) of the class with the largest score."""
-        ...
-
-
 @dataclass(frozen=True)
-class Nearest:
+class Nearest(Classifier):
     """Each class scores as its most similar reference: the nearest neighbor by the averaged kernel."""
 
     def scores(self, compared: Compared) -> Array:
@@ -58,7 +46,7 @@ class Nearest:
 
 
 @dataclass(frozen=True)
-class NearestEach:
+class NearestEach(Classifier):
     """Each class scores as the average over representations of its most similar reference in each.
 
     Of several demonstrations one may have the movement's path, and another its timing: each representation chooses its
@@ -71,13 +59,12 @@ class NearestEach:
 
     def best(self, compared: Compared) -> NDArray[np.intp]:
         """Return the index (n,) of the class with the largest score."""
-        if len(compared.references) == len(compared.references.classes):
-            return Nearest().best(compared)
-        return self.scores(compared).argmax(axis=1)
+        one_each = len(compared.references) == len(compared.references.classes)
+        return Nearest().best(compared) if one_each else super().best(compared)
 
 
 @dataclass(frozen=True, eq=False)
-class Prototype:
+class Prototype(Classifier):
     """Each class is its medoid: the reference most similar to the others of its class.
 
     Attributes
@@ -101,7 +88,7 @@ class Prototype:
 
 
 @dataclass(frozen=True, eq=False)
-class SupportVectors:
+class SupportVectors(Classifier):
     """scikit-learn's SVM on the averaged kernel, one class against the others.
 
     The kernels are twice as wide as for the nearest neighbor, which should depend on the closest movement alone. An SVM
@@ -116,10 +103,6 @@ class SupportVectors:
         gram = np.exp(LOG_MEANS[self.similarity.mean](self.similarity.logs_at(compared.squares)))
         values = np.asarray(self.model.decision_function(gram))
         return np.column_stack((-values, values)) if values.ndim == 1 else values
-
-    def best(self, compared: Compared) -> NDArray[np.intp]:
-        """Return the index (n,) of the class with the largest decision value."""
-        return self.scores(compared).argmax(axis=1)
 
 
 def fit_prototype(comparison: Comparison, references: References) -> Prototype:

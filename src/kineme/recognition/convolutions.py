@@ -7,7 +7,7 @@ samples above them. Here the series are midpoints and tangents of the detailed s
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Any, NamedTuple
 
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from kineme.errors import SpecificationError
 from kineme.similarity.comparison import Comparison, References
 from kineme.similarity.describe import Described
-from kineme.similarity.scores import Compared
+from kineme.similarity.scores import Classifier, Compared
 from kineme.similarity.specification import softmax
 from kineme.validation import Array
 
@@ -56,9 +56,13 @@ def series_of(described: Described) -> Single:
     return np.concatenate((shapes.midpoints, shapes.tangents), axis=2).transpose(0, 2, 1)
 
 
-def fit_kernels(series: Single, seed: int = 0) -> Kernels:
-    """Draw the channels of the kernels, and thresholds from quantiles of what they make of movements drawn."""
-    rng, (n, c, T) = np.random.default_rng(seed), series.shape
+def fit_kernels(series: Single) -> Kernels:
+    """Draw the channels of the kernels, and thresholds from quantiles of what they make of movements drawn.
+
+    Movements are drawn from them in the order of their values, so that neither their order nor names change a kernel.
+    """
+    rng, (n, c, T) = np.random.default_rng(0), series.shape
+    series = series[np.lexsort(series.reshape(n, -1)[:, :: max(1, c * T // 32)].T)]
     dilations = tuple(range(1, (T - 1) // (_LENGTH - 1) + 1))
     n_thresholds = max(1, _FEATURES // (84 * len(dilations)))
     channels, thresholds = [], []
@@ -96,7 +100,7 @@ def transform(series: Single, kernels: Kernels) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Convolutions:
+class Convolutions(Classifier):
     """A ridge regression of the classes on features of random convolutions, `transform`.
 
     Attributes
@@ -110,21 +114,17 @@ class Convolutions:
         Factor of the scores in probabilities, the most likely one for demonstrations left out.
     """
 
-    kernels: Kernels
-    mean: Array
-    scale: Array
-    coefficients: Array
-    intercept: Array
+    kernels: Kernels = field(repr=False)
+    mean: Array = field(repr=False)
+    scale: Array = field(repr=False)
+    coefficients: Array = field(repr=False)
+    intercept: Array = field(repr=False)
     sharpness: float
 
     def scores(self, compared: Compared) -> Array:
         """Return the values of the regression, (n, C)."""
         features = transform(series_of(compared.described), self.kernels)
         return np.asarray((features - self.mean) / self.scale @ self.coefficients + self.intercept)
-
-    def best(self, compared: Compared) -> NDArray[np.intp]:
-        """Return the index (n,) of the class with the largest value."""
-        return self.scores(compared).argmax(axis=1)
 
     def probabilities(self, scores: Array) -> Array:
         """Return the probability of each class, (n, C): a softmax of the scores."""

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from kineme.movements.channels.detect import point_names
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import Label
 from kineme.similarity.comparison import Comparison, IndexedMovements
-from kineme.similarity.describe import even_paths, fit_maps, recorded_paths
+from kineme.similarity.describe import N_POINTS, even_paths, fit_maps, recorded_paths
 from kineme.similarity.specification import POSITIONS
 from kineme.validation import Array
 
@@ -20,6 +21,15 @@ if TYPE_CHECKING:
 _NEAR = 0.5  # of the largest difference: the part around it that is named
 _SAME = 0.005  # of the size: what is rounded to 0 %
 _ALIKE = 0.05  # of the size: differences that are no more than people's hands
+_ALONG = replace(POSITIONS, n_points=N_POINTS)
+_CONVOLUTIONS = "ranked by random convolutions; example and shares are those of the kernels"
+
+
+class Part(NamedTuple):
+    """A point of a movement, or one of its columns where these are no points: its name, and the numbers of columns."""
+
+    name: str
+    columns: tuple[int, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,17 +42,20 @@ class Overlay:
         What the example shows.
     similarity : float
         The averaged kernel K between the two, from 0 to 1.
-    path : ndarray of shape (100, d)
-        The example at even arc lengths, in the coordinates of the movement.
-    differences : ndarray of shape (100,)
+    path : ndarray of shape (199, d)
+        The example at even arc lengths, of a signal at even times, in the coordinates of the movement.
+    differences : ndarray of shape (199,)
         Its distance from the movement at the same share of their paths, as a share of the movement's size: the root
         mean square distance from its center.
+    part : str or None
+        The point, or the column, in which they differ most where they differ most; None where there is but one.
     """
 
     label: Label
     similarity: float
-    path: Array
-    differences: Array
+    path: Array = field(repr=False)
+    differences: Array = field(repr=False)
+    part: str | None
 
     @property
     def where(self) -> tuple[float, float]:
@@ -65,9 +78,10 @@ class Overlay:
         if largest <= _ALIKE:
             return f"nowhere farther from {self.label} than {100 * largest:.0f} % of its size"
         first, last = self.where
+        along, part = "time" if self.path.shape[1] == 1 else "path", f", most in {self.part}" if self.part else ""
         return (
-            f"farthest from {self.label} at {100 * first:.0f} to {100 * last:.0f} % of the path, "
-            f"by up to {100 * largest:.0f} % of its size"
+            f"farthest from {self.label} at {100 * first:.0f} to {100 * last:.0f} % of the {along}, "
+            f"by up to {100 * largest:.0f} % of its size{part}"
         )
 
 
@@ -79,27 +93,36 @@ class Explanation:
     ----------
     answer : str
         The answer in words, such as "sure GShape".
-    path : ndarray of shape (100, d)
-        The movement, smoothed, at even arc lengths.
+    path : ndarray of shape (199, d)
+        The movement, smoothed, at even arc lengths, of a signal at even times.
+    columns : tuple of d str
+        Names of the columns, with their units where these are known.
+    parts : tuple of Part
+        The points, or the columns where these are no points.
     nearest : Overlay
         The most similar example of the class that is answered, or, if the movement is new, of the class that it is most
         like.
     runner_up : Overlay or None
-        That of the next class; None if there is no other.
+        That of the class next in rank; None if there is no other.
     shares : dict from str to float
         Share of each representation in the similarity to the nearest example.
+    by_convolutions : bool
+        True if random convolutions ranked the classes, and the kernels chose the examples alone.
     """
 
     answer: str
-    path: Array
+    path: Array = field(repr=False)
+    columns: tuple[str, ...] = field(repr=False)
+    parts: tuple[Part, ...] = field(repr=False)
     nearest: Overlay
     runner_up: Overlay | None
-    shares: dict[str, float]
+    shares: dict[str, float] = field(repr=False)
+    by_convolutions: bool
 
     @property
     def in_words(self) -> str:
         """The answer, where the movement differs from its nearest example, and from the runner-up."""
-        words = f"{self.answer}: {self.nearest.in_words}"
+        words = f"{self.answer}{f' ({_CONVOLUTIONS})' * self.by_convolutions}: {self.nearest.in_words}"
         return f"{words}; {self.runner_up.in_words}" if self.runner_up is not None else words
 
     def to_dict(self) -> dict[str, Any]:
@@ -115,6 +138,7 @@ class Explanation:
                 "largest_difference": float(shown.differences.max()),
                 "from": first,
                 "to": last,
+                "part": shown.part,
                 "differences": shown.differences.tolist(),
                 "path": shown.path.tolist(),
             }
@@ -122,6 +146,8 @@ class Explanation:
         return {
             "answer": self.answer,
             "in_words": self.in_words,
+            "by_convolutions": self.by_convolutions,
+            "columns": list(self.columns),
             "path": self.path.tolist(),
             "nearest": overlay(self.nearest),
             "runner_up": overlay(self.runner_up),
@@ -131,6 +157,8 @@ class Explanation:
     def plot(self) -> Figure:
         """Draw the movement over its nearest example and over the runner-up, colored by how far it is from them.
 
+        Each point is drawn apart, and each column where these are no points; of many those that differ most.
+
         Returns
         -------
         matplotlib.figure.Figure
@@ -138,16 +166,18 @@ class Explanation:
         """
         from kineme.recognition.answer_figure import Panel, draw_explanation
 
-        overlays = {"nearest": self.nearest, "next": self.runner_up}
-        return draw_explanation(
-            self.answer,
-            self.path,
-            [
-                Panel(f"{role}: {overlay.label}, {overlay.similarity:.2f} alike", overlay.path, overlay.differences)
-                for role, overlay in overlays.items()
-                if overlay is not None
-            ],
-        )
+        overlays = {"nearest": self.nearest, "next in rank": self.runner_up}
+        panels = [
+            Panel(
+                f"{role}: {overlay.label}, {overlay.similarity:.2f} alike",
+                overlay.path,
+                by_part(self.path, overlay.path, self.parts),
+            )
+            for role, overlay in overlays.items()
+            if overlay is not None
+        ]
+        title = [self.answer, *[_CONVOLUTIONS] * self.by_convolutions]
+        return draw_explanation(title, self.path, self.columns, self.parts, panels)
 
 
 class Rationale(NamedTuple):
@@ -157,6 +187,7 @@ class Rationale(NamedTuple):
     references: IndexedMovements
     movement: Demonstrations  # one
     examples: tuple[tuple[Label, int, float], ...]  # label, index and similarity: the nearest, and the runner-up
+    by_convolutions: bool
 
 
 def explain(rationale: Rationale, answer: str, shares: dict[str, float]) -> Explanation:
@@ -165,18 +196,35 @@ def explain(rationale: Rationale, answer: str, shares: dict[str, float]) -> Expl
     rows = np.array([index for _, index, _ in rationale.examples], dtype=np.intp)
     used, which = np.unique(rows, return_inverse=True)
     stored = rationale.references[used]
-    own, examples = (POSITIONS.along(_smooth(movements, comparison)) for movements in (rationale.movement, stored))
+    target, examples = (_ALONG.along(_smooth(movements, comparison)) for movements in (rationale.movement, stored))
     examples = examples[which]
-    mapped = fit_maps(examples, own, comparison.normalization, comparison.procrustes).move(examples)
-    size = float(np.sqrt(own[0].var(axis=1).sum())) or 1.0
-    differences = np.sqrt(((mapped - own) ** 2).sum(axis=1)) / size
-    overlays = [
-        Overlay(label, similarity, np.ascontiguousarray(path.T), difference)
-        for (label, _, similarity), path, difference in zip(rationale.examples, mapped, differences, strict=True)
-    ]
-    return Explanation(
-        answer, np.ascontiguousarray(own[0].T), overlays[0], overlays[1] if overlays[1:] else None, shares
-    )
+    mapped = fit_maps(examples, target, comparison.normalization, comparison.procrustes).move(examples)
+    path, columns = np.ascontiguousarray(target[0].T), rationale.movement._samples.axis_names
+    parts, overlays = _parts(rationale, columns), []
+    for (label, _, similarity), moved in zip(rationale.examples, mapped, strict=True):
+        example = np.ascontiguousarray(moved.T)
+        squares = by_part(path, example, parts) ** 2
+        differences = np.sqrt(squares.sum(axis=0))
+        part = parts[squares[:, differences.argmax()].argmax()].name if parts[1:] else None
+        overlays.append(Overlay(label, similarity, example, differences, part))
+    runner_up = overlays[1] if overlays[1:] else None
+    return Explanation(answer, path, columns, parts, overlays[0], runner_up, shares, rationale.by_convolutions)
+
+
+def _parts(rationale: Rationale, columns: tuple[str, ...]) -> tuple[Part, ...]:
+    """Return the points of the movement; its columns where these are none in the plane or in space."""
+    n, d = rationale.comparison.procrustes.n_points, rationale.comparison.procrustes.n_dims
+    if d not in (2, 3):
+        return tuple(Part(name, (k,)) for k, name in enumerate(columns))
+    names = point_names(rationale.movement.channels)
+    names = names if len(names) == n else tuple(f"point {k + 1}" for k in range(n))
+    return tuple(Part(name, tuple(range(k * d, (k + 1) * d))) for k, name in enumerate(names))
+
+
+def by_part(path: Array, example: Array, parts: tuple[Part, ...]) -> Array:
+    """Return distances (P, T) of two paths (T, d) in each part, as shares of the size of the first."""
+    size = float(np.sqrt(path.var(axis=0).sum())) or 1.0
+    return np.stack([np.linalg.norm((example - path)[:, part.columns], axis=1) for part in parts]) / size
 
 
 def _smooth(movements: Demonstrations, comparison: Comparison) -> Array:

@@ -15,7 +15,7 @@ from kineme.kernels.rotation import RotationPrior
 from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
 from kineme.movements.trajectories.trajectory import HasDemonstrations, MovementLike, MovementsLike, Trajectory
-from kineme.recognition.answer import Answer, answers, is_one, known_labels
+from kineme.recognition.answer import Answer, is_one, known_classes
 from kineme.recognition.classifiers import CLASSIFIERS, SupportVectors, fit_best
 from kineme.recognition.conformal import Calibration, calibrate, check_error_rate, check_groups, class_probabilities
 from kineme.recognition.convolutions import Convolutions
@@ -71,7 +71,8 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         "nearest" stored movement, "nearest-each", where each representation has its own nearest stored movement of a
         class, nearest class "prototype" (its medoid), an "svm" on the averaged kernel, or a ridge regression on random
         "convolutions" of the path. "auto" is "nearest-each", or from eight demonstrations of each class on
-        "convolutions" where these recognize more of them when they are left out.
+        "convolutions" where these recognize more of them when they are left out. Whether a movement is known is told by
+        the kernels, and the convolutions then name it: see `kineme.recognition.answer.known_labels`.
     rotation_prior : RotationPrior or None
         How rare rotations between movements of one class are, in two and three dimensions, where there is no
         `max_angle`: one or the other can be given. By default a rotation by a right angle costs 0.06 of the inner
@@ -98,6 +99,8 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         Their kernel widths.
     n_dims_ : int
         Dimensions of the movements.
+    n_points_ : int
+        Points that turn together, by `points` or by the names of columns; 1 of other movements.
     channels_ : tuple of Channel or None
         What was recorded of the movements; None if that is not known. Movements to be recognized are converted by them.
     comparison_ : Comparison
@@ -194,7 +197,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
 
     @property
     def demonstrations_(self) -> Demonstrations:
-        """The training movements, ordered by class."""
+        """The training movements with their labels, ordered by class."""
         return self._fitted[1].all_movements()
 
     @property
@@ -216,6 +219,11 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     def n_dims_(self) -> int:
         """Number of dimensions of the movements."""
         return self._fitted[0].n_dims
+
+    @property
+    def n_points_(self) -> int:
+        """Number of points that turn together, J."""
+        return self._fitted[0].procrustes.n_points
 
     @property
     def channels_(self) -> Channels | None:
@@ -257,8 +265,8 @@ class Recognizer(ClassifierMixin, BaseEstimator):
 
         The largest is that of `predict`. By the classifiers "nearest" and "nearest-each" they are those of
         `Answer.probabilities`, see `class_probabilities`; by "prototype" they follow in the same way from the distances
-        to the prototypes; by "svm" they are a softmax of its scores, which nothing calibrates. Whether a movement is of
-        a known class at all is what `recognize` tells.
+        to the prototypes; by "svm" they are a softmax of its scores, which nothing calibrates; by "convolutions" one as
+        sharp as makes demonstrations that are left out most likely. `recognize` tells if a movement is known at all.
         """
         scores = self._scores(X)
         if isinstance(self.classifier_, Convolutions):
@@ -293,10 +301,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         -------
         Answer, or list of Answer for many movements
         """
-        check_error_rate(error_rate)
-        comparison, references = self._fitted
-        demos = comparison.checked([X] if is_one(X) else X)
-        every = answers(comparison, references, self.classifier_, self.calibration(), demos, error_rate)
+        every = known_classes(self).recognize([X] if is_one(X) else X, error_rate)
         return every[0] if is_one(X) else every
 
     def p_values(self, X: MovementsLike, error_rate: float = 0.05) -> Array:
@@ -306,20 +311,19 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         classes the rate holds, see `Calibration`.
         """
         check_error_rate(error_rate)
-        return self.calibration().p_values(self._score(X, nearest)[0], error_rate)
+        return self.calibration().p_values(self._scores(X, nearest), error_rate)
 
     def predict_known(self, X: MovementsLike, error_rate: float = 0.05) -> NDArray[Any]:
-        """Return labels as from `predict`, among the classes whose p-value is above `error_rate`.
+        """Return labels as from `predict`, by kernels among the classes whose p-value is above `error_rate`.
 
         None, for unknown, if the movement is more novel than all but `error_rate` of the known ones, see `Calibration`.
         """
-        check_error_rate(error_rate)
-        similarities, scores = self._score(X, nearest, self._classifier_scores)
-        return known_labels(self.classes_, scores, similarities, self.calibration(), error_rate)
+        known = known_classes(self)
+        return known.labels(known.comparison.checked(X), error_rate)[0]
 
     def novelty(self, X: MovementsLike) -> Array:
         """Return the smallest nonconformity to any class, shape (n,): the larger, the less it is any known movement."""
-        return np.asarray(self.calibration().scores(self._score(X, nearest)[0]).min(axis=1))
+        return np.asarray(self.calibration().scores(self._scores(X, nearest)).min(axis=1))
 
     def calibration(self) -> Calibration:
         """Return the calibration of the p-values; computed on first use, since it compares all demonstrations."""
@@ -401,17 +405,10 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         check_is_fitted(self, "comparison_")
         return self.comparison_, self.references_
 
-    def _scores(self, X: MovementsLike) -> Array:
-        """Return the score of each class by the classifier, shape (n, C)."""
-        return self._score(X, self._classifier_scores)[0]
-
-    def _classifier_scores(self, compared: Compared) -> Array:
-        return self.classifier_.scores(compared)
-
-    def _score(self, X: MovementsLike, *scores: Score) -> tuple[Array, ...]:
-        """Return scores (n, C) by each function; every movement is described once."""
+    def _scores(self, X: MovementsLike, by: Score | None = None) -> Array:
+        """Return the score of each class, shape (n, C), by the classifier or by a function of what is compared."""
         comparison, references = self._fitted
-        return score(comparison, references, comparison.checked(X), *scores)
+        return score(comparison, references, comparison.checked(X), by or self.classifier_.scores)[0]
 
     def _beginnings(self, early: Early | None) -> Hypotheses:
         """Return the beginnings of the demonstrations, kept from the last time that the same ones were asked for."""

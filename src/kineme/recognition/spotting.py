@@ -87,11 +87,7 @@ class Spotted(NamedTuple):
 
 
 def spot(
-    templates: Templates,
-    recording: MovementsLike,
-    error_rate: float,
-    max_pieces: int,
-    progress: Progress | None = None,
+    templates: Templates, recording: MovementsLike, error_rate: float, max_pieces: int, progress: Progress | None = None
 ) -> list[Spotted]:
     """Find movements like the references in a recording; see `Recognizer.spot`.
 
@@ -322,12 +318,7 @@ def alike_windows(spans: Array, chosen: list[int]) -> list[NDArray[np.intp]]:
 
 
 def closest_classes(
-    compared: ComparedWindows,
-    distances: Array,
-    typical: Expected,
-    manner: Manner,
-    spans: Array,
-    chosen: list[int],
+    compared: ComparedWindows, distances: Array, typical: Expected, manner: Manner, spans: Array, chosen: list[int]
 ) -> NDArray[np.intp]:
     """Return class of each chosen window: the closest to it, or to a window that has nine tenths of the union with it.
 

@@ -11,7 +11,7 @@ from kineme.runtime.compiled import jit
 
 @jit
 def fill_normalized(paths, least, normalized):  # type: ignore[no-untyped-def]
-    """Return paths (n, d, T) minus their center, divided by their size; see `normalization.Normalization.apply`.
+    """Return paths (n, d, T) minus their center, divided by their size; see `specification.Normalization.apply`.
 
     Dimensions larger than a share `least` of the whole are divided by their own size, with infinity none.
     """

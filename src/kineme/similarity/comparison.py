@@ -10,11 +10,13 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from kineme.dmp.discrete.encode import check_movement
 from kineme.errors import SpecificationError
 from kineme.kernels.procrustes import Procrustes
 from kineme.kernels.rotation import RotationPrior
 from kineme.movements.channels.channel import Channels
 from kineme.movements.channels.coordinates import with_periods
+from kineme.movements.preparation.resample import extents_of
 from kineme.movements.trajectories.as_learned import as_learned
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import in_coordinates
@@ -116,9 +118,10 @@ def fit_comparison(
 
     Returns `comparison`: with the representations that have a weight above 0, and with positions over arc length if any
     of them is compared pair by pair; `references`: the movements, ordered by class. Raises `SpecificationError`:
-    weights that do not fit the specification, or movements that are all the same.
+    weights that do not fit the specification, or movements that are all the same; `TrajectoryError`: one at rest.
     """
-    demos = Demonstrations.of_movements(in_coordinates(demos.movements), demos.steps)
+    demos = Demonstrations.of_movements(replace(in_coordinates(demos.movements), labels=labels), demos.steps)
+    check_movement(demos, demos.positions[demos.offsets[:-1]], extents_of(demos, 0, len(demos)))
     specification = specification.with_points(demos.channels)
     order = np.argsort(labels, kind="stable")
     demos, labels = demos[order], labels[order]
@@ -145,17 +148,14 @@ def fit_to_references(
         alone = len(references) == 1
         quantities = [representation.quantity for representation in representations]
         if alone:
-            sizes = described.sizes()
-            if not sizes[: len(described.blocks)].all():
-                raise SpecificationError("expected a training movement that moves, got one at rest; add demonstrations")
-            widths = np.array([ALONE[quantity] for quantity in quantities]) * sizes
+            widths = np.array([ALONE[quantity] for quantity in quantities]) * described.sizes()
         else:
             widths = impostor_widths(described, labels)
         similarity = AveragedSimilarity(described.procrustes, widths, specification.mean)
         if isinstance(weights, str):
             check_choice("weights", weights, list(WEIGHTS))
             chosen = own_weights if alone else WEIGHTS[weights]  # nothing to fit to
-            values = chosen(similarity, described, labels, representations)
+            values = chosen(similarity, described, labels)
         else:
             if specification.mean != "arithmetic":
                 raise SpecificationError(

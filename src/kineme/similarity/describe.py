@@ -160,11 +160,7 @@ class Tile(NamedTuple):
 
 
 def for_described(
-    demos: Demonstrations,
-    like: Compares,
-    procrustes: Procrustes,
-    work: Callable[[Tile], None],
-    most: int | None = None,
+    demos: Demonstrations, like: Compares, procrustes: Procrustes, work: Callable[[Tile], None], most: int | None = None
 ) -> None:
     """Describe movements tile by tile, in threads, and call `work` with each tile of at most `most` movements.
 
@@ -249,10 +245,10 @@ def _path_rows(
     paths: Array, details: Array, how: ComparisonSpecification, dtype: DTypeLike
 ) -> tuple[NDArray[Any], ...]:
     """Return feature rows of paths (n, d, T), and of the same paths in detail, as `dtype`."""
-    normalized: dict[tuple[float, int], NDArray[Any]] = {}  # representations of equal phase share it
+    normalized: dict[tuple[float, int, bool], NDArray[Any]] = {}  # representations of equal phase share it
     rows = []
     for representation in how.by_rows:
-        phase = (representation.arc_share, representation.n_points)
+        phase = (representation.arc_share, representation.n_points, representation.signal)
         if phase not in normalized:
             normalized[phase] = how.normalization.apply(representation.along(paths), dtype)
         rows.append(representation.describe(normalized[phase], how.normalization.translation))
@@ -355,15 +351,15 @@ class Described:
             self, blocks=blocks, pairs=replace(self.pairs, positions=positions, shapes=shapes, details=details)
         )
 
-    def twins(self) -> list[int]:
+    def coarse(self) -> list[int]:
         """Return for each representation, (R,), that of the same quantity which is not in detail, or itself."""
-        twins = list(range(self.n_representations))
+        coarse = list(range(self.n_representations))
         if self.pairs is not None:
             first = len(self.blocks)
             number = {measure: first + k for k, measure in enumerate(self.pairs.measures)}
             for measure, r in number.items():
-                twins[r] = number.get(measure - len(PAIR_QUANTITIES), r)
-        return twins
+                coarse[r] = number.get(measure - len(PAIR_QUANTITIES), r)
+        return coarse
 
     def sizes(self) -> np.ndarray[Any, np.dtype[np.float64]]:
         """Return typical sizes in each representation, (R,): median norms of rows, or distances of opposite tangents.

@@ -14,6 +14,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from operator import attrgetter
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,17 +87,23 @@ class Compared:
         return SHARES[self.comparison.mean](self.logs[:, np.arange(len(self)), chosen])
 
 
+class Classifier(Protocol):
+    """A fitted classifier: scores of each class."""
+
+    def scores(self, compared: Compared) -> Array:
+        """Return a score per class, shape (n, C): larger is more like it."""
+        ...
+
+    def best(self, compared: Compared) -> NDArray[np.intp]:
+        """Return the index (n,) of the class with the largest score."""
+        return self.scores(compared).argmax(axis=1)
+
+
 Score = Callable[[Compared], Array]
 
 
-def nearest(compared: Compared) -> Array:
-    """Return log similarity to the nearest reference of each class, (n, C)."""
-    return compared.nearest
-
-
-def nearest_each(compared: Compared) -> Array:
-    """Return log similarity to each class, in each representation to its own nearest reference of the class, (n, C)."""
-    return compared.nearest_each
+nearest: Score = attrgetter("nearest")
+nearest_each: Score = attrgetter("nearest_each")
 
 
 def score(

@@ -14,45 +14,35 @@ from kineme.kernels.procrustes import Procrustes
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.sampling import evenly_spaced
 from kineme.similarity.describe import Described, describe, squared_distances
-from kineme.similarity.specification import LOG_MEANS, Compares, Representation
+from kineme.similarity.specification import LOG_MEANS, Compares
 from kineme.validation import Array
 
 _LEAST_WEIGHT = 0.02  # smaller weights become 0, to save the time of their representation
 _OWN = 0.5  # of the fitted weight always belongs to the representations' own weights
 _MOST_SWEEPS, _SWEEP_CHANGE = 10_000, 1e-9  # of least squares, and the change of weights, relative, that ends them
 
-Representations = tuple[Representation, ...]
 
-
-def own_weights(
-    similarity: AveragedSimilarity, described: Described, labels: NDArray[Any], representations: Representations
-) -> Array:
+def own_weights(similarity: AveragedSimilarity, described: Described, labels: NDArray[Any]) -> Array:
     """Return the weights of the representations themselves, in the arithmetic mean; equal ones in the others."""
-    own = np.array([representation.own_weight(described.n_dims) for representation in representations])
+    own = np.array(described.own_weights or 0.0)
     if similarity.mean != "arithmetic" or not own.any():
-        return equal_weights(similarity, described, labels, representations)
+        return equal_weights(similarity, described, labels)
     return own / own.sum()
 
 
-def auto_weights(
-    similarity: AveragedSimilarity, described: Described, labels: NDArray[Any], representations: Representations
-) -> Array:
+def auto_weights(similarity: AveragedSimilarity, described: Described, labels: NDArray[Any]) -> Array:
     """Return `fitted_weights` where that can be: two movements of some class, two classes, an arithmetic mean."""
     n_classes = len(np.unique(labels))
     fits = similarity.mean == "arithmetic" and 1 < n_classes < len(labels)
-    return (fitted_weights if fits else own_weights)(similarity, described, labels, representations)
+    return (fitted_weights if fits else own_weights)(similarity, described, labels)
 
 
-def equal_weights(
-    similarity: AveragedSimilarity, described: Described, labels: NDArray[Any], representations: Representations
-) -> Array:
+def equal_weights(similarity: AveragedSimilarity, described: Described, labels: NDArray[Any]) -> Array:
     """Return the same weight for each."""
-    return np.full(len(representations), 1.0 / len(representations))
+    return np.full(described.n_representations, 1.0 / described.n_representations)
 
 
-def fitted_weights(
-    similarity: AveragedSimilarity, described: Described, labels: NDArray[Any], representations: Representations
-) -> Array:
+def fitted_weights(similarity: AveragedSimilarity, described: Described, labels: NDArray[Any]) -> Array:
     """Return half of the weight as `aligned_weights` fits it, half as the representations' own weights.
 
     The fitted weights are those of representations that separate the training movements. A representation that does
@@ -64,7 +54,7 @@ def fitted_weights(
         raise SpecificationError(
             f"expected weights='fitted' with mean='arithmetic', got it with mean={similarity.mean!r}"
         )
-    own = own_weights(similarity, described, labels, representations)
+    own = own_weights(similarity, described, labels)
     return np.asarray((1.0 - _OWN) * aligned_weights(similarity, described, labels) + _OWN * own)
 
 
@@ -89,7 +79,7 @@ def aligned_weights(similarity: AveragedSimilarity, described: Described, labels
     weights = _nonnegative_least_squares(kernels @ kernels.T, kernels @ _centered(same))
     weights = np.where(weights >= _LEAST_WEIGHT * weights.sum(), weights, 0.0)
     if not weights.any():  # no kernel is aligned with that of the labels
-        return np.full(described.n_representations, 1.0 / described.n_representations)
+        return equal_weights(similarity, described, labels)
     return np.asarray(weights / weights.sum())
 
 
@@ -130,7 +120,7 @@ def given_weights(weights: ArrayLike, n: int) -> Array:
 
 
 #: Name -> what computes the weights (R,), summing to 1.
-WEIGHTS: dict[str, Callable[[AveragedSimilarity, Described, NDArray[Any], Representations], Array]] = {
+WEIGHTS: dict[str, Callable[[AveragedSimilarity, Described, NDArray[Any]], Array]] = {
     "auto": auto_weights,
     "own": own_weights,
     "equal": equal_weights,
@@ -154,8 +144,7 @@ SHARE = 0.4
 #: median over eight sets of handwriting, gestures in space, signs, words and exercises.
 ALONE = {"positions": 0.2, "forcing": 0.3, "elastic": 0.16, "turning": 0.045, "cloud": 0.15}
 _LEAST = 0.01  # share of the typical size; smallest distance that is used
-_SAME = 1e-3  # share of the size; smaller distances are rounding errors of single precision
-_COPIES = 1e-4  # share of the size; unlabeled movements at smaller distances are copies
+_SAME = 1e-3  # share of the size; smaller distances are rounding errors of single precision, movements there copies
 _ROWS = 500  # movements that widths are estimated from, at most
 _BEGUN_MOVEMENTS = 60  # the same, where each has many beginnings
 _NO_IMPOSTOR = 0.1  # width where no two beginnings differ
@@ -281,22 +270,15 @@ def impostor_widths(described: Described, labels: NDArray[np.generic]) -> Array:
     some, owners = described.take(chosen), labels[chosen]
     sizes = some.sizes()
     nearest = zip(_nearest_of_others(some, owners, chosen), sizes, strict=True)
-    widths = [_share_of_median(distances, _SAME * size, SHARE) for distances, size in nearest]
+    widths = [_share_of_median(distances, _SAME * size) for distances, size in nearest]
     if all(width is None for width in widths):
         raise SpecificationError(
             "expected training movements that differ, got one movement or all the same; add demonstrations"
         )
     # Movements that do not differ in one representation have a similarity of 1 there.
-    return _as_twins(some, np.maximum([np.inf if width is None else width for width in widths], _LEAST * sizes))
-
-
-def _as_twins(described: Described, widths: Array) -> Array:
-    """Return widths (R,), those in detail as of the same quantities that are rotated.
-
-    In detail movements of one class are farther apart than after a rotation; with wider kernels of their own they would
-    count where only the rotated ones tell.
-    """
-    return widths[described.twins()]
+    # In detail they are as wide as of the same quantity that is rotated: without a rotation movements of one class are
+    # farther apart, and wider kernels would count where only the rotated ones tell.
+    return np.maximum([np.inf if width is None else width for width in widths], _LEAST * sizes)[some.coarse()]
 
 
 def beginning_widths(beginnings: Described, labels: NDArray[np.generic]) -> Array:
@@ -310,8 +292,7 @@ def beginning_widths(beginnings: Described, labels: NDArray[np.generic]) -> Arra
     rows = (chosen[:, None] * n_progress + np.arange(n_progress)).ravel()
     owners, movements = np.repeat(labels[chosen], n_progress), np.repeat(chosen, n_progress)
     widths = [
-        _share_of_median(distances, 0.0, SHARE)
-        for distances in _nearest_of_others(beginnings.take(rows), owners, movements)
+        _share_of_median(distances, 0.0) for distances in _nearest_of_others(beginnings.take(rows), owners, movements)
     ]
     return np.array([_NO_IMPOSTOR if width is None else width for width in widths])
 
@@ -339,14 +320,14 @@ def gap_widths(described: Described) -> Array:
     chosen = evenly_spaced(n, _ROWS)
     widths = []
     for squares, same in zip(
-        squared_distances(described.take(chosen), described), _COPIES * described.sizes(), strict=True
+        squared_distances(described.take(chosen), described), _SAME * described.sizes(), strict=True
     ):
         squares[np.arange(len(chosen)), chosen] = -1.0  # itself first
         ordered = np.sqrt(np.maximum(np.sort(squares, axis=1)[:, 1:], 0.0))
-        widths.append(_share_of_median(_beyond_the_gap(ordered, same), same, SHARE))
+        widths.append(_share_of_median(_beyond_the_gap(ordered, same), same))
     if all(width is None for width in widths):
         raise SpecificationError("expected movements that differ, got copies of one movement; add other movements")
-    return _as_twins(described, np.array([np.inf if width is None else width for width in widths]))
+    return np.array([np.inf if width is None else width for width in widths])[described.coarse()]
 
 
 def median_distances(described: Described) -> Array:
@@ -369,10 +350,10 @@ def _nearest_of_others(described: Described, owners: NDArray[np.generic], each: 
     return nearest
 
 
-def _share_of_median(distances: Array, same: float, share: float) -> float | None:
-    """Return the `share` of the median of those distances that are finite and above `same`; None if none is."""
+def _share_of_median(distances: Array, same: float) -> float | None:
+    """Return `SHARE` of the median of those distances that are finite and above `same`; None if none is."""
     apart = distances[np.isfinite(distances) & (distances > same)]
-    return share * float(np.median(apart)) if len(apart) else None
+    return SHARE * float(np.median(apart)) if len(apart) else None
 
 
 def _beyond_the_gap(ordered: Array, same: float) -> Array:

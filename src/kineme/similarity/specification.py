@@ -27,7 +27,7 @@ from kineme.kernels.pair_distances import CloudSpec, ElasticSpec
 from kineme.kernels.procrustes import Procrustes
 from kineme.kernels.rotation import RotationPrior
 from kineme.movements.channels.channel import Channels
-from kineme.movements.channels.detect import count_points
+from kineme.movements.channels.detect import point_names
 from kineme.movements.preparation.resample import resample_by_arc_length
 from kineme.movements.preparation.smooth import Smooth, spline_matrix
 from kineme.runtime.compiled import compiled_module, use_compiled
@@ -212,6 +212,12 @@ def check_representations(representations: Any) -> tuple[Representation, ...]:
             "expected Representation('positions', arc_share=1.0) beside those that are compared pair by pair, whose "
             "rotation it gives; add it"
         )
+    in_pairs = [item for item in given if item.in_pairs]
+    if in_pairs and len({item.signal for item in (*in_pairs, given[rotating(given)])}) > 1:
+        raise SpecificationError(
+            "expected one value of signal in positions over arc length and all that are compared pair by pair, which "
+            "are made from these, got True and False; pass the same to each"
+        )
     return tuple(sorted(given, key=lambda item: (item.in_pairs, item.detailed)))  # the order within each sort stays
 
 
@@ -361,6 +367,11 @@ class ComparisonSpecification:
     points: int | None = None  # J points that turn together; None: those that channels name, see `with_points`
 
     def __post_init__(self) -> None:
+        if isinstance(self.points, (str, list, tuple)):
+            raise SpecificationError(
+                f"expected points to be a number, got {self.points!r}; leave it out where columns have these names, as "
+                "left_hand_x: names tell the points by themselves"
+            )
         if self.points is not None:
             check_count("points", self.points, 1)
         check_choice("mean", self.mean, list(LOG_MEANS))
@@ -393,7 +404,12 @@ class ComparisonSpecification:
     @cached_property
     def stored_rows(self) -> tuple[Representation, ...]:
         """What feature rows hold: representations compared sample by sample, then positions in detail, if needed."""
-        return (*self.by_rows, DETAILED_POSITIONS) if self.detailed else self.by_rows
+        return (*self.by_rows, self.detailed_positions) if self.detailed else self.by_rows
+
+    @property
+    def detailed_positions(self) -> Representation:
+        """The positions that are compared pair by pair in detail."""
+        return replace(DETAILED_POSITIONS, signal=self.representations[rotating(self.representations)].signal)
 
     @cached_property
     def detailed(self) -> bool:
@@ -434,7 +450,7 @@ class ComparisonSpecification:
 
     def with_points(self, channels: Channels | None) -> ComparisonSpecification:
         """Return the specification with the number of points, which are told by the names of columns if at all."""
-        return self if self.points is not None else replace(self, points=count_points(channels))
+        return self if self.points is not None else replace(self, points=len(point_names(channels)) or 1)
 
 
 class Compares(Protocol):

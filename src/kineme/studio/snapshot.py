@@ -28,7 +28,7 @@ from kineme.movements.preparation import pauses
 from kineme.movements.preparation.smooth import spline_matrix
 from kineme.recognition import conformal
 from kineme.recognition.answer import LEAST_CONFIDENCE, FittedRecognizer, KnownClasses, known_classes
-from kineme.recognition.classifiers import Classifier, Nearest, NearestEach, Prototype, fit_prototype
+from kineme.recognition.classifiers import Nearest, NearestEach, Prototype, fit_prototype
 from kineme.recognition.conformal import GUESSES, RULES, Calibration
 from kineme.recognition.convolutions import Convolutions
 from kineme.recognition.early import evidence
@@ -37,6 +37,7 @@ from kineme.recognition.early.hypotheses import Early, hypotheses
 from kineme.sampling import evenly_spaced
 from kineme.similarity.comparison import Comparison
 from kineme.similarity.describe import N_POINTS, Pairs, even_paths, feature_rows
+from kineme.similarity.scores import Classifier
 from kineme.similarity.specification import DETAILED_POSITIONS, Representation, forcing_operator, rotating
 
 #: Numbers of the stored paths, those of early recognition included, at most: 1.3 MB in base64, so that a page with all
@@ -125,7 +126,9 @@ def _comparison(how: Comparison, pairs: Pairs | None, arrays: _Arrays) -> dict[s
         "pauses": pause_rule(),
         "mean": how.mean,
         "rule": rotation_rule(how.procrustes),
-        "by_rows": [_row_representation(representation, r, arrays) for r, representation in enumerate(by_rows)],
+        "by_rows": [
+            _row_representation(representation, how.n_dims, r, arrays) for r, representation in enumerate(by_rows)
+        ],
         "by_pairs": [representation.measure for representation in representations[len(by_rows) :]],
         "rotating": rotating(representations) if pairs is not None else -1,
         "shapes": None if pairs is None else pair_rule(pairs.shapes),
@@ -136,13 +139,14 @@ def _comparison(how: Comparison, pairs: Pairs | None, arrays: _Arrays) -> dict[s
     }
 
 
-def _row_representation(representation: Representation, r: int, arrays: _Arrays) -> dict[str, Any]:
-    """Write what is compared sample by sample: its parameters, and the matrices that describing needs."""
+def _row_representation(representation: Representation, n_dims: int, r: int, arrays: _Arrays) -> dict[str, Any]:
+    """Write what is compared sample by sample in n dimensions: its parameters, and matrices that describing needs."""
     row = _fields(representation, "quantity", "arc_share", "n_points", "signal")
     if representation.quantity == "forcing":
         row["operator"] = f"operator {r}"
         arrays[row["operator"]] = forcing_operator(representation, np.dtype(np.float32))
-    if representation.arc_share == 0 and (N_POINTS - 1) % (representation.n_points - 1):
+    over_time = representation.arc_share == 0 or (n_dims == 1 and representation.signal)
+    if over_time and (N_POINTS - 1) % (representation.n_points - 1):
         row["resample"] = f"resample {r}"
         arrays[row["resample"]] = spline_matrix(N_POINTS, representation.n_points)
     return row
@@ -159,7 +163,7 @@ def pause_rule(allowance: float = 1.0) -> dict[str, float]:
 def _detail_rule(how: Comparison, details: Shapes) -> dict[str, Any]:
     """Write how movements are compared in detail."""
     own = _fields(how.specification, "upright") | {"cutoff": how.specification.detailed_cutoff}
-    positions = _fields(DETAILED_POSITIONS, "arc_share", "n_points", "signal")
+    positions = _fields(how.specification.detailed_positions, "arc_share", "n_points", "signal")
     return pair_rule(details) | own | {"positions": positions}
 
 
@@ -178,7 +182,12 @@ def rotation_rule(procrustes: Procrustes) -> dict[str, Any]:
     if procrustes.n_points > 1:
         raise SpecificationError(
             f"expected movements of one point, got {procrustes.n_points} points that turn together, which the page "
-            f"does not have; {_AGAIN}"
+            f"does not have; {_AGAIN.replace('Recognizer()', 'Recognizer(points=1)')}"
+        )
+    if procrustes.mixing is not None:
+        raise SpecificationError(
+            f"expected movements of at most {len(procrustes.mixing)} columns, got {procrustes.n_columns}, whose "
+            "principal ones the page does not have; choose columns"
         )
     if d == 3 and prior is None and procrustes.max_angle > 0:
         raise SpecificationError(
@@ -245,6 +254,7 @@ def early_parts(classes: KnownClasses, early: Early | None = None) -> Snapshot:
         "n_progress": described.early.n_progress,
         **{name: None if math.isinf(value) else value for name, value in spreads.items()},
         "own_rotations": described.early.max_angle is not None,
+        "signals": described.are_signals,
         "pauses": pause_rule(beginnings.ALLOWANCE),
         "rule": rotation_rule(described.procrustes),
         "shapes": pair_rule(described.described.pairs.shapes),

@@ -10,6 +10,7 @@ from sklearn.model_selection import cross_val_score
 
 import kineme
 from kineme import Demonstrations, Trajectory
+from kineme.errors import TrajectoryError
 
 T = np.linspace(0.0, 2.0, 40)
 X = np.column_stack([np.sin(T), np.cos(3 * T), T**2])
@@ -44,6 +45,11 @@ def test_lists_of_what_holds_movements_are_one_after_the_other():
     assert demos.names == ("one", "one", "two", "one", "two")
     _same(demos[[3, 4]], pair)
     _same(Demonstrations.of(held), pair)
+
+
+def test_names_of_files_are_no_movements():
+    with pytest.raises(TrajectoryError, match=r"got 'new.csv'; read files with kineme.read_recordings"):
+        Demonstrations.of(["new.csv"])
 
 
 def test_a_list_may_hold_arrays_beside_trajectories():

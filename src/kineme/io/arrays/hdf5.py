@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,9 @@ from kineme.io.arrays.trees import GROUPS, Rate, is_label, rate_of, seconds_name
 from kineme.io.limits import check_expanded
 from kineme.io.records import damaged_as, needs
 from kineme.movements.tables.layout import Layout, Parsed
+
+#: Errors of h5py on damaged files.
+DAMAGE = (OSError, RuntimeError, KeyError, ValueError, TypeError)
 
 _SMALL, _CHUNKS = 2**20, 1000  # bytes and chunks that need not be written
 _EXPANDED = 1100  # times as many bytes gzip, which packs best, gives at most
@@ -29,15 +33,37 @@ _NAMES = frozenset({"label", "task"})  # attributes
 
 def hdf5_movements(path: Path, layout: Layout) -> Parsed:
     """Return the movements in an HDF5 file: groups of data sets of one length; only those that are needed are read."""
+    with hdf5_file(path) as file:
+        return tree_movements(hdf5_tree(file), layout, "HDF5", GROUPS)
+
+
+@contextmanager
+def hdf5_file(path: Path) -> Iterator[Any]:
+    """Context manager: an HDF5 file that is read; what h5py raises on damage becomes a `DataError`."""
     with needs("h5py", "read HDF5", "hdf5"):
         import h5py
     damaged = "expected an HDF5 file, got something foreign, truncated or damaged"
-    with damaged_as(damaged, OSError, RuntimeError, KeyError), h5py.File(os.fspath(path), "r") as file:
-        return tree_movements(_tree(file, h5py, [0]), layout, "HDF5", GROUPS)
+    with damaged_as(damaged, *DAMAGE), h5py.File(os.fspath(path), "r") as file:
+        yield file
+
+
+def hdf5_tree(group: Any) -> dict[str, Any]:
+    """Return a file or a group as a mapping of data sets that are not read yet, single values, and groups."""
+    import h5py
+
+    return _tree(group, h5py, [0])
+
+
+def hdf5_group(group: Any, name: str) -> Any:
+    """Return a group within a group, or nothing where there is none, and where it lies in another file."""
+    import h5py
+
+    member = group[name] if isinstance(group.get(name, getlink=True), h5py.HardLink) else None
+    return member if isinstance(member, Mapping) else {}
 
 
 def _tree(group: Any, h5py: Any, counted: list[int], depth: int = 0, unit: Any = None) -> dict[str, Any]:
-    """Return a group, in the unit of that around it, as a mapping of data sets not read yet, single values, groups."""
+    """Return a group, in the unit of that around it."""
     tree: dict[str, Any] = {}
     unit = _unit_in(group, group.attrs) or unit
     tree |= _label_and_rate(group, group.attrs)
@@ -65,12 +91,12 @@ def _tree(group: Any, h5py: Any, counted: list[int], depth: int = 0, unit: Any =
                 records = _Stored(member, None, None)[()]
                 tree[name] = {head: records[head] for head in member.dtype.names if member.dtype[head].kind in "biuf"}
             elif len(member.shape) == 1 and member.dtype.kind in "SO" and is_label(name):
-                tree[name] = _labels(member)
+                tree[name] = texts_of(member)
     return tree
 
 
-def _labels(stored: Any) -> list[str | float | None]:
-    """Read the texts of a data set that labels movements, one by one: all may be the same large one in the file."""
+def texts_of(stored: Any) -> list[str | float | None]:
+    """Read the texts of a data set, one by one: all may be the same large one in the file."""
     n_letters, labels = stored.shape[0] * max(1, stored.dtype.itemsize), []
     for k in range(stored.shape[0]):
         if n_letters > _LETTERS:

@@ -149,7 +149,7 @@ def _of_group(
     stamps = {name for name, owner in owners.items() if owner in arrays}
     own_times = all(name in times or name in stamps for name in arrays)
     if arrays and not own_times and not labels and (_are_columns(arrays, style, rate) or _continues(arrays, groups)):
-        entries = {inner: entry for inner, entry in _flat(tree, style.separator) if _fits(entry)}
+        entries = {inner: entry for inner, entry in flat(tree, style.separator) if _fits(entry)}
         yield TreeMovement(place, label, {k: entry for k, entry in entries.items() if not _is_rate(k, entries)}, rate)
         return
     for name, array in arrays.items():
@@ -209,18 +209,17 @@ def _are_columns(arrays: Mapping[str, Any], style: Style, rate: Rate | None) -> 
 def _continues(arrays: Mapping[str, Any], groups: Mapping[str, Any]) -> bool:
     """Tell whether the groups beside arrays hold arrays of the same length: further columns of one movement."""
     lengths = {array.shape[0] for array in arrays.values()}
-    inner = {
-        array.shape[0] for group in groups.values() if isinstance(group, Mapping) for _, array in _flat(group, "/")
-    }
+    inner = {array.shape[0] for group in groups.values() if isinstance(group, Mapping) for _, array in flat(group, "/")}
     return len(lengths) == 1 and lengths <= inner
 
 
-def _flat(tree: Mapping[str, Any], separator: str, depth: int = 0) -> Iterator[tuple[str, Any]]:
+def flat(tree: Mapping[str, Any], separator: str, depth: int = 0) -> Iterator[tuple[str, Any]]:
+    """Yield the arrays in a tree with their paths."""
     for name, branch in tree.items():
         if is_array(branch):
             yield name, branch
         elif isinstance(branch, Mapping) and depth < _DEEPEST:
-            yield from ((f"{name}{separator}{inner}", leaf) for inner, leaf in _flat(branch, separator, depth + 1))
+            yield from ((f"{name}{separator}{inner}", leaf) for inner, leaf in flat(branch, separator, depth + 1))
 
 
 def _fits(array: Any) -> bool:

@@ -18,6 +18,7 @@ from kineme.io.records import Contents, Problem
 from kineme.movements.channels.channel import Channel, Channels
 from kineme.movements.channels.column_match import columns_recorded
 from kineme.movements.channels.coordinates import columns_of, lever_of
+from kineme.movements.channels.detect import point_names
 from kineme.movements.tables.layout import Detected
 from kineme.movements.tables.time_stamps import GUESSED
 from kineme.movements.trajectories.demonstrations import Demonstrations
@@ -153,7 +154,7 @@ def _notes(recordings: Recordings, labels: tuple[LabelSummary, ...]) -> list[str
     unlabeled = sum(summary.movements for summary in labels if summary.label is None)
     if 0 < unlabeled < len(recordings):
         notes.append(f"{unlabeled} movements have no label: their files lie in no folder of their own")
-    notes += notes_on_gaps(recordings) + notes_on_sampling(recordings) + notes_on_sizes(demos)
+    notes += notes_on_gaps(recordings) + notes_on_sampling(recordings) + notes_on_sizes(demos) + notes_on_points(demos)
     return notes + notes_on_extents(demos) + _notes_on_channels(demos)
 
 
@@ -207,6 +208,12 @@ def extents_of(demos: Demonstrations) -> Array:
 
 def _sides(x: Array, offsets: NDArray[np.intp]) -> Array:
     return np.asarray(np.maximum.reduceat(x, offsets[:-1], axis=0) - np.minimum.reduceat(x, offsets[:-1], axis=0))
+
+
+def notes_on_points(demos: Demonstrations) -> list[str]:
+    """Say which points the columns are, by their names, and how they are compared."""
+    names = point_names(demos.channels)
+    return [f"{len(names)} points that turn together: {first_names(names, _CHANNELS)}"] if names else []
 
 
 def notes_on_extents(demos: Demonstrations) -> list[str]:

@@ -16,22 +16,9 @@ import pyarrow as pa
 from pyarrow import parquet
 
 from kineme.errors import DataError
+from kineme.io.lerobot import motions as language
 from kineme.io.lerobot.episodes import STORAGES, runs, shard_frames
 from kineme.io.lerobot.info import MARKER, Info, read_episodes, read_info, read_json
-from kineme.io.lerobot.motions import (
-    COLUMNS,
-    DETAILS,
-    PENDING,
-    Details,
-    Motions,
-    OwnRows,
-    Row,
-    Rows,
-    own_rows,
-    pending_details,
-    rows_of,
-    write_details,
-)
 from kineme.io.records import damaged_as, needs
 from kineme.reporting.atomic import bring_to_disk, write_atomically
 
@@ -45,25 +32,25 @@ _META = "meta.lance"  # the files of meta/ a second time, for programs that open
 _NEW = "kineme_language_persistent"  # name of the column until it takes the place of another
 
 
-def copy_with_motions(source: Path, target: Path, motions: Motions) -> None:
+def copy_with_motions(source: Path, target: Path, motions: language.Motions) -> None:
     """Copy a data set in Parquet into an empty folder, with rows that name the motions of its episodes.
 
-    They stand on each of the frames, in the column that `COLUMNS` has for the version and meta/info.json names. Shards
-    are written anew. All else is copied; videos and pictures are hard links where the file system has them. Rows of
-    earlier runs are replaced, those of others stay. `motions.DETAILS` says all that is known of the motions.
+    They stand on each of the frames, in the column that `motions.COLUMNS` has for the version and meta/info.json names.
+    Shards are written anew. All else is copied; videos and pictures are hard links where the file system has them. Rows
+    of earlier runs are replaced, those of others stay. `motions.DETAILS` says all that is known of the motions.
     """
     info = checked_info(source, motions)
     shards = [shard for shard in dict.fromkeys(read_episodes(source, info).shards) if (source / shard).is_file()]
-    own = own_rows(source)
-    copy_others(source, target, {source / file for file in (*shards, DETAILS, PENDING)})
-    write_details(
-        target / DETAILS,
+    own = language.own_rows(source)
+    copy_others(source, target, {source / file for file in (*shards, language.DETAILS, language.PENDING)})
+    language.write_details(
+        target / language.DETAILS,
         (named for shard in shards for named in _write_shard(source, target, info, shard, motions, own)),
     )
     declare(target, info)
 
 
-def checked_info(folder: Path, motions: Motions) -> Info:
+def checked_info(folder: Path, motions: language.Motions) -> Info:
     """Read meta/info.json; a `DataError` if the meta folder is damaged, or a motion is of an episode it lacks."""
     info = read_info(folder)
     declared = read_episodes(folder, info)
@@ -92,40 +79,40 @@ def copy_others(source: Path, target: Path, changed: set[Path]) -> None:
 
 def declare(folder: Path, info: Info) -> None:
     """Name the column in meta/info.json, unless it is there."""
-    column = COLUMNS[info.version]
+    column = language.COLUMNS[info.version]
     declaration = read_json(folder / MARKER, MARKER)
     if column.name not in declaration["features"]:
         declaration["features"][column.name] = column.feature
         write_atomically(folder / MARKER, json.dumps(declaration, indent=4, ensure_ascii=False).encode())
 
 
-def new_rows(folder: Path, info: Info, shard: str, motions: Motions, own: OwnRows) -> Rows:
+def new_rows(folder: Path, info: Info, shard: str, motions: language.Motions, own: language.OwnRows) -> language.Rows:
     """Return number of an episode of a shard -> the rows to write; a stamp where others name a motion is theirs."""
-    column, taken = COLUMNS[info.version], dict[int, set[float]]()
+    column, taken = language.COLUMNS[info.version], dict[int, set[float]]()
     with STORAGES[info.storage].open(folder / shard) as table:
         if column.name in table.columns:
             for batch in table.batches(["episode_index", column.name], _FRAMES, None):
                 episodes = batch.column("episode_index").to_numpy(zero_copy_only=False)
                 for episode, stamp in column.others(batch.column(column.name), episodes, own):
                     taken.setdefault(episode, set()).add(stamp)
-    rows: dict[int, Sequence[Row]] = {}
+    rows: dict[int, Sequence[language.Row]] = {}
     problems: list[str] = []
     for frames in runs(shard_frames(folder, info, shard, {}), problems):
         number = int(frames.episodes[0])
         if number in motions and number not in rows:
-            rows[number] = rows_of(frames.stamps, motions[number], taken.get(number, ()))
+            rows[number] = language.rows_of(frames.stamps, motions[number], taken.get(number, ()))
     if problems:
         raise DataError(problems[0])
     return rows
 
 
 def _write_shard(
-    source: Path, target: Path, info: Info, shard: str, motions: Motions, own: OwnRows
-) -> Iterator[Details]:
+    source: Path, target: Path, info: Info, shard: str, motions: language.Motions, own: language.OwnRows
+) -> Iterator[language.Details]:
     """Copy a shard with the new rows of its episodes on each of their frames, behind those of others; yield these."""
     # What is wrong with the disk when writing stays an error of the system.
     reading = partial(damaged_as, "expected a Parquet file, got a damaged one", OSError)
-    column = COLUMNS[info.version]
+    column = language.COLUMNS[info.version]
     try:
         with reading():
             file = parquet.ParquetFile(source / shard)
@@ -169,14 +156,14 @@ def _compression(metadata: Any, leaves: Sequence[str]) -> str | dict[str, str]:
     return {path: "NONE" if name == "UNCOMPRESSED" else name for path, name in compressions.items()}
 
 
-def copy_in_lance(source: Path, target: Path, motions: Motions) -> None:
+def copy_in_lance(source: Path, target: Path, motions: language.Motions) -> None:
     """Copy a data set into an empty folder, its tables as hard links, and name the motions of its episodes there."""
     checked_info(source, motions)
     copy_others(source, target, set())
     name_in_place(target, motions)
 
 
-def name_in_place(folder: Path, motions: Motions) -> int:
+def name_in_place(folder: Path, motions: language.Motions) -> int:
     """Write the column `language_persistent` of all frames, as one new version, whose number is returned.
 
     Earlier versions stay as they are, and readers see the old column or the new one. Rows of earlier runs are replaced,
@@ -193,10 +180,9 @@ def name_in_place(folder: Path, motions: Motions) -> int:
     with _alone(folder):
         version = _name_frames(folder, info, motions, lance)
         declare(folder, info)
-        bring_to_disk(folder / PENDING)
-        os.replace(folder / PENDING, folder / DETAILS)
+        os.replace(folder / language.PENDING, folder / language.DETAILS)
         if (folder / _META).is_dir():
-            paths = [Path(name).relative_to("meta").as_posix() for name in (MARKER, DETAILS)]
+            paths = [Path(name).relative_to("meta").as_posix() for name in (MARKER, language.DETAILS)]
             files = {"path": paths, "data": [(folder / "meta" / path).read_bytes() for path in paths]}
             table = lance.dataset(str(folder / _META))
             new = pa.table(files, schema=pa.schema([table.schema.field(name) for name in files]))
@@ -207,8 +193,8 @@ def name_in_place(folder: Path, motions: Motions) -> int:
 @contextmanager
 def _alone(folder: Path) -> Iterator[None]:
     """Context manager: a lock on the data set, which ends with this process; a `DataError` where another has it."""
-    (folder / DETAILS).parent.mkdir(parents=True, exist_ok=True)
-    with (folder / DETAILS).with_name(".lock").open("ab") as handle:
+    (folder / language.DETAILS).parent.mkdir(parents=True, exist_ok=True)
+    with (folder / language.DETAILS).with_name(".lock").open("ab") as handle:
         if os.name == "posix":
             import fcntl
 
@@ -221,21 +207,22 @@ def _alone(folder: Path) -> Iterator[None]:
         yield
 
 
-def _name_frames(folder: Path, info: Info, motions: Motions, lance: Any) -> int:
+def _name_frames(folder: Path, info: Info, motions: language.Motions, lance: Any) -> int:
     """Commit the new column, again from the newest version where another program was faster, and return its version."""
     # Should this process die between the new version and its details, the next run still knows whose rows they are.
-    leftover = pending_details(folder)
+    leftover = language.pending_details(folder)
     for _ in range(_ATTEMPTS):
-        own = own_rows(folder)
+        own = language.own_rows(folder)
         rows = new_rows(folder, info, info.data_path, motions, own)
-        beside = folder / f"{PENDING}.new"
-        write_details(beside, [*((k, motions[k], rows[k]) for k in rows), *leftover])
-        os.replace(beside, folder / PENDING)
+        beside = folder / f"{language.PENDING}.new"
+        language.write_details(beside, [*((k, motions[k], rows[k]) for k in rows), *leftover])
+        bring_to_disk(beside)
+        os.replace(beside, folder / language.PENDING)
         try:
             return _commit(folder / info.data_path, rows, own, lance)
         except OSError as error:
             if not leftover:
-                (folder / PENDING).unlink()
+                (folder / language.PENDING).unlink()
             if _CONFLICT not in str(error).lower():
                 raise
     raise DataError(
@@ -244,12 +231,12 @@ def _name_frames(folder: Path, info: Info, motions: Motions, lance: Any) -> int:
     )
 
 
-def _commit(path: Path, rows: Rows, own: OwnRows, lance: Any) -> int:
+def _commit(path: Path, rows: language.Rows, own: language.OwnRows, lance: Any) -> int:
     """Write the column of each fragment, and make all of them one new version; frames stay in their order.
 
     An update of rows would move them, and the frame of an episode is found by its place.
     """
-    table, column = lance.dataset(str(path)), COLUMNS[3]
+    table, column = lance.dataset(str(path)), language.COLUMNS[3]
     kind, is_there = column.type_in(table.schema), column.name in table.schema.names
     new = pa.schema([(_NEW if is_there else column.name, kind)])
 
@@ -286,10 +273,10 @@ def _in_place_of_old(schema: Any, lance: Any) -> Any:
         path, operations = f"{folder}/empty.lance", lance.LanceOperation
         lance.LanceDataset.commit(path, operations.Overwrite(pa.schema([]), []))
         empty = lance.LanceDataset.commit(path, operations.Merge([], schema), read_version=1)
-        empty.drop_columns([COLUMNS[3].name])
-        empty.alter_columns({"path": _NEW, "name": COLUMNS[3].name})
+        empty.drop_columns([language.COLUMNS[3].name])
+        empty.alter_columns({"path": _NEW, "name": language.COLUMNS[3].name})
         renamed = empty.lance_schema
-    expected = [field.id() for field in schema.fields() if field.name() != COLUMNS[3].name]
+    expected = [field.id() for field in schema.fields() if field.name() != language.COLUMNS[3].name]
     if (got := [field.id() for field in renamed.fields()]) != expected:
         raise DataError(f"expected fields {expected} of the frames from Lance {lance.__version__}, got {got}")
     return renamed

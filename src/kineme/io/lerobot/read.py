@@ -13,15 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import DataError
-from kineme.io.lerobot.episodes import (
-    Frames,
-    check_storage,
-    contradictions,
-    episodes,
-    joined,
-    shard_frames,
-    task_texts,
-)
+from kineme.io.lerobot.episodes import Frames, check_storage, contradictions, episodes, joined, shard_frames, task_texts
 from kineme.io.lerobot.info import Episodes, Info, read_episodes, read_info, read_tasks
 from kineme.io.limits import check_expanded
 from kineme.movements.episodes import Episode

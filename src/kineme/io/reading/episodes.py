@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from kineme.errors import DataError
+from kineme.errors import DataError, SpecificationError
+from kineme.io.arrays.robot_sets import LAYOUTS, RobotLayout, robot_episodes, robot_layout
 from kineme.io.lerobot.info import MARKER
 from kineme.io.records import needs
 from kineme.movements.episodes import Episode
@@ -17,32 +18,44 @@ class EpisodeLayout(NamedTuple):
 
     name: str
     fits: Callable[[Path], bool]  # whether a file or folder has it; reads little, and raises nothing
-    # The path and the names of the features to read, None for all of numbers, -> episodes as they are stored.
-    read: Callable[[Path, Sequence[str] | None], Iterator[Episode]]
+    # The path, the names of the features to read, None for all of numbers, and a rate [1/s], None for that of the set
+    # or of the custom, -> episodes as they are stored.
+    read: Callable[[Path, Sequence[str] | None, float | None], Iterator[Episode]]
 
 
-def _lerobot(path: Path, features: Sequence[str] | None) -> Iterator[Episode]:
+def _lerobot(path: Path, features: Sequence[str] | None, rate: float | None) -> Iterator[Episode]:
+    if rate is not None:
+        raise SpecificationError(f"expected no rate for a data set of LeRobot, which has stamps, got {rate:g}")
     with needs("pyarrow", "read LeRobot", "parquet"):
         from kineme.io.lerobot.episodes import episodes
     return episodes(path, features)
 
 
+def _of_robot(*rows: RobotLayout) -> EpisodeLayout:
+    names = ", ".join(row.name for row in rows)
+    return EpisodeLayout(names, lambda path: robot_layout(path) in rows, robot_episodes)
+
+
 #: Layouts in the order in which they are tried.
 EPISODE_LAYOUTS: tuple[EpisodeLayout, ...] = (
     EpisodeLayout("LeRobot", lambda path: (path / MARKER).is_file(), _lerobot),
+    *(_of_robot(*rows) for rows in LAYOUTS.values()),
 )
 
 
-def read_episodes(path: Path | str, features: Sequence[str] | None = None) -> Iterator[Episode]:
+def read_episodes(
+    path: Path | str, features: Sequence[str] | None = None, rate: float | None = None
+) -> Iterator[Episode]:
     """Yield the episodes of a data set as they are stored, with the features of numbers, or those that are named.
 
-    A `DataError` names the layouts if the path has none of them, or says why the data set cannot be read at all; what
-    is wrong with a single episode stands in its `problems`.
+    A `rate` [1/s] is that of a layout without stamps, instead of what the set says or the custom is; of another it is a
+    `SpecificationError`. A `DataError` names the layouts if the path has none of them, or says why the data set cannot
+    be read at all; what is wrong with a single episode stands in its `problems`.
     """
     path = Path(path)
     for layout in EPISODE_LAYOUTS:
         if layout.fits(path):
-            return layout.read(path, features)
+            return layout.read(path, features, rate)
     there = "another" if path.exists() else "nothing there"
     layouts = ", ".join(layout.name for layout in EPISODE_LAYOUTS)
     raise DataError(f"expected a data set of episodes ({layouts}), got {there}: {path}")

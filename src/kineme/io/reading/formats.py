@@ -13,10 +13,10 @@ from typing import NamedTuple
 from kineme.errors import DataError
 from kineme.io.arrays.arrays import POSITIONS, arrays_movements, has_known_names
 from kineme.io.arrays.bodies import body_movements
-from kineme.io.arrays.hdf5 import hdf5_movements
 from kineme.io.arrays.json_trees import json_lines_movements, json_messages, json_movements
 from kineme.io.arrays.matlab import mat_movements
 from kineme.io.arrays.npz import Npz, array_of_npy
+from kineme.io.arrays.robot_sets import ENDS, hdf5_or_robot_movements, zarr_movements
 from kineme.io.arrays.rows import row_movements, series_movements
 from kineme.io.arrays.tree_movements import nested, tree_movements
 from kineme.io.lerobot.info import MARKER
@@ -121,8 +121,9 @@ FORMATS: dict[str, Format] = {
     ".npy": Format(_read_npy),
     ".parquet": Format(_read_parquet),
     ".mat": Format(mat_movements, label_is_stem=True),
-    ".h5": Format(read_path=hdf5_movements),
-    ".hdf5": Format(read_path=hdf5_movements),
+    ".h5": Format(read_path=hdf5_or_robot_movements),
+    ".hdf5": Format(read_path=hdf5_or_robot_movements),
+    ".zip": Format(read_path=zarr_movements),
     ".ts": Format(series_movements, has_lines=True),
     ".bvh": Format(_of_tables(read_bvh_table, "BVH")),
     ".c3d": Format(_of_tables(read_c3d_table, "C3D")),
@@ -144,6 +145,13 @@ DATA_SETS: tuple[DataSet, ...] = (
         ("data", "frames.lance"),
         ("meta/*.jsonl", "meta/*.parquet", "meta/episodes/*/*.parquet", "data/*/*.parquet", "frames.lance/data/*"),
         Format(read_path=_read_lerobot),
+    ),
+    DataSet(
+        f"{ENDS}/.zarray",
+        ("data",),
+        # Not the frames of cameras, which take minutes to read.
+        (f"{ENDS}/*", "data/*pos/*", "data/*state/*", "data/*action/*", "data/*angle/*", "data/*width/*"),
+        Format(read_path=zarr_movements),
     ),
     DataSet("metadata.yaml", ("*.db3*", "*.mcap*"), ("*.db3*", "*.mcap*"), _BAG, b"rosbag2_bagfile_information"),
 )

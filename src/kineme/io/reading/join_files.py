@@ -156,7 +156,7 @@ def _are_sensors(files: Sequence[FileRead]) -> bool:
     spans = np.array([_span(read) for read in files])
     if spans[:, 0].min() > _SINCE_1970:
         return True
-    if (np.ptp(spans, axis=0) > _ALIKE * np.ptp(spans)).any():
+    if not spans[:, 0].any() or (np.ptp(spans, axis=0) > _ALIKE * np.ptp(spans)).any():
         return False
     of_files = {(frozenset(Columns(read.detected.columns, ()).names), sensors_of(read.path)) for read in files}
     return len(of_files) == len(files)

@@ -75,7 +75,7 @@ def write_movement(path: str | Path, movement: MovementsLike | Columns, names: C
         A path that is none, as where the arguments are in the other order.
     """
     path = as_path(path, "the path of a file to write", "write write_movement(path, movement)")
-    columns, names = (_checked(movement, names), names) if isinstance(movement, dict) else _columns_of(movement)
+    columns, names = (_checked(movement, names), names) if isinstance(movement, dict) else columns_of(movement)
     return write_atomically(path, encode_movement(columns, path.suffix.lower(), names))
 
 
@@ -99,7 +99,8 @@ def _checked(columns: Mapping[str, ArrayLike], names: ColumnNames | None) -> Col
     return arrays
 
 
-def _columns_of(movement: MovementsLike) -> tuple[Columns, ColumnNames | None]:
+def columns_of(movement: MovementsLike) -> tuple[Columns, ColumnNames | None]:
+    """Return the columns of one movement as it was recorded, and their names where it has such."""
     trajectory = as_recording(movement)
     derivatives = {name: np.asarray(getattr(movement, name)[0]) for name in _DERIVATIVES if hasattr(movement, name)}
     rates: Any = getattr(movement, "rate_names", None)  # of rollouts

@@ -120,12 +120,7 @@ def split(store: Store, name: str, ids: Any, new: str) -> int:
 
 
 def assign(
-    store: Store,
-    ids: Any,
-    who: str,
-    how: str = "anchored",
-    medoid: int | None = None,
-    description: str | None = None,
+    store: Store, ids: Any, who: str, how: str = "anchored", medoid: int | None = None, description: str | None = None
 ) -> int:
     """Assign movements to a symbol, which is created if needed; they leave the one that they belonged to.
 

@@ -34,10 +34,7 @@ def export(store: Store, path: str | Path) -> Path:
     """
     target = Path(path)
     with _new(target) as beside:
-        with (
-            closing(connect(store.path, "ro", store.wait)) as connection,
-            limited_copy(connection, store.path, beside),
-        ):
+        with closing(connect(store.path, "ro", store.wait)) as connection, limited_copy(connection, store.path, beside):
             _copy(connection, store, beside)
         with closing(connect(beside, "rw", store.wait)) as copy:
             copy.execute("PRAGMA schema_version = 1")  # a counter of VACUUM, which is not content

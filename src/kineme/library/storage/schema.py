@@ -90,7 +90,7 @@ MIGRATIONS: dict[int, tuple[str, ...]] = {
         added INTEGER NOT NULL REFERENCES version, crc INTEGER NOT NULL)""",
         """CREATE TABLE recorded (
         movement INTEGER PRIMARY KEY REFERENCES movement, columns BLOB NOT NULL, crc INTEGER NOT NULL)""",
-    ),
+    )
 }
 
 _LARGEST_REAL = "1.7976931348623157e308"

@@ -284,10 +284,10 @@ def _order_of(heads: Sequence[str], q: Array, offsets: NDArray[np.intp]) -> str:
 _NO_PLACES = _OTHER_QUANTITIES | {"gyroscope", "mag", "magnetometer", "emg", "euler"}
 
 
-def count_points(channels: Channels | None) -> int:
-    """Return how many points the columns are, one after the other: x, y, z or x, y of each, under one name.
+def point_names(channels: Channels | None) -> tuple[str, ...]:
+    """Return names of the points that the columns are, one after the other: x, y, z or x, y of each, under one name.
 
-    1 where they are anything else: one point, other quantities, other orders, or no names.
+    None where they are anything else: one point, other quantities, other orders, or no names.
     """
     for axes in ("xyz", "xy"):
         n, d = len(channels or ()), len(axes)
@@ -299,8 +299,8 @@ def count_points(channels: Channels | None) -> int:
         if len({*stems}) == len(stems) and all(
             [axis for _, axis in point] == [*axes] and len({stem for stem, _ in point}) == 1 for point in points
         ):
-            return len(points)
-    return 1
+            return tuple(stems)
+    return ()
 
 
 def _name_and_axis(channel: Channel) -> tuple[str, str]:

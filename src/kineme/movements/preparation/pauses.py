@@ -81,12 +81,7 @@ def cut_pauses(times: Array, positions: Array, offsets: NDArray[np.intp], allowa
 
 
 def _fill_shortened(
-    times: Array,
-    positions: Array,
-    offsets: NDArray[np.intp],
-    allowance: float,
-    steps: Array,
-    moving: NDArray[np.bool_],
+    times: Array, positions: Array, offsets: NDArray[np.intp], allowance: float, steps: Array, moving: NDArray[np.bool_]
 ) -> bool:
     """Write the time that each step counts, 0 after last samples, and which samples are kept; whether any changes."""
     first, last, lengths = offsets[:-1], offsets[1:] - 1, np.diff(offsets)

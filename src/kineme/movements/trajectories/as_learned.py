@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -18,7 +17,7 @@ from kineme.movements.trajectories.movements import in_coordinates, of_channels
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.units import converted
 
-_SELECT = "select the dimensions by columns= of read_recordings, in the shell --columns"
+_SELECT = "select the dimensions by --columns in the shell, by columns= of read_recordings in Python"
 _SAY = (
     "choose the columns by columns= and say what they are by kinds= of read_recordings, in the shell --columns and "
     "--kind"
@@ -41,12 +40,14 @@ def as_learned(
 
     `what` they are called in messages.
     """
-    if isinstance(movements, (list, tuple)) and _of_several_channels(movements):
+    several = movements if isinstance(movements, (list, tuple)) else ()
+    every = {id(channels): channels for channels in (getattr(movement, "channels", None) for movement in several)}
+    if len({*every.values()}) > 1:  # of all movements together nothing would be known
 
         def convert(movement: Any) -> Demonstrations:
             return as_learned(movement if hasattr(movement, "demonstrations") else [movement], learned, n_dims, what)
 
-        return Demonstrations(one_by_one(movements, convert))
+        return Demonstrations(one_by_one(several, convert))
     demos = Demonstrations.of(movements)
     if demos.channels is not None:
         return _of_kinds(demos, learned, n_dims, what)
@@ -55,12 +56,6 @@ def as_learned(
     if demos.n_dims != n_dims:
         raise TrajectoryError(_of_width(demos, learned, n_dims, what))
     return demos
-
-
-def _of_several_channels(movements: Sequence[Any]) -> bool:
-    """Tell whether channels differ in a list: of all its movements together nothing would be known."""
-    every = {id(channels): channels for channels in (getattr(movement, "channels", None) for movement in movements)}
-    return len(every) > 1 and len({*every.values()}) > 1
 
 
 def _of_kinds(demos: Demonstrations, learned: Channels | None, n_dims: int, what: str) -> Demonstrations:
@@ -92,7 +87,7 @@ def _of_width(demos: Demonstrations, learned: Channels | None, n_dims: int, what
     """Say what is wrong with movements of another width."""
     if learned is None or is_plain(learned):
         learned_of = "" if learned is None else f", where those that were learned are {in_words(learned)}"
-        return f"expected {what} of {n_dims} dimensions as in fit, got {demos.n_dims}{learned_of}; {_SELECT}"
+        return f"expected {what} of {n_dims} dimensions as learned, got {demos.n_dims}{learned_of}; {_SELECT}"
     return (
         f"expected {what} of {len(recorded_names(learned))} columns, {in_words(learned)}, or of the {n_dims} "
         f"coordinates that are learned of them, got {demos.n_dims} columns; {_SELECT}"

@@ -172,6 +172,9 @@ def _from_block(block: NDArray[Any], copy: bool) -> tuple[Array, NDArray[np.intp
 
 def _from_list(given: Sequence[ArrayLike], names: Sequence[str | None] | None) -> tuple[Array, NDArray[np.intp]]:
     arrays: list[Any] = list(given)
+    for array in arrays:
+        if isinstance(array, (str, PurePath)):
+            raise TrajectoryError(f"expected movements as (T, d) arrays, got {array!r}{_instead_of(array)}")
     names_of_arrays = tuple(names) if names is not None and len(names) == len(arrays) else None
     if not _are_plain(arrays, 2) or min(map(len, arrays)) < MIN_SAMPLES or not min(map(attrgetter("size"), arrays)):
         arrays = _check_each(as_positions, (arrays,), names_of_arrays)

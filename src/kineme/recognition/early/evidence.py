@@ -61,9 +61,9 @@ def describe_begun(
     `wholes` are the same paths with their pauses cut as those of whole movements are, and in detail, see
     `ComparisonSpecification.detailed_cutoff`.
     """
-    prefixes = beginnings(paths, _WHOLE)
+    prefixes = beginnings(paths, _WHOLE, over_time=stored.are_signals)
     shift = 0.0 if stored.comparison.normalization.translation else starts[:, :, None]
-    described = describe_prefixes(prefixes, stored.procrustes)
+    described = describe_prefixes(prefixes, stored.procrustes, signals=stored.are_signals)
     return Begun(prefixes, described, wholes[0] + shift, wholes[1] + shift, durations)
 
 

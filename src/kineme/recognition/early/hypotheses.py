@@ -26,14 +26,14 @@ from kineme.similarity.similarity import SHARE, beginning_widths
 from kineme.similarity.specification import PAIR_QUANTITIES
 from kineme.validation import Array, check_count, check_number
 
-N_PREFIX = ElasticSpec().n_segments + 1  # samples along the arc length of a beginning: the ends of segments
+N_PREFIX = ElasticSpec().n_segments + 1  # samples of a beginning: the ends of segments
 LAST = 0.02  # share of a beginning's time in which the speed at its end is measured
 LEAST_SPEED = 0.01  # of the mean speed
 #: Pauses count so many times as long as in whole movements, see `cut_pauses`: where somebody rests, at the start or at
 #: a corner, tells how far the movement is. With 1, beginnings are recognized less often: 0.02 of LASA's after 30 % of
 #: the path, 0.02 of digits by others after half of it.
 ALLOWANCE = 4.0
-#: What beginnings are compared by pair by pair.
+#: What beginnings are compared by pair by pair; signals by the first of these.
 _PAIRS = tuple(PAIR_QUANTITIES.index(quantity) for quantity in ("elastic", "cloud"))
 
 _LEAST_SPREAD = 0.4  # of the logarithm of the speed, where there are few movements
@@ -120,8 +120,8 @@ class Hypotheses(NamedTuple):
     durations : ndarray of shape (m,)
     prefixes : Prefixes
     described : Described
-        Positions, elastic paths and point clouds.
-    widths : ndarray of shape (3,)
+        Positions, elastic paths and, unless they are signals, point clouds.
+    widths : ndarray of shape (3,), or (2,) of signals
     log_lengths, log_durations : ndarray of shape (m * G,)
         Of the stored beginnings.
     timing_squares : ndarray of shape (m * G,)
@@ -147,6 +147,11 @@ class Hypotheses(NamedTuple):
     timing_squares: Array
     ending: Ending
     first: NDArray[np.intp]
+
+    @property
+    def are_signals(self) -> bool:
+        """True for movements of one dimension, which are compared over time; see `Representation.signal`."""
+        return are_signals(self.comparison)
 
     def log_classes(self, evidence: Array) -> Array:
         """Return logarithm of the evidence for each class (n, C), and, last, for an unknown movement: shape (n, C + 1).
@@ -178,8 +183,8 @@ def hypotheses(comparison: Comparison, references: References, early: Early) -> 
     demos = references.all_movements()
     demos = without_pauses(demos, 0, len(demos), ALLOWANCE) or demos
     paths = smooth_paths(demos, comparison.cutoff)
-    prefixes = beginnings(paths, progress)
-    described = describe_prefixes(prefixes, procrustes)
+    prefixes = beginnings(paths, progress, over_time=are_signals(comparison))
+    described = describe_prefixes(prefixes, procrustes, signals=are_signals(comparison))
     return Hypotheses(
         early,
         procrustes,
@@ -197,6 +202,11 @@ def hypotheses(comparison: Comparison, references: References, early: Early) -> 
         ending(prefixes.end_speeds.reshape(len(demos), -1)),
         references.first,
     )
+
+
+def are_signals(comparison: Comparison) -> bool:
+    """Tell whether movements are signals of one dimension, which are compared over time."""
+    return comparison.n_dims == 1 and all(representation.signal for representation in comparison.representations)
 
 
 def beginning_procrustes(procrustes: Procrustes, max_angle: float | None) -> Procrustes:
@@ -247,7 +257,7 @@ def _moments(speeds: Array) -> tuple[float, float]:
 
 
 class Prefixes(NamedTuple):
-    """G beginnings of each of n movements; S samples each, evenly spaced along their own arc length.
+    """G beginnings of each of n movements; S samples each, evenly spaced along their own arc length, or in time.
 
     Attributes
     ----------
@@ -286,44 +296,50 @@ def smoother(cutoff: float) -> Array:
     return matrix
 
 
-def beginnings(paths: Array, progress: Array) -> Prefixes:
+def beginnings(paths: Array, progress: Array, *, over_time: bool = False) -> Prefixes:
     """Describe the beginnings of smooth, evenly timed paths (n, d, T) until each share (G,) of their arc length.
 
     The path is compared along its arc length, so that hesitation does not deform it; when the samples were
-    reached is kept apart, as `timing`.
+    reached is kept apart, as `timing`. A signal has no shape but its values over time: with `over_time`, progress and
+    samples are shares of the time.
     """
     n, d, n_samples = paths.shape
-    phase = arc_length_phase(paths)
+    even, lengths = np.linspace(0.0, 1.0, n_samples), arc_length_phase(paths)
+    phase = np.broadcast_to(even, (n, n_samples)) if over_time else lengths
     shift = 2.0 * np.arange(n)[:, None, None]  # one increasing parameter for all movements
     targets = (progress[:, None] * np.linspace(0.0, 1.0, N_PREFIX) + shift).ravel()
     knots = (phase + shift[:, 0]).ravel()
     shape = (n * len(progress), N_PREFIX)
     along = np.stack([np.interp(targets, knots, paths[:, k].ravel()).reshape(shape) for k in range(d)], axis=1)
-    elapsed = np.interp(targets, knots, np.tile(np.linspace(0.0, 1.0, n_samples), n)).reshape(shape)
+    elapsed = np.interp(targets, knots, np.tile(even, n)).reshape(shape)
     chords = np.sqrt((np.diff(along, axis=2) ** 2).sum(axis=1))
     centered = along - along.mean(axis=2, keepdims=True)
     sizes = np.sqrt((centered**2).sum(axis=1).mean(axis=1))
-    even, ends = np.linspace(0.0, 1.0, n_samples), (1.0 - LAST) * elapsed[:, -1].reshape(n, -1)
-    before = np.stack([np.interp(end, even, path) for end, path in zip(ends, phase, strict=True)])
+    ends = elapsed[:, -1].reshape(n, -1)
+    before, until = (
+        np.stack([np.interp(share * end, even, length) for end, length in zip(ends, lengths, strict=True)])
+        for share in (1.0 - LAST, 1.0)
+    )
     return Prefixes(
         (centered / (_nonzero(sizes) * np.sqrt(N_PREFIX))[:, None, None]).reshape(len(along), -1),
         elapsed / (_nonzero(elapsed[:, -1:]) * np.sqrt(N_PREFIX)),
         sizes,
         chords.sum(axis=1),
         elapsed[:, -1],
-        np.asarray(np.log(np.maximum((1.0 - before / progress) / LAST, LEAST_SPEED)).ravel()),
+        np.asarray(np.log(np.maximum((1.0 - before / _nonzero(until)) / LAST, LEAST_SPEED)).ravel()),
     )
 
 
-def describe_prefixes(prefixes: Prefixes, procrustes: Procrustes) -> Described:
+def describe_prefixes(prefixes: Prefixes, procrustes: Procrustes, *, signals: bool = False) -> Described:
     """Return beginnings ready for comparison: positions sample by sample, elastic paths and point clouds pair by pair.
 
-    In single precision, which is far finer than any width.
+    In single precision, which is far finer than any width. Signals have slopes instead of tangents, and no cloud.
     """
     rows = prefixes.positions
     positions = procrustes.prepare(rows.astype(np.float32))
-    shapes = shapes_of(procrustes.mixed(math.sqrt(N_PREFIX) * rows.reshape(len(rows), -1, N_PREFIX)))
-    return Described((positions,), procrustes, pairs=Pairs(positions, shapes, _PAIRS))
+    paths = procrustes.mixed(math.sqrt(N_PREFIX) * rows.reshape(len(rows), -1, N_PREFIX))
+    pairs = Pairs(positions, shapes_of(paths, slopes=signals), _PAIRS[:1] if signals else _PAIRS)
+    return Described((positions,), procrustes, pairs=pairs)
 
 
 def _nonzero(values: Array) -> Array:

@@ -126,11 +126,7 @@ class LiveState(NamedTuple):
             "label": None if self.label is None else str(self.label),
             "certainty": self.certainty,
             "ranked": [
-                {
-                    "label": str(guess.label),
-                    "confidence": guess.confidence,
-                    "probability": self._probability(guess),
-                }
+                {"label": str(guess.label), "confidence": guess.confidence, "probability": self._probability(guess)}
                 for guess in self.ranked[:top]
             ],
             "unknown": unknown,

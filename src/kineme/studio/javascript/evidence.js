@@ -80,7 +80,7 @@ export function logEvidence(stored, begun, whole, start, duration) {
   } = header;
   const [G, S, prefixes, numbers] = [early.n_progress, stored.S, stored.prefixes, early.numbers];
   const priors = logPriors(stored, begun, duration);
-  const [w0, w1, w2] = early.widths.map((width) => 2 * width * width);
+  const [w0, ...pairs] = early.widths.map((width) => 2 * width * width);
   const compare = (h, R) => {
     const norms = Math.sqrt(begun.squares[0] * prefixes.squares[h]);
     return align(early.rule, begun.rows, 0, prefixes.rows, h * d * S, S, norms, R);
@@ -91,14 +91,14 @@ export function logEvidence(stored, begun, whole, start, duration) {
   });
   const odds = logOdds(early, begun.endSpeeds[0]);
   const evidence = new Float64Array(rough.length).fill(-Infinity);
-  const measure = pairDistances(early.shapes, d, begun.shapes);
-  const [R, squares] = [new Float64Array(d * d), new Float64Array(3)];
+  const [measure, R] = [pairDistances(early.shapes, d, begun.shapes), new Float64Array(d * d)];
+  const squares = new Float64Array(3);
   for (const h of choose(rough, first, G, numbers.compared)) {
     compare(h, R);
     for (let k = 0; k < d * d; k++) R[k] = Math.fround(R[k]);
     measure(prefixes.shapes, h, R, squares);
-    const near = logSumExp([-squares[0] / w1, -squares[2] / w2]) - Math.LN2 + logRotation(early, R);
-    evidence[h] = near + priors[h] - logSumExp([0, odds]);
+    const logs = pairs.map((w, k) => -squares[2 * k] / w); // of the elastic path, and of the cloud except for signals
+    evidence[h] = logSumExp(logs) - Math.log(logs.length) + logRotation(early, R) + priors[h] - logSumExp([0, odds]);
   }
   addOver(
     stored,

@@ -17,11 +17,11 @@ import { arcLengthPhase } from "./preparation.js";
  */
 
 /**
- * The beginnings of paths (n, d, N_POINTS) until each share of their arc length; `numbers.last` is the share of a
- * beginning's time in which the speed at its end is measured.
+ * The beginnings of paths (n, d, N_POINTS) until each share of their arc length, of signals of their time;
+ * `numbers.last` is the share of a beginning's time in which the speed at its end is measured.
  * @returns {Prefixes}
  */
-export function beginnings(paths, d, progress, { shapes: how, numbers }) {
+export function beginnings(paths, d, progress, { shapes: how, numbers, signals }) {
   const [S, G, n] = [how.n_segments + 1, progress.length, paths.length / (d * N_POINTS)];
   const room = (size) => new Float64Array(n * G * size);
   const [squares, sizes, lengths, elapsed, endSpeeds] = [1, 1, 1, 1, 1].map(room);
@@ -30,7 +30,8 @@ export function beginnings(paths, d, progress, { shapes: how, numbers }) {
   const even = linspace(0, 1, N_POINTS);
   for (let i = 0; i < n; i++) {
     const path = paths.subarray(i * d * N_POINTS, (i + 1) * d * N_POINTS);
-    const phase = arcLengthPhase(path, d);
+    const lengths = arcLengthPhase(path, d);
+    const phase = signals ? even : lengths;
     for (let g = 0; g < G; g++) {
       const at = i * G + g;
       const targets = linspace(0, progress[g], S);
@@ -38,16 +39,16 @@ export function beginnings(paths, d, progress, { shapes: how, numbers }) {
       const own = new Float64Array(d * S);
       for (let k = 0; k < d; k++)
         own.set(interpolate(targets, phase, path.subarray(k * N_POINTS, (k + 1) * N_POINTS)), k * S);
-      describeBeginning(prefixes, at, own, times, d, S);
-      const before = interpolate([(1 - numbers.last) * times[S - 1]], even, phase)[0];
-      endSpeeds[at] = Math.log(Math.max((1 - before / progress[g]) / numbers.last, numbers.least_speed));
+      describeBeginning(prefixes, at, own, times, d, S, signals);
+      const [before, until] = interpolate([(1 - numbers.last) * times[S - 1], times[S - 1]], even, lengths);
+      endSpeeds[at] = Math.log(Math.max((1 - before / (until || 1)) / numbers.last, numbers.least_speed));
     }
   }
   return prefixes;
 }
 
 /** Write beginning number `at` with its samples (d, S) and their times. */
-function describeBeginning(prefixes, at, own, times, d, S) {
+function describeBeginning(prefixes, at, own, times, d, S, signals) {
   for (let t = 1; t < S; t++) {
     let square = 0;
     for (let k = 0; k < d; k++) square += (own[k * S + t] - own[k * S + t - 1]) ** 2;
@@ -70,7 +71,7 @@ function describeBeginning(prefixes, at, own, times, d, S) {
   prefixes.squares[at] = product(single, 0, single, 0, d * S);
   prefixes.elapsed[at] = times[S - 1];
   for (let t = 0; t < S; t++) prefixes.timing[at * S + t] = times[t] / ((times[S - 1] || 1) * Math.sqrt(S));
-  fillShapes(own, d, prefixes.shapes, at, Math.sqrt(S));
+  fillShapes(own, d, prefixes.shapes, at, Math.sqrt(S), signals);
 }
 
 /**
@@ -82,8 +83,7 @@ export function hypotheses(recognizer) {
   const { early, comparison, n_movements: m } = header;
   const G = early.n_progress;
   const progress = Float64Array.from({ length: G }, (_, g) => (g + 1) / G);
-  const size = comparison.n_dims * N_POINTS;
-  const paths = arrays.paths.slice();
+  const [size, paths] = [comparison.n_dims * N_POINTS, arrays.paths.slice()];
   arrays["early movements"].forEach((i, k) => {
     paths.set(arrays["early paths"].subarray(k * size, (k + 1) * size), i * size);
   });

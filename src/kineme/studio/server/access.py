@@ -135,9 +135,9 @@ def _with_headers(send: Send, scope: Scope, host: str) -> Send:
     framed = scope["path"] == _FRAMED
     socket_of = f"ws://{host} wss://{host}" if all(mark.isalnum() or mark in ".-:[]" for mark in host) else ""
     policy = (
-        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; font-src 'self'; "
-        f"connect-src 'self' {socket_of}; frame-src 'self'; manifest-src 'self'; base-uri 'none'; form-action 'none'; "
-        f"frame-ancestors {chr(39)}{'self' if framed else 'none'}{chr(39)}"
+        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; media-src 'self'; "
+        f"font-src 'self'; connect-src 'self' {socket_of}; frame-src 'self'; manifest-src 'self'; base-uri 'none'; "
+        f"form-action 'none'; frame-ancestors {chr(39)}{'self' if framed else 'none'}{chr(39)}"
     )
     added = [
         (b"content-security-policy", policy.encode("latin-1")),

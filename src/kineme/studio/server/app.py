@@ -19,6 +19,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from kineme.studio.server import (
     change_routes,
+    episode_routes,
     library_routes,
     live_socket,
     recording_routes,
@@ -104,21 +105,29 @@ ROUTERS = (
     rollout_routes.router,
     change_routes.proposal_router,
     recording_routes.router,
+    episode_routes.router,
     robot_routes.router,
     live_socket.router,
 )
 
 
 def create_app(
-    folder: str | Path, token: str, *, once: str = "", read_only: bool = False, hosts: tuple[str, ...] = ()
+    folder: str | Path,
+    token: str,
+    *,
+    once: str = "",
+    read_only: bool = False,
+    hosts: tuple[str, ...] = (),
+    recordings: str | Path | None = None,
 ) -> FastAPI:
     """The studio of one library, for any ASGI server; the library is made if there is none, unless read only.
 
     Every request must know the token, as a cookie or as ``Authorization: Bearer``; ``/?token=...`` sets the cookie, and
     ``/?once=...`` sets it one time. The hosts are names beside those of the loopback under which it may be asked; with
-    one, every address too. Read only, it refuses every change.
+    one, every address too. Read only, it refuses every change. The path `recordings` is a data set or are files whose
+    episodes it shows.
     """
-    studio = Studio(Path(folder), read_only)
+    studio = Studio(Path(folder), read_only, None if recordings is None else Path(recordings))
     app = StudioApp(
         title="kineme studio",
         version=version("kineme"),

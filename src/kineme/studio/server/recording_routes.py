@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Header, Request
@@ -14,10 +13,8 @@ from kineme.io.reading.merge_files import Recordings
 from kineme.io.reading.read_labels import LabelRow, LabelTable, labeled_pieces
 from kineme.library.annotate import annotate
 from kineme.library.learn import learn_recordings
-from kineme.movements.channels.channel import recorded_names
-from kineme.movements.trajectories.movements import axis_names
-from kineme.sampling import evenly_spaced
 from kineme.studio.server import records
+from kineme.studio.server.opened import columns_of, movement_of
 from kineme.studio.server.refusals import in_studio_words
 from kineme.studio.server.studio import Reads, Studio, Work, Writes, while_wanted
 from kineme.studio.server.uploads import go_on
@@ -58,7 +55,7 @@ class ColumnOut(BaseModel):
 
 
 class PlotOut(BaseModel):
-    """Columns over time, at most 1,000 samples of each."""
+    """Columns over time, thinned: of each stretch the least and the greatest value."""
 
     times: list[float]
     columns: list[ColumnOut]
@@ -96,6 +93,7 @@ class SpannedOut(RestOut):
 
     label: str | None
     p: float | None
+    confidence: float | None
 
 
 class SpottedOut(BaseModel):
@@ -113,7 +111,7 @@ class SearchedOut(BaseModel):
 
 router = APIRouter(prefix="/api/recordings", tags=["recordings"])
 
-_PLOTTED = 1000  # samples of a column
+_PLOTTED = 1000  # samples of a column, at most
 
 
 @router.post(
@@ -136,9 +134,9 @@ async def send(
         read = await while_wanted(request, studio.long, work, lambda: studio.uploads.recordings(key, check=work.check))
     return {
         "recording": key,
-        "tables": [_table(read, k) for k in range(len(read))],
+        "tables": [table_of(read, k) for k in range(len(read))],
         "problems": [in_studio_words(str(problem)) for problem in read.problems],
-        "plots": [_plot(read, k) for k in range(len(read))],
+        "plots": [plot_of(read, k) for k in range(len(read))],
     }
 
 
@@ -158,7 +156,10 @@ async def spotted(studio: Reads, request: Request, key: records.RecordingKey, bo
         if report.problems:
             raise SpecificationError(report.problems[0].what)
         spans = [
-            {"begin": each.span[0], "end": each.span[1], "label": each.symbol, "p": records.numbers(each.p_value)}
+            {
+                **{"begin": each.span[0], "end": each.span[1], "label": each.symbol},
+                **{"p": records.numbers(each.p_value), "confidence": records.numbers(each.confidence)},
+            }
             for each in report.annotations
         ]
         ends = [0.0, *(span["end"] for span in spans)]
@@ -189,18 +190,25 @@ def learn(studio: Writes, key: records.RecordingKey, body: LearnRequest) -> dict
     else:
         rows = (LabelRow(span.begin, span.end, span.label, "", "", k + 1) for k, span in enumerate(body.spans))
         pieces = labeled_pieces(_one(studio, key, body), LabelTable("of the spans", tuple(rows), True))
-    columns = _columns_of(studio.uploads.recordings(key), body.channels) if body.channels else None
+    columns = _columns_of(_read(studio, key), body.channels) if body.channels else None
     report = learn_recordings(studio.library.store, pieces, {"columns": columns})
     return {"ids": report.ids.tolist(), "version": report.version}
 
 
+def _read(studio: Studio, key: str, columns: Sequence[str] = (), check: Callable[[], object] = go_on) -> Recordings:
+    """Read a file that was sent, or an episode of what was opened, in these columns or in those that are found."""
+    if studio.opened is not None and key in studio.opened:
+        return studio.opened.recordings(key, columns)
+    return studio.uploads.recordings(key, columns, check)
+
+
 def _in_columns(studio: Studio, key: str, body: ChannelChoice, check: Callable[[], object] = go_on) -> Recordings:
     """Read all tables of a file, in the columns that are asked for, or those of the library where it has them."""
-    read = studio.uploads.recordings(key, check=check)
-    ours = () if studio.library.channels is None else recorded_names(studio.library.channels)
-    wanted = _columns_of(read, body.channels) if body.channels else list(ours)
-    if wanted != _columns(read) and (body.channels or (ours and set(ours) <= set(_columns(read)))):
-        read = studio.uploads.recordings(key, wanted, check)
+    read = _read(studio, key, check=check)
+    ours = [column for channel in studio.library.channels or () for column in channel.columns]
+    wanted = _columns_of(read, body.channels) if body.channels else ours
+    if wanted != columns_of(read) and (body.channels or (ours and set(ours) <= set(columns_of(read)))):
+        read = _read(studio, key, wanted, check)
     return read
 
 
@@ -211,16 +219,11 @@ def _one(studio: Studio, key: str, body: ChannelChoice, check: Callable[[], obje
     k = 0 if table is None else names.index(table) if table in names else -1
     if k < 0:
         raise SpecificationError(f"expected one of the tables {', '.join(names[:20])}, got {table!r}")
-    return replace(read, demonstrations=read.demonstrations[k : k + 1], sources=read.sources[k : k + 1])
+    return movement_of(read, k)
 
 
 def _name(read: Recordings, k: int) -> str:
     return read.sources[k].place or read.sources[k].path
-
-
-def _columns(read: Recordings) -> list[str]:
-    demos = read.demonstrations
-    return list(axis_names(demos.n_dims) if demos.channels is None else recorded_names(demos.channels))
 
 
 def _columns_of(read: Recordings, names: Sequence[str]) -> list[str]:
@@ -229,12 +232,11 @@ def _columns_of(read: Recordings, names: Sequence[str]) -> list[str]:
     return [column for name in names for column in columns.get(name, (name,))]
 
 
-def _table(read: Recordings, k: int) -> dict[str, Any]:
+def table_of(read: Recordings, k: int) -> dict[str, Any]:
+    """Describe a recording of a file."""
     demos, duration = read.demonstrations, float(read.demonstrations.durations[k])
     n = int(demos.offsets[k + 1] - demos.offsets[k])
-    channels = [
-        {"name": name, "kind": "position", "columns": [name], "unit": None} for name in axis_names(demos.n_dims)
-    ]
+    channels = [{"name": name, "kind": "position", "columns": [name], "unit": None} for name in columns_of(read)]
     if demos.channels is not None:
         channels = [channel._asdict() for channel in demos.channels]
     return {
@@ -247,12 +249,9 @@ def _table(read: Recordings, k: int) -> dict[str, Any]:
     }
 
 
-def _plot(read: Recordings, k: int) -> dict[str, Any]:
-    """Take at most 1,000 samples of each column, over seconds since the first one."""
+def plot_of(read: Recordings, k: int, width: int = _PLOTTED // 2) -> dict[str, Any]:
+    """Return its columns over seconds since the first sample, at most 2 `width` samples of each."""
     demos = read.demonstrations
     rows = slice(demos.offsets[k], demos.offsets[k + 1])
     values = (demos.positions if demos.channels is None else demos.recorded)[rows]
-    times = demos.movements.stamps[rows]
-    shown = evenly_spaced(len(times), _PLOTTED)
-    columns = [{"name": name, "values": records.numbers(values[shown, j])} for j, name in enumerate(_columns(read))]
-    return {"times": records.numbers(times[shown] - times[0]), "columns": columns}
+    return records.plot(demos.movements.stamps[rows], values, columns_of(read), width)

@@ -47,6 +47,7 @@ class Options(NamedTuple):
     host: str = LOOPBACK
     port: int | None = None
     read_only: bool = False
+    recordings: Path | None = None  # what is shown of episodes
 
 
 def serve(options: Options, ready: Callable[[str, str], object]) -> None:
@@ -70,7 +71,8 @@ def serve(options: Options, ready: Callable[[str, str], object]) -> None:
     token, once = _token(), secrets.token_urlsafe(24)
     with closing(_listening(options)) as listening:
         hosts = () if is_loopback(options.host) else own_names(options.host)
-        config = config_of(create_app(options.folder, token, once=once, read_only=options.read_only, hosts=hosts))
+        how: dict[str, Any] = {"read_only": options.read_only, "recordings": options.recordings}
+        config = config_of(create_app(options.folder, token, once=once, hosts=hosts, **how))
         address = f"http://{_name(options.host)}:{listening.getsockname()[1]}/"
         studio = config.app.state.studio
 

@@ -19,6 +19,7 @@ from kineme.errors import KinemeError
 from kineme.library.library import ActionLibrary
 from kineme.library.storage.symbols import Symbol
 from kineme.recognition.early.stream import Live
+from kineme.studio.server.opened import OpenedRecordings
 from kineme.studio.server.refusals import ConflictError, MissingError, StoppedError
 from kineme.studio.server.uploads import Uploads
 from kineme.studio.snapshot import DRAWN
@@ -45,16 +46,19 @@ class LibraryView(NamedTuple):
 class Studio:
     """An open library and what its clients share; any thread may use it.
 
-    The folder is that of the library, which is made where there is none; read only, every change is refused.
+    The folder is that of the library, which is made where there is none; read only, every change is refused. Of other
+    files than the library's only those below the path `recordings` are read, which no client names.
     """
 
-    def __init__(self, folder: Path, read_only: bool = False) -> None:
+    def __init__(self, folder: Path, read_only: bool = False, recordings: Path | None = None) -> None:
         self.read_only = read_only
+        self.opened = None if recordings is None else OpenedRecordings(recordings)
         self.library = ActionLibrary(folder, create=not read_only, read_only=read_only)
         self.uploads = Uploads()
         self.writers = asyncio.Semaphore(_WRITERS)
         self.live = ThreadPoolExecutor(max(2, os.cpu_count() or 1), "kineme-live")
         self.long = ThreadPoolExecutor(_LONG, "kineme-long")
+        self.reader = ThreadPoolExecutor(1, "kineme-episodes")
         self.works = Works()
         self.warm = -1  # the version of the library that recognition is prepared for
         self._warming: list[Thread] = []
@@ -66,14 +70,18 @@ class Studio:
     def close(self) -> None:
         """Close the library, once no thread reads or writes it, and delete what was sent."""
         self.works.close()
-        for pool in (self.live, self.long):
+        for pool in (self.live, self.long, self.reader):
             pool.shutdown(wait=False, cancel_futures=True)
         self.library.close()
         self.uploads.close()
 
+    async def reading(self, act: Callable[..., Result], *arguments: object) -> Result:
+        """Return the result of `act`, which reads episodes; those who wait for the disk hold no thread of requests."""
+        return await asyncio.get_running_loop().run_in_executor(self.reader, act, *arguments)
+
     def join(self) -> None:
         """Wait for what its threads still compute, after it is closed; the threads that they share end with them."""
-        for pool in (self.live, self.long):
+        for pool in (self.live, self.long, self.reader):
             pool.shutdown()
         for thread in self._warming:
             thread.join()

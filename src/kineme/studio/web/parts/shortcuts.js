@@ -9,10 +9,11 @@ const KEYS = [
   ["Ctrl Z", "undo the last change of the library; in Move, the last change of a point or the duration"],
   ["Esc", "clear the drawing"],
   ["Enter", "learn the drawing under the name in the field; on the map, open the symbol"],
-  ["Space", "in the drawing area: pen down, pen up; in Move: play; in Robot: play and pause"],
-  ["← ↑ → ↓", "move the pen, the point or the boundary in focus; turn a view in space"],
+  ["Space", "in the drawing area: pen down, pen up; in Move: play; in Recordings and Robot: play and pause"],
+  ["← ↑ → ↓", "move the pen, the point, the boundary or the playhead in focus; turn a view in space"],
   ["Shift ← ↑ → ↓", "the same, ten times as far"],
   ["+ −", "in a recording, show less of the time or more"],
+  ["↑ ↓", "in a recording, from span to span, and Enter names one; in a list of episodes, from one to the next"],
   ["Delete", "remove the via point or obstacle in focus"],
   ["?", "this list"],
 ];

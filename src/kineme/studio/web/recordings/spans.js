@@ -1,6 +1,8 @@
 // What was found, as a table: times and names can be typed, a row can be removed.
 import { byId, fill, keepingFocus, make } from "../parts/elements.js";
 
+const BY_HAND = { p: null, confidence: null }; // they were of what was found
+
 /** @param {any[]} spans @param {number} chosen @param {{choose: (k: number) => void, changed: () => void}} page */
 export function showSpans(spans, chosen, page) {
   const time = (/** @type {any} */ span, /** @type {number} */ k, /** @type {"begin"|"end"} */ which) => {
@@ -13,7 +15,7 @@ export function showSpans(spans, chosen, page) {
     });
     field.value = span[which].toFixed(2);
     field.addEventListener("change", () => {
-      if (Number.isFinite(field.valueAsNumber)) span[which] = field.valueAsNumber;
+      if (Number.isFinite(field.valueAsNumber)) Object.assign(span, { [which]: field.valueAsNumber, ...BY_HAND });
       page.changed();
     });
     return field;
@@ -30,7 +32,7 @@ export function showSpans(spans, chosen, page) {
     });
     field.value = span.label ?? "";
     field.addEventListener("change", () => {
-      span.label = field.value.trim() || null;
+      Object.assign(span, { label: field.value.trim() || null, ...BY_HAND });
       page.changed();
     });
     return field;

@@ -2,17 +2,27 @@
 import { Board, color } from "../parts/canvas.js";
 import { drag } from "../parts/dragging.js";
 import { byId, make } from "../parts/elements.js";
-import { line, readableOn } from "../parts/lines.js";
-import { COLORS, lookOf, symbolNamed } from "../parts/library_state.js";
+import { COLORS } from "../parts/library_state.js";
+import { readableOn } from "../parts/lines.js";
+import { signal } from "./signal.js";
+import { colorOf } from "./strip.js";
 
 const BAND = 40; // height of the spans [px]
 const SIDE = 12;
 const AXIS = 22;
 
-/** @typedef {{begin: number, end: number, label: string|null, p: number|null}} Span */
+/** @typedef {{begin: number, end: number, label: string|null, p: number|null, confidence?: number|null}} Span */
+
+/**
+ * @typedef {Object} Page
+ * @property {(k: number) => void} choose
+ * @property {() => void} changed By the person.
+ * @property {(time: number) => void} seek
+ * @property {(event: KeyboardEvent) => void} key For the playhead.
+ */
 
 export class Timeline {
-  /** @param {{choose: (k: number) => void, changed: () => void}} page */
+  /** @param {Page} page */
   constructor(page) {
     this.page = page;
     this.plot = { times: [0, 1], columns: [] };
@@ -20,7 +30,10 @@ export class Timeline {
     this.spans = [];
     this.chosen = -1;
     this.range = [0, 1];
+    this.head = 0; // where the playhead is [s]
     this.board = new Board(byId("timeline-canvas"), () => this.paint());
+    this.playhead = make("div", { class: "playhead", "aria-hidden": "true" });
+    byId("edges").append(this.playhead);
     this.edges = ["begin", "end"].map((which) => this.edge(/** @type {"begin"|"end"} */ (which)));
     this.board.canvas.addEventListener("pointerdown", (event) => this.grab(event));
     this.board.canvas.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
@@ -50,29 +63,21 @@ export class Timeline {
     const { context, height } = this.board;
     const lane = height - BAND - AXIS - 12;
     for (const [k, span] of this.spans.entries()) this.paintSpan(span, k);
+    const x = this.plot.times.map((/** @type {number} */ time) => this.x(time));
     this.plot.columns.forEach((/** @type {any} */ column, /** @type {number} */ k) => {
-      const low = Math.min(...column.values);
-      const span = Math.max(...column.values) - low || 1;
-      const points = this.plot.times.map((/** @type {number} */ t, /** @type {number} */ i) => [
-        this.x(t),
-        8 + lane * (1 - (column.values[i] - low) / span),
-      ]);
-      line(
-        context,
-        points.filter(([x]) => x > -50 && x < this.board.width + 50),
-        { color: color(column.color ?? COLORS[k % COLORS.length]), width: 1.7 },
-      );
+      const look = { color: color(column.color ?? COLORS[k % COLORS.length]), width: 1.4 };
+      signal(context, x, column.values, [8, 8 + lane], look);
     });
     this.paintAxis();
     this.placeEdges();
+    this.placeHead();
   }
 
   /** @param {Span} span @param {number} k */
   paintSpan(span, k) {
     const { context, height } = this.board;
     const [x, w] = [this.x(span.begin), Math.max(this.x(span.end) - this.x(span.begin), 2)];
-    const symbol = span.label === null ? null : symbolNamed(span.label);
-    const paint = color(symbol ? lookOf(symbol.id).color : "--gray");
+    const paint = colorOf(span.label);
     const top = height - BAND - AXIS;
     Object.assign(context, { fillStyle: paint, strokeStyle: paint, globalAlpha: k === this.chosen ? 0.2 : 0.09 });
     context.fillRect(x, 0, w, top);
@@ -144,7 +149,20 @@ export class Timeline {
       which === "begin"
         ? Math.min(Math.max(time, this.extent[0]), span.end - least)
         : Math.max(Math.min(time, this.extent[1]), span.begin + least);
+    span.p = span.confidence = null; // they were of what was found
     this.board.now();
+  }
+
+  /** Move the playhead. @param {number} time */
+  goTo(time) {
+    this.head = time;
+    this.placeHead();
+  }
+
+  placeHead() {
+    const x = this.x(this.head);
+    this.playhead.hidden = x < 0 || x > this.board.width;
+    this.playhead.style.setProperty("--x", `${x}px`);
   }
 
   placeEdges() {
@@ -173,7 +191,9 @@ export class Timeline {
     const hit = this.spans.findIndex((span) => span.begin <= at && at <= span.end);
     const go = (/** @type {PointerEvent} */ now) =>
       this.pan((-now.movementX / (this.board.width - 2 * SIDE)) * (this.range[1] - this.range[0]));
-    if (drag(this.board.canvas, event, go)) this.page.choose(hit);
+    if (!drag(this.board.canvas, event, go)) return;
+    this.page.choose(hit);
+    this.page.seek(at);
   }
 
   pan(/** @type {number} */ by) {
@@ -206,11 +226,13 @@ export class Timeline {
   key(event) {
     if (event.key === "+" || event.key === "=") this.zoom(0.7);
     else if (event.key === "-") this.zoom(1 / 0.7);
-    else if (event.key === "ArrowLeft" || event.key === "ArrowRight")
+    else if (event.key === "ArrowUp" || event.key === "ArrowDown")
       this.page.choose(
-        Math.min(Math.max(this.chosen + (event.key === "ArrowRight" ? 1 : -1), 0), this.spans.length - 1),
+        Math.min(Math.max(this.chosen + (event.key === "ArrowDown" ? 1 : -1), 0), this.spans.length - 1),
       );
-    else return;
+    else if (event.key === "Enter" && this.chosen >= 0)
+      /** @type {HTMLElement} */ (document.querySelector(`[data-key="span ${this.chosen} name"]`))?.focus();
+    else return this.page.key(event);
     event.preventDefault();
   }
 }

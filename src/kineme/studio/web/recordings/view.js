@@ -3,23 +3,52 @@ import { get, post } from "../parts/api.js";
 import { learnSpans } from "../parts/changes.js";
 import { byId, counted, fill, make } from "../parts/elements.js";
 import { COLORS, library, onLibrary } from "../parts/library_state.js";
+import { ask } from "../parts/dialogs.js";
 import { tried } from "../parts/toasts.js";
 import { startDropping } from "./dropping.js";
+import { Episodes } from "./episodes.js";
 import { columnCount, fitting, mismatch } from "./fitting.js";
+import { Player } from "./player.js";
 import { markRow, showSpans } from "./spans.js";
 import { Timeline } from "./timeline.js";
 
 const SHORT = 10; // a recording of one movement [s]
 const ASKED = 400; // how often it is asked how much is searched [ms]
 
+/** What an episode is called above its signals. @param {any} episode */
+const nameOf = ({ number, task, place }) => `Episode ${number}: ${task ?? place}`;
+
+/**
+ * Names of the channels that are chosen at first: of an episode those of the library, or of its first feature.
+ * @param {any} recording @param {any} table @returns {Set<string>}
+ */
+const chosenOf = ({ chosen }, { channels }) => {
+  const named = (/** @type {string[]} */ names) =>
+    channels.filter((/** @type {any} */ channel) => names.includes(channel.name));
+  const ours = (library().channels ?? []).map((/** @type {any} */ channel) => channel.name);
+  const own = !chosen ? channels : ours.length && named(ours).length === ours.length ? named(ours) : named(chosen);
+  const fits = !library().symbols.length || !mismatch(own, library());
+  return fitting(chosen && fits ? own : channels, library());
+};
+
 class Recordings {
   constructor() {
     this.read = null;
     /** @type {AbortController|null} Of the search that is under way. */
     this.search = null;
-    const page = { choose: (/** @type {number} */ k) => this.choose(k), changed: () => this.changed() };
-    this.page = page;
-    this.timeline = new Timeline(page);
+    this.page = {
+      choose: (/** @type {number} */ k) => this.choose(k),
+      changed: () => this.corrected(),
+      seek: (/** @type {number} */ time) => this.player.seek(time),
+      key: (/** @type {KeyboardEvent} */ event) => this.player.key(event),
+    };
+    this.timeline = new Timeline(this.page);
+    this.player = new Player((time) => this.timeline.goTo(time));
+    this.episodes = new Episodes({
+      open: (detail) => this.open(detail, nameOf(detail.episode)),
+      channels: (detail) => [...chosenOf(detail, detail.tables[0])],
+      spotted: (key, spans) => key === this.read?.recording && this.spotted(spans),
+    });
     startDropping((recording, name) => this.open(recording, name));
     byId("spot").addEventListener("click", () => (this.search ? this.search.abort() : this.spot()));
     byId("add-span").addEventListener("click", () => this.add());
@@ -52,6 +81,7 @@ class Recordings {
         make("option", { value: String(k) }, table.name),
       ),
     );
+    byId("tables-part").hidden = recording.tables.length < 2;
     const labeled = recording.tables.filter((/** @type {any} */ table) => table.label !== null);
     const labels = [...new Set(labeled.map((/** @type {any} */ table) => table.label))].slice(0, 8).join(", ");
     byId("learn-file").hidden = recording.tables.length < 2 || !labeled.length;
@@ -62,7 +92,8 @@ class Recordings {
       ...recording.problems.map((/** @type {string} */ problem) => make("p", { class: "small" }, problem)),
     );
     this.table();
-    byId("spot").focus({ preventScroll: true });
+    byId(recording.episode ? "timeline-canvas" : "spot").focus({ preventScroll: true });
+    if (recording.episode) byId("recording").scrollIntoView({ block: "start" });
   }
 
   /** Another table, of this file or of a new one: what is still searched for is about the one before. */
@@ -74,7 +105,7 @@ class Recordings {
     const rate = table.rate ? `, ${Math.round(table.rate)} samples a second` : "";
     byId("recording-facts").textContent =
       `${table.duration.toFixed(1)} s, ${counted(table.channels.length, "channel")}${rate}`;
-    const chosen = fitting(table.channels, library());
+    const chosen = chosenOf(this.read, table);
     const box = (/** @type {any} */ channel, /** @type {number} */ k) => {
       const key = make("span", { class: "key" });
       key.style.borderColor = `var(${COLORS[columnCount(table.channels.slice(0, k)) % COLORS.length]})`;
@@ -93,8 +124,10 @@ class Recordings {
     };
     fill(byId("channels"), make("legend", {}, "Channels"), ...table.channels.map(box));
     this.timeline.spans = table.label === null ? [] : [{ begin: 0, end: table.duration, label: table.label, p: null }];
+    if (this.read.episode) this.timeline.spans = this.read.episode.spans;
     this.columns();
     this.timeline.show(this.shownPlot());
+    this.player.open(table.duration, this.read.videos ?? []);
     this.changed();
   }
 
@@ -131,7 +164,14 @@ class Recordings {
   }
 
   async spot() {
-    const path = `/api/recordings/${encodeURIComponent(this.read.recording)}/spotted`;
+    const { recording, episode } = this.read;
+    const question = {
+      title: "Look again?",
+      text: "What is found takes the place of what was corrected in this episode.",
+      yes: "Look again",
+    };
+    if (episode?.corrected && !(await ask(question))) return;
+    const path = `/api/recordings/${encodeURIComponent(recording)}/spotted`;
     const search = new AbortController();
     this.search = search;
     this.allow();
@@ -141,13 +181,27 @@ class Recordings {
     clearInterval(timer);
     if (this.search === search) this.over(search.signal.aborted ? "Canceled; nothing was changed." : "");
     if (!answer || search.signal.aborted) return;
-    this.timeline.spans = answer.spans;
+    if (episode) this.episodes.put(recording, answer.spans, false);
+    this.spotted(answer.spans);
+  }
+
+  /** Show what was found. @param {any[]} spans */
+  spotted(spans) {
+    this.timeline.spans = spans;
+    if (this.read.episode) Object.assign(this.read.episode, { spans, corrected: false });
     this.choose(-1);
     this.changed();
-    const named = answer.spans.filter((/** @type {any} */ span) => span.label !== null).length;
-    const advice = answer.spans.length ? " Choose one to drag its edges." : "";
-    byId("spans-state").textContent =
-      `${counted(named, "known movement")}, ${answer.spans.length - named} unknown.${advice}`;
+    const named = spans.filter((span) => span.label !== null).length;
+    const advice = spans.length ? " Choose one to drag its edges." : "";
+    byId("spans-state").textContent = `${counted(named, "known movement")}, ${spans.length - named} unknown.${advice}`;
+  }
+
+  /** A person has changed what an episode shows: it is kept. */
+  corrected() {
+    this.changed();
+    if (!this.read?.episode) return;
+    this.read.episode.corrected = true;
+    this.episodes.put(this.read.recording, this.timeline.spans, true);
   }
 
   /** How much is searched. @param {string} path @param {AbortController} search */
@@ -169,7 +223,7 @@ class Recordings {
     const [from, to] = this.timeline.range;
     const aside = !this.timeline.spans.length && to - from < SHORT ? 0 : 0.4 * (to - from);
     this.timeline.spans.push({ begin: from + aside, end: to - aside, label: null, p: null });
-    this.changed();
+    this.corrected();
     this.choose(this.timeline.spans.length - 1);
     /** @type {HTMLElement} */ (byId("spans").querySelector("tr:last-child input[type=text]")).focus();
   }

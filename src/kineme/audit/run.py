@@ -1,0 +1,356 @@
+"""The audit of a set of episodes: measured one after the other, then compared, and said in words.
+
+Signals are read once and not kept. In memory remain some hundred numbers of each episode; ways and stretches of time
+are spooled to a temporary file.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import closing
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.audit import calibrate
+from kineme.audit.checks import CHECKS, Check
+from kineme.audit.motion import FEWEST_FRAMES, PATH, Motion, motion_of, path_of
+from kineme.errors import DataError
+from kineme.movements.episodes import Episode
+from kineme.recognition.conformal import check_error_rate
+from kineme.reporting.text import counted, first_names, shortened
+from kineme.validation import Array
+
+_IN_MEMORY = 256 * 2**20  # bytes of ways and stretches, beyond which they go to the disk
+_REASONS = 6  # of an episode, at most
+_LEAST_REASON = 3.0  # evidence: one good episode in twenty has as much, of each check
+_RANKED = 10  # episodes that are listed although nothing calibrates them
+_LONGEST = 300  # letters that are kept of the problems of an episode
+_LEAST_EVIDENCE = 0.3
+_SIDES: dict[str, Callable[[Array], Array]] = {"upper": np.positive, "lower": np.negative, "both": np.abs}
+_SHARED = 0.5  # share of the episodes beyond which a contradiction is one of the set
+
+#: Why an episode is listed -> what that promises.
+KINDS = {
+    "contradiction": "It contradicts what the data set declares: certain, whatever the others are like.",
+    "outlying": "Far beyond what the others do: of those listed, about the error rate are false alarms.",
+    "unusual": "Among the most unusual of the others: of good episodes, the error rate or less are.",
+    "ranked": "Among the most unusual of too few to say more.",
+}
+
+
+class Reason(NamedTuple):
+    """Something unusual about an episode."""
+
+    check: str
+    words: str
+    channel: str  # that it is about; empty of all
+    start: float  # [s]
+    end: float
+    evidence: float  # minus the log of the share of good episodes, about; infinite of a contradiction
+
+
+class Finding(NamedTuple):
+    """An episode that is listed."""
+
+    episode: int
+    task: str | None
+    place: str
+    seconds: float
+    kind: str  # a key of `KINDS`
+    p_value: float  # 0 of a contradiction
+    evidence: float
+    reasons: tuple[Reason, ...]  # the strongest first
+
+
+@dataclass(frozen=True, eq=False)
+class Audit:
+    """Result of `audit_episodes`.
+
+    - `numbers` (n,): indices of all episodes; `p_values`, `evidence`, `flagged` (n,) are in the same order.
+    - `error_rate`: the stated share of good episodes that are flagged by chance; `by_chance` is the number of episodes
+      that this makes here, at most. 0 where there are too few to calibrate anything.
+    - `findings`: those flagged, contradictions first, then the most unusual; where nothing is calibrated, also the
+      ten most unusual, of the kind "ranked", which are not flagged.
+    - `of_the_set`: contradictions, and remarks of the reader, that more than half of the episodes share, each a
+      sentence; they flag none.
+    """
+
+    numbers: NDArray[np.int64]
+    seconds: float
+    tasks: int
+    error_rate: float
+    by_chance: int
+    p_values: Array
+    evidence: Array
+    flagged: NDArray[np.bool_]
+    findings: tuple[Finding, ...]
+    of_the_set: tuple[str, ...]
+
+    @property
+    def calibrated(self) -> bool:
+        """Tell if there are enough episodes for the stated rate."""
+        return self.by_chance > 0
+
+
+class _Spool:
+    """Rows of float32 in the order of the episodes, in memory as long as they are small."""
+
+    def __init__(self, width: int) -> None:
+        self.width = width
+        self.file = tempfile.SpooledTemporaryFile(max_size=_IN_MEMORY)  # noqa: SIM115 - lives as long as the audit
+
+    def append(self, row: NDArray[np.float32]) -> None:
+        self.file.write(row.tobytes())
+
+    def read(self, row: int) -> NDArray[np.float32]:
+        self.file.seek(4 * row * self.width)
+        return np.frombuffer(self.file.read(4 * self.width), dtype=np.float32)
+
+
+class _Measured:
+    """All that is kept of the episodes while they are read."""
+
+    def __init__(self) -> None:
+        self.numbers: list[int] = []
+        self.seconds: list[float] = []
+        self.tasks: list[str | None] = []
+        self.places: list[str] = []
+        self.rates: list[float] = []
+        self.problems: dict[int, str] = {}
+        self.unusable: list[int] = []  # episodes without motion that can be compared
+        self.notes: list[str] = []  # on the set
+        self.remarks: Counter[str] = Counter()  # of the reader, on single episodes
+        self.names: tuple[str, ...] | None = None  # of the channels, those of the first episode that has some
+        self.sizes: list[int] = []  # values of each check
+        self.rows = bytearray()  # float32, of `sizes` values each
+        self.spool: _Spool | None = None
+
+    def add(self, episode: Episode) -> None:
+        """Measure an episode; of what belongs to none, which has a negative number, keep the problems."""
+        if episode.number < 0:
+            self.notes += [shortened(problem, _LONGEST) for problem in episode.problems]
+            return
+        at, motion, problem = len(self.numbers), motion_of(episode), "; ".join(episode.problems)
+        if motion is None:
+            problem = problem or f"has {counted(len(episode), 'frame')} of motion; at least {FEWEST_FRAMES} are needed"
+        elif self.names is None:
+            self.names = motion.names
+        elif motion.names != self.names:
+            problem = problem or f"has the channels {first_names(motion.names, 3)}; others {first_names(self.names, 3)}"
+            motion = None
+        if problem:
+            self.problems[at] = shortened(problem, _LONGEST)
+        if motion is None:
+            self.unusable.append(at)
+        self.remarks.update(episode.notes)
+        self.numbers.append(episode.number)
+        self.seconds.append(motion.seconds if motion else len(episode) / episode.fps if episode.fps > 0 else 0.0)
+        self.tasks.append(episode.task)
+        self.places.append(episode.place)
+        self.rates.append(episode.fps)
+        self._keep(motion, at)
+
+    def close(self) -> None:
+        """Remove the temporary file."""
+        if self.spool is not None:
+            self.spool.file.close()
+
+    def _keep(self, motion: Motion | None, at: int) -> None:
+        if motion is None:
+            if self.spool is not None:
+                self.rows += np.full(sum(self.sizes), np.nan, dtype=np.float32).tobytes()
+                self.spool.append(np.zeros(self.spool.width, dtype=np.float32))
+            return
+        with np.errstate(all="ignore"):  # damaged values are huge
+            measures = [check.measure(motion) for check in CHECKS if check.measure is not None]
+        if self.spool is None:
+            self.sizes = [len(measure.values) for measure in measures]
+            self.spool = _Spool(len(motion.names) * PATH + 2 * sum(self.sizes))
+            for _ in range(at):
+                self._keep(None, at)
+        self.rows += np.concatenate([measure.values for measure in measures]).astype(np.float32).tobytes()
+        spans = np.concatenate([measure.spans for measure in measures]).astype(np.float32)
+        self.spool.append(np.concatenate([path_of(motion).ravel(), spans.ravel()]))
+
+    def ways(self, rows: NDArray[np.intp]) -> Array:
+        """Return the ways (m, d, 64) of some episodes."""
+        assert self.spool is not None
+        assert self.names is not None
+        size = len(self.names) * PATH
+        chosen = [self.spool.read(int(row))[:size] for row in rows]
+        return np.array(chosen, dtype=np.float64).reshape(len(rows), len(self.names), PATH)
+
+    def stretch(self, row: int, value: int) -> tuple[float, float]:
+        """Return the stretch [s] of a value of an episode."""
+        assert self.spool is not None
+        assert self.names is not None
+        first = len(self.names) * PATH + 2 * value
+        start, end = self.spool.read(row)[first : first + 2].tolist()
+        return start, end
+
+    def values(self) -> list[Array]:
+        """Return the values (n, k) of each check that measures an episode alone."""
+        table = np.frombuffer(self.rows, dtype=np.float32).reshape(len(self.numbers), sum(self.sizes))
+        return np.split(table, np.cumsum(self.sizes)[:-1], axis=1)
+
+
+class _Compared(NamedTuple):
+    """A check over the whole set."""
+
+    check: Check
+    values: Array  # (n, k)
+    columns: NDArray[np.intp]  # (n,), the value that is the most unusual
+    evidence: Array  # (n,); of exact checks infinite where they contradict
+    first: int  # index of the stretch of its first value; -1 if it has none
+
+
+def audit_episodes(
+    episodes: Iterable[Episode], error_rate: float = 0.05, progress: Callable[[int], object] | None = None
+) -> Audit:
+    """Find the episodes of a data set that are unlike the others, or contradict it; see `kineme.audit.calibrate`.
+
+    Parameters
+    ----------
+    episodes : iterable of Episode
+        Read once, one at a time.
+    error_rate : float, default 0.05
+        Share of good episodes that may be flagged. It takes ``1 / error_rate`` episodes; with fewer, only
+        contradictions are flagged, and the others ranked.
+    progress : callable, optional
+        Called with the number of episodes that are done since the last call, twice for each: measured, compared.
+
+    Raises
+    ------
+    DataError
+        No episode at all.
+    SpecificationError
+        An error rate that is not between 0 and 1.
+    """
+    check_error_rate(error_rate)
+    with closing(_Measured()) as measured:
+        for episode in episodes:
+            measured.add(episode)
+            if progress is not None:
+                progress(1)
+        if not measured.numbers:
+            raise DataError("expected a data set with episodes, got one without; see if its download is complete")
+        return _audited(measured, error_rate, progress or (lambda done: None))
+
+
+def _audited(measured: _Measured, error_rate: float, progress: Callable[[int], object]) -> Audit:
+    """Compare what was measured, and list what is unusual."""
+    tasks = calibrate.tasks_of(measured.tasks)
+    compared = list(_compared(measured, tasks, progress)) if measured.names else []
+    broken, of_the_set = _contradictions(measured, compared)
+    soft = [row.evidence for row in compared if row.check.side != "exact"]
+    evidence = np.stack(soft, axis=1) if soft else np.zeros((len(broken), 0))
+    ranking = calibrate.rank(evidence, ~broken, error_rate)
+    flagged = broken | ((ranking.p_values <= error_rate + 1e-12) | ranking.outlying) & (ranking.by_chance > 0)
+    return Audit(
+        np.array(measured.numbers), sum(measured.seconds), len(tasks), error_rate, ranking.by_chance,
+        np.where(broken, 0.0, ranking.p_values), ranking.evidence, flagged,
+        _findings(measured, compared, broken, ranking, flagged), of_the_set,
+    )  # fmt: skip
+
+
+def _compared(measured: _Measured, tasks: calibrate.Groups, say: Callable[[int], object]) -> Iterator[_Compared]:
+    """Yield the checks with their evidence."""
+    alone = [check for check in CHECKS if check.measure is not None]
+    values = dict(zip([check.name for check in alone], measured.values(), strict=True))
+    extents = np.nanmedian(values["above"] - values["below"], axis=0).astype(np.float64)
+    usable = np.ones(len(measured.numbers), dtype=np.bool_)
+    usable[measured.unusable] = False
+    groups = {by_task: calibrate.groups_of(tasks, fewest) for by_task, fewest in calibrate.ENOUGH.items()}
+    ways = calibrate.unlike(measured.ways, extents, [rows[usable[rows]] for rows in tasks], len(usable), say)
+    values |= {"unlike": ways[:, :1], "task": ways[:, 1:]}
+    unit, stretch = np.where(extents > 0, extents, 1.0), 0
+    for check in CHECKS:
+        own = values[check.name]
+        first, stretch = (stretch, stretch + own.shape[1]) if check.measure else (-1, stretch)
+        if check.side == "exact":
+            wrong = np.where(own[:, 0] > 0, np.inf, 0.0)
+            yield _Compared(check, own, np.zeros(len(own), dtype=np.intp), wrong, first)
+            continue
+        scaled = calibrate.centered(own / np.tile(unit, own.shape[1] // len(unit)) if check.relative else own, tasks)
+        among = groups[check.by_task]
+        columns = calibrate.evidence_of(_SIDES[check.side](scaled), among, check.least)
+        evidence = calibrate.evidence_of(columns.max(axis=1, keepdims=True), among, _LEAST_EVIDENCE)[:, 0]
+        yield _Compared(check, own, columns.argmax(axis=1), evidence, first)
+
+
+def _contradictions(measured: _Measured, compared: list[_Compared]) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
+    """Return which episodes contradict themselves (n,), and what more than half of the set does, which flags none."""
+    n = len(measured.numbers)
+    broken, of_the_set = np.zeros(n, dtype=np.bool_), list(measured.notes)
+    of_the_set += [remark for remark, count in measured.remarks.items() if count > _SHARED * n]
+    for row in compared:
+        if row.check.side != "exact":
+            continue
+        wrong = np.isinf(row.evidence)
+        if wrong.mean() > _SHARED and n > 1:
+            first = int(wrong.argmax())
+            words = row.check.words.format(
+                value=float(np.median(row.values[wrong, 0])), fps=measured.rates[first],
+                problems=measured.problems.get(first, ""),
+            )  # fmt: skip
+            of_the_set.append(f"{row.check.name}: in {wrong.sum():,} of {counted(n, 'episode')}, {words}")
+            row.evidence[:] = 0.0
+        broken |= np.isinf(row.evidence)
+    broken[list(measured.unusable)] = True
+    return broken, tuple(of_the_set)
+
+
+def _findings(
+    measured: _Measured,
+    compared: list[_Compared],
+    broken: NDArray[np.bool_],
+    ranking: calibrate.Ranking,
+    flagged: NDArray[np.bool_],
+) -> tuple[Finding, ...]:
+    """Return the findings, in their order."""
+    tasks = calibrate.tasks_of(measured.tasks)
+    order = np.lexsort((-ranking.evidence, ~broken))
+    listed = order[flagged[order]]
+    if not (flagged & ~broken).any():
+        listed = np.concatenate([listed, order[~flagged[order] & (ranking.evidence[order] > 0)][:_RANKED]])
+    task_of = np.empty(len(broken), dtype=np.intp)
+    for task, rows in enumerate(tasks):
+        task_of[rows] = task
+    usual: dict[tuple[str, int], Array] = {}
+
+    def reason(row: _Compared, at: int) -> Reason:
+        column, rows = int(row.columns[at]), tasks[task_of[at]]
+        if len(rows) < calibrate.FEWEST_OF_TASK:
+            rows = np.arange(len(broken))
+        if (row.check.name, rows[0]) not in usual:
+            usual[row.check.name, rows[0]] = np.nanmedian(row.values[rows], axis=0)
+        names, heads = measured.names or ("",), row.check.columns
+        size = max(1, row.values.shape[1] // len(heads))
+        channel = names[column % len(names)] if "{channel}" in row.check.words else ""
+        words = row.check.words.format(
+            value=row.check.shown(float(row.values[at, column])), problems=measured.problems.get(at, ""),
+            usual=row.check.shown(float(usual[row.check.name, rows[0]][column])),
+            channel=channel, column=heads[column // size], fps=measured.rates[at],
+        )  # fmt: skip
+        start, end = (0.0, measured.seconds[at]) if row.first < 0 else measured.stretch(at, row.first + column)
+        return Reason(row.check.name, words, channel, start, end, float(row.evidence[at]))
+
+    def finding(at: int) -> Finding:
+        by_evidence = sorted(compared, key=lambda row: -row.evidence[at])
+        least = min(_LEAST_REASON, by_evidence[0].evidence[at]) if by_evidence else 0.0
+        reasons = [reason(row, at) for row in by_evidence if row.evidence[at] >= least > 0]
+        if at in measured.problems and not any(reason.check == "problems" for reason in reasons):
+            reasons = [Reason("problems", measured.problems[at], "", 0.0, measured.seconds[at], np.inf), *reasons]
+        kind = "contradiction" if broken[at] else "outlying" if ranking.outlying[at] else "unusual"
+        return Finding(
+            measured.numbers[at], measured.tasks[at], measured.places[at], measured.seconds[at],
+            kind if flagged[at] else "ranked", 0.0 if broken[at] else float(ranking.p_values[at]),
+            float(ranking.evidence[at]), tuple(reasons[:_REASONS]),
+        )  # fmt: skip
+
+    return tuple(finding(int(at)) for at in listed)

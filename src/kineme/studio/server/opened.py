@@ -1,0 +1,360 @@
+"""Recordings that the studio was started with: episodes, read when they are looked at, and what was found in them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from threading import Lock
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from kineme.errors import DataError, KinemeError
+from kineme.io.lerobot import info
+from kineme.io.reading.episode_recordings import episode_recordings, heads_of
+from kineme.io.reading.episodes import EPISODE_LAYOUTS, read_episodes
+from kineme.io.reading.formats import entries_of, name_of
+from kineme.io.reading.merge_files import Recordings
+from kineme.io.reading.read_labels import read_labels
+from kineme.io.reading.recordings import read_recordings
+from kineme.io.records import needs
+from kineme.io.writing.annotations import Annotation, to_csv
+from kineme.movements.channels.channel import recorded_names
+from kineme.movements.episodes import Episode
+from kineme.movements.trajectories.movements import axis_names
+from kineme.reporting.atomic import write_atomically
+from kineme.studio.server.refusals import ConflictError, MissingError
+
+KEY = "episode-"  # what the key of an episode begins with; its position follows
+HELD = 2**28  # bytes of the episodes that are kept in memory
+
+#: First bytes of files that are videos, where they begin, and their kinds: nothing else is sent as one.
+_VIDEOS = ((4, b"ftyp", "video/mp4"), (0, b"\x1a\x45\xdf\xa3", "video/webm"))
+_HEAD = 16  # bytes that are read to know them
+
+_NOTHING = np.zeros(0)
+
+
+_ENDING = "-corrections.csv"
+
+Movement = tuple[str, str]  # recording and place, as in `Annotation`
+
+
+class Lane(NamedTuple):
+    """The symbols of one movement."""
+
+    annotations: tuple[Annotation, ...] = ()
+    corrected: bool = False  # whether a person has changed any, and so has looked at all of them
+
+
+class Corrections:
+    """The lanes of all movements that were looked at, and a table of those that a person corrected.
+
+    The table lies beside what was opened, ``demos-corrections.csv`` beside ``demos``; one that is there is read, so
+    that work goes on where it ended. A table that is none is left as it is, and is a problem.
+    """
+
+    def __init__(self, opened: Path) -> None:
+        # Beside a link, not what it leads to; two dots and nothing are no names.
+        place = opened.resolve() if opened.name in {"", ".."} else opened.absolute()
+        self.path = place.with_name(f"{place.name if place.is_dir() else place.stem}{_ENDING}")
+        self.problem: str | None = None
+        self.saved = True  # whether the table holds all that was corrected
+        self._lanes: dict[Movement, Lane] = {}
+        self._bytes: bytes | None = None  # of the table as it was read or written last; None: there was none
+        self._turn = Lock()
+        if self.path.is_file():
+            self._read()
+
+    def _read(self) -> None:
+        lanes: dict[Movement, list[Annotation]] = {}
+        try:
+            for row in read_labels(self.path).rows:
+                note = Annotation(row.recording, row.place, row.start, row.end, row.label, float("nan"), 1.0)
+                lanes.setdefault((row.recording, row.place), []).append(note)
+            self._bytes = self.path.read_bytes()
+        except (DataError, OSError) as error:
+            self.problem = f"{self.path.name} was not read: {error}"
+        else:
+            self._lanes = {key: Lane(tuple(notes), corrected=True) for key, notes in lanes.items()}
+
+    def add(self, annotations: Iterable[Annotation]) -> None:
+        """Add what is known of movements from elsewhere, but for those that a person corrected."""
+        lanes: dict[Movement, list[Annotation]] = {}
+        for note in annotations:
+            lanes.setdefault((note.recording, note.place), []).append(note)
+        self._lanes = {key: Lane(tuple(notes)) for key, notes in lanes.items()} | self._lanes
+
+    def lane(self, movement: Movement) -> Lane:
+        """Return what was found in a movement, or corrected."""
+        return self._lanes.get(movement, Lane())
+
+    def put(self, movement: Movement, lane: Lane) -> None:
+        """Replace it."""
+        with self._turn:
+            self.saved = self.saved and not (lane.corrected or self.lane(movement).corrected)
+            self._lanes[movement] = lane
+
+    @property
+    def corrected(self) -> Sequence[Annotation]:
+        """All annotations of movements that a person corrected, in the order in which they were first looked at."""
+        return [note for lane in list(self._lanes.values()) if lane.corrected for note in lane.annotations]
+
+    def table(self) -> bytes:
+        """Return `corrected` as `kineme annotate` writes annotations."""
+        return to_csv(self.corrected)
+
+    def save(self, *, replace: bool = False) -> Path:
+        """Write the table; a ConflictError if it was written by others since, unless that is to be replaced."""
+        with self._turn:
+            now = self.path.read_bytes() if self.path.is_file() else None
+            if now is not None and now != self._bytes and not replace:
+                raise ConflictError(
+                    f"expected {self.path.name} as this studio left it, others wrote it; replace it, or download yours"
+                )
+            table = self.table()
+            try:
+                write_atomically(self.path, table)
+            except OSError as error:
+                raise DataError(
+                    f"expected to write {self.path.name} beside the recordings, got: {error.strerror or error}; "
+                    "download it instead"
+                ) from error
+            self._bytes, self.saved = table, True
+        return self.path
+
+
+class Opened(NamedTuple):
+    """A movement of what was opened."""
+
+    episode: Episode
+    recording: str  # it and the place as in `kineme.io.writing.annotations.Annotation`
+    place: str
+    file: Path | None = None  # which file it is a movement of; None: of a data set of episodes
+
+    @property
+    def movement(self) -> tuple[str, str]:
+        """The name under which its symbols are kept."""
+        return self.recording, self.place
+
+    @property
+    def origin(self) -> float:
+        """Time stamp of the first sample [s]."""
+        return float(self.episode.times[0]) if len(self.episode) else 0.0
+
+    @property
+    def heads(self) -> dict[str, tuple[str, ...]]:
+        """Names of the columns of each feature; the one that is read by default comes first."""
+        return heads_of(self.episode)
+
+    def annotation(
+        self, span: tuple[float, float], symbol: str | None, p_value: float | None, confidence: float | None
+    ) -> Annotation:
+        """Return what a stretch shows, in seconds since the first sample; without a p-value, a person said it."""
+        start, end = (self.origin + time for time in span)
+        certainty = float("nan") if p_value is None else p_value, 1.0 if confidence is None else confidence
+        return Annotation(self.recording, self.place, start, end, symbol, *certainty, self.origin)
+
+    @property
+    def duration(self) -> float:
+        """Time from the first sample to the last [s]."""
+        return float(self.episode.times[-1]) - self.origin if len(self.episode) else 0.0
+
+
+class OpenedRecordings:
+    """The episodes of a path, by their position, with what was found in them; any thread may use it.
+
+    Of a data set of LeRobot only the episodes that are asked for are read, where its description says that they lie.
+    Anything else is read from its beginning up to them, and again where they were let go.
+    """
+
+    def __init__(self, path: Path, held: int = HELD) -> None:
+        self.path, self.held = path, held
+        self.name = str(name_of(path))
+        self.corrections = Corrections(path)
+        self.total: int | None = None  # None until all of it has been read
+        self._numbers: list[int] | None = None
+        if not path.exists():
+            raise DataError(f"expected a file or folder of recordings, found nothing at {str(path)!r}")
+        if (path / info.MARKER).is_file():
+            with needs("pyarrow", "read LeRobot", "parquet"):
+                from kineme.io.lerobot import episodes, motions
+            self._lerobot = episodes
+            self._numbers = info.read_episodes(path, info.read_info(path)).numbers.tolist()
+            self.total = len(self._numbers)
+            try:
+                self.corrections.add(
+                    Annotation(self.name, f"episode {motion.episode}", *motion[1:6])
+                    for motion in motions.read_motions(path)
+                )
+            except DataError as error:
+                self.corrections.problem = str(error)
+        self._episodes: dict[int, Opened] = {}
+        self._stream, self._next = opened_at(path), 0
+        self._videos: dict[int, dict[str, info.Video]] | None = None  # by number and camera
+        self._turn = Lock()
+
+    def __contains__(self, key: str) -> bool:
+        """Tell whether a key is of an episode, rather than of a file that was sent."""
+        return key.startswith(KEY)
+
+    def episode(self, key: str) -> Opened:
+        """Return the episode of a key."""
+        position = key.removeprefix(KEY)
+        page = self.page(int(position), 1) if position.isdecimal() and len(position) < 10 else []
+        if not page:
+            raise MissingError(f"expected an episode of {self.name}, got {key[:40]!r}")
+        return page[0]
+
+    def page(self, offset: int, limit: int) -> list[Opened]:
+        """Return some episodes in their order; behind the last there are none."""
+        with self._turn:
+            wanted = range(offset, offset + limit if self.total is None else min(offset + limit, self.total))
+            if not all(k in self._episodes for k in wanted):
+                if self._numbers is None:
+                    self._stream_to(wanted)
+                else:
+                    self._read(self._numbers, [k for k in wanted if k not in self._episodes])
+            page = [self._episodes[k] for k in wanted if k in self._episodes]
+            for k in wanted:  # those asked for last are let go last
+                if k in self._episodes:
+                    self._episodes[k] = self._episodes.pop(k)
+            sizes = {k: _size(item.episode) for k, item in self._episodes.items()}
+            total = sum(sizes.values())
+            for k in [k for k in self._episodes if k not in wanted]:
+                if total <= self.held:
+                    break
+                total -= sizes[k]
+                del self._episodes[k]
+        return page
+
+    def _read(self, numbers: Sequence[int], positions: Sequence[int]) -> None:
+        """Read the episodes at these positions; one that cannot be read is there with its problem."""
+        where = {numbers[k]: k for k in positions}
+        reason = "expected frames of the episode, got none"
+        try:
+            for episode in self._lerobot.episodes(
+                self.path, None, where
+            ):  # of one whose frames lie in two places, the first
+                opened = Opened(episode, self.name, f"episode {episode.number}")
+                self._episodes.setdefault(where[episode.number], opened)
+        except KinemeError as error:
+            reason = str(error)
+        for number, k in where.items():
+            if k not in self._episodes:
+                lost = Episode(number, _NOTHING, {}, {}, problems=(reason,), place=f"episode {number}")
+                self._episodes[k] = Opened(lost, self.name, lost.place)
+
+    def _stream_to(self, wanted: range) -> None:
+        """Read on until these episodes are there, and one more says that there are others."""
+        if any(k < self._next for k in wanted if k not in self._episodes):
+            self._stream, self._next = opened_at(self.path), 0
+        end = wanted.stop + (self.total is None)
+        while self._next < end:
+            episode = next(self._stream, None)
+            if episode is None:
+                self.total = self._next
+                break
+            self._episodes[self._next] = episode
+            self._next += 1
+
+    def about_video(self, opened: Opened, camera: str) -> dict[str, Any]:
+        """Return when an episode begins in the video of a camera [s], and its codec, None if no file says it."""
+        if self._numbers is None:
+            return {"start": 0.0, "codec": None}
+        if self._videos is None:
+            self._videos = info.read_videos(self.path, info.read_info(self.path))
+        feature = info.read_json(self.path / info.MARKER, info.MARKER)["features"].get(camera)
+        declared = feature.get("info", feature.get("video_info")) if isinstance(feature, dict) else None
+        codec = declared.get("video.codec") if isinstance(declared, dict) else None
+        video = self._videos.get(opened.episode.number, {}).get(camera)
+        return {"start": 0.0 if video is None else video.start, "codec": codec if isinstance(codec, str) else None}
+
+    def video(self, opened: Opened, camera: str) -> tuple[Path, str]:
+        """Return the file of a camera's video and its kind, by its first bytes; a MissingError if there is none.
+
+        A path that leads out of the data set is none, and so is a link to anything else than a video.
+        """
+        name = opened.episode.videos.get(camera)
+        if name is None or Path(name).is_absolute() or ".." in Path(name).parts:
+            cameras = list(opened.episode.videos)
+            raise MissingError(f"expected a video of {opened.place}, of one of {cameras}, got {camera[:80]!r}")
+        path = self.path / name
+        try:
+            with path.open("rb") as file:
+                head = file.read(_HEAD)
+        except OSError as error:
+            raise MissingError(f"expected the video {path.name}, got: {error.strerror or error}") from error
+        for at, mark, kind in _VIDEOS:
+            if head[at : at + len(mark)] == mark:
+                return path, kind
+        raise MissingError(f"expected a video (MP4, WebM) in {path.name}, got something else")
+
+    def recordings(self, key: str, columns: Sequence[str] = ()) -> Recordings:
+        """Read one episode as a recording, in these columns or in all that are found.
+
+        Where these are no movement together, it is read in those of the feature that is read by default.
+        """
+        opened = self.episode(key)
+        if opened.file is None:
+            try:
+                return episode_recordings(opened.episode, opened.recording, columns)
+            except KinemeError:
+                default = next(iter(opened.heads.values()), ())
+                if columns or not default:
+                    raise
+                return episode_recordings(opened.episode, opened.recording, default)
+        read = read_recordings(opened.file, columns=list(columns) or None)
+        sources = [source._replace(path=opened.recording) for source in read.sources]
+        if opened.place not in (places := [source.place for source in sources]):
+            raise DataError(f"expected the movement {opened.place!r} in {opened.recording} in these columns, got none")
+        return movement_of(replace(read, sources=tuple(sources), problems=()), places.index(opened.place))
+
+
+def movement_of(read: Recordings, k: int) -> Recordings:
+    """Return one of the movements that were read."""
+    return replace(read, demonstrations=read.demonstrations[k : k + 1], sources=read.sources[k : k + 1])
+
+
+def columns_of(read: Recordings) -> list[str]:
+    """Return the names of the columns, as they were recorded."""
+    demos = read.demonstrations
+    return list(axis_names(demos.n_dims) if demos.channels is None else recorded_names(demos.channels))
+
+
+def opened_at(path: Path) -> Iterator[Opened]:
+    """Yield the movements of a data set of episodes, or of files; a file that cannot be read is one with a problem."""
+    if any(layout.fits(path) for layout in EPISODE_LAYOUTS):
+        for episode in read_episodes(path):
+            is_file = bool(episode.place) and path.is_dir() and (path / episode.place).is_file()
+            yield Opened(episode, *((episode.place, "") if is_file else (str(name_of(path)), episode.place)))
+        return
+    number = 0
+    for entry in entries_of([path])[0]:
+        try:
+            read = read_recordings(entry.path)
+        except KinemeError as error:
+            lost = Episode(number, _NOTHING, {}, {}, problems=(str(error),), place=entry.name)
+            yield Opened(lost, entry.name, "", entry.path)
+            number += 1
+            continue
+        demos = read.demonstrations
+        names = columns_of(read)
+        values, stamps = demos.positions if demos.channels is None else demos.recorded, demos.movements.stamps
+        for k, source in enumerate(read.sources):
+            rows = slice(demos.offsets[k], demos.offsets[k + 1])
+            where = " ".join(filter(None, (entry.name, source.place)))
+            label = source.label or entry.relative.parent.name or None
+            yield Opened(
+                Episode(number, stamps[rows].copy(), {"": values[rows].copy()}, {"": tuple(names)}, label, place=where),
+                entry.name,
+                source.place,
+                entry.path,
+            )
+            number += 1
+
+
+def _size(episode: Episode) -> int:
+    """Bytes of the arrays of an episode."""
+    return episode.times.nbytes + sum(values.nbytes for values in episode.signals.values())

@@ -1,0 +1,196 @@
+// The episodes of what the studio was started with: a page of strips at a time, symbols found in them, corrections.
+import { get, post } from "../parts/api.js";
+import { ask } from "../parts/dialogs.js";
+import { byId, counted, fill, write } from "../parts/elements.js";
+import { onLibrary } from "../parts/library_state.js";
+import { say, tried } from "../parts/toasts.js";
+import { onShow } from "../parts/views.js";
+import { Strip } from "./strip.js";
+
+const PAGE = 20; // episodes
+
+const of = (/** @type {string} */ key) => `/api/episodes/${encodeURIComponent(key)}`;
+
+export class Episodes {
+  /**
+   * @param {{open: (detail: any) => void, channels: (detail: any) => string[],
+   *   spotted: (key: string, spans: any[]) => void}} page
+   */
+  constructor(page) {
+    this.page = page;
+    this.offset = 0;
+    /** @type {any} The answer that is shown. */
+    this.answer = null;
+    this.saved = true;
+    /** @type {string|null} Key of the episode that is open. */
+    this.opened = null;
+    /** @type {string[]|null} Channels in which movements are looked for. */
+    this.channels = null;
+    /** @type {Promise<any>} What is sent of spans, one after the other. */
+    this.sending = Promise.resolve();
+    /** @type {AbortController|null} Of the search of a page that is under way. */
+    this.search = null;
+    /** @type {Strip[]} */
+    this.strips = [];
+    onShow("recordings", () => this.answer || tried(() => this.turn(0)));
+    byId("episodes-before").addEventListener("click", () => tried(() => this.turn(this.offset - PAGE)));
+    byId("episodes-next").addEventListener("click", () => tried(() => this.turn(this.offset + PAGE)));
+    byId("episodes-from").addEventListener("change", () =>
+      tried(() => this.turn((byId("episodes-from").valueAsNumber || 1) - 1)),
+    );
+    byId("spot-page").addEventListener("click", () => (this.search ? this.search.abort() : this.spot()));
+    byId("save-corrections").addEventListener("click", () => tried(() => this.save()));
+    byId("strips").addEventListener("keydown", (event) => this.key(event));
+    onLibrary(() => {
+      this.channels = null; // it may hold others now
+      for (const strip of this.strips) strip.recolor();
+    });
+  }
+
+  /** Show the episodes from one on. @param {number} offset */
+  async turn(offset) {
+    this.search?.abort();
+    await this.sending;
+    const answer = await get(`/api/episodes?offset=${Math.max(Math.floor(offset), 0)}&limit=${PAGE}`);
+    if (answer.name === null) {
+      this.answer = answer;
+      return;
+    }
+    if (!answer.episodes.length && answer.total) return this.turn(Math.floor((answer.total - 1) / PAGE) * PAGE);
+    this.answer = answer;
+    this.offset = answer.offset;
+    this.saved = answer.saved;
+    byId("download-corrections").hidden = !answer.n_corrected;
+    if (!this.strips.length) {
+      this.strips = Array.from({ length: PAGE }, () => new Strip((strip) => this.open(strip)));
+      byId("drop").classList.add("small-drop");
+      byId("episodes").hidden = false;
+      fill(byId("strips"), ...this.strips.map((strip) => strip.element));
+      if (answer.problem) say(answer.problem, { failed: true });
+    }
+    for (const [k, strip] of this.strips.entries()) strip.show(answer.episodes[k] ?? null);
+    this.mark();
+    this.say();
+  }
+
+  say() {
+    const { name, total, episodes } = this.answer;
+    const last = this.offset + episodes.length;
+    const range = episodes.length ? `${this.offset + 1} to ${last}` : "none";
+    write(byId("episodes-title"), name);
+    write(byId("episodes-facts"), total === null ? range : `${range} of ${counted(total, "episode")}`);
+    byId("episodes-from").value = String(this.offset + 1);
+    byId("episodes-before").disabled = !this.offset;
+    byId("episodes-next").disabled = total !== null ? last >= total : episodes.length < PAGE;
+    byId("episodes-pages").hidden = !this.offset && byId("episodes-next").disabled;
+    byId("save-corrections").disabled = this.saved;
+    write(byId("spot-page"), this.search ? "Cancel" : "Find movements in these");
+  }
+
+  /** Mark the strip of the episode that is open. */
+  mark() {
+    for (const { button, episode } of this.strips)
+      button.setAttribute("aria-current", String(episode?.key === this.opened));
+  }
+
+  /** @param {Strip} strip */
+  async open(strip) {
+    await this.sending;
+    const detail = await tried(() => get(`${of(strip.episode.key)}?width=${Math.round(window.innerWidth)}`));
+    if (!detail) return;
+    this.opened = detail.recording;
+    this.mark();
+    const address = (/** @type {any} */ { camera }) => `${of(detail.recording)}/videos/${encodeURIComponent(camera)}`;
+    const videos = detail.videos.map((/** @type {any} */ video) => ({ ...video, address: address(video) }));
+    this.page.open({ ...detail, videos });
+  }
+
+  /**
+   * Keep what an episode shows.
+   * @param {string} key @param {any[]} spans @param {boolean} corrected Whether a person has changed any.
+   */
+  put(key, spans, corrected) {
+    const body = {
+      spans: spans.map(({ begin, end, label, p = null, confidence = null }) => ({ begin, end, label, p, confidence })),
+      corrected,
+    };
+    if (corrected) {
+      this.saved = false;
+      byId("download-corrections").hidden = false;
+    }
+    this.sending = this.sending.then(() => tried(() => post(`${of(key)}/spans`, body)));
+    const strip = this.strips.find(({ episode }) => episode?.key === key);
+    if (strip) {
+      Object.assign(strip.episode, body);
+      strip.say();
+      strip.board.draw();
+    }
+    this.say();
+    return this.sending;
+  }
+
+  /** Look for movements in each episode of this page; what a person has corrected stays as it is. */
+  async spot() {
+    const search = new AbortController();
+    this.search = search;
+    const strips = this.strips.filter(({ episode }) => episode?.n_samples && !episode.corrected);
+    let done = 0;
+    /** @type {string[]} Why others could not be. */
+    const refused = [];
+    this.say();
+    try {
+      for (const { episode } of strips) {
+        write(byId("episodes-state"), `Looking … ${done} of ${counted(strips.length, "episode")}`);
+        const spans = await this.find(episode.key, search.signal).catch((error) => {
+          if (error.status !== 400) throw error;
+          refused.push(`Episode ${episode.number}: ${error.message}`);
+        });
+        if (!spans) continue;
+        await this.put(episode.key, spans, false);
+        this.page.spotted(episode.key, spans);
+        done += 1;
+      }
+      write(byId("episodes-state"), `Looked through ${counted(done, "episode")}.`);
+      if (refused.length)
+        say(`${counted(refused.length, "episode")} not looked through. ${refused[0]}`, { failed: true });
+    } catch (error) {
+      write(byId("episodes-state"), search.signal.aborted ? `Canceled after ${counted(done, "episode")}.` : "");
+      if (!search.signal.aborted) say(error.message, { failed: true });
+    } finally {
+      if (this.search === search) this.search = null;
+      this.say();
+    }
+  }
+
+  /** What happens when in an episode. @param {string} key @param {AbortSignal} signal @returns {Promise<any[]>} */
+  async find(key, signal) {
+    this.channels ??= this.page.channels(await get(of(key)));
+    const path = `/api/recordings/${encodeURIComponent(key)}/spotted`;
+    return (await post(path, { channels: this.channels }, signal)).spans;
+  }
+
+  /** Write the table of corrections beside what was opened. */
+  async save(replace = false) {
+    await this.sending;
+    try {
+      const { file, n_spans } = await post("/api/episodes/corrections", { replace });
+      this.saved = true;
+      this.say();
+      say(`${counted(n_spans, "span")} written to ${file}.`);
+    } catch (error) {
+      if (error.status !== 409 || replace) throw error;
+      const question = { title: `Replace ${this.answer.file}?`, text: error.message, yes: "Replace", danger: true };
+      if (await ask(question)) await this.save(true);
+    }
+  }
+
+  /** Arrow keys go from strip to strip. @param {KeyboardEvent} event */
+  key(event) {
+    const step = { ArrowUp: -1, ArrowDown: 1 }[event.key];
+    const at = this.strips.findIndex(({ button }) => button === event.target);
+    const next = this.strips[at + (step ?? 0)];
+    if (!step || at < 0 || !next || next.element.hidden) return;
+    event.preventDefault();
+    next.button.focus();
+  }
+}

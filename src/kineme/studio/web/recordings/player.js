@@ -1,0 +1,131 @@
+// The playhead of a recording: played, stepped through, with the video of a camera beside it where there is one.
+import { byId, fill, make, write } from "../parts/elements.js";
+
+const STEP = 0.1; // of an arrow key [s]; ten times as much with Shift
+const NEAR = 0.05; // a video that is so near the playhead stays where it is [s]
+
+/** @typedef {{camera: string, start: number, codec: string|null, address: string}} Video */
+
+export class Player {
+  /** @param {(time: number) => void} moved */
+  constructor(moved) {
+    this.moved = moved;
+    this.at = 0;
+    this.end = 0;
+    this.playing = false;
+    this.last = 0; // when the playhead was moved last [ms]
+    /** @type {Video[]} */
+    this.videos = [];
+    /** @type {Video|null} The one that is shown, unless the browser cannot play it. */
+    this.video = null;
+    this.film = byId("video");
+    this.film.addEventListener("error", () => this.fail());
+    this.film.addEventListener("loadedmetadata", () => (this.film.videoWidth ? this.follow() : this.fail()));
+    byId("camera").addEventListener("change", () => this.show(Number(byId("camera").value)));
+    byId("play-recording").addEventListener("click", () => this.toggle());
+    byId("playhead").addEventListener("input", () => this.seek(byId("playhead").valueAsNumber));
+    byId("playhead").addEventListener("keydown", (event) => this.key(event));
+  }
+
+  /** Another recording. @param {number} end [s] @param {Video[]} videos */
+  open(end, videos) {
+    this.pause();
+    Object.assign(this, { end, videos });
+    byId("playhead").max = String(end);
+    byId("video-part").hidden = !videos.length;
+    byId("camera-part").hidden = videos.length < 2;
+    fill(byId("camera"), ...videos.map(({ camera }, k) => make("option", { value: String(k) }, camera)));
+    this.show(0);
+    this.seek(0);
+  }
+
+  /** The video of a camera. @param {number} k */
+  show(k) {
+    this.video = this.videos[k] ?? null;
+    this.film.hidden = !this.video;
+    write(byId("video-note"), "");
+    if (!this.video) {
+      this.film.removeAttribute("src");
+      return this.film.load();
+    }
+    this.film.setAttribute("aria-label", `Video of ${this.video.camera}`);
+    this.film.src = this.video.address;
+    if (this.playing) this.film.play().catch(() => {}); // an error of the video says more
+  }
+
+  /** Say that the browser cannot play what is shown; the playhead goes on without it. */
+  fail() {
+    if (!this.video) return;
+    const { camera, codec } = this.video;
+    write(
+      byId("video-note"),
+      `This browser cannot play the video of ${camera}${codec ? ` (${codec})` : ""}. The signals go on without it.`,
+    );
+    this.video = null;
+    this.film.hidden = true;
+  }
+
+  /** Put the video where the playhead is. */
+  follow() {
+    if (!this.video || !this.film.readyState) return;
+    const time = this.video.start + this.at;
+    if (Math.abs(this.film.currentTime - time) > NEAR) this.film.currentTime = time;
+  }
+
+  toggle() {
+    if (this.playing) this.pause();
+    else this.play();
+  }
+
+  play() {
+    if (!this.end) return;
+    if (this.at >= this.end) this.seek(0);
+    this.playing = true;
+    write(byId("play-recording"), "Pause");
+    this.last = performance.now();
+    if (this.video) this.film.play().catch(() => {});
+    requestAnimationFrame(() => this.tick());
+  }
+
+  pause() {
+    this.playing = false;
+    write(byId("play-recording"), "Play");
+    this.film.pause();
+  }
+
+  /** The playhead goes with the video where one plays, and with the clock else. */
+  tick() {
+    if (!this.playing) return;
+    const now = performance.now();
+    const filmed = this.video && this.film.readyState && !this.film.paused && !this.film.ended;
+    const time = filmed ? this.film.currentTime - this.video.start : this.at + (now - this.last) / 1000;
+    this.last = now;
+    this.go(time);
+    if (this.at >= this.end) this.pause();
+    else requestAnimationFrame(() => this.tick());
+  }
+
+  /** @param {number} time [s] */
+  seek(time) {
+    this.go(time);
+    this.follow();
+  }
+
+  /** @param {number} time [s] */
+  go(time) {
+    this.at = Math.min(Math.max(time, 0), this.end);
+    byId("playhead").value = String(this.at);
+    byId("playhead").setAttribute("aria-valuetext", `${this.at.toFixed(2)} seconds`);
+    write(byId("playhead-text"), `${this.at.toFixed(2)} of ${this.end.toFixed(2)} s`);
+    this.moved(this.at);
+  }
+
+  /** Space plays and pauses, arrow keys step. @param {KeyboardEvent} event */
+  key(event) {
+    const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+    if (event.key === " ") this.toggle();
+    else if (step) this.seek(this.at + step * STEP * (event.shiftKey ? 10 : 1));
+    else return;
+    event.preventDefault();
+  }
+}
