@@ -1,12 +1,12 @@
-"""A grammar of symbols: what follows what, and sequences of pieces labeled by it and by how alike they are.
+"""A grammar of symbols, what follows what with which probability, and sequences that are labeled by it.
 
-An episode may hold each kind of movement once. Pieces of it then tell little about the kinds; pieces of all episodes,
-and their order, do. A bigram with a begin and an end is the least that knows an order, and is learned from few episodes.
+An episode may hold each kind of movement once. Its pieces then tell little about the kinds; those of all episodes, and
+their order, do. A bigram with a begin and an end is the least that knows an order, and few episodes suffice for it.
 
 Sources: L. R. Rabiner, "A tutorial on hidden Markov models and selected applications in speech recognition",
-Proceedings of the IEEE 77, 1989 (Viterbi, forward-backward); S.-Z. Yu, "Hidden semi-Markov models", Artificial
-Intelligence 174, 2010 (states that last, here over a lattice of possible boundaries); D. J. C. MacKay, L. C. Bauman
-Peto, "A hierarchical Dirichlet language model", Natural Language Engineering 1, 1995 (smoothing).
+Proceedings of the IEEE 77, 1989 (Viterbi, forward-backward); D. J. C. MacKay, L. C. Bauman Peto, "A hierarchical
+Dirichlet language model", Natural Language Engineering 1, 1995 (smoothing); J. R. Saffran, R. N. Aslin, E. L. Newport,
+"Statistical learning by 8-month-old infants", Science 274, 1996 (units are within what predicts each other).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from kineme.errors import SpecificationError
@@ -38,23 +38,29 @@ class Grammar:
     transitions : ndarray of shape (K, K + 1)
         Probability that each is followed by each; the last column is the end of the sequence. Rows sum to 1.
     counts : ndarray of shape (K + 1, K + 1)
-        How often each was followed by each; the last row is the begin, the last column the end.
+        How often each was followed by each; the last row is the begin, the last column the end. Expected counts are no
+        whole numbers.
     """
 
     symbols: tuple[str, ...]
     initial: Array
     transitions: Array
-    counts: NDArray[np.intp]
+    counts: Array
 
     def __len__(self) -> int:
         return len(self.symbols)
 
     def __repr__(self) -> str:
-        return f"Grammar({len(self)} symbols, {int(self.counts[-1].sum())} sequences)"
+        return f"Grammar({len(self)} symbols, {self.counts[-1].sum():.0f} sequences)"
 
     def __str__(self) -> str:
         rows = [("begin", self.initial), *zip(self.symbols, self.transitions, strict=True)]
-        return "\n".join(f"{name} -> {_likely(self.symbols, shares)}" for name, shares in rows)
+        names = [*self.symbols, "end"]
+        lines = []
+        for name, shares in rows:
+            likely = [k for k in np.argsort(-shares, kind="stable").tolist() if shares[k] >= _RARE]
+            lines.append(f"{name} -> " + (", ".join(f"{names[k]} {shares[k]:.2f}" for k in likely) or "anything"))
+        return "\n".join(lines)
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data: the symbols, probabilities, and counts."""
@@ -66,50 +72,57 @@ class Grammar:
         }
 
 
-class Parse(NamedTuple):
-    """The most probable path through a lattice."""
+class Posterior(NamedTuple):
+    """Symbols of a sequence of n pieces as far as they are known (forward-backward)."""
 
-    edges: NDArray[np.intp]  # (p,) of the edges, in order
-    labels: NDArray[np.intp]  # (p,) the symbol of each
-    probability: Array  # (p,) of that symbol on that edge, among all paths
-    log_probability: float  # of the path and what was observed together
+    probabilities: Array  # (n, K) of each symbol at each piece
+    counts: Array  # (K + 1, K + 1) expected transitions, as `Grammar.counts`
+    log_probability: float  # of what was observed
 
 
 def estimate_grammar(
-    sequences: Sequence[Sequence[str]], prior: float = 0.5, symbols: Sequence[str] | None = None
+    sequences: Sequence[Sequence[str]], symbols: Sequence[str] | None = None, prior: float = 0.5
 ) -> Grammar:
     """Estimate a grammar from sequences of symbols, such as the annotations of episodes.
-
-    A transition that was counted n times among N from a symbol has the probability ``(n + prior m) / (N + prior)``: the
-    mean of its posterior under a Dirichlet prior around m, which is even over the K symbols and the end. So nothing is
-    impossible, and what is rare is no more likely than it was.
 
     Parameters
     ----------
     sequences : sequence of sequences of str
-    prior : float, default 0.5
-        Weight of the prior, in observations; above 0.
     symbols : sequence of str, optional
         The symbols; by default those of the sequences, ordered by where in a sequence they are on average.
+    prior : float, default 0.5
+        As of `grammar_of_counts`.
 
     Raises
     ------
     SpecificationError
         No symbols, a prior that is not above 0, or sequences with other symbols than those given.
     """
-    check_number("prior", prior, above=0.0)
     names = tuple(in_order(sequences) if symbols is None else symbols)
-    if not names:
-        raise SpecificationError("expected sequences with symbols, got none; say symbols, or annotate movements first")
     number = {name: k for k, name in enumerate(names)}
     if strange := {name for sequence in sequences for name in sequence} - number.keys():
         raise SpecificationError(f"expected sequences of the symbols {list(names)}, got {min(strange)!r}")
     end = len(names)
-    counts = np.zeros((end + 1, end + 1), dtype=np.intp)
+    counts = np.zeros((end + 1, end + 1))
     for sequence in filter(len, sequences):
         path = np.array([end, *(number[name] for name in sequence), end])
-        np.add.at(counts, (path[:-1], path[1:]), 1)
-    return _of_counts(names, counts, prior)
+        np.add.at(counts, (path[:-1], path[1:]), 1.0)
+    return grammar_of_counts(names, counts, prior)
+
+
+def grammar_of_counts(symbols: Sequence[str], counts: Array, prior: float = 0.5) -> Grammar:
+    """Return the grammar of symbols that followed each other so often, counts (K + 1, K + 1).
+
+    A transition that was counted n times among N from a symbol has the probability ``(n + prior m) / (N + prior)``: the
+    mean of its posterior under a Dirichlet prior around m, which is even over the K symbols and the end. So nothing is
+    impossible. Raises `SpecificationError`: no symbols, or a prior that is not above 0.
+    """
+    check_number("prior", prior, above=0.0)
+    if not len(symbols):
+        raise SpecificationError("expected sequences with symbols, got none; say symbols, or annotate movements first")
+    K = len(symbols)
+    initial, follow = counts[-1, :-1] + prior / K, counts[:-1] + prior / (K + 1)
+    return Grammar(tuple(symbols), initial / initial.sum(), follow / follow.sum(axis=1, keepdims=True), counts)
 
 
 def in_order(sequences: Sequence[Sequence[str]]) -> list[str]:
@@ -121,118 +134,85 @@ def in_order(sequences: Sequence[Sequence[str]]) -> list[str]:
     return sorted(places, key=lambda name: (round(float(np.mean(places[name])), 6), name))
 
 
-def parse(grammar: Grammar, edges: ArrayLike, log_likelihoods: Array) -> Parse:
-    """Label the most probable path through a lattice of pieces, by Viterbi, with probabilities by forward-backward.
+def most_probable(grammar: Grammar, log_likelihoods: Array) -> NDArray[np.intp]:
+    """Return the most probable symbols (n,) of a sequence of n pieces (Viterbi).
 
-    The probability of a path is ``initial(s1) L(e1, s1) transitions(s1, s2) L(e2, s2) ... transitions(sp, end)``.
-
-    Parameters
-    ----------
-    grammar : Grammar
-    edges : array_like of shape (E, 2)
-        From which point to which later one each piece leads; paths lead from the first point, 0, to the last. One piece
-        after the other, ``[[0, 1], [1, 2], ...]``, relabels pieces whose boundaries stay: see `chain`.
-    log_likelihoods : ndarray of shape (E, K)
-        ``log L(e, s)``: of what is observed during each piece, if it shows each symbol.
-
-    Raises
-    ------
-    SpecificationError
-        Arrays of other shapes, edges that lead back, or no path from the first point to the last.
+    They maximize ``initial(s1) L(1, s1) transitions(s1, s2) L(2, s2) ... transitions(sn, end)``. `log_likelihoods`
+    (n, K) are log L: of what is observed during each piece if it shows each symbol.
     """
-    lattice = np.asarray(edges, dtype=np.intp).reshape(-1, 2)
-    if log_likelihoods.shape != (len(lattice), len(grammar)) or not len(lattice):
+    initial, follow = _logs(grammar, log_likelihoods)
+    n = len(log_likelihoods)
+    before = np.zeros(log_likelihoods.shape, dtype=np.intp)
+    best = initial
+    for i, likelihoods in enumerate(log_likelihoods):
+        if i:
+            ways = best[:, None] + follow[:, :-1]
+            before[i], best = ways.argmax(axis=0), ways.max(axis=0)
+        best = best + likelihoods
+    labels = np.zeros(n, dtype=np.intp)
+    if n:
+        labels[-1] = (best + follow[:, -1]).argmax()
+    for i in range(n - 1, 0, -1):
+        labels[i - 1] = before[i, labels[i]]
+    return labels
+
+
+def posterior(grammar: Grammar, log_likelihoods: Array) -> Posterior:
+    """Return the probabilities of the symbols of a sequence, and the expected counts of transitions.
+
+    The grammar of the counts of many sequences, added up, is at least as probable as this one (Baum-Welch).
+    """
+    initial, follow = _logs(grammar, log_likelihoods)
+    n, K = log_likelihoods.shape
+    counts = np.zeros((K + 1, K + 1))
+    if not n:
+        return Posterior(np.zeros((0, K)), counts, 0.0)
+    ahead, behind = np.empty((n, K)), np.empty((n, K))
+    ahead[0], behind[-1] = initial + log_likelihoods[0], follow[:, -1]
+    for i in range(1, n):
+        ahead[i] = logsumexp(ahead[i - 1][:, None] + follow[:, :-1], axis=0) + log_likelihoods[i]
+    for i in range(n - 2, -1, -1):
+        behind[i] = logsumexp(follow[:, :-1] + (log_likelihoods[i + 1] + behind[i + 1]), axis=1)
+    total = float(logsumexp(ahead[-1] + follow[:, -1]))
+    probabilities = np.exp(ahead + behind - total)
+    pairs = ahead[:-1, :, None] + follow[:, :-1] + (log_likelihoods[1:] + behind[1:])[:, None] - total
+    counts[:-1, :-1] = np.exp(pairs).sum(axis=0)
+    counts[-1, :-1], counts[:-1, -1] = probabilities[0], probabilities[-1]
+    return Posterior(probabilities, counts, total)
+
+
+def units(grammar: Grammar, least: float = 0.8) -> list[tuple[int, ...]]:
+    """Find symbols that are parts of a larger unit: numbers of symbols that come one after the other, as a rule.
+
+    Symbol b belongs to a if a is followed by b, and b preceded by a, in a share of at least `least` of the times. It is
+    evidence only where an order could have been another one: a unit is proposed if what comes before it varies, or what
+    its predecessor is followed by, and likewise behind it. Where every sequence has the same order, nothing is joined.
+    """
+    counts = grammar.counts
+    forward = counts[:-1] / np.maximum(counts[:-1].sum(axis=1, keepdims=True), 1.0)
+    backward = counts[:, :-1] / np.maximum(counts[:, :-1].sum(axis=0), 1.0)
+    K = len(grammar)
+    joined = (forward[:, :K] >= least) & (backward[:K] >= least) & ~np.eye(K, dtype=bool)
+    followers = {int(a): int(b) for a, b in np.argwhere(joined)}
+    # Shares of the times at which each symbol has its usual neighbor, which has it as its usual one.
+    fixed_before = np.max(np.minimum(backward[:K], forward[:, :K]), axis=0) >= least
+    fixed_before |= counts[-1, :-1] >= least * counts[:, :-1].sum(axis=0)
+    fixed_behind = (np.max(np.minimum(forward[:, :K], backward[:K]), axis=1) >= least) | (forward[:, K] >= least)
+    chains = []
+    for first in sorted(followers.keys() - set(followers.values())):
+        chain = [first]
+        while chain[-1] in followers and followers[chain[-1]] not in chain:
+            chain.append(followers[chain[-1]])
+        if not fixed_before[first] and not fixed_behind[chain[-1]]:
+            chains.append(tuple(chain))
+    return chains
+
+
+def _logs(grammar: Grammar, log_likelihoods: Array) -> tuple[Array, Array]:
+    """Return the logarithms of the probabilities of a grammar, and refuse likelihoods of other symbols."""
+    if log_likelihoods.ndim != 2 or log_likelihoods.shape[1] != len(grammar):
         raise SpecificationError(
-            f"expected log likelihoods of shape {(len(lattice), len(grammar))}, a row for each edge and a column for "
-            f"each symbol, got {np.shape(log_likelihoods)}"
+            f"expected log likelihoods of shape (n, {len(grammar)}), a column for each symbol, got "
+            f"{log_likelihoods.shape}"
         )
-    if (lattice[:, 0] >= lattice[:, 1]).any() or lattice.min() < 0:
-        raise SpecificationError("expected edges from a point to a later one, counted from 0, got one that leads back")
-    with np.errstate(divide="ignore"):
-        initial, follow = np.log(grammar.initial), np.log(grammar.transitions)
-    best, before = _forward(lattice, log_likelihoods, initial, follow, viterbi=True)
-    last = int(lattice[:, 1].max())
-    total = best[last] + follow[:, -1]
-    if not np.isfinite(total).any():
-        raise SpecificationError("expected edges that lead from the first point to the last, got none that do")
-    path, point, symbol = [], last, int(total.argmax())
-    log_probability = float(total.max())
-    while point > 0:
-        edge, previous = before[point, symbol].tolist()
-        path.append((edge, symbol))
-        point, symbol = int(lattice[edge, 0]), previous
-    edge_of, labels = np.array(path[::-1], dtype=np.intp).T
-    return Parse(
-        edge_of, labels, _posteriors(lattice, log_likelihoods, initial, follow)[edge_of, labels], log_probability
-    )
-
-
-def chain(n: int) -> NDArray[np.intp]:
-    """Return the edges (n, 2) of n pieces, one after the other."""
-    return np.column_stack((np.arange(n), np.arange(1, n + 1)))
-
-
-def _of_counts(names: tuple[str, ...], counts: NDArray[np.intp], prior: float) -> Grammar:
-    even = np.full(len(names) + 1, 1.0 / (len(names) + 1))
-    initial = counts[-1, :-1] + prior / len(names)
-    transitions = counts[:-1] + prior * even
-    return Grammar(
-        names, initial / initial.sum(), transitions / transitions.sum(axis=1, keepdims=True), counts
-    )
-
-
-def _likely(symbols: Sequence[str], shares: Array) -> str:
-    order = np.argsort(-shares, kind="stable")
-    names = [*symbols, "end"]
-    return ", ".join(f"{names[k]} {shares[k]:.2f}" for k in order if shares[k] >= _RARE) or "anything"
-
-
-def _forward(
-    edges: NDArray[np.intp], log_likelihoods: Array, initial: Array, follow: Array, viterbi: bool
-) -> tuple[Array, NDArray[np.intp]]:
-    """Return the log maximum or sum (points, K) over paths to each point whose last piece shows each symbol.
-
-    Of the maximum also the edge and the symbol before that it comes from, (points, K, 2).
-    """
-    n, K = int(edges[:, 1].max()) + 1, len(initial)
-    arrived = np.full((n, K), -np.inf)
-    before = np.full((n, K, 2), -1, dtype=np.intp)
-    order = np.argsort(edges[:, 1], kind="stable")
-    starts = np.searchsorted(edges[order, 1], np.arange(n + 1))
-    for point in range(1, n):
-        own = order[starts[point] : starts[point + 1]]
-        if not len(own):
-            continue
-        sources = edges[own, 0]
-        ways = arrived[sources][:, :, None] + follow[:, :-1]  # (edges, symbol before, symbol)
-        entered = ways.max(axis=1) if viterbi else logsumexp(ways, axis=1)
-        entered[sources == 0] = initial
-        reached = entered + log_likelihoods[own]
-        if viterbi:
-            which = reached.argmax(axis=0)
-            arrived[point] = reached[which, np.arange(K)]
-            before[point, :, 0] = own[which]
-            before[point, :, 1] = ways.argmax(axis=1)[which, np.arange(K)]
-        else:
-            arrived[point] = logsumexp(reached, axis=0)
-    return arrived, before
-
-
-def _posteriors(edges: NDArray[np.intp], log_likelihoods: Array, initial: Array, follow: Array) -> Array:
-    """Return the probability (E, K) that the sequence has each edge with each symbol (forward-backward)."""
-    ahead, _ = _forward(edges, log_likelihoods, initial, follow, viterbi=False)
-    n, K = ahead.shape
-    left = np.full((n, K), -np.inf)  # of all that follows a point, by the symbol before it
-    left[-1] = follow[:, -1]
-    order = np.argsort(edges[:, 0], kind="stable")
-    starts = np.searchsorted(edges[order, 0], np.arange(n + 1))
-    for point in range(n - 2, 0, -1):
-        own = order[starts[point] : starts[point + 1]]
-        if len(own):
-            ways = (log_likelihoods[own] + left[edges[own, 1]])[:, None] + follow[None, :, :-1]
-            left[point] = logsumexp(ways, axis=(0, 2))
-    with np.errstate(invalid="ignore"):
-        entered = logsumexp(ahead[edges[:, 0]][:, :, None] + follow[:, :-1], axis=1)
-    entered[edges[:, 0] == 0] = initial
-    joint = entered + log_likelihoods + left[edges[:, 1]]
-    return np.asarray(np.exp(joint - logsumexp(ahead[-1] + follow[:, -1])))
+    return np.log(grammar.initial), np.log(grammar.transitions)

@@ -20,7 +20,7 @@ from scipy.special import logsumexp
 from kineme.errors import DataError
 from kineme.movements.segmentation.table import moving_bouts, noise_variance, weighted_quantile
 from kineme.movements.tables.time_stamps import words_of
-from kineme.validation import Array, check_number
+from kineme.validation import Array, check_count, check_number
 
 #: Role of a column -> words of its name, the first role that fits; columns of none of them are the arm's own.
 ROLES: dict[str, frozenset[str]] = {
@@ -33,8 +33,14 @@ ROLES: dict[str, frozenset[str]] = {
 _RATE = 50.0  # [1/s], at most: what people and robots do at work has little above 10 Hz
 _SMOOTHING = 0.06  # standard deviation of the Gaussian that velocities are taken with [s]
 _FLOOR = 0.05  # of the peak speed: lower speeds count as equally slow
+_REST = 1.0  # of the floor of the speed: slower is rest
+_PAUSE = 0.3  # a longer rest has two ends [s]
 _SHALLOW = 0.3  # prominence in the logarithm of speed [nats] of a minimum that counts, at least
 _WINDOW = 0.2  # over which directions before and after are taken [s]
+_BACK = -0.8  # cosine between a stroke and the one before it, at most
+_AS_LONG = 0.3  # the shorter of two strokes by the longer, at least
+_GRIPPED = 0.2  # of a gripper's range: it moves
+_STILL = 0.12  # extent of a rest, in shares of the extents of the joints, at most
 _STEP = 6.0  # height of a step of a contact, in standard deviations of its noise, at least
 _LARGEST = 3.0  # strength of one event, at most: a cue alone does not outweigh all others
 _NARROW = 0.04  # standard deviation of the place of an event [s], at least
@@ -47,19 +53,19 @@ class Work:
 
     - `penalty`: log odds that a boundary costs; the larger, the fewer there are.
     - `min_movement`: the shortest movement [s].
-    - `least`: confidence of a boundary, at least.
+    - `strokes`: so many ways there and back without a rest between them, or more, are one movement, as wiping is.
 
     Raises `SpecificationError`: a parameter out of its range.
     """
 
-    penalty: float = 2.0
+    penalty: float = 1.5
     min_movement: float = 0.3
-    least: float = 0.0
+    strokes: int = 3
 
     def __post_init__(self) -> None:
         check_number("penalty", self.penalty)
         check_number("min_movement", self.min_movement, least=0.0)
-        check_number("least", self.least, least=0.0)
+        check_count("strokes", self.strokes, 2)
 
 
 class Boundaries(NamedTuple):
@@ -102,11 +108,11 @@ def roles_of(names: Sequence[str]) -> dict[str, NDArray[np.intp]]:
 def boundaries(times: Array, columns: Array, names: Sequence[str], how: Work | None = None) -> Boundaries:
     """Find the boundaries between movements in the columns (T, m) of a recording at increasing times (T,) [s].
 
-    Events of all cues add up to log odds ``E(t) = sum strength exp(-(t - event)^2 / (2 width^2))``, whose maxima are
-    candidates c. Of all sets of candidates that are ``min_movement`` apart, the one with the largest sum of
-    ``E(c) - penalty`` is found exactly, by dynamic programming over candidates. The confidence of a boundary is its
-    probability among all these sets (forward-backward); its interval holds the times whose E is within 1.92 of the
-    maximum: a profile likelihood at 95 %.
+    Events of all cues add up to log odds ``E(t) = sum strength exp(-(t - event)^2 / (2 width^2))``, of each cue the
+    largest term, whose maxima are candidates c. Of all sets of candidates that are ``min_movement`` apart, the one with
+    the largest sum of ``E(c) - penalty`` is found exactly, by dynamic programming over candidates. The confidence of a
+    boundary is its probability among all these sets (forward-backward); its interval holds the times whose E is within
+    1.92 of the maximum: a profile likelihood at 95 %. Boundaries within strokes there and back are left out.
 
     Columns that are NaN throughout are left aside; other NaN are interpolated. Raises `DataError`: times that do not
     increase, or another number of names than of columns.
@@ -123,10 +129,23 @@ def boundaries(times: Array, columns: Array, names: Sequence[str], how: Work | N
     candidates = np.flatnonzero(peak) + 1
     odds = total[candidates] - how.penalty
     chosen, probability = _best_subset(t[candidates], odds, how.min_movement)
-    chosen = chosen[probability[chosen] >= how.least]
+    chosen = chosen[~_within_strokes(observed, candidates[chosen], how.strokes)]
     rows = candidates[chosen]
     spans = np.array([_interval(total, row) for row in rows.tolist()], dtype=np.intp).reshape(-1, 2)
     return Boundaries(times[0] + t[rows], probability[chosen], times[0] + t[spans], evidence[:, rows].T)
+
+
+def at_rest(times: Array, columns: Array, names: Sequence[str], edges: Array) -> NDArray[np.bool_]:
+    """Tell which of the pieces between times edges (n + 1,) [s] are rests: neither the arm nor a gripper moves."""
+    observed = observe_work(times, columns, names)
+    if observed is None:
+        return np.ones(len(edges) - 1, dtype=bool)
+    rows = np.searchsorted(observed.times, edges - times[0] - 1e-9).clip(0, len(observed.times) - 1)
+    gripper = observed.others["gripper"]
+    moving = np.column_stack((observed.arm, gripper / np.maximum(np.ptp(gripper, axis=0), np.finfo(float).tiny)))
+    starts = np.minimum(rows[:-1], rows[1:])
+    highest, lowest = (reach.reduceat(moving, starts, axis=0) for reach in (np.maximum, np.minimum))
+    return np.asarray(np.linalg.norm(highest - lowest, axis=1) < _STILL)
 
 
 def observe_work(times: Array, columns: Array, names: Sequence[str]) -> Observed | None:
@@ -164,13 +183,25 @@ def observe_work(times: Array, columns: Array, names: Sequence[str]) -> Observed
 
 
 def slow_moments(observed: Observed) -> Events:
-    """Minima of speed: their prominence in its logarithm, at most 3; as wide as half of it."""
+    """Minima of speed, and both ends of rests: their prominence in the logarithm of speed, at most 3."""
     from scipy.signal import find_peaks, peak_widths  # it takes long to load, and most commands cut nothing
 
     slowness = -np.log(observed.speed + observed.floor)
-    rows, properties = find_peaks(slowness, prominence=_SHALLOW, plateau_size=0)
-    widths = peak_widths(slowness, rows, rel_height=0.5)[0] / observed.rate
-    return Events(observed.times[rows], np.minimum(properties["prominences"], _LARGEST), 0.25 * widths)
+    rows, properties = find_peaks(slowness, prominence=_SHALLOW)
+    strengths = np.minimum(properties["prominences"], _LARGEST)
+    widths = 0.25 * peak_widths(slowness, rows, rel_height=0.5)[0] / observed.rate
+    rests = moving_bouts(-observed.speed, -_REST * observed.floor, -np.inf)
+    rests = rests[rests[:, 1] - rests[:, 0] > _PAUSE * observed.rate]
+    owner = np.searchsorted(rests[:, 0], rows, side="right") - 1
+    resting = (owner >= 0) & (rows < rests[np.maximum(owner, 0), 1]) if len(rests) else np.zeros(len(rows), dtype=bool)
+    deepest = np.zeros(len(rests))
+    np.maximum.at(deepest, owner[resting], strengths[resting])
+    ends = np.column_stack((rests[:, 0], rests[:, 1] - 1)).ravel()
+    return Events(
+        observed.times[np.append(rows[~resting], ends)],
+        np.append(strengths[~resting], np.repeat(np.maximum(deepest, _LARGEST), 2)),
+        np.append(widths[~resting], np.full(len(ends), _SMOOTHING)),
+    )
 
 
 def turns(observed: Observed) -> Events:
@@ -269,6 +300,23 @@ def _best_subset(times: Array, odds: Array, apart: float) -> tuple[NDArray[np.in
         k = int(last[before[k]])
     probability = np.exp(ahead + behind - odds - logsumexp(np.append(0.0, ahead)))
     return np.array(chosen[::-1], dtype=np.intp), np.minimum(probability, 1.0)
+
+
+def _within_strokes(observed: Observed, rows: NDArray[np.intp], strokes: int) -> NDArray[np.bool_]:
+    """Tell which boundaries lie within so many strokes: each turns back, is about as long, and no gripper moves."""
+    edges = np.concatenate(([0], rows, [len(observed.times) - 1]))
+    way = np.diff(observed.arm[edges], axis=0)
+    size = np.linalg.norm(way, axis=1)
+    gripper = observed.others["gripper"]
+    grip = np.abs(np.diff(gripper[edges], axis=0)) > _GRIPPED * np.ptp(gripper, axis=0)
+    product = np.maximum(size[:-1] * size[1:], np.finfo(float).tiny)
+    back = (np.einsum("ij,ij->i", way[:-1], way[1:]) < _BACK * product) & ~(grip[:-1] | grip[1:]).any(axis=1)
+    back &= np.minimum(size[:-1], size[1:]) > _AS_LONG * np.maximum(size[:-1], size[1:])
+    runs = moving_bouts(back.astype(np.float64), 0.5, 0.5)  # of boundaries at which the arm turns back
+    inside = np.zeros(len(rows), dtype=bool)
+    for first, stop in runs[runs[:, 1] - runs[:, 0] >= strokes - 1].tolist():
+        inside[first:stop] = True
+    return inside
 
 
 def _interval(total: Array, row: int) -> tuple[int, int]:
