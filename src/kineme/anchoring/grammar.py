@@ -5,8 +5,7 @@ their order, do. A bigram with a begin and an end is the least that knows an ord
 
 Sources: L. R. Rabiner, "A tutorial on hidden Markov models and selected applications in speech recognition",
 Proceedings of the IEEE 77, 1989 (Viterbi, forward-backward); D. J. C. MacKay, L. C. Bauman Peto, "A hierarchical
-Dirichlet language model", Natural Language Engineering 1, 1995 (smoothing); J. R. Saffran, R. N. Aslin, E. L. Newport,
-"Statistical learning by 8-month-old infants", Science 274, 1996 (units are within what predicts each other).
+Dirichlet language model", Natural Language Engineering 1, 1995 (smoothing).
 """
 
 from __future__ import annotations
@@ -179,33 +178,6 @@ def posterior(grammar: Grammar, log_likelihoods: Array) -> Posterior:
     counts[:-1, :-1] = np.exp(pairs).sum(axis=0)
     counts[-1, :-1], counts[:-1, -1] = probabilities[0], probabilities[-1]
     return Posterior(probabilities, counts, total)
-
-
-def units(grammar: Grammar, least: float = 0.8) -> list[tuple[int, ...]]:
-    """Find symbols that are parts of a larger unit: numbers of symbols that come one after the other, as a rule.
-
-    Symbol b belongs to a if a is followed by b, and b preceded by a, in a share of at least `least` of the times. It is
-    evidence only where an order could have been another one: a unit is proposed if what comes before it varies, or what
-    its predecessor is followed by, and likewise behind it. Where every sequence has the same order, nothing is joined.
-    """
-    counts = grammar.counts
-    forward = counts[:-1] / np.maximum(counts[:-1].sum(axis=1, keepdims=True), 1.0)
-    backward = counts[:, :-1] / np.maximum(counts[:, :-1].sum(axis=0), 1.0)
-    K = len(grammar)
-    joined = (forward[:, :K] >= least) & (backward[:K] >= least) & ~np.eye(K, dtype=bool)
-    followers = {int(a): int(b) for a, b in np.argwhere(joined)}
-    # Shares of the times at which each symbol has its usual neighbor, which has it as its usual one.
-    fixed_before = np.max(np.minimum(backward[:K], forward[:, :K]), axis=0) >= least
-    fixed_before |= counts[-1, :-1] >= least * counts[:, :-1].sum(axis=0)
-    fixed_behind = (np.max(np.minimum(forward[:, :K], backward[:K]), axis=1) >= least) | (forward[:, K] >= least)
-    chains = []
-    for first in sorted(followers.keys() - set(followers.values())):
-        chain = [first]
-        while chain[-1] in followers and followers[chain[-1]] not in chain:
-            chain.append(followers[chain[-1]])
-        if not fixed_before[first] and not fixed_behind[chain[-1]]:
-            chains.append(tuple(chain))
-    return chains
 
 
 def _logs(grammar: Grammar, log_likelihoods: Array) -> tuple[Array, Array]:

@@ -21,9 +21,10 @@ from scipy.special import logsumexp
 from kineme.anchoring.grammar import Grammar, grammar_of_counts, posterior
 from kineme.validation import Array
 
-_NOISE = 0.1  # standard deviation in which features of one kind differ at least, in that of all features
+_NOISE = 0.12  # standard deviation in which features of one kind differ at least, in that of all features
 _ROUNDS = 15  # of expectation and maximization of kinds and grammar together, at most
 _GAIN = 1e-3  # of the log likelihood of a piece, below which rounds stop
+_UNDONE, _ALWAYS = 0.4, 0.8  # of an excursion, see there
 _FEWEST = 4  # pieces of a kind
 _AXES = 3  # principal axes along which a kind is divided, beside the features themselves
 
@@ -44,16 +45,35 @@ class Kinds:
         return len(self.means)
 
 
-def describe_piece(path: Array) -> Array:
-    """Return features (3 d,) of a path (m, d) in shares of the spread: center, displacement, and bulge.
+def describe_pieces(paths: Array) -> Array:
+    """Return features (n, 3 d) of pieces, of which paths (n, 3, d) hold begin, middle and end.
 
-    The center is the mean of begin and end, the displacement end minus begin, the bulge the middle minus the center.
-    They are linear in the path.
+    They are linear: the center of begin and end, the displacement end minus begin, and the bulge, the middle minus the
+    center.
     """
-    begin, end = path[0], path[-1]
-    center, m = 0.5 * (begin + end), len(path)
-    middle = 0.5 * (path[(m - 1) // 2] + path[m // 2])
-    return np.concatenate((center, end - begin, middle - center))
+    begin, middle, end = paths[:, 0], paths[:, 1], paths[:, 2]
+    center = 0.5 * (begin + end)
+    return np.concatenate((center, end - begin, middle - center), axis=1)
+
+
+def excursions(kinds: Kinds, n_axes: int) -> list[tuple[int, int]]:
+    """Return pairs of kinds (a, b) that are one movement: b always undoes what a did right before it.
+
+    So a press is, down and up, or a glass that is tilted and put upright again. Kind b is preceded by a in 0.8 of the
+    times, or more, and the sum of their mean displacements is less than 0.4 of the longer one. Where a begins or b ends
+    most of their sequences, as in a way there and a way back, nothing around tells that they belong together.
+    `n_axes` is the number d of columns of paths, as in `describe_pieces`, whose features come first.
+    """
+    counts, K = kinds.grammar.counts, len(kinds)
+    preceded = counts[:-1, :-1] / np.maximum(counts[:, :-1].sum(axis=0), 1e-9)
+    way = kinds.means[:, n_axes : 2 * n_axes]
+    size = np.linalg.norm(way, axis=1)
+    undone = np.linalg.norm(way[:, None] + way, axis=2) < _UNDONE * np.maximum(np.maximum(size[:, None], size), _NOISE)
+    begins = counts[-1, :-1] / np.maximum(counts[:, :-1].sum(axis=0), 1e-9)
+    ends = counts[:-1, -1] / np.maximum(counts[:-1].sum(axis=1), 1e-9)
+    inner = (begins[:, None] < 0.5) | (ends < 0.5)
+    pairs = np.argwhere((preceded >= _ALWAYS) & undone & inner & (size > _NOISE) & ~np.eye(K, dtype=bool))
+    return [(int(a), int(b)) for a, b in pairs]
 
 
 def log_densities(means: Array, roots: Array, features: Array) -> Array:
@@ -113,7 +133,7 @@ def _divided(features: Array, related: NDArray[np.bool_], most: int) -> tuple[fl
 
 def _halved(features: Array, related: NDArray[np.bool_]) -> Array | None:
     """Return how much each piece (m,) belongs to the second half of a kind; None where it is better in one."""
-    whole, _ = _mixture(features, related, np.ones((len(features), 1)))
+    undivided, _ = _mixture(features, related, np.ones((len(features), 1)))
     centered = features - features.mean(axis=0)
     spread = centered.std(axis=0)
     axes = np.linalg.svd(centered / np.maximum(spread, _NOISE), full_matrices=False)[2][:_AXES]
@@ -126,7 +146,7 @@ def _halved(features: Array, related: NDArray[np.bool_]) -> Array | None:
     if not halves:
         return None
     best, responsibilities = min(halves, key=lambda pair: pair[0])
-    return responsibilities[:, 1] if best < whole else None
+    return responsibilities[:, 1] if best < undivided else None
 
 
 def _mixture(
@@ -159,7 +179,9 @@ def _gaussians(features: Array, related: NDArray[np.bool_], responsibilities: Ar
     return means, np.stack(roots)
 
 
-def _in_order_of_sequences(features: Array, related: NDArray[np.bool_], lengths: Sequence[int], responsibilities: Array) -> Kinds:
+def _in_order_of_sequences(
+    features: Array, related: NDArray[np.bool_], lengths: Sequence[int], responsibilities: Array
+) -> Kinds:
     """Learn kinds and grammar together from responsibilities (n, K) to begin with."""
     ends = np.cumsum(lengths)
     K, before = responsibilities.shape[1], -np.inf

@@ -12,6 +12,7 @@ import click
 
 from kineme.cli.anchor import anchor
 from kineme.cli.annotate import annotate
+from kineme.cli.discover import discover
 from kineme.cli.evaluate import evaluate, reproduce
 from kineme.cli.generate import generate
 from kineme.cli.inspect import inspect
@@ -83,7 +84,7 @@ def main() -> None:
 
 
 for command in (
-    anchor, annotate, evaluate, generate, move, inspect, learn, library, page, recognize, reproduce, segment, studio,
-    why,
+    anchor, annotate, discover, evaluate, generate, move, inspect, learn, library, page, recognize, reproduce, segment,
+    studio, why,
 ):  # fmt: skip
     main.add_command(command)

@@ -99,9 +99,7 @@ class Observed(NamedTuple):
 
 def roles_of(names: Sequence[str]) -> dict[str, NDArray[np.intp]]:
     """Return role -> its columns, by the words of their names; "arm" are all that have no other role."""
-    roles = [
-        next((role for role, words in ROLES.items() if words & {*words_of(name)}), "arm") for name in names
-    ]
+    roles = [next((role for role, words in ROLES.items() if words & {*words_of(name)}), "arm") for name in names]
     return {role: np.flatnonzero(np.array(roles) == role) for role in ("arm", *ROLES)}
 
 
@@ -162,7 +160,7 @@ def observe_work(times: Array, columns: Array, names: Sequence[str]) -> Observed
     duration = float(times[-1] - times[0])
     n = min(len(times), int(duration * _RATE) + 1)
     t = np.linspace(0.0, duration, n)
-    usable = np.isfinite(columns).any(axis=0)
+    usable: NDArray[np.bool_] = np.asarray(np.isfinite(columns).any(axis=0))
     even = np.zeros((n, len(names)))
     for k in np.flatnonzero(usable).tolist():
         valid = np.isfinite(columns[:, k])
@@ -176,7 +174,7 @@ def observe_work(times: Array, columns: Array, names: Sequence[str]) -> Observed
     arm = arm / np.maximum(extents, 0.3 * extents.max())
     velocity = rate * gaussian_filter1d(arm, _SMOOTHING * rate, axis=0, order=1, mode="nearest")
     speed = np.linalg.norm(velocity, axis=1)
-    # White noise of variance s^2 at rate r passes the derivative of a Gaussian of width w with s^2 / (4 sqrt(pi) w^3 r).
+    # Of white noise of variance s^2 at rate r, a Gaussian derivative of width w passes s^2 / (4 sqrt(pi) w^3 r).
     noise = np.sqrt(noise_variance(arm) / (4.0 * np.sqrt(np.pi) * _SMOOTHING**3 * rate))
     floor = max(_FLOOR * weighted_quantile(speed, speed, 0.9), 2.0 * float(noise))
     return Observed(t, rate, arm, velocity, speed, floor, {role: even[:, own] for role, own in roles.items()})
