@@ -39,7 +39,7 @@ def work_episode(number, task, seed=0, fps=30, noise=0.002, jitter=0.03):
         u = np.arange(round(lasting * fps)) / round(lasting * fps)
         s = (u**3 * (10 - 15 * u + 6 * u**2))[:, None]
         points.append(at + s * (goal - at))
-        openings.append(grip + np.clip(1.6 * u - 0.1, 0.0, 1.0) * (opening - grip))
+        openings.append(grip + np.clip(1.15 * u - 0.1, 0.0, 1.0) * (opening - grip))
         spans.append((t0, t0 + len(u) / fps, kind))
         at, grip, t0 = goal, opening, t0 + len(u) / fps
     joints = np.concatenate(points)

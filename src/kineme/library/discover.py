@@ -28,7 +28,6 @@ from kineme.movements.episodes import Episode
 from kineme.movements.segmentation.work import Work, at_rest, boundaries, roles_of
 from kineme.movements.trajectories.as_learned import of_columns
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.sampling import evenly_spaced
 from kineme.validation import MIN_SAMPLES, Array
 
 STATES = ("observation.state", "action")  # features that kinds are described by, the first that an episode has
@@ -150,7 +149,9 @@ def discover(
     features, n_axes = features_of(observations, columns)
     starts = np.cumsum([0, *(len(each.edges) for each in observations)])
     share = min(1.0, n_learned / starts[-1])
-    sample = evenly_spaced(len(observations), max(1, round(share * len(observations))))
+    # Not evenly spaced ones: tasks may take turns.
+    order = np.random.default_rng(0).permutation(len(observations))
+    sample = np.sort(order[: max(1, round(share * len(observations)))])
     rows = np.concatenate([np.arange(starts[i], starts[i + 1]) for i in sample])
     kinds = learn_kinds(features[rows], np.diff(starts)[sample].tolist(), 3 * n_axes)
     units = excursions(kinds, n_axes)

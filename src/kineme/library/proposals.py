@@ -145,14 +145,15 @@ def store_proposals(store: Store, proposals: Sequence[NamedProposal]) -> int:
 
 
 def stored_proposals(store: Store) -> list[NamedProposal]:
-    """Return the proposals that were stored last, if that was not taken back."""
+    """Return the proposals that were stored last, as far as that was not taken back."""
+    at: dict[int, Mapping[str, Any] | None] = {0: None}  # version -> the proposals that were stored by then
     detail: Mapping[str, Any] | None = None
-    at = 0
     for version in history(store):
         if version.action == _DISCOVER:
-            detail, at = version.detail, version.id
-        elif version.action in RETURNS and version.detail["to"] < at:
-            detail = None
+            detail = version.detail
+        elif version.action in RETURNS:
+            detail = at[version.detail["to"]]
+        at[version.id] = detail
     if detail is None:
         return []
     ends = np.cumsum(detail["sizes"])[:-1]
