@@ -27,7 +27,7 @@ TASKS = {
 }  # fmt: skip
 
 
-def work_episode(number, task, seed=0, fps=30, noise=0.002, jitter=0.03):
+def work_episode(number, task, seed=0, fps=30, noise=0.001, jitter=0.03):
     """An episode, and its truth: (start, end, kind) of each movement [s]."""
     rng = np.random.default_rng([seed, number])
     at, grip, t0 = np.array(PLACES["home"]), 1.0, 0.0

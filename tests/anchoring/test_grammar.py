@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
@@ -52,7 +52,7 @@ def _paths(grammar, log_likelihoods):
     n, K = log_likelihoods.shape
     for path in product(range(K), repeat=n):
         logs = np.log(grammar.initial[path[0]]) + np.log(grammar.transitions[path[-1], -1])
-        logs += sum(np.log(grammar.transitions[a, b]) for a, b in zip(path, path[1:], strict=False))
+        logs += sum(np.log(grammar.transitions[a, b]) for a, b in pairwise(path))
         yield path, logs + log_likelihoods[np.arange(n), path].sum()
 
 

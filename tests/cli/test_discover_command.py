@@ -6,8 +6,9 @@ import csv
 import json
 
 import pytest
-from bench.work_sets import write_set
 from commands import answer, run, start
+
+from bench.work_sets import write_set
 from work_samples import TASKS, work_episodes
 
 pytest.importorskip("pyarrow")

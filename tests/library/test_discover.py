@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from work_samples import NAMES, TASKS, work_episode, work_episodes
 
 from kineme.anchoring.clustering import adjusted_rand
 from kineme.errors import DataError
@@ -15,6 +14,7 @@ from kineme.library.discover import annotations_of, discover, propose_names, sta
 from kineme.library.library import ActionLibrary
 from kineme.library.proposals import stored_proposals
 from kineme.recognition.recognizer import Recognizer
+from work_samples import NAMES, TASKS, work_episode, work_episodes
 
 KEPT = Recognizer(translation=False, scale="none", max_angle=0.0)
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import pytest
-from work_samples import work_episodes
 
 from kineme.library.discover import discover, store_discovery
 from kineme.library.library import ActionLibrary
 from kineme.recognition.recognizer import Recognizer
+from work_samples import work_episodes
 
 
 @pytest.fixture(scope="module")

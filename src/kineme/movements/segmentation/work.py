@@ -32,9 +32,10 @@ ROLES: dict[str, frozenset[str]] = {
 
 _RATE = 50.0  # [1/s], at most: what people and robots do at work has little above 10 Hz
 _SMOOTHING = 0.06  # standard deviation of the Gaussian that velocities are taken with [s]
-_FLOOR = 0.05  # of the peak speed: lower speeds count as equally slow
+_FLOOR, _MOST = 0.05, 0.15  # of the peak speed: lower speeds count as equally slow, and where a hand trembles
+_SLOWEST, _HAND = 0.05, 2.5  # share of samples that are slowest; times their speed is trembling
 _REST = 1.0  # of the floor of the speed: slower is rest
-_PAUSE = 0.3  # a longer rest has two ends [s]
+_PAUSE = 0.2  # a longer rest has two ends [s]
 _SHALLOW = 0.3  # prominence in the logarithm of speed [nats] of a minimum that counts, at least
 _WINDOW = 0.2  # over which directions before and after are taken [s]
 _BACK = -0.8  # cosine between a stroke and the one before it, at most
@@ -59,7 +60,7 @@ class Work:
     """
 
     penalty: float = 1.5
-    min_movement: float = 0.3
+    min_movement: float = 0.2
     strokes: int = 3
 
     def __post_init__(self) -> None:
@@ -176,7 +177,9 @@ def observe_work(times: Array, columns: Array, names: Sequence[str]) -> Observed
     speed = np.linalg.norm(velocity, axis=1)
     # Of white noise of variance s^2 at rate r, a Gaussian derivative of width w passes s^2 / (4 sqrt(pi) w^3 r).
     noise = np.sqrt(noise_variance(arm) / (4.0 * np.sqrt(np.pi) * _SMOOTHING**3 * rate))
-    floor = max(_FLOOR * weighted_quantile(speed, speed, 0.9), 2.0 * float(noise))
+    fast = weighted_quantile(speed, speed, 0.9)
+    trembling = min(_HAND * float(np.quantile(speed, _SLOWEST)), _MOST * fast)  # a hand's, which is no white noise
+    floor = max(_FLOOR * fast, 2.0 * float(noise), trembling)
     return Observed(t, rate, arm, velocity, speed, floor, {role: even[:, own] for role, own in roles.items()})
 
 
@@ -221,12 +224,12 @@ def turns(observed: Observed) -> Events:
 
 def gripper_events(observed: Observed) -> Events:
     """Begin and end of each closing or opening of a gripper."""
-    return _begin_and_end(observed, observed.others["gripper"])
+    return _begin_and_end(observed, observed.others["gripper"], 2.0)
 
 
 def object_events(observed: Observed) -> Events:
-    """Begin and end of the movements of objects."""
-    return _begin_and_end(observed, observed.others["object"])
+    """Begin and end of the movements of objects, which lag behind those of the arm."""
+    return _begin_and_end(observed, observed.others["object"], 1.0)
 
 
 def contact_events(observed: Observed) -> Events:
@@ -253,7 +256,7 @@ CUES: dict[str, Callable[[Observed], Events]] = {
 }
 
 
-def _begin_and_end(observed: Observed, columns: Array) -> Events:
+def _begin_and_end(observed: Observed, columns: Array, strength: float) -> Events:
     """Return begin and end of the bouts of motion of columns (n, k) together."""
     extents = np.ptp(columns, axis=0) if columns.size else np.zeros(0)
     if not extents.any():
@@ -266,7 +269,7 @@ def _begin_and_end(observed: Observed, columns: Array) -> Events:
     if not len(bouts):
         return Events(np.empty(0), np.empty(0), np.empty(0))
     times = observed.times[np.column_stack((bouts[:, 0], bouts[:, 1] - 1)).ravel()]
-    return Events(times, np.full(len(times), 2.0), np.full(len(times), _SMOOTHING))
+    return Events(times, np.full(len(times), strength), np.full(len(times), _SMOOTHING))
 
 
 def _on_grid(events: Events, t: Array) -> Array:
