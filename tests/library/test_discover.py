@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from kineme.anchoring.clustering import adjusted_rand
-from kineme.errors import DataError
+from kineme.errors import DataError, TrajectoryError
 from kineme.library.discover import annotations_of, discover, propose_names, state_of, store_discovery, times_of
 from kineme.library.library import ActionLibrary
 from kineme.library.proposals import stored_proposals
@@ -122,6 +122,9 @@ def test_episodes_that_cannot_be_used_are_problems(worked):
     assert [kind.times for kind in with_bad.kinds] == [kind.times for kind in discovery.kinds]
     with pytest.raises(DataError, match="episodes with movements"):
         discover([short])
+    signals = {"observation.state": episodes[0].signals["observation.state"][:50]}
+    with pytest.raises(DataError, match="give more episodes"):
+        discover([replace(episodes[0], times=episodes[0].times[:50], signals=signals)])
 
 
 def test_kinds_become_proposals_that_a_person_accepts(worked, tmp_path):
@@ -176,6 +179,15 @@ def test_storing_again_replaces_what_was_proposed_and_undo_takes_it_back(worked,
         assert [proposal.name for proposal in library.propose()] == [kind.name for kind in discovery.kinds]
         library.undo(to=0)
         assert stored_proposals(library.store) == []
+
+
+def test_a_library_of_other_columns_is_refused(worked, tmp_path):
+    episodes, _, discovery = worked
+    with ActionLibrary(tmp_path / "actions", create=True) as library:
+        library.learn([np.random.default_rng(0).normal(size=(20, 2)) for _ in range(3)])
+        with pytest.raises(TrajectoryError, match="dimensions"):
+            store_discovery(library.store, episodes, discovery)
+        assert library.version == 1
 
 
 def test_discovered_movements_do_not_join_symbols_that_merely_look_alike(worked, tmp_path):

@@ -52,7 +52,8 @@ def discover(dataset: Path, folder: Path | None, output: Path | None, **options:
             check_new(target, options["force"], dataset)
     with progress(read_episodes(dataset), desc="cutting", unit="episode") as episodes:
         discovery = find(episodes, feature, Work(penalty=options["penalty"]))
-    data = discovery.to_dict() | {"written": [], "library": None, "version": None}
+    plain = discovery.to_dict() if options["as_json"] else discovery.summary()
+    data = plain | {"written": [], "library": None, "version": None}
     if output is not None:
         notes = annotations_of(discovery, dataset.name)
         movements = [(note.recording, note.place) for note in notes]
@@ -88,14 +89,13 @@ def _text(data: dict[str, Any]) -> str:
         )
         for number, kind in enumerate(data["kinds"], 1)
     ]
-    n_alone = sum(segment["kind"] is None for segment in data["segments"])
     title = (
-        f"{counted(len(rows), 'kind')} among {counted(len(data['segments']), 'movement')} of "
+        f"{counted(len(rows), 'kind')} among {counted(data['movements'], 'movement')} of "
         f"{counted(data['episodes'], 'episode')}, {data['seconds']:,.0f} s"
     )
     lines = [table(("kind", "times", "seconds", "follows", "proposed name"), rows, title)]
-    if n_alone:
-        lines.append(f"{counted(n_alone, 'movement')} like no other")
+    if data["alone"]:
+        lines.append(f"{counted(data['alone'], 'movement')} like no other")
     problems = data["problems"]
     lines += [f"not cut: {printable(problem)}" for problem in problems[:_PROBLEMS]]
     if len(problems) > _PROBLEMS:

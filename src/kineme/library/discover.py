@@ -23,6 +23,7 @@ from kineme.io.writing.annotations import Annotation
 from kineme.library.learn import learn
 from kineme.library.proposals import NamedProposal, store_proposals
 from kineme.library.storage.store import Store
+from kineme.movements.channels.channel import Channels
 from kineme.movements.channels.detect import find_channels
 from kineme.movements.episodes import Episode
 from kineme.movements.segmentation.work import Work, at_rest, boundaries, roles_of
@@ -35,7 +36,8 @@ _CUES = ("gripper", "contact", "object")  # roles of columns of other features t
 _LEARNED = 3000  # pieces that kinds are learned from, about
 _VARIANCE = 0.95  # share of that of the joints that their principal axes hold, at least
 _MIN_MEMBERS = 3  # movements of a kind
-_SHARE = 0.2  # of a kind's movements are in a task that it belongs to, or behind what it follows, at least
+_HOLD = 0.3  # of the episodes of a task hold a kind that belongs to it, at least
+_FOLLOW = 0.1  # of a kind's movements follow what is listed, at least
 _LONGEST = 40  # letters of a proposed name
 _AT_ONCE = 256  # episodes whose movements are stored in one change
 _COMMON_WORDS = frozenset(
@@ -79,20 +81,26 @@ class Discovery:
     seconds: float
     problems: tuple[str, ...]
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data."""
-        names = [kind.name for kind in self.kinds]
+    def summary(self) -> dict[str, Any]:
+        """Return plain data without the segments: what stays small, however many episodes there are."""
         return {
             "kinds": [kind._asdict() | {"follows": dict(kind.follows)} for kind in self.kinds],
-            "segments": [
-                segment._asdict() | {"kind": None if segment.kind is None else names[segment.kind]}
-                for segment in self.segments
-            ],
             "grammar": self.grammar.to_dict(),
+            "movements": len(self.segments),
+            "alone": sum(segment.kind is None for segment in self.segments),
             "episodes": self.episodes,
             "seconds": self.seconds,
             "problems": list(self.problems),
         }
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data, with a row for each segment."""
+        names = [kind.name for kind in self.kinds]
+        rows = (
+            segment._asdict() | {"kind": None if segment.kind is None else names[segment.kind]}
+            for segment in self.segments
+        )
+        return self.summary() | {"segments": list(rows)}
 
 
 class Observation(NamedTuple):
@@ -128,7 +136,8 @@ def discover(
     Raises
     ------
     DataError
-        No episode with movements. Episodes that cannot be used are among the problems of the result.
+        No episode with movements, or no three that are alike. Episodes that cannot be used are among the problems of
+        the result.
     """
     observations: list[Observation] = []
     problems: list[str] = []
@@ -273,6 +282,11 @@ def _named(segments: Sequence[Segment], observations: Sequence[Observation], pro
     for segment in segments:
         if times[segment.kind] >= _MIN_MEMBERS:
             by_episode.setdefault(segment.episode, []).append(str(segment.kind))
+    if not by_episode:
+        raise DataError(
+            f"expected {_MIN_MEMBERS} movements of one kind or more, got {len(segments)} movements that are all unlike "
+            "each other; give more episodes"
+        )
     order = in_order([*by_episode.values()])
     number = {int(name): k for k, name in enumerate(order)}
     segments = [segment._replace(kind=number.get(segment.kind)) for segment in segments]  # type: ignore[arg-type]
@@ -281,14 +295,17 @@ def _named(segments: Sequence[Segment], observations: Sequence[Observation], pro
     for segment in segments:
         if segment.kind is not None:
             own[segment.kind].append(segment)
-    shares = [Counter(tasks[segment.episode] for segment in several) for several in own]
-    of_tasks = [tuple(sorted(task for task, n in counts.items() if n >= _SHARE * counts.total())) for counts in shares]
+    episodes = Counter(tasks.values())
+    of_tasks = []
+    for several in own:
+        holding = Counter(tasks[episode] for episode in {segment.episode for segment in several})
+        of_tasks.append(tuple(sorted(task for task, n in holding.items() if n >= _HOLD * episodes[task])))
     names = propose_names(of_tasks, {*tasks.values()})
     grammar = estimate_grammar([[names[number[int(name)]] for name in path] for path in by_episode.values()], names)
     before = grammar.counts / np.maximum(grammar.counts.sum(axis=0), 1.0)
     kinds = []
     for k, several in enumerate(own):
-        likely = [i for i in np.argsort(-before[:, k], kind="stable").tolist() if before[i, k] >= _SHARE]
+        likely = [i for i in np.argsort(-before[:, k], kind="stable").tolist() if before[i, k] >= _FOLLOW]
         follows = tuple(([*names, "begin"][i], float(before[i, k])) for i in likely)
         lasting = float(np.mean([segment.end - segment.start for segment in several]))
         kinds.append(Kind(names[k], len(several), lasting, follows, of_tasks[k]))
@@ -349,7 +366,7 @@ def store_discovery(
     """Store the movements of a discovery, read from the episodes again, and propose its kinds; return the version.
 
     A person names the proposals, in the studio or by ``kineme anchor``. `progress` is called with the number of
-    episodes that are done.
+    episodes that are done. Raises `TrajectoryError`: the library holds movements of other columns.
     """
     by_episode: dict[int, list[Segment]] = {}
     for segment in discovery.segments:
@@ -359,14 +376,16 @@ def store_discovery(
     stored: list[Segment] = []
     pending: list[tuple[Segment, Array, Array]] = []
     columns: tuple[str, ...] = ()
+    channels: Channels | None = None  # of the first movements: a gripper that rests in others is none of steps
 
     def flush() -> None:
+        nonlocal channels
         if not pending:
             return
         segments, times, states = zip(*pending, strict=True)
         names = [f"{segment.place}[{segment.start:.2f}-{segment.end:.2f} s]" for segment in segments]
         demos = Demonstrations.from_arrays(states, None, times, names)
-        channels = store.channels or find_channels(columns, demos.positions, demos.offsets, {})
+        channels = channels or find_channels(columns, demos.positions, demos.offsets, {})
         ids.extend(learn(store, of_columns(demos, channels)).ids.tolist())
         stored.extend(segments)
         pending.clear()
