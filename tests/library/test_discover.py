@@ -13,6 +13,7 @@ from kineme.errors import DataError, TrajectoryError
 from kineme.library.discover import annotations_of, discover, propose_names, state_of, store_discovery, times_of
 from kineme.library.library import ActionLibrary
 from kineme.library.proposals import stored_proposals
+from kineme.library.storage.verify import _version as strange_versions
 from kineme.recognition.recognizer import Recognizer
 from work_samples import NAMES, TASKS, work_episode, work_episodes
 
@@ -196,3 +197,22 @@ def test_discovered_movements_do_not_join_symbols_that_merely_look_alike(worked,
         store_discovery(library.store, episodes, discovery)
         library.accept(library.propose()[0], "reach")
         assert library.join() == {}
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"sizes": [1]},
+        {"sizes": [0, 2]},
+        {"movements": ["1", "2"]},
+        {"names": ["a"]},
+        {"medoids": None},
+        {"sizes": [2, 1]},
+    ],
+)
+def test_damaged_proposals_are_problems(wrong):
+    detail = {
+        "names": ["a", "b"], "sizes": [1, 1], "medoids": [1, 2], "certainties": [1.0, 0.5], "movements": [1, 2],
+    }  # fmt: skip
+    assert not list(strange_versions([(1, "", "discover", json.dumps(detail))]))
+    assert list(strange_versions([(1, "", "discover", json.dumps(detail | wrong))]))

@@ -16,7 +16,7 @@ _PROBLEMS = 10  # that are printed one by one
 
 
 @click.command(cls=GroupedCommand, short_help="Find kinds of movements in robot data without examples.")
-@click.argument("dataset", type=click.Path(exists=True, path_type=Path))
+@click.argument("dataset", type=click.Path(path_type=Path))
 @library_option_of(
     required=False, words="Folder of the action library that the proposals are stored in; made if it is not there."
 )
