@@ -110,6 +110,16 @@ def test_the_state_is_a_feature_without_its_empty_columns():
     heads, state = state_of(replace(episode, signals={"observation.state": holed}))
     assert state.shape[1] == len(heads) == len(NAMES) - 1
     assert state_of(episode, "action")[0][0].startswith("action.")
+    assert state_of(replace(episode, signals={"action": holed}))[0][0].startswith("action.")
+    parts = {"observation.robot0_joint_pos": holed[:, 2:4], "observation.robot0_gripper_qpos": holed[:, 6:]}
+    several = replace(
+        episode,
+        signals=parts | {"observation.robot0_joint_vel": holed, "action": holed},
+        names={name: [str(k) for k in range(values.shape[1])] for name, values in parts.items()},
+    )
+    heads, state = state_of(several)
+    assert heads[-1] == "observation.robot0_gripper_qpos.0"
+    np.testing.assert_array_equal(state, holed[:, [2, 3, 6]])
     with pytest.raises(DataError, match="--feature"):
         state_of(episode, "wrist")
 

@@ -20,7 +20,7 @@ _PROBLEMS = 10  # that are printed one by one
 @library_option_of(
     required=False, words="Folder of the action library that the proposals are stored in; made if it is not there."
 )
-@click.option("--feature", help="Describe movements by this one.  [default: observation.state, else action]")
+@click.option("--feature", help="Describe movements by this one.  [default: observation.state, or positions]")
 @click.option("--penalty", type=Finite(), default=1.5, show_default=True,
               help="Log odds that a boundary costs: larger means fewer.")  # fmt: skip
 @heading("Output")

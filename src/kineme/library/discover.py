@@ -31,7 +31,8 @@ from kineme.movements.trajectories.as_learned import of_columns
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.validation import MIN_SAMPLES, Array
 
-STATES = ("observation.state", "action")  # features that kinds are described by, the first that an episode has
+#: Features of positions that an arm observes, where there is no ``observation.state``.
+_POSITIONS = re.compile(r"observation\..*(joint_pos|eef_pos|eef_rot_axis_angle|gripper_qpos|gripper_width)")
 _CUES = ("gripper", "contact", "object")  # roles of columns of other features that help to find boundaries
 _LEARNED = 3000  # pieces that kinds are learned from, about
 _VARIANCE = 0.95  # share of that of the joints that their principal axes hold, at least
@@ -126,8 +127,8 @@ def discover(
     episodes : iterable of Episode
         Read once, one at a time.
     feature : str, optional
-        What kinds are described by: by default ``observation.state``, else ``action``. Columns of grippers, contacts
-        and objects in other features, by their names, help to find boundaries.
+        What kinds are described by, see `state_of`. Columns of grippers, contacts and objects in other features, by
+        their names, help to find boundaries.
     how : Work, optional
         How episodes are cut.
     n_learned : int
@@ -173,16 +174,22 @@ def discover(
 
 
 def state_of(episode: Episode, feature: str | None = None) -> tuple[tuple[str, ...], Array]:
-    """Return the heads and the values (T, d) of the feature that kinds are described by, without columns of NaN."""
-    chosen = feature or next((name for name in STATES if name in episode.signals), "")
-    if chosen not in episode.signals:
+    """Return the heads and the values (T, d) that kinds are described by, without columns of NaN.
+
+    By default those of ``observation.state``; else of all observed positions of joints, tips and grippers, as robomimic
+    and UMI name them; else of ``action``.
+    """
+    parts = [name for name in episode.signals if _POSITIONS.fullmatch(name)]
+    usual = (["observation.state"], parts, ["action"])
+    chosen = [feature] if feature else next((names for names in usual if {*names} & episode.signals.keys()), usual[0])
+    if chosen[0] not in episode.signals:
         raise DataError(
-            f"expected the feature {chosen or ' or '.join(STATES)}, got {', '.join(episode.signals) or 'none'}; say "
-            "which one, in the shell with --feature"
+            f"expected the feature {chosen[0]}, got {', '.join(episode.signals) or 'none'}; say which one, in the "
+            "shell with --feature"
         )
-    values = np.asarray(episode.signals[chosen], dtype=np.float64)
+    values = np.concatenate([np.asarray(episode.signals[name], dtype=np.float64) for name in chosen], axis=1)
     usable = np.flatnonzero(np.isfinite(values).any(axis=0))
-    heads = _heads(episode, chosen)
+    heads = [head for name in chosen for head in _heads(episode, name)]
     return tuple(heads[k] for k in usable.tolist()), values[:, usable]
 
 
