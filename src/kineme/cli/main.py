@@ -13,6 +13,7 @@ import click
 from kineme.cli.anchor import anchor
 from kineme.cli.annotate import annotate
 from kineme.cli.audit import audit
+from kineme.cli.discover import discover
 from kineme.cli.evaluate import evaluate, reproduce
 from kineme.cli.generate import generate
 from kineme.cli.inspect import inspect
@@ -84,7 +85,8 @@ def main() -> None:
 
 
 for command in (
-    anchor, annotate, audit, evaluate, generate, move, inspect, learn, library, page, recognize, reproduce, segment,
+    anchor, annotate, audit, discover, evaluate, generate, move, inspect, learn, library, page, recognize, reproduce,
+    segment,
     studio, why,
 ):  # fmt: skip
     main.add_command(command)
