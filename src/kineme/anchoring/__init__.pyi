@@ -14,6 +14,11 @@ from kineme.anchoring.assignment import suggest_splits as suggest_splits
 from kineme.anchoring.assignment import Merge as Merge
 from kineme.anchoring.assignment import Split as Split
 
+# What follows what
+from kineme.anchoring.grammar import estimate_grammar as estimate_grammar
+from kineme.anchoring.grammar import most_probable as most_probable
+from kineme.anchoring.grammar import Grammar as Grammar
+
 # What symbols mean
 from kineme.anchoring.grounding import prototype as prototype
 from kineme.anchoring.grounding import Prototype as Prototype

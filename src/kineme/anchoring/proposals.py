@@ -49,6 +49,8 @@ class Proposal:
         Index of the proposal most similar to this one.
     nearness : float
         Mean similarity of its members to these.
+    name : str or None
+        A name for it, if something proposes one, such as the tasks of the episodes that it comes from.
     """
 
     members: NDArray[np.intp]
@@ -57,6 +59,7 @@ class Proposal:
     stability: float
     nearest: int | None
     nearness: float
+    name: str | None = None
 
     def __len__(self) -> int:
         return len(self.members)

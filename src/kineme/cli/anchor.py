@@ -17,12 +17,15 @@ from kineme.reporting.text import counted, printable
 
 HELP = """\
   a name         makes it a symbol, or joins the symbol of that name
+  /yes           takes the name that is proposed
   (nothing)      leaves it for later
   /split         looks for two clusters in it
   /reject        leaves its movements unnamed, and does not propose it again
   /members       lists its movements
   /name TEXT     a name that begins with a slash
   /quit          stops; what is named stays"""
+
+COMMANDS = "/split, /reject, /members, /name, /yes, /quit"
 
 _SHOWN = 5  # remaining movements that are listed
 
@@ -52,7 +55,7 @@ _CHOICE = Parsed("1,2,...|all", _choice)
 @click.option("--accept", type=_CHOICE, help="Accept these proposals without asking.")
 @click.option("--reject", type=_CHOICE, help="Reject these proposals, and do not propose their movements again.")
 @click.option("--names", type=click.Path(exists=True, dir_okay=False, path_type=Path),
-              help='A JSON file of names: {"1": "wave", "2": "nod"}.  [default: cluster 1, ...]')  # fmt: skip
+              help='A JSON file of names: {"1": "wave", "2": "nod"}.  [default: proposed, or cluster 1]')  # fmt: skip
 @click.option("--pictures", type=FOLDER, default="proposals", show_default=True,
               help="Folder for a picture of every proposal.")  # fmt: skip
 @json_option
@@ -102,7 +105,7 @@ def anchor(folder: Path, **options: Any) -> None:
         for number in accepted:
             taken = {symbol.name for symbol in library.symbols()}
             free = (f"cluster {k}" for k in range(number, number + len(taken) + 1) if f"cluster {k}" not in taken)
-            name = names.get(number) or next(free)
+            name = names.get(number) or proposals[number - 1].name or next(free)
             library.accept(proposals[number - 1], name)
             data["accepted"][name] = len(proposals[number - 1])
         for number in rejected:
@@ -173,6 +176,7 @@ def _as_data(proposals: Any) -> dict[str, Any]:
                 "cohesion": proposal.cohesion,
                 "stability": proposal.stability,
                 "nearest": None if proposal.nearest is None else proposal.nearest + 1,
+                "name": proposal.name,
             }
             for number, proposal in enumerate((proposals[i] for i in range(len(proposals))), 1)
         ],
@@ -186,13 +190,16 @@ def _text(data: dict[str, Any], alone: str) -> str:
     proposals = data["proposals"]
     rows = [
         (str(proposal["number"]), str(len(proposal["movements"])), f"{proposal['stability']:.2f}",
-         f"{proposal['cohesion']:.2f}", "" if proposal["nearest"] is None else str(proposal["nearest"]))
+         f"{proposal['cohesion']:.2f}", "" if proposal["nearest"] is None else str(proposal["nearest"]),
+         printable(proposal["name"] or ""))
         for proposal in proposals
     ]  # fmt: skip
+    heads: tuple[str, ...] = ("number", "movements", "stability", "cohesion", "most like", "proposed name")
+    n_columns = len(heads) if any(proposal["name"] for proposal in proposals) else len(heads) - 1
     title = f"{counted(len(proposals), 'proposal')}, {counted(len(data['left_over']), 'movement')} left over{alone}"
     if not (lines or rows or data["left_over"]):
         title = "no unlabeled movements"
-    lines.append(table(("number", "movements", "stability", "cohesion", "most like"), rows, title) if rows else title)
+    lines.append(table(heads[:n_columns], [row[:n_columns] for row in rows], title) if rows else title)
     if data["pictures"]:
         lines.append(f"pictures: {printable(data['pictures'][0])}")
     lines += [f"{printable(name)}: {counted(n, 'movement')}" for name, n in data.get("accepted", {}).items()]
@@ -224,7 +231,8 @@ class Session:
             item = self.items[0]
             size, stability = counted(len(item.proposal), "movement"), item.proposal.stability
             where = f"; see {printable(item.picture)}" if item.picture else ""
-            write(f"\n{item.title}: {size}, stability {stability:.2f}{where}")
+            suggestion = f"; /yes for {printable(item.proposal.name)}" if item.proposal.name else ""
+            write(f"\n{item.title}: {size}, stability {stability:.2f}{where}{suggestion}")
             try:
                 line = ask("name")
             except click.Abort:
@@ -260,10 +268,10 @@ class Session:
         elif command == "/reject":
             self.library.reject(item.proposal)
             self.items.popleft()
-        elif command == "/name":
-            self._accept(item, rest)
+        elif command == "/name" or (command == "/yes" and item.proposal.name):
+            self._accept(item, rest if command == "/name" else item.proposal.name)
         elif command.startswith("/"):
-            write(f"  expected a name or one of /split, /reject, /members, /name, /quit, got {printable(command)}")
+            write(f"  expected a name or one of {COMMANDS}, got {printable(command)}")
         elif line:
             self._accept(item, line)
         else:

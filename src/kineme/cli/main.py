@@ -14,6 +14,7 @@ from kineme.cli.anchor import anchor
 from kineme.cli.annotate import annotate
 from kineme.cli.audit import audit
 from kineme.cli.correct import correct
+from kineme.cli.discover import discover
 from kineme.cli.evaluate import evaluate, reproduce
 from kineme.cli.find import find
 from kineme.cli.generate import generate
@@ -86,7 +87,7 @@ def main() -> None:
 
 
 for command in (
-    anchor, annotate, audit, correct, evaluate, find, generate, move, inspect, learn, library, page, recognize,
-    reproduce, segment, studio, why,
+    anchor, annotate, audit, correct, discover, evaluate, find, generate, move, inspect, learn, library, page,
+    recognize, reproduce, segment, studio, why,
 ):  # fmt: skip
     main.add_command(command)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,11 +17,17 @@ from kineme.library.members import Members, described, groups_of, members_of, so
 from kineme.library.recognize import known_members
 from kineme.library.storage import changes, read
 from kineme.library.storage.read import Ids
+from kineme.library.storage.schema import RETURNS
 from kineme.library.storage.store import Store, history
 from kineme.recognition.answer import KnownClasses, open_set_labels
 from kineme.reporting.text import counted
+from kineme.sampling import evenly_spaced
+from kineme.similarity.similarity import similarities
 
 _MOST = 3000  # movements that are compared at most, equally many of each symbol
+
+_DISCOVER = "discover"  # action of the versions that store proposals
+_COMPARED = 20  # members of a stored proposal whose similarities are taken
 
 _SAME = 0.8  # share of members in a rejected proposal from which on a proposal counts as the same
 
@@ -83,20 +90,127 @@ def propose(
     if len(chosen) < 3:
         return LibraryProposals(chosen, Proposals((), np.full(len(chosen), -1, dtype=np.intp), np.empty(0)))
     chosen = read.as_ids(store, chosen)
-    by_symbols = ids is None and method is None and n_clusters is None
-    classes = joining.classes or known_symbols(store) if by_symbols else None
-    if classes is not None:
-        members = described(store, chosen, classes.comparison)
-        proposals = assign_described(members, classes, min_members=min_members).proposals
+    by_default = ids is None and method is None and n_clusters is None
+    stored = _stored(store, chosen, min_members) if by_default else ()
+    free = np.setdiff1d(np.arange(len(chosen)), np.concatenate([np.empty(0, int), *(each.members for each in stored)]))
+    if len(free) >= 3 or not stored:
+        classes = joining.classes or known_symbols(store) if by_default else None
+        proposals = _clustered(store, chosen[free], classes, method, n_clusters, min_members)
     else:
-        members, like = described(store, chosen), store.specification.comparison
-        how = method or DEFAULT_METHOD
-        people = groups_of(store, chosen)
-        proposals = propose_clusters(members, how, n_clusters, groups=people, min_members=min_members, like=like)
+        proposals = Proposals((), np.full(len(free), -1, dtype=np.intp), np.empty(0))
+    if stored:
+        proposals = _behind(stored, proposals, free, len(chosen))
     if ids is None:
         rejected = [version.detail.get("movements", []) for version in history(store) if version.action == "reject"]
         proposals = _without(proposals, [np.flatnonzero(np.isin(chosen, members)) for members in rejected])
     return LibraryProposals(chosen, proposals)
+
+
+def _clustered(
+    store: Store, ids: Ids, classes: KnownClasses | None, method: str | None, n_clusters: int | None, min_members: int
+) -> Proposals:
+    """Cluster movements: by how similar movements of known symbols are, where there are any."""
+    if classes is not None:
+        members = described(store, ids, classes.comparison)
+        return assign_described(members, classes, min_members=min_members).proposals
+    members, like = described(store, ids), store.specification.comparison
+    how, people = method or DEFAULT_METHOD, groups_of(store, ids)
+    return propose_clusters(members, how, n_clusters, groups=people, min_members=min_members, like=like)
+
+
+@dataclass(frozen=True, eq=False)
+class NamedProposal:
+    """A proposal as it is stored: a name, ids of movements, the most typical one, and how certain they belong to it."""
+
+    name: str
+    members: Ids
+    medoid: int
+    certainty: float  # mean probability of the members
+
+
+def store_proposals(store: Store, proposals: Sequence[NamedProposal]) -> int:
+    """Store proposals with names instead of those that were stored before; return the version.
+
+    `propose` gives them, in this order and before all others, as far as their movements have no symbol yet.
+    """
+    detail = {
+        "names": [proposal.name for proposal in proposals],
+        "sizes": [len(proposal.members) for proposal in proposals],
+        "medoids": [int(proposal.medoid) for proposal in proposals],
+        "certainties": [round(float(proposal.certainty), 4) for proposal in proposals],
+        "movements": [int(key) for proposal in proposals for key in proposal.members],
+    }
+    with store.writing(_DISCOVER, detail) as change:
+        pass
+    return change.version
+
+
+def stored_proposals(store: Store) -> list[NamedProposal]:
+    """Return the proposals that were stored last, as far as that was not taken back."""
+    at: dict[int, Mapping[str, Any] | None] = {0: None}  # version -> the proposals that were stored by then
+    detail: Mapping[str, Any] | None = None
+    for version in history(store):
+        if version.action == _DISCOVER:
+            detail = version.detail
+        elif version.action in RETURNS:
+            detail = at[version.detail["to"]]
+        at[version.id] = detail
+    if detail is None:
+        return []
+    ends = np.cumsum(detail["sizes"])[:-1]
+    parts = np.split(np.array(detail["movements"], dtype=np.int64), ends)
+    rows = zip(detail["names"], parts, detail["medoids"], detail["certainties"], strict=True)
+    return [NamedProposal(*row) for row in rows]
+
+
+def _stored(store: Store, chosen: Ids, min_members: int) -> tuple[Proposal, ...]:
+    """Return what is left of stored proposals, with positions among the chosen movements (ascending ids)."""
+    names, parts, medoids, certainties = [], [], [], []
+    for proposal in stored_proposals(store):
+        members = np.flatnonzero(np.isin(chosen, proposal.members))
+        if len(members) >= min_members:
+            medoid = int(np.searchsorted(chosen, proposal.medoid))
+            names.append(proposal.name)
+            parts.append(members)
+            medoids.append(medoid if medoid in members else int(members[0]))
+            certainties.append(proposal.certainty)
+    if not parts:
+        return ()
+    some = [members[evenly_spaced(len(members), _COMPARED)] for members in parts]
+    K = similarities(described(store, chosen[np.concatenate(some)]))
+    owner = np.repeat(np.eye(len(some)), [len(members) for members in some], axis=0)
+    sizes = owner.sum(axis=0)
+    sums = owner.T @ K @ owner
+    within = (np.diag(sums) - sizes) / np.maximum(sizes * (sizes - 1), 1)
+    between = sums / np.outer(sizes, sizes)
+    np.fill_diagonal(between, -1.0)
+    alone = len(parts) == 1
+    return tuple(
+        Proposal(
+            members, medoids[k], float(within[k]), certainties[k], None if alone else int(between[k].argmax()),
+            0.0 if alone else float(between[k].max()), names[k],
+        )
+        for k, members in enumerate(parts)
+    )  # fmt: skip
+
+
+def _behind(stored: Sequence[Proposal], others: Proposals, free: NDArray[np.intp], n: int) -> Proposals:
+    """Return stored proposals among n movements, and behind them the others, which are among those at `free`."""
+    clusters = np.full(n, -1, dtype=np.intp)
+    for k, proposal in enumerate(stored):
+        clusters[proposal.members] = k
+    first = len(stored)
+    clusters[free] = np.where(others.clusters < 0, -1, others.clusters + first)
+    moved = tuple(
+        replace(
+            proposal,
+            members=free[proposal.members],
+            medoid=int(free[proposal.medoid]),
+            nearest=None if proposal.nearest is None else proposal.nearest + first,
+        )
+        for proposal in others.proposals
+    )
+    return Proposals((*stored, *moved), clusters, others.widths)
 
 
 def accept(store: Store, proposal: Proposal, name: str, description: str | None = None) -> int:
@@ -164,7 +278,8 @@ def known_symbols(store: Store) -> KnownClasses | None:
 
 def recognized(store: Store, error_rate: float = 0.05) -> Recognized:
     """Recognize the movements without a symbol; nothing is changed."""
-    unlabeled = read.unlabeled_ids(store)
+    named = [np.empty(0, dtype=np.int64), *(proposal.members for proposal in stored_proposals(store))]
+    unlabeled = np.setdiff1d(read.unlabeled_ids(store), np.concatenate(named))  # those know their kind better
     classes = known_symbols(store) if len(unlabeled) else None
     if classes is None:
         return Recognized()

@@ -49,8 +49,22 @@ def _version(rows: Sequence[Row]) -> Strange:
             yield key, "a detail that is no JSON object"
         elif action == "reject" and not _are(int, detail.get("movements")):
             yield key, "a rejection without its list of movements"
+        elif action == "discover" and not _is_discovery(detail):
+            yield key, "proposals without their names, sizes, medoids, certainties and movements"
         elif action in RETURNS and not (type(detail.get("to")) is int and 0 <= detail["to"] < key):
             yield key, f"an action {action} without the earlier version that it returned to"
+
+
+#: What a version that proposes kinds says of each: of what type, and whether there is one for each kind.
+_PROPOSED = {"names": str, "sizes": int, "medoids": int, "certainties": float, "movements": int}
+
+
+def _is_discovery(detail: dict[str, Any]) -> bool:
+    """Tell whether there are lists of the right types, as long as each other, and as many movements as they say."""
+    if not all(_are(kind, detail.get(name)) for name, kind in _PROPOSED.items()):
+        return False
+    sizes, n = detail["sizes"], {len(detail[name]) for name in _PROPOSED if name != "movements"}
+    return len(n) == 1 and min(sizes, default=1) > 0 and sum(sizes) == len(detail["movements"])
 
 
 def _json(text: str) -> Any:

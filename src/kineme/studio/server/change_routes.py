@@ -162,6 +162,7 @@ class ProposalOut(BaseModel):
     medoid: int
     cohesion: float
     stability: float | None
+    name: str | None = Field(None, description="A name that is proposed for it.")
     path: records.Points
 
 
@@ -201,6 +202,7 @@ def _listed_proposals(studio: Studio) -> dict[str, Any]:
                 "medoid": proposal.medoid,
                 "cohesion": proposal.cohesion,
                 "stability": records.numbers(proposal.stability),
+                "name": proposal.name,
                 "path": records.thumbnail(read.movements(store, np.array([proposal.medoid]))[0].positions),
             }
             for key, proposal in by_key.items()

@@ -87,6 +87,9 @@ _SAID: dict[str, Any] = {
     "assign": lambda detail: f"Assigned {_movements(detail['movements'])} to {_name(detail['symbol'])}",
     "release": lambda detail: f"Took the name off {_movements(detail['movements'])}",
     "reject": lambda detail: f"Rejected a proposal of {_movements(len(detail['movements']))}",
+    "discover": lambda detail: (
+        f"Proposed {counted(len(detail['names']), 'kind')} of {_movements(len(detail['movements']))}"
+    ),
     "restore": lambda detail: f"Restored version {detail['to']}",
 }
 

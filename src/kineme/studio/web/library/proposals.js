@@ -30,6 +30,7 @@ function card(proposal, movements) {
     placeholder: "Name",
     "aria-label": "Name of these movements",
     "data-key": `proposal ${proposal.medoid}`,
+    value: proposal.name ?? "",
   });
   const yes = make("button", { class: "button main", type: "submit" });
   const label = () =>

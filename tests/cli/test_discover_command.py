@@ -1,0 +1,84 @@
+"""`kineme discover`: from a data set to a table, a file, and proposals that `kineme anchor` names."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import pytest
+from commands import answer, run, start
+
+from bench.work_sets import write_set
+from work_samples import TASKS, work_episodes
+
+pytest.importorskip("pyarrow")
+N_KINDS = sum(map(len, TASKS.values()))
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory):
+    return write_set(tmp_path_factory.mktemp("sets") / "worked", work_episodes(12)[0])
+
+
+def test_it_shows_kinds_and_what_they_follow(dataset):
+    shown = start("discover", dataset)
+    assert shown.returncode == 0, shown.stderr
+    assert f"{N_KINDS} kinds among 60 movements of 12 episodes" in shown.stdout
+    assert "begin 100%" in shown.stdout
+    assert "pick the cube 1" in shown.stdout
+
+
+def test_it_stores_proposals_which_anchor_accepts_by_their_names(dataset, tmp_path):
+    told = answer("discover", dataset, "--library", tmp_path / "actions")
+    names = [kind["name"] for kind in told["kinds"]]
+    assert len(names) == N_KINDS
+    assert told["library"] == str(tmp_path / "actions")
+    listed = answer("anchor", "--library", tmp_path / "actions", cwd=tmp_path)
+    assert [proposal["name"] for proposal in listed["proposals"]] == names
+    shown = run("anchor", "--library", tmp_path / "actions", cwd=tmp_path)
+    assert "proposed name" in shown.stdout
+    (tmp_path / "names.json").write_text(json.dumps({"1": "reach"}))
+    accepted = answer(
+        "anchor", "--library", tmp_path / "actions", "--accept", "1,2", "--names", "names.json", cwd=tmp_path
+    )
+    assert list(accepted["accepted"]) == ["reach", names[1]]
+    assert answer("library", "verify", "--library", tmp_path / "actions")["ok"]
+    assert "discover" in run("library", "history", "--library", tmp_path / "actions").stdout
+
+
+def test_movements_are_compared_where_they_are(dataset, tmp_path):
+    """A way there is no way back: what was accepted is recognized, and nothing else."""
+    answer("discover", dataset, "--library", tmp_path / "actions")
+    answer("anchor", "--library", tmp_path / "actions", "--accept", "all", cwd=tmp_path)
+    symbols = answer("library", "list", "--library", tmp_path / "actions")["symbols"]
+    assert sorted(symbol["movements"] for symbol in symbols) == [6] * N_KINDS
+    from kineme.library.library import ActionLibrary
+
+    with ActionLibrary(tmp_path / "actions", read_only=True) as library:
+        normalization = library.specification.comparison.normalization
+    assert (normalization.translation, normalization.scale) == (False, "none")
+
+
+def test_it_writes_the_movements_of_each_episode_and_nothing_over_a_file(dataset, tmp_path):
+    told = answer("discover", dataset, "-o", tmp_path / "movements.csv")
+    with (tmp_path / "movements.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == len(told["segments"]) == 60
+    assert {row["place"] for row in rows} == {f"episode {k}" for k in range(12)}
+    assert [row["symbol"] for row in rows[:5]] == [segment["kind"] for segment in told["segments"][:5]]
+    refused = run("discover", dataset, "-o", tmp_path / "movements.csv")
+    assert refused.returncode == 2
+    assert "--force" in refused.stderr
+
+
+def test_another_feature_and_what_is_no_data_set(dataset, tmp_path):
+    assert len(answer("discover", dataset, "--feature", "action")["kinds"]) >= N_KINDS - 2
+    assert "--feature" in run("discover", dataset, "--feature", "wrist").stderr
+    refused = run("discover", tmp_path)
+    assert refused.returncode == 1
+    assert "expected a data set of episodes" in refused.stderr
+
+
+def test_fewer_boundaries_for_a_larger_penalty(dataset):
+    few, many = (len(answer("discover", dataset, "--penalty", penalty)["segments"]) for penalty in (4.0, 1.5))
+    assert few < many
