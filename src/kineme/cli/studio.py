@@ -19,7 +19,7 @@ _PORTS = click.IntRange(1, 65535)
 
 @click.command(short_help="Show, name and move it in the browser.")
 @library_option_of(required=True, words="Folder of the action library; made if there is none.")
-@click.option("--recordings", type=click.Path(path_type=Path, exists=True),
+@click.option("--recordings", type=click.Path(path_type=Path),
               help="Data set of LeRobot, folder or file whose episodes are shown, named and corrected.")  # fmt: skip
 @click.option("--port", type=_PORTS, help="Port to serve at.  [default: 8420, or any that is free]")
 @click.option("--no-open", is_flag=True, help="Print the address, and open no browser.")
