@@ -104,7 +104,7 @@ def test_stamps_that_go_back_are_replaced_by_the_declared_rate():
 def test_the_state_is_a_feature_without_its_empty_columns():
     episode, _ = work_episode(0, "pick the cube")
     heads, state = state_of(episode)
-    assert heads == tuple(f"observation.state.{name}" for name in NAMES)
+    assert heads == tuple(NAMES)  # as `kineme learn` and `kineme annotate` call them
     holed = episode.signals["observation.state"].copy()
     holed[:, 1] = np.nan
     heads, state = state_of(replace(episode, signals={"observation.state": holed}))
