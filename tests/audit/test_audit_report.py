@@ -40,7 +40,7 @@ def test_words_say_which_why_where_and_what_to_do(audit):
     words = audit_as_words(audit)
     flat = " ".join(words.split())
     assert "100 episodes of 1 task" in flat
-    assert "1 contradict what the set declares, 2 lie far beyond the others" in flat
+    assert "1 contradicts what the set declares, 2 lie far beyond the others" in flat
     assert "frames come at 25 per second, the data set declares 50" in flat
     assert re.search(r"lift.pos jumps within one frame, \d+ times its noise", flat)
     assert "at 3.98 s" in flat
