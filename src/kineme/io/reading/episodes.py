@@ -11,6 +11,9 @@ from kineme.io.arrays.robot_sets import LAYOUTS, RobotLayout, robot_episodes, ro
 from kineme.io.lerobot.info import MARKER
 from kineme.io.records import needs
 from kineme.movements.episodes import Episode
+from kineme.reporting.text import first_names
+
+_NEAR = 3  # data sets in a folder, or around it, that a message names
 
 
 class EpisodeLayout(NamedTuple):
@@ -58,4 +61,7 @@ def read_episodes(
             return layout.read(path, features, rate)
     there = "another" if path.exists() else "nothing there"
     layouts = ", ".join(layout.name for layout in EPISODE_LAYOUTS)
-    raise DataError(f"expected a data set of episodes ({layouts}), got {there}: {path}")
+    around = [folder for folder in path.absolute().parents[:3] if (folder / MARKER).is_file()]
+    near = around or sorted(marker.parents[1] for marker in path.glob(f"*/{MARKER}"))
+    remedy = f"; say the folder of one: {first_names(near, _NEAR)}" if near and path.exists() else ""
+    raise DataError(f"expected a data set of episodes ({layouts}), got {there}: {path}{remedy}")
