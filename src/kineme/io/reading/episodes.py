@@ -20,7 +20,9 @@ class EpisodeLayout(NamedTuple):
     """A layout of files that holds episodes of robot data."""
 
     name: str
-    fits: Callable[[Path], bool]  # whether a file or folder has it; reads little, and raises nothing
+    fits: Callable[
+        [Path], bool
+    ]  # whether a file or folder has it; reads little; raises a `DataError` if a package is missing
     # The path, the names of the features to read, None for all of numbers, and a rate [1/s], None for that of the set
     # or of the custom, -> episodes as they are stored.
     read: Callable[[Path, Sequence[str] | None, float | None], Iterator[Episode]]
