@@ -55,6 +55,12 @@ def test_a_set_without_faults_is_said_to_have_none():
     assert "at most 5 % of the good episodes" in verdict(clean).lower()
 
 
+def test_an_episode_whose_task_is_not_known_is_none_of_another_task():
+    some = episodes(9)
+    assert audit_episodes([*some[:8], replace(some[8], task=None)]).tasks == 1
+    assert audit_episodes(replace(episode, task=None) for episode in some).tasks == 1
+
+
 def test_too_few_are_uncalibrated_in_words():
     assert "Uncalibrated: it takes 20 episodes" in verdict(audit_episodes(episodes(9)))
 

@@ -20,9 +20,8 @@ class EpisodeLayout(NamedTuple):
     """A layout of files that holds episodes of robot data."""
 
     name: str
-    fits: Callable[
-        [Path], bool
-    ]  # whether a file or folder has it; reads little; raises a `DataError` if a package is missing
+    # Whether a file or folder has it; reads little, and raises a `DataError` only if a package is missing.
+    fits: Callable[[Path], bool]
     # The path, the names of the features to read, None for all of numbers, and a rate [1/s], None for that of the set
     # or of the custom, -> episodes as they are stored.
     read: Callable[[Path, Sequence[str] | None, float | None], Iterator[Episode]]
