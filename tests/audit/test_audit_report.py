@@ -40,7 +40,7 @@ def test_words_say_which_why_where_and_what_to_do(audit):
     words = audit_as_words(audit)
     flat = " ".join(words.split())
     assert "100 episodes of 1 task" in flat
-    assert "1 contradict what the set declares, 2 lie far beyond the others" in flat
+    assert "1 contradicts what the set declares, 2 lie far beyond the others" in flat
     assert "frames come at 25 per second, the data set declares 50" in flat
     assert re.search(r"lift.pos jumps within one frame, \d+ times its noise", flat)
     assert "at 3.98 s" in flat
@@ -53,6 +53,12 @@ def test_a_set_without_faults_is_said_to_have_none():
     if not any(finding.kind == "outlying" for finding in clean.findings):
         assert "Nothing stands out" in verdict(clean)
     assert "at most 5 % of the good episodes" in verdict(clean).lower()
+
+
+def test_an_episode_whose_task_is_not_known_is_none_of_another_task():
+    some = episodes(9)
+    assert audit_episodes([*some[:8], replace(some[8], task=None)]).tasks == 1
+    assert audit_episodes(replace(episode, task=None) for episode in some).tasks == 1
 
 
 def test_too_few_are_uncalibrated_in_words():

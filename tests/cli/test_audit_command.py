@@ -74,6 +74,16 @@ def test_the_page_and_the_mask_are_written(data_set, tmp_path):
     assert f'--dataset.episodes "{json.dumps(kept, separators=(",", ":"))}"' in done.stdout
 
 
+@pytest.mark.parametrize(
+    ("option", "name", "endings"), [("-o", "audit.pdf", ".html or .htm"), ("--train-mask", "keep.txt", ".csv or .json")]
+)
+def test_a_file_of_another_kind_is_not_written(tmp_path, option, name, endings):
+    refused = run("audit", tmp_path, option, tmp_path / name)
+    assert refused.returncode == 2
+    assert f"expected a path ending in {endings}, got" in " ".join(refused.stderr.split())
+    assert not (tmp_path / name).exists()
+
+
 def test_nothing_is_written_over_unasked(data_set, tmp_path):
     target = tmp_path / "audit.html"
     target.write_text("mine")

@@ -59,6 +59,15 @@ def test_movements_are_compared_where_they_are(dataset, tmp_path):
     assert (normalization.translation, normalization.scale) == (False, "none")
 
 
+def test_what_was_named_annotates_the_data_set_and_joins_a_library_that_learned_from_it(dataset, tmp_path):
+    answer("discover", dataset, "--library", tmp_path / "actions")
+    answer("anchor", "--library", tmp_path / "actions", "--accept", "all", cwd=tmp_path)
+    named = answer("annotate", dataset, "--library", tmp_path / "actions", "-o", tmp_path / "named")
+    assert {row["symbol"] for row in named["annotations"]} > {"pick the cube 1"}
+    answer("learn", dataset, "--library", tmp_path / "whole")
+    assert answer("discover", dataset, "--library", tmp_path / "whole")["version"] > 1
+
+
 def test_it_writes_the_movements_of_each_episode_and_nothing_over_a_file(dataset, tmp_path):
     told = answer("discover", dataset, "-o", tmp_path / "movements.csv")
     with (tmp_path / "movements.csv").open(newline="") as file:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import csv
+from types import SimpleNamespace
 
 import pytest
 from commands import answer, run, start
 
 import kineme
+from kineme.errors import DataError
 from kineme.io.lerobot import read as lerobot_read
+from kineme.library.annotate import check_symbols
 from robot_work import SYMBOLS, write_episodes, write_library
 
 
@@ -108,6 +111,12 @@ def test_hits_are_where_the_symbol_is_the_surest_first(work, tmp_path):
     both = answer("find", "stir", folder / "set", "--also", "tap", "-l", folder / "actions")["hits"]
     assert [hit for hit in both if hit["symbol"] == "stir"] == [{**hit, "recording": "set"} for hit in in_set]
     assert {hit["symbol"] for hit in both} == {"stir", "tap"}
+
+
+def test_symbols_that_a_message_does_not_name_are_counted(monkeypatch):
+    monkeypatch.setattr("kineme.library.annotate.members_of", lambda store: SimpleNamespace(names="abcdefg"))
+    with pytest.raises(DataError, match=r"there are a, b, c, d, e and 2 more$"):
+        check_symbols(SimpleNamespace(folder="actions"), ["wave"])
 
 
 def test_the_command_names_near_symbols_and_shows_a_table(work):

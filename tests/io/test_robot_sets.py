@@ -324,3 +324,11 @@ def test_other_paths_are_no_robot_sets(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "numcodecs", None)
     with pytest.raises(DataError, match=r"pip install 'kineme\[zarr\]'"):
         kineme.read_recordings(path)
+
+
+def test_episodes_that_need_a_missing_package_say_which(tmp_path, monkeypatch):
+    paths = write_robomimic(tmp_path / "lift.hdf5"), write_aloha(tmp_path / "cups")
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    for path in paths:
+        with pytest.raises(DataError, match=r"pip install 'kineme\[hdf5\]'"):
+            read_episodes(path)

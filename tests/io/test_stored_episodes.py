@@ -280,6 +280,10 @@ def test_other_layouts_are_named(tmp_path):
     (tmp_path / "a.csv").write_text("t,x\n")
     with pytest.raises(DataError, match=r"expected a data set of episodes \(LeRobot.*\), got another"):
         read_episodes(str(tmp_path / "a.csv"))
+    write_v3(tmp_path / "cups", (20,))
+    for place in (tmp_path, tmp_path / "cups" / "meta", tmp_path / "cups" / "data" / "chunk-000"):
+        with pytest.raises(DataError, match=r"say the folder of one: .*cups$"):
+            read_episodes(place)
 
 
 def many(folder, n, length=10, per_shard=1000):

@@ -97,6 +97,8 @@ def test_stamps_that_go_back_are_replaced_by_the_declared_rate():
     stuck = replace(episode, times=np.minimum(episode.times, 1.0))
     np.testing.assert_allclose(times_of(stuck), episode.times, atol=1e-9)
     np.testing.assert_array_equal(times_of(episode), episode.times)
+    rounded = replace(episode, times=episode.times.astype(np.float32).astype(float))  # as LeRobot stores them
+    np.testing.assert_array_equal(times_of(rounded), np.arange(len(episode)) / episode.fps)
     with pytest.raises(DataError, match="stamps that increase"):
         times_of(replace(stuck, fps=float("nan")))
 
@@ -104,7 +106,7 @@ def test_stamps_that_go_back_are_replaced_by_the_declared_rate():
 def test_the_state_is_a_feature_without_its_empty_columns():
     episode, _ = work_episode(0, "pick the cube")
     heads, state = state_of(episode)
-    assert heads == tuple(f"observation.state.{name}" for name in NAMES)
+    assert heads == tuple(NAMES)  # as `kineme learn` and `kineme annotate` call them
     holed = episode.signals["observation.state"].copy()
     holed[:, 1] = np.nan
     heads, state = state_of(replace(episode, signals={"observation.state": holed}))

@@ -29,11 +29,11 @@ def verdict(audit: Audit) -> str:
     n, kinds = len(audit.numbers), Counter(finding.kind for finding in audit.findings)
     hours = f"{counted(n, 'episode')} of {counted(audit.tasks, 'task')}, {audit.seconds / 3600:,.2f} hours"
     said = {
-        "contradiction": "contradict what the set declares",
-        "outlying": "lie far beyond the others",
-        "unusual": "are the most unusual of the others",
+        "contradiction": ("contradicts what the set declares", "contradict what the set declares"),
+        "outlying": ("lies far beyond the others", "lie far beyond the others"),
+        "unusual": ("is the most unusual of the others", "are the most unusual of the others"),
     }
-    parts = [f"{kinds[kind]:,} {words}" for kind, words in said.items() if kinds[kind]]
+    parts = [counted(kinds[kind], *words) for kind, words in said.items() if kinds[kind]]
     if not audit.calibrated:
         needed = math.ceil(1 / audit.error_rate)
         listed = f": {parts[0]}" if parts else ""

@@ -252,7 +252,8 @@ def _audited(measured: _Measured, error_rate: float, progress: Callable[[int], o
     ranking = calibrate.rank(evidence, ~broken, error_rate)
     flagged = broken | ((ranking.p_values <= error_rate + 1e-12) | ranking.outlying) & (ranking.by_chance > 0)
     return Audit(
-        np.array(measured.numbers), sum(measured.seconds), len(tasks), error_rate, ranking.by_chance,
+        np.array(measured.numbers), sum(measured.seconds), len({*filter(None, measured.tasks)}) or 1, error_rate,
+        ranking.by_chance,
         np.where(broken, 0.0, ranking.p_values), ranking.evidence, flagged,
         _findings(measured, compared, broken, ranking, flagged), of_the_set,
     )  # fmt: skip

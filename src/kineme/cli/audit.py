@@ -55,8 +55,11 @@ def audit(dataset: Path, error_rate: float, output: Path | None, mask: Path | No
     from kineme.reporting.atomic import whole_file
 
     rerun, force = options["rerun"], options["force"]
-    for path in (output, mask, rerun):
+    endings = ((output, (".html", ".htm")), (mask, (".csv", ".json")), (rerun, None))
+    for path, allowed in endings:
         if path is not None:
+            if allowed and path.suffix.lower() not in allowed:
+                raise click.UsageError(f"expected a path ending in {' or '.join(allowed)}, got {printable(path)}")
             inside = dataset.resolve() in path.resolve().parents
             check_new(path, force, path if inside else dataset)
             if not path.parent.is_dir():

@@ -15,6 +15,7 @@ from kineme.library.storage.store import Store
 from kineme.recognition.answer import KnownClasses
 from kineme.recognition.compared_windows import Templates
 from kineme.recognition.spotting import spot
+from kineme.reporting.text import first_names
 
 _MAX_PIECES = 8  # most stretches between rests that a movement may consist of, as in `Recognizer.spot`
 
@@ -129,7 +130,8 @@ def check_symbols(store: Store, symbols: Collection[str]) -> None:
     names = list(members_of(store).names)
     for symbol in symbols:
         if symbol not in names:
-            near = get_close_matches(symbol, names, _SUGGESTED, 0.5) or names[:_SUGGESTED]
+            near = get_close_matches(symbol, names, _SUGGESTED, 0.5) or names
             raise DataError(
-                f"expected a symbol of the library {store.folder}, got {symbol!r}; there are {', '.join(near)}"
+                f"expected a symbol of the library {store.folder}, got {symbol!r}; there are "
+                f"{first_names(near, _SUGGESTED)}"
             )

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from kineme.anchoring.grammar import Grammar, estimate_grammar, in_order, most_probable, posterior
 from kineme.anchoring.kinds import Kinds, describe_pieces, excursions, learn_kinds, log_densities
 from kineme.errors import DataError, KinemeError
+from kineme.io.reading.episode_recordings import STATE, heads_of, stamps_of
 from kineme.io.writing.annotations import Annotation
 from kineme.library.learn import learn
 from kineme.library.proposals import NamedProposal, store_proposals
@@ -180,7 +181,7 @@ def state_of(episode: Episode, feature: str | None = None) -> tuple[tuple[str, .
     and UMI name them; else of ``action``.
     """
     parts = [name for name in episode.signals if _POSITIONS.fullmatch(name)]
-    usual = (["observation.state"], parts, ["action"])
+    usual = ([STATE], parts, ["action"])
     chosen = [feature] if feature else next((names for names in usual if {*names} & episode.signals.keys()), usual[0])
     if chosen[0] not in episode.signals:
         raise DataError(
@@ -194,8 +195,8 @@ def state_of(episode: Episode, feature: str | None = None) -> tuple[tuple[str, .
 
 
 def times_of(episode: Episode) -> Array:
-    """Return the stamps of an episode [s]; where they repeat or go back, those of the declared rate."""
-    times = np.asarray(episode.times, dtype=np.float64)
+    """Return the stamps of an episode [s]; where they agree with the declared rate, repeat or go back, those of it."""
+    times = np.asarray(stamps_of(episode), dtype=np.float64)
     if len(times) < MIN_SAMPLES or not np.isfinite(times).all() or not (np.diff(times) > 0).all():
         if not episode.fps > 0 or len(times) < MIN_SAMPLES:
             raise DataError(
@@ -424,6 +425,9 @@ def store_discovery(
 
 
 def _heads(episode: Episode, feature: str) -> tuple[str, ...]:
+    """Name the columns of a feature as `kineme.read_recordings` does: ``observation.state`` by its entries alone."""
+    if feature == STATE:
+        return heads_of(episode)[feature]
     return tuple(f"{feature}.{entry}" if entry else feature for entry in episode.names[feature])
 
 

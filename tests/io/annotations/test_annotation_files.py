@@ -95,6 +95,8 @@ def test_several_movements_become_a_file_each_in_a_folder(tmp_path):
 def test_what_no_writer_knows_is_refused_with_the_list():
     with pytest.raises(DataError, match=r"one of \.csv, \.json, \.eaf, \.txt.*got 'what.doc'.*csv, json"):
         writer_of(Path("what.doc"), None, [LONG])
+    with pytest.raises(DataError, match="only one data set of LeRobot, or one bag in a folder, is copied"):
+        writer_of(Path("named"), None, [LONG])
 
 
 def test_a_writer_of_copies_is_chosen_by_its_recording(monkeypatch):

@@ -93,14 +93,20 @@ class _Part(NamedTuple):
 
 
 def robot_layout(path: Path) -> RobotLayout | None:
-    """Tell the layout of a file, or of the first file in a folder; None of any other, and of what is damaged."""
-    with suppress(DataError, OSError, ValueError):
+    """Tell the layout of a file, or of the first file in a folder; None of any other, and of what is damaged.
+
+    A `DataError` says which package is missing to tell.
+    """
+    try:
         for source in _sources(path)[:1]:
             if source.suffix.lower() in HDF5:
                 with hdf5_file(source) as file:
                     return _of_hdf5(file)
             with zarr_arrays(source) as arrays:
                 return _of_zarr(arrays)
+    except (OSError, ValueError) as error:  # a `DataError` is an OSError
+        if isinstance(error.__cause__, ImportError):
+            raise
     return None
 
 

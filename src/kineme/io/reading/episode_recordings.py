@@ -14,6 +14,7 @@ from kineme.movements.episodes import Episode
 from kineme.movements.tables.columns import choose_roles
 from kineme.movements.tables.layout import Layout, Parsed, no_lines
 from kineme.movements.tables.table import Segments, Table, table_movements
+from kineme.validation import Array
 
 STATE = "observation.state"
 _STAMP = "timestamp [s]"
@@ -37,6 +38,12 @@ def heads_of(episode: Episode) -> dict[str, tuple[str, ...]]:
     return heads
 
 
+def stamps_of(episode: Episode) -> Array:
+    """Return the stamps of an episode [s]: those of the declared rate where all lie within 0.1 ms of them."""
+    even = np.arange(len(episode)) / episode.fps
+    return even if np.all(np.abs(episode.times - even) <= _TOLERANCE) else episode.times
+
+
 def episode_recordings(episode: Episode, name: str, columns: Sequence[str] = ()) -> Recordings:
     """Read an episode of the data set `name` as one movement, in these columns or in all of numbers.
 
@@ -44,8 +51,7 @@ def episode_recordings(episode: Episode, name: str, columns: Sequence[str] = ())
     no movement.
     """
     heads = heads_of(episode)
-    even = np.arange(len(episode)) / episode.fps
-    times = even if np.all(np.abs(episode.times - even) <= _TOLERANCE) else episode.times
+    times = stamps_of(episode)
     values = [column for feature in heads for column in episode.signals[feature].T]
     names = (_STAMP, *(head for feature in heads for head in heads[feature]))
     segments = Segments(np.array([0, len(episode)]), [episode.place or f"episode {episode.number}"], [episode.task])

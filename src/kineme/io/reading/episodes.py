@@ -11,13 +11,17 @@ from kineme.io.arrays.robot_sets import LAYOUTS, RobotLayout, robot_episodes, ro
 from kineme.io.lerobot.info import MARKER
 from kineme.io.records import needs
 from kineme.movements.episodes import Episode
+from kineme.reporting.text import first_names
+
+_NEAR = 3  # data sets in a folder, or around it, that a message names
 
 
 class EpisodeLayout(NamedTuple):
     """A layout of files that holds episodes of robot data."""
 
     name: str
-    fits: Callable[[Path], bool]  # whether a file or folder has it; reads little, and raises nothing
+    # Whether a file or folder has it; reads little, and raises a `DataError` only if a package is missing.
+    fits: Callable[[Path], bool]
     # The path, the names of the features to read, None for all of numbers, and a rate [1/s], None for that of the set
     # or of the custom, -> episodes as they are stored.
     read: Callable[[Path, Sequence[str] | None, float | None], Iterator[Episode]]
@@ -58,4 +62,7 @@ def read_episodes(
             return layout.read(path, features, rate)
     there = "another" if path.exists() else "nothing there"
     layouts = ", ".join(layout.name for layout in EPISODE_LAYOUTS)
-    raise DataError(f"expected a data set of episodes ({layouts}), got {there}: {path}")
+    around = [folder for folder in path.absolute().parents[:3] if (folder / MARKER).is_file()]
+    near = around or sorted(marker.parents[1] for marker in path.glob(f"*/{MARKER}"))
+    remedy = f"; say the folder of one: {first_names(near, _NEAR)}" if near and path.exists() else ""
+    raise DataError(f"expected a data set of episodes ({layouts}), got {there}: {path}{remedy}")

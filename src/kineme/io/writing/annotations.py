@@ -289,7 +289,7 @@ def writer_of(path: Path, name: str | None, sources: Sequence[Path]) -> Writer:
             endings = ", ".join(end for writer in WRITERS.values() for end in writer.endings)
             raise DataError(
                 f"expected a path ending in one of {endings}, got {str(path)!r}; or name the format, one of "
-                f"{', '.join(WRITERS)}"
+                f"{', '.join(WRITERS)}; only one data set of LeRobot, or one bag in a folder, is copied into a folder"
             )
         writer = fitting[0]
     if writer.copies is not None and not (len(sources) == 1 and writer.copies(sources[0])):
