@@ -246,7 +246,8 @@ def _features(row: RobotLayout, arrays: Mapping[str, Any], chosen: Sequence[str]
     features: dict[str, Any] = {}
     for path, array in arrays.items():
         is_image = len(array.shape) > 2 and array.dtype == np.uint8
-        if array.dtype.kind not in "biuf" or not array.shape or is_image or math.prod(array.shape[1:]) > _WIDEST:
+        is_row = bool(array.shape) and 0 < math.prod(array.shape[1:]) <= _WIDEST
+        if array.dtype.kind not in "biuf" or is_image or not is_row:
             continue
         matches = ((re.fullmatch(pattern, path), name) for pattern, name in row.features)
         name = next((match.expand(name) for match, name in matches if match), None)
