@@ -57,8 +57,7 @@ def audit(dataset: Path, error_rate: float, output: Path | None, mask: Path | No
     rerun, force = options["rerun"], options["force"]
     for path in (output, mask, rerun):
         if path is not None:
-            inside = dataset.resolve() in path.resolve().parents
-            check_new(path, force, path if inside else dataset)
+            check_new(path, force, dataset)
             if not path.parent.is_dir():
                 raise click.UsageError(f"expected a folder to write into, there is none at {printable(path.parent)}")
     with progress(desc="auditing", unit="episode") as bar:
