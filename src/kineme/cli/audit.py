@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -93,7 +94,7 @@ def _write_rerun(path: Path, result: Any, episodes: list[Any], force: bool) -> P
     reasons = {finding.episode: finding.reasons for finding in result.findings}
 
     def lanes(episode: Any) -> dict[str, list[Stretch]]:
-        begin = float(episode.times[0])
+        begin = next((float(stamp) for stamp in episode.times if math.isfinite(stamp)), 0.0)
         return {
             reason.check: [Stretch(begin + reason.start, begin + reason.end, reason.words)]
             for reason in reasons[episode.number]
