@@ -1,6 +1,7 @@
 """Descriptions of data sets that somebody wrote to harm: of arrays in Zarr, and of the shards of LeRobot."""
 
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from kineme.errors import DataError
 from kineme.io.reading.episodes import read_episodes
 from kineme.library.discover import discover
 from lerobot_sets import write_v2, write_v3
-from robot_array_sets import write_umi
+from robot_array_sets import write_aloha, write_robomimic, write_umi
 from work_samples import work_episode
 
 ENDS, PLACES = "meta/episode_ends", "data/robot0_eef_pos"
@@ -91,3 +92,18 @@ def test_an_episode_without_a_usable_number_is_a_problem_of_a_discovery(value):
     discovery = discover(episodes)
     assert discovery.problems == ("episode 4: expected finite numbers in observation.state, got none",)
     assert discovery.episodes == usual.episodes - 1
+
+
+def test_files_that_count_alike_are_episodes_of_their_own(tmp_path):
+    pytest.importorskip("h5py", reason="h5py writes HDF5")
+    folder = write_aloha(tmp_path / "aloha")
+    for k in range(2):
+        shutil.copy(folder / f"episode_{k}.hdf5", folder / f"other_{k}.hdf5")
+    assert [episode.number for episode in read_episodes(folder)] == [0, 1, 2, 3, 4]
+
+
+def test_a_demonstration_of_very_many_digits_has_a_number(tmp_path):
+    h5py = pytest.importorskip("h5py", reason="h5py writes HDF5")
+    with h5py.File(write_robomimic(tmp_path / "a.hdf5"), "a") as file:
+        file.move("data/demo_2", f"data/demo_{'9' * 5000}")
+    assert [episode.number for episode in read_episodes(tmp_path / "a.hdf5")] == [0, 1, 10**18 - 1]
