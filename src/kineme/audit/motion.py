@@ -51,7 +51,8 @@ class Motion(NamedTuple):
 
 def features_of(episode: Episode) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the features that say how the robot moved, and those that say how it was commanded."""
-    names = [name for name, values in episode.signals.items() if values.ndim == 2 and not _SET_ASIDE.search(name)]
+    filled = (name for name, values in episode.signals.items() if values.ndim == 2 and values.size)
+    names = [name for name in filled if not _SET_ASIDE.search(name)]
     actions = tuple(name for name in names if _ACTION.search(name))
     others = [name for name in names if name not in actions]
     states = [name for name in others if _STATE.search(name)] or others

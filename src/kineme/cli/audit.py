@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -60,8 +61,7 @@ def audit(dataset: Path, error_rate: float, output: Path | None, mask: Path | No
         if path is not None:
             if allowed and path.suffix.lower() not in allowed:
                 raise click.UsageError(f"expected a path ending in {' or '.join(allowed)}, got {printable(path)}")
-            inside = dataset.resolve() in path.resolve().parents
-            check_new(path, force, path if inside else dataset)
+            check_new(path, force, dataset)
             if not path.parent.is_dir():
                 raise click.UsageError(f"expected a folder to write into, there is none at {printable(path.parent)}")
     with progress(desc="auditing", unit="episode") as bar:
@@ -97,7 +97,7 @@ def _write_rerun(path: Path, result: Any, episodes: list[Any], force: bool) -> P
     reasons = {finding.episode: finding.reasons for finding in result.findings}
 
     def lanes(episode: Any) -> dict[str, list[Stretch]]:
-        begin = float(episode.times[0])
+        begin = next((float(stamp) for stamp in episode.times if math.isfinite(stamp)), 0.0)
         return {
             reason.check: [Stretch(begin + reason.start, begin + reason.end, reason.words)]
             for reason in reasons[episode.number]

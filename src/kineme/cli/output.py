@@ -29,13 +29,21 @@ def write(text: Any = "", *, err: bool = False) -> None:
 
 
 def check_new(path: Path | None, force: bool, *inputs: str | Path, remedy: str = "--force") -> None:
-    """Refuse to write over an input, and without --force, or what `remedy` names, over any file."""
+    """Refuse to write over an input, or a file in one, and without --force, or what `remedy` names, over any file."""
     if path is None or str(path) == "-" or not path.exists():
         return
     if any(Path(source).exists() and path.samefile(source) for source in inputs):
         raise click.UsageError(f"expected another file to write than the input {printable(path)}")
+    if path.is_file() and (inside := next((source for source in inputs if _holds(source, path)), None)) is not None:
+        raise click.UsageError(
+            f"expected another file to write than {printable(path)}, one of the input {printable(inside)}"
+        )
     if not force and path.is_file():
         raise click.UsageError(f"expected a new file to write, {printable(path)} is there; write over it with {remedy}")
+
+
+def _holds(source: str | Path, path: Path) -> bool:
+    return Path(source).is_dir() and Path(source).resolve() in path.resolve().parents
 
 
 def write_bytes(data: bytes) -> None:

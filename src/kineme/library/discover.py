@@ -42,6 +42,7 @@ _HOLD = 0.3  # of the episodes of a task hold a kind that belongs to it, at leas
 _FOLLOW = 0.1  # of a kind's movements follow what is listed, at least
 _LONGEST = 40  # letters of a proposed name
 _AT_ONCE = 256  # episodes whose movements are stored in one change
+_LARGEST, _SLOWEST = 1e30, 1e-10  # a value, and a rate [1/s]: what is beyond is a fault, and no number
 _COMMON_WORDS = frozenset(
     {"a", "an", "and", "at", "from", "in", "into", "it", "its", "of", "off", "on", "onto", "out", "over", "the", "then",
      "to", "up", "with"}
@@ -188,8 +189,10 @@ def state_of(episode: Episode, feature: str | None = None) -> tuple[tuple[str, .
             f"expected the feature {chosen[0]}, got {', '.join(episode.signals) or 'none'}; say which one, in the "
             "shell with --feature"
         )
-    values = np.concatenate([np.asarray(episode.signals[name], dtype=np.float64) for name in chosen], axis=1)
+    values = np.concatenate([_numbers(episode, name) for name in chosen], axis=1)
     usable = np.flatnonzero(np.isfinite(values).any(axis=0))
+    if not len(usable):
+        raise DataError(f"expected finite numbers in {', '.join(chosen)}, got none")
     heads = [head for name in chosen for head in _heads(episode, name)]
     return tuple(heads[k] for k in usable.tolist()), values[:, usable]
 
@@ -198,7 +201,7 @@ def times_of(episode: Episode) -> Array:
     """Return the stamps of an episode [s]; where they agree with the declared rate, repeat or go back, those of it."""
     times = np.asarray(stamps_of(episode), dtype=np.float64)
     if len(times) < MIN_SAMPLES or not np.isfinite(times).all() or not (np.diff(times) > 0).all():
-        if not episode.fps > 0 or len(times) < MIN_SAMPLES:
+        if not episode.fps > _SLOWEST or len(times) < MIN_SAMPLES:
             raise DataError(
                 f"expected {MIN_SAMPLES} frames or more with stamps that increase, or a declared rate, got "
                 f"{len(times)} frames"
@@ -213,11 +216,11 @@ def observe(episode: Episode, names: Sequence[str], state: Array, how: Work | No
     heads, values = [*names], [state]
     for feature in episode.signals:
         several = _heads(episode, feature)
-        if feature.startswith("observation.") and several[0] not in names:
+        if feature.startswith("observation.") and not {*several[:1]} & {*names}:
             roles = roles_of(several)
             chosen = np.sort(np.concatenate([roles[role] for role in _CUES]))
             heads += [several[k] for k in chosen]
-            values.append(np.asarray(episode.signals[feature], dtype=np.float64)[:, chosen])
+            values.append(_numbers(episode, feature)[:, chosen])
     columns = np.concatenate(values, axis=1)
     cuts = boundaries(times, columns, heads, how)
     edges = np.concatenate((times[:1], cuts.times, times[-1:]))
@@ -429,6 +432,11 @@ def _heads(episode: Episode, feature: str) -> tuple[str, ...]:
     if feature == STATE:
         return heads_of(episode)[feature]
     return tuple(f"{feature}.{entry}" if entry else feature for entry in episode.names[feature])
+
+
+def _numbers(episode: Episode, feature: str) -> Array:
+    values = np.asarray(episode.signals[feature], dtype=np.float64)
+    return np.where(np.abs(values) <= _LARGEST, values, np.nan)
 
 
 def _words(task: str) -> list[str]:

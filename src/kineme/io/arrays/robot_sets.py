@@ -37,7 +37,7 @@ _DATA = "data/"  # of Zarr: what the names of arrays with a row for each frame b
 
 _WIDEST = 1000  # numbers in a row; images have more
 _LONGEST = 2**20  # letters of a description in JSON
-_NUMBER = re.compile(r"(\d+)$")
+_NUMBER = re.compile(r"(\d{1,18})$")
 _JOINTS = ("waist", "shoulder", "elbow", "forearm_roll", "wrist_angle", "wrist_rotate", "gripper")
 _FILL = "the fill value of the array"
 
@@ -119,7 +119,7 @@ def robot_episodes(path: Path, features: Sequence[str] | None = None, rate: floa
     """
     if rate is not None:
         check_number("rate", rate, above=0)
-    sources, number = _sources(path), 0
+    sources, number, taken = _sources(path), 0, set[int]()
     if not sources:
         raise DataError(f"expected HDF5 files of a robot in {path.name}, got none")
     for source in sources:
@@ -129,14 +129,22 @@ def robot_episodes(path: Path, features: Sequence[str] | None = None, rate: floa
                 place = "/".join(text for text in (beside, part.place) if text) or source.name
                 # Numbers in several files of many episodes would repeat.
                 own = _NUMBER.search(part.place or source.stem) if row is ALOHA or not beside else None
-                number = int(own[1]) if own else number
+                number = _free(int(own[1]) if own else number, taken)
                 yield _episode(row, part, features, number, place, rate)
                 number += 1
         except DataError as error:
             if not beside or features is not None:
                 raise
+            number = _free(number, taken)
             yield Episode(number, np.empty(0), {}, {}, problems=(str(error),), place=beside)
             number += 1
+
+
+def _free(number: int, taken: set[int]) -> int:
+    """Return a number, or the next one where files of several names count alike, and add it to those taken."""
+    number = max(taken) + 1 if number in taken else number
+    taken.add(number)
+    return number
 
 
 def _parts(source: Path) -> Iterator[tuple[RobotLayout, _Part]]:
@@ -252,7 +260,8 @@ def _features(row: RobotLayout, arrays: Mapping[str, Any], chosen: Sequence[str]
     features: dict[str, Any] = {}
     for path, array in arrays.items():
         is_image = len(array.shape) > 2 and array.dtype == np.uint8
-        if array.dtype.kind not in "biuf" or not array.shape or is_image or math.prod(array.shape[1:]) > _WIDEST:
+        is_row = bool(array.shape) and 0 < math.prod(array.shape[1:]) <= _WIDEST
+        if array.dtype.kind not in "biuf" or is_image or not is_row:
             continue
         matches = ((re.fullmatch(pattern, path), name) for pattern, name in row.features)
         name = next((match.expand(name) for match, name in matches if match), None)

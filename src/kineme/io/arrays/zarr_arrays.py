@@ -13,7 +13,6 @@ import zipfile
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -27,6 +26,7 @@ from kineme.io.records import damaged_as, needs
 _META = ".zarray"
 _ARRAY = r"[^/]+/[^/]+/\.zarray"
 _LONGEST = 2**16  # bytes of the description of an array
+_MOST = 2**62  # rows, or numbers in one of them
 _ANY_WINDOW = 47  # of zlib: with the head of zlib or of gzip
 _DEFLATED = frozenset({"zlib", "gzip"})
 _PACKED = frozenset({"blosc", "zstd", "lz4"})  # codecs that unpack into room of a given size, and refuse more
@@ -53,10 +53,12 @@ class ZarrArray:
             self.shape, self._chunks = (tuple(map(int, meta[key])) for key in ("shape", "chunks"))
             self.dtype = np.dtype(meta["dtype"] if isinstance(meta["dtype"], str) else "O")
             self._order, self._codec = meta["order"], meta["compressor"]
-            self._between = meta.get("dimension_separator", ".")
-            self._fill = _NOT_FINITE.get(meta["fill_value"], meta["fill_value"] or 0)
+            self._between = str(meta.get("dimension_separator", "."))
+            with np.errstate(all="ignore"):  # a number beyond those of the type is another one of it
+                self._fill = np.full((), _NOT_FINITE.get(meta["fill_value"], meta["fill_value"] or 0), self.dtype)
             is_sound = len(self.shape) == len(self._chunks) > 0 and min(self.shape) >= 0 < min(self._chunks)
-            codec = None if self._codec is None else self._codec["id"]
+            is_sound = is_sound and max(self.shape + self._chunks) <= _MOST
+            codec = None if self._codec is None else str(self._codec["id"])
         if meta.get("filters") or self.dtype.kind not in "biuf" or self._order not in ("C", "F") or not is_sound:
             raise DataError(f"expected numbers without filters in the array {name} of Zarr, got {self.dtype}")
         if codec is not None and codec not in _PACKED | _DEFLATED:
@@ -90,7 +92,11 @@ class ZarrArray:
     def _places(self, first: int, last: int) -> Iterator[tuple[int, ...]]:
         along = range(first // self._chunks[0], -(-last // self._chunks[0])) if last > first else range(0)
         beside = (range(-(-n // width)) for n, width in zip(self.shape[1:], self._chunks[1:], strict=True))
-        return product(along, *beside)
+        # `itertools.product` would list what it is given, and a description may declare any number of chunks.
+        ranges = (along, *beside)
+        counts = tuple(map(len, ranges))
+        for k in range(math.prod(counts)):
+            yield tuple(chunks[i] for chunks, i in zip(ranges, np.unravel_index(k, counts), strict=True))
 
     def _key(self, place: tuple[int, ...]) -> str:
         return f"{self.name}/{self._between.join(map(str, place))}"

@@ -215,6 +215,7 @@ def _name_frames(folder: Path, info: Info, motions: language.Motions, lance: Any
         own = language.own_rows(folder)
         rows = new_rows(folder, info, info.data_path, motions, own)
         beside = folder / f"{language.PENDING}.new"
+        beside.unlink(missing_ok=True)  # that of a run which was killed, or a link to a file elsewhere
         language.write_details(beside, [*((k, motions[k], rows[k]) for k in rows), *leftover])
         bring_to_disk(beside)
         os.replace(beside, folder / language.PENDING)

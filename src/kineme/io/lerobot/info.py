@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import sys
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -38,7 +39,8 @@ _NUMBERS = ("float", "int", "uint", "bool")
 _WIDEST = 1000  # numbers in a frame; images have more
 _MOST_BYTES = 100_000_000
 _LONGEST_PATH = 1000  # characters
-_WIDE_FIELD = re.compile(r"\{[^}]*(\d{3}|\{)")  # in a path: {chunk_index:300000000} would be a text of 300 MB
+#: In a path: {chunk_index:300000000} would be a text of 300 MB, and {chunk_index:c} any character, also of ../
+_FIELD = re.compile(r"\{\w*(:0?\d{0,2}d?)?\}")
 
 
 class Info(NamedTuple):
@@ -80,8 +82,8 @@ def read_info(folder: Path) -> Info:
         raise DataError(f"expected a LeRobot data set in Parquet, or of version 3 in Lance, got {said} in {storage!r}")
     fps = description.get("fps")
     path = _FRAMES if storage == "lance" else description.get("data_path")
-    if isinstance(fps, bool) or not isinstance(fps, (int, float)) or not 0 < fps < math.inf:
-        raise DataError(f"expected fps above 0 in {MARKER}, got {fps!r}")
+    if isinstance(fps, bool) or not isinstance(fps, (int, float)) or not 0 < fps <= sys.float_info.max:
+        raise DataError(f"expected fps above 0 in {MARKER}, got {fps!r:.80}")
     _check_path(path, "data_path")
     videos = None if storage == "lance" else description.get("video_path")
     if videos is not None:
@@ -92,14 +94,14 @@ def read_info(folder: Path) -> Info:
     cameras = tuple(name for name in others if _dtype(features[name]) == "video")
     return Info(
         int(major), float(fps), heads, others, str(path), videos, cameras, storage,
-        total if isinstance(total, int) else None, chunk if isinstance(chunk, int) and chunk > 0 else 1000,
+        total if isinstance(total, int) else None, chunk if isinstance(chunk, int) and 0 < chunk < _LARGEST else 1000,
     )  # fmt: skip
 
 
 def _check_path(path: Any, key: str) -> None:
     if not isinstance(path, str) or len(path) > _LONGEST_PATH:
         raise DataError(f"expected a {key} of at most {_LONGEST_PATH} characters in {MARKER}, got {path!r:.80}")
-    if Path(path).is_absolute() or ".." in Path(path).parts or _WIDE_FIELD.search(path):
+    if Path(path).is_absolute() or ".." in Path(path).parts or {*"{}"} & {*_FIELD.sub("", path)}:
         raise DataError(f"expected a {key} within the data set in {MARKER}, got {path!r}")
 
 

@@ -35,6 +35,7 @@ _POINTS = 5000  # of a drawn path, at most
 _DOT = 6.0  # radius of a moving point, on the screen
 _ABOVE = 1.5  # of the extent of paths in a plane: height from which they are seen
 _LEAST = 1e-6  # extent, where nothing moves
+_LATEST = 9e9  # [s] since the first sample: the viewer counts nanoseconds in 64 bits
 _PLOTS = 6  # plots of one scene; features beyond share one
 _TABS = 50  # scenes with a view of their own; the tree of the viewer has all
 _AXIS = re.compile(r"(?:(.*)[._/ -])?([xyz])", re.IGNORECASE)
@@ -58,7 +59,7 @@ class Scene:
     """One movement or episode as the viewer shows it: T samples at common time stamps.
 
     - `name`: its place in the tree of the viewer.
-    - `times` (T,): stamps [s]; shown since the first one, rows without a finite one are left out.
+    - `times` (T,): stamps [s]; shown since the first one, those without a finite one, or one centuries later, are not.
     - `signals`: name of a plot -> its curves (T, d).
     - `names`: name of a plot -> the names of its d curves.
     - `paths`: name of a point -> its positions (T, 3), or (T, 2), which are shown in the plane z = 0.
@@ -183,8 +184,9 @@ def _log_scene(rr: Any, recording: Any, branch: str, scene: Scene, colors: dict[
     import pyarrow as pa  # of which rerun-sdk consists
 
     times = np.asarray(scene.times, float)
-    rows = np.flatnonzero(np.isfinite(times))
-    origin = float(times[rows[0]]) if len(rows) else 0.0
+    finite = times[np.isfinite(times)]
+    origin = float(finite[0]) if len(finite) else 0.0
+    rows = np.flatnonzero(np.abs(times - origin) <= _LATEST)
     index = [rr.TimeColumn(TIMELINE, duration=times[rows] - origin)]
     for plot, values in scene.signals.items():
         entity = f"{branch}/signals/{rr.escape_entity_path_part(plot)}"
@@ -206,7 +208,10 @@ def _log_scene(rr: Any, recording: Any, branch: str, scene: Scene, colors: dict[
             recording.log(entity, look, static=True, strict=True)
             stamps = [rr.TimeColumn(TIMELINE, duration=times[rows][finite] - origin)]
             recording.send_columns(entity, indexes=stamps, columns=rr.Points3D.columns(positions=line), strict=True)
-    for lane, stretches in scene.lanes.items():
+    for lane, several in scene.lanes.items():
+        stretches = [each for each in several if np.abs(np.array(each[:2]) - origin).max() <= _LATEST]
+        if not stretches:
+            continue
         entity = f"{branch}/symbols/{rr.escape_entity_path_part(printable(lane))}"
         for state in dict.fromkeys(stretch.state for stretch in stretches):
             colors.setdefault(state, _shade(len(colors) - 1))

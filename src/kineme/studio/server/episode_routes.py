@@ -217,7 +217,7 @@ def _episode(opened: OpenedRecordings, item: Opened, position: int) -> dict[str,
 def _strip(item: Opened, width: int) -> dict[str, Any]:
     """Thin the feature that is read by default."""
     for feature, heads in item.heads.items():
-        return records.plot(item.episode.times, item.episode.signals[feature], heads, width)
+        return records.plot(item.times, item.episode.signals[feature], heads, width)
     return {"times": [], "columns": []}
 
 

@@ -25,6 +25,7 @@ from kineme.movements.episodes import Episode
 from kineme.movements.trajectories.movements import axis_names
 from kineme.reporting.atomic import write_atomically
 from kineme.studio.server.refusals import ConflictError, MissingError
+from kineme.validation import Array
 
 KEY = "episode-"  # what the key of an episode begins with; its position follows
 HELD = 2**28  # bytes of the episodes that are kept in memory
@@ -139,9 +140,15 @@ class Opened(NamedTuple):
         return self.recording, self.place
 
     @property
+    def times(self) -> Array:
+        """Time stamps (T,) [s]; those of the rate, where one is missing."""
+        stamps, rate = self.episode.times, self.episode.fps
+        return stamps if np.isfinite(stamps).all() else np.arange(len(stamps)) / (rate if rate > 0 else 1.0)
+
+    @property
     def origin(self) -> float:
         """Time stamp of the first sample [s]."""
-        return float(self.episode.times[0]) if len(self.episode) else 0.0
+        return float(self.times[0]) if len(self.episode) else 0.0
 
     @property
     def heads(self) -> dict[str, tuple[str, ...]]:
@@ -159,7 +166,7 @@ class Opened(NamedTuple):
     @property
     def duration(self) -> float:
         """Time from the first sample to the last [s]."""
-        return float(self.episode.times[-1]) - self.origin if len(self.episode) else 0.0
+        return float(self.times[-1]) - self.origin if len(self.episode) else 0.0
 
 
 class OpenedRecordings:
