@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from kineme.errors import DataError
 from kineme.io.reading.merge_files import Recordings
-from kineme.io.reading.pieces import EPISODE, is_episodic
+from kineme.io.reading.pieces import is_episodic
 from kineme.io.reading.read_labels import LabelRow, LabelTable, Stretch, cut_stretches, stretches_of
 from kineme.io.records import Problem
 from kineme.io.writing.annotations import Annotation
@@ -16,6 +16,7 @@ from kineme.library.learn import LearnReport, learn_recordings
 from kineme.library.storage import changes as storage
 from kineme.library.storage.read import names_of
 from kineme.library.storage.store import Store
+from kineme.movements.episodes import place_of
 
 _SAME = 1  # samples by which both ends of a stretch may differ from those annotated: files round times
 _MOVED = 0.3  # intersection over union from which a stretch is one that was annotated, with other boundaries
@@ -74,7 +75,7 @@ def motions_in(path: Path) -> list[Annotation]:
     from kineme.io.lerobot.motions import read_motions
 
     return [
-        Annotation("", f"{EPISODE}{motion.episode}", *motion[1:4], motion.p_value, motion.confidence)
+        Annotation("", place_of(motion.episode), *motion[1:4], motion.p_value, motion.confidence)
         for motion in read_motions(path)
         if motion.annotator == "kineme"
     ]

@@ -25,7 +25,7 @@ from kineme.library.proposals import NamedProposal, store_proposals
 from kineme.library.storage.store import Store
 from kineme.movements.channels.channel import Channels
 from kineme.movements.channels.detect import find_channels
-from kineme.movements.episodes import Episode
+from kineme.movements.episodes import STATE, Episode, head_of
 from kineme.movements.segmentation.work import Work, at_rest, boundaries, roles_of
 from kineme.movements.trajectories.as_learned import of_columns
 from kineme.movements.trajectories.demonstrations import Demonstrations
@@ -150,7 +150,7 @@ def discover(
                 raise DataError(f"expected the columns {', '.join(columns or ())} as before, got {', '.join(names)}")
             observations.append(observe(episode, names, state, how))
         except KinemeError as error:
-            problems.append(f"{episode.place or f'episode {episode.number}'}: {error}")
+            problems.append(f"{episode.label}: {error}")
             continue
         columns = names
     if columns is None or not any(len(each.edges) for each in observations):
@@ -180,7 +180,7 @@ def state_of(episode: Episode, feature: str | None = None) -> tuple[tuple[str, .
     and UMI name them; else of ``action``.
     """
     parts = [name for name in episode.signals if _POSITIONS.fullmatch(name)]
-    usual = (["observation.state"], parts, ["action"])
+    usual = ([STATE], parts, ["action"])
     chosen = [feature] if feature else next((names for names in usual if {*names} & episode.signals.keys()), usual[0])
     if chosen[0] not in episode.signals:
         raise DataError(
@@ -424,7 +424,7 @@ def store_discovery(
 
 
 def _heads(episode: Episode, feature: str) -> tuple[str, ...]:
-    return tuple(f"{feature}.{entry}" if entry else feature for entry in episode.names[feature])
+    return tuple(head_of(feature, entry) for entry in episode.names[feature])
 
 
 def _words(task: str) -> list[str]:

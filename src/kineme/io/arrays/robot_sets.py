@@ -26,7 +26,7 @@ from kineme.io.arrays.trees import GROUPS, flat, rate_of
 from kineme.io.arrays.zarr_arrays import ZarrArray, zarr_arrays
 from kineme.io.limits import check_expanded
 from kineme.io.records import damaged_as
-from kineme.movements.episodes import Episode
+from kineme.movements.episodes import Episode, place_of
 from kineme.movements.tables.layout import Layout, Parsed, listed
 from kineme.movements.tables.time_stamps import words_of
 from kineme.validation import Array, check_number
@@ -147,7 +147,7 @@ def _parts(source: Path) -> Iterator[tuple[RobotLayout, _Part]]:
             raise DataError(f"expected a replay buffer in {source.name}, with data/ and {ENDS}, got {listed(arrays)}")
         for k, (start, end) in enumerate(_spans(arrays)):
             rows = {name.removeprefix(_DATA): _Rows(array, start, end) for name, array in arrays.items()}
-            yield row, _Part(f"episode {k}", rows, length=max(0, end - start))
+            yield row, _Part(place_of(k), rows, length=max(0, end - start))
 
 
 def _in_hdf5(file: Any, row: RobotLayout) -> Iterator[_Part]:
@@ -296,12 +296,12 @@ def zarr_movements(path: Path, layout: Layout) -> Parsed:
         spans = [(k, start, end) for k, (start, end) in enumerate(_spans(arrays))]
         n_rows = min((array.shape[0] for array in of_data.values()), default=0)
         left_out = [
-            f"episode {k}: expected rows among {n_rows:,}, got {start} to {end}"
+            f"{place_of(k)}: expected rows among {n_rows:,}, got {start} to {end}"
             for k, start, end in spans
             if not start < end <= n_rows
         ]
         tree: dict[str, Any] = {
-            f"episode {k}": {name: _Rows(array, start, end) for name, array in of_data.items()}
+            place_of(k): {name: _Rows(array, start, end) for name, array in of_data.items()}
             for k, start, end in spans
             if start < end <= n_rows
         }

@@ -20,6 +20,7 @@ from kineme.io.records import UNKNOWN, needs
 from kineme.io.ros.add_topic import copy_with_topic
 from kineme.io.ros.choose import bag_contents
 from kineme.io.writing.write_movement import Movement, distinct_stems
+from kineme.movements.episodes import number_at
 from kineme.reporting.atomic import whole_file, whole_folder, write_atomically
 from kineme.reporting.text import as_cell, printable
 
@@ -142,7 +143,6 @@ def write_elan(path: Path, annotations: Sequence[Annotation], source: Path | Non
 
 TOPIC = "/kineme/annotations"
 _SECOND = 10**9  # ns
-_EPISODE = "episode "  # a movement's place in a data set of LeRobot begins with it
 
 
 def is_bag(source: Path) -> bool:
@@ -187,11 +187,11 @@ def write_lerobot(path: Path, annotations: Sequence[Annotation], source: Path | 
     assert source is not None  # see `writer_of`
     motions: dict[int, list[Motion]] = {}
     for note in annotations:
-        number = note.place.removeprefix(_EPISODE)
-        if not number.isdecimal():
+        number = number_at(note.place)
+        if number is None:
             raise DataError(f"expected annotations of episodes, got one of {note.place!r}")
-        motion = Motion(int(number), note.start, note.end, note.symbol, note.p_value, note.confidence)
-        motions.setdefault(int(number), []).append(motion)
+        motion = Motion(number, note.start, note.end, note.symbol, note.p_value, note.confidence)
+        motions.setdefault(number, []).append(motion)
     if is_in_place(path, [source]):
         name_in_place(source, motions)
         return path

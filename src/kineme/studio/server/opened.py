@@ -21,7 +21,7 @@ from kineme.io.reading.recordings import read_recordings
 from kineme.io.records import needs
 from kineme.io.writing.annotations import Annotation, to_csv
 from kineme.movements.channels.channel import recorded_names
-from kineme.movements.episodes import Episode
+from kineme.movements.episodes import Episode, place_of
 from kineme.movements.trajectories.movements import axis_names
 from kineme.reporting.atomic import write_atomically
 from kineme.studio.server.refusals import ConflictError, MissingError
@@ -185,7 +185,7 @@ class OpenedRecordings:
             self.total = len(self._numbers)
             try:
                 self.corrections.add(
-                    Annotation(self.name, f"episode {motion.episode}", *motion[1:6])
+                    Annotation(self.name, place_of(motion.episode), *motion[1:6])
                     for motion in motions.read_motions(path)
                 )
             except DataError as error:
@@ -237,13 +237,13 @@ class OpenedRecordings:
             for episode in self._lerobot.episodes(
                 self.path, None, where
             ):  # of one whose frames lie in two places, the first
-                opened = Opened(episode, self.name, f"episode {episode.number}")
+                opened = Opened(episode, self.name, place_of(episode.number))
                 self._episodes.setdefault(where[episode.number], opened)
         except KinemeError as error:
             reason = str(error)
         for number, k in where.items():
             if k not in self._episodes:
-                lost = Episode(number, _NOTHING, {}, {}, problems=(reason,), place=f"episode {number}")
+                lost = Episode(number, _NOTHING, {}, {}, problems=(reason,), place=place_of(number))
                 self._episodes[k] = Opened(lost, self.name, lost.place)
 
     def _stream_to(self, wanted: range) -> None:
