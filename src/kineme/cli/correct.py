@@ -14,7 +14,6 @@ from kineme.cli.reading import layout_options, pieces, problem_lines, recordings
 from kineme.reporting.text import counted, printable
 
 _SHOWN = 20  # changes and problems that are listed; --json has all
-_CORRECTIONS = "-corrections.csv"  # the studio writes demos-corrections.csv beside demos
 
 
 @click.command(cls=GroupedCommand, short_help="Learn what a person corrected of annotations.")
@@ -84,8 +83,9 @@ def correct(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
 
 def _beside(recordings: tuple[Path, ...]) -> Path:
     """The table of corrections that the studio writes beside what it opened."""
-    place = recordings[0].resolve()
-    path = place.with_name(f"{place.name if place.is_dir() else place.stem}{_CORRECTIONS}")
+    from kineme.library.correct import corrections_beside
+
+    path = corrections_beside(recordings[0])
     if len(recordings) > 1 or not path.is_file():
         raise click.UsageError(f"expected --labels, or the corrections of the studio in {printable(path)}, got neither")
     return path

@@ -18,6 +18,7 @@ from kineme.library.storage.read import names_of
 from kineme.library.storage.store import Store
 from kineme.movements.episodes import place_of
 
+_ENDING = "-corrections.csv"
 _SAME = 1  # samples by which both ends of a stretch may differ from those annotated: files round times
 _MOVED = 0.3  # intersection over union from which a stretch is one that was annotated, with other boundaries
 
@@ -57,6 +58,13 @@ class Corrections(NamedTuple):
     def examples(self) -> list[Stretch]:
         """Stretches to learn."""
         return [change.stretch for change in self.changes if change.learned]
+
+
+def corrections_beside(recordings: Path) -> Path:
+    """Return where the studio writes corrections: ``demos-corrections.csv`` beside ``demos`` or ``demos.csv``."""
+    # Beside a link, not what it leads to; two dots and nothing are no names.
+    path = recordings.resolve() if recordings.name in {"", ".."} else recordings.absolute()
+    return path.with_name(f"{path.name if path.is_dir() else path.stem}{_ENDING}")
 
 
 def as_labels(annotations: Sequence[Annotation]) -> LabelTable:

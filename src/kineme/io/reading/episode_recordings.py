@@ -46,14 +46,7 @@ def episode_recordings(episode: Episode, name: str, columns: Sequence[str] = ())
     values = [column for feature in heads for column in episode.signals[feature].T]
     names = (_STAMP, *(head for feature in heads for head in heads[feature]))
     segments = Segments(np.array([0, len(episode)]), [episode.label], [episode.task])
-    table = Table(
-        names,
-        [times, *values],
-        len(episode),
-        no_lines,
-        segments=segments,
-        maker="episodes",
-    )
+    table = Table(names, [times, *values], len(episode), no_lines, segments=segments, maker="episodes")
 
     def parse(layout: Layout) -> Parsed:
         return table_movements(table, choose_roles(names, ("number",) * len(names), layout), layout, "episode")
