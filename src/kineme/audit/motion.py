@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from kineme.movements.episodes import Episode
 from kineme.movements.preparation.resample import arc_length_phase, resample_by_phase
+from kineme.sampling import runs
 from kineme.validation import Array
 
 #: Samples of the way that stands for an episode, evenly spaced by arc length.
@@ -119,12 +120,6 @@ def smoothed(values: Array, width: int) -> Array:
     centers = np.arange(len(values))
     first, last = np.maximum(centers - width // 2, 0), np.minimum(centers + width // 2 + 1, len(values))
     return np.asarray((sums[last] - sums[first]) / (last - first)[:, None])
-
-
-def runs(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """Return (n, 2) first indices of the runs of True, and those behind them."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
-    return np.asarray(edges.reshape(-1, 2))
 
 
 def longest_runs(mask: NDArray[np.bool_]) -> NDArray[np.intp]:

@@ -17,6 +17,7 @@ from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.preparation.smooth import Smooth
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.trajectory import Trajectory
+from kineme.sampling import runs
 from kineme.validation import Array, check_count, check_number
 
 _LEVEL = 0.05  # threshold, as a share of the movement's own peak speed
@@ -394,8 +395,7 @@ def noise_variance(positions: Array) -> float:
 
 def moving_bouts(speed: Array, low: float, high: float) -> Rows:
     """Runs of samples faster than `low` that exceed `high` somewhere: rows (n, 2), first and one past the last."""
-    edges = np.diff(np.concatenate(([False], speed > low, [False])).astype(np.int8))
-    rows = np.column_stack((np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)))
+    rows = runs(speed > low)
     if not len(rows):
         return rows
     fastest = np.maximum.reduceat(np.append(speed, 0.0), rows.ravel())[::2]

@@ -20,6 +20,7 @@ from scipy.special import logsumexp
 from kineme.errors import DataError
 from kineme.movements.segmentation.table import moving_bouts, noise_variance, weighted_quantile
 from kineme.movements.tables.time_stamps import words_of
+from kineme.sampling import runs
 from kineme.validation import Array, check_count, check_number
 
 #: Role of a column -> words of its name, the first role that fits; columns of none of them are the arm's own.
@@ -191,7 +192,7 @@ def slow_moments(observed: Observed) -> Events:
     rows, properties = find_peaks(slowness, prominence=_SHALLOW)
     strengths = np.minimum(properties["prominences"], _LARGEST)
     widths = 0.25 * peak_widths(slowness, rows, rel_height=0.5)[0] / observed.rate
-    rests = moving_bouts(-observed.speed, -_REST * observed.floor, -np.inf)
+    rests = runs(observed.speed < _REST * observed.floor)
     rests = rests[rests[:, 1] - rests[:, 0] > _PAUSE * observed.rate]
     owner = np.searchsorted(rests[:, 0], rows, side="right") - 1
     resting = (owner >= 0) & (rows < rests[np.maximum(owner, 0), 1]) if len(rests) else np.zeros(len(rows), dtype=bool)
@@ -313,9 +314,9 @@ def _within_strokes(observed: Observed, rows: NDArray[np.intp], strokes: int) ->
     product = np.maximum(size[:-1] * size[1:], np.finfo(float).tiny)
     back = (np.einsum("ij,ij->i", way[:-1], way[1:]) < _BACK * product) & ~(grip[:-1] | grip[1:]).any(axis=1)
     back &= np.minimum(size[:-1], size[1:]) > _AS_LONG * np.maximum(size[:-1], size[1:])
-    runs = moving_bouts(back.astype(np.float64), 0.5, 0.5)  # of boundaries at which the arm turns back
+    turning = runs(back)
     inside = np.zeros(len(rows), dtype=bool)
-    for first, stop in runs[runs[:, 1] - runs[:, 0] >= strokes - 1].tolist():
+    for first, stop in turning[turning[:, 1] - turning[:, 0] >= strokes - 1].tolist():
         inside[first:stop] = True
     return inside
 
