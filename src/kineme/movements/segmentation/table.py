@@ -383,14 +383,19 @@ def without_glitches(positions: Array) -> Array:
     return np.where(glitches[:, None], path, positions) if glitches.any() else positions
 
 
-def noise_variance(positions: Array) -> float:
-    """Variance of white noise on (T, d) positions, summed over dimensions.
+def noise_deviations(positions: Array) -> Array:
+    """Return the standard deviation (d,) of white noise on (T, d) positions.
 
     Estimated from the median size of third differences, to which a smooth path hardly contributes: for Gaussian noise
     it is ``0.6745 sqrt(20) sigma``. A median, so that single jumps have no influence.
     """
     sizes = np.median(np.abs(np.diff(positions, n=3, axis=0)), axis=0)
-    return float(((sizes / (0.6745 * np.sqrt(20.0))) ** 2).sum())
+    return np.asarray(sizes / (0.6745 * np.sqrt(20.0)))
+
+
+def noise_variance(positions: Array) -> float:
+    """Return the variance of white noise on (T, d) positions, summed over dimensions."""
+    return float((noise_deviations(positions) ** 2).sum())
 
 
 def moving_bouts(speed: Array, low: float, high: float) -> Rows:
