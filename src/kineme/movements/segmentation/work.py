@@ -27,7 +27,9 @@ from kineme.validation import Array, check_count, check_number
 ROLES: dict[str, frozenset[str]] = {
     "aside": frozenset({"vel", "velocity", "velocities", "qvel", "effort", "torque", "torques", "acc", "current"}),
     "contact": frozenset({"contact", "contacts", "touch", "tactile", "force", "forces", "pressure", "wrench"}),
-    "gripper": frozenset({"gripper", "finger", "fingers", "grip", "jaw", "suction", "vacuum"}),
+    "gripper": frozenset(
+        {"gripper", "grippers", "finger", "fingers", "grip", "jaw", "jaws", "claw", "suction", "vacuum"}
+    ),
     "object": frozenset({"object", "objects", "obj", "cube", "block", "target", "environment", "env"}),
 }
 
