@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from kineme.cli.options import FILE, GroupedCommand, error_rate_option, json_option, library_option
-from kineme.cli.output import progress, say, table
+from kineme.cli.output import progress, say, stretch_cells, table, unlisted
 from kineme.cli.reading import layout_options, pieces, problem_lines, recordings_argument
 from kineme.reporting.text import counted, printable
 
@@ -92,7 +92,7 @@ def _beside(recordings: tuple[Path, ...]) -> Path:
 
 
 def _recordings(paths: tuple[Path, ...], options: dict[str, Any], library: Any, places: list[str]) -> Any:
-    """What is corrected; of data sets the episodes that have corrections alone."""
+    """Read the recordings; of data sets the episodes that have corrections alone."""
     from kineme.errors import DataError
 
     several = list(pieces(paths, options, library, places))
@@ -106,7 +106,7 @@ def _recordings(paths: tuple[Path, ...], options: dict[str, Any], library: Any, 
 
 
 def _annotated(paths: tuple[Path, ...], parsed: Any, library: Any, error_rate: float) -> Any:
-    """What was annotated: as it stands in the data set, else found again."""
+    """Return what was annotated: as it stands in the data set, else found again."""
     from kineme.library.annotate import annotate
     from kineme.library.correct import as_labels, motions_in
 
@@ -135,17 +135,13 @@ def _text(data: dict[str, Any], folder: Path, problems: list[str]) -> str:
     if changes:
         cells = [
             (
-                printable(f"{change['recording']} {change['place']}".strip()), f"{change['start']:.2f}",
-                f"{change['end']:.2f}", printable(change["symbol"] or "unknown"), printable(change["was"] or "-"),
+                *stretch_cells(change), printable(change["symbol"] or "unknown"), printable(change["was"] or "-"),
                 change["kind"],
             )
             for change in changes[:_SHOWN]
         ]  # fmt: skip
         lines.append(table(("recording", "start [s]", "end [s]", "symbol", "was", "change"), cells))
-    lines += problems[:_SHOWN]
-    for what, all_of in (("changes", changes), ("problems", problems)):
-        if len(all_of) > _SHOWN:
-            lines.append(f"and {len(all_of) - _SHOWN:,} more {what}; --json has all")
+    lines += [*problems[:_SHOWN], *unlisted({"changes": changes, "problems": problems}, _SHOWN)]
     if data["learned"]:
         lines.append(f"take it back: kineme library undo --library {printable(folder)}")
     return "\n".join(lines)

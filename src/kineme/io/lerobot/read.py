@@ -78,17 +78,17 @@ def lerobot_parts(
 def _of_episodes(info: Info, part: Sequence[Episode], layout: Layout) -> Parsed:
     """Return the movements of some episodes in the columns of a layout; those with problems are left out."""
     chosen = _chosen(info, layout)
-    whole = [episode for episode in part if len(episode) and not episode.problems]
+    intact = [episode for episode in part if len(episode) and not episode.problems]
     left_out = [
         f"{place_of(episode.number)}: {reason}" if episode.number >= 0 else reason
         for episode in part
         for reason in episode.problems
     ]
-    offsets = np.concatenate(([0], np.cumsum([len(episode) for episode in whole]))).astype(np.intp)
-    values = [np.concatenate([episode.signals[name] for name in chosen.features], axis=1) for episode in whole]
-    stamps = [even_stamps(episode.times, info.fps) for episode in whole]
+    offsets = np.concatenate(([0], np.cumsum([len(episode) for episode in intact]))).astype(np.intp)
+    values = [np.concatenate([episode.signals[name] for name in chosen.features], axis=1) for episode in intact]
+    stamps = [even_stamps(episode.times, info.fps) for episode in intact]
     frames = np.concatenate([np.empty((0, sum(chosen.features.values()))), *values])
-    segments = Segments(offsets, [place_of(episode.number) for episode in whole], [each.task for each in whole])
+    segments = Segments(offsets, [place_of(episode.number) for episode in intact], [each.task for each in intact])
     parsed = _in_columns(info, layout, chosen, (np.concatenate([np.empty(0), *stamps]), frames), segments, {})
     return parsed._replace(left_out=tuple(left_out))
 
