@@ -143,8 +143,7 @@ def _parts(source: Path) -> Iterator[tuple[RobotLayout, _Part]]:
                 yield row, part
         return
     with zarr_arrays(source) as arrays:
-        if (row := _of_zarr(arrays)) is None:
-            raise DataError(f"expected a replay buffer in {source.name}, with data/ and {ENDS}, got {listed(arrays)}")
+        row = _buffer_in(arrays, source)
         for k, (start, end) in enumerate(_spans(arrays)):
             rows = {name.removeprefix(_DATA): _Rows(array, start, end) for name, array in arrays.items()}
             yield row, _Part(place_of(k), rows, length=max(0, end - start))
@@ -286,8 +285,7 @@ def hdf5_or_robot_movements(path: Path, layout: Layout) -> Parsed:
 def zarr_movements(path: Path, layout: Layout) -> Parsed:
     """Return the movements of a replay buffer in Zarr, one for each episode; coordinates as of `robot_episodes`."""
     with zarr_arrays(path) as arrays:
-        if (row := _of_zarr(arrays)) is None:
-            raise DataError(f"expected a replay buffer in {path.name}, with data/ and {ENDS}, got {listed(arrays)}")
+        row = _buffer_in(arrays, path)
         of_data = {
             name.removeprefix(_DATA): array
             for name, array in arrays.items()
@@ -382,6 +380,13 @@ def _of_hdf5(file: Any) -> RobotLayout | None:
 
 def _of_zarr(arrays: Mapping[str, Any]) -> RobotLayout | None:
     return _marked([*arrays], LAYOUTS["Zarr"])
+
+
+def _buffer_in(arrays: Mapping[str, Any], path: Path) -> RobotLayout:
+    """Tell the layout of a replay buffer in Zarr; a `DataError` if it is none."""
+    if (row := _of_zarr(arrays)) is None:
+        raise DataError(f"expected a replay buffer in {path.name}, with data/ and {ENDS}, got {listed(arrays)}")
+    return row
 
 
 def _marked(names: Sequence[str], rows: Sequence[RobotLayout]) -> RobotLayout | None:

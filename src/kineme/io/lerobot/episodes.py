@@ -274,12 +274,11 @@ def episodes(
 
     if wanted is None and (problems := (*declared.problems, *unsaid)):
         yield episode(_no_frames(sum(widths.values())), -1, "meta", problems)
-    declared_in: dict[str, list[int]] = {}
-    for number, shard in zip(declared.numbers.tolist(), declared.shards, strict=True):
-        if wanted is None or number in wanted:
-            declared_in.setdefault(shard, []).append(number)
     done: set[int] = set()
-    for shard, expected in declared_in.items():
+    for shard, numbers_there in declared.by_shard().items():
+        expected = [number for number in numbers_there if wanted is None or number in wanted]
+        if not expected:
+            continue
         broken: list[str] = []
         parts = shard_frames(folder, info, shard, widths, None if wanted is None else expected)
         for frames in runs(parts, broken):

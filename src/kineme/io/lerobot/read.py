@@ -182,10 +182,7 @@ def _all_frames(
     parts: list[Frames] = []
     unread: dict[str, str] = {}
     taken, width = 0, sum(features.values())
-    episodes_of: dict[str, list[int]] = {}
-    for k, shard in zip(declared.numbers.tolist(), declared.shards, strict=True):
-        episodes_of.setdefault(shard, []).append(k)
-    for shard, numbers in episodes_of.items():
+    for shard, numbers in declared.by_shard().items():
         n_before, n_bytes = len(parts), taken
         try:
             for frames in shard_frames(folder, info, shard, features):
@@ -230,7 +227,7 @@ def whole_episodes(
     absent = set(np.setdiff1d(declared.numbers, numbers).tolist())
     places = zip(declared.numbers.tolist(), declared.shards, strict=True) if absent else ()
     left_out += [
-        f"episode {k}: expected frames in {shard}, got none"
+        f"{place_of(k)}: expected frames in {shard}, got none"
         for k, shard in places
         if k in absent and shard not in unread
     ]

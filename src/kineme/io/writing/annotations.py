@@ -14,8 +14,9 @@ from typing import Any, NamedTuple
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from kineme.errors import DataError
-from kineme.io.lerobot.info import MARKER, read_info
-from kineme.io.reading.formats import FORMATS, data_set_of, format_at
+from kineme.io.lerobot.info import read_info
+from kineme.io.reading.formats import FORMATS, format_at
+from kineme.io.reading.pieces import is_episodic
 from kineme.io.records import UNKNOWN, needs
 from kineme.io.ros.add_topic import copy_with_topic
 from kineme.io.ros.choose import bag_contents
@@ -151,12 +152,6 @@ def is_bag(source: Path) -> bool:
     return form is not None and form.contents is bag_contents
 
 
-def is_lerobot(source: Path) -> bool:
-    """Tell whether it is the folder of a data set of LeRobot."""
-    data_set = data_set_of(source) if source.is_dir() else None
-    return data_set is not None and data_set.marker == MARKER
-
-
 def write_bag(path: Path, annotations: Sequence[Annotation], source: Path | None) -> Path:
     """Write a copy of a bag with the topic `TOPIC`: messages of std_msgs/String with JSON, all others byte for byte.
 
@@ -206,7 +201,7 @@ def is_in_place(path: Path, sources: Sequence[Path]) -> bool:
     return (
         len(sources) == 1
         and path.resolve() == sources[0].resolve()
-        and is_lerobot(sources[0])
+        and is_episodic(sources[0])
         and read_info(sources[0]).storage == "lance"
     )
 
@@ -275,7 +270,7 @@ WRITERS: dict[str, Writer] = {
     "elan": Writer(write_elan, (".eaf",), several=False),
     "audacity": Writer(write_audacity, (".txt",), several=False),
     "bag": Writer(write_bag, (".bag", ".mcap", ".db3"), copies=is_bag, check=check_bag),
-    "lerobot": Writer(write_lerobot, (), copies=is_lerobot, check=check_lerobot),
+    "lerobot": Writer(write_lerobot, (), copies=is_episodic, check=check_lerobot),
 }
 
 
