@@ -26,7 +26,7 @@ from kineme.library.storage.store import Store
 from kineme.movements.channels.channel import Channels
 from kineme.movements.channels.detect import find_channels
 from kineme.movements.episodes import STATE, Episode, head_of
-from kineme.movements.segmentation.work import Work, at_rest, boundaries, roles_of
+from kineme.movements.segmentation.work import Work, at_rest, boundaries, interpolated, roles_of
 from kineme.movements.trajectories.as_learned import of_columns
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.validation import MIN_SAMPLES, Array
@@ -224,8 +224,7 @@ def observe(episode: Episode, names: Sequence[str], state: Array, how: Work | No
     moving = np.flatnonzero(~at_rest(times, columns, heads, edges))
     spans = np.column_stack((edges[moving], edges[moving + 1]))
     at = np.column_stack((spans[:, 0], spans.mean(axis=1), spans[:, 1]))
-    paths = np.stack([np.interp(at, times[good], column[good])
-                      for column in state.T for good in [np.isfinite(column)]], axis=2)  # fmt: skip
+    paths = interpolated(at, times, state)
     between = np.stack((intervals[moving], intervals[moving + 1]), axis=1)
     origin, seconds = float(times[0]), float(times[-1] - times[0])
     task = episode.task or ""
@@ -401,8 +400,7 @@ def store_discovery(
         if own := by_episode.get(episode.number):
             columns, state = state_of(episode, feature)
             times = times_of(episode)
-            state = np.column_stack([np.interp(times, times[np.isfinite(column)], column[np.isfinite(column)])
-                                     for column in state.T])  # fmt: skip
+            state = interpolated(times, times, state)
             for segment in own:
                 rows = slice(*np.searchsorted(times, (segment.start - 1e-9, segment.end + 1e-9)).tolist())
                 if rows.stop - rows.start >= MIN_SAMPLES:

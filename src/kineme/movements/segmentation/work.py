@@ -138,7 +138,7 @@ def boundaries(times: Array, columns: Array, names: Sequence[str], how: Work | N
 
 
 def at_rest(times: Array, columns: Array, names: Sequence[str], edges: Array) -> NDArray[np.bool_]:
-    """Tell which of the pieces between times edges (n + 1,) [s] are rests: neither the arm nor a gripper moves."""
+    """Tell which of the n pieces between times `edges` (n + 1,) [s] are rests: neither the arm nor a gripper moves."""
     observed = observe_work(times, columns, names)
     if observed is None:
         return np.ones(len(edges) - 1, dtype=bool)
@@ -148,6 +148,15 @@ def at_rest(times: Array, columns: Array, names: Sequence[str], edges: Array) ->
     starts = np.minimum(rows[:-1], rows[1:])
     highest, lowest = (reach.reduceat(moving, starts, axis=0) for reach in (np.maximum, np.minimum))
     return np.asarray(np.linalg.norm(highest - lowest, axis=1) < _STILL)
+
+
+def interpolated(at: Array, times: Array, columns: Array) -> Array:
+    """Return columns (T, d) at other times, (*at.shape, d): linear between `times` (T,) at which they are finite."""
+    values = np.empty((*at.shape, columns.shape[1]))
+    for k, column in enumerate(columns.T):
+        valid = np.isfinite(column)
+        values[..., k] = np.interp(at, times[valid], column[valid])
+    return values
 
 
 def observe_work(times: Array, columns: Array, names: Sequence[str]) -> Observed | None:
@@ -166,9 +175,7 @@ def observe_work(times: Array, columns: Array, names: Sequence[str]) -> Observed
     t = np.linspace(0.0, duration, n)
     usable: NDArray[np.bool_] = np.asarray(np.isfinite(columns).any(axis=0))
     even = np.zeros((n, len(names)))
-    for k in np.flatnonzero(usable).tolist():
-        valid = np.isfinite(columns[:, k])
-        even[:, k] = np.interp(t, times[valid] - times[0], columns[valid, k])
+    even[:, usable] = interpolated(t, times - times[0], columns[:, usable])
     roles = {role: own[usable[own]] for role, own in roles_of(names).items()}
     rate = (n - 1) / duration
     arm = even[:, roles["arm"]]
