@@ -138,6 +138,7 @@ def _annotated(
     Pieces are kept with their annotations in `held`, for a picture of them, unless it is None.
     """
     from kineme.io.reading.recordings import paths_of
+    from kineme.io.records import Problem
     from kineme.library.annotate import annotate_by
     from kineme.library.recognize import some_of_each_symbol
 
@@ -147,7 +148,7 @@ def _annotated(
     bar_format = "{l_bar}{bar}| {n:.0f} of {total:.0f} s [{elapsed}<{remaining}]"
     with progress(total=total, desc="annotating", bar_format=bar_format) as bar:
         for piece in pieces(recordings, options, library):
-            if not hasattr(piece, "sources"):  # a problem
+            if isinstance(piece, Problem):
                 answer.problems.append(piece)
                 continue
             streamed = total is not None

@@ -94,13 +94,14 @@ def _beside(recordings: tuple[Path, ...]) -> Path:
 def _recordings(paths: tuple[Path, ...], options: dict[str, Any], library: Any, places: list[str]) -> Any:
     """Read the recordings; of data sets the episodes that have corrections alone."""
     from kineme.errors import DataError
+    from kineme.io.records import Problem
 
     several = list(pieces(paths, options, library, places))
-    read = [piece for piece in several if hasattr(piece, "sources")]  # others are problems
+    read = [piece for piece in several if not isinstance(piece, Problem)]
     if len(read) != 1:
         raise DataError(
             f"expected one data set, or files, to correct, got {len(read)} data sets that can be read"
-            + "".join(f"; {piece}" for piece in several if piece not in read)
+            + "".join(f"; {piece}" for piece in several if isinstance(piece, Problem))
         )
     return read[0]
 
