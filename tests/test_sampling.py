@@ -1,4 +1,4 @@
-"""Evenly spaced indices."""
+"""Evenly spaced indices, and runs."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kineme.sampling import evenly_spaced
+from kineme.sampling import evenly_spaced, runs
 
 
 @given(n=st.integers(1, 5000), most=st.integers(1, 6000))
@@ -18,3 +18,8 @@ def test_indices_are_evenly_spaced_and_no_more_than_asked(n, most):
     steps = np.diff(some)
     assert (steps > 0).all()
     assert np.ptp(steps, axis=0) <= 1 if len(steps) else True
+
+
+def test_runs_are_half_open():
+    assert runs(np.array([True, True, False, True])).tolist() == [[0, 2], [3, 4]]
+    assert runs(np.zeros(0, dtype=bool)).tolist() == []

@@ -5,7 +5,7 @@ import pytest
 from audit_samples import CONTRADICTIONS, FAULTS, FPS, episode, episodes, spike, with_state
 
 from kineme.audit.checks import CHECKS
-from kineme.audit.motion import features_of, frames_behind, motion_of, path_of, runs
+from kineme.audit.motion import features_of, frames_behind, motion_of, path_of
 from kineme.audit.run import audit_episodes
 from kineme.movements.episodes import Episode
 
@@ -124,8 +124,3 @@ def test_a_way_does_not_depend_on_tempo():
     motions = [motion_of(each) for each in (clean, Episode(0, np.arange(2 * len(clean)) / FPS, slow, clean.names))]
     way, other = (path_of(motion) for motion in motions)
     assert np.abs(way - other).max() < 0.1
-
-
-def test_runs_are_half_open():
-    assert runs(np.array([True, True, False, True])).tolist() == [[0, 2], [3, 4]]
-    assert runs(np.zeros(0, dtype=bool)).tolist() == []

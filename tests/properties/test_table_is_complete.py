@@ -55,6 +55,7 @@ EXEMPT = {
     "dmp.rhythmic.rhythmic_dmp.RhythmicPrimitives.controller": "one movement by contract",
     "dmp.pose.pose_controller.PoseState.orientation": "of one movement at one moment",
     "dmp.pose.pose_controller.PoseState.pose": "of one movement at one moment",
+    "movements.episodes.Episode.label": "of one episode",
     "audit.motion.Motion.frames": "of one episode",
     "audit.motion.Motion.seconds": "of one episode",
     "recognition.answer_figure.View.points": "one picture",

@@ -1,1 +1,1 @@
-"""What is wrong with the episodes of a set of robot data: checks, their calibration, a report, what to keep."""
+"""Faults of the episodes in a set of robot data: checks, their calibration, a report, the episodes to keep."""

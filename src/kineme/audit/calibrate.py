@@ -1,4 +1,4 @@
-"""How unusual an episode is among the others of its set, with a stated rate of false alarms, whatever the checks are.
+"""Calibration of checks: evidence that an episode is unusual in its set, with a stated rate of false alarms.
 
 1. Each value of each check is compared with those of the other episodes of its task, or, where a task has too few, with
    those of all such tasks, each about the median of its own. Above their median m, values of good episodes fall about

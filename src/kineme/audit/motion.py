@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from kineme.movements.episodes import Episode
 from kineme.movements.preparation.resample import arc_length_phase, resample_by_phase
+from kineme.movements.segmentation.table import noise_deviations
+from kineme.sampling import runs
 from kineme.validation import Array
 
 #: Samples of the way that stands for an episode, evenly spaced by arc length.
@@ -78,8 +80,7 @@ def motion_of(episode: Episode) -> Motion | None:
     times = episode.times - episode.times[0] if increasing else np.arange(float(len(episode))) * step
     changes = np.abs(np.diff(state, axis=0))
     least = np.where(changes > 0, changes, np.inf).min(axis=0)  # that the sensor resolves; infinite if it never changes
-    noise = np.median(np.abs(np.diff(state, 3, axis=0)), axis=0) * 1.4826 / np.sqrt(20)
-    noise = np.maximum(noise, np.where(np.isinf(least), 0.0, 0.5 * least))
+    noise = np.maximum(noise_deviations(state), np.where(np.isinf(least), 0.0, 0.5 * least))
     low, high = np.quantile(state, [0.05, 0.95], axis=0)
     scale = np.asarray(np.where(high - low > _MOVING * noise, high - low, np.inf))
     lead = None
@@ -120,12 +121,6 @@ def smoothed(values: Array, width: int) -> Array:
     centers = np.arange(len(values))
     first, last = np.maximum(centers - width // 2, 0), np.minimum(centers + width // 2 + 1, len(values))
     return np.asarray((sums[last] - sums[first]) / (last - first)[:, None])
-
-
-def runs(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """Return (n, 2) first indices of the runs of True, and those behind them."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
-    return np.asarray(edges.reshape(-1, 2))
 
 
 def longest_runs(mask: NDArray[np.bool_]) -> NDArray[np.intp]:

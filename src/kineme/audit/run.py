@@ -255,7 +255,7 @@ def _audited(measured: _Measured, error_rate: float, progress: Callable[[int], o
         np.array(measured.numbers), sum(measured.seconds), len({*filter(None, measured.tasks)}) or 1, error_rate,
         ranking.by_chance,
         np.where(broken, 0.0, ranking.p_values), ranking.evidence, flagged,
-        _findings(measured, compared, broken, ranking, flagged), of_the_set,
+        _findings(measured, compared, broken, ranking, flagged, tasks), of_the_set,
     )  # fmt: skip
 
 
@@ -312,9 +312,9 @@ def _findings(
     broken: NDArray[np.bool_],
     ranking: calibrate.Ranking,
     flagged: NDArray[np.bool_],
+    tasks: calibrate.Groups,
 ) -> tuple[Finding, ...]:
     """Return the findings, in their order."""
-    tasks = calibrate.tasks_of(measured.tasks)
     order = np.lexsort((-ranking.evidence, ~broken))
     listed = order[flagged[order]]
     if not (flagged & ~broken).any():

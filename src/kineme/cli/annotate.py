@@ -20,7 +20,7 @@ from kineme.cli.options import (
     library_option,
     rerun_option,
 )
-from kineme.cli.output import check_new, progress, say, table, write
+from kineme.cli.output import check_new, progress, say, stretch_cells, table, write
 from kineme.cli.reading import layout_options, notes_beside, pieces, problem_lines, recordings_argument, seconds_of
 from kineme.reporting.text import counted, printable
 
@@ -138,16 +138,17 @@ def _annotated(
     Pieces are kept with their annotations in `held`, for a picture of them, unless it is None.
     """
     from kineme.io.reading.recordings import paths_of
+    from kineme.io.records import Problem
     from kineme.library.annotate import annotate_by
     from kineme.library.recognize import some_of_each_symbol
 
-    known = some_of_each_symbol(library.store)
-    answer = _Answer([], [], 0.0, bool(known.calibration.calibrated(error_rate).all()), [], [], False)
+    classes = some_of_each_symbol(library.store)
+    answer = _Answer([], [], 0.0, bool(classes.calibration.calibrated(error_rate).all()), [], [], False)
     total = seconds_of(recordings)
     bar_format = "{l_bar}{bar}| {n:.0f} of {total:.0f} s [{elapsed}<{remaining}]"
     with progress(total=total, desc="annotating", bar_format=bar_format) as bar:
         for piece in pieces(recordings, options, library):
-            if not hasattr(piece, "sources"):  # a problem
+            if isinstance(piece, Problem):
                 answer.problems.append(piece)
                 continue
             streamed = total is not None
@@ -158,7 +159,7 @@ def _annotated(
             seconds = float(piece.demonstrations.durations.sum())
             bar.total = bar.total or seconds
             done = partial(_advance, bar, answer.seconds)
-            report = annotate_by(known, piece, error_rate, done)
+            report = annotate_by(classes, piece, error_rate, done)
             answer.annotations.extend(report.annotations)
             if held is not None:
                 held.append((piece, report.annotations))
@@ -199,11 +200,9 @@ def _text(data: dict[str, Any], annotations: list[Any], problems: list[str]) -> 
         lines.append(table(("symbol", "times", "seconds"), totals))
     elif rows:
         heads = ("recording", "start [s]", "end [s]", "symbol", "how sure")
-        where = [printable(f"{row['recording']} {row['place']}".strip()) for row in rows]
-        spans = [(f"{row['start']:.2f}", f"{row['end']:.2f}") for row in rows]
         names = ["unknown" if row["unknown"] else printable(row["symbol"]) for row in rows]
-        cells = zip(where, spans, names, rows, strict=True)
-        lines.append(table(heads, [(of, *span, name, row["certainty"]) for of, span, name, row in cells]))
+        cells = [(*stretch_cells(row), name, row["certainty"]) for row, name in zip(rows, names, strict=True)]
+        lines.append(table(heads, cells))
     return "\n".join([*lines, *_remarks(data, problems), *(f"written to {printable(path)}" for path in written)])
 
 

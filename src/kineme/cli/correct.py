@@ -9,12 +9,11 @@ from typing import Any
 import click
 
 from kineme.cli.options import FILE, GroupedCommand, error_rate_option, json_option, library_option
-from kineme.cli.output import progress, say, table
+from kineme.cli.output import progress, say, stretch_cells, table, unlisted
 from kineme.cli.reading import layout_options, pieces, problem_lines, recordings_argument
 from kineme.reporting.text import counted, printable
 
 _SHOWN = 20  # changes and problems that are listed; --json has all
-_CORRECTIONS = "-corrections.csv"  # the studio writes demos-corrections.csv beside demos
 
 
 @click.command(cls=GroupedCommand, short_help="Learn what a person corrected of annotations.")
@@ -84,29 +83,31 @@ def correct(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
 
 def _beside(recordings: tuple[Path, ...]) -> Path:
     """The table of corrections that the studio writes beside what it opened."""
-    place = recordings[0].resolve()
-    path = place.with_name(f"{place.name if place.is_dir() else place.stem}{_CORRECTIONS}")
+    from kineme.library.correct import corrections_beside
+
+    path = corrections_beside(recordings[0])
     if len(recordings) > 1 or not path.is_file():
         raise click.UsageError(f"expected --labels, or the corrections of the studio in {printable(path)}, got neither")
     return path
 
 
 def _recordings(paths: tuple[Path, ...], options: dict[str, Any], library: Any, places: list[str]) -> Any:
-    """What is corrected; of data sets the episodes that have corrections alone."""
+    """Read the recordings; of data sets the episodes that have corrections alone."""
     from kineme.errors import DataError
+    from kineme.io.records import Problem
 
     several = list(pieces(paths, options, library, places))
-    read = [piece for piece in several if hasattr(piece, "sources")]  # others are problems
+    read = [piece for piece in several if not isinstance(piece, Problem)]
     if len(read) != 1:
         raise DataError(
             f"expected one data set, or files, to correct, got {len(read)} data sets that can be read"
-            + "".join(f"; {piece}" for piece in several if piece not in read)
+            + "".join(f"; {piece}" for piece in several if isinstance(piece, Problem))
         )
     return read[0]
 
 
 def _annotated(paths: tuple[Path, ...], parsed: Any, library: Any, error_rate: float) -> Any:
-    """What was annotated: as it stands in the data set, else found again."""
+    """Return what was annotated: as it stands in the data set, else found again."""
     from kineme.library.annotate import annotate
     from kineme.library.correct import as_labels, motions_in
 
@@ -135,17 +136,13 @@ def _text(data: dict[str, Any], folder: Path, problems: list[str]) -> str:
     if changes:
         cells = [
             (
-                printable(f"{change['recording']} {change['place']}".strip()), f"{change['start']:.2f}",
-                f"{change['end']:.2f}", printable(change["symbol"] or "unknown"), printable(change["was"] or "-"),
+                *stretch_cells(change), printable(change["symbol"] or "unknown"), printable(change["was"] or "-"),
                 change["kind"],
             )
             for change in changes[:_SHOWN]
         ]  # fmt: skip
         lines.append(table(("recording", "start [s]", "end [s]", "symbol", "was", "change"), cells))
-    lines += problems[:_SHOWN]
-    for what, all_of in (("changes", changes), ("problems", problems)):
-        if len(all_of) > _SHOWN:
-            lines.append(f"and {len(all_of) - _SHOWN:,} more {what}; --json has all")
+    lines += [*problems[:_SHOWN], *unlisted({"changes": changes, "problems": problems}, _SHOWN)]
     if data["learned"]:
         lines.append(f"take it back: kineme library undo --library {printable(folder)}")
     return "\n".join(lines)

@@ -16,7 +16,7 @@ from kineme.cli.options import (
     json_option,
     library_option,
 )
-from kineme.cli.output import check_new, progress, say, table
+from kineme.cli.output import check_new, progress, say, stretch_cells, table, unlisted
 from kineme.cli.reading import files_of, layout_options, problem_lines, recordings_argument
 from kineme.reporting.text import counted, printable
 
@@ -57,41 +57,32 @@ def find(symbol: str, recordings: tuple[Path, ...], folder: Path, also: tuple[st
     with ActionLibrary(folder, read_only=True) as library:
         search.check_symbols(library.store, symbols)
         with progress(desc="searching", unit=" s of recordings", bar_format="{l_bar}{n:.0f}{unit} [{elapsed}]") as bar:
-            found = search.find(
+            occurrences = search.find(
                 library.store,
                 files_of(recordings, options, library),
                 symbols,
                 error_rate,
                 lambda seconds: bar.update(seconds - bar.n),
             )
-    sure = [certainty(hit.confidence, is_new=False, is_guess=not found.calibrated) for hit in found.hits]
+    sure = [certainty(hit.confidence, is_new=False, is_guess=not occurrences.calibrated) for hit in occurrences.hits]
     if writer is not None and output is not None:
-        writer.write(output, found.hits, None)
+        writer.write(output, occurrences.hits, None)
     data = {
-        "hits": [as_row(hit) | {"certainty": words} for hit, words in zip(found.hits, sure, strict=True)],
-        "recordings": found.recordings,
-        "seconds": found.seconds,
-        "calibrated": found.calibrated,
+        "hits": [as_row(hit) | {"certainty": words} for hit, words in zip(occurrences.hits, sure, strict=True)],
+        "recordings": occurrences.recordings,
+        "seconds": occurrences.seconds,
+        "calibrated": occurrences.calibrated,
         "written": [] if output is None else [str(output)],
-        "problems": [str(problem) for problem in found.problems],
+        "problems": [str(problem) for problem in occurrences.problems],
     }
-    say(as_json, data, lambda: _text(data, problem_lines(found.problems, "not searched: ")))
+    say(as_json, data, lambda: _text(data, problem_lines(occurrences.problems, "not searched: ")))
 
 
 def _text(data: dict[str, Any], problems: list[str]) -> str:
     hits = data["hits"]
     lines = [f"{counted(len(hits), 'hit')} in {counted(data['recordings'], 'recording')} of {data['seconds']:,.1f} s"]
     if hits:
-        cells = [
-            (
-                printable(f"{hit['recording']} {hit['place']}".strip()), f"{hit['start']:.2f}", f"{hit['end']:.2f}",
-                printable(hit["symbol"]), hit["certainty"],
-            )
-            for hit in hits[:_SHOWN]
-        ]  # fmt: skip
+        cells = [(*stretch_cells(hit), printable(hit["symbol"]), hit["certainty"]) for hit in hits[:_SHOWN]]
         lines.append(table(("recording", "start [s]", "end [s]", "symbol", "how sure"), cells))
-    for what, all_of in (("hits", hits), ("problems", problems)):
-        lines += problems[:_SHOWN] if what == "problems" else []
-        if len(all_of) > _SHOWN:
-            lines.append(f"and {len(all_of) - _SHOWN:,} more {what}; --json has all")
+    lines += [*unlisted({"hits": hits}, _SHOWN), *problems[:_SHOWN], *unlisted({"problems": problems}, _SHOWN)]
     return "\n".join([*lines, *(f"written to {printable(path)}" for path in data["written"])])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -63,6 +63,18 @@ def table(heads: tuple[str, ...], rows: Any, title: str = "") -> str:
     from kineme.reporting.table import Table, to_text
 
     return to_text(Table(title, heads, rows))
+
+
+def stretch_cells(row: Mapping[str, Any]) -> tuple[str, str, str]:
+    """Return where a stretch is, its start and its end [s] as cells of a table."""
+    where = printable(f"{row['recording']} {row['place']}".strip())
+    return where, f"{row['start']:.2f}", f"{row['end']:.2f}"
+
+
+def unlisted(lists: Mapping[str, Sequence[Any]], most: int) -> list[str]:
+    """Say of lists by their names how many items are beyond the first ones that are shown."""
+    return [f"and {len(items) - most:,} more {name}; --json has all" for name, items in lists.items()
+            if len(items) > most]  # fmt: skip
 
 
 def ask(question: str) -> str:

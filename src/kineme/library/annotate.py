@@ -43,11 +43,11 @@ def annotate(
 
 
 def annotate_by(
-    known: KnownClasses, recordings: Recordings, error_rate: float = 0.05, progress: Progress | None = None
+    classes: KnownClasses, recordings: Recordings, error_rate: float = 0.05, progress: Progress | None = None
 ) -> Annotated:
     """Annotate by symbols that are prepared once for many recordings, see `some_of_each_symbol`."""
-    known.comparison.checked(recordings.demonstrations[:1], "recordings")  # all of them have the same columns
-    templates = Templates(known.comparison, known.references, known.calibration)
+    classes.comparison.checked(recordings.demonstrations[:1], "recordings")  # all of them have the same columns
+    templates = Templates(classes.comparison, classes.references, classes.calibration)
     annotations: list[Annotation] = []
     problems: list[Problem] = []
     done = 0.0
@@ -72,7 +72,7 @@ def annotate_by(
                 annotations.append(Annotation(source.path, source.place, *times, label, *certainty, origin))
         done += recording.duration
         tell(1.0)
-    return Annotated(annotations, problems, bool(known.calibration.calibrated(error_rate).all()))
+    return Annotated(annotations, problems, bool(classes.calibration.calibrated(error_rate).all()))
 
 
 _SUGGESTED = 5  # symbols that a message names
@@ -100,7 +100,7 @@ def find(
     All symbols compete for a stretch, as in `annotate`, so that its certainty is calibrated; only the hits are held.
     `progress` is called after each piece with the seconds of recordings that are done.
     """
-    known = some_of_each_symbol(store)
+    classes = some_of_each_symbol(store)
     hits: list[Annotation] = []
     problems: list[Problem] = []
     n, seconds = 0, 0.0
@@ -109,7 +109,7 @@ def find(
             problems.append(piece)
             continue
         try:
-            report = annotate_by(known, piece, error_rate)
+            report = annotate_by(classes, piece, error_rate)
         except KinemeError as error:  # other columns than those of the library, most likely
             paths = dict.fromkeys(source.path for source in piece.sources)
             problems += [Problem(path, None, str(error), type(error)) for path in paths]
@@ -120,7 +120,7 @@ def find(
         if progress is not None:
             progress(seconds)
     hits.sort(key=lambda hit: (-hit.confidence, -hit.p_value))
-    return Occurrences(hits, n, seconds, problems, bool(known.calibration.calibrated(error_rate).all()))
+    return Occurrences(hits, n, seconds, problems, bool(classes.calibration.calibrated(error_rate).all()))
 
 
 def check_symbols(store: Store, symbols: Collection[str]) -> None:

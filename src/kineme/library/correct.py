@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from kineme.errors import DataError
 from kineme.io.reading.merge_files import Recordings
-from kineme.io.reading.pieces import EPISODE, is_episodic
+from kineme.io.reading.pieces import is_episodic
 from kineme.io.reading.read_labels import LabelRow, LabelTable, Stretch, cut_stretches, stretches_of
 from kineme.io.records import Problem
 from kineme.io.writing.annotations import Annotation
@@ -16,7 +16,9 @@ from kineme.library.learn import LearnReport, learn_recordings
 from kineme.library.storage import changes as storage
 from kineme.library.storage.read import names_of
 from kineme.library.storage.store import Store
+from kineme.movements.episodes import place_of
 
+_ENDING = "-corrections.csv"
 _SAME = 1  # samples by which both ends of a stretch may differ from those annotated: files round times
 _MOVED = 0.3  # intersection over union from which a stretch is one that was annotated, with other boundaries
 
@@ -58,6 +60,13 @@ class Corrections(NamedTuple):
         return [change.stretch for change in self.changes if change.learned]
 
 
+def corrections_beside(recordings: Path) -> Path:
+    """Return where the studio writes corrections: ``demos-corrections.csv`` beside ``demos`` or ``demos.csv``."""
+    # Beside a link, not what it leads to; two dots and nothing are no names.
+    path = recordings.resolve() if recordings.name in {"", ".."} else recordings.absolute()
+    return path.with_name(f"{path.name if path.is_dir() else path.stem}{_ENDING}")
+
+
 def as_labels(annotations: Sequence[Annotation]) -> LabelTable:
     """Return annotations as a table of labels, by the clock of the recordings."""
     rows = [
@@ -74,7 +83,7 @@ def motions_in(path: Path) -> list[Annotation]:
     from kineme.io.lerobot.motions import read_motions
 
     return [
-        Annotation("", f"{EPISODE}{motion.episode}", *motion[1:4], motion.p_value, motion.confidence)
+        Annotation("", place_of(motion.episode), *motion[1:4], motion.p_value, motion.confidence)
         for motion in read_motions(path)
         if motion.annotator == "kineme"
     ]

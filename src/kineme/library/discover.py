@@ -19,15 +19,15 @@ from numpy.typing import NDArray
 from kineme.anchoring.grammar import Grammar, estimate_grammar, in_order, most_probable, posterior
 from kineme.anchoring.kinds import Kinds, describe_pieces, excursions, learn_kinds, log_densities
 from kineme.errors import DataError, KinemeError
-from kineme.io.reading.episode_recordings import STATE, heads_of, stamps_of
+from kineme.io.reading.episode_recordings import heads_of
 from kineme.io.writing.annotations import Annotation
 from kineme.library.learn import learn
 from kineme.library.proposals import NamedProposal, store_proposals
 from kineme.library.storage.store import Store
 from kineme.movements.channels.channel import Channels
 from kineme.movements.channels.detect import find_channels
-from kineme.movements.episodes import Episode
-from kineme.movements.segmentation.work import Work, at_rest, boundaries, roles_of
+from kineme.movements.episodes import STATE, Episode, even_stamps, head_of
+from kineme.movements.segmentation.work import Work, at_rest, boundaries, interpolated, roles_of
 from kineme.movements.trajectories.as_learned import of_columns
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.validation import MIN_SAMPLES, Array
@@ -152,7 +152,7 @@ def discover(
                 raise DataError(f"expected the columns {', '.join(columns or ())} as before, got {', '.join(names)}")
             observations.append(observe(episode, names, state, how))
         except KinemeError as error:
-            problems.append(f"{episode.place or f'episode {episode.number}'}: {error}")
+            problems.append(f"{episode.label}: {error}")
             continue
         columns = names
     if columns is None or not any(len(each.edges) for each in observations):
@@ -199,7 +199,7 @@ def state_of(episode: Episode, feature: str | None = None) -> tuple[tuple[str, .
 
 def times_of(episode: Episode) -> Array:
     """Return the stamps of an episode [s]; where they agree with the declared rate, repeat or go back, those of it."""
-    times = np.asarray(stamps_of(episode), dtype=np.float64)
+    times = np.asarray(even_stamps(episode.times, episode.fps), dtype=np.float64)
     if len(times) < MIN_SAMPLES or not np.isfinite(times).all() or not (np.diff(times) > 0).all():
         if not episode.fps > _SLOWEST or len(times) < MIN_SAMPLES:
             raise DataError(
@@ -228,8 +228,7 @@ def observe(episode: Episode, names: Sequence[str], state: Array, how: Work | No
     moving = np.flatnonzero(~at_rest(times, columns, heads, edges))
     spans = np.column_stack((edges[moving], edges[moving + 1]))
     at = np.column_stack((spans[:, 0], spans.mean(axis=1), spans[:, 1]))
-    paths = np.stack([np.interp(at, times[good], column[good])
-                      for column in state.T for good in [np.isfinite(column)]], axis=2)  # fmt: skip
+    paths = interpolated(at, times, state)
     between = np.stack((intervals[moving], intervals[moving + 1]), axis=1)
     origin, seconds = float(times[0]), float(times[-1] - times[0])
     task = episode.task or ""
@@ -405,8 +404,7 @@ def store_discovery(
         if own := by_episode.get(episode.number):
             columns, state = state_of(episode, feature)
             times = times_of(episode)
-            state = np.column_stack([np.interp(times, times[np.isfinite(column)], column[np.isfinite(column)])
-                                     for column in state.T])  # fmt: skip
+            state = interpolated(times, times, state)
             for segment in own:
                 rows = slice(*np.searchsorted(times, (segment.start - 1e-9, segment.end + 1e-9)).tolist())
                 if rows.stop - rows.start >= MIN_SAMPLES:
@@ -431,7 +429,7 @@ def _heads(episode: Episode, feature: str) -> tuple[str, ...]:
     """Name the columns of a feature as `kineme.read_recordings` does: ``observation.state`` by its entries alone."""
     if feature == STATE:
         return heads_of(episode)[feature]
-    return tuple(f"{feature}.{entry}" if entry else feature for entry in episode.names[feature])
+    return tuple(head_of(feature, entry) for entry in episode.names[feature])
 
 
 def _numbers(episode: Episode, feature: str) -> Array:

@@ -5,7 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from kineme.validation import Array
+
+STATE = "observation.state"  # the feature that is read by default, as LeRobot calls it
+STAMP_TOLERANCE = 1e-4  # [s] between stored stamps and those of the declared rate, as LeRobot allows
+_PLACE = "episode "
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,3 +43,30 @@ class Episode:
 
     def __len__(self) -> int:
         return len(self.times)
+
+    @property
+    def label(self) -> str:
+        """The place, or the number where that is empty."""
+        return self.place or place_of(self.number)
+
+
+def place_of(number: int) -> str:
+    """Return the place of an episode that is stored with others in one file."""
+    return f"{_PLACE}{number}"
+
+
+def number_at(place: str) -> int | None:
+    """Return the number of the episode at a place that `place_of` gives; None for other places."""
+    number = place.removeprefix(_PLACE)
+    return int(number) if number.isdecimal() else None
+
+
+def head_of(feature: str, entry: str) -> str:
+    """Return the name of a column: ``feature.entry``, or the feature where its only entry has no name."""
+    return f"{feature}.{entry}" if entry else feature
+
+
+def even_stamps(times: Array, fps: float) -> Array:
+    """Return the stamps k / fps [s] of an episode where all stored ones (T,) lie within 0.1 ms of them, else these."""
+    even = np.arange(len(times)) / fps
+    return even if np.all(np.abs(times - even) <= STAMP_TOLERANCE) else times

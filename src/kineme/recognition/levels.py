@@ -12,12 +12,11 @@ import numpy as np
 
 from kineme.movements.channels.channel import Channels
 from kineme.movements.segmentation.table import Motion, Rows, observe
+from kineme.movements.segmentation.work import ROLES
 from kineme.movements.tables.time_stamps import words_of
 from kineme.similarity.comparison import References
 from kineme.validation import Array
 
-#: Words of heads of what opens and closes.
-GRIPPING = frozenset({"gripper", "grippers", "finger", "fingers", "jaw", "jaws", "claw", "grip"})
 _SPREAD = 0.35  # distance of levels, in the range of all demonstrations, that counts as much as a typical distance
 _ENDS = 0.125  # share of a movement at each end whose mean is a level; the third is that of the middle half
 _LEAST = 0.2  # of the largest range of a gripper: one that moves less does nothing
@@ -35,7 +34,7 @@ class Levels(NamedTuple):
 def gripper_levels(references: References, channels: Channels | None, resolution: float) -> Levels | None:
     """Return the levels of the grippers of demonstrations; None if none moves, or no channel is called one."""
     names = [(channel, name) for channel in channels or () for name in channel.coordinates]
-    columns = [k for k, (channel, _) in enumerate(names) if GRIPPING & {*words_of(channel.name)}]
+    columns = [k for k, (channel, _) in enumerate(names) if ROLES["gripper"] & {*words_of(channel.name)}]
     if not columns:
         return None
     movements = references.all_movements()
@@ -48,14 +47,14 @@ def gripper_levels(references: References, channels: Channels | None, resolution
     return Levels(tuple(columns), spans[columns], np.concatenate(every) / np.tile(spans[columns], 3), references.first)
 
 
-def level_scores(known: Levels, motion: Motion, rows: Rows) -> Array:
+def level_scores(references: Levels, motion: Motion, rows: Rows) -> Array:
     """Return distances (n, C) of the levels of windows rows[:, 0] to rows[:, 1] to the nearest ones of each class.
 
     As parts of a nonconformity ``sqrt(a^2 + b^2)``: a by the path, b by the levels.
     """
-    levels = _levels(motion, rows, known.columns) / np.tile(known.ranges, 3)
-    squares = (levels**2).sum(axis=1)[:, None] + (known.levels**2).sum(axis=1) - 2.0 * levels @ known.levels.T
-    nearest = np.minimum.reduceat(np.maximum(squares, 0.0), known.first, axis=1)
+    levels, others = _levels(motion, rows, references.columns) / np.tile(references.ranges, 3), references.levels
+    squares = (levels**2).sum(axis=1)[:, None] + (others**2).sum(axis=1) - 2.0 * levels @ others.T
+    nearest = np.minimum.reduceat(np.maximum(squares, 0.0), references.first, axis=1)
     return np.asarray(np.sqrt(nearest) / _SPREAD)
 
 

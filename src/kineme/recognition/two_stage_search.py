@@ -45,7 +45,6 @@ _NEAREST = 8  # by their bounds, compared exactly: the nearest of all nine times
 _TOGETHER = 4  # movements in one product
 _OTHERS = 64  # of the largest bounds, among which the nearest movement of another class is
 _BOUNDED = 8  # movements whose bounds to all members are in memory at once
-_MORE = 16  # the same among all, where shapes differ
 _AT_ONCE = 64  # classes whose movements are read together
 
 _LEADING, _BEST = 3, 16  # classes, and movements of each, compared first

@@ -26,7 +26,7 @@ from kineme.io.arrays.trees import GROUPS, flat, rate_of
 from kineme.io.arrays.zarr_arrays import ZarrArray, zarr_arrays
 from kineme.io.limits import check_expanded
 from kineme.io.records import damaged_as
-from kineme.movements.episodes import Episode
+from kineme.movements.episodes import Episode, place_of
 from kineme.movements.tables.layout import Layout, Parsed, listed
 from kineme.movements.tables.time_stamps import words_of
 from kineme.validation import Array, check_number
@@ -157,11 +157,10 @@ def _parts(source: Path) -> Iterator[tuple[RobotLayout, _Part]]:
                 yield row, part
         return
     with zarr_arrays(source) as arrays:
-        if (row := _of_zarr(arrays)) is None:
-            raise DataError(f"expected a replay buffer in {source.name}, with data/ and {ENDS}, got {listed(arrays)}")
+        row = _buffer_in(arrays, source)
         for k, (start, end) in enumerate(_spans(arrays)):
             rows = {name.removeprefix(_DATA): _Rows(array, start, end) for name, array in arrays.items()}
-            yield row, _Part(f"episode {k}", rows, length=max(0, end - start))
+            yield row, _Part(place_of(k), rows, length=max(0, end - start))
 
 
 def _in_hdf5(file: Any, row: RobotLayout) -> Iterator[_Part]:
@@ -301,8 +300,7 @@ def hdf5_or_robot_movements(path: Path, layout: Layout) -> Parsed:
 def zarr_movements(path: Path, layout: Layout) -> Parsed:
     """Return the movements of a replay buffer in Zarr, one for each episode; coordinates as of `robot_episodes`."""
     with zarr_arrays(path) as arrays:
-        if (row := _of_zarr(arrays)) is None:
-            raise DataError(f"expected a replay buffer in {path.name}, with data/ and {ENDS}, got {listed(arrays)}")
+        row = _buffer_in(arrays, path)
         of_data = {
             name.removeprefix(_DATA): array
             for name, array in arrays.items()
@@ -311,12 +309,12 @@ def zarr_movements(path: Path, layout: Layout) -> Parsed:
         spans = [(k, start, end) for k, (start, end) in enumerate(_spans(arrays))]
         n_rows = min((array.shape[0] for array in of_data.values()), default=0)
         left_out = [
-            f"episode {k}: expected rows among {n_rows:,}, got {start} to {end}"
+            f"{place_of(k)}: expected rows among {n_rows:,}, got {start} to {end}"
             for k, start, end in spans
             if not start < end <= n_rows
         ]
         tree: dict[str, Any] = {
-            f"episode {k}": {name: _Rows(array, start, end) for name, array in of_data.items()}
+            place_of(k): {name: _Rows(array, start, end) for name, array in of_data.items()}
             for k, start, end in spans
             if start < end <= n_rows
         }
@@ -397,6 +395,13 @@ def _of_hdf5(file: Any) -> RobotLayout | None:
 
 def _of_zarr(arrays: Mapping[str, Any]) -> RobotLayout | None:
     return _marked([*arrays], LAYOUTS["Zarr"])
+
+
+def _buffer_in(arrays: Mapping[str, Any], path: Path) -> RobotLayout:
+    """Tell the layout of a replay buffer in Zarr; a `DataError` if it is none."""
+    if (row := _of_zarr(arrays)) is None:
+        raise DataError(f"expected a replay buffer in {path.name}, with data/ and {ENDS}, got {listed(arrays)}")
+    return row
 
 
 def _marked(names: Sequence[str], rows: Sequence[RobotLayout]) -> RobotLayout | None:

@@ -40,7 +40,7 @@ def copy_with_motions(source: Path, target: Path, motions: language.Motions) -> 
     of earlier runs are replaced, those of others stay. `motions.DETAILS` says all that is known of the motions.
     """
     info = checked_info(source, motions)
-    shards = [shard for shard in dict.fromkeys(read_episodes(source, info).shards) if (source / shard).is_file()]
+    shards = [shard for shard in read_episodes(source, info).by_shard() if (source / shard).is_file()]
     own = language.own_rows(source)
     copy_others(source, target, {source / file for file in (*shards, language.DETAILS, language.PENDING)})
     language.write_details(

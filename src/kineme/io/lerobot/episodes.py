@@ -21,7 +21,7 @@ from kineme.io.lerobot.info import Episodes, Info, read_episodes, read_info, rea
 from kineme.io.limits import check_expanded
 from kineme.io.records import needs
 from kineme.io.tables.parquet import is_list, rows_of_lists
-from kineme.movements.episodes import Episode
+from kineme.movements.episodes import Episode, place_of
 from kineme.reporting.text import counted
 from kineme.validation import Array
 
@@ -274,12 +274,11 @@ def episodes(
 
     if wanted is None and (problems := (*declared.problems, *unsaid)):
         yield episode(_no_frames(sum(widths.values())), -1, "meta", problems)
-    declared_in: dict[str, list[int]] = {}
-    for number, shard in zip(declared.numbers.tolist(), declared.shards, strict=True):
-        if wanted is None or number in wanted:
-            declared_in.setdefault(shard, []).append(number)
     done: set[int] = set()
-    for shard, expected in declared_in.items():
+    for shard, numbers_there in declared.by_shard().items():
+        expected = [number for number in numbers_there if wanted is None or number in wanted]
+        if not expected:
+            continue
         broken: list[str] = []
         parts = shard_frames(folder, info, shard, widths, None if wanted is None else expected)
         for frames in runs(parts, broken):
@@ -295,12 +294,12 @@ def episodes(
             done.add(number)
             # Only an episode that was cut off is touched by the damage: those before it were read.
             reasons += broken if reasons else []
-            place = f"episode {number}" if number >= 0 else "frames without an episode"
+            place = place_of(number) if number >= 0 else "frames without an episode"
             yield episode(frames, number, place, reasons, task)
         for number in expected:
             if number not in done:
                 reasons = broken or [f"expected frames in {shard}, got none"]
-                yield episode(_no_frames(sum(widths.values())), number, f"episode {number}", reasons)
+                yield episode(_no_frames(sum(widths.values())), number, place_of(number), reasons)
                 done.add(number)
 
 

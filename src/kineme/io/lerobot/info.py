@@ -143,6 +143,13 @@ class Episodes(NamedTuple):
     shards: list[str]  # the file or table that holds each, relative to the data set
     problems: list[str]  # what of meta/episodes could not be read
 
+    def by_shard(self) -> dict[str, list[int]]:
+        """Return shard -> the numbers of its episodes, both in the order of the episodes."""
+        numbers: dict[str, list[int]] = {}
+        for number, shard in zip(self.numbers.tolist(), self.shards, strict=True):
+            numbers.setdefault(shard, []).append(number)
+        return numbers
+
 
 def read_episodes(folder: Path, info: Info) -> Episodes:
     """Read the episodes as meta/episodes says."""

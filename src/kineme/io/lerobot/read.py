@@ -16,7 +16,7 @@ from kineme.errors import DataError
 from kineme.io.lerobot.episodes import Frames, check_storage, contradictions, episodes, joined, shard_frames, task_texts
 from kineme.io.lerobot.info import Episodes, Info, read_episodes, read_info, read_tasks
 from kineme.io.limits import check_expanded
-from kineme.movements.episodes import Episode
+from kineme.movements.episodes import STAMP_TOLERANCE, STATE, Episode, even_stamps, head_of, place_of
 from kineme.movements.tables.columns import choose_roles, column_numbers
 from kineme.movements.tables.layout import Column, Layout, Parsed, listed, no_lines
 from kineme.movements.tables.table import Segments, Table, table_movements
@@ -26,9 +26,7 @@ from kineme.validation import Array
 _SHOWN = 5  # numbers of episodes in one message
 _NUMBERS = 2**22  # of the episodes of a part, at least, unless it is the last one
 
-STATE = "observation.state"
 _STAMP = "timestamp [s]"
-_TOLERANCE = 1e-4  # s between the stored stamps and the frames at the declared rate, as LeRobot allows
 
 
 def lerobot_movements(folder: Path, layout: Layout) -> Parsed:
@@ -43,7 +41,7 @@ def lerobot_movements(folder: Path, layout: Layout) -> Parsed:
     left_out = [*declared.problems, *unsaid, *unread.values(), *wrong]
     if len(offsets) < 2:
         raise DataError(f"expected episodes in a LeRobot data set, got none that is whole; the first: {left_out[0]}")
-    places = [f"episode {k}" for k in frames.episodes[offsets[:-1]].tolist()]
+    places = [place_of(k) for k in frames.episodes[offsets[:-1]].tolist()]
     segments = Segments(offsets, places, task_texts(frames, offsets, tasks))
     stamps = _stamps(frames, offsets, info.fps)
     parsed = _in_columns(info, layout, chosen, (stamps, frames.values), segments, frames.faults)
@@ -80,21 +78,17 @@ def lerobot_parts(
 def _of_episodes(info: Info, part: Sequence[Episode], layout: Layout) -> Parsed:
     """Return the movements of some episodes in the columns of a layout; those with problems are left out."""
     chosen = _chosen(info, layout)
-    whole = [episode for episode in part if len(episode) and not episode.problems]
+    intact = [episode for episode in part if len(episode) and not episode.problems]
     left_out = [
-        f"episode {episode.number}: {reason}" if episode.number >= 0 else reason
+        f"{place_of(episode.number)}: {reason}" if episode.number >= 0 else reason
         for episode in part
         for reason in episode.problems
     ]
-    offsets = np.concatenate(([0], np.cumsum([len(episode) for episode in whole]))).astype(np.intp)
-    values = [np.concatenate([episode.signals[name] for name in chosen.features], axis=1) for episode in whole]
-    even = [np.arange(len(episode)) / info.fps for episode in whole]
-    stamps = [
-        each if (np.abs(episode.times - each) <= _TOLERANCE).all() else episode.times
-        for episode, each in zip(whole, even, strict=True)
-    ]
+    offsets = np.concatenate(([0], np.cumsum([len(episode) for episode in intact]))).astype(np.intp)
+    values = [np.concatenate([episode.signals[name] for name in chosen.features], axis=1) for episode in intact]
+    stamps = [even_stamps(episode.times, info.fps) for episode in intact]
     frames = np.concatenate([np.empty((0, sum(chosen.features.values()))), *values])
-    segments = Segments(offsets, [f"episode {episode.number}" for episode in whole], [each.task for each in whole])
+    segments = Segments(offsets, [place_of(episode.number) for episode in intact], [each.task for each in intact])
     parsed = _in_columns(info, layout, chosen, (np.concatenate([np.empty(0), *stamps]), frames), segments, {})
     return parsed._replace(left_out=tuple(left_out))
 
@@ -145,7 +139,7 @@ def _chosen(info: Info, layout: Layout) -> _Chosen:
         raise DataError(f"expected features of numbers in a LeRobot data set, got {only}")
     owners = [name for name, entries in info.heads.items() for _ in entries]
     entries = [entry for entries_of_head in info.heads.values() for entry in entries_of_head]
-    full = [f"{name}.{entry}" if entry else name for name, entry in zip(owners, entries, strict=True)]
+    full = [head_of(name, entry) for name, entry in zip(owners, entries, strict=True)]
     vectors = {name: len(entries) for name, entries in info.heads.items() if entries != ("",)}
     name = STATE if STATE in info.heads else next(iter(vectors)) if len(vectors) == 1 else None
     if layout.coordinates is not None:
@@ -188,10 +182,7 @@ def _all_frames(
     parts: list[Frames] = []
     unread: dict[str, str] = {}
     taken, width = 0, sum(features.values())
-    episodes_of: dict[str, list[int]] = {}
-    for k, shard in zip(declared.numbers.tolist(), declared.shards, strict=True):
-        episodes_of.setdefault(shard, []).append(k)
-    for shard, numbers in episodes_of.items():
+    for shard, numbers in declared.by_shard().items():
         n_before, n_bytes = len(parts), taken
         try:
             for frames in shard_frames(folder, info, shard, features):
@@ -213,7 +204,7 @@ def _all_frames(
 def _stamps(frames: Frames, offsets: NDArray[np.intp], fps: float) -> Array:
     """Give seconds since the beginning of each episode: of its frames at the declared rate, else as they are stored."""
     even = frames.frames / fps
-    others = np.add.reduceat(~(np.abs(frames.stamps - even) <= _TOLERANCE), offsets[:-1]) > 0
+    others = np.add.reduceat(~(np.abs(frames.stamps - even) <= STAMP_TOLERANCE), offsets[:-1]) > 0
     return np.where(np.repeat(others, np.diff(offsets)), frames.stamps, even)
 
 
@@ -236,7 +227,7 @@ def whole_episodes(
     absent = set(np.setdiff1d(declared.numbers, numbers).tolist())
     places = zip(declared.numbers.tolist(), declared.shards, strict=True) if absent else ()
     left_out += [
-        f"episode {k}: expected frames in {shard}, got none"
+        f"{place_of(k)}: expected frames in {shard}, got none"
         for k, shard in places
         if k in absent and shard not in unread
     ]

@@ -16,6 +16,7 @@ from kineme.movements.channels.detect import Given, find_channels
 from kineme.movements.rotations import slerp
 from kineme.movements.tables.layout import Block, Layout, Repair
 from kineme.reporting.text import counted
+from kineme.sampling import runs
 from kineme.validation import (
     LARGEST_POSITION,
     LARGEST_STAMP,
@@ -174,8 +175,7 @@ def take_movements(block: Block, chosen: Flags) -> Block:
 
 def spans_of(missing: Flags, times: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
     """Find runs of missing values (T,) at times (T,) [s]: first rows, rows after the last ones, and lengths [s]."""
-    edges = np.diff(np.concatenate(([False], missing, [False])).astype(np.int8))
-    first, stop = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
+    first, stop = runs(missing).T
     before, after = np.concatenate(([-np.inf], times)), np.concatenate((times, [np.inf]))
     return first, stop, after[stop] - before[first]
 

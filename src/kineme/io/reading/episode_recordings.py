@@ -10,15 +10,12 @@ import numpy as np
 from kineme.io.reading.formats import Format
 from kineme.io.reading.merge_files import Recordings, merge_files
 from kineme.io.reading.read_file import parsed_file
-from kineme.movements.episodes import Episode
+from kineme.movements.episodes import STATE, Episode, even_stamps, head_of
 from kineme.movements.tables.columns import choose_roles
 from kineme.movements.tables.layout import Layout, Parsed, no_lines
 from kineme.movements.tables.table import Segments, Table, table_movements
-from kineme.validation import Array
 
-STATE = "observation.state"
 _STAMP = "timestamp [s]"
-_TOLERANCE = 1e-4  # s between stored stamps and those of the declared rate, as LeRobot allows
 
 
 def heads_of(episode: Episode) -> dict[str, tuple[str, ...]]:
@@ -34,14 +31,8 @@ def heads_of(episode: Episode) -> dict[str, tuple[str, ...]]:
     for feature in sorted(widths, key=lambda name: name != default):
         entries = episode.names.get(feature) or tuple(map(str, range(widths[feature])))
         short = feature == default and not any(not entry or entry.isdecimal() for entry in entries)
-        heads[feature] = entries if short else tuple(f"{feature}.{entry}" if entry else feature for entry in entries)
+        heads[feature] = entries if short else tuple(head_of(feature, entry) for entry in entries)
     return heads
-
-
-def stamps_of(episode: Episode) -> Array:
-    """Return the stamps of an episode [s]: those of the declared rate where all lie within 0.1 ms of them."""
-    even = np.arange(len(episode)) / episode.fps
-    return even if np.all(np.abs(episode.times - even) <= _TOLERANCE) else episode.times
 
 
 def episode_recordings(episode: Episode, name: str, columns: Sequence[str] = ()) -> Recordings:
@@ -51,10 +42,10 @@ def episode_recordings(episode: Episode, name: str, columns: Sequence[str] = ())
     no movement.
     """
     heads = heads_of(episode)
-    times = stamps_of(episode)
+    times = even_stamps(episode.times, episode.fps)
     values = [column for feature in heads for column in episode.signals[feature].T]
     names = (_STAMP, *(head for feature in heads for head in heads[feature]))
-    segments = Segments(np.array([0, len(episode)]), [episode.place or f"episode {episode.number}"], [episode.task])
+    segments = Segments(np.array([0, len(episode)]), [episode.label], [episode.task])
     table = Table(names, [times, *values], len(episode), no_lines, segments=segments, maker="episodes")
 
     def parse(layout: Layout) -> Parsed:

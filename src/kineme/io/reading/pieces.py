@@ -13,9 +13,8 @@ from kineme.io.reading.merge_files import Recordings, merge_files
 from kineme.io.reading.read_file import parsed_file
 from kineme.io.reading.recordings import NameRule, read_paths, trimmed
 from kineme.io.records import Problem, needs
+from kineme.movements.episodes import number_at
 from kineme.movements.tables.layout import Layout
-
-EPISODE = "episode "  # a movement's place in a data set begins with it
 
 
 def is_episodic(path: Path) -> bool:
@@ -58,10 +57,9 @@ def _of_data_set(
     """Yield the whole episodes of a data set, and why others are not."""
     with needs("pyarrow", "read Parquet", "parquet"):
         from kineme.io.lerobot.read import lerobot_parts
-    known = layout.reference.columns if layout.reference is not None and layout.coordinates is None else ()
-    layouts = [replace(layout, columns=known), layout] if known else [layout]
-    named = [place.removeprefix(EPISODE) for place in places or ()]
-    numbers = None if places is None else {int(number) for number in named if number.isdecimal()}
+    learned = layout.reference.columns if layout.reference is not None and layout.coordinates is None else ()
+    layouts = [replace(layout, columns=learned), layout] if learned else [layout]
+    numbers = None if places is None else {number for place in places if (number := number_at(place)) is not None}
     for parse in lerobot_parts(entry.path, layouts, numbers):
         file = rule.apply(parsed_file(parse, Format(), entry.relative, layout), entry.path)
         file = file._replace(path=entry.name, problems=[each._replace(file=entry.name) for each in file.problems])

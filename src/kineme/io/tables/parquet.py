@@ -14,6 +14,7 @@ from pyarrow import compute, parquet
 from kineme.errors import DataError
 from kineme.io.limits import check_expanded
 from kineme.io.records import damaged_as
+from kineme.movements.episodes import STATE
 from kineme.movements.tables.columns import Roles, choose_roles
 from kineme.movements.tables.layout import Layout, no_lines
 from kineme.movements.tables.table import Table
@@ -24,7 +25,7 @@ _SHOWN = 1000  # faults that are told apart; more rows than that are left to the
 
 _ROWS = 2**18  # rows that are decompressed at a time
 _WIDEST = 1000  # numbers in a list; images have more
-_STATE, _COMMANDS = "observation.state", frozenset({"action"})  # of LeRobot's episodes
+_COMMANDS = frozenset({"action"})  # of LeRobot's episodes
 
 _LARGE, _EXPANDED = 2**26, 1000  # bytes from which on packing is looked at; times as many as repeated rows alone give
 
@@ -89,8 +90,8 @@ def _lists_to_read(file: Any, layout: Layout) -> set[str]:
     lists = {name for name, kind in zip(names, types, strict=True) if is_list(kind) and names.count(name) == 1}
     if layout.coordinates is not None or not lists:
         return lists
-    if _STATE in lists:
-        return {_STATE}
+    if STATE in lists:
+        return {STATE}
     try:
         kinds = [_kind(kind) for kind in types]
         choose_roles(_without_commands(names, kinds, types, layout), kinds, layout)

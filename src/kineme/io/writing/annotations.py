@@ -14,12 +14,14 @@ from typing import Any, NamedTuple
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from kineme.errors import DataError
-from kineme.io.lerobot.info import MARKER, read_info
-from kineme.io.reading.formats import FORMATS, data_set_of, format_at
+from kineme.io.lerobot.info import read_info
+from kineme.io.reading.formats import FORMATS, format_at
+from kineme.io.reading.pieces import is_episodic
 from kineme.io.records import UNKNOWN, needs
 from kineme.io.ros.add_topic import copy_with_topic
 from kineme.io.ros.choose import bag_contents
 from kineme.io.writing.write_movement import Movement, distinct_stems
+from kineme.movements.episodes import number_at
 from kineme.reporting.atomic import whole_file, whole_folder, write_atomically
 from kineme.reporting.text import as_cell, printable
 
@@ -142,19 +144,12 @@ def write_elan(path: Path, annotations: Sequence[Annotation], source: Path | Non
 
 TOPIC = "/kineme/annotations"
 _SECOND = 10**9  # ns
-_EPISODE = "episode "  # a movement's place in a data set of LeRobot begins with it
 
 
 def is_bag(source: Path) -> bool:
     """Tell whether it is a bag of ROS, a file or a folder."""
     form = format_at(source)
     return form is not None and form.contents is bag_contents
-
-
-def is_lerobot(source: Path) -> bool:
-    """Tell whether it is the folder of a data set of LeRobot."""
-    data_set = data_set_of(source) if source.is_dir() else None
-    return data_set is not None and data_set.marker == MARKER
 
 
 def write_bag(path: Path, annotations: Sequence[Annotation], source: Path | None) -> Path:
@@ -187,11 +182,11 @@ def write_lerobot(path: Path, annotations: Sequence[Annotation], source: Path | 
     assert source is not None  # see `writer_of`
     motions: dict[int, list[Motion]] = {}
     for note in annotations:
-        number = note.place.removeprefix(_EPISODE)
-        if not number.isdecimal():
+        number = number_at(note.place)
+        if number is None:
             raise DataError(f"expected annotations of episodes, got one of {note.place!r}")
-        motion = Motion(int(number), note.start, note.end, note.symbol, note.p_value, note.confidence)
-        motions.setdefault(int(number), []).append(motion)
+        motion = Motion(number, note.start, note.end, note.symbol, note.p_value, note.confidence)
+        motions.setdefault(number, []).append(motion)
     if is_in_place(path, [source]):
         name_in_place(source, motions)
         return path
@@ -206,7 +201,7 @@ def is_in_place(path: Path, sources: Sequence[Path]) -> bool:
     return (
         len(sources) == 1
         and path.resolve() == sources[0].resolve()
-        and is_lerobot(sources[0])
+        and is_episodic(sources[0])
         and read_info(sources[0]).storage == "lance"
     )
 
@@ -275,7 +270,7 @@ WRITERS: dict[str, Writer] = {
     "elan": Writer(write_elan, (".eaf",), several=False),
     "audacity": Writer(write_audacity, (".txt",), several=False),
     "bag": Writer(write_bag, (".bag", ".mcap", ".db3"), copies=is_bag, check=check_bag),
-    "lerobot": Writer(write_lerobot, (), copies=is_lerobot, check=check_lerobot),
+    "lerobot": Writer(write_lerobot, (), copies=is_episodic, check=check_lerobot),
 }
 
 

@@ -81,8 +81,7 @@ def episode_scene(episode: Episode, lanes: Mapping[str, Sequence[Stretch]] | Non
         for feature, values in episode.signals.items()
         for point, xs in points_in(episode.names.get(feature, ()), values).items()
     }
-    name = episode.place or f"episode {episode.number}"
-    return Scene(name, episode.times, episode.signals, episode.names, paths, lanes or {})
+    return Scene(episode.label, episode.times, episode.signals, episode.names, paths, lanes or {})
 
 
 def movement_scene(

@@ -17,6 +17,7 @@ from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.preparation.smooth import Smooth
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.trajectory import Trajectory
+from kineme.sampling import runs
 from kineme.validation import Array, check_count, check_number
 
 _LEVEL = 0.05  # threshold, as a share of the movement's own peak speed
@@ -382,20 +383,24 @@ def without_glitches(positions: Array) -> Array:
     return np.where(glitches[:, None], path, positions) if glitches.any() else positions
 
 
-def noise_variance(positions: Array) -> float:
-    """Variance of white noise on (T, d) positions, summed over dimensions.
+def noise_deviations(positions: Array) -> Array:
+    """Return the standard deviation (d,) of white noise on (T, d) positions.
 
     Estimated from the median size of third differences, to which a smooth path hardly contributes: for Gaussian noise
     it is ``0.6745 sqrt(20) sigma``. A median, so that single jumps have no influence.
     """
     sizes = np.median(np.abs(np.diff(positions, n=3, axis=0)), axis=0)
-    return float(((sizes / (0.6745 * np.sqrt(20.0))) ** 2).sum())
+    return np.asarray(sizes / (0.6745 * np.sqrt(20.0)))
+
+
+def noise_variance(positions: Array) -> float:
+    """Return the variance of white noise on (T, d) positions, summed over dimensions."""
+    return float((noise_deviations(positions) ** 2).sum())
 
 
 def moving_bouts(speed: Array, low: float, high: float) -> Rows:
     """Runs of samples faster than `low` that exceed `high` somewhere: rows (n, 2), first and one past the last."""
-    edges = np.diff(np.concatenate(([False], speed > low, [False])).astype(np.int8))
-    rows = np.column_stack((np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)))
+    rows = runs(speed > low)
     if not len(rows):
         return rows
     fastest = np.maximum.reduceat(np.append(speed, 0.0), rows.ravel())[::2]

@@ -20,13 +20,16 @@ from scipy.special import logsumexp
 from kineme.errors import DataError
 from kineme.movements.segmentation.table import moving_bouts, noise_variance, weighted_quantile
 from kineme.movements.tables.time_stamps import words_of
+from kineme.sampling import runs
 from kineme.validation import Array, check_count, check_number
 
 #: Role of a column -> words of its name, the first role that fits; columns of none of them are the arm's own.
 ROLES: dict[str, frozenset[str]] = {
     "aside": frozenset({"vel", "velocity", "velocities", "qvel", "effort", "torque", "torques", "acc", "current"}),
     "contact": frozenset({"contact", "contacts", "touch", "tactile", "force", "forces", "pressure", "wrench"}),
-    "gripper": frozenset({"gripper", "finger", "fingers", "grip", "jaw", "suction", "vacuum"}),
+    "gripper": frozenset(
+        {"gripper", "grippers", "finger", "fingers", "grip", "jaw", "jaws", "claw", "suction", "vacuum"}
+    ),
     "object": frozenset({"object", "objects", "obj", "cube", "block", "target", "environment", "env"}),
 }
 
@@ -135,7 +138,7 @@ def boundaries(times: Array, columns: Array, names: Sequence[str], how: Work | N
 
 
 def at_rest(times: Array, columns: Array, names: Sequence[str], edges: Array) -> NDArray[np.bool_]:
-    """Tell which of the pieces between times edges (n + 1,) [s] are rests: neither the arm nor a gripper moves."""
+    """Tell which of the n pieces between times `edges` (n + 1,) [s] are rests: neither the arm nor a gripper moves."""
     observed = observe_work(times, columns, names)
     if observed is None:
         return np.ones(len(edges) - 1, dtype=bool)
@@ -145,6 +148,15 @@ def at_rest(times: Array, columns: Array, names: Sequence[str], edges: Array) ->
     starts = np.minimum(rows[:-1], rows[1:])
     highest, lowest = (reach.reduceat(moving, starts, axis=0) for reach in (np.maximum, np.minimum))
     return np.asarray(np.linalg.norm(highest - lowest, axis=1) < _STILL)
+
+
+def interpolated(at: Array, times: Array, columns: Array) -> Array:
+    """Return columns (T, d) at other times, (*at.shape, d): linear between `times` (T,) at which they are finite."""
+    values = np.empty((*at.shape, columns.shape[1]))
+    for k, column in enumerate(columns.T):
+        valid = np.isfinite(column)
+        values[..., k] = np.interp(at, times[valid], column[valid])
+    return values
 
 
 def observe_work(times: Array, columns: Array, names: Sequence[str]) -> Observed | None:
@@ -163,9 +175,7 @@ def observe_work(times: Array, columns: Array, names: Sequence[str]) -> Observed
     t = np.linspace(0.0, duration, n)
     usable: NDArray[np.bool_] = np.asarray(np.isfinite(columns).any(axis=0))
     even = np.zeros((n, len(names)))
-    for k in np.flatnonzero(usable).tolist():
-        valid = np.isfinite(columns[:, k])
-        even[:, k] = np.interp(t, times[valid] - times[0], columns[valid, k])
+    even[:, usable] = interpolated(t, times - times[0], columns[:, usable])
     roles = {role: own[usable[own]] for role, own in roles_of(names).items()}
     rate = (n - 1) / duration
     arm = even[:, roles["arm"]]
@@ -191,7 +201,7 @@ def slow_moments(observed: Observed) -> Events:
     rows, properties = find_peaks(slowness, prominence=_SHALLOW)
     strengths = np.minimum(properties["prominences"], _LARGEST)
     widths = 0.25 * peak_widths(slowness, rows, rel_height=0.5)[0] / observed.rate
-    rests = moving_bouts(-observed.speed, -_REST * observed.floor, -np.inf)
+    rests = runs(observed.speed < _REST * observed.floor)
     rests = rests[rests[:, 1] - rests[:, 0] > _PAUSE * observed.rate]
     owner = np.searchsorted(rests[:, 0], rows, side="right") - 1
     resting = (owner >= 0) & (rows < rests[np.maximum(owner, 0), 1]) if len(rests) else np.zeros(len(rows), dtype=bool)
@@ -313,9 +323,9 @@ def _within_strokes(observed: Observed, rows: NDArray[np.intp], strokes: int) ->
     product = np.maximum(size[:-1] * size[1:], np.finfo(float).tiny)
     back = (np.einsum("ij,ij->i", way[:-1], way[1:]) < _BACK * product) & ~(grip[:-1] | grip[1:]).any(axis=1)
     back &= np.minimum(size[:-1], size[1:]) > _AS_LONG * np.maximum(size[:-1], size[1:])
-    runs = moving_bouts(back.astype(np.float64), 0.5, 0.5)  # of boundaries at which the arm turns back
+    turning = runs(back)
     inside = np.zeros(len(rows), dtype=bool)
-    for first, stop in runs[runs[:, 1] - runs[:, 0] >= strokes - 1].tolist():
+    for first, stop in turning[turning[:, 1] - turning[:, 0] >= strokes - 1].tolist():
         inside[first:stop] = True
     return inside
 

@@ -20,8 +20,9 @@ from kineme.io.reading.read_labels import read_labels
 from kineme.io.reading.recordings import read_recordings
 from kineme.io.records import needs
 from kineme.io.writing.annotations import Annotation, to_csv
+from kineme.library.correct import corrections_beside
 from kineme.movements.channels.channel import recorded_names
-from kineme.movements.episodes import Episode
+from kineme.movements.episodes import Episode, place_of
 from kineme.movements.trajectories.movements import axis_names
 from kineme.reporting.atomic import write_atomically
 from kineme.studio.server.refusals import ConflictError, MissingError
@@ -36,9 +37,6 @@ _HEAD = 16  # bytes that are read to know them
 
 _NOTHING = np.zeros(0)
 
-
-_ENDING = "-corrections.csv"
-
 Movement = tuple[str, str]  # recording and place, as in `Annotation`
 
 
@@ -52,14 +50,12 @@ class Lane(NamedTuple):
 class Corrections:
     """The lanes of all movements that were looked at, and a table of those that a person corrected.
 
-    The table lies beside what was opened, ``demos-corrections.csv`` beside ``demos``; one that is there is read, so
-    that work goes on where it ended. A table that is none is left as it is, and is a problem.
+    The table lies beside what was opened, see `corrections_beside`; one that is there is read, so that work goes on
+    where it ended. A table that is none is left as it is, and is a problem.
     """
 
     def __init__(self, opened: Path) -> None:
-        # Beside a link, not what it leads to; two dots and nothing are no names.
-        place = opened.resolve() if opened.name in {"", ".."} else opened.absolute()
-        self.path = place.with_name(f"{place.name if place.is_dir() else place.stem}{_ENDING}")
+        self.path = corrections_beside(opened)
         self.problem: str | None = None
         self.saved = True  # whether the table holds all that was corrected
         self._lanes: dict[Movement, Lane] = {}
@@ -192,7 +188,7 @@ class OpenedRecordings:
             self.total = len(self._numbers)
             try:
                 self.corrections.add(
-                    Annotation(self.name, f"episode {motion.episode}", *motion[1:6])
+                    Annotation(self.name, place_of(motion.episode), *motion[1:6])
                     for motion in motions.read_motions(path)
                 )
             except DataError as error:
@@ -241,16 +237,15 @@ class OpenedRecordings:
         where = {numbers[k]: k for k in positions}
         reason = "expected frames of the episode, got none"
         try:
-            for episode in self._lerobot.episodes(
-                self.path, None, where
-            ):  # of one whose frames lie in two places, the first
-                opened = Opened(episode, self.name, f"episode {episode.number}")
+            for episode in self._lerobot.episodes(self.path, None, where):
+                # Of one whose frames lie in two places, the first.
+                opened = Opened(episode, self.name, place_of(episode.number))
                 self._episodes.setdefault(where[episode.number], opened)
         except KinemeError as error:
             reason = str(error)
         for number, k in where.items():
             if k not in self._episodes:
-                lost = Episode(number, _NOTHING, {}, {}, problems=(reason,), place=f"episode {number}")
+                lost = Episode(number, _NOTHING, {}, {}, problems=(reason,), place=place_of(number))
                 self._episodes[k] = Opened(lost, self.name, lost.place)
 
     def _stream_to(self, wanted: range) -> None:
