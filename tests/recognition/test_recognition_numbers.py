@@ -145,7 +145,7 @@ def _scored(factor, manner=Manner(), around=(0.0, 0.0, 0.0)):  # noqa: B008 - a 
     compared = compare_windows(known, observe(whole, 0.04), np.array([[0, 79]]))
     edges, far, inside = (np.array([value]) for value in around)
     surrounded = Surroundings(edges, far, np.zeros(1), inside)
-    scored = score_windows(compared, expected(recognizer.references_), surrounded, manner, 0.05)
+    scored = score_windows(compared, expected(recognizer.references_), surrounded, manner, spotting.far(0.05))
     assert scored.best.tolist() == [0]
     unlike = float(compared.scores[0, 0]) / (0.975 * math.sqrt(4.0 / math.pi * math.log(20.0)))
     assert unlike < 0.02

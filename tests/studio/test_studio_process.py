@@ -209,7 +209,7 @@ REFUSED = [
     (["--read-only"], 1, "expected a library in"),
     (["--port", "0"], 2, "0 is not in the range"),
     (["--host", "nowhere.invalid"], 1, "correct --host and --port"),
-    (["--recordings", "nowhere"], 2, "'nowhere' does not exist"),
+    (["--recordings", "nowhere"], 1, "found nothing at 'nowhere'"),
 ]
 
 

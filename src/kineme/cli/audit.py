@@ -59,9 +59,9 @@ def audit(dataset: Path, error_rate: float, output: Path | None, mask: Path | No
     endings = ((output, (".html", ".htm")), (mask, (".csv", ".json")), (rerun, None))
     for path, allowed in endings:
         if path is not None:
+            check_new(path, force, dataset)
             if allowed and path.suffix.lower() not in allowed:
                 raise click.UsageError(f"expected a path ending in {' or '.join(allowed)}, got {printable(path)}")
-            check_new(path, force, dataset)
             if not path.parent.is_dir():
                 raise click.UsageError(f"expected a folder to write into, there is none at {printable(path.parent)}")
     with progress(desc="auditing", unit="episode") as bar:
