@@ -55,6 +55,14 @@ def test_a_set_without_faults_is_said_to_have_none():
     assert "at most 5 % of the good episodes" in verdict(clean).lower()
 
 
+def test_a_set_whose_bad_episodes_hide_each_other_is_said_to_be_one():
+    clean = audit_episodes(episodes(60, seed=4))
+    assert "vouch for each other" not in verdict(clean)
+    evidence = clean.evidence.copy()
+    evidence[np.flatnonzero(~clean.flagged)[:3]] = 14.0
+    assert "3 more are as unusual as no good ones are" in verdict(replace(clean, evidence=evidence))
+
+
 def test_an_episode_whose_task_is_not_known_is_none_of_another_task():
     some = episodes(9)
     assert audit_episodes([*some[:8], replace(some[8], task=None)]).tasks == 1

@@ -22,6 +22,10 @@ _SAID = 2  # reasons in the table
 _SHOWN = 40  # episodes of the table; the rest is counted
 _LONGEST_ARGUMENT = 2000  # letters of a list of episodes that is printed
 _WHOLE = 0.98  # of an episode: a stretch that is longer is not said
+#: Share of good episodes that are as unusual, below which there are none in sets of some hundred; and how many such
+#: episodes, not flagged, say that the set hides them. Of clean simulated sets of 40 none had a share below 5e-4; with
+#: a third of the episodes bad, 4 to 7 had.
+_RARE, _HIDDEN = 1e-4, 2
 
 
 def verdict(audit: Audit) -> str:
@@ -43,9 +47,14 @@ def verdict(audit: Audit) -> str:
             "are flagged; the others are ranked only."
         )
     stand_out = kinds["contradiction"] + kinds["outlying"]
-    return f"{hours}. {audit.flagged.sum():,} flagged: {', '.join(parts) or 'none'}. {_chance(audit)} " + (
-        "See those first that contradict or lie beyond." if stand_out else "Nothing stands out."
-    )
+    hidden = int(((np.exp(-audit.evidence) < _RARE) & ~audit.flagged).sum())
+    advice = "See those first that contradict or lie beyond." if stand_out else "Nothing stands out."
+    if hidden >= _HIDDEN:
+        advice = (
+            f"{hidden:,} more are as unusual as no good ones are, and are not flagged: more than a fifth of the set "
+            "may be bad, so that its episodes vouch for each other. The picture of the page shows them."
+        )
+    return f"{hours}. {audit.flagged.sum():,} flagged: {', '.join(parts) or 'none'}. {_chance(audit)} {advice}"
 
 
 def _chance(audit: Audit) -> str:
