@@ -124,6 +124,11 @@ def test_the_command_names_near_symbols_and_shows_a_table(work):
     refused = run("find", "stirr", folder / "set", "-l", folder / "actions")
     assert refused.returncode == 1
     assert "there are stir" in refused.stderr
+    (folder / "alone").mkdir()
+    (folder / "alone" / "junk.csv").write_text("a,b\nthis is,no recording\n")
+    nothing = start("find", "tap", folder / "alone", "-l", folder / "actions")
+    assert nothing.returncode == 1
+    assert "junk.csv" in nothing.stdout + nothing.stderr
     shown = start("find", "tap", folder / "set", "-l", folder / "actions")
     assert shown.returncode == 0
     assert shown.stdout.startswith("6 hits in 6 recordings of")

@@ -129,6 +129,14 @@ def test_a_rate_is_a_number_and_for_sets_without_stamps(tmp_path):
         read_episodes(write_v3(tmp_path / "lerobot"), rate=25.0)
 
 
+def test_a_file_beside_a_data_set_is_not_read_in_its_place(tmp_path):
+    write_robomimic(tmp_path / "lift.hdf5")
+    assert len(list(read_episodes(tmp_path))) == len(LENGTHS)
+    write_v3(tmp_path / "cups")
+    with pytest.raises(DataError, match=r"expected a data set of episodes .* got several: .*; say the folder of one: "):
+        read_episodes(tmp_path)
+
+
 def test_umi_is_read_from_a_folder_and_from_an_archive(tmp_path):
     folder, archive = write_umi(tmp_path / "a.zarr"), write_umi(tmp_path / "a.zarr.zip")
     for path in (folder, archive):

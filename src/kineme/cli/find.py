@@ -39,7 +39,8 @@ def find(symbol: str, recordings: tuple[Path, ...], folder: Path, also: tuple[st
 
     Each recording is searched for all symbols of the library, as by kineme annotate: a stretch that is more like
     another one is no hit. Files are read one after the other, and data sets some episodes at a time; what cannot be
-    read, or has other columns than the library, is listed and stops nothing.
+    read, or has other columns than the library, is listed and stops nothing. If nothing could be searched, the exit
+    status is 1.
 
     Example: kineme find reach archive/ --library actions/ -o hits.csv
     """
@@ -76,6 +77,8 @@ def find(symbol: str, recordings: tuple[Path, ...], folder: Path, also: tuple[st
         "problems": [str(problem) for problem in occurrences.problems],
     }
     say(as_json, data, lambda: _text(data, problem_lines(occurrences.problems, "not searched: ")))
+    if not occurrences.recordings:
+        click.get_current_context().exit(1)
 
 
 def _text(data: dict[str, Any], problems: list[str]) -> str:

@@ -57,12 +57,13 @@ def read_episodes(
     be read at all; what is wrong with a single episode stands in its `problems`.
     """
     path = Path(path)
-    for layout in EPISODE_LAYOUTS:
-        if layout.fits(path):
-            return layout.read(path, features, rate)
-    there = "another" if path.exists() else "nothing there"
+    layout = next((layout for layout in EPISODE_LAYOUTS if layout.fits(path)), None)
+    within = sorted(marker.parents[1] for marker in path.glob(f"*/{MARKER}"))
+    if layout is not None and (layout is EPISODE_LAYOUTS[0] or not within):
+        return layout.read(path, features, rate)
+    there = "nothing there" if not path.exists() else "another" if layout is None else "several"
     layouts = ", ".join(layout.name for layout in EPISODE_LAYOUTS)
     around = [folder for folder in path.absolute().parents[:3] if (folder / MARKER).is_file()]
-    near = around or sorted(marker.parents[1] for marker in path.glob(f"*/{MARKER}"))
+    near = around or within
     remedy = f"; say the folder of one: {first_names(near, _NEAR)}" if near and path.exists() else ""
     raise DataError(f"expected a data set of episodes ({layouts}), got {there}: {path}{remedy}")
