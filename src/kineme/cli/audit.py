@@ -41,7 +41,7 @@ def audit(dataset: Path, error_rate: float, output: Path | None, mask: Path | No
     """Audit DATASET, a folder or file with episodes of robot data: which are bad, why, where, and what to do.
 
     Episodes are compared with the others of their task: ways, rests, spikes, jerk, frozen channels, ranges, durations,
-    lag and offset of action and state. Of good episodes at most the error rate is flagged, whatever the data are like;
+    lag and offset of action and state. Of good episodes about the error rate or less is flagged;
     it takes 20 episodes to say that at 0.05. Stamps, rates and frames that contradict what the set declares are flagged
     by themselves. Nothing is changed.
 
