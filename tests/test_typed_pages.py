@@ -95,7 +95,8 @@ def checked(tmp_path_factory):
         capture_output=True, text=True, check=False, cwd=ROOT, env={**os.environ, "MYPYPATH": str(folder)},
     )  # fmt: skip
     assert done.returncode in (0, 1), done.stderr
-    return [line.removeprefix(f"{folder}{os.sep}") for line in done.stdout.splitlines()]
+    # Messages that mypy kept of equal files name the folder of that run.
+    return [re.sub(r"^\S*[/\\](?=(?:\w+_page|results)\.py:)", "", line) for line in done.stdout.splitlines()]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=page_name)
