@@ -2,6 +2,7 @@
 
 import pytest
 
+from result_tables import motion_layer
 from result_tables.__main__ import GUIDES
 from result_tables.measured import filled
 
@@ -10,3 +11,9 @@ from result_tables.measured import filled
 def test_the_page_shows_what_was_measured(module):
     page = module.PAGE.read_text(encoding="utf-8")
     assert page == filled(page, module.tables()), "run make tables"
+
+
+@pytest.mark.parametrize("page", motion_layer.tables(), ids=lambda page: page.name)
+def test_pages_on_robot_data_show_what_was_measured(page):
+    text = page.read_text(encoding="utf-8")
+    assert text == filled(text, motion_layer.tables()[page]), "run make tables"

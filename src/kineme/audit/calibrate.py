@@ -12,7 +12,7 @@
    where the exponential does not. "Outlying" are those that the procedure of Benjamini and Hochberg lists by that law.
    Where these are more than the share e, good episodes cannot be all of them: they are set aside, and the rest is
    ranked, so that bad episodes do not hide each other. The good ones among those set aside then come on top: where
-   values have far heavier tails than exponential ones, up to twice the share e is flagged.
+   values have far heavier tails than exponential ones, more than the share e is flagged.
 
 Sources: Y. Benjamini, Y. Hochberg, "Controlling the False Discovery Rate", J. R. Stat. Soc. B 57(1), 1995; V. Vovk,
 A. Gammerman, G. Shafer, "Algorithmic Learning in a Random World", Springer 2005.
