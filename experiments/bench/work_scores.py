@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import resource
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
@@ -108,12 +107,6 @@ def rate(hits: int, of: int, level: float = 0.95) -> tuple[float, float, float]:
     low = float(beta.ppf(tail, hits, of - hits + 1)) if hits else 0.0
     high = float(beta.ppf(1.0 - tail, hits + 1, of - hits)) if hits < of else 1.0
     return hits / of, low, high
-
-
-def peak_memory() -> float:
-    """Return the most memory that this process or a finished child held so far [MB]."""
-    of = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
-    return max(resource.getrusage(who).ru_maxrss for who in of) / 1024.0
 
 
 def _shared(start: float, end: float, other_start: float, other_end: float) -> float:
