@@ -8,8 +8,7 @@ demonstrations on, where aeon is installed. Seeds are others than those that cho
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from typing import Any
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,13 +53,14 @@ def _sets() -> Iterator[tuple[str, Recorded]]:
     yield "LASA, strongly perturbed", lasa._replace(demos=TOGETHER[2].apply(lasa.demos, [SEED, 0]))
     for name, k in SIGNALS.items():
         if name in sets:
-            yield f"{name}, coordinate {k + 1}", _changed(sets[name], lambda x, k=k: x[:, k : k + 1])
+            yield f"{name}, coordinate {k + 1}", _coordinate(sets[name], k)
     if gestures is not None:
         yield "two hands, turned", two_hands(sets["digits"])
 
 
-def _changed(movements: Recorded, change: Callable[[NDArray[Any]], NDArray[Any]]) -> Recorded:
-    arrays, times = [change(demo.positions) for demo in movements.demos], [demo.times for demo in movements.demos]
+def _coordinate(movements: Recorded, k: int) -> Recorded:
+    arrays = [demo.positions[:, k : k + 1] for demo in movements.demos]
+    times = [demo.times for demo in movements.demos]
     return movements._replace(demos=kineme.Demonstrations.from_arrays(arrays, movements.labels, times))
 
 

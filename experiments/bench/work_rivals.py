@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from bench.work_sets import ACTION, STATE, Array
 from kineme.movements.episodes import Episode
+from kineme.sampling import runs
 
 
 class Verdicts(NamedTuple):
@@ -122,5 +123,4 @@ RIVALS: Mapping[str, Callable[[Sequence[Episode]], Verdicts]] = {
 
 def _longest(true: NDArray[np.bool_]) -> int:
     """Length of the longest run."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], true.astype(np.int8), [0]))))
-    return int((edges[1::2] - edges[::2]).max(initial=0))
+    return int(np.diff(runs(true), axis=1).max(initial=0))

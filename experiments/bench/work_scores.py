@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import resource
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
@@ -10,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-WITHIN = 0.25  # s
+_WITHIN = 0.25  # s
 _JOINED = 0.1  # s, an end and a start that are nearer are one boundary
 
 Segment = tuple[float, float, str | None]  # start, end [s], name
@@ -53,16 +52,14 @@ def boundaries_of(segments: Iterable[Segment]) -> NDArray[np.float64]:
     return np.asarray(np.bincount(groups, times) / np.bincount(groups))
 
 
-def score_boundaries(
-    truth: Sequence[Sequence[Segment]], found: Sequence[Sequence[Segment]], within: float = WITHIN
-) -> Boundaries:
-    """Match boundaries of each episode one to one, within some seconds, as many as possible (in the order of time)."""
+def score_boundaries(truth: Sequence[Sequence[Segment]], found: Sequence[Sequence[Segment]]) -> Boundaries:
+    """Match boundaries of each episode one to one, within 0.25 s, as many as possible (in the order of time)."""
     hits = n_found = n_true = 0
     for true, segments in zip(truth, found, strict=True):
         a, b = boundaries_of(true).tolist(), boundaries_of(segments).tolist()
         n_found, n_true, i, j = n_found + len(b), n_true + len(a), 0, 0
         while i < len(a) and j < len(b):  # on a line, matching the earliest that fit is optimal
-            if abs(a[i] - b[j]) <= within:
+            if abs(a[i] - b[j]) <= _WITHIN:
                 hits, i, j = hits + 1, i + 1, j + 1
             elif a[i] < b[j]:
                 i += 1
@@ -108,12 +105,6 @@ def rate(hits: int, of: int, level: float = 0.95) -> tuple[float, float, float]:
     low = float(beta.ppf(tail, hits, of - hits + 1)) if hits else 0.0
     high = float(beta.ppf(1.0 - tail, hits + 1, of - hits)) if hits < of else 1.0
     return hits / of, low, high
-
-
-def peak_memory() -> float:
-    """Return the most memory that this process or a finished child held so far [MB]."""
-    of = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
-    return max(resource.getrusage(who).ru_maxrss for who in of) / 1024.0
 
 
 def _shared(start: float, end: float, other_start: float, other_end: float) -> float:

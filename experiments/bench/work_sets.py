@@ -135,12 +135,12 @@ def examples(works: Iterable[Work], each: int = 3, seed: int = 0) -> list[tuple[
     return sorted(chosen)
 
 
-def write_labels(path: Path, rows: Iterable[tuple[int, float, float, str]], recording: str = "") -> None:
+def write_labels(path: Path, rows: Iterable[tuple[int, float, float, str]]) -> None:
     """Write (episode, start, end, name) as the table that ``kineme learn --labels`` takes."""
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(("recording", "place", "start", "end", "label"))
-        writer.writerows((recording, f"episode {k}", f"{a:.3f}", f"{b:.3f}", name) for k, a, b, name in rows)
+        writer.writerows(("", f"episode {k}", f"{a:.3f}", f"{b:.3f}", name) for k, a, b, name in rows)
 
 
 def write_set(folder: Path, episodes: Iterable[Episode], features: Sequence[str] = (STATE, ACTION)) -> Path:

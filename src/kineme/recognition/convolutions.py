@@ -153,10 +153,11 @@ def fit_convolutions(comparison: Comparison, references: References) -> tuple[Co
     features = transform(series, kernels)
     mean, scale = features.mean(axis=0), features.std(axis=0)
     scale = np.where(scale > 0, scale, 1.0)
+    normalized = (features - mean) / scale
     owners = np.searchsorted(references.classes, references.labels)
     targets = np.where(owners[:, None] == np.arange(len(references.classes)), 1.0, -1.0)
-    model: Any = RidgeCV(_ALPHAS, store_cv_results=True).fit((features - mean) / scale, targets)
-    left_out = left_out_values(model, (features - mean) / scale, targets)
+    model: Any = RidgeCV(_ALPHAS, store_cv_results=True).fit(normalized, targets)
+    left_out = left_out_values(model, normalized, targets)
     rows = np.arange(len(owners))
     likely = [np.log(softmax(sharp * left_out, axis=1)[rows, owners] + _TINY).sum() for sharp in _SHARPNESS]
     sharpness = float(_SHARPNESS[int(np.argmax(likely))])

@@ -10,6 +10,7 @@ import numpy as np
 from kineme.movements.channels.detect import point_names
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import Label
+from kineme.sampling import runs
 from kineme.similarity.comparison import Comparison, IndexedMovements
 from kineme.similarity.describe import N_POINTS, even_paths, fit_maps, recorded_paths
 from kineme.similarity.specification import POSITIONS
@@ -60,14 +61,10 @@ class Overlay:
     @property
     def where(self) -> tuple[float, float]:
         """Shares of the path between which they differ most: where differences are half of the largest or more."""
-        largest = int(self.differences.argmax())
-        far = self.differences >= _NEAR * self.differences[largest]
-        first = last = largest
-        while first > 0 and far[first - 1]:
-            first -= 1
-        while last < len(far) - 1 and far[last + 1]:
-            last += 1
-        return first / (len(far) - 1), last / (len(far) - 1)
+        largest, last = int(self.differences.argmax()), len(self.differences) - 1
+        far = runs(self.differences >= _NEAR * self.differences[largest])
+        first, stop = far[far[:, 1] > largest][0].tolist()
+        return first / last, (stop - 1) / last
 
     @property
     def in_words(self) -> str:

@@ -268,16 +268,14 @@ CUES: dict[str, Callable[[Observed], Events]] = {
 
 def _begin_and_end(observed: Observed, columns: Array, strength: float) -> Events:
     """Return begin and end of the bouts of motion of columns (n, k) together."""
-    extents = np.ptp(columns, axis=0) if columns.size else np.zeros(0)
+    extents = np.ptp(columns, axis=0)
     if not extents.any():
         return Events(np.empty(0), np.empty(0), np.empty(0))
     moving = columns[:, extents > 0] / extents[extents > 0]
     sigma = 0.5 * _SMOOTHING * observed.rate
     speed = np.linalg.norm(gaussian_filter1d(moving, sigma, axis=0, order=1, mode="nearest"), axis=1)
     low = max(0.1 * float(speed.max()), 4.0 * 1.4826 * float(np.median(speed)))
-    bouts = moving_bouts(speed, low, 3.0 * low) if 3.0 * low < speed.max() else moving_bouts(speed, low, low)
-    if not len(bouts):
-        return Events(np.empty(0), np.empty(0), np.empty(0))
+    bouts = moving_bouts(speed, low, 3.0 * low if 3.0 * low < speed.max() else low)
     times = observed.times[np.column_stack((bouts[:, 0], bouts[:, 1] - 1)).ravel()]
     return Events(times, np.full(len(times), strength), np.full(len(times), _SMOOTHING))
 
