@@ -327,8 +327,9 @@ def _movements(
     tree: dict[str, Any], group: dict[str, Any], row: RobotLayout, first: _Part, layout: Layout, kind: str
 ) -> Parsed:
     """Read the movements of a tree, all in one group of it, by the coordinates and the rate of the first."""
-    rated = first.hertz > 0 or rate_of(group) is not None or rate_of(tree) is not None
-    if rate_of(group) is None and rate_of(tree) is None:
+    rated = rate_of(group) is not None or rate_of(tree) is not None
+    if not rated:
+        rated = first.hertz > 0
         group["rate"] = first.hertz if rated else row.hertz
     features = _features(row, first.arrays, None)
     paths = {name: path for name, path in features.items() if re.fullmatch(row.coordinates, name)}
