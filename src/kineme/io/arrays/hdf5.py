@@ -12,11 +12,9 @@ from typing import Any
 import numpy as np
 
 from kineme.errors import DataError
-from kineme.io.arrays.tree_movements import tree_movements
-from kineme.io.arrays.trees import GROUPS, Rate, is_label, rate_of, seconds_named
+from kineme.io.arrays.trees import Rate, is_label, rate_of, seconds_named
 from kineme.io.limits import check_expanded
 from kineme.io.records import damaged_as, needs
-from kineme.movements.tables.layout import Layout, Parsed
 
 #: Errors of h5py on damaged files.
 DAMAGE = (OSError, RuntimeError, KeyError, ValueError, TypeError)
@@ -29,12 +27,6 @@ _LETTERS = 2**20  # of labels, at most
 _SCALE = frozenset({"conversion", "offset"})  # attributes by which samples are multiplied, and which is added
 _UNITS = frozenset({"unit", "units"})  # attributes
 _NAMES = frozenset({"label", "task"})  # attributes
-
-
-def hdf5_movements(path: Path, layout: Layout) -> Parsed:
-    """Return the movements in an HDF5 file: groups of data sets of one length; only those that are needed are read."""
-    with hdf5_file(path) as file:
-        return tree_movements(hdf5_tree(file), layout, "HDF5", GROUPS)
 
 
 @contextmanager

@@ -220,7 +220,7 @@ def _episode(
     row: RobotLayout, part: _Part, features: Sequence[str] | None, number: int, place: str, rate: float | None
 ) -> Episode:
     """Read an episode, at the rate that is asked for [1/s], if one is."""
-    arrays = _features(row, part.arrays, features)
+    arrays = {name: part.arrays[path] for name, path in _features(row, part.arrays, features).items()}
     if features is not None and not part.problems and (unknown := [name for name in features if name not in arrays]):
         there = listed([*_features(row, part.arrays, None), *part.arrays])
         raise DataError(f"expected features of {place} ({there}), got {unknown[0]!r}")
@@ -254,9 +254,9 @@ def _episode(
     return Episode(number, times, signals, names, part.task, fps, tuple(problems), place, notes=notes)
 
 
-def _features(row: RobotLayout, arrays: Mapping[str, Any], chosen: Sequence[str] | None) -> dict[str, Any]:
-    """Return the arrays of numbers by the names of their features, those that are no images; or those chosen."""
-    features: dict[str, Any] = {}
+def _features(row: RobotLayout, arrays: Mapping[str, Any], chosen: Sequence[str] | None) -> dict[str, str]:
+    """Return feature -> path of its array, of those of numbers that are no images; or of those chosen."""
+    features: dict[str, str] = {}
     for path, array in arrays.items():
         is_image = len(array.shape) > 2 and array.dtype == np.uint8
         is_row = bool(array.shape) and 0 < math.prod(array.shape[1:]) <= _WIDEST
@@ -265,9 +265,9 @@ def _features(row: RobotLayout, arrays: Mapping[str, Any], chosen: Sequence[str]
         matches = ((re.fullmatch(pattern, path), name) for pattern, name in row.features)
         name = next((match.expand(name) for match, name in matches if match), None)
         if chosen is None and name is not None:
-            features[name] = array
+            features[name] = path
         elif chosen is not None:
-            features |= {each: array for each in (name or path, path) if each in chosen}
+            features |= {each: path for each in (name or path, path) if each in chosen}
     return features if chosen is None else {name: features[name] for name in chosen if name in features}
 
 
@@ -327,27 +327,25 @@ def _movements(
     tree: dict[str, Any], group: dict[str, Any], row: RobotLayout, first: _Part, layout: Layout, kind: str
 ) -> Parsed:
     """Read the movements of a tree, all in one group of it, by the coordinates and the rate of the first."""
-    rated = first.hertz > 0 or rate_of(group) is not None or rate_of(tree) is not None
-    if rate_of(group) is None and rate_of(tree) is None:
+    rated = rate_of(group) is not None or rate_of(tree) is not None
+    if not rated:
+        rated = first.hertz > 0
         group["rate"] = first.hertz if rated else row.hertz
-    paths = {id(array): path for path, array in first.arrays.items()}
-    named = {
-        name: array for name, array in _features(row, first.arrays, None).items() if re.fullmatch(row.coordinates, name)
-    }
-    arrays = [paths[id(array)] for array in named.values()]
+    features = _features(row, first.arrays, None)
+    paths = {name: path for name, path in features.items() if re.fullmatch(row.coordinates, name)}
     joints = {  # head in the file -> name of the joint
         f"{path}.{k}": entry
-        for path, (name, array) in zip(arrays, named.items(), strict=True)
-        if row is ALOHA and len(array.shape) == 2
-        for k, entry in enumerate(_entries(row, name, array.shape[1]))
+        for name, path in paths.items()
+        if row is ALOHA and len(first.arrays[path].shape) == 2
+        for k, entry in enumerate(_entries(row, name, first.arrays[path].shape[1]))
         if not entry.isdecimal()
     }
     of_file = {entry: head for head, entry in joints.items()}
-    columns = [of_file.get(str(column), column) for column in layout.coordinates or arrays]
+    columns = [of_file.get(str(column), column) for column in layout.coordinates or paths.values()]
     parsed = tree_movements(tree, replace(layout, columns=columns or None), kind, GROUPS)
     heads = parsed.detected.columns
     names = tuple(joints.get(head, head) for head in heads)
-    starts = tuple(f"{path}." for path in arrays)
+    starts = tuple(f"{path}." for path in paths.values())
     measured = {  # those whose unit is that of the coordinates: of a gripper it is another
         head: head in joints and not joints[head].endswith("gripper") if row is ALOHA else head.startswith(starts)
         for head in heads

@@ -18,7 +18,7 @@ from pyarrow import parquet
 from kineme.errors import DataError
 from kineme.io.lerobot import motions as language
 from kineme.io.lerobot.episodes import STORAGES, runs, shard_frames
-from kineme.io.lerobot.info import MARKER, Info, read_episodes, read_info, read_json
+from kineme.io.lerobot.info import MARKER, Episodes, Info, read_episodes, read_info, read_json
 from kineme.io.records import damaged_as, needs
 from kineme.reporting.atomic import bring_to_disk, write_atomically
 
@@ -39,8 +39,8 @@ def copy_with_motions(source: Path, target: Path, motions: language.Motions) -> 
     Shards are written anew. All else is copied; videos and pictures are hard links where the file system has them. Rows
     of earlier runs are replaced, those of others stay. `motions.DETAILS` says all that is known of the motions.
     """
-    info = checked_info(source, motions)
-    shards = [shard for shard in read_episodes(source, info).by_shard() if (source / shard).is_file()]
+    info, declared = _checked(source, motions)
+    shards = [shard for shard in declared.by_shard() if (source / shard).is_file()]
     own = language.own_rows(source)
     copy_others(source, target, {source / file for file in (*shards, language.DETAILS, language.PENDING)})
     language.write_details(
@@ -50,15 +50,15 @@ def copy_with_motions(source: Path, target: Path, motions: language.Motions) -> 
     declare(target, info)
 
 
-def checked_info(folder: Path, motions: language.Motions) -> Info:
-    """Read meta/info.json; a `DataError` if the meta folder is damaged, or a motion is of an episode it lacks."""
+def _checked(folder: Path, motions: language.Motions) -> tuple[Info, Episodes]:
+    """Read the meta folder; a `DataError` if it is damaged, or a motion is of an episode it lacks."""
     info = read_info(folder)
     declared = read_episodes(folder, info)
     if declared.problems:
         raise DataError(f"expected a whole data set to name motions in: {declared.problems[0]}")
     if unknown := {*motions} - {*declared.numbers.tolist()}:
         raise DataError(f"expected an episode of the data set, got {min(unknown)}")
-    return info
+    return info, declared
 
 
 def copy_others(source: Path, target: Path, changed: set[Path]) -> None:
@@ -158,7 +158,7 @@ def _compression(metadata: Any, leaves: Sequence[str]) -> str | dict[str, str]:
 
 def copy_in_lance(source: Path, target: Path, motions: language.Motions) -> None:
     """Copy a data set into an empty folder, its tables as hard links, and name the motions of its episodes there."""
-    checked_info(source, motions)
+    _checked(source, motions)
     copy_others(source, target, set())
     name_in_place(target, motions)
 
@@ -174,7 +174,7 @@ def name_in_place(folder: Path, motions: language.Motions) -> int:
     """
     with needs("pylance", "write a LeRobot data set in Lance", "lance"):
         import lance
-    info = checked_info(folder, motions)
+    info, _ = _checked(folder, motions)
     if info.storage != "lance":
         raise DataError(f"expected a data set in Lance to name motions in place, got {folder}; name a new folder")
     with _alone(folder):

@@ -310,7 +310,7 @@ def text_type(schema: Any) -> Any:
 
 def others_in_texts(old: Any, episodes: Integers, own: OwnRows) -> Iterator[tuple[int, float]]:
     """Yield episode and stamp of the rows of others that name motions."""
-    texts, _, pairs, _ = _coded(old, episodes)
+    texts, pairs, _ = _coded(old, episodes)
     for text, episode in pairs.tolist():
         for row in _texts_of_others(texts[text], episode, own):
             if isinstance(row, dict) and (row.get("style"), row.get("role")) == (STYLE, ROLE):
@@ -320,7 +320,7 @@ def others_in_texts(old: Any, episodes: Integers, own: OwnRows) -> Iterator[tupl
 def with_texts(old: Any, episodes: Integers, own: OwnRows, rows: Rows, kind: Any) -> Any:
     """Return the column of some frames, see `with_language`."""
     plain = {"role": ROLE, "style": STYLE, "camera": None, "tool_calls": None}
-    texts, _, pairs, which = _coded(old, episodes)
+    texts, pairs, which = _coded(old, episodes)
     contents = [
         _texts_of_others(texts[text], episode, own)
         + [{**plain, "content": row.content, "timestamp": row.stamp} for row in rows.get(episode, [])]
@@ -329,15 +329,15 @@ def with_texts(old: Any, episodes: Integers, own: OwnRows, rows: Rows, kind: Any
     return pa.array([json.dumps(content, ensure_ascii=False) for content in contents], kind).take(pa.array(which))
 
 
-def _coded(old: Any, episodes: Integers) -> tuple[list[str], Integers, Integers, Integers]:
-    """Return the texts that occur, which one each frame has, pairs of text and episode (n, 2), and those of frames."""
+def _coded(old: Any, episodes: Integers) -> tuple[list[str], Integers, Integers]:
+    """Return the texts that occur, pairs of text and episode (n, 2), and which pair each frame has."""
     texts, text_of = [""], np.zeros(len(episodes), dtype=np.int64)
     if old is not None:
         coded = old.dictionary_encode()
         texts = [text or "" for text in coded.dictionary.to_pylist()] + [""]
         text_of = coded.indices.fill_null(len(texts) - 1).to_numpy(zero_copy_only=False).astype(np.int64)
     pairs, which = np.unique(np.column_stack((text_of, episodes)), axis=0, return_inverse=True)
-    return texts, text_of, pairs, which.ravel()
+    return texts, pairs, which.ravel()
 
 
 def _stamp(row: dict[str, Any]) -> float:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from kineme.errors import DataError, SpecificationError
-from kineme.io.arrays.robot_sets import LAYOUTS, RobotLayout, robot_episodes, robot_layout
+from kineme.io.arrays.robot_sets import LAYOUTS, robot_episodes, robot_layout
 from kineme.io.lerobot.info import MARKER
 from kineme.io.records import needs
 from kineme.movements.episodes import Episode
@@ -35,15 +35,14 @@ def _lerobot(path: Path, features: Sequence[str] | None, rate: float | None) -> 
     return episodes(path, features)
 
 
-def _of_robot(*rows: RobotLayout) -> EpisodeLayout:
-    names = ", ".join(row.name for row in rows)
-    return EpisodeLayout(names, lambda path: robot_layout(path) in rows, robot_episodes)
-
-
 #: Layouts in the order in which they are tried.
 EPISODE_LAYOUTS: tuple[EpisodeLayout, ...] = (
     EpisodeLayout("LeRobot", lambda path: (path / MARKER).is_file(), _lerobot),
-    *(_of_robot(*rows) for rows in LAYOUTS.values()),
+    EpisodeLayout(
+        ", ".join(row.name for rows in LAYOUTS.values() for row in rows),
+        lambda path: robot_layout(path) is not None,
+        robot_episodes,
+    ),
 )
 
 

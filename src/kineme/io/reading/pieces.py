@@ -61,8 +61,7 @@ def _of_data_set(
     layouts = [replace(layout, columns=learned), layout] if learned else [layout]
     numbers = None if places is None else {number for place in places if (number := number_at(place)) is not None}
     for parse in lerobot_parts(entry.path, layouts, numbers):
-        file = rule.apply(parsed_file(parse, Format(), entry.relative, layout), entry.path)
-        file = file._replace(path=entry.name, problems=[each._replace(file=entry.name) for each in file.problems])
+        file = rule.apply(parsed_file(parse, Format(), entry.relative, layout), entry.path).renamed(entry.name)
         if not file.block.labels:
             yield from file.problems
             continue

@@ -54,6 +54,10 @@ class FileRead(NamedTuple):
         """Return the file as one that cannot be read, with one problem more."""
         return self._replace(block=NO_MOVEMENTS, problems=[*self.problems, Problem(self.path, None, reason)])
 
+    def renamed(self, name: str) -> FileRead:
+        """Return the file under the name that it has in the result, also in its problems."""
+        return self._replace(path=name, problems=[problem._replace(file=name) for problem in self.problems])
+
 
 def read_file(path: Path, relative: Path, layout: Layout, follow_links: bool = False) -> FileRead:
     """Read a file, or a folder that is one data set, called `relative` in the result; it need not exist any more."""

@@ -174,8 +174,7 @@ def read_paths(  # noqa: PLR0913 - those of `read_recordings`, in records
         entry = by_path[path]
         relative = Path(entry.relative.name) if rule.label_by == TASK else entry.relative
         read = read_file(path, relative, layout, follow_links)
-        read = read._replace(path=entry.name, problems=[each._replace(file=entry.name) for each in read.problems])
-        return read, entry._replace(relative=relative)
+        return read.renamed(entry.name), entry._replace(relative=relative)
 
     files = [placed(path, parts) for path in (by_path if progress is None else progress(list(by_path)))]
     notes = () if join else notes_on_clocks(files)

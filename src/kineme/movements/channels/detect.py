@@ -171,9 +171,8 @@ def _kind(head: str, unit: str | None, values: Array, offsets: NDArray[np.intp],
     rate = "/" in (unit or "") or (words & _PER_TIME and words & set(_UNIT_WORDS))
     if rate or words & _OTHER_QUANTITIES or (measure is not None and measure.quantity != "angle"):
         return "position"
-    wraps = wrap_period(values, offsets) is not None
     named = words & ANGLE_WORDS and not (_OF_MOTOR in words and unit is None and _may_be_percent(values))
-    if is_joint or named or measure is not None or wraps:
+    if is_joint or named or measure is not None or wrap_period(values, offsets) is not None:
         return "angle"
     return "position"
 
