@@ -106,7 +106,7 @@ def assign_described(
     labels, p_values = open_set_labels(classes, described, error_rate)
     unknown = np.flatnonzero([label is None for label in labels])
     proposals = _among_unknown(classes, described.take(unknown), min_members)
-    return Assignment(labels, p_values.max(axis=1), _at(unknown, proposals, len(described)))
+    return Assignment(labels, p_values.max(axis=1), at_indices(unknown, proposals, len(described)))
 
 
 def _among_unknown(classes: KnownClasses, unknown: Described, min_members: int) -> Proposals:
@@ -170,7 +170,7 @@ def mean_similarities(K: Array, member: NDArray[np.intp]) -> tuple[Array, NDArra
     return H.T @ K @ H / np.maximum(np.outer(counts, counts) - np.diag(counts), 1), counts
 
 
-def _at(indices: NDArray[np.intp], proposals: Proposals, n: int) -> Proposals:
+def at_indices(indices: NDArray[np.intp], proposals: Proposals, n: int) -> Proposals:
     """The same proposals, of movements with these indices among n."""
     clusters = np.full(n, -1, dtype=np.intp)
     clusters[indices] = proposals.clusters

@@ -193,21 +193,15 @@ def _stored(store: Store, chosen: Ids, min_members: int) -> tuple[Proposal, ...]
 
 def _behind(stored: Sequence[Proposal], others: Proposals, free: NDArray[np.intp], n: int) -> Proposals:
     """Return stored proposals among n movements, and behind them the others, which are among those at `free`."""
-    clusters = np.full(n, -1, dtype=np.intp)
+    first, others = len(stored), assignment.at_indices(free, others, n)
+    clusters = np.where(others.clusters < 0, -1, others.clusters + first)
     for k, proposal in enumerate(stored):
         clusters[proposal.members] = k
-    first = len(stored)
-    clusters[free] = np.where(others.clusters < 0, -1, others.clusters + first)
-    moved = tuple(
-        replace(
-            proposal,
-            members=free[proposal.members],
-            medoid=int(free[proposal.medoid]),
-            nearest=None if proposal.nearest is None else proposal.nearest + first,
-        )
+    behind = (
+        replace(proposal, nearest=None if proposal.nearest is None else proposal.nearest + first)
         for proposal in others.proposals
     )
-    return Proposals((*stored, *moved), clusters, others.widths)
+    return Proposals((*stored, *behind), clusters, others.widths)
 
 
 def accept(store: Store, proposal: Proposal, name: str, description: str | None = None) -> int:
