@@ -106,7 +106,7 @@ def assign_described(
     labels, p_values = open_set_labels(classes, described, error_rate)
     unknown = np.flatnonzero([label is None for label in labels])
     proposals = _among_unknown(classes, described.take(unknown), min_members)
-    return Assignment(labels, p_values.max(axis=1), _at(unknown, proposals, len(described)))
+    return Assignment(labels, p_values.max(axis=1), at_indices(unknown, proposals, len(described)))
 
 
 def _among_unknown(classes: KnownClasses, unknown: Described, min_members: int) -> Proposals:
@@ -151,7 +151,7 @@ def agreement(comparison: Comparison, references: References) -> float:
     some = evenly_spaced(len(references), 500)
     described, labels = references.described.take(some), references.labels[some]
     K = compare(comparison.similarity, described, described)
-    means, counts = _mean_similarities(K, np.unique(labels, return_inverse=True)[1])
+    means, counts = mean_similarities(K, np.unique(labels, return_inverse=True)[1])
     others = np.where(np.eye(len(counts), dtype=bool), -1.0, means).max(axis=1)
     apart = float(np.median(others)) if len(counts) > 1 else 0.0
     several = counts > 1
@@ -162,7 +162,7 @@ def agreement(comparison: Comparison, references: References) -> float:
     return float(np.exp(-0.5 * np.median(reach) ** 2))
 
 
-def _mean_similarities(K: Array, member: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]]:
+def mean_similarities(K: Array, member: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]]:
     """Mean of different members of each two symbols (c, c), and the numbers of members; the diagonal of K becomes 0."""
     np.fill_diagonal(K, 0.0)
     counts = np.bincount(member)
@@ -170,7 +170,7 @@ def _mean_similarities(K: Array, member: NDArray[np.intp]) -> tuple[Array, NDArr
     return H.T @ K @ H / np.maximum(np.outer(counts, counts) - np.diag(counts), 1), counts
 
 
-def _at(indices: NDArray[np.intp], proposals: Proposals, n: int) -> Proposals:
+def at_indices(indices: NDArray[np.intp], proposals: Proposals, n: int) -> Proposals:
     """The same proposals, of movements with these indices among n."""
     clusters = np.full(n, -1, dtype=np.intp)
     clusters[indices] = proposals.clusters
@@ -237,7 +237,7 @@ def suggest_merges(
     of_symbols = np.split(np.argsort(member, kind="stable"), np.cumsum(np.bincount(member))[:-1])
     most = max(3, _LARGEST // len(names))
     chosen = np.sort(np.concatenate([own[evenly_spaced(len(own), most)] for own in of_symbols]))
-    means, counts = _mean_similarities(similarities(described.take(chosen), widths=widths), member[chosen])
+    means, counts = mean_similarities(similarities(described.take(chosen), widths=widths), member[chosen])
     several = counts > 1
     typical = float(np.median(np.diag(means)[several])) if several.any() else 1.0
     within = np.maximum(np.where(several, np.diag(means), typical), np.finfo(float).tiny)

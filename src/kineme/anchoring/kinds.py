@@ -94,15 +94,13 @@ def learn_kinds(features: Array, lengths: Sequence[int], n_correlated: int = 0, 
     criterion for the data. Then kinds and grammar are learned together (Baum-Welch), so that what is alike and
     follows other things comes apart.
     """
-    n, f = features.shape
-    best, responsibilities, masks = np.inf, np.ones((n, 1)), []
+    mixtures = []
     for correlated in {0, n_correlated}:
-        related = np.eye(f, dtype=bool)
+        related = np.eye(features.shape[1], dtype=bool)
         related[:correlated, :correlated] = True
-        score, candidate = _divided(features, related, most)
-        if score < best:
-            best, responsibilities, masks = score, candidate, [related]
-    return _in_order_of_sequences(features, masks[0], lengths, responsibilities)
+        mixtures.append((*_divided(features, related, most), related))
+    _, responsibilities, related = min(mixtures, key=lambda mixture: mixture[0])
+    return _in_order_of_sequences(features, related, lengths, responsibilities)
 
 
 def _divided(features: Array, related: NDArray[np.bool_], most: int) -> tuple[float, Array]:

@@ -340,10 +340,10 @@ def _by_neighbors(
         return clusters, np.empty(0)
     squares, weights = squares[:, large[:, None], large], described.own_weights
     similar = clustering.fuse(squares, weights)
-    if people is not None:
-        similar = link_people(similar, clustering.local_similarities(squares, weights), people[large])
-    similar = clustering.set_apart(similar, component[large])
     who = None if people is None else people[large]
+    if who is not None:
+        similar = link_people(similar, clustering.local_similarities(squares, weights), who)
+    similar = clustering.set_apart(similar, component[large])
     wanted = clustering.count_by_eigengap(similar, min_members, who) if n_clusters is None else n_clusters
     clusters[large] = clustering.spectral(similar, wanted, min_members)
     stable = clustering.stabilities(similar, clusters[large], lambda some: clustering.spectral(some, wanted))

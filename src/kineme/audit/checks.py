@@ -14,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.audit.motion import LARGEST, STEADY, Motion, features_of, longest_runs, smoothed, steps_of
+from kineme.audit.motion import STEADY, Motion, features_of, longest_runs, smoothed, steps_of
+from kineme.movements.episodes import LARGEST
 from kineme.sampling import runs
 from kineme.validation import Array
 

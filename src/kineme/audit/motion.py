@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.movements.episodes import Episode
+from kineme.movements.episodes import LARGEST, LATEST, Episode
 from kineme.movements.preparation.resample import arc_length_phase, resample_by_phase
 from kineme.movements.segmentation.table import noise_deviations
 from kineme.sampling import runs
@@ -18,7 +18,6 @@ from kineme.validation import Array
 PATH = 64
 FEWEST_FRAMES = 8
 STEADY = 0.98  # share of the samples that spikes are not among
-LARGEST, LATEST = 1e30, 1e10  # a value, and a stamp [s]: what is beyond is a fault, and no number
 _MOST_CHANNELS = 64
 _SET_ASIDE = re.compile(r"(^|[./])(next|reward|done|success|timestamp|mask|\w*index)([./]|$)")  # no motion
 _ACTION = re.compile(r"(^|[./])actions?([./]|$)")

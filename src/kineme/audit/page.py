@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.audit.motion import motion_of
-from kineme.audit.report import checks_as_rows, reasons_of, verdict
+from kineme.audit.report import checks_table, findings_table, reasons_of, verdict
 from kineme.audit.run import KINDS, Audit, Finding
 from kineme.movements.episodes import Episode
 from kineme.reporting.colors import BLUE, GRAY, ORANGE, PURPLE
 from kineme.reporting.page import page
+from kineme.reporting.table import Table
 from kineme.reporting.text import in_markup
 from kineme.sampling import evenly_spaced
 from kineme.validation import Array
@@ -43,8 +44,9 @@ def audit_page(audit: Audit, name: str, episodes: Iterable[Episode], facts: Mapp
     if audit.of_the_set:
         notes = "".join(f"<li>{in_markup(note)}</li>" for note in audit.of_the_set)
         parts.append(f"<h2>Of the whole set</h2><ul>{notes}</ul>")
-    if rows := checks_as_rows(audit):
-        parts.append(_table(("first because of", "episodes", "what that means", "what to do"), rows, "Reasons"))
+    checks = checks_table(audit)
+    if checks.rows:
+        parts.append(_table("Reasons", checks))
     if findings:
         parts.append("<h2>Episodes</h2>")
     for number, finding in findings.items():
@@ -57,11 +59,7 @@ def audit_page(audit: Audit, name: str, episodes: Iterable[Episode], facts: Mapp
             f"{strips.get(number, '')}<ul>{reasons}</ul></figure>"
         )
     if others := audit.findings[DRAWN : DRAWN + _LISTED]:
-        cells = [
-            (f"{finding.episode}", finding.task or "", finding.kind, f"{finding.p_value:.2g}", reasons_of(finding)[0])
-            for finding in others
-        ]
-        parts.append(_table(("episode", "task", "kind", "p-value", "because"), cells, "And these"))
+        parts.append(_table("And these", findings_table(others, 1)))
     if (more := len(audit.findings) - DRAWN - _LISTED) > 0:
         parts.append(f"<p>and {more:,} more, which the table of --train-mask and --json list.</p>")
     return page(f"kineme: audit of {name}", f"Audit of {name}", "\n".join(parts), dict(facts))
@@ -72,9 +70,9 @@ def drawn_episodes(audit: Audit) -> frozenset[int]:
     return frozenset(finding.episode for finding in audit.findings[:DRAWN])
 
 
-def _table(heads: tuple[str, ...], rows: Iterable[tuple[str, ...]], title: str) -> str:
-    head = "".join(f"<th>{in_markup(cell)}</th>" for cell in heads)
-    body = "".join(f"<tr>{''.join(f'<td>{in_markup(cell)}</td>' for cell in row)}</tr>" for row in rows)
+def _table(title: str, table: Table) -> str:
+    head = "".join(f"<th>{in_markup(cell)}</th>" for cell in table.columns)
+    body = "".join(f"<tr>{''.join(f'<td>{in_markup(cell)}</td>' for cell in row)}</tr>" for row in table.rows)
     return f"<h2>{in_markup(title)}</h2><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 
 

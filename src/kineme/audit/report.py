@@ -7,6 +7,7 @@ import io
 import json
 import math
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -80,30 +81,35 @@ def reasons_of(finding: Finding) -> list[str]:
     ]
 
 
-def checks_as_rows(audit: Audit) -> list[tuple[str, str, str, str]]:
+def checks_table(audit: Audit) -> Table:
     """Return the checks that something is listed for: name, how many episodes, what it means, what to do."""
     counts = Counter(reason.check for finding in audit.findings for reason in finding.reasons[:1])
-    return [
+    rows = [
         (check.name, f"{counts[check.name]:,}", check.meaning, check.remedy) for check in CHECKS if counts[check.name]
     ]
+    return Table("", ("first because of", "episodes", "what that means", "what to do"), rows)
+
+
+def findings_table(findings: Sequence[Finding], n_reasons: int) -> Table:
+    """Return a row for each finding, with the first ones of its reasons."""
+    rows = [
+        (
+            f"{finding.episode}", finding.task or "", finding.kind, f"{finding.p_value:.2g}",
+            "; ".join(reasons_of(finding)[:n_reasons]),
+        )
+        for finding in findings
+    ]  # fmt: skip
+    return Table("", ("episode", "task", "kind", "p-value", "because"), rows)
 
 
 def audit_as_words(audit: Audit) -> str:
     """Return the verdict, the findings as a table, and what to do about them."""
     parts = [verdict(audit), *(f"of the whole set: {note}" for note in audit.of_the_set)]
-    rows = [
-        (
-            f"{finding.episode}", printable(finding.task or ""), finding.kind, f"{finding.p_value:.2g}",
-            "; ".join(reasons_of(finding)[:_SAID]),
-        )
-        for finding in audit.findings[:_SHOWN]
-    ]  # fmt: skip
-    if rows:
-        table = to_text(Table("", ("episode", "task", "kind", "p-value", "because"), rows))
-        more = len(audit.findings) - len(rows)
+    if audit.findings:
+        table = to_text(findings_table(audit.findings[:_SHOWN], _SAID))
+        more = len(audit.findings) - _SHOWN
         parts.append(f"{table}\nand {more:,} more" if more > 0 else table)
-        heads = ("first because of", "episodes", "what that means", "what to do")
-        parts.append(to_text(Table("", heads, checks_as_rows(audit))))
+        parts.append(to_text(checks_table(audit)))
     return "\n\n".join(parts)
 
 

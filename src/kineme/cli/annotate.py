@@ -143,17 +143,17 @@ def _annotated(
     from kineme.library.recognize import some_of_each_symbol
 
     classes = some_of_each_symbol(library.store)
-    answer = _Answer([], [], 0.0, bool(classes.calibration.calibrated(error_rate).all()), [], [], False)
     total = seconds_of(recordings)
+    calibrated = bool(classes.calibration.calibrated(error_rate).all())
+    answer = _Answer([], [], 0.0, calibrated, [], [], streamed=total is not None)
     bar_format = "{l_bar}{bar}| {n:.0f} of {total:.0f} s [{elapsed}<{remaining}]"
     with progress(total=total, desc="annotating", bar_format=bar_format) as bar:
         for piece in pieces(recordings, options, library):
             if isinstance(piece, Problem):
                 answer.problems.append(piece)
                 continue
-            streamed = total is not None
             if not answer.movements:
-                at_once = [] if streamed else [(source.path, source.place) for source in piece.sources]
+                at_once = [] if answer.streamed else [(source.path, source.place) for source in piece.sources]
                 check(at_once, *paths_of(recordings, piece))
                 answer.notes.extend(notes_beside(piece, options, library.channels))
             seconds = float(piece.demonstrations.durations.sum())
@@ -165,7 +165,7 @@ def _annotated(
                 held.append((piece, report.annotations))
             answer.movements.extend((source.path, source.place) for source in piece.sources)
             answer.problems.extend((*piece.problems, *report.problems))
-            answer = answer._replace(seconds=answer.seconds + seconds, streamed=streamed)
+            answer = answer._replace(seconds=answer.seconds + seconds)
     if not answer.movements:
         first = f"; the first: {answer.problems[0]}" if answer.problems else ""
         raise FileNotFoundError(f"expected recordings to annotate, found none that can be read{first}")

@@ -157,10 +157,7 @@ def read(paths: Path | Sequence[Path], options: dict[str, Any], library: Any = N
 
 def pieces(paths: Sequence[Path], options: dict[str, Any], library: Any, places: Any = None) -> Any:
     """Read recordings piece by piece: all at once, unless all are data sets that are read some episodes at a time."""
-    from kineme.io.reading.formats import expanded
-    from kineme.io.reading.pieces import is_episodic
-
-    if not all(is_episodic(path) for given in paths for path in expanded(given)):
+    if _data_sets(paths) is None:
         yield read(paths, options, library)
         return
     yield from files_of(paths, options, library, places)
@@ -182,14 +179,21 @@ def files_of(paths: Sequence[Path], options: dict[str, Any], library: Any, place
 def seconds_of(paths: Sequence[Path]) -> float | None:
     """The declared length of data sets that are read some episodes at a time; None of other recordings."""
     from kineme.io.lerobot.info import read_episodes, read_info
+
+    folders = _data_sets(paths)
+    if folders is None:
+        return None
+    infos = [(folder, read_info(folder)) for folder in folders]
+    return sum(float(read_episodes(folder, info).lengths.sum()) / info.fps for folder, info in infos)
+
+
+def _data_sets(paths: Sequence[Path]) -> list[Path] | None:
+    """The data sets that are read some episodes at a time; None where other recordings are among the paths."""
     from kineme.io.reading.formats import expanded
     from kineme.io.reading.pieces import is_episodic
 
     folders = [path for given in paths for path in expanded(given)]
-    if not all(is_episodic(folder) for folder in folders):
-        return None
-    infos = [(folder, read_info(folder)) for folder in folders]
-    return sum(float(read_episodes(folder, info).lengths.sum()) / info.fps for folder, info in infos)
+    return folders if all(map(is_episodic, folders)) else None
 
 
 def _how(options: dict[str, Any], library: Any) -> tuple[Any, Any, dict[str, bool], bool]:

@@ -26,7 +26,7 @@ from kineme.library.proposals import NamedProposal, store_proposals
 from kineme.library.storage.store import Store
 from kineme.movements.channels.channel import Channels
 from kineme.movements.channels.detect import find_channels
-from kineme.movements.episodes import STATE, Episode, even_stamps, head_of
+from kineme.movements.episodes import LARGEST, LATEST, STATE, Episode, even_stamps, head_of
 from kineme.movements.segmentation.work import Work, at_rest, boundaries, interpolated, roles_of
 from kineme.movements.trajectories.as_learned import of_columns
 from kineme.movements.trajectories.demonstrations import Demonstrations
@@ -42,7 +42,6 @@ _HOLD = 0.3  # of the episodes of a task hold a kind that belongs to it, at leas
 _FOLLOW = 0.1  # of a kind's movements follow what is listed, at least
 _LONGEST = 40  # letters of a proposed name
 _AT_ONCE = 256  # episodes whose movements are stored in one change
-_LARGEST, _SLOWEST = 1e30, 1e-10  # a value, and a rate [1/s]: what is beyond is a fault, and no number
 _COMMON_WORDS = frozenset(
     {"a", "an", "and", "at", "from", "in", "into", "it", "its", "of", "off", "on", "onto", "out", "over", "the", "then",
      "to", "up", "with"}
@@ -201,7 +200,7 @@ def times_of(episode: Episode) -> Array:
     """Return the stamps of an episode [s]; where they agree with the declared rate, repeat or go back, those of it."""
     times = np.asarray(even_stamps(episode.times, episode.fps), dtype=np.float64)
     if len(times) < MIN_SAMPLES or not np.isfinite(times).all() or not (np.diff(times) > 0).all():
-        if not episode.fps > _SLOWEST or len(times) < MIN_SAMPLES:
+        if not episode.fps > 1 / LATEST or len(times) < MIN_SAMPLES:
             raise DataError(
                 f"expected {MIN_SAMPLES} frames or more with stamps that increase, or a declared rate, got "
                 f"{len(times)} frames"
@@ -434,7 +433,7 @@ def _heads(episode: Episode, feature: str) -> tuple[str, ...]:
 
 def _numbers(episode: Episode, feature: str) -> Array:
     values = np.asarray(episode.signals[feature], dtype=np.float64)
-    return np.where(np.abs(values) <= _LARGEST, values, np.nan)
+    return np.where(np.abs(values) <= LARGEST, values, np.nan)
 
 
 def _words(task: str) -> list[str]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kineme.anchoring.assignment import Merge, Split, assign_described, suggest_merges, suggest_splits
+from kineme.anchoring import assignment
 from kineme.anchoring.proposals import DEFAULT_METHOD, Proposal, Proposals
 from kineme.anchoring.proposals import propose as propose_clusters
 from kineme.errors import SpecificationError
@@ -112,7 +112,7 @@ def _clustered(
     """Cluster movements: by how similar movements of known symbols are, where there are any."""
     if classes is not None:
         members = described(store, ids, classes.comparison)
-        return assign_described(members, classes, min_members=min_members).proposals
+        return assignment.assign_described(members, classes, min_members=min_members).proposals
     members, like = described(store, ids), store.specification.comparison
     how, people = method or DEFAULT_METHOD, groups_of(store, ids)
     return propose_clusters(members, how, n_clusters, groups=people, min_members=min_members, like=like)
@@ -178,17 +178,14 @@ def _stored(store: Store, chosen: Ids, min_members: int) -> tuple[Proposal, ...]
         return ()
     some = [members[evenly_spaced(len(members), _COMPARED)] for members in parts]
     K = similarities(described(store, chosen[np.concatenate(some)]))
-    owner = np.repeat(np.eye(len(some)), [len(members) for members in some], axis=0)
-    sizes = owner.sum(axis=0)
-    sums = owner.T @ K @ owner
-    within = (np.diag(sums) - sizes) / np.maximum(sizes * (sizes - 1), 1)
-    between = sums / np.outer(sizes, sizes)
-    np.fill_diagonal(between, -1.0)
+    means, _ = assignment.mean_similarities(K, np.repeat(np.arange(len(some)), [len(members) for members in some]))
+    within = np.diag(means).copy()
+    np.fill_diagonal(means, -1.0)
     alone = len(parts) == 1
     return tuple(
         Proposal(
-            members, medoids[k], float(within[k]), certainties[k], None if alone else int(between[k].argmax()),
-            0.0 if alone else float(between[k].max()), names[k],
+            members, medoids[k], float(within[k]), certainties[k], None if alone else int(means[k].argmax()),
+            0.0 if alone else float(means[k].max()), names[k],
         )
         for k, members in enumerate(parts)
     )  # fmt: skip
@@ -196,21 +193,15 @@ def _stored(store: Store, chosen: Ids, min_members: int) -> tuple[Proposal, ...]
 
 def _behind(stored: Sequence[Proposal], others: Proposals, free: NDArray[np.intp], n: int) -> Proposals:
     """Return stored proposals among n movements, and behind them the others, which are among those at `free`."""
-    clusters = np.full(n, -1, dtype=np.intp)
+    first, others = len(stored), assignment.at_indices(free, others, n)
+    clusters = np.where(others.clusters < 0, -1, others.clusters + first)
     for k, proposal in enumerate(stored):
         clusters[proposal.members] = k
-    first = len(stored)
-    clusters[free] = np.where(others.clusters < 0, -1, others.clusters + first)
-    moved = tuple(
-        replace(
-            proposal,
-            members=free[proposal.members],
-            medoid=int(free[proposal.medoid]),
-            nearest=None if proposal.nearest is None else proposal.nearest + first,
-        )
+    behind = (
+        replace(proposal, nearest=None if proposal.nearest is None else proposal.nearest + first)
         for proposal in others.proposals
     )
-    return Proposals((*stored, *moved), clusters, others.widths)
+    return Proposals((*stored, *behind), clusters, others.widths)
 
 
 def accept(store: Store, proposal: Proposal, name: str, description: str | None = None) -> int:
@@ -310,8 +301,8 @@ class Review:
         See `kineme.anchoring.suggest_splits`; the parts are ids of movements.
     """
 
-    merges: tuple[Merge, ...]
-    splits: tuple[Split, ...]
+    merges: tuple[assignment.Merge, ...]
+    splits: tuple[assignment.Split, ...]
 
 
 def review(store: Store) -> Review:
@@ -321,8 +312,8 @@ def review(store: Store) -> Review:
         return Review((), ())
     ids, labels, like = members.ids, members.labels, store.specification.comparison
     movements = described(store, ids)
-    splits = suggest_splits(movements, labels, like=like)
+    splits = assignment.suggest_splits(movements, labels, like=like)
     return Review(
-        suggest_merges(movements, labels, like=like),
+        assignment.suggest_merges(movements, labels, like=like),
         tuple(split._replace(parts=(ids[split.parts[0]], ids[split.parts[1]])) for split in splits),
     )

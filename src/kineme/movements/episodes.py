@@ -11,6 +11,7 @@ from kineme.validation import Array
 
 STATE = "observation.state"  # the feature that is read by default, as LeRobot calls it
 STAMP_TOLERANCE = 1e-4  # [s] between stored stamps and those of the declared rate, as LeRobot allows
+LARGEST, LATEST = 1e30, 1e10  # a value, and a stamp [s]: what is beyond is a fault, and no number
 _PLACE = "episode "
 
 
