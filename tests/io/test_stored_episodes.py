@@ -13,7 +13,19 @@ from kineme.errors import DataError
 from kineme.io.lerobot.episodes import Frames, episodes, runs
 from kineme.io.lerobot.info import read_info, read_videos
 from kineme.io.reading.episodes import read_episodes
-from lerobot_sets import CAMERA, FILM, NAMES, TASKS, add_videos, episode_rows, write_lance, write_v2, write_v3
+from lerobot_sets import (
+    CAMERA,
+    FILM,
+    NAMES,
+    TASKS,
+    add_videos,
+    change,
+    episode_rows,
+    shard_of,
+    write_lance,
+    write_v2,
+    write_v3,
+)
 
 WRITERS = {
     "v2": write_v2, "v3": write_v3, "v3 lists": lambda folder: write_v3(folder, fixed=False), "lance": write_lance,
@@ -26,16 +38,6 @@ def folder(request, tmp_path):
     if request.param == "lance":
         pytest.importorskip("lance")
     return WRITERS[request.param](tmp_path / "set")
-
-
-def shard_of(folder, k=0):
-    return sorted(folder.glob("data/*/*.parquet"))[k]
-
-
-def change(folder, frames, k=0):
-    """Write a changed shard."""
-    path = shard_of(folder, k)
-    frames(pd.read_parquet(path)).to_parquet(path)
 
 
 def test_all_that_is_stored_of_numbers_comes_as_it_is(folder):
