@@ -177,6 +177,7 @@ class OpenedRecordings:
         self.name = str(name_of(path))
         self.corrections = Corrections(path)
         self.total: int | None = None  # None until all of it has been read
+        self._info: info.Info | None = None
         self._numbers: list[int] | None = None
         if not path.exists():
             raise DataError(f"expected a file or folder of recordings, found nothing at {str(path)!r}")
@@ -184,7 +185,8 @@ class OpenedRecordings:
             with needs("pyarrow", "read LeRobot", "parquet"):
                 from kineme.io.lerobot import episodes, motions
             self._lerobot = episodes
-            self._numbers = info.read_episodes(path, info.read_info(path)).numbers.tolist()
+            self._info = info.read_info(path)
+            self._numbers = info.read_episodes(path, self._info).numbers.tolist()
             self.total = len(self._numbers)
             try:
                 self.corrections.add(
@@ -263,15 +265,12 @@ class OpenedRecordings:
 
     def about_video(self, opened: Opened, camera: str) -> dict[str, Any]:
         """Return when an episode begins in the video of a camera [s], and its codec, None if no file says it."""
-        if self._numbers is None:
+        if self._info is None:
             return {"start": 0.0, "codec": None}
         if self._videos is None:
-            self._videos = info.read_videos(self.path, info.read_info(self.path))
-        feature = info.read_json(self.path / info.MARKER, info.MARKER)["features"].get(camera)
-        declared = feature.get("info", feature.get("video_info")) if isinstance(feature, dict) else None
-        codec = declared.get("video.codec") if isinstance(declared, dict) else None
+            self._videos = info.read_videos(self.path, self._info)
         video = self._videos.get(opened.episode.number, {}).get(camera)
-        return {"start": 0.0 if video is None else video.start, "codec": codec if isinstance(codec, str) else None}
+        return {"start": 0.0 if video is None else video.start, "codec": self._info.cameras.get(camera)}
 
     def video(self, opened: Opened, camera: str) -> tuple[Path, str]:
         """Return the file of a camera's video and its kind, by its first bytes; a MissingError if there is none.
