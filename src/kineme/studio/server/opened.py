@@ -47,6 +47,14 @@ class Lane(NamedTuple):
     corrected: bool = False  # whether a person has changed any, and so has looked at all of them
 
 
+def _lanes(annotations: Iterable[Annotation], corrected: bool) -> dict[Movement, Lane]:
+    """Return the annotations of each movement."""
+    notes: dict[Movement, list[Annotation]] = {}
+    for note in annotations:
+        notes.setdefault((note.recording, note.place), []).append(note)
+    return {movement: Lane(tuple(own), corrected) for movement, own in notes.items()}
+
+
 class Corrections:
     """The lanes of all movements that were looked at, and a table of those that a person corrected.
 
@@ -65,23 +73,18 @@ class Corrections:
             self._read()
 
     def _read(self) -> None:
-        lanes: dict[Movement, list[Annotation]] = {}
         try:
-            for row in read_labels(self.path).rows:
-                note = Annotation(row.recording, row.place, row.start, row.end, row.label, float("nan"), 1.0)
-                lanes.setdefault((row.recording, row.place), []).append(note)
+            rows = read_labels(self.path).rows
             self._bytes = self.path.read_bytes()
         except (DataError, OSError) as error:
             self.problem = f"{self.path.name} was not read: {error}"
-        else:
-            self._lanes = {key: Lane(tuple(notes), corrected=True) for key, notes in lanes.items()}
+            return
+        notes = (Annotation(row.recording, row.place, row.start, row.end, row.label, float("nan"), 1.0) for row in rows)
+        self._lanes = _lanes(notes, corrected=True)
 
     def add(self, annotations: Iterable[Annotation]) -> None:
         """Add what is known of movements from elsewhere, but for those that a person corrected."""
-        lanes: dict[Movement, list[Annotation]] = {}
-        for note in annotations:
-            lanes.setdefault((note.recording, note.place), []).append(note)
-        self._lanes = {key: Lane(tuple(notes)) for key, notes in lanes.items()} | self._lanes
+        self._lanes = _lanes(annotations, corrected=False) | self._lanes
 
     def lane(self, movement: Movement) -> Lane:
         """Return what was found in a movement, or corrected."""
@@ -131,7 +134,7 @@ class Opened(NamedTuple):
     file: Path | None = None  # which file it is a movement of; None: of a data set of episodes
 
     @property
-    def movement(self) -> tuple[str, str]:
+    def movement(self) -> Movement:
         """The name under which its symbols are kept."""
         return self.recording, self.place
 
