@@ -233,8 +233,9 @@ def test_nothing_but_videos_within_the_data_set_is_sent(demos, client):
     file.unlink()
     assert client.get(address).status_code == 404
     item = client.app.state.studio.opened.page(1, 1)[0]
-    for name in ("../outside.mp4", "/etc/passwd", "videos/../../outside.mp4"):
-        (demos.parent / "outside.mp4").write_bytes(WEBM)
+    outside = demos.parent / "outside.mp4"
+    outside.write_bytes(WEBM)
+    for name in ("../outside.mp4", "/etc/passwd", str(outside), "videos/../../outside.mp4"):
         item.episode.videos[CAMERA] = name
         assert client.get(address).status_code == 404
 
