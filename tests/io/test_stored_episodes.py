@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kineme.errors import DataError
-from kineme.io.lerobot.episodes import Frames, episodes, runs
+from kineme.io.lerobot.episodes import Frames, episodes, runs, shard_frames
 from kineme.io.lerobot.info import read_info, read_videos
 from kineme.io.reading.episodes import read_episodes
 from lerobot_sets import (
@@ -97,10 +97,16 @@ def test_features_and_episodes_are_chosen(folder):
         next(episodes(folder, numbers=[0, 7]))
 
 
-def test_only_shards_of_chosen_episodes_are_read(tmp_path):
+def test_only_shards_of_chosen_episodes_are_read(tmp_path, monkeypatch):
     folder = write_v3(tmp_path / "set")
     shard_of(folder, 0).unlink()
+    shards = []
+    monkeypatch.setattr(
+        "kineme.io.lerobot.episodes.shard_frames",
+        lambda folder, info, shard, *given: shards.append(shard) or shard_frames(folder, info, shard, *given),
+    )
     assert [(episode.number, episode.problems) for episode in episodes(folder, numbers=[2])] == [(2, ())]
+    assert shards == ["data/chunk-000/file-001.parquet"]
 
 
 def swapped(frames):
