@@ -102,6 +102,10 @@ def test_episodes_are_found_corrected_played_and_saved(opened, film, tmp_path):
     page.mouse.move(x - 40, y, steps=4)
     page.mouse.up()
     assert float(page.input_value(ROW.format(3, "td:nth-child(2) input"))) < before
+    assert page.inner_text(ROW.format(2, "td:nth-child(4)")) != "–"
+    page.locator(ROW.format(2, "input[type=text]")).focus()
+    page.locator("[data-key='edge end']").press("ArrowLeft")
+    assert page.inner_text(ROW.format(2, "td:nth-child(4)")) == "–"  # it was that of the stretch that was found
     settle(page)
     assert "a new one" in page.locator(".strip-symbols").nth(1).inner_text()
     assert "corrected" in page.locator(".strip-symbols").nth(1).inner_text()
