@@ -138,6 +138,7 @@ def test_a_playhead_goes_with_the_video_and_without_it(opened, film, tmp_path):
     page.keyboard.press("ArrowRight")
     page.keyboard.press("ArrowRight")
     assert page.inner_text("#playhead-text").startswith("0.20 of ")
+    assert page.evaluate("video.currentTime") == pytest.approx(0.2, abs=0.06)
     assert page.evaluate("document.querySelector('.playhead').getBoundingClientRect().x > 0")
     page.locator("#timeline-canvas").focus()
     page.keyboard.press(" ")
