@@ -90,6 +90,19 @@ def write_v3(folder, lengths=(20, 30, 25), per_shard=2, fixed=True, fps=50):
     return folder
 
 
+def shard_of(folder, k=0):
+    """The path of a shard in Parquet."""
+    return sorted(folder.glob("data/*/*.parquet"))[k]
+
+
+def change(folder, frames, k=0):
+    """Write what a function makes of the frames of a shard."""
+    import pandas as pd
+
+    path = shard_of(folder, k)
+    frames(pd.read_parquet(path)).to_parquet(path)
+
+
 def add_videos(folder, path):
     """Declare the videos of a camera in meta/info.json, and write a file for each."""
     place = folder / "meta" / "info.json"

@@ -102,7 +102,8 @@ def test_nothing_is_written_over_unasked(data_set, tmp_path):
 
 def test_the_data_set_stays_as_it_is(data_set, tmp_path):
     before = {path: path.read_bytes() for path in sorted(data_set.rglob("*")) if path.is_file()}
-    run("audit", data_set, "-o", tmp_path / "audit.html", "--train-mask", tmp_path / "keep.csv")
+    done = run("audit", data_set, "-o", tmp_path / "audit.html", "--train-mask", tmp_path / "keep.csv")
+    assert (done.returncode, (tmp_path / "keep.csv").is_file()) == (0, True)
     assert {path: path.read_bytes() for path in sorted(data_set.rglob("*")) if path.is_file()} == before
 
 

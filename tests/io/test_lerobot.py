@@ -12,7 +12,7 @@ from kineme.errors import DataError
 from kineme.io.inspection.inspect import inspect
 from kineme.io.lerobot.info import read_tasks
 from kineme.io.limits import VARIABLE
-from lerobot_sets import NAMES, TASKS, write_v2, write_v3
+from lerobot_sets import NAMES, TASKS, change, shard_of, write_v2, write_v3
 from limited_child import MIB, LimitedChild
 
 
@@ -20,16 +20,6 @@ from limited_child import MIB, LimitedChild
 def folder(request, tmp_path):
     where = tmp_path / "set"
     return write_v2(where) if request.param == "v2" else write_v3(where, fixed="lists" not in request.param)
-
-
-def shard_of(folder, k=0):
-    return sorted(folder.glob("data/*/*.parquet"))[k]
-
-
-def change(folder, frames, k=0):
-    """Write a changed shard."""
-    path = shard_of(folder, k)
-    frames(pd.read_parquet(path)).to_parquet(path)
 
 
 def test_episodes_are_movements_and_tasks_are_labels(folder):

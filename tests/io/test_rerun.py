@@ -128,6 +128,25 @@ def test_what_is_missing_leaves_gaps(tmp_path):
     assert [part["time"] for part in over_time.values()] == [[], []]
 
 
+@pytest.mark.parametrize(
+    ("stamps", "shown"),
+    [
+        ([np.nan, 0.1, 0.2], [0.0, 0.1]),
+        ([0.0, 1e12, 2e12], [0.0]),
+        ([np.nan] * 3, []),
+        ([1e12, 1e12 + 1, 1e12 + 2], [0.0, 1.0, 2.0]),
+    ],
+)
+def test_stamps_that_are_none_cost_their_samples_alone(stamps, shown, tmp_path):
+    """Missing ones, and ones centuries later, which the viewer cannot count."""
+    lanes = {"rest": [Stretch(np.nan, np.nan, "idle"), Stretch(0.0, 1e12, "gap"), Stretch(0.0, 0.1, "idle")]}
+    odd = Scene("episode 0", np.array(stamps), {"state": np.zeros((3, 2))}, {"state": ("a", "b")}, lanes=lanes)
+    over_time, _ = columns_in(write_rerun(tmp_path / "a.rrd", [odd]))
+    assert over_time[r"/episode\ 0/signals/state"]["time"] == pytest.approx(shown)
+    rest = over_time.get(r"/episode\ 0/symbols/rest", {"state": []})
+    assert rest["state"] == ([] if stamps[0] == 1e12 else [["idle"], [None]])
+
+
 @given(st.lists(st.tuples(st.integers(0, 50), st.integers(0, 9), st.sampled_from("abc")), min_size=1, max_size=8))
 def test_states_that_are_shown_are_those_of_the_stretches(tmp_path_factory, spans):
     stretches = [Stretch(5 + start / 10, 5 + (start + length) / 10, state) for start, length, state in spans]

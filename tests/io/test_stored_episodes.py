@@ -10,10 +10,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kineme.errors import DataError
-from kineme.io.lerobot.episodes import Frames, episodes, runs
+from kineme.io.lerobot.episodes import Frames, episodes, runs, shard_frames
 from kineme.io.lerobot.info import read_info, read_videos
 from kineme.io.reading.episodes import read_episodes
-from lerobot_sets import CAMERA, FILM, NAMES, TASKS, add_videos, episode_rows, write_lance, write_v2, write_v3
+from lerobot_sets import (
+    CAMERA,
+    FILM,
+    NAMES,
+    TASKS,
+    add_videos,
+    change,
+    episode_rows,
+    shard_of,
+    write_lance,
+    write_v2,
+    write_v3,
+)
 
 WRITERS = {
     "v2": write_v2, "v3": write_v3, "v3 lists": lambda folder: write_v3(folder, fixed=False), "lance": write_lance,
@@ -26,16 +38,6 @@ def folder(request, tmp_path):
     if request.param == "lance":
         pytest.importorskip("lance")
     return WRITERS[request.param](tmp_path / "set")
-
-
-def shard_of(folder, k=0):
-    return sorted(folder.glob("data/*/*.parquet"))[k]
-
-
-def change(folder, frames, k=0):
-    """Write a changed shard."""
-    path = shard_of(folder, k)
-    frames(pd.read_parquet(path)).to_parquet(path)
 
 
 def test_all_that_is_stored_of_numbers_comes_as_it_is(folder):
@@ -95,10 +97,16 @@ def test_features_and_episodes_are_chosen(folder):
         next(episodes(folder, numbers=[0, 7]))
 
 
-def test_only_shards_of_chosen_episodes_are_read(tmp_path):
+def test_only_shards_of_chosen_episodes_are_read(tmp_path, monkeypatch):
     folder = write_v3(tmp_path / "set")
     shard_of(folder, 0).unlink()
+    shards = []
+    monkeypatch.setattr(
+        "kineme.io.lerobot.episodes.shard_frames",
+        lambda folder, info, shard, *given: shards.append(shard) or shard_frames(folder, info, shard, *given),
+    )
     assert [(episode.number, episode.problems) for episode in episodes(folder, numbers=[2])] == [(2, ())]
+    assert shards == ["data/chunk-000/file-001.parquet"]
 
 
 def swapped(frames):
@@ -175,13 +183,14 @@ def test_a_missing_and_a_damaged_shard(tmp_path):
     assert "file-001.parquet to be a Parquet file, got a damaged one" in read[3].problems[0]
 
 
-def test_a_shard_that_breaks_off_gives_the_episodes_before(tmp_path):
-    """Groups of rows are read one after the other: what is before the damage is read."""
+@pytest.mark.parametrize("size", [20, 25])
+def test_a_shard_that_breaks_off_gives_the_episodes_before(tmp_path, size):
+    """Groups of rows are read one after the other: what is before the damage is read, also up to an episode's end."""
     from pyarrow import parquet
 
     folder = write_v3(tmp_path / "set", per_shard=3)
     path = shard_of(folder)
-    parquet.write_table(parquet.read_table(path), path, row_group_size=25, compression="none")
+    parquet.write_table(parquet.read_table(path), path, row_group_size=size, compression="none")
     start = parquet.ParquetFile(path).metadata.row_group(1).column(0).data_page_offset
     data = bytearray(path.read_bytes())
     data[start : start + 40] = b"\xff" * 40
@@ -189,7 +198,7 @@ def test_a_shard_that_breaks_off_gives_the_episodes_before(tmp_path):
     read = list(episodes(folder))
     assert [episode.number for episode in read] == [0, 1, 2]
     assert read[0].problems == ()
-    assert len(read[1]) == 5
+    assert len(read[1]) == size - 20
     assert "got a damaged one" in " ".join(read[1].problems)
     assert "got a damaged one" in " ".join(read[2].problems)
 

@@ -102,6 +102,10 @@ def test_episodes_are_found_corrected_played_and_saved(opened, film, tmp_path):
     page.mouse.move(x - 40, y, steps=4)
     page.mouse.up()
     assert float(page.input_value(ROW.format(3, "td:nth-child(2) input"))) < before
+    assert page.inner_text(ROW.format(2, "td:nth-child(4)")) != "–"
+    page.locator(ROW.format(2, "input[type=text]")).focus()
+    page.locator("[data-key='edge end']").press("ArrowLeft")
+    assert page.inner_text(ROW.format(2, "td:nth-child(4)")) == "–"  # it was that of the stretch that was found
     settle(page)
     assert "a new one" in page.locator(".strip-symbols").nth(1).inner_text()
     assert "corrected" in page.locator(".strip-symbols").nth(1).inner_text()
@@ -134,6 +138,7 @@ def test_a_playhead_goes_with_the_video_and_without_it(opened, film, tmp_path):
     page.keyboard.press("ArrowRight")
     page.keyboard.press("ArrowRight")
     assert page.inner_text("#playhead-text").startswith("0.20 of ")
+    assert page.evaluate("video.currentTime") == pytest.approx(0.2, abs=0.06)
     assert page.evaluate("document.querySelector('.playhead').getBoundingClientRect().x > 0")
     page.locator("#timeline-canvas").focus()
     page.keyboard.press(" ")

@@ -199,6 +199,28 @@ def test_what_kineme_annotate_wrote_is_shown_and_is_no_correction(folder, demos,
     assert (page["episodes"][1]["corrected"], page["n_corrected"]) == (False, 0)
 
 
+def test_corrections_stand_before_what_kineme_annotate_wrote(folder, demos, open_studio, tmp_path):
+    note = Annotation("demos", "episode 1", 0.6, 2.1, "kind 2", 0.7, 0.9)
+    write_annotations(tmp_path / "named", [note], [demos], "lerobot")
+    client = open_studio(folder, recordings=tmp_path / "named")
+    _put(client, "episode-1", (0.6, 2.0, "mine"))
+    client.post("/api/episodes/corrections", json={})
+    item = open_studio(folder, recordings=tmp_path / "named").get("/api/episodes").json()["episodes"][1]
+    assert ([span["label"] for span in item["spans"]], item["corrected"]) == (["mine"], True)
+
+
+def test_spans_are_kept_in_order_and_those_without_a_length_are_not(client):
+    spans = _put(client, "episode-0", (1.0, 1.5, "b"), (0.2, 0.6, "a"), (0.8, 0.8, "c")).json()["spans"]
+    assert [span["label"] for span in spans] == ["a", "b"]
+
+
+def test_a_correction_that_is_taken_back_is_to_be_saved_again(client):
+    _put(client, "episode-0", (0.6, 2.0, "mine"))
+    client.post("/api/episodes/corrections", json={})
+    _put(client, "episode-0", (0.6, 2.0, "kind 0"), corrected=False)
+    assert client.get("/api/episodes").json()["saved"] is False
+
+
 def test_videos_are_sent_in_parts(client):
     (video,) = client.get("/api/episodes/episode-1").json()["videos"]
     assert video == {"camera": CAMERA, "start": 0.0, "codec": "av1"}
@@ -233,8 +255,9 @@ def test_nothing_but_videos_within_the_data_set_is_sent(demos, client):
     file.unlink()
     assert client.get(address).status_code == 404
     item = client.app.state.studio.opened.page(1, 1)[0]
-    for name in ("../outside.mp4", "/etc/passwd", "videos/../../outside.mp4"):
-        (demos.parent / "outside.mp4").write_bytes(WEBM)
+    outside = demos.parent / "outside.mp4"
+    outside.write_bytes(WEBM)
+    for name in ("../outside.mp4", "/etc/passwd", str(outside), "videos/../../outside.mp4"):
         item.episode.videos[CAMERA] = name
         assert client.get(address).status_code == 404
 

@@ -53,7 +53,7 @@ class Info(NamedTuple):
     others: tuple[str, ...]  # features that cannot be coordinates: images, texts
     data_path: str  # where the shards are, in the syntax of `str.format`
     video_path: str | None  # where the videos are, likewise; None where there are no files of videos
-    cameras: tuple[str, ...]  # features that are videos
+    cameras: dict[str, str | None]  # feature that is a video -> its codec, None where none is declared
     storage: str  # "parquet" or "lance"
     episodes: int | None  # how many it says that there are
     chunk: int  # episodes in a chunk, for version 2
@@ -91,7 +91,7 @@ def read_info(folder: Path) -> Info:
     total, chunk = description.get("total_episodes"), description.get("chunks_size")
     heads = {name: entries for name, feature in features.items() if (entries := _entries(name, feature))}
     others = tuple(name for name in features if name not in heads and name not in COUNTERS)
-    cameras = tuple(name for name in others if _dtype(features[name]) == "video")
+    cameras = {name: _codec(features[name]) for name in others if _dtype(features[name]) == "video"}
     return Info(
         int(major), float(fps), heads, others, str(path), videos, cameras, storage,
         total if isinstance(total, int) else None, chunk if isinstance(chunk, int) and 0 < chunk < _LARGEST else 1000,
@@ -107,6 +107,12 @@ def _check_path(path: Any, key: str) -> None:
 
 def _dtype(feature: Any) -> str:
     return str(feature.get("dtype")) if isinstance(feature, Mapping) else ""
+
+
+def _codec(feature: Mapping[str, Any]) -> str | None:
+    declared = feature.get("info", feature.get("video_info"))
+    codec = declared.get("video.codec") if isinstance(declared, Mapping) else None
+    return codec if isinstance(codec, str) else None
 
 
 def _entries(name: str, feature: Any) -> tuple[str, ...]:

@@ -47,6 +47,14 @@ class Lane(NamedTuple):
     corrected: bool = False  # whether a person has changed any, and so has looked at all of them
 
 
+def _lanes(annotations: Iterable[Annotation], corrected: bool) -> dict[Movement, Lane]:
+    """Return the annotations of each movement."""
+    notes: dict[Movement, list[Annotation]] = {}
+    for note in annotations:
+        notes.setdefault((note.recording, note.place), []).append(note)
+    return {movement: Lane(tuple(own), corrected) for movement, own in notes.items()}
+
+
 class Corrections:
     """The lanes of all movements that were looked at, and a table of those that a person corrected.
 
@@ -65,23 +73,18 @@ class Corrections:
             self._read()
 
     def _read(self) -> None:
-        lanes: dict[Movement, list[Annotation]] = {}
         try:
-            for row in read_labels(self.path).rows:
-                note = Annotation(row.recording, row.place, row.start, row.end, row.label, float("nan"), 1.0)
-                lanes.setdefault((row.recording, row.place), []).append(note)
+            rows = read_labels(self.path).rows
             self._bytes = self.path.read_bytes()
         except (DataError, OSError) as error:
             self.problem = f"{self.path.name} was not read: {error}"
-        else:
-            self._lanes = {key: Lane(tuple(notes), corrected=True) for key, notes in lanes.items()}
+            return
+        notes = (Annotation(row.recording, row.place, row.start, row.end, row.label, float("nan"), 1.0) for row in rows)
+        self._lanes = _lanes(notes, corrected=True)
 
     def add(self, annotations: Iterable[Annotation]) -> None:
         """Add what is known of movements from elsewhere, but for those that a person corrected."""
-        lanes: dict[Movement, list[Annotation]] = {}
-        for note in annotations:
-            lanes.setdefault((note.recording, note.place), []).append(note)
-        self._lanes = {key: Lane(tuple(notes)) for key, notes in lanes.items()} | self._lanes
+        self._lanes = _lanes(annotations, corrected=False) | self._lanes
 
     def lane(self, movement: Movement) -> Lane:
         """Return what was found in a movement, or corrected."""
@@ -131,7 +134,7 @@ class Opened(NamedTuple):
     file: Path | None = None  # which file it is a movement of; None: of a data set of episodes
 
     @property
-    def movement(self) -> tuple[str, str]:
+    def movement(self) -> Movement:
         """The name under which its symbols are kept."""
         return self.recording, self.place
 
@@ -177,6 +180,7 @@ class OpenedRecordings:
         self.name = str(name_of(path))
         self.corrections = Corrections(path)
         self.total: int | None = None  # None until all of it has been read
+        self._info: info.Info | None = None
         self._numbers: list[int] | None = None
         if not path.exists():
             raise DataError(f"expected a file or folder of recordings, found nothing at {str(path)!r}")
@@ -184,7 +188,8 @@ class OpenedRecordings:
             with needs("pyarrow", "read LeRobot", "parquet"):
                 from kineme.io.lerobot import episodes, motions
             self._lerobot = episodes
-            self._numbers = info.read_episodes(path, info.read_info(path)).numbers.tolist()
+            self._info = info.read_info(path)
+            self._numbers = info.read_episodes(path, self._info).numbers.tolist()
             self.total = len(self._numbers)
             try:
                 self.corrections.add(
@@ -263,15 +268,12 @@ class OpenedRecordings:
 
     def about_video(self, opened: Opened, camera: str) -> dict[str, Any]:
         """Return when an episode begins in the video of a camera [s], and its codec, None if no file says it."""
-        if self._numbers is None:
+        if self._info is None:
             return {"start": 0.0, "codec": None}
         if self._videos is None:
-            self._videos = info.read_videos(self.path, info.read_info(self.path))
-        feature = info.read_json(self.path / info.MARKER, info.MARKER)["features"].get(camera)
-        declared = feature.get("info", feature.get("video_info")) if isinstance(feature, dict) else None
-        codec = declared.get("video.codec") if isinstance(declared, dict) else None
+            self._videos = info.read_videos(self.path, self._info)
         video = self._videos.get(opened.episode.number, {}).get(camera)
-        return {"start": 0.0 if video is None else video.start, "codec": codec if isinstance(codec, str) else None}
+        return {"start": 0.0 if video is None else video.start, "codec": self._info.cameras.get(camera)}
 
     def video(self, opened: Opened, camera: str) -> tuple[Path, str]:
         """Return the file of a camera's video and its kind, by its first bytes; a MissingError if there is none.

@@ -71,10 +71,12 @@ def serve(options: Options, ready: Callable[[str, str], object]) -> None:
     token, once = _token(), secrets.token_urlsafe(24)
     with closing(_listening(options)) as listening:
         hosts = () if is_loopback(options.host) else own_names(options.host)
-        how: dict[str, Any] = {"read_only": options.read_only, "recordings": options.recordings}
-        config = config_of(create_app(options.folder, token, once=once, hosts=hosts, **how))
+        app = create_app(
+            options.folder, token, once=once, read_only=options.read_only, hosts=hosts, recordings=options.recordings
+        )
+        config = config_of(app)
         address = f"http://{_name(options.host)}:{listening.getsockname()[1]}/"
-        studio = config.app.state.studio
+        studio = app.state.studio
 
         def end_at_once() -> None:
             """End the process: a thread that computes cannot be ended otherwise, and the library loses nothing."""

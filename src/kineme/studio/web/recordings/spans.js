@@ -1,7 +1,7 @@
 // What was found, as a table: times and names can be typed, a row can be removed.
 import { byId, fill, keepingFocus, make } from "../parts/elements.js";
 
-const BY_HAND = { p: null, confidence: null }; // they were of what was found
+export const BY_HAND = { p: null, confidence: null }; // they were of what was found
 
 /** @param {any[]} spans @param {number} chosen @param {{choose: (k: number) => void, changed: () => void}} page */
 export function showSpans(spans, chosen, page) {

@@ -5,6 +5,7 @@ import { byId, make } from "../parts/elements.js";
 import { COLORS } from "../parts/library_state.js";
 import { readableOn } from "../parts/lines.js";
 import { signal } from "./signal.js";
+import { BY_HAND } from "./spans.js";
 import { colorOf } from "./strip.js";
 
 const BAND = 40; // height of the spans [px]
@@ -149,7 +150,7 @@ export class Timeline {
       which === "begin"
         ? Math.min(Math.max(time, this.extent[0]), span.end - least)
         : Math.max(Math.min(time, this.extent[1]), span.begin + least);
-    span.p = span.confidence = null; // they were of what was found
+    Object.assign(span, BY_HAND);
     this.board.now();
   }
 
