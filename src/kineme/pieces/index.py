@@ -23,7 +23,7 @@ from kineme.reporting.atomic import whole_folder
 
 FOLDER = "search-"  # and a checksum
 _FORMAT = 1
-_MOST = 2**20  # rows of an index, unless one shard has more
+MOST = 2**20  # rows of an index, unless one shard has more
 _WRONG = 1e-4  # of a square: reduced features and residual are farther from it than rounding
 
 
@@ -35,11 +35,11 @@ class Group(NamedTuple):
     rows: Rows  # (n,), row in the shard
 
 
-def groups_of(shards: Sequence[Shard]) -> list[range]:
-    """Return numbers of the shards of each group: neighbors, up to a million rows."""
+def groups_of(shards: Sequence[Shard], most: int) -> list[range]:
+    """Return numbers of the shards of each group: neighbors, of at most so many rows or one shard."""
     groups, first, total = list[range](), 0, 0
     for number, shard in enumerate(shards):
-        if total and total + len(shard) > _MOST:
+        if total and total + len(shard) > most:
             groups, first, total = [*groups, range(first, number)], number, 0
         total += len(shard)
     return [*groups, range(first, len(shards))] if total else groups
@@ -69,9 +69,11 @@ def open_group(folder: Path, plan: Plan, chosen: list[int], reduction: Reduction
     return group
 
 
-def remove_others(folder: Path, plan: Plan, chosen: list[int], reduction: Reduction, shards: Sequence[Shard]) -> None:
-    """Remove indexes of shards that are there no more."""
-    used = {_key(plan, chosen, reduction, [shards[i] for i in group]) for group in groups_of(shards)}
+def remove_others(
+    folder: Path, plan: Plan, chosen: list[int], reduction: Reduction, groups: Sequence[Sequence[Shard]]
+) -> None:
+    """Remove indexes of shards that are there no more, or that are in other groups now."""
+    used = {_key(plan, chosen, reduction, shards) for shards in groups}
     for path in folder.glob(f"{FOLDER}*"):
         if path.name.removeprefix(FOLDER) not in used:
             shutil.rmtree(path, ignore_errors=True)

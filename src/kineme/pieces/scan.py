@@ -198,7 +198,7 @@ def scan(plan: Plan, index: Index, query: Query, best: Best, first_row: int) -> 
 
 
 def scan_plain(plan: Plan, index: Index, query: Query, best: Best, first_row: int) -> None:
-    """Do the same without a compiler, 64 blocks at a time, those with the largest bounds first."""
+    """Do the same without a compiler, up to 64 blocks at a time, those with the largest bounds first."""
     nearest = np.clip(query.marks, index.lows, index.highs)
     far = np.maximum(np.abs(index.lows), np.abs(index.highs))
     slack = _SLACK * _by_representation(plan, far.astype(np.float64) ** 2 + query.marks.astype(np.float64) ** 2)
@@ -206,8 +206,10 @@ def scan_plain(plan: Plan, index: Index, query: Query, best: Best, first_row: in
     bounds = _bounds(plan, away - slack)
     order = np.argsort(-bounds, kind="stable")
     asked = plan.features(query.reduced[None])
-    for start in range(0, len(order), _PLAIN_BLOCKS):
-        blocks = order[start : start + _PLAIN_BLOCKS]
+    start, count = 0, 1
+    while start < len(order):
+        blocks = order[start : start + count]
+        start, count = start + count, min(2 * count, _PLAIN_BLOCKS)  # the first few set the bar
         blocks = blocks[bounds[blocks] >= _bar(best)]
         if not len(blocks):
             return

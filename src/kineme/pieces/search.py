@@ -19,16 +19,18 @@ from numpy.typing import NDArray
 
 from kineme.errors import DataError
 from kineme.movements.trajectories.trajectory import MovementsLike
-from kineme.pieces.index import Group, arranged, groups_of, open_group, remove_others
+from kineme.pieces.index import MOST, Group, arranged, groups_of, open_group, remove_others
 from kineme.pieces.scan import Best, Plan, Query, Single, best_of, plan_of, scan
 from kineme.pieces.shards import PATTERN, Reduction, Shard, open_shard, read_reduction
+from kineme.recognition.answer import Answer
+from kineme.runtime.compiled import load_compiled
 from kineme.runtime.parallel import for_tiles, n_threads, single_threaded_blas
 from kineme.similarity.bounds import reduce_features
 from kineme.similarity.describe import Described, feature_rows
 from kineme.validation import check_count
 
 CANDIDATES = 256  # movements that are compared by all representations
-MOST = 100_000  # the same at most
+MOST_CANDIDATES = 100_000  # the same at most
 
 _DECIMALS = 6  # of logarithms of similarities: movements that are closer are equally near
 _WRONG = 1e-2  # share of a norm by which reduced features may differ from those of the feature rows beside them
@@ -76,6 +78,7 @@ class Shards:
     folder: Path
     reduction: Reduction
     shards: tuple[Shard, ...]
+    most: int = MOST  # rows that are indexed together
 
     def __len__(self) -> int:
         return sum(map(len, self.shards))
@@ -97,17 +100,16 @@ class Shards:
     @cached_property
     def groups(self) -> tuple[tuple[int, Group], ...]:
         """The indexes, each with the number of its first shard; made, which takes a while, where there are none."""
-        ranges = groups_of(self.shards)
-        groups = [
+        return tuple(
             (each.start, open_group(self.folder, *self.plan, self.reduction, self.shards[each.start : each.stop]))
-            for each in ranges
-        ]
-        return tuple(groups)
+            for each in groups_of(self.shards, self.most)
+        )
 
     def prepare(self) -> None:
         """Make the indexes now, and remove those of shards that are there no more."""
         self.groups  # noqa: B018 - made on use
-        remove_others(self.folder, *self.plan, self.reduction, self.shards)
+        groups = [self.shards[each.start : each.stop] for each in groups_of(self.shards, self.most)]
+        remove_others(self.folder, *self.plan, self.reduction, groups)
 
     def nearest(
         self, movements: MovementsLike, n: int = 10, candidates: int = CANDIDATES
@@ -130,7 +132,8 @@ class Shards:
         DataError
             Feature rows that are damaged.
         """
-        check_count("candidates", candidates, check_count("n", n, 1, most=MOST) or n, most=MOST)
+        check_count("n", n, 1, most=MOST_CANDIDATES)
+        check_count("candidates", candidates, n, most=MOST_CANDIDATES)
         described, queries = self.described(movements)
         return self.ranked(described, self.candidates(queries, candidates), n)
 
@@ -261,6 +264,21 @@ class Shards:
         return tuple(held[representation] for representation in comparison.specification.stored_rows)
 
 
+def as_dict(
+    shards: Shards, candidates: int, ranked: Sequence[Sequence[Near]], answers: Sequence[Answer | None]
+) -> dict[str, Any]:
+    """Return the nearest of some movements, and what a library recognizes them as, as ``nearest.schema.json`` says."""
+    recognized = [
+        None
+        if answer is None
+        else {"label": answer.to_dict()["label"], "certainty": answer.certainty, "confidence": float(answer.confidence)}
+        for answer in answers
+    ]
+    pairs = zip(recognized, ranked, strict=True)
+    listed = [{"recognized": answer, "nearest": [near._asdict() for near in nearest]} for answer, nearest in pairs]
+    return {"movements": len(shards), "candidates": candidates, "answers": listed}
+
+
 def open_shards(folder: str | Path, progress: Callable[[int, int], object] | None = None) -> Shards:
     """Open the shards in a folder, which `kineme features` has written, for searching.
 
@@ -278,6 +296,7 @@ def open_shards(folder: str | Path, progress: Callable[[int, int], object] | Non
     DataError
         No shards, damaged ones, or some of other bases or of another library.
     """
+    load_compiled()  # so that answers do not depend on what was computed before
     place = Path(folder)
     reduction = read_reduction(place)
     paths = sorted(place.glob(PATTERN))
