@@ -37,6 +37,7 @@ SUBJECTS = (
     "defaults",
     "library",
     "million",
+    "shards",
     "lerobot",
     "bags",
     "binning",

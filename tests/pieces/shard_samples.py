@@ -26,7 +26,10 @@ def movements(n, n_dims=2, seed=0, n_classes=4):
     if n_dims > 1:
         turned = paths.copy()
         c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
-        turned[:, :, 0], turned[:, :, 1] = c * paths[:, :, 0] - s * paths[:, :, 1], s * paths[:, :, 0] + c * paths[:, :, 1]
+        turned[:, :, 0], turned[:, :, 1] = (
+            c * paths[:, :, 0] - s * paths[:, :, 1],
+            s * paths[:, :, 0] + c * paths[:, :, 1],
+        )
         paths = turned
     return paths + random.normal(size=(n, 1, n_dims)), np.array([f"class {c}" for c in which])
 

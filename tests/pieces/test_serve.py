@@ -48,7 +48,19 @@ class Served:
         with socket.create_server(("127.0.0.1", 0)) as free:
             port = free.getsockname()[1]
         source = str(Path(__file__).parents[2] / "src")
-        command = [sys.executable, "-m", "kineme", "serve", "--library", library, "--shards", shards, "--port", port, *more]
+        command = [
+            sys.executable,
+            "-m",
+            "kineme",
+            "serve",
+            "--library",
+            library,
+            "--shards",
+            shards,
+            "--port",
+            port,
+            *more,
+        ]
         environment = os.environ | {"PYTHONPATH": source, "KINEME_STUDIO_TOKEN": TOKEN}
         self.process = subprocess.Popen(
             list(map(str, command)), env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
@@ -164,7 +176,11 @@ def test_a_body_that_is_too_large_is_refused(served):
 
 @pytest.mark.parametrize(
     ("headers", "status"),
-    [({"Authorization": "Bearer wrong"}, 401), ({"Host": "evil.example"}, 403), ({"Origin": "http://evil.example"}, 403)],
+    [
+        ({"Authorization": "Bearer wrong"}, 401),
+        ({"Host": "evil.example"}, 403),
+        ({"Origin": "http://evil.example"}, 403),
+    ],
 )
 def test_who_may_not_ask_is_refused(served, headers, status):
     answer = served.post(_body(MOVING), **headers)

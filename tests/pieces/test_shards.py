@@ -47,7 +47,9 @@ def test_a_shard_holds_where_movements_come_from_and_their_features(made):
     reduced = reduce_features(reduction.bases, blocks[: len(reduction.bases)], paths.shape[2])
     for column, features in zip(reduction.columns(), reduced, strict=True):
         expected = np.column_stack(features)
-        np.testing.assert_allclose(read[0].take(rows, "reduced")[:, column], expected, atol=2e-5 * np.abs(expected).max())
+        np.testing.assert_allclose(
+            read[0].take(rows, "reduced")[:, column], expected, atol=2e-5 * np.abs(expected).max()
+        )
 
 
 def test_rows_are_taken_in_any_order_across_batches(made, tmp_path, monkeypatch):

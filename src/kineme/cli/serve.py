@@ -20,7 +20,9 @@ from kineme.reporting.text import printable
 @click.option("--port", type=click.IntRange(1, 65535), default=8765, show_default=True, help="Port to serve at.")
 @click.option("--host", default="127.0.0.1", show_default=True,
               help="Address to listen at. Another one needs a token in KINEME_STUDIO_TOKEN.")  # fmt: skip
-@click.option("--processes", type=whole(1, 1000), help="That search, each some of the shards.  [default: one a processor]")
+@click.option(
+    "--processes", type=whole(1, 1000), help="That search, each some of the shards.  [default: one a processor]"
+)
 def serve(folder: Path, shards: Path, port: int, host: str, processes: int | None) -> None:
     """Answer which movements of an archive are nearest to a movement, exactly, for many clients.
 
@@ -35,7 +37,9 @@ def serve(folder: Path, shards: Path, port: int, host: str, processes: int | Non
         from kineme.studio.server.nearest import SearchOptions, serve_search
 
     def ready(address: str, token: str, opened: Any) -> None:
-        write(f"{len(opened):,} movements of {printable(shards)} at {address}nearest\ntoken: {token}\nstop it with Ctrl-C")
+        write(
+            f"{len(opened):,} movements of {printable(shards)} at {address}nearest\ntoken: {token}\nstop it with Ctrl-C"
+        )
         sys.stdout.flush()
 
     serve_search(SearchOptions(folder, shards, host, port, processes), ready)

@@ -145,7 +145,9 @@ class Plan:
 
     def features(self, reduced: NDArray[Any], dtype: Any = np.float64) -> tuple[ReducedFeatures, ...]:
         """Return rows (n, W) as reduced features of each representation, with the x of all points first."""
-        columns = (reduced[:, first:last].astype(dtype) for first, last in zip(self.begins, self.begins[1:], strict=False))
+        columns = (
+            reduced[:, first:last].astype(dtype) for first, last in zip(self.begins, self.begins[1:], strict=False)
+        )
         return tuple(ReducedFeatures(part[:, :-2], part[:, -2], part[:, -1]) for part in columns)
 
     def queries(self, reduced: NDArray[Any]) -> list[Query]:

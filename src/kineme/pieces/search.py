@@ -111,9 +111,7 @@ class Shards:
         groups = [self.shards[each.start : each.stop] for each in groups_of(self.shards, self.most)]
         remove_others(self.folder, *self.plan, self.reduction, groups)
 
-    def nearest(
-        self, movements: MovementsLike, n: int = 10, candidates: int = CANDIDATES
-    ) -> list[list[Near]]:
+    def nearest(self, movements: MovementsLike, n: int = 10, candidates: int = CANDIDATES) -> list[list[Near]]:
         """Return the nearest of all movements to each of some.
 
         Parameters

@@ -113,7 +113,9 @@ def write_reduction(folder: Path, reduction: Reduction) -> Path:
     path, comparison = folder / BASES, reduction.comparison
     if path.exists():
         if read_reduction(folder).digest != reduction.digest:
-            raise DataError(f"expected shards of one set of bases in {folder}, got {BASES} of another; take a new folder")
+            raise DataError(
+                f"expected shards of one set of bases in {folder}, got {BASES} of another; take a new folder"
+            )
         return path
     channels, mixing = comparison.channels, comparison.procrustes.mixing
     about = {
@@ -168,7 +170,9 @@ def _reduction_of(held: Mapping[str, NDArray[Any]], path: Path) -> Reduction:
         raise ValueError("bases that are not orthonormal, or of other representations")
     if widths.shape != (len(chosen),) or not (np.isfinite(widths) | np.isposinf(widths)).all() or (widths <= 0).any():
         raise ValueError("widths that are none")
-    if weights is not None and (weights.shape != widths.shape or not np.isclose(weights.sum(), 1) or (weights < 0).any()):
+    if weights is not None and (
+        weights.shape != widths.shape or not np.isclose(weights.sum(), 1) or (weights < 0).any()
+    ):
         raise ValueError("weights that are none")
     similarity = AveragedSimilarity(procrustes, widths, specification.mean, weights)
     comparison = Comparison(chosen, specification.normalization, specification.cutoff, similarity, channels)

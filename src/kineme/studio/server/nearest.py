@@ -181,9 +181,10 @@ def serve_search(options: SearchOptions, ready: Callable[[str, str, Shards], obj
             f"expected a token in {TOKEN} with --host {options.host}, which others on the network reach, got none; "
             "set it to 16 or more letters and digits, or leave --host out"
         )
-    with closing(listening_at(options.host, options.port)) as listening, ActionLibrary(
-        options.library, read_only=True
-    ) as library:
+    with (
+        closing(listening_at(options.host, options.port)) as listening,
+        ActionLibrary(options.library, read_only=True) as library,
+    ):
         shards = open_shards(options.shards)
         if shards.reduction.library != library.store.id:
             raise SpecificationError(
@@ -195,4 +196,3 @@ def serve_search(options: SearchOptions, ready: Callable[[str, str, Shards], obj
             app = create_search_app(shards, processes, library, token, hosts)
             address = f"http://{name_of(options.host)}:{listening.getsockname()[1]}/"
             run(app, listening, lambda: ready(address, token, shards), lambda: None, processes.stop)
-

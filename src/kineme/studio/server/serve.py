@@ -75,7 +75,6 @@ def serve(options: Options, ready: Callable[[str, str], object]) -> None:
         address = f"http://{name_of(options.host)}:{listening.getsockname()[1]}/"
         studio = app.state.studio
 
-
         def tell() -> None:
             ready(f"{address}?token={token}", f"{address}?once={once}")
 
@@ -181,9 +180,7 @@ def listening_at(host: str, port: int | None) -> socket.socket:
     except OSError as error:
         taken = error.errno == errno.EADDRINUSE
         remedy = "choose another --port, or leave it out" if taken else "correct --host and --port"
-        raise DataError(
-            f"expected to serve at {host}:{port or 0}, got: {error.strerror or error}; {remedy}"
-        ) from error
+        raise DataError(f"expected to serve at {host}:{port or 0}, got: {error.strerror or error}; {remedy}") from error
 
 
 def _bound(host: str, port: int) -> socket.socket:
