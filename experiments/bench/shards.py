@@ -1,8 +1,8 @@
-"""The nearest among 100,000, a million and ten million movements in shards, exactly: time, memory, and what is compared.
+"""The nearest among 100,000, a million and ten million movements in shards, exactly: time, memory, what is compared.
 
-Feature rows of bent handwriting are mixed with others of their kind, so that there are as many as wanted. Movements that
-are asked for are drawn anew and perturbed more; strangers are of kinds that the archive does not hold. Files of ten
-million take 24 GB in the folder for temporary files while it runs. ``KINEME_BENCH_MOVEMENTS`` takes another number.
+Feature rows of bent handwriting are mixed with others of their kind, so that there are as many as wanted. Movements
+that are asked for are drawn anew and perturbed more; strangers are of kinds that the archive does not hold. Files of
+ten million take 24 GB in the folder for temporary files while it runs. ``KINEME_BENCH_MOVEMENTS`` takes another number.
 """
 
 from __future__ import annotations
@@ -96,7 +96,9 @@ def _write(folder: Path, count: int) -> int:
             "start": np.zeros(n),
             "duration": np.ones(n),
         }
-        columns |= {name: pa.FixedSizeListArray.from_arrays(part.ravel(), part.shape[1]) for name, part in numbers.items()}
+        columns |= {
+            name: pa.FixedSizeListArray.from_arrays(part.ravel(), part.shape[1]) for name, part in numbers.items()
+        }
         table = pa.table(columns).replace_schema_metadata({b"kineme.bases": bases_digest(reduction.bases)})
         path = folder / f"part-{k:04d}.arrow"
         write_shard(path, [table])
@@ -123,7 +125,7 @@ def _feature_rows() -> tuple[Array, ...]:
 
 
 def _mixed(reduction: Reduction, blocks: tuple[Array, ...], n: int, random: np.random.Generator) -> tuple[Any, Any]:
-    """Feature rows (n, W) and reduced features of mixtures of two movements of a kind each, of the norm of the first."""
+    """Feature rows (n, W) and reduced features of mixtures of two movements of a kind, of the norm of the first."""
     first = random.integers(0, len(blocks[0]), n)
     second = first // _OF_KIND * _OF_KIND + random.integers(0, _OF_KIND, n)
     share = random.uniform(-0.3, 0.7, (n, 1)).astype(np.float32)
@@ -186,7 +188,7 @@ def _compared(shards: Shards, queries: list[Any]) -> tuple[float, float]:
     for query in queries:
         best = best_of(CANDIDATES)
         for _, group in shards.groups:
-            scan(plan, group.index, query, best, 0)
+            scan(plan, group.rows, query, best, 0)
         compared += float(best.state[2])
         for bounds in _block_bounds(shards, query):
             reached, blocks = reached + int((bounds >= best.scores[0]).sum()), blocks + len(bounds)
@@ -195,22 +197,23 @@ def _compared(shards: Shards, queries: list[Any]) -> tuple[float, float]:
 
 def _block_bounds(shards: Shards, query: Any) -> Iterator[Array]:
     plan = shards.plan[0]
-    ends = np.cumsum([0, *plan.n_marks])
     for _, group in shards.groups:
-        away = (np.clip(query.marks, group.index.lows, group.index.highs) - query.marks) ** 2
-        squares = np.stack([away[:, a:b].sum(axis=1) for a, b in zip(ends, ends[1:], strict=False)])
+        away = (np.clip(query.marks, group.rows.lows, group.rows.highs) - query.marks) ** 2
+        parts = np.split(away, np.cumsum(plan.n_marks)[:-1], axis=1)
         halves = 0.5 / plan.similarity.widths**2
-        yield np.logaddexp.reduce(plan.log_weights[:, None] - squares * halves[:, None], axis=0)
+        logs = [log - part.sum(axis=1) * half for log, part, half in zip(plan.log_weights, parts, halves, strict=True)]
+        yield np.logaddexp.reduce(np.stack(logs), axis=0)
 
 
 def _is_right(shards: Shards, query: Any) -> bool:
     plan = shards.plan[0]
-    scores = np.concatenate([
-        log_bounds(plan.similarity, plan.features(query.reduced[None]), plan.features(group.index.reduced[a : a + 2**16]))[0]
-        for _, group in shards.groups for a in range(0, len(group.index), 2**16)
-    ])  # fmt: skip
+    asked, scores = plan.features(query.reduced[None]), []
+    for _, group in shards.groups:
+        for start in range(0, len(group.rows.reduced), 2**16):
+            stored = plan.features(group.rows.reduced[start : start + 2**16])
+            scores.append(log_bounds(plan.similarity, asked, stored)[0].astype(np.float32))
     best = shards.candidates([query])[0].scores
-    return bool(np.array_equal(np.sort(best), np.sort(scores.astype(np.float32))[-len(best) :]))
+    return bool(np.array_equal(np.sort(best), np.sort(np.concatenate(scores))[-len(best) :]))
 
 
 if __name__ == "__main__":

@@ -48,15 +48,14 @@ def reduction_of(folder):
         return fit_reduction(opened.store)
 
 
-def recordings(paths, first=0, labels=None, copies_of=None):
+def recordings(paths, first=0, labels=None):
     """Movements as what was read of files, three in each."""
     n = len(paths)
     times = [np.linspace(i, i + 1.5, paths.shape[1]) for i in range(first, first + n)]
     numbers = range(first, first + n)
     sources = tuple(
-        Source(f"file {i // 3:04d}.csv", "0" * 64, 1, 0.0, str(i % 3), None if labels is None else str(labels[i - first]),
-               None, 0, 0.0, 0.0)
-        for i in numbers
+        Source(f"file {i // 3:04d}.csv", "0" * 64, 1, 0.0, str(i % 3), label, None, 0, 0.0, 0.0)
+        for i, label in zip(numbers, [None] * n if labels is None else map(str, labels), strict=True)
     )  # fmt: skip
     return Recordings(Demonstrations.from_arrays(list(paths), times=times), sources, (), ())
 

@@ -8,11 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import shard_samples as samples
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-import shard_samples as samples
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.kernels.rotation import RotationPrior
 from kineme.pieces import scan as scanning
@@ -136,12 +136,12 @@ def test_both_twins_give_the_same(searched):
     opened, paths, asked, _ = searched
     plan, _ = opened.plan
     _, queries = opened.described(np.concatenate((asked, paths[:2])))
-    compiled = compiled_module("kineme.pieces._scan")
+    compiled = compiled_module("kineme.pieces._compiled")
     for query in queries:
         for _, group in opened.groups:
             plain, fast = best_of(K), best_of(K)
-            scan_plain(plan, group.index, query, plain, 5)
-            compiled.scan(tuple(map(np.asarray, group.index)), tuple(query), plan.numbers, *fast, 5)
+            scan_plain(plan, group.rows, query, plain, 5)
+            compiled.scan(tuple(map(np.asarray, group.rows)), tuple(query), plan.numbers, *fast, 5)
             np.testing.assert_allclose(np.sort(fast.scores), np.sort(plain.scores), rtol=1e-6, atol=1e-6)
             least = np.partition(plain.scores, 0)[0]
             clear = {row for row, score in zip(plain.rows, plain.scores, strict=True) if score > least + 1e-5}
@@ -181,7 +181,7 @@ def test_few_rows_are_compared(tmp_path):
     _, queries = opened.described(paths[:5])
     for query in queries:
         best = best_of(10)
-        scanning.scan(opened.plan[0], opened.groups[0][1].index, query, best, 0)
+        scanning.scan(opened.plan[0], opened.groups[0][1].rows, query, best, 0)
         assert best.state[2] < 0.25 * len(paths)
 
 
@@ -228,9 +228,9 @@ def test_marks_are_never_farther_apart_than_rows(searched):
     _, queries = opened.described(asked)
     group = opened.groups[0][1]
     ends = np.cumsum([0, *plan.n_marks])
-    marks = plan.marks(group.index.reduced)
+    marks = plan.marks(group.rows.reduced)
     for query in queries:
-        stored = plan.features(group.index.reduced)
+        stored = plan.features(group.rows.reduced)
         for r, (a, b) in enumerate(zip(plan.features(query.reduced[None]), stored, strict=True)):
             some = AveragedSimilarity(plan.procrustes, np.ones(1))
             points = plan.procrustes.by_points
@@ -286,7 +286,7 @@ def test_a_damaged_index_is_made_again(tmp_path, damage):
     expected = open_shards(folder).nearest(paths[:3], 4)
     index = next(folder.glob("search-*"))
     if damage == "pointers":
-        np.save(index / "rows.npy", np.full(90, 10**9))
+        np.save(index / "places.npy", np.full(90, 10**9))
     else:
         data = (index / "reduced.npy").read_bytes()
         (index / "reduced.npy").write_bytes(data[: len(data) // 2] if damage == "truncated" else b"")

@@ -19,8 +19,8 @@ import httpx
 import jsonschema
 import numpy as np
 import pytest
-
 import shard_samples as samples
+
 from kineme.errors import DataError, SpecificationError
 from kineme.library.library import ActionLibrary
 from kineme.pieces.processes import Process, Processes, UnavailableError
@@ -194,8 +194,8 @@ def test_a_client_that_goes_away_leaves_others_alone(served):
     host, port = served.address.removeprefix("http://").split(":")
     for sent in (body, body[: len(body) // 2]):
         with socket.create_connection((host, int(port))) as client:
-            head = f"POST /nearest HTTP/1.1\r\nHost: {host}:{port}\r\nAuthorization: Bearer {TOKEN}\r\nContent-Length: {len(body)}"
-            head += "\r\nContent-Type: application/json"
+            head = f"POST /nearest HTTP/1.1\r\nHost: {host}:{port}\r\nAuthorization: Bearer {TOKEN}"
+            head += f"\r\nContent-Length: {len(body)}\r\nContent-Type: application/json"
             client.sendall(head.encode() + b"\r\n\r\n" + sent)
     assert served.post(_body(MOVING)).status_code == 200
 

@@ -7,8 +7,8 @@ import json
 import numpy as np
 import pyarrow as pa
 import pytest
-
 import shard_samples as samples
+
 from kineme.errors import DataError, SpecificationError
 from kineme.pieces.search import open_shards
 from kineme.pieces.shards import open_shard, read_reduction, shard_table, write_reduction, write_shard
@@ -142,7 +142,7 @@ def test_a_shard_of_other_bases_is_refused(made, tmp_path):
 def test_a_shard_that_says_it_is_another_is_refused(made, tmp_path, said):
     reduction, paths, _, _ = made
     write_shard(tmp_path / "part-0.arrow", [reduction.table(samples.recordings(paths[:4]))], said)
-    with pytest.raises(DataError, match="another library|the task 'annotate'"):
+    with pytest.raises(DataError, match=r"another library|the task 'annotate'"):
         open_shard(tmp_path / "part-0.arrow", reduction)
 
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -36,10 +34,7 @@ def serve(folder: Path, shards: Path, port: int, host: str, processes: int | Non
     with needs("fastapi and uvicorn", "serve", "studio"):
         from kineme.studio.server.nearest import SearchOptions, serve_search
 
-    def ready(address: str, token: str, opened: Any) -> None:
-        write(
-            f"{len(opened):,} movements of {printable(shards)} at {address}nearest\ntoken: {token}\nstop it with Ctrl-C"
-        )
-        sys.stdout.flush()
+    def ready(address: str, token: str, count: int) -> None:
+        write(f"{count:,} movements of {printable(shards)} at {address}nearest\ntoken: {token}\nstop it with Ctrl-C")
 
     serve_search(SearchOptions(folder, shards, host, port, processes), ready)

@@ -30,9 +30,9 @@ _WRONG = 1e-4  # of a square: reduced features and residual are farther from it 
 class Group(NamedTuple):
     """Some shards that are searched together."""
 
-    index: Index
+    rows: Index
     shards: NDArray[np.int32]  # (n,), number of the shard of each row
-    rows: Rows  # (n,), row in the shard
+    places: Rows  # (n,), row in the shard
 
 
 def groups_of(shards: Sequence[Shard], most: int) -> list[range]:
@@ -62,7 +62,8 @@ def open_group(folder: Path, plan: Plan, chosen: list[int], reduction: Reduction
         if path.is_dir():
             shutil.rmtree(path)
         with whole_folder(path) as beside:
-            for name, array in zip(names, (*group.index, *group[1:]), strict=True):
+            arrays = [*group.rows, group.shards, group.places]
+            for name, array in zip(names, arrays, strict=True):
                 np.save(beside / f"{name}.npy", array)
         arrays = [np.load(path / f"{name}.npy", mmap_mode="r") for name in names]
         return Group(Index(*arrays[:4]), *arrays[4:])
@@ -95,12 +96,12 @@ def _fits(group: Group, plan: Plan, shards: Sequence[Shard]) -> bool:
     n, width, n_marks = sum(map(len, shards)), int(plan.begins[-1]), sum(plan.n_marks)
     blocks = -(-n // BLOCK)
     shapes = [(blocks, n_marks, BLOCK), (blocks, n_marks), (blocks, n_marks), (n, width), (n,), (n,)]
-    arrays = (*group.index, *group[1:])
-    if [array.shape for array in arrays] != shapes or any(array.dtype != np.float32 for array in group.index):
+    arrays = (*group.rows, *group[1:])
+    if [array.shape for array in arrays] != shapes or any(array.dtype != np.float32 for array in group.rows):
         return False
     lengths = np.array([len(shard) for shard in shards])
-    inside = (group.shards >= 0) & (group.shards < len(shards)) & (group.rows >= 0)
-    return bool(inside.all() and (group.rows < lengths[group.shards]).all())
+    inside = (group.shards >= 0) & (group.shards < len(shards)) & (group.places >= 0)
+    return bool(inside.all() and (group.places < lengths[group.shards]).all())
 
 
 def _made(plan: Plan, chosen: list[int], reduction: Reduction, shards: Sequence[Shard]) -> Group:
@@ -135,6 +136,6 @@ def _check(block: Single, reduction: Reduction, path: Path) -> None:
         wrong = ~(np.abs(part[:, -2] - squares) <= _WRONG * np.maximum(part[:, -2], squares)) | (part[:, -1] < 0)
         if wrong.any():
             raise DataError(
-                f"expected reduced features in {path}, got damaged ones in {int(wrong.sum()):,} of {len(block):,} rows; "
-                "remove the shard, and write it again by kineme features"
+                f"expected reduced features in {path}, got damaged ones in {int(wrong.sum()):,} of {len(block):,} "
+                "rows; remove the shard, and write it again by kineme features"
             )

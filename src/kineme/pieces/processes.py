@@ -8,14 +8,12 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
-from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from kineme.errors import KinemeError
-from kineme.pieces.scan import Query
 from kineme.pieces.search import Candidates, Shards, open_shards
 from kineme.runtime.parallel import n_threads
 
@@ -53,7 +51,7 @@ class Process:
         theirs.close()
         self._receive(_START)
 
-    def search(self, queries: Sequence[Query], k: int) -> list[Candidates]:
+    def search(self, queries: Sequence[Any], k: int) -> list[Candidates]:
         """Return the best of its groups for each query; a process that has died is started once more.
 
         Raises `UnavailableError`: that one died, too.
@@ -93,13 +91,13 @@ class Process:
             self._process = None
 
 
-def _serve(pipe: Connection, folder: str, most: int, groups: list[int], threads: int) -> None:
+def _serve(pipe: Any, folder: str, most: int, groups: list[int], threads: int) -> None:
     """Answer queries until nobody asks any more."""
     os.environ["KINEME_NUM_THREADS"] = str(threads)
     try:
         shards = replace(open_shards(folder), most=most)
         for _, group in (shards.groups[g] for g in groups):
-            for array in group.index:
+            for array in group.rows:
                 np.asarray(array).ravel()[::1024].sum()  # read once, so that it is in memory
         pipe.send(None)
     except KinemeError as error:
@@ -121,7 +119,7 @@ class Processes:
         count = n_threads() if count is None else count
         shards = replace(shards, most=max(1, min(shards.most, -(-len(shards) // count))))
         shards.prepare()
-        sizes = [len(group.index) for _, group in shards.groups]
+        sizes = [len(group.rows.reduced) for _, group in shards.groups]
         count = min(len(sizes), count)
         shares: list[list[int]] = [[] for _ in range(count)]
         for g in np.argsort(sizes)[::-1].tolist():  # the largest first, each to whom has the fewest rows
@@ -144,7 +142,7 @@ class Processes:
         for process in self.processes:
             process.stop()
 
-    def candidates(self, queries: Sequence[Query], k: int) -> list[Candidates]:
+    def candidates(self, queries: Sequence[Any], k: int) -> list[Candidates]:
         """Return the same as `Shards.candidates`, from all processes."""
         answers = list(self._pool.map(lambda process: process.search(queries, k), self.processes))
         return [self.shards.best(parts, k) for parts in zip(*answers, strict=True)]

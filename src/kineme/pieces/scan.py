@@ -12,7 +12,6 @@ over. So the result is exactly that of comparing all. Where nothing is rotated, 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -44,9 +43,6 @@ class Index(NamedTuple):
     lows: Single  # (blocks, M), the least marks
     highs: Single  # (blocks, M)
     reduced: Single  # (n, W), of each representation values, square and residual norm
-
-    def __len__(self) -> int:
-        return len(self.reduced)
 
 
 class Query(NamedTuple):
@@ -158,9 +154,9 @@ class Plan:
 
     def index(self, reduced: Single) -> tuple[Index, Rows]:
         """Return rows (n, W) in the order in which they are searched, and that order (n,)."""
-        marks = self.marks(reduced)
+        marks: Single = self.marks(reduced)
         widths = np.repeat(self.similarity.widths, self.n_marks)
-        order = np.concatenate(_halved(marks / widths.astype(np.float32), np.arange(len(marks))))
+        order = np.concatenate(_halved(np.asarray(marks / widths, dtype=np.float32), np.arange(len(marks))))
         n, blocks = len(marks), -(-len(marks) // BLOCK)
         padded = np.full((blocks * BLOCK, marks.shape[1]), np.nan, np.float32)
         padded[:n] = marks[order]
@@ -169,7 +165,7 @@ class Plan:
         return Index(np.nan_to_num(by_block, nan=1e15), lows, highs, reduced[order]), order
 
 
-def plan_of(similarity: AveragedSimilarity, n_reduced: Sequence[int]) -> tuple[Plan, list[int]]:
+def plan_of(similarity: AveragedSimilarity, n_reduced: list[int]) -> tuple[Plan, list[int]]:
     """Return the plan for an average over R representations, and numbers of those that count in it.
 
     `similarity` is of those that are compared sample by sample, with `n_reduced` coordinates each.
@@ -177,7 +173,7 @@ def plan_of(similarity: AveragedSimilarity, n_reduced: Sequence[int]) -> tuple[P
     chosen = np.flatnonzero(np.isfinite(similarity.log_weights()))
     weights = None if similarity.weights is None else similarity.weights[chosen]
     some = AveragedSimilarity(similarity.procrustes, similarity.widths[chosen], similarity.mean, weights)
-    return Plan(some, tuple(n_reduced[r] for r in chosen)), chosen.tolist()
+    return Plan(some, tuple(n_reduced[r] for r in chosen.tolist())), chosen.tolist()
 
 
 def _halved(marks: Single, rows: Rows) -> list[Rows]:
@@ -193,7 +189,7 @@ def _halved(marks: Single, rows: Rows) -> list[Rows]:
 def scan(plan: Plan, index: Index, query: Query, best: Best, first_row: int) -> None:
     """Go on with the best rows by those of an index, which are numbered from `first_row`."""
     if use_compiled(_OPERATIONS * len(index.lows)):
-        compiled = compiled_module("kineme.pieces._scan")
+        compiled = compiled_module("kineme.pieces._compiled")
         compiled.scan(tuple(index), tuple(query), plan.numbers, *best, first_row)
         return
     scan_plain(plan, index, query, best, first_row)
@@ -218,7 +214,7 @@ def scan_plain(plan: Plan, index: Index, query: Query, best: Best, first_row: in
         away = (index.marks[blocks].astype(np.float64) - query.marks[:, None]) ** 2
         away = _by_representation(plan, away.transpose(0, 2, 1)) - slack[:, blocks, None]
         doubtful = (blocks[:, None] * BLOCK + np.arange(BLOCK))[_bounds(plan, away) >= _bar(best)]
-        rows = doubtful[doubtful < len(index)]
+        rows = doubtful[doubtful < len(index.reduced)]
         if len(rows):
             scores = _log_bounds(plan, asked, plan.features(index.reduced[rows]))
             _keep(best, scores, rows + first_row)
@@ -226,9 +222,8 @@ def scan_plain(plan: Plan, index: Index, query: Query, best: Best, first_row: in
 
 def _by_representation(plan: Plan, squares: Array) -> Array:
     """Add squares (..., M) up over the marks of each representation, (R, ...)."""
-    ends = np.cumsum([0, *plan.n_marks])
-    sums = [squares[..., first:last].sum(axis=-1) for first, last in zip(ends, ends[1:], strict=False)]
-    return np.stack(sums)
+    parts = np.split(squares, np.cumsum(plan.n_marks)[:-1], axis=-1)
+    return np.stack([part.sum(axis=-1) for part in parts])
 
 
 def _bounds(plan: Plan, squares: Array) -> Array:

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -68,7 +67,7 @@ class Candidates(NamedTuple):
 
     def take(self, chosen: NDArray[np.intp]) -> Candidates:
         """Return the chosen ones."""
-        return Candidates(*(part[chosen] for part in self))
+        return Candidates(self.scores[chosen], self.shards[chosen], self.rows[chosen])
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,12 +165,12 @@ class Shards:
     def _scan(self, query: Query, best: Best, chosen: Sequence[int]) -> None:
         firsts = self._firsts
         for g in chosen:
-            scan(self.plan[0], self.groups[g][1].index, query, best, int(firsts[g]))
+            scan(self.plan[0], self.groups[g][1].rows, query, best, int(firsts[g]))
 
     @cached_property
     def _firsts(self) -> NDArray[np.intp]:
         """The number of the first row of each group, and that of all rows."""
-        return np.cumsum([0, *(len(group.index) for _, group in self.groups)])
+        return np.cumsum([0, *(len(group.rows.reduced) for _, group in self.groups)])
 
     def _complete(self, query: Query, tops: Sequence[Best], k: int, chosen: Sequence[int]) -> Candidates:
         """Return the best of all parts; with more room if rows as good as the last one had no place."""
@@ -190,12 +189,13 @@ class Shards:
             own = owners == g
             first, group = self.groups[g]
             inside = rows[own] - self._firsts[g]
-            shards[own], places[own] = first + group.shards[inside], group.rows[inside]
+            shards[own], places[own] = first + group.shards[inside], group.places[inside]
         return self.best([Candidates(scores, shards, places)], k)
 
     def best(self, parts: Sequence[Candidates], k: int) -> Candidates:
         """Return the k best of several; of equal ones the first by path, place and start."""
-        every = Candidates(*(np.concatenate(part) for part in zip(*parts, strict=True)))
+        scores, shards, rows = (np.concatenate(part) for part in zip(*parts, strict=True))
+        every = Candidates(scores, shards, rows)
         if len(every.scores) <= k:
             return every
         least = np.partition(every.scores, -k)[-k]
@@ -239,9 +239,9 @@ class Shards:
         chosen = candidates.take(nearest)
         durations, labels = self._column(chosen, "duration"), self._column(chosen, "label")
         similarities = np.exp(logs[nearest]).tolist()
-        about = itemgetter(*nearest.tolist())(names) if len(nearest) > 1 else (names[nearest[0]],)
+        about = [names[i] for i in nearest.tolist()]
         parts = zip(about, durations, labels, similarities, strict=True)
-        return [Near(*name, duration, label, similarity) for name, duration, label, similarity in parts]
+        return [Near(path, place, start, *others) for (path, place, start), *others in parts]
 
     def _rows(self, chosen: Candidates) -> tuple[Single, ...]:
         """Return the feature rows of movements, which have to fit their reduced features."""

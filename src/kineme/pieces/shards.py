@@ -13,6 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
@@ -29,7 +30,6 @@ from kineme.library.storage import read
 from kineme.library.storage.channels import channels_of_text, channels_to_text
 from kineme.library.storage.specification import Specification
 from kineme.library.storage.store import Store
-from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.reporting.atomic import whole_file
 from kineme.sampling import evenly_spaced
 from kineme.similarity.bounds import fit_bases, reduce_features
@@ -81,7 +81,7 @@ class Reduction:
     def columns(self) -> list[slice]:
         """Return where in the reduced features of a movement those of each representation are, two norms last."""
         ends = np.cumsum([0, *(self.comparison.n_dims * basis.shape[1] + 2 for basis in self.bases)]).tolist()
-        return [slice(first, last) for first, last in zip(ends[:-1], ends[1:], strict=True)]
+        return [slice(first, last) for first, last in pairwise(ends)]
 
     def table(self, recordings: Recordings) -> Any:
         """Return the shard of recordings, whose columns become those of the library; see `shard_table`."""
@@ -188,11 +188,11 @@ def shard_table(specification: ComparisonSpecification, bases: Sequence[Array], 
     """
     with needs("pyarrow", "write shards", "parquet"):
         import pyarrow as pa
-    demos: Demonstrations = recordings.demonstrations
+    demos = recordings.demonstrations
     blocks = feature_rows(demos, specification)
     reduced = reduce_features(tuple(bases), blocks[: len(bases)], demos.n_dims)
     parts = [part for each in reduced for part in (each.values, each.squares[:, None], each.residual_norms[:, None])]
-    numbers = {"rows": np.concatenate(blocks, axis=1), "reduced": np.concatenate(parts, axis=1)}
+    numbers: dict[str, Array] = {"rows": np.concatenate(blocks, axis=1), "reduced": np.concatenate(parts, axis=1)}
     sources = recordings.sources
     texts = {name: [getattr(source, name) for source in sources] for name in ("path", "place", "label")}
     columns: dict[str, Any] = {name: pa.array(values, pa.string()) for name, values in texts.items()}
@@ -259,12 +259,12 @@ class Shard:
 
 
 @contextmanager
-def _in_words(path: Path) -> Iterator[None]:
-    """Raise what Arrow raises on damaged bytes as a `DataError`."""
+def _arrow(path: Path) -> Iterator[Any]:
+    """Context manager: the package pyarrow; what it raises on damaged bytes becomes a `DataError`."""
     with needs("pyarrow", "read shards", "parquet"):
         import pyarrow as pa
     try:
-        yield
+        yield pa
     except (pa.ArrowException, *_SPOILED) as error:
         reason = " ".join(str(error).split())[:200]
         raise DataError(
@@ -275,9 +275,7 @@ def _in_words(path: Path) -> Iterator[None]:
 
 def open_shard(path: Path, reduction: Reduction) -> Shard:
     """Map a shard into memory. Raises `DataError`: it is damaged, or was made with other bases or another library."""
-    with _in_words(path):
-        import pyarrow as pa
-
+    with _arrow(path) as pa:
         with pa.memory_map(str(path)) as mapped:
             file = pa.ipc.open_file(mapped)
             metadata = file.schema.metadata or {}
@@ -289,7 +287,7 @@ def open_shard(path: Path, reduction: Reduction) -> Shard:
                 return Shard(path, ())
         if about.get("task") != TASK:
             raise ValueError(f"a file of the task {about.get('task')!r}")
-        _check_columns(batches, reduction)
+        _check_columns(pa, batches, reduction)
     if digest != reduction.digest or about.get("library", reduction.library) != reduction.library:
         raise DataError(
             f"expected {path} to be made with the bases beside it, got a shard of other bases or another library; "
@@ -298,9 +296,7 @@ def open_shard(path: Path, reduction: Reduction) -> Shard:
     return Shard(path, batches)
 
 
-def _check_columns(batches: Sequence[Any], reduction: Reduction) -> None:
-    import pyarrow as pa
-
+def _check_columns(pa: Any, batches: Sequence[Any], reduction: Reduction) -> None:
     widths = {"rows": reduction.rows_width, "reduced": reduction.columns()[-1].stop}
     kinds = dict.fromkeys(("place", "label"), pa.string()) | dict.fromkeys(("start", "duration"), pa.float64())
     kinds |= {name: pa.list_(pa.float32(), width) for name, width in widths.items()}

@@ -8,13 +8,11 @@ from __future__ import annotations
 
 import asyncio
 import os
-from collections.abc import AsyncIterator, Callable, Sequence
-from contextlib import asynccontextmanager, closing
-from importlib.metadata import version
+from collections.abc import Callable, Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
-import anyio.to_thread
 from fastapi import FastAPI, Request
 from pydantic import Field
 from starlette.responses import JSONResponse
@@ -34,7 +32,6 @@ from kineme.studio.server.serve import LOOPBACK, TOKEN, is_loopback, listening_a
 COMMAND = "kineme serve"
 _TOGETHER = 128  # movements in one search
 _MOST = 1000  # movements in one request, and neighbors of each
-_THREADS = 8  # requests that are worked on at once
 
 
 class MovementBody(RequestBody):
@@ -93,7 +90,7 @@ class Turns:
             some = [self._waiting[i] for i in alike]
             self._waiting = [entry for i, entry in enumerate(self._waiting) if i not in set(alike)]
             try:
-                best = await anyio.to_thread.run_sync(self._search, [query for query, _, _ in some], k)
+                best = await asyncio.to_thread(self._search, [query for query, _, _ in some], k)
             except Exception as error:
                 for _, _, future in some:
                     if not future.done():
@@ -111,16 +108,7 @@ def create_search_app(
 
     The processes have been started. The hosts are names beside those of the loopback under which it may be asked.
     """
-
-    @asynccontextmanager
-    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        anyio.to_thread.current_default_thread_limiter().total_tokens = _THREADS
-        yield
-
-    app = FastAPI(
-        title=COMMAND, version=version("kineme"), openapi_url="/openapi.json", docs_url=None, redoc_url=None,
-        lifespan=lifespan,
-    )  # fmt: skip
+    app = FastAPI(title=COMMAND, openapi_url="/openapi.json", docs_url=None, redoc_url=None)
     answer_errors(app)
     for kind, status in ((UnavailableError, 503), (DataError, 500)):
         app.add_exception_handler(kind, _refusal(status))
@@ -139,7 +127,7 @@ def create_search_app(
         movements = body.trajectories()
         if body.candidates < body.n:
             raise SpecificationError(f"expected at least n={body.n} candidates, got {body.candidates}")
-        in_thread = anyio.to_thread.run_sync
+        in_thread = asyncio.to_thread
         described, queries = await in_thread(shards.described, movements)
         candidates = await turns.candidates(queries, body.candidates)
         ranked = await in_thread(shards.ranked, described, candidates, body.n)
@@ -169,8 +157,8 @@ class SearchOptions(NamedTuple):
     processes: int | None = None
 
 
-def serve_search(options: SearchOptions, ready: Callable[[str, str, Shards], object]) -> None:
-    """Serve the shards until interrupted; `ready` is called with the address, the token and the shards.
+def serve_search(options: SearchOptions, ready: Callable[[str, str, int], object]) -> None:
+    """Serve the shards until interrupted; `ready` is called with the address, the token and the count.
 
     Raises `SpecificationError`: an address of a network without a token in the environment, or shards of another
     library; `DataError`: shards that are damaged.
@@ -195,4 +183,4 @@ def serve_search(options: SearchOptions, ready: Callable[[str, str, Shards], obj
         with Processes(shards, options.processes) as processes:
             app = create_search_app(shards, processes, library, token, hosts)
             address = f"http://{name_of(options.host)}:{listening.getsockname()[1]}/"
-            run(app, listening, lambda: ready(address, token, shards), lambda: None, processes.stop)
+            run(app, listening, lambda: ready(address, token, len(shards)), lambda: None, processes.stop)

@@ -6,6 +6,7 @@ Twin of `kineme.pieces.scan.scan_plain`, which says what the parts of an index, 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -25,12 +26,12 @@ def scan(index, query, plan, best, rows, state, first_row):  # type: ignore[no-u
 
     `state` is that of `kineme.pieces.scan.Best`. Rows are numbered from `first_row`.
     """
-    marks, lows, highs, reduced = index
+    marks, lows, highs, _ = index
     n_blocks, size = marks.shape[0], marks.shape[2]
     bounds, slacks = _block_bounds(lows, highs, query[0], plan)
     work = np.empty(size, np.float32), np.empty(size, np.float32), np.empty(len(plan[3]))
     for _ in range(min(_FIRST, n_blocks)):
-        b = np.argmax(bounds)
+        b: Any = np.argmax(bounds)
         if bounds[b] >= _bar(best, state):
             _scan_block(index, b, slacks, query, plan, work, (best, rows, state), first_row)
         bounds[b] = -np.inf
@@ -49,7 +50,8 @@ def _bar(best, state):  # type: ignore[no-untyped-def]
 def _block_bounds(lows, highs, marks, plan):  # type: ignore[no-untyped-def]
     """Bounds (n_blocks,) of the scores in each block, and its slack (n_blocks, R) of squared distances."""
     ends, _, _, halves, logs, codes, _ = plan
-    n_blocks, n_representations = len(lows), len(halves)
+    n_blocks: Any = len(lows)
+    n_representations: Any = len(halves)
     bounds, slacks = np.empty(n_blocks, np.float32), np.empty((n_blocks, n_representations), np.float32)
     for b in range(n_blocks):
         total = np.float32(0.0)
@@ -63,13 +65,13 @@ def _block_bounds(lows, highs, marks, plan):  # type: ignore[no-untyped-def]
                 norms += far * far + mark * mark
             slacks[b, r] = _SLACK * norms
             own = np.float32(logs[r]) - max(square - slacks[b, r], np.float32(0.0)) * np.float32(halves[r])
-            total = own if r == 0 else _joined(total, own, codes[0], r)
+            total = own if r == 0 else _joined(total, own, codes[0])
         bounds[b] = _averaged(total, codes[0], n_representations)
     return bounds, slacks
 
 
 @jit
-def _joined(total, own, mean, r):  # type: ignore[no-untyped-def]
+def _joined(total, own, mean):  # type: ignore[no-untyped-def]
     """Add the logarithm of one more kernel to an upper bound of their sum, or to what the mean is bounded by."""
     if mean == 0:  # log(exp a + exp b) = max + log(1 + exp -t), and the latter is at most ln 2 (1 + t / 32 ln 2)^-16
         x = np.float32(1.0) + _SLOPE * abs(total - own)
@@ -95,25 +97,15 @@ def _scan_block(index, b, slacks, query, plan, work, top, first_row):  # type: i
     best, rows, state = top
     size, mean = marks.shape[2], codes[0]
     for r in range(len(halves)):
-        sums[:] = np.float32(0.0)
-        for j in range(ends[r], ends[r + 1]):
-            mark, block = query[0][j], marks[b, j]
-            for i in range(size):
-                away = block[i] - mark
-                sums[i] += away * away
-        half, log, slack = np.float32(halves[r]), np.float32(logs[r]), slacks[b, r]
+        _fill_logs(marks[b], query[0], (ends[r], ends[r + 1]), (logs[r], halves[r], slacks[b, r]), sums)
         if r == 0:
-            for i in range(size):
-                totals[i] = log - max(sums[i] - slack, np.float32(0.0)) * half
+            totals[:] = sums
         elif mean == 0:
             for i in range(size):
-                totals[i] = _joined(totals[i], log - max(sums[i] - slack, np.float32(0.0)) * half, 0, r)
-        elif mean == 1:
-            for i in range(size):
-                totals[i] = max(totals[i], log - max(sums[i] - slack, np.float32(0.0)) * half)
+                totals[i] = _joined(totals[i], sums[i], 0)
         else:
             for i in range(size):
-                totals[i] += log - max(sums[i] - slack, np.float32(0.0)) * half
+                totals[i] = _joined(totals[i], sums[i], mean)
     start = b * size
     for i in range(min(size, len(reduced) - start)):
         if _averaged(totals[i], mean, len(halves)) >= _bar(best, state):
@@ -121,6 +113,21 @@ def _scan_block(index, b, slacks, query, plan, work, top, first_row):  # type: i
             state[2] += 1
             if score >= state[0]:
                 _keep(best, rows, state, score, first_row + start + i)
+
+
+@jit
+def _fill_logs(block, marks, part, how, logs):  # type: ignore[no-untyped-def]
+    """Write upper bounds (BLOCK,) of the logarithm of one kernel."""
+    begin, end = part
+    log, half, slack = np.float32(how[0]), np.float32(how[1]), how[2]
+    logs[:] = np.float32(0.0)
+    for j in range(begin, end):
+        mark, row = marks[j], block[j]
+        for i in range(len(logs)):
+            away = row[i] - mark
+            logs[i] += away * away
+    for i in range(len(logs)):
+        logs[i] = log - max(logs[i] - slack, np.float32(0.0)) * half
 
 
 @jit
