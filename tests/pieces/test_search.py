@@ -222,6 +222,26 @@ def test_any_rows_under_any_mean(numbers, mean, how, k):
     assert sorted(order.tolist()) == list(range(39))
 
 
+@given(st.lists(st.integers(0, 5), min_size=30, max_size=200), st.integers(1, 20))
+def test_rows_as_good_as_the_last_one_are_reported(kinds, k):
+    """Of rows of a few kinds, whether one that is as good as the last one of the best had no place."""
+    similarity = AveragedSimilarity(ComparisonSpecification(max_angle=0.0).procrustes(2), np.ones(1))
+    values = np.array(kinds, np.float32)[:, None] * np.float32([1, 0, 0, 0])
+    reduced = np.column_stack((values, (values**2).sum(axis=1), np.zeros(len(kinds)))).astype(np.float32)
+    plan, _ = plan_of(similarity, [2])
+    index, _ = plan.index(reduced)
+    query = plan.queries(np.zeros((1, 6), np.float32))[0]
+    places = sorted(kinds)
+    for choice in ("always", "never"):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setenv("KINEME_COMPILED", choice)
+            best, every = best_of(k), best_of(len(kinds))
+            scanning.scan(plan, index, query, best, 0)
+            scanning.scan(plan, index, query, every, 0)
+        np.testing.assert_array_equal(np.sort(best.scores), np.sort(every.scores)[-k:])
+        assert (best.state[1] == best.scores.min()) == (places[k - 1] == places[k])
+
+
 def test_marks_are_never_farther_apart_than_rows(searched):
     opened, _, asked, _ = searched
     plan, _ = opened.plan

@@ -253,13 +253,17 @@ def test_a_process_says_what_is_wrong_with_its_shards(tmp_path):
         Process(tmp_path, 100, [0], 1).start()
 
 
+def _fail(*_):
+    os.kill(os.getpid(), signal.SIGINT)  # ends the server, so that the test fails
+
+
 def test_an_address_of_a_network_needs_a_token(folders, monkeypatch):
     monkeypatch.delenv("KINEME_STUDIO_TOKEN", raising=False)
     with pytest.raises(SpecificationError, match="KINEME_STUDIO_TOKEN with --host 0"):
-        serve_search(SearchOptions(*folders, host="0.0.0.0", port=0), print)
+        serve_search(SearchOptions(*folders, host="0.0.0.0", port=0), _fail)
 
 
 def test_shards_of_another_library_are_refused(folders, tmp_path):
     other = samples.library(tmp_path / "other", n=30)
     with pytest.raises(SpecificationError, match="another one"):
-        serve_search(SearchOptions(other, folders[1], port=0), print)
+        serve_search(SearchOptions(other, folders[1], port=0), _fail)

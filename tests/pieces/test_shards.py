@@ -168,8 +168,9 @@ def test_damaged_numbers_are_refused(made, tmp_path, name):
         at = start + 4 * width * row
         data[at : at + 4] = np.float32(12345.0).tobytes()
     path.write_bytes(data)
+    opened = open_shards(folder)
     with pytest.raises(DataError, match=r"part-0001\.arrow"):
-        open_shards(folder).nearest(paths, 5)
+        opened.prepare() if name == "reduced" else opened.nearest(paths, 5)
 
 
 @pytest.mark.parametrize("change", ["type", "null", "width", "missing"])

@@ -110,11 +110,13 @@ def _made(plan: Plan, chosen: list[int], reduction: Reduction, shards: Sequence[
     reduced = np.empty((sum(lengths), plan.begins[-1]), dtype=np.float32)
     done = 0
     for shard in shards:
+        shard.advise("SEQUENTIAL")
         for block in shard.numbers["reduced"]:
             _check(block, reduction, shard.path)
             part = reduced[done : done + len(block)]
             part[:] = np.concatenate([arranged(plan, block[:, column]) for column in columns], axis=1)
             done += len(block)
+        shard.advise("RANDOM")
     index, order = plan.index(reduced)
     owners = np.repeat(np.arange(len(shards), dtype=np.int32), lengths)
     rows = np.concatenate([np.arange(length) for length in lengths])

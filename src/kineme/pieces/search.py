@@ -222,6 +222,9 @@ class Shards:
 
     def ranked(self, described: Described, candidates: Sequence[Candidates], n: int) -> list[list[Near]]:
         """Return the n candidates of each movement that are most similar by all representations."""
+        every = Candidates(*(np.concatenate(part) for part in zip(*candidates, strict=True)))
+        for number in np.unique(every.shards).tolist():
+            self.shards[number].will_need(np.unique(every.rows[every.shards == number]))
         with single_threaded_blas():
             movements = (described.take(slice(i, i + 1)) for i in range(len(described)))
             return [self._ranked(*pair, n) for pair in zip(movements, candidates, strict=True)]

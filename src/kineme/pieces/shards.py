@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import mmap
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -226,6 +227,7 @@ class Shard:
 
     path: Path
     batches: tuple[Any, ...]  # pyarrow.RecordBatch
+    mapped: Any  # mmap.mmap of the file
 
     def __len__(self) -> int:
         return sum(batch.num_rows for batch in self.batches)
@@ -242,6 +244,25 @@ class Shard:
             name: [column.flatten().to_numpy().reshape(len(column), -1) for column in parts]
             for name, parts in columns.items()
         }
+
+    def advise(self, advice: str) -> None:
+        """Tell the system how the file is going to be read, "RANDOM" or "SEQUENTIAL", where it can be told."""
+        if hasattr(mmap, f"MADV_{advice}"):
+            self.mapped.madvise(getattr(mmap, f"MADV_{advice}"))
+
+    def will_need(self, rows: NDArray[np.intp]) -> None:
+        """Begin to read the numbers of some rows, all at once, where the system can be told."""
+        if not hasattr(mmap, "MADV_WILLNEED"):
+            return
+        base = np.frombuffer(self.mapped, np.uint8).ctypes.data
+        which = np.searchsorted(self._ends, rows, side="right")
+        first = np.concatenate(([0], self._ends))
+        for blocks in self.numbers.values():
+            for b, row in zip(which, rows, strict=True):
+                block = blocks[b]
+                begin = block.ctypes.data - base + int(row - first[b]) * block.strides[0]
+                aligned = begin // mmap.PAGESIZE * mmap.PAGESIZE
+                self.mapped.madvise(mmap.MADV_WILLNEED, aligned, begin + block.strides[0] - aligned)
 
     def take(self, rows: NDArray[np.intp], name: str) -> Any:
         """Return a column at some rows: lists as an array (k, width), others as a list."""
@@ -276,15 +297,16 @@ def _arrow(path: Path) -> Iterator[Any]:
 def open_shard(path: Path, reduction: Reduction) -> Shard:
     """Map a shard into memory. Raises `DataError`: it is damaged, or was made with other bases or another library."""
     with _arrow(path) as pa:
-        with pa.memory_map(str(path)) as mapped:
-            file = pa.ipc.open_file(mapped)
+        with path.open("rb") as opened:
+            mapped = mmap.mmap(opened.fileno(), 0, access=mmap.ACCESS_READ)
+            file = pa.ipc.open_file(pa.BufferReader(pa.py_buffer(mapped)))
             metadata = file.schema.metadata or {}
             about = json.loads(metadata.get(_ABOUT, b"{}"))
             digest = metadata.get(_BASES, str(about.get("bases", "")).encode()).decode()
             if file.num_record_batches and len(file.schema):
                 batches = tuple(file.get_batch(b) for b in range(file.num_record_batches))
             else:  # of a piece in which nothing could be read
-                return Shard(path, ())
+                return Shard(path, (), mapped)
         if about.get("task") != TASK:
             raise ValueError(f"a file of the task {about.get('task')!r}")
         _check_columns(pa, batches, reduction)
@@ -293,7 +315,9 @@ def open_shard(path: Path, reduction: Reduction) -> Shard:
             f"expected {path} to be made with the bases beside it, got a shard of other bases or another library; "
             "keep the shards of one library in one folder"
         )
-    return Shard(path, batches)
+    shard = Shard(path, batches, mapped)
+    shard.advise("RANDOM")  # a few rows of each: what lies beside them is not read
+    return shard
 
 
 def _check_columns(pa: Any, batches: Sequence[Any], reduction: Reduction) -> None:
