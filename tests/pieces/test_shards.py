@@ -14,9 +14,10 @@ from kineme.pieces.search import open_shards
 from kineme.pieces.shards import open_shard, read_reduction, shard_table, write_reduction, write_shard
 from kineme.similarity.bounds import reduce_features
 from kineme.similarity.describe import feature_rows
+from soaking import some
 
 
-@pytest.fixture(scope="module", params=[1, 2, 3])
+@pytest.fixture(scope="module", params=some([1, 2, 3], 1))
 def made(request, tmp_path_factory):
     """The reduction of a library, an archive, and the folder of its shards."""
     folder = tmp_path_factory.mktemp("shards")
