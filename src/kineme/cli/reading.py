@@ -30,6 +30,8 @@ class Recording(click.Path):
         """The path; of an empty text none, since it would mean the current folder."""
         if str(value) == "":
             self.fail("expected a file or a folder, got an empty name; the current folder is .", param, ctx)
+        if "://" in str(value) and not Path(value).exists():
+            return str(value)  # of a store: a path would lose a slash
         return super().convert(value, param, ctx)
 
 
@@ -196,24 +198,16 @@ def _data_sets(paths: Sequence[Path]) -> list[Path] | None:
     return folders if all(map(is_episodic, folders)) else None
 
 
-def _how(options: dict[str, Any], library: Any) -> tuple[Any, Any, dict[str, bool], bool]:
+def _how(options: dict[str, Any], library: Any) -> Any:
     """The layout and the rule of names that the `layout_options` say, the switches, and whether files are joined."""
-    from kineme.io.reading.recordings import NameRule
-    from kineme.movements.tables.layout import Layout
+    from kineme.io.reading.recordings import how_to_read
 
-    layout_options = {name.removesuffix("_column"): value for name, value in options.items()}
-    rule = NameRule(layout_options.pop("label_pattern", None), layout_options.pop("label_by", None))
-    how = {name: layout_options.pop(name, False) for name in ("follow_links", "trim")}
-    join = bool(layout_options.pop("join_files", False))
-    for name in ("fill_gaps", "rows"):  # libraries store what was given
-        if layout_options.get(name) is None:
-            layout_options.pop(name, None)
+    reference = None
     if library is not None:
         from kineme.library.storage.source import known_sources
 
-        layout_options["reference"] = known_sources(library.store)
-    layout_options["kinds"] = dict(layout_options.get("kinds") or ()) or None
-    return Layout(**layout_options), rule, how, join
+        reference = known_sources(library.store)
+    return how_to_read(options, reference)
 
 
 def notes_beside(parsed: Any, options: dict[str, Any], learned: Any) -> list[str]:

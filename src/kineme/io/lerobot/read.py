@@ -53,7 +53,8 @@ def lerobot_parts(
 ) -> Iterator[Callable[[Layout], Parsed]]:
     """Yield parts of a data set, some whole episodes each, as functions from one of `layouts` to its movements.
 
-    A batch of frames and one part are in memory at a time; episodes with these `numbers` are one part. The features are
+    A batch of frames and one part are in memory at a time; episodes with these `numbers` are one part, unless
+    they are a range. The features are
     those of the layouts that the data set can fill. A part whose episodes all are damaged says why in
     `Parsed.left_out`, and has no movements.
     """
@@ -66,9 +67,10 @@ def lerobot_parts(
     if not features:
         _chosen(info, layouts[-1])  # says why
     part: list[Episode] = []
+    in_parts = numbers is None or isinstance(numbers, range)
     for episode in episodes(folder, list(features), numbers):
         part.append(episode)
-        if numbers is None and sum(map(len, part)) * sum(features.values()) >= _NUMBERS:
+        if in_parts and sum(map(len, part)) * sum(features.values()) >= _NUMBERS:
             yield partial(_of_episodes, info, part)
             part = []
     if part:

@@ -6,7 +6,7 @@ import csv
 import io
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -75,6 +75,15 @@ def to_csv(annotations: Sequence[Annotation]) -> bytes:
 def write_csv(path: Path, annotations: Sequence[Annotation], source: Path | None) -> Path:
     """Write `to_csv`."""
     return write_atomically(path, to_csv(annotations))
+
+
+def write_csv_stream(path: Path, parts: Iterable[Sequence[Annotation]]) -> Path:
+    """Write `to_csv` of many annotations, some at a time."""
+    with whole_file(path) as beside, beside.open("wb") as file:
+        file.write(to_csv([]))
+        for annotations in parts:
+            file.write(to_csv(annotations).partition(b"\n")[2])
+    return path
 
 
 def write_json(path: Path, annotations: Sequence[Annotation], source: Path | None) -> Path:

@@ -1,0 +1,158 @@
+"""``kineme gather``: one answer of the parts of a large archive."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import click
+
+from kineme.cli.audit import AuditFiles, audit_text
+from kineme.cli.options import FILE, FOLDER, GroupedCommand, force_option, heading, json_option
+from kineme.cli.output import check_new, say, table, unlisted
+from kineme.cli.pieces import SHOWN, UNFINISHED
+from kineme.reporting.text import counted, printable
+
+
+@click.command(cls=GroupedCommand, short_help="Check the parts of a large archive, and make one answer of them.")
+@click.argument("parts", type=FOLDER)
+@click.option("--partial", is_flag=True, help="Make an answer of the parts that are there, though others are not.")
+@heading("Output")
+@click.option(
+    "--output", "-o", type=click.Path(path_type=Path),
+    help="What to write, as the command itself does: a table of annotate or find, a copy of a data set of annotate, a "
+    "page of audit.  [default: show a summary]",
+)  # fmt: skip
+@click.option("--train-mask", "mask", type=FILE, help="Of an audit: which episodes to train on, .csv or .json.")
+@json_option
+@force_option
+def gather(parts: Path, partial: bool, output: Path | None, mask: Path | None, as_json: bool, force: bool) -> None:
+    """Gather PARTS, the folder of a command with --workers, --scheduler or --shard: check that every piece is there.
+
+    Pieces are compared with the archive as it is now: one whose files have changed since is stale, and its command,
+    called again, does it anew. This is the only step that reads all parts.
+
+    The exit status is 0 if all pieces are there, and 3 if some are missing, stale or failed; then nothing is written
+    without --partial.
+
+    Example: kineme gather out/ -o labels.csv
+    """
+    from kineme.pieces.gather import checked, plan_of, read_run, tables_of
+    from kineme.pieces.tasks import job_of
+
+    asked = read_run(parts)
+    if output is not None:
+        check_new(output, force, *(path for path in asked.archives if Path(path).exists()))
+    job, plan = job_of(asked.task, str(parts), asked.options), plan_of(asked)
+    found = checked(job, plan.pieces)
+    data: dict[str, Any] = {
+        "task": asked.task,
+        "pieces": {
+            "done": len(found.parts), "missing": len(found.missing), "stale": len(found.stale),
+            "failed": len(found.failed), "strange": len(found.strange),
+        },
+        "recordings": sum(part.recordings for _, part in found.parts),
+        "seconds": sum(part.seconds for _, part in found.parts),
+        "problems": [*map(str, plan.problems), *found.problems],
+    }  # fmt: skip
+    words = [found.in_words()]
+    if found.is_complete or partial:
+        words.append(_ANSWERS[asked.task](asked, tables_of(job, found), Files(output, mask, force), data))
+    words += [f"not read: {printable(problem)}" for problem in data["problems"][:SHOWN]]
+    words += unlisted({"problems": data["problems"]}, SHOWN)
+    say(as_json, data, lambda: "\n".join(words))
+    if not found.is_complete:
+        click.get_current_context().exit(UNFINISHED)
+
+
+class Files(NamedTuple):
+    """What to write of all parts."""
+
+    output: Path | None
+    mask: Path | None  # of an audit: the episodes that are kept
+    force: bool
+
+
+def _annotated(asked: Any, tables: Iterable[Any], files: Files, data: dict[str, Any]) -> str:
+    """Write the annotations of all parts; those of kineme find the surest first."""
+    from kineme.io.writing.annotations import Annotation, write_annotations, write_csv_stream
+
+    output = files.output
+    counts: Counter[str] = Counter()
+    seconds: dict[str, float] = defaultdict(float)
+
+    def several() -> Iterable[list[Any]]:
+        for rows in tables:
+            notes = [Annotation(**row) for row in rows.to_pylist()]
+            for note in notes:
+                name = "unknown" if note.unknown else printable(str(note.symbol))
+                counts[name] += 1
+                seconds[name] += note.end - note.start
+            yield notes
+
+    written: list[Path] = []
+    if asked.task == "find":
+        notes = sorted((note for rows in several() for note in rows), key=lambda hit: (-hit.confidence, -hit.p_value))
+        if output is not None:
+            written = write_annotations(output, notes, [Path(path) for path in asked.archives])
+    elif output is not None and output.suffix.lower() == ".csv":
+        written = [write_csv_stream(output, several())]
+    else:
+        notes = [note for rows in several() for note in rows] if output is not None else []
+        if output is not None:
+            written = write_annotations(output, notes, [Path(path) for path in asked.archives])
+        for _ in several():
+            pass
+    data["symbols"] = {name: {"times": n, "seconds": seconds[name]} for name, n in counts.most_common()}
+    data["written"] = list(map(str, written))
+    rows = [(name, f"{n:,}", f"{seconds[name]:,.1f}") for name, n in counts.most_common()]
+    lines = [table(("symbol", "times", "seconds"), rows)] if rows else []
+    return "\n".join([*lines, *(f"written to {printable(path)}" for path in written)])
+
+
+def _audited(asked: Any, tables: Iterable[Any], files: Files, data: dict[str, Any]) -> str:
+    """Compare the episodes of all parts; those that are drawn are read again."""
+    from kineme.audit.run import audit_measured
+    from kineme.io.reading.episodes import read_episodes
+    from kineme.pieces.tasks import measured, numbered
+
+    rows = (row for part in tables for row in measured(part))
+    result = audit_measured(numbered(rows), asked.options["error_rate"])
+    dataset = Path(asked.archives[0])
+    reports = AuditFiles(files.output, files.mask)
+    reports.check(files.force, dataset)
+    said = reports.write(result, dataset, lambda: read_episodes(dataset, rate=asked.options["rate"]), files.force)
+    data |= said
+    return audit_text(result, said)
+
+
+def _inspected(asked: Any, tables: Iterable[Any], files: Files, data: dict[str, Any]) -> str:
+    """Summarize movements by label."""
+    import pyarrow as pa
+
+    if files.output is not None:
+        raise click.UsageError("expected no --output, inspect shows a table; say --json for numbers")
+
+    from kineme.io.inspection.inspect import labels_as_words, summaries, summary_as_data
+    from kineme.pieces.tasks import inspected
+
+    parts = [part.drop_columns(["path", "place"]) for part in tables]
+    if not parts:
+        return "no movements"
+    rows = pa.concat_tables(parts, promote_options="permissive")
+    labels = summaries(inspected(rows))
+    columns = Counter(rows.column("columns").to_pylist())
+    data["labels"] = [summary_as_data(summary) for summary in labels]
+    data["columns"] = dict(columns.most_common())
+    return labels_as_words(labels, f"{counted(rows.num_rows, 'movement')}")
+
+
+#: Task -> what makes one answer of the rows of all parts; it adds to the data of the answer, and returns its words.
+_ANSWERS: dict[str, Callable[[Any, Iterable[Any], Files, dict[str, Any]], str]] = {
+    "annotate": _annotated,
+    "find": _annotated,
+    "audit": _audited,
+    "inspect": _inspected,
+}

@@ -1,0 +1,167 @@
+"""Pieces on an executor: this process, processes of this machine, or the workers of a cluster of Dask."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from functools import partial
+from itertools import islice
+from multiprocessing import get_context
+from typing import Any
+
+import kineme
+from kineme.errors import DataError, SpecificationError
+from kineme.io.records import needs
+from kineme.pieces.plan import Piece
+from kineme.pieces.run import Job, Outcome, failed, run_piece
+
+_AHEAD = 2  # pieces of each worker that wait for it
+_SUBMITTED = 10_000  # pieces that a scheduler holds at once
+_RETRIES = 3
+_ENDED = "the process that worked on it was ended by the system, twice: it may need more memory than there is"
+_THREADS = ("KINEME_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+
+def execute(job: Job, pieces: Sequence[Piece], workers: int | None = None, client: Any = None) -> Iterator[Outcome]:
+    """Yield the outcomes of pieces as they are done: in this process, in `workers` others, or by a client of Dask.
+
+    Raises `SpecificationError`: both are given, or fewer than one worker; `DataError`: workers of a cluster have other
+    versions.
+    """
+    if workers is not None and client is not None:
+        raise SpecificationError("expected workers, or a client, not both")
+    if client is not None:
+        return _on_cluster(job, pieces, client)
+    if workers is None:
+        return map(partial(run_piece, job), pieces)
+    if workers < 1:
+        raise SpecificationError(f"expected at least one worker, got {workers}")
+    return _in_processes(job, pieces, workers)
+
+
+def _in_processes(job: Job, pieces: Sequence[Piece], workers: int) -> Iterator[Outcome]:
+    """Yield outcomes of processes with one thread each.
+
+    When a process is ended from outside, nobody knows by which piece: those under way are done again, each alone, and
+    the one that ends its process a second time fails.
+    """
+    alone: list[Piece] = []
+    waiting = iter(pieces)
+    while True:
+        suspects: list[Piece] = []
+        with _pool(workers) as pool:
+            futures: dict[Future[Outcome], Piece] = {}
+            broken = False
+            while not broken:
+                for piece in islice(waiting, workers * _AHEAD - len(futures)):
+                    try:
+                        futures[pool.submit(run_piece, job, piece)] = piece
+                    except BrokenProcessPool:
+                        suspects.append(piece)
+                        broken = True
+                        break
+                if not futures:
+                    break
+                for future in wait(futures, return_when=FIRST_COMPLETED).done:
+                    piece = futures.pop(future)
+                    try:
+                        yield future.result()
+                    except BrokenProcessPool:
+                        suspects.append(piece)
+                        broken = True
+            suspects += futures.values()
+        alone += suspects
+        if not broken:
+            break
+        for piece in alone:
+            yield _alone(job, piece)
+        alone = []
+
+
+def _alone(job: Job, piece: Piece) -> Outcome:
+    """Return the outcome of a piece in a process of its own."""
+    with _pool(1) as pool:
+        try:
+            return pool.submit(run_piece, job, piece).result()
+        except BrokenProcessPool:
+            return failed(job, piece, _ENDED)
+
+
+@contextmanager
+def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
+    """Context manager: processes that begin anew, and whose libraries use one thread."""
+    before = {name: os.environ.get(name) for name in _THREADS}
+    os.environ.update(dict.fromkeys(_THREADS, "1"))  # they read it when they are imported
+    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
+    try:
+        for _ in range(workers):  # processes are started by work, and have the environment of that moment
+            pool.submit(os.getpid)
+        yield pool
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+
+def _on_cluster(job: Job, pieces: Sequence[Piece], client: Any) -> Iterator[Outcome]:
+    """Yield outcomes of the workers of a cluster; the scheduler holds some thousand pieces at a time."""
+    from distributed import as_completed
+
+    _check_versions(client)
+    waiting = iter(pieces)
+    first = list(islice(waiting, _SUBMITTED))
+    if not first:
+        return
+    piece_of = {}
+
+    def submit(piece: Piece) -> Any:
+        future = client.submit(run_piece, job, piece, pure=False, retries=_RETRIES)
+        piece_of[future.key] = piece
+        return future
+
+    running = as_completed([submit(piece) for piece in first])
+    for future in running:
+        piece = piece_of.pop(future.key)
+        error = future.exception() if future.status in ("error", "lost") else None
+        if future.status == "cancelled":
+            error = DataError("the cluster cancelled it")
+        yield failed(job, piece, f"the cluster gave it up ({error})") if error is not None else future.result()
+        future.release()
+        for other in islice(waiting, 1):
+            running.add(submit(other))
+
+
+def _check_versions(client: Any) -> None:
+    """Refuse a cluster whose workers have other versions: their parts would differ."""
+    try:
+        client.get_versions(check=True)
+    except ValueError as error:
+        raise DataError(f"expected the same versions on all workers, got others: {error}") from error
+    for worker, version in client.run(_version).items():
+        if version != kineme.__version__:
+            raise DataError(
+                f"expected kineme {kineme.__version__} on all workers, got {version} on {worker}; install the same"
+            )
+
+
+def _version() -> str:
+    return kineme.__version__
+
+
+@contextmanager
+def cluster_client(address: str) -> Iterator[Any]:
+    """Context manager: a client of the scheduler of a cluster of Dask at an address, as ``tcp://head:8786``."""
+    with needs("distributed", "use a cluster of Dask", "cluster"):
+        from distributed import Client
+    try:
+        client = Client(address, timeout="10s", set_as_default=False)
+    except (OSError, TimeoutError, ValueError) as error:
+        raise DataError(f"expected a scheduler of Dask at {address}, got none that answers ({error})") from error
+    with client:
+        yield client

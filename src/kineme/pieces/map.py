@@ -1,0 +1,104 @@
+"""A function of the user over the recordings of an archive, piece by piece, on any executor."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from kineme.io.reading.merge_files import Recordings
+from kineme.io.records import needs
+from kineme.pieces.executors import execute
+from kineme.pieces.plan import PIECE_BYTES, plan
+from kineme.pieces.run import Job, Outcome, Source, recordings_of, sweep
+
+Rows = Mapping[str, Sequence[Any]]
+
+
+def map(  # noqa: A001, PLR0913 - as in the standard library, over movements
+    function: Callable[[Recordings], Rows | None],
+    archive: str | Path | Sequence[str | Path],
+    client: Any = None,
+    *,
+    output: str | Path,
+    workers: int | None = None,
+    size: int = PIECE_BYTES,
+    progress: Callable[[Outcome], object] | None = None,
+    **reading: Any,
+) -> list[Outcome]:
+    """Call ``function(recordings)`` for all recordings of an archive, and write the rows that it returns.
+
+    Each piece of `plan` becomes a file ``part-*.parquet`` in the folder `output`, whole or not at all. Called again,
+    pieces whose part is there and fits are skipped: nothing else remembers what is done. An exception fails its piece
+    and no other.
+
+    Parameters
+    ----------
+    function : callable
+        Takes `Recordings`, a file or some episodes at a time; returns name of a column -> values, all equally many, or
+        None for no rows. For processes and clusters it must be a function of a module, found by its name.
+    archive : str, Path, or sequence of them
+        As for `plan`.
+    client : distributed.Client, optional
+        The user's own client of Dask; its workers read the archive and write to `output` themselves.
+    output : str or Path
+        A folder, created if it is not there, that all workers see.
+    workers : int, optional
+        So many processes of this machine; by default the work is done in this process.
+    size : int
+        Of a piece [bytes], see `plan`.
+    progress : callable, optional
+        Called with the outcome of each piece.
+    **reading
+        Options of `kineme.read_recordings`: ``columns``, ``label_by``, ...
+
+    Returns
+    -------
+    list of Outcome
+        One for each piece, in the order of the plan.
+
+    Raises
+    ------
+    DataError
+        Nothing there; workers with other versions; pyarrow is missing.
+    """
+    with needs("pyarrow", "write Parquet", "parquet"):
+        import pyarrow  # noqa: F401 - before any piece is read
+    archives = [archive] if isinstance(archive, (str, Path)) else list(archive)
+    planned = plan([str(each) for each in archives], size, follow_links=bool(reading.get("follow_links")))
+    name = f"{getattr(function, '__module__', '')}.{getattr(function, '__qualname__', type(function).__qualname__)}"
+    specification = {"function": name, "reading": {key: reading[key] for key in sorted(reading)}}
+    job = Job("map", partial(_rows, function, reading), str(output), specification)
+    return run(job, planned.pieces, workers, client, progress)
+
+
+def run(
+    job: Job,
+    pieces: Sequence[Any],
+    workers: int | None = None,
+    client: Any = None,
+    progress: Callable[[Outcome], object] | None = None,
+) -> list[Outcome]:
+    """Do a job on pieces, and return their outcomes in the order of the pieces."""
+    Path(job.output).mkdir(parents=True, exist_ok=True)
+    sweep(Path(job.output), time.time() - _IDLE)
+    outcomes = {}
+    for outcome in execute(job, pieces, workers, client):
+        outcomes[outcome.piece.key] = outcome
+        if progress is not None:
+            progress(outcome)
+    return [outcomes[piece.key] for piece in pieces]
+
+
+_IDLE = 3600.0  # seconds since the last write after which a half-written file is a leftover
+
+
+def _rows(function: Callable[[Recordings], Rows | None], reading: Mapping[str, Any], source: Source) -> Iterable[Any]:
+    import pyarrow as pa
+
+    for recordings in recordings_of(source, reading):
+        rows = function(recordings)
+        if rows is not None:
+            yield rows if isinstance(rows, pa.Table) else pa.table(dict(rows))

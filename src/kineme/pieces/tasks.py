@@ -1,0 +1,186 @@
+"""Commands over pieces: the table of what each writes for a piece, and the rows of its parts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from kineme.audit.run import Measurement, measure_episode
+from kineme.errors import DataError
+from kineme.io.inspection.inspect import Measures, measures_of
+from kineme.io.reading.episodes import read_episodes
+from kineme.io.records import Problem
+from kineme.io.writing.annotations import Annotation
+from kineme.library.annotate import annotate_by
+from kineme.library.recognize import some_of_each_symbol
+from kineme.library.storage.connection import FILE
+from kineme.library.storage.source import known_sources
+from kineme.library.storage.store import Store
+from kineme.movements.channels.channel import recorded_names
+from kineme.movements.tables.layout import Known
+from kineme.pieces.archive import local_copy
+from kineme.pieces.run import Job, Source, recordings_of
+from kineme.recognition.answer import KnownClasses
+
+Options = Mapping[str, Any]
+
+
+class Learned(NamedTuple):
+    """What a process knows of a library, prepared once for all pieces."""
+
+    classes: KnownClasses
+    known: Known
+
+
+@lru_cache(maxsize=1)
+def learned_at(folder: str, version: int) -> Learned:
+    """Return the symbols of a library as they were at a version, whatever is learned meanwhile."""
+    store = Store(Path(folder) / FILE, read_only=True, as_of=version)
+    try:
+        return Learned(some_of_each_symbol(store), known_sources(store))
+    finally:
+        store.close()
+
+
+def annotated(source: Source, options: Options) -> Iterator[Any]:
+    """Yield a row for each stretch of motion, as `kineme annotate` finds it."""
+    import pyarrow as pa
+
+    learned = learned_at(options["library"], options["library_version"])
+    for recordings in recordings_of(source, options["reading"], learned.known):
+        report = annotate_by(learned.classes, recordings, options["error_rate"])
+        source.problems.extend(report.problems)
+        wanted = options.get("symbols")
+        rows = [note for note in report.annotations if wanted is None or note.symbol in wanted]
+        if rows:
+            yield pa.Table.from_pylist([vars(note) for note in rows], annotation_schema())
+
+
+def annotation_schema() -> Any:
+    """Return the columns of annotations."""
+    import pyarrow as pa
+
+    kinds = {"str": pa.string(), "float": pa.float64(), "str | None": pa.string()}
+    return pa.schema([(name, kinds[str(kind)]) for name, kind in Annotation.__annotations__.items()])
+
+
+def measurements(source: Source, options: Options) -> Iterator[Any]:
+    """Yield a row for each episode with what an audit compares: some numbers of it, not its signals."""
+    import pyarrow as pa
+
+    schema = measurement_schema()
+    for unit in source.piece.units:
+        try:
+            with local_copy(unit) as folder:
+                path = folder / unit.name
+                for episode in read_episodes(path, rate=options.get("rate"), numbers=source.piece.numbers):
+                    row = measure_episode(episode)
+                    source.counts["recordings"] += episode.number >= 0
+                    source.counts["seconds"] += row.seconds
+                    yield pa.Table.from_pylist([row._asdict()], schema)
+        except DataError as error:
+            source.problems.append(Problem(unit.name, None, str(error)))
+
+
+def measurement_schema() -> Any:
+    """Return the columns of measurements of episodes."""
+    import pyarrow as pa
+
+    kinds = {
+        "number": pa.int64(), "seconds": pa.float64(), "fps": pa.float64(), "sizes": pa.list_(pa.int32()),
+        "values": pa.list_(pa.float32()), "drawn": pa.list_(pa.float32()), "problems": pa.list_(pa.string()),
+        "notes": pa.list_(pa.string()), "names": pa.list_(pa.string()),
+    }  # fmt: skip
+    return pa.schema([(name, kinds.get(name, pa.string())) for name in Measurement._fields])
+
+
+def measured(table: Any) -> Iterator[Measurement]:
+    """Yield the measurements in the rows of a table."""
+    for row in table.to_pylist():
+        texts = {name: tuple(row[name]) for name in ("problems", "notes", "names", "sizes")}
+        arrays = {name: np.array(row[name], dtype=np.float32) for name in ("values", "drawn")}
+        yield Measurement(**(row | texts | arrays))
+
+
+def numbered(episodes: Iterable[Measurement]) -> Iterator[Measurement]:
+    """Yield episodes with numbers of their own, where files of one set count alike: the next free ones."""
+    taken: set[int] = set()
+    largest = -1
+    for episode in episodes:
+        number = largest + 1 if episode.number in taken else episode.number
+        if number >= 0:
+            taken.add(number)
+            largest = max(largest, number)
+        yield episode._replace(number=number)
+
+
+def inspections(source: Source, options: Options) -> Iterator[Any]:
+    """Yield a row for each movement: its label, length, sampling rate, gaps and extent."""
+    import pyarrow as pa
+
+    for recordings in recordings_of(source, options["reading"]):
+        measures = measures_of(recordings)._asdict()
+        columns = {name: pa.array(values.tolist() if name == "labels" else values) for name, values in measures.items()}
+        columns["labels"] = columns["labels"].cast(pa.string())
+        demos = recordings.demonstrations
+        heads = ", ".join(recorded_names(demos.channels or ())) or f"{demos.n_dims} columns"
+        yield pa.table({
+            "path": [each.path for each in recordings.sources], "place": [each.place for each in recordings.sources],
+            **columns, "columns": pa.array([heads] * len(recordings)).dictionary_encode(),
+        })  # fmt: skip
+
+
+def inspected(table: Any) -> Measures:
+    """Return the measures in the rows of a table."""
+    columns = {name: table.column(name).to_numpy(zero_copy_only=False) for name in Measures._fields}
+    return Measures(**(columns | {"labels": columns["labels"].astype(object)}))
+
+
+class Task(NamedTuple):
+    """A command over pieces."""
+
+    work: Callable[[Source, Options], Iterable[Any]]  # source, all options -> tables
+    takes: frozenset[str]  # options, besides those of reading
+    by_library: bool = False
+    ending: str = ".parquet"
+
+
+#: Name -> command over pieces.
+TASKS: dict[str, Task] = {
+    "annotate": Task(annotated, frozenset({"error_rate"}), by_library=True),
+    "find": Task(annotated, frozenset({"error_rate", "symbols"}), by_library=True),
+    "audit": Task(measurements, frozenset({"rate", "error_rate"})),
+    "inspect": Task(inspections, frozenset()),
+}
+
+
+def job_of(task: str, output: str, options: Options) -> Job:
+    """Return the job of a task with its options, which are plain data.
+
+    The folder of a library says where it is; parts depend on what it holds: its id and its version.
+    """
+    row = TASKS[task]
+    if unknown := sorted(set(options) - row.takes - {"reading", "library", "library_id", "library_version"}):
+        raise DataError(f"expected options of {task} ({', '.join(sorted(row.takes)) or 'none'}), got {unknown[0]!r}")
+    said = {name: value for name, value in options.items() if name != "library"}
+    return Job(task, partial(_work, task, dict(options)), output, said, row.ending)
+
+
+def _work(task: str, options: Options, source: Source) -> Iterable[Any]:
+    """Call the work of a task, found by name where a process begins anew."""
+    return TASKS[task].work(source, options)
+
+
+def plain(options: Options) -> dict[str, Any]:
+    """Return options of reading as JSON holds them, without those that are not given."""
+    return {name: _plain(value) for name, value in sorted(options.items()) if value not in (None, False, ())}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [_plain(each) for each in value]
+    return value
