@@ -77,7 +77,7 @@ class Files(NamedTuple):
 
 def _annotated(asked: Any, tables: Iterable[Any], files: Files, data: dict[str, Any]) -> str:
     """Write the annotations of all parts; those of kineme find the surest first."""
-    from kineme.io.writing.annotations import Annotation, write_annotations, write_csv_stream
+    from kineme.io.writing.annotations import Annotation, write_annotations, write_csv_stream, writer_of
 
     output = files.output
     counts: Counter[str] = Counter()
@@ -95,8 +95,8 @@ def _annotated(asked: Any, tables: Iterable[Any], files: Files, data: dict[str, 
     written: list[Path] = []
     if asked.task == "find":
         notes = sorted((note for rows in several() for note in rows), key=lambda hit: (-hit.confidence, -hit.p_value))
-        if output is not None:
-            written = write_annotations(output, notes, [Path(path) for path in asked.archives])
+        if output is not None:  # in this order, not by recordings
+            written = [writer_of(output, None, []).write(output, notes, None)]
     elif output is not None and output.suffix.lower() == ".csv":
         written = [write_csv_stream(output, several())]
     else:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import os
 import re
+import stat
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from fnmatch import fnmatch
+from functools import lru_cache
 from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
@@ -47,11 +49,6 @@ def is_remote(archive: str) -> bool:
     return bool(_REMOTE.match(archive)) and not archive.startswith("file://")
 
 
-def shown(archive: str) -> str:
-    """Return an archive for a message: without the name and password in its URI."""
-    return _PRIVATE.sub("://", archive)
-
-
 def units_of(archives: Sequence[str], follow_links: bool = False) -> tuple[list[Unit], list[Problem]]:
     """List what is to be read in archives, sorted by name, and what cannot be listed.
 
@@ -75,12 +72,16 @@ def units_of(archives: Sequence[str], follow_links: bool = False) -> tuple[list[
             except OSError as error:
                 problems.append(Problem(entry.name, None, f"expected a file, got {error.strerror or error}"))
     if not units and not problems:
-        raise DataError(f"expected recordings in {', '.join(map(shown, archives))}, found none")
+        raise DataError(f"expected recordings in {', '.join(archives)}, found none")
     return units, problems
 
 
 def _local_unit(archive: str, entry: Entry) -> Unit:
-    data_set = data_set_of(entry.path) if entry.path.is_dir() else None
+    status = os.stat(entry.path)
+    if not stat.S_ISDIR(status.st_mode):
+        name = as_text(entry.relative)
+        return Unit(archive, name, (File(name, status.st_size, str(status.st_mtime_ns)),))
+    data_set = data_set_of(entry.path)
     paths = [entry.path] if data_set is None else data_set.files(entry.path)
     is_archive = data_set is not None and entry.path == Path(archive.removeprefix("file://"))
     files = []
@@ -140,12 +141,23 @@ def _copy(system: Any, path: str, target: Path, file: File) -> None:
 
 
 def _reason(error: BaseException) -> str:
-    return _PRIVATE.sub("://", " ".join(str(error).split()))[:200]
+    return _hidden(" ".join(str(error).split()))[:200]
 
 
+def _hidden(text: str) -> str:
+    """Return a text without names and passwords in URIs."""
+    return _PRIVATE.sub("://", text)
+
+
+@lru_cache(maxsize=16)
 def _open(archive: str) -> tuple[Any, str]:
     """Return the file system of a URI and the path in it: of pyarrow, or of what fsspec knows."""
-    with needs("pyarrow", f"read {shown(archive)}", "parquet"):
+    if _PRIVATE.search(archive):
+        raise SpecificationError(
+            f"expected a URI without a name and password, which would be written to files, got {_hidden(archive)}; say "
+            "them as the store asks for it, such as in AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY"
+        )
+    with needs("pyarrow", f"read {archive}", "parquet"):
         from pyarrow import ArrowException, fs
     try:
         system, path = fs.FileSystem.from_uri(archive)
@@ -158,11 +170,11 @@ def _open(archive: str) -> tuple[Any, str]:
         system, path = fsspec.core.url_to_fs(archive)
     except ImportError as error:
         raise DataError(
-            f"expected a package that opens {shown(archive)}, got none ({_reason(refused)}); pip install fsspec and "
+            f"expected a package that opens {archive}, got none ({_reason(refused)}); pip install fsspec and "
             "the package that it names"
         ) from error
     except (ValueError, OSError) as error:
-        raise SpecificationError(f"expected the URI of an archive, got {shown(archive)}: {_reason(error)}") from error
+        raise SpecificationError(f"expected the URI of an archive, got {archive}: {_reason(error)}") from error
     return fs.PyFileSystem(fs.FSSpecHandler(system)), path
 
 
@@ -176,7 +188,7 @@ def _remote_units(archive: str) -> list[Unit]:
         if top.type != fs.FileType.File:
             found = system.get_file_info(fs.FileSelector(base, recursive=True, allow_not_found=True))
     except (ArrowException, OSError) as error:
-        raise DataError(f"expected to list {shown(archive)}, the store refuses ({_reason(error)})") from error
+        raise DataError(f"expected to list {archive}, the store refuses ({_reason(error)})") from error
     names: dict[str, File] = {}
     for info in found:
         if info.type != fs.FileType.File:

@@ -97,11 +97,12 @@ def plan(archive: str | Sequence[str], size: int = PIECE_BYTES, *, follow_links:
     units, problems = units_of(archives, follow_links)
     pieces: list[Piece] = []
     bundle: list[Unit] = []
+    n_bytes = 0
     for unit in [*units, None]:
         is_new = unit is None or unit.marker or (bundle and bundle[-1].archive != unit.archive)
-        if bundle and (is_new or _is_complete(bundle, size)):
+        if bundle and (is_new or _is_complete(bundle, n_bytes, size)):
             pieces.append(Piece(bundle[0].archive, bundle[0].name, bundle[-1].name, tuple(bundle)))
-            bundle = []
+            bundle, n_bytes = [], 0
         if unit is None:
             break
         if unit.marker == MARKER:
@@ -113,12 +114,12 @@ def plan(archive: str | Sequence[str], size: int = PIECE_BYTES, *, follow_links:
             pieces.append(Piece(unit.archive, unit.name, unit.name, (unit,)))
         else:
             bundle.append(unit)
+            n_bytes += unit.files[0].size
     return Plan(tuple(pieces), tuple(problems))
 
 
-def _is_complete(bundle: Sequence[Unit], size: int) -> bool:
+def _is_complete(bundle: Sequence[Unit], n_bytes: int, size: int) -> bool:
     """Tell whether a bundle ends here: it is large, or large enough and its last name says so."""
-    n_bytes = sum(file.size for unit in bundle for file in unit.files)
     if n_bytes >= 2 * size or len(bundle) >= _MOST_FILES:
         return True
     ends = zlib.crc32(bundle[-1].name.encode()) % _ENDS == 0
