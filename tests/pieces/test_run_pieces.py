@@ -21,7 +21,7 @@ from kineme.errors import SpecificationError
 from kineme.pieces import map as map_pieces
 from kineme.pieces import plan, run
 from kineme.pieces.executors import execute
-from kineme.pieces.map import _rows
+from kineme.pieces.mapping import _rows
 from kineme.pieces.run import Job, read_part, sweep
 
 SIZE = 6000

@@ -70,7 +70,7 @@ def in_pieces(  # noqa: PLR0913 - what a command knows when it hands its work on
     from kineme.io.records import needs
     from kineme.pieces.executors import cluster_client
     from kineme.pieces.gather import Asked, plan_of, write_run
-    from kineme.pieces.map import run
+    from kineme.pieces.mapping import run
     from kineme.pieces.run import FAILED, summary_of
     from kineme.pieces.tasks import job_of, plain
 

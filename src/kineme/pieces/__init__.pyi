@@ -1,10 +1,10 @@
 # An archive in pieces
-from kineme.pieces.plan import plan as plan
-from kineme.pieces.plan import Plan as Plan
-from kineme.pieces.plan import Piece as Piece
+from kineme.pieces.planning import plan as plan
+from kineme.pieces.planning import Plan as Plan
+from kineme.pieces.planning import Piece as Piece
 
 # A function over all pieces, and what it left in a folder
-from kineme.pieces.map import map as map  # noqa: A004
+from kineme.pieces.mapping import map as map  # noqa: A004
 from kineme.pieces.run import Outcome as Outcome
 from kineme.pieces.gather import check as check
 from kineme.pieces.gather import Checked as Checked

@@ -15,7 +15,7 @@ from typing import Any
 import kineme
 from kineme.errors import DataError, SpecificationError
 from kineme.io.records import needs
-from kineme.pieces.plan import Piece
+from kineme.pieces.planning import Piece
 from kineme.pieces.run import Job, Outcome, failed, run_piece
 
 _AHEAD = 2  # pieces of each worker that wait for it
@@ -125,7 +125,7 @@ def _on_cluster(job: Job, pieces: Sequence[Piece], client: Any) -> Iterator[Outc
         piece_of[future.key] = piece
         return future
 
-    running = as_completed([submit(piece) for piece in first])
+    running = as_completed([submit(piece) for piece in first], loop=client.loop)
     for future in running:
         piece = piece_of.pop(future.key)
         error = future.exception() if future.status in ("error", "lost") else None
@@ -155,12 +155,15 @@ def _version() -> str:
 
 
 @contextmanager
-def cluster_client(address: str) -> Iterator[Any]:
-    """Context manager: a client of the scheduler of a cluster of Dask at an address, as ``tcp://head:8786``."""
+def cluster_client(address: str, timeout: float = 10.0) -> Iterator[Any]:
+    """Context manager: a client of the scheduler of a cluster of Dask at an address, as ``tcp://head:8786``.
+
+    It waits so long for the scheduler to answer [s].
+    """
     with needs("distributed", "use a cluster of Dask", "cluster"):
         from distributed import Client
     try:
-        client = Client(address, timeout="10s", set_as_default=False)
+        client = Client(address, timeout=timeout, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         raise DataError(f"expected a scheduler of Dask at {address}, got none that answers ({error})") from error
     with client:

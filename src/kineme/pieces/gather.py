@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from kineme.errors import DataError
-from kineme.pieces.plan import PIECE_BYTES, Piece, plan
+from kineme.pieces.planning import PIECE_BYTES, Piece, plan
 from kineme.pieces.run import Job, Part, read_part
 from kineme.pieces.tasks import job_of
 from kineme.reporting.atomic import whole_file

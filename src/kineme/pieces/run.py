@@ -21,7 +21,7 @@ from kineme.io.reading.recordings import how_to_read
 from kineme.io.records import Problem
 from kineme.movements.tables.layout import Known
 from kineme.pieces.archive import is_remote, local_copy
-from kineme.pieces.plan import Piece
+from kineme.pieces.planning import Piece
 from kineme.reporting.atomic import whole_file, write_atomically
 from kineme.reporting.text import counted, shortened
 

@@ -11,7 +11,7 @@ from typing import Any
 from kineme.io.reading.merge_files import Recordings
 from kineme.io.records import needs
 from kineme.pieces.executors import execute
-from kineme.pieces.plan import PIECE_BYTES, plan
+from kineme.pieces.planning import PIECE_BYTES, plan
 from kineme.pieces.run import Job, Outcome, Source, recordings_of, sweep
 
 Rows = Mapping[str, Sequence[Any]]
