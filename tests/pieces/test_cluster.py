@@ -82,5 +82,8 @@ def test_another_version_on_a_worker_is_refused(client, tmp_path, monkeypatch):
 
 
 def test_a_scheduler_that_is_not_there_is_said():
-    with pytest.raises(DataError, match="expected a scheduler of Dask"), cluster_client("tcp://127.0.0.1:9", timeout=0.3):
+    with (
+        pytest.raises(DataError, match="expected a scheduler of Dask"),
+        cluster_client("tcp://127.0.0.1:9", timeout=0.3),
+    ):
         pass

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import errno
 import json
+import os
 import re
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -24,6 +25,7 @@ from kineme.pieces.archive import is_remote, local_copy
 from kineme.pieces.planning import Piece
 from kineme.reporting.atomic import whole_file, write_atomically
 from kineme.reporting.text import counted, shortened
+from kineme.runtime.compiled import CHOICE
 
 DONE, SKIPPED, FAILED = "done", "skipped", "failed"
 
@@ -120,7 +122,8 @@ def run_piece(job: Job, piece: Piece) -> Outcome:
         return Outcome(piece, SKIPPED, "", part.rows, part.problems)
     source = Source(piece, [], {"recordings": 0, "seconds": 0.0})
     try:
-        tables = list(job.work(source))
+        with _compiled_always():
+            tables = list(job.work(source))
         _check_unchanged(piece)
         problems = tuple(str(problem) for problem in source.problems)
         rows = _write(path, tables, {_ABOUT: about, _REPORT: {"problems": problems, **source.counts}})
@@ -133,6 +136,18 @@ def run_piece(job: Job, piece: Piece) -> Outcome:
     done = time.process_time() - before
     counts = int(source.counts["recordings"]), float(source.counts["seconds"])
     return Outcome(piece, DONE, "", rows, problems, *counts, done)
+
+
+@contextmanager
+def _compiled_always() -> Iterator[None]:
+    """Context manager: loops are compiled, however little work there is, so that all processes get the same digits."""
+    before = os.environ.get(CHOICE)
+    os.environ[CHOICE] = before or "always"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[CHOICE]
 
 
 def failed(job: Job, piece: Piece, reason: str, processor: float = 0.0) -> Outcome:
