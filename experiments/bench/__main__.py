@@ -43,6 +43,7 @@ SUBJECTS = (
     "anchoring",
     "annotate",
     "motion_layer",
+    "pieces",
     "page",
     "migrating",
     "studio",
