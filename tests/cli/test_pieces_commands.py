@@ -153,3 +153,10 @@ def test_a_folder_without_parts_is_said(tmp_path):
 def test_an_archive_elsewhere_needs_a_folder_of_parts(work):
     done = run("annotate", "s3://fleet/sets", "-l", work / "actions")
     assert (done.returncode, "an archive in a store" in done.stderr) == (2, True)
+
+
+def test_commands_that_read_at_once_refuse_an_archive_elsewhere(work):
+    done = run("recognize", "s3://fleet/sets", "-l", work / "actions")
+    assert (done.returncode, "of this machine, got s3://fleet/sets" in done.stderr) == (2, True)
+    done = run("audit", "s3://fleet/sets")
+    assert (done.returncode, "an archive in a store" in done.stderr) == (2, True)

@@ -21,11 +21,12 @@ from kineme.cli.options import (
 )
 from kineme.cli.output import check_new, progress, say
 from kineme.cli.pieces import how_divided, in_pieces, pieces_options
+from kineme.cli.reading import Recording
 from kineme.reporting.text import printable
 
 
 @click.command(cls=GroupedCommand, short_help="Find the bad episodes of a set of robot data.")
-@click.argument("dataset", type=click.Path(path_type=Path))
+@click.argument("dataset", type=Recording(allow_dash=False))
 @error_rate_option("Share of good episodes that may be flagged.")
 @click.option("--rate", type=Finite(0, min_open=True), help="Samples per second, where the data set does not say it.")
 @under(

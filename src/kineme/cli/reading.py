@@ -21,17 +21,19 @@ STANDARD_INPUT = "standard input.csv"
 
 
 class Recording(click.Path):
-    """A file, a folder or a pattern of them."""
+    """A file, a folder or a pattern of them; of commands that work in pieces, the URI of an archive, too."""
 
-    def __init__(self) -> None:
-        super().__init__(allow_dash=True, path_type=Path)
+    def __init__(self, allow_dash: bool = True) -> None:
+        super().__init__(allow_dash=allow_dash, path_type=Path)
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Any:
-        """The path; of an empty text none, since it would mean the current folder."""
+        """The path; of an empty text none, since it would mean the current folder. A URI stays a text."""
         if str(value) == "":
             self.fail("expected a file or a folder, got an empty name; the current folder is .", param, ctx)
-        if "://" in str(value) and not Path(value).exists():
-            return str(value)  # of a store: a path would lose a slash
+        if "://" in str(value) and not Path(value).exists():  # a path would lose a slash
+            if not any(option.name == "shard" for option in ctx.command.params):
+                self.fail(f"expected a file or folder of this machine, got {value}; copy it first", param, ctx)
+            return str(value)
         return super().convert(value, param, ctx)
 
 
