@@ -88,8 +88,8 @@ def _local_unit(archive: str, entry: Entry) -> Unit:
     for path in paths:
         status = os.stat(path)
         inside = path.relative_to(entry.path)
-        name = inside if is_archive else entry.relative / inside
-        files.append(File(as_text(name), status.st_size, str(status.st_mtime_ns)))
+        relative = inside if is_archive else entry.relative / inside
+        files.append(File(as_text(relative), status.st_size, str(status.st_mtime_ns)))
     marker = "" if data_set is None else data_set.marker
     return Unit(archive, as_text(entry.relative), tuple(files), marker, is_archive)
 
