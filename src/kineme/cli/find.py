@@ -7,14 +7,7 @@ from typing import Any
 
 import click
 
-from kineme.cli.options import (
-    GroupedCommand,
-    error_rate_option,
-    force_option,
-    heading,
-    json_option,
-    library_option,
-)
+from kineme.cli.options import GroupedCommand, error_rate_option, force_option, heading, json_option, library_option
 from kineme.cli.output import check_new, progress, say, stretch_cells, table, unlisted
 from kineme.cli.pieces import how_divided, in_pieces, pieces_options
 from kineme.cli.reading import files_of, layout_options, problem_lines, recordings_argument
