@@ -35,6 +35,7 @@ from kineme.recognition.compared_windows import (
     surroundings,
 )
 from kineme.recognition.conformal import Calibration, check_error_rate, class_probabilities, distances
+from kineme.recognition.edges import pauses, settled, uncertainties
 from kineme.recognition.levels import level_scores
 from kineme.sampling import evenly_spaced
 from kineme.similarity.comparison import References
@@ -77,6 +78,8 @@ class Spotted(NamedTuple):
     p_known : float
         As `Answer.p_known`: share of movements of known classes that would be as novel or more. It may be below the
         error rate: a movement in a recording is cut by the search itself, which makes it somewhat more novel.
+    uncertainty : float
+        Half of the 95 % interval of start and end [s], of the less certain one; see `edges.uncertainties`.
     """
 
     start: float
@@ -84,6 +87,7 @@ class Spotted(NamedTuple):
     label: Label | None
     confidence: float
     p_known: float = math.nan  # of records that were stored without
+    uncertainty: float = math.nan
 
 
 def spot(
@@ -113,6 +117,12 @@ def spot(
     rows = np.concatenate((chosen, unknown))
     if not len(rows):
         return []
+    rests = pauses(windows.motion)
+    if templates.levels is not None and lasting is not None:
+        known = np.arange(len(rows)) < len(best)
+        rows = settled(windows.motion, rests, rows, known, np.array(templates.levels.columns))
+        rows = rows[rows[:, 1] > 0]
+    doubts = uncertainties(windows.motion, rests, rows).tolist()
     logs, similar = score(comparison, references, pieces_of(timed, rows), nearest, nearest_each)
     if templates.levels is not None:
         ends = np.column_stack((rows[:, 0], rows[:, 1] - 1))
@@ -122,10 +132,10 @@ def spot(
     confidence = 1.0 - p_known
     confidence[: len(best)] = class_probabilities(similar, calibration.exponent)[np.arange(len(best)), best]
     classes = references.classes.tolist()
-    labels = [*(classes[c] for c in best.tolist()), *([None] * len(unknown))]
+    labels = [*(classes[c] for c in best.tolist()), *([None] * (len(rows) - len(best)))]
     t = timed.times
     return [
-        Spotted(float(t[rows[i, 0]]), float(t[rows[i, 1] - 1]), labels[i], float(confidence[i]), float(p_known[i]))
+        Spotted(*t[rows[i] - (0, 1)].tolist(), labels[i], float(confidence[i]), float(p_known[i]), doubts[i])
         for i in np.argsort(rows[:, 0], kind="stable").tolist()
     ]
 
