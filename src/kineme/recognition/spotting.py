@@ -35,7 +35,7 @@ from kineme.recognition.compared_windows import (
     surroundings,
 )
 from kineme.recognition.conformal import Calibration, check_error_rate, class_probabilities, distances
-from kineme.recognition.edges import pauses, settled, uncertainties
+from kineme.recognition.edges import placed
 from kineme.recognition.levels import level_scores
 from kineme.sampling import evenly_spaced
 from kineme.similarity.comparison import References
@@ -79,7 +79,7 @@ class Spotted(NamedTuple):
         As `Answer.p_known`: share of movements of known classes that would be as novel or more. It may be below the
         error rate: a movement in a recording is cut by the search itself, which makes it somewhat more novel.
     uncertainty : float
-        Half of the 95 % interval of start and end [s], of the less certain one; see `edges.uncertainties`.
+        Half of the 95 % interval of start and end [s], of the less certain one; see `kineme.recognition.edges`.
     """
 
     start: float
@@ -115,14 +115,10 @@ def spot(
     least = 0.0 if lasting is None else _LEAST_UNKNOWN * float(lasting.min())
     unknown = _left_over(chosen, windows.bouts, timed.times, least)
     rows = np.concatenate((chosen, unknown))
+    longest = None if lasting is None else float(lasting.max())
+    rows, doubts = placed(windows.motion, rows, np.arange(len(rows)) < len(best), templates.levels, longest)
     if not len(rows):
         return []
-    rests = pauses(windows.motion)
-    if templates.levels is not None and lasting is not None:
-        known = np.arange(len(rows)) < len(best)
-        rows = settled(windows.motion, rests, rows, known, np.array(templates.levels.columns))
-        rows = rows[rows[:, 1] > 0]
-    doubts = uncertainties(windows.motion, rests, rows).tolist()
     logs, similar = score(comparison, references, pieces_of(timed, rows), nearest, nearest_each)
     if templates.levels is not None:
         ends = np.column_stack((rows[:, 0], rows[:, 1] - 1))
@@ -135,7 +131,7 @@ def spot(
     labels = [*(classes[c] for c in best.tolist()), *([None] * (len(rows) - len(best)))]
     t = timed.times
     return [
-        Spotted(*t[rows[i] - (0, 1)].tolist(), labels[i], float(confidence[i]), float(p_known[i]), doubts[i])
+        Spotted(*t[rows[i] - (0, 1)].tolist(), labels[i], float(confidence[i]), float(p_known[i]), float(doubts[i]))
         for i in np.argsort(rows[:, 0], kind="stable").tolist()
     ]
 
