@@ -129,10 +129,10 @@ def spot(
     confidence[: len(best)] = class_probabilities(similar, calibration.exponent)[np.arange(len(best)), best]
     classes = references.classes.tolist()
     labels = [*(classes[c] for c in best.tolist()), *([None] * (len(rows) - len(best)))]
-    t = timed.times
+    start, end = timed.times[rows - (0, 1)].T.tolist()
+    certainties = np.column_stack((confidence, p_known, doubts)).tolist()
     return [
-        Spotted(*t[rows[i] - (0, 1)].tolist(), labels[i], float(confidence[i]), float(p_known[i]), float(doubts[i]))
-        for i in np.argsort(rows[:, 0], kind="stable").tolist()
+        Spotted(start[i], end[i], labels[i], *certainties[i]) for i in np.argsort(rows[:, 0], kind="stable").tolist()
     ]
 
 
