@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -11,13 +9,15 @@ from hypothesis import strategies as st
 
 from kineme import Trajectory
 from kineme.movements.segmentation.table import observe
-from kineme.recognition.edges import pauses, placed, settled
+from kineme.recognition.edges import pauses, placed, settled, speeds
+from kineme.recognition.levels import Levels
 
 RATE = 50.0
 FAR = np.array([1.0, -0.6, 0.3])
+LEVELS = Levels((3,), np.array([0.8]), np.empty((0, 3)), np.empty(0, dtype=np.intp))
 
 
-def _motion(*steps, noise=2e-4):
+def _motion(*steps, noise=2e-4, unit=1.0):
     """Steps are (seconds, way of the arm, way of the gripper) with least jerk, from rest to rest; return their ends."""
     rng, at, parts, ends = np.random.default_rng(0), np.zeros(4), [np.zeros((1, 4))], [0.0]
     for seconds, way, grip in steps:
@@ -27,7 +27,7 @@ def _motion(*steps, noise=2e-4):
         at = goal
         ends.append(ends[-1] + round(seconds * RATE) / RATE)
     positions = np.concatenate(parts)
-    positions = positions + rng.normal(scale=noise, size=positions.shape)
+    positions = (positions + rng.normal(scale=noise, size=positions.shape)) * [1.0, 1.0, 1.0, unit]
     return observe(Trajectory(np.arange(len(positions)) / RATE, positions), 0.04), np.array(ends)
 
 
@@ -40,14 +40,23 @@ def _spans(motion, rows):
 
 
 def _settled(motion, known, *spans):
-    return settled(motion, pauses(motion), _rows(*spans), np.array(known), (3,))
+    return _settled_rows(motion, _rows(*spans), np.array(known))
+
+
+def _settled_rows(motion, rows, known):
+    arm, grippers = speeds(motion, LEVELS)
+    return settled(motion.times, arm, _pauses(motion, np.hypot(arm, grippers)), rows, known)
+
+
+def _pauses(motion, speed):
+    return pauses(motion.times, speed, 0.05, 0.25 / motion.cutoff)
 
 
 @given(st.floats(0.5, 2.0), st.floats(0.5, 2.0), st.floats(0.2, 1.0))
 def test_pauses_are_from_the_end_of_one_movement_to_the_begin_of_the_next(first, second, rest):
     motion, ends = _motion((0.5, 0, 0), (first, 1, 0), (rest, 0, 0), (second, -1, 0), (0.5, 0, 0))
     near = 0.05 + 0.05 * max(first, second)  # beside a fast movement a slow one is seen late
-    assert pauses(motion) == pytest.approx(np.reshape(ends, (3, 2)), abs=near)
+    assert _pauses(motion, motion.speed / motion.peak) == pytest.approx(np.reshape(ends, (3, 2)), abs=near)
 
 
 def test_edges_move_to_the_pause_that_is_near():
@@ -81,11 +90,25 @@ def test_a_hand_that_opens_at_rest_is_no_part_of_what_comes_next():
     assert _spans(motion, rows)[2] == pytest.approx(ends[2:4], abs=0.08)
 
 
+def test_an_opening_in_percent_does_not_hide_the_arm():
+    steps = (0.5, 0, 0), (1.5, 1, 0), (0.5, 0, 0), (0.5, 0, 0.8), (0.5, 0, 0), (1.5, -1, 0), (0.5, 0, 0)
+    motion, ends = _motion(*steps, unit=100.0)
+    levels = LEVELS._replace(ranges=np.array([80.0]))
+    rows, _ = placed(motion, _rows((0.4, 2.1), (3.5, 5.0)), np.array([True, True]), levels, 2.0)
+    assert _spans(motion, rows) == pytest.approx(ends[[1, 2, 5, 6]].reshape(2, 2), abs=0.1)
+
+
+def test_a_gripper_that_does_not_move_does_not_hide_a_rest():
+    motion, ends = _motion((0.5, 0, 0), (1.0, 1, 0), (0.8, 0, 0), (1.2, -1, 0), (0.5, 0, 0), noise=1e-3)
+    rows = _settled(motion, [True, True], (0.4, 1.6), (1.9, 3.4))
+    assert _spans(motion, rows) == pytest.approx(ends[1:5].reshape(2, 2), abs=0.08)
+
+
 def test_known_movements_of_few_samples_are_kept():
     t = np.arange(40) / 5.0
     positions = np.repeat(np.sin(0.4 * np.pi * t)[:, None] ** 3, 4, axis=1) * [1.0, 0.5, 0.2, 0.0]
     motion = observe(Trajectory(t, positions), 0.04)
-    rows = settled(motion, pauses(motion), np.array([[0, 6], [6, 12]]), np.array([True, False]), (3,))
+    rows = _settled_rows(motion, np.array([[0, 6], [6, 12]]), np.array([True, False]))
     assert rows.tolist() == [[0, 6], [0, 0]]
 
 
@@ -101,32 +124,30 @@ def test_movements_stay_in_order_and_apart(steps, seed):
     rows = rows[np.diff(rows, axis=1)[:, 0] >= 8]
     order = rng.permutation(len(rows))
     known = rng.random(len(rows)) < 0.6
-    levels = SimpleNamespace(columns=(3,))
-    kept, doubts = placed(motion, rows[order], known, levels, 2.0)
+    kept, doubts = placed(motion, rows[order], known, LEVELS, 2.0)
     assert len(kept) == len(doubts)
     assert known.sum() <= len(kept) <= len(rows)
     spans = kept[np.argsort(kept[:, 0])]
     assert (spans[:, 1] - spans[:, 0] >= 8).all()
-    assert (spans[1:, 0] >= spans[:-1, 1] - 8).all()
+    assert (spans[1:, 0] >= spans[:-1, 1] - 0.2 * RATE - 1).all()  # known ones of too few samples stay where they were
     assert (doubts >= 1.0 / motion.cutoff - 1e-12).all()
     assert (doubts <= max(0.12 * 2.0, 1.0 / motion.cutoff) + 1e-12).all()
 
 
 def test_an_edge_is_the_less_certain_the_longer_it_is_slow_there():
-    levels = SimpleNamespace(columns=(3,))
     doubts = []
     for seconds in (0.8, 4.0):
         motion, ends = _motion((0.5, 0, 0), (seconds, 1, 0), (0.5, 0, 0))
-        rows, (doubt,) = placed(motion, _rows(ends[1:3]), np.array([True]), levels, 5.0)
+        rows, (doubt,) = placed(motion, _rows(ends[1:3]), np.array([True]), LEVELS, 5.0)
         assert np.abs(_spans(motion, rows) - ends[1:3]).max() < doubt
         doubts.append(doubt)
     assert doubts[1] > 2.0 * doubts[0]
+    assert doubts[1] < 0.9 * 0.12 * 4.0  # which it would be if the rest beside it counted
 
 
 def test_where_nothing_slows_down_the_share_of_windows_counts():
     motion, _ = _motion((0.5, 0, 0), (3.0, 1, 0), (0.5, 0, 0))
-    levels = SimpleNamespace(columns=(3,))
-    _, doubts = placed(motion, _rows((0.5, 2.0), (2.0, 3.5)), np.array([True, True]), levels, 2.0)
+    _, doubts = placed(motion, _rows((0.5, 2.0), (2.0, 3.5)), np.array([True, True]), LEVELS, 2.0)
     assert doubts == pytest.approx(0.12 * 1.5, abs=0.01)
 
 
@@ -141,6 +162,6 @@ def test_without_a_gripper_edges_stay_and_their_uncertainty_is_a_share_of_the_du
 
 def test_nothing_is_placed_where_nothing_is_found():
     motion, _ = _motion((0.5, 0, 0), (1.0, 1, 0), (0.5, 0, 0))
-    for levels in (None, SimpleNamespace(columns=(3,))):
+    for levels in (None, LEVELS):
         rows, doubts = placed(motion, np.empty((0, 2), dtype=np.intp), np.empty(0, dtype=bool), levels, 1.0)
         assert len(rows) == len(doubts) == 0

@@ -9,16 +9,17 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.movements.segmentation.table import Motion, Rows, moving_bouts
+from kineme.movements.segmentation.table import Motion, Rows, moving_bouts, weighted_quantile
 from kineme.recognition.compared_windows import MIN_SAMPLES
 from kineme.recognition.levels import Levels
 from kineme.validation import Array
 
 _REST = 0.05  # share of the peak speed below which an arm rests
+_CLOSING = 1.875  # least peak speed of a gripper, in its range [1/s]
 _LATE = 0.1  # longest extrapolation of an onset, as a share of the bout
 _BLUR = 0.25  # time that smoothing moves a crossing outward, in cycles at the cutoff
 _NEAR = 0.2  # distance of an edge from the pause that it is moved to, at most [s]
-_SHORT = 0.15  # a shorter pause is one boundary, a shorter movement none [s]
+_SHORT = 0.15  # a shorter pause is one boundary [s]
 _SLIVER = 0.5  # shorter motion that nothing parts from a movement belongs to it [s]
 _SLOW = 0.1  # share of the peak speed below which a movement may begin or end
 _SHARE = 0.12  # distance of the edges of windows, in durations of the shortest windows between them
@@ -39,20 +40,35 @@ def placed(
     if levels is None or longest is None:
         lasting = motion.times[rows[:, 1] - 1] - motion.times[rows[:, 0]]
         return rows, _BY_WINDOWS * (lasting if longest is None else np.minimum(lasting, longest))
-    rests = pauses(motion)
-    rows = settled(motion, rests, rows, known, levels.columns)
+    t, arm, tools = motion.times, *speeds(motion, levels)
+    speed, noise = np.hypot(arm, tools), motion.noise / motion.peak
+    rests = pauses(t, speed, max(_REST, 2.0 * noise), _BLUR / motion.cutoff)
+    rows = settled(t, arm, rests, rows, known)
     rows = rows[rows[:, 1] > 0]
-    return rows, _by_speed(motion, rests, rows, longest)
+    return rows, _by_speed(t, speed, rests, rows, longest, 1.0 / motion.cutoff)
 
 
-def pauses(motion: Motion) -> Array:
+def speeds(motion: Motion, levels: Levels) -> tuple[Array, Array]:
+    """Return the speeds of an arm and of its grippers (T,), each as a share of its own peak.
+
+    So an opening in percent does not hide joints in radians. Nine tenths of a path are covered below its peak speed;
+    that of grippers is at least 1.875 of their range in the demonstrations in a second: what least jerk over it takes
+    (they may not move at all).
+    """
+    arm, grippers = np.delete(motion.positions, levels.columns, axis=1), motion.positions[:, levels.columns]
+    ways, least = (arm, grippers / levels.ranges), (np.finfo(float).tiny, _CLOSING)
+    rates = [np.linalg.norm(np.gradient(way, motion.times, axis=0), axis=1) for way in ways]
+    shares = [rate / max(weighted_quantile(rate, rate, 0.9), slow) for rate, slow in zip(rates, least, strict=True)]
+    return shares[0], shares[1]
+
+
+def pauses(t: Array, speed: Array, low: float, blur: float) -> Array:
     """Return rests between bouts of motion, from when to when (p, 2) [s]; before the first and after the last too.
 
-    Speed grows at first about as the square of the time since the onset, which so lies as far before the crossing of a
-    level as that lies before the crossing of four times the level; smoothing moves crossings outward.
+    Bouts are faster than `low`, somewhere twice as fast. Speed grows at first about as the square of the time since the
+    onset, which so lies as far before the crossing of a level as that lies before the crossing of four times the level;
+    smoothing moves crossings outward, by `blur` [s].
     """
-    t, speed = motion.times, motion.speed
-    low = max(_REST * motion.peak, 2.0 * motion.noise)
     bouts = moving_bouts(speed, low, 2.0 * low)
     if not len(bouts):
         return np.array([[t[0], t[-1]]])
@@ -60,34 +76,34 @@ def pauses(motion: Motion) -> Array:
     peaks = np.maximum.reduceat(np.append(speed, 0.0), bouts.ravel())[::2]
     higher = np.flatnonzero((owner >= 0) & (speed >= np.minimum(4.0 * low, 0.9 * peaks)[owner]))
     first, last = bouts[:, 0], bouts[:, 1] - 1
-    longest, blur = _LATE * (t[last] - t[first]), _BLUR / motion.cutoff
+    longest = _LATE * (t[last] - t[first])
     begin = t[first] - np.minimum(t[higher[np.searchsorted(higher, first)]] - t[first], longest) + blur
     end = t[last] + np.minimum(t[last] - t[higher[np.searchsorted(higher, last, side="right") - 1]], longest) - blur
     rests = np.column_stack((np.append(t[0], end), np.append(begin, t[-1])))
     return np.asarray(rests[rests[:, 1] > rests[:, 0]])
 
 
-def settled(motion: Motion, rests: Array, rows: Rows, known: NDArray[np.bool_], tools: tuple[int, ...]) -> Rows:
+def settled(t: Array, arm: Array, rests: Array, rows: Rows, known: NDArray[np.bool_]) -> Rows:
     """Return movements of an arm at work, first sample and one past the last (n, 2), with edges at rests (p, 2) [s].
 
-    Each edge is moved to the rest within 0.2 s, if there is one: a movement begins where the rest ends. Between two
-    that are less than 0.15 s apart is one boundary. Of motion that is not `known` (n,), less than half a second beside
-    a known movement, from which no rest parts it, belongs to that, unless only tools move: coordinates `tools`, such as
-    grippers. Such rows, and unknown ones that are too short, then have no samples.
+    Each edge is moved to the rest within 0.2 s, if there is one on its side of the middle: a movement begins where the
+    rest ends. Between two that are less than 0.15 s apart is one boundary. Of motion that is not `known` (n,), less
+    than half a second beside a known movement, from which no rest parts it, belongs to that, if the arm moves: `arm`
+    (T,) is its speed in shares of the peak. Such rows, and unknown ones that are too short, then have no samples.
     """
     order = np.argsort(rows[:, 0], kind="stable")
-    t = motion.times
     start, end = t[rows[order] - (0, 1)].T
+    middle = 0.5 * (start + end)
     before = rests[_nearest(rests, start)]
-    near = (_distance(before, start) <= _NEAR) & (before[:, 1] < end - _SHORT)
+    near = (_distance(before, start) <= _NEAR) & (before[:, 1] < middle)
     start = np.where(near, before[:, 1], start)
     after = rests[_nearest(rests, end)]
-    near = (_distance(after, end) <= _NEAR) & (after[:, 0] > start + _SHORT)
+    near = (_distance(after, end) <= _NEAR) & (after[:, 0] > middle)
     end = np.where(near, after[:, 0], end)
     joint = start[1:] - end[:-1] < _SHORT
     end[:-1][joint] = start[1:][joint] = 0.5 * (start[1:] + end[:-1])[joint]
-    edges = np.maximum.accumulate(np.column_stack((start, end)).ravel()).reshape(-1, 2)
-    _join_slivers(motion, edges, known[order], joint, tools)
+    edges = np.column_stack((start, end))
+    _join_slivers(t, arm, edges, known[order], joint)
     moved = np.empty_like(rows)
     half = 0.5 * float(np.median(np.diff(t)))
     moved[order] = np.searchsorted(t, edges - half) + np.array([0, 1])
@@ -96,15 +112,14 @@ def settled(motion: Motion, rests: Array, rows: Rows, known: NDArray[np.bool_], 
     return moved
 
 
-def _by_speed(motion: Motion, rests: Array, rows: Rows, longest: float) -> Array:
+def _by_speed(t: Array, speed: Array, rests: Array, rows: Rows, longest: float, least: float) -> Array:
     """Return half of the 95 % interval (n,) [s] of the edges of movements of an arm at work, rows (n, 2).
 
     It is the time that the speed stays below a tenth of its peak beside the edge: within the movement where a rest ends
-    there, else on either side. It is at least a cycle at the cutoff of the smoothing, and at most 0.12 of the duration,
-    the distance of the edges of windows; this where the speed is higher, so that no event says where to cut.
+    there, else on either side. It is at least a cycle at the cutoff of the smoothing, `least`, and at most 0.12 of the
+    duration, the distance of the edges of windows; this where the speed is higher, so that no event says where to cut.
     """
-    t, ends = motion.times, rows - (0, 1)
-    slow = motion.speed <= _SLOW * motion.peak
+    ends, slow = rows - (0, 1), speed <= _SLOW
     fast = np.concatenate(([-np.inf], t[~slow], [np.inf]))
     edges = t[ends]
     ahead = np.searchsorted(fast, edges)
@@ -114,7 +129,7 @@ def _by_speed(motion: Motion, rests: Array, rows: Rows, longest: float) -> Array
     resting = np.column_stack([_distance(rests[_nearest(rests, edge)], edge) <= step for edge in edges.T])
     most = _SHARE * np.minimum(edges[:, 1] - edges[:, 0], longest)[:, None]
     lasting = np.where(slow[ends], np.minimum(np.where(resting, inward, np.maximum(later, before)), most), most)
-    return np.asarray(np.maximum(lasting, 1.0 / motion.cutoff).max(axis=1))
+    return np.asarray(np.maximum(lasting, least).max(axis=1))
 
 
 def _nearest(rests: Array, at: Array) -> NDArray[np.intp]:
@@ -130,25 +145,21 @@ def _distance(rests: Array, at: Array) -> Array:
     return np.asarray(np.maximum(np.maximum(rests[:, 0] - at, at - rests[:, 1]), 0.0))
 
 
-def _join_slivers(
-    motion: Motion, edges: Array, known: NDArray[np.bool_], joint: NDArray[np.bool_], tools: tuple[int, ...]
-) -> None:
+def _join_slivers(t: Array, arm: Array, edges: Array, known: NDArray[np.bool_], joint: NDArray[np.bool_]) -> None:
     """Give short unknown motion of the arm to the known movement beside it, in `edges` (n, 2); it then has no time.
 
     `joint` (n - 1,): whether no rest parts a movement from the next one. Of two known ones beside it, each gets the
     part up to the slowest sample.
     """
-    t = motion.times
-    speed = np.linalg.norm(np.gradient(np.delete(motion.positions, tools, axis=1), t, axis=0), axis=1)
     ahead = np.append(False, known[:-1] & joint)
     behind = np.append(known[1:] & joint, False)
     short = ~known & (edges[:, 1] - edges[:, 0] < _SLIVER) & (ahead | behind)
     for i in np.flatnonzero(short).tolist():
         start, end = edges[i]
         first, stop = np.searchsorted(t, edges[i])
-        if stop <= first or speed[first:stop].max() < _SLOW * motion.peak:
+        if stop <= first or arm[first:stop].max() < _SLOW:
             continue
-        cut = end if not behind[i] else start if not ahead[i] else t[first + int(speed[first:stop].argmin())]
+        cut = end if not behind[i] else start if not ahead[i] else t[first + int(arm[first:stop].argmin())]
         edges[i] = cut
         if ahead[i]:
             edges[i - 1, 1] = cut
