@@ -71,6 +71,12 @@ def test_an_edge_within_a_movement_stays():
     assert _spans(motion, rows)[:, ::-1].ravel()[[0, 3]] == pytest.approx([2.0, 2.0], abs=0.011)
 
 
+def test_an_edge_does_not_move_beyond_the_middle():
+    motion, _ = _motion((0.5, 0, 0), (0.5, 1, 0), (0.8, 0, 0), (1.0, -1, 0), (0.5, 0, 0))
+    rows = _settled(motion, [False], (0.9, 1.2))
+    assert _spans(motion, rows)[0] == pytest.approx([0.9, 1.2])
+
+
 def test_movements_that_are_hardly_apart_have_one_boundary_in_the_middle():
     motion, ends = _motion((0.5, 0, 0), (1.0, 1, 0), (0.06, 0, 0), (1.0, -1, 0), (0.5, 0, 0))
     spans = _spans(motion, _settled(motion, [True, True], (0.5, 1.45), (1.5, 2.6)))
