@@ -58,6 +58,10 @@ def test_open_and_closed_fingers_tell_a_reach_from_a_carry():
     spotted = [one for one in recognizer.spot(_recording(channels, openings)) if one.end - one.start > 0.6]
     assert [one.label for one in spotted] == ["reach" if opening > 0.5 else "carry" for opening in openings]
     assert min(one.confidence for one in spotted) > 0.9  # the path alone leaves it at even odds
+    begins = (110 * np.arange(5) + 25) / RATE
+    for one, begin in zip(spotted, begins, strict=True):
+        assert (one.start, one.end) == pytest.approx((begin, begin + 59 / RATE), abs=one.uncertainty)
+        assert 0.0 < one.uncertainty <= 0.2
 
 
 def test_levels_are_those_of_columns_that_are_called_so():

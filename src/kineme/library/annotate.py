@@ -69,7 +69,8 @@ def annotate_by(
                 times = movement.start, movement.end
                 certainty = movement.p_known, movement.confidence
                 origin = float(recording.times[0])
-                annotations.append(Annotation(source.path, source.place, *times, label, *certainty, origin))
+                place = source.path, source.place
+                annotations.append(Annotation(*place, *times, label, *certainty, origin, movement.uncertainty))
         done += recording.duration
         tell(1.0)
     return Annotated(annotations, problems, bool(classes.calibration.calibrated(error_rate).all()))

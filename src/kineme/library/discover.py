@@ -348,7 +348,8 @@ def propose_names(of_tasks: Sequence[Sequence[str]], tasks: Iterable[str]) -> tu
 def annotations_of(discovery: Discovery, recording: str) -> list[Annotation]:
     """Return the movements as annotations of a recording of that name, by the names that are proposed.
 
-    The p-value of a movement is the share of its kind whose density is as low or lower.
+    The p-value of a movement is the share of its kind whose density is as low or lower; the uncertainty of its edges is
+    half of the longer interval.
     """
     densities: dict[int | None, list[float]] = {}
     for segment in discovery.segments:
@@ -359,7 +360,7 @@ def annotations_of(discovery: Discovery, recording: str) -> list[Annotation]:
             recording, segment.place, segment.start, segment.end,
             None if segment.kind is None else discovery.kinds[segment.kind].name,
             float(np.searchsorted(ranked[segment.kind], segment.density, side="right") / len(ranked[segment.kind])),
-            segment.confidence, segment.origin,
+            segment.confidence, segment.origin, 0.5 * float(np.ptp(segment.intervals, axis=1).max()),
         )
         for segment in discovery.segments
     ]  # fmt: skip

@@ -35,6 +35,7 @@ from kineme.recognition.compared_windows import (
     surroundings,
 )
 from kineme.recognition.conformal import Calibration, check_error_rate, class_probabilities, distances
+from kineme.recognition.edges import placed
 from kineme.recognition.levels import level_scores
 from kineme.sampling import evenly_spaced
 from kineme.similarity.comparison import References
@@ -77,6 +78,8 @@ class Spotted(NamedTuple):
     p_known : float
         As `Answer.p_known`: share of movements of known classes that would be as novel or more. It may be below the
         error rate: a movement in a recording is cut by the search itself, which makes it somewhat more novel.
+    uncertainty : float
+        Half of the 95 % interval of start and end [s], of the less certain one; see `kineme.recognition.edges`.
     """
 
     start: float
@@ -84,6 +87,7 @@ class Spotted(NamedTuple):
     label: Label | None
     confidence: float
     p_known: float = math.nan  # of records that were stored without
+    uncertainty: float = math.nan
 
 
 def spot(
@@ -111,6 +115,8 @@ def spot(
     least = 0.0 if lasting is None else _LEAST_UNKNOWN * float(lasting.min())
     unknown = _left_over(chosen, windows.bouts, timed.times, least)
     rows = np.concatenate((chosen, unknown))
+    longest = None if lasting is None else float(lasting.max())
+    rows, doubts = placed(windows.motion, rows, np.arange(len(rows)) < len(best), templates.levels, longest)
     if not len(rows):
         return []
     logs, similar = score(comparison, references, pieces_of(timed, rows), nearest, nearest_each)
@@ -122,11 +128,11 @@ def spot(
     confidence = 1.0 - p_known
     confidence[: len(best)] = class_probabilities(similar, calibration.exponent)[np.arange(len(best)), best]
     classes = references.classes.tolist()
-    labels = [*(classes[c] for c in best.tolist()), *([None] * len(unknown))]
-    t = timed.times
+    labels = [*(classes[c] for c in best.tolist()), *([None] * (len(rows) - len(best)))]
+    start, end = timed.times[rows - (0, 1)].T.tolist()
+    certainties = np.column_stack((confidence, p_known, doubts)).tolist()
     return [
-        Spotted(float(t[rows[i, 0]]), float(t[rows[i, 1] - 1]), labels[i], float(confidence[i]), float(p_known[i]))
-        for i in np.argsort(rows[:, 0], kind="stable").tolist()
+        Spotted(start[i], end[i], labels[i], *certainties[i]) for i in np.argsort(rows[:, 0], kind="stable").tolist()
     ]
 
 
