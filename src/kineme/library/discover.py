@@ -30,6 +30,7 @@ from kineme.movements.episodes import LARGEST, LATEST, STATE, Episode, even_stam
 from kineme.movements.segmentation.work import Work, at_rest, boundaries, interpolated, roles_of
 from kineme.movements.trajectories.as_learned import of_columns
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.runtime.parallel import single_threaded_blas
 from kineme.validation import MIN_SAMPLES, Array
 
 #: Features of positions that an arm observes, where there is no ``observation.state``.
@@ -118,6 +119,7 @@ class Observation(NamedTuple):
     paths: NDArray[np.float32]  # (n, 3, d) the state at the begin, in the middle, at the end
 
 
+@single_threaded_blas()  # kinds have few features: a second thread mostly waits, and takes ten times as long
 def discover(
     episodes: Iterable[Episode], feature: str | None = None, how: Work | None = None, n_learned: int = _LEARNED
 ) -> Discovery:
