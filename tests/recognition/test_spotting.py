@@ -34,7 +34,7 @@ from kineme.recognition.spotting import (
     Expected,
     Manner,
     Spotted,
-    _complete_scores,
+    _completed,
     _left_over,
     best_chain,
     closest_classes,
@@ -293,7 +293,7 @@ def test_windows_within_reach_are_compared_completely_and_no_other_seems_to_be(m
     assert (scores <= exact * (1 + 1e-5)).all()
     assert not np.allclose(scores, exact)
     chosen = np.arange(0, len(windows), 7)
-    complete = _complete_scores(known, windows.motion, some, chosen)
+    complete = _completed(known, windows.motion, some, chosen).compared.scores[chosen]
     np.testing.assert_allclose(complete, every.compared.scores[chosen], rtol=1e-5)
     for name in ("rows", "log_durations", "log_sizes", "slowness"):
         np.testing.assert_allclose(getattr(some.compared, name), getattr(every.compared, name))

@@ -16,6 +16,7 @@ from kineme.recognition.answer import KnownClasses
 from kineme.recognition.compared_windows import Templates
 from kineme.recognition.spotting import spot
 from kineme.reporting.text import first_names
+from kineme.runtime.parallel import single_threaded_blas
 
 _MAX_PIECES = 8  # most stretches between rests that a movement may consist of, as in `Recognizer.spot`
 
@@ -42,6 +43,7 @@ def annotate(
     return annotate_by(some_of_each_symbol(store), recordings, error_rate, progress)
 
 
+@single_threaded_blas()  # of few rows at a time: a second thread mostly waits
 def annotate_by(
     classes: KnownClasses, recordings: Recordings, error_rate: float = 0.05, progress: Progress | None = None
 ) -> Annotated:

@@ -156,32 +156,44 @@ def _chosen(
         return np.empty((0, 2), dtype=np.intp), np.empty(0, dtype=np.intp)
     motion, typical = windows.motion, expected(templates.references)
     reach = far(error_rate, at_work=templates.levels is not None)
-    candidates = compare_candidates(templates, motion, windows.rows, reach, progress)
-    compared = candidates.weighted()
-    around = surroundings(motion, windows.bouts, compared.rows)
+    around = surroundings(motion, windows.bouts, windows.rows)
     manner = Manner()
-    for _ in range(_PASSES - 1):
+
+    def matters(compared: ComparedWindows) -> Array:
+        return most_nonconformity(compared, typical, around, manner, reach)
+
+    at_work = templates.levels is not None  # the reach is wide then, and holds many windows that cannot be chosen
+    candidates = compare_candidates(templates, motion, windows.rows, reach, progress, matters if at_work else None)
+    exact = matters(candidates.compared) if at_work else np.inf
+    compared, chosen = candidates.weighted(), list[int]()
+    for k in range(_PASSES):
         progress(1.0)
         scored = score_windows(compared, typical, around, manner, reach)
         chosen = _best_windows(compared.rows, scored)
-        manner = manner_of(compared, typical, chosen, scored.best)
-    chosen = _best_windows(compared.rows, score_windows(compared, typical, around, manner, reach))
+        if k < _PASSES - 1:
+            manner = manner_of(compared, typical, chosen, scored.best)
+            doubtful = (compared.scores > exact) & (compared.scores < matters(compared))
+            candidates = _completed(templates, motion, candidates, np.flatnonzero(doubtful.any(axis=1)))
+            compared = candidates.weighted()
     rows = compared.rows[chosen]
     spans = motion.times[compared.rows]
     alike = np.unique(np.concatenate((chosen, *alike_windows(spans, chosen)))).astype(np.intp)
-    distances = _complete_scores(templates, motion, candidates, alike) * templates.calibration.scales
+    distances = _completed(templates, motion, candidates, alike).compared.scores[alike] * templates.calibration.scales
     distances /= reach * np.exp(np.log(templates.calibration.scales).mean())
     again = np.searchsorted(alike, chosen).tolist()
     classes = closest_classes(compared.take(alike), distances, typical, manner, spans[alike], again)
     return np.column_stack((rows[:, 0], rows[:, 1] + 1)), classes
 
 
-def _complete_scores(templates: Templates, motion: Motion, candidates: Candidates, chosen: NDArray[np.intp]) -> Array:
-    """Return the nonconformity of chosen windows to every class, (n, C)."""
-    scores = candidates.compared.scores[chosen]
-    partly = ~candidates.completely[chosen]
-    scores[partly] = compare_windows(templates, motion, candidates.compared.rows[chosen[partly]]).scores
-    return scores
+def _completed(templates: Templates, motion: Motion, candidates: Candidates, chosen: NDArray[np.intp]) -> Candidates:
+    """Return the candidates, the chosen ones of them compared with every reference."""
+    partly = chosen[~candidates.completely[chosen]]
+    if not len(partly):
+        return candidates
+    scores, completely = candidates.compared.scores.copy(), candidates.completely.copy()
+    scores[partly] = compare_windows(templates, motion, candidates.compared.rows[partly]).scores
+    completely[partly] = True
+    return candidates._replace(compared=replace(candidates.compared, scores=scores), completely=completely)
 
 
 def _best_windows(rows: Rows, scored: ScoredWindows) -> list[int]:
@@ -368,16 +380,34 @@ def score_windows(
     inside. The score is ``(1 - cost) * duration / typical duration`` where positive, less a cost per movement: so that
     a whole movement is preferred to its parts, and no part of it is a movement by chance.
     """
-    costs = compared.scores / reach + _manner_costs(compared, typical, manner)
+    others, counts = _other_costs(compared, typical, around, manner)
+    costs = compared.scores / reach + others
+    best = costs.argmin(axis=1)
+    closeness = np.maximum(1.0 - costs[np.arange(len(best)), best], 0.0)
+    return ScoredWindows(best, closeness * counts - _PER_MOVEMENT)
+
+
+def most_nonconformity(
+    compared: ComparedWindows, typical: Expected, around: Surroundings, manner: Manner, reach: float
+) -> Array:
+    """Return the nonconformity (n, C) from which on windows have no score above 0 as each class, see `score_windows`.
+
+    The scores of the windows themselves have no part in it.
+    """
+    others, counts = _other_costs(compared, typical, around, manner)
+    return np.asarray(reach * (1.0 - others - (_PER_MOVEMENT / counts)[:, None]))
+
+
+def _other_costs(
+    compared: ComparedWindows, typical: Expected, around: Surroundings, manner: Manner
+) -> tuple[Array, Array]:
+    """Return costs (n, C) beside the nonconformity, and durations (n,) in typical ones."""
+    costs = _manner_costs(compared, typical, manner)
+    costs += _REST_INSIDE * np.maximum(compared.slowness[:, None] - typical.slowness, 0.0)
+    edges = _EDGE * around.edge_speeds + _FAR_FROM_REST * around.far_from_rest + _SPANNED * around.rests_inside
     lasting = compared.log_durations
     usual = float(np.median(lasting)) if typical.log_durations is None else float(np.median(typical.log_durations))
-    usual += manner.tempo or 0.0
-    costs += _REST_INSIDE * np.maximum(compared.slowness[:, None] - typical.slowness, 0.0)
-    best = costs.argmin(axis=1)
-    closeness = 1.0 - costs[np.arange(len(best)), best]
-    closeness -= _EDGE * around.edge_speeds + _FAR_FROM_REST * around.far_from_rest
-    closeness -= _SPANNED * around.rests_inside
-    return ScoredWindows(best, np.maximum(closeness, 0.0) * np.exp(lasting - usual) - _PER_MOVEMENT)
+    return costs + edges[:, None], np.exp(lasting - (usual + (manner.tempo or 0.0)))
 
 
 def manner_of(compared: ComparedWindows, typical: Expected, chosen: list[int], best: NDArray[np.intp]) -> Manner:

@@ -21,12 +21,12 @@ import numpy as np
 
 from kineme.errors import DataError
 from kineme.io.arrays.hdf5 import DAMAGE, hdf5_file, hdf5_group, hdf5_tree, texts_of
-from kineme.io.arrays.tree_movements import tree_movements
+from kineme.io.arrays.tree_movements import heads_of_array, tree_movements
 from kineme.io.arrays.trees import GROUPS, flat, rate_of
 from kineme.io.arrays.zarr_arrays import ZarrArray, zarr_arrays
 from kineme.io.limits import check_expanded
 from kineme.io.records import damaged_as
-from kineme.movements.episodes import Episode, place_of
+from kineme.movements.episodes import Episode, head_of, place_of
 from kineme.movements.tables.layout import Layout, Parsed, listed
 from kineme.movements.tables.time_stamps import words_of
 from kineme.validation import Array, check_number
@@ -341,10 +341,15 @@ def _movements(
         if not entry.isdecimal()
     }
     of_file = {entry: head for head, entry in joints.items()}
+    for name, path in features.items():  # as `robot_episodes` calls them, and a library that was discovered in these
+        of_array = heads_of_array(path, first.arrays[path].shape)
+        entries = _entries(row, name, len(of_array))
+        of_file |= {head_of(name, entry): head for entry, head in zip(entries, of_array, strict=True)}
+    named = {of_file[str(column)]: str(column) for column in layout.coordinates or () if str(column) in of_file}
     columns = [of_file.get(str(column), column) for column in layout.coordinates or paths.values()]
     parsed = tree_movements(tree, replace(layout, columns=columns or None), kind, GROUPS)
     heads = parsed.detected.columns
-    names = tuple(joints.get(head, head) for head in heads)
+    names = tuple(named.get(head, joints.get(head, head)) for head in heads)
     starts = tuple(f"{path}." for path in paths.values())
     measured = {  # those whose unit is that of the coordinates: of a gripper it is another
         head: head in joints and not joints[head].endswith("gripper") if row is ALOHA else head.startswith(starts)
