@@ -379,8 +379,12 @@ def manner_of(compared: ComparedWindows, typical: Expected, chosen: list[int], b
     if not chosen:
         return Manner()
     classes = best[chosen]
-    manner = Manner(size=float(np.median(compared.log_sizes[chosen] - typical.log_sizes[classes])))
+    manner = Manner(size=shrunk_median(compared.log_sizes[chosen] - typical.log_sizes[classes], 0.0))
     if typical.log_durations is None:
         return manner
-    ratio = float(np.median(compared.log_durations[chosen] - typical.log_durations[classes]))
-    return replace(manner, tempo=ratio * len(chosen) / (len(chosen) + 1.0))
+    return replace(manner, tempo=shrunk_median(compared.log_durations[chosen] - typical.log_durations[classes], 1.0))
+
+
+def shrunk_median(log_ratios: Array, prior: float) -> float:
+    """Return the median of logarithms of ratios (n,), towards 0 as if by so many more movements: n / (n + prior)."""
+    return float(np.median(log_ratios)) * len(log_ratios) / (len(log_ratios) + prior)
