@@ -245,7 +245,7 @@ def test_windows_that_start_earlier_or_later_are_alike_too():
     assert closest_classes(compared, compared.scores, SAME, Manner(), spans, [0, 1, 2]).tolist() == [1, 1, 1]
 
 
-def test_a_quarter_of_what_durations_and_sizes_cost_decides_between_classes_that_are_as_close():
+def test_durations_and_sizes_decide_between_classes_that_are_as_close():
     compared = _compared([[0.5, 0.5]], [2.0])
     typical = Expected(np.log([1.0, 2.0]), np.zeros(2), np.zeros(2))
     spans, asked = np.array([[0.0, 2.0]]), Manner(tempo=0.0)
