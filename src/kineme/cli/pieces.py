@@ -79,7 +79,7 @@ def in_pieces(  # noqa: PLR0913 - what a command knows when it hands its work on
     if output is None or output.suffix or output.is_file():
         raise click.UsageError(
             "expected --output FOLDER, the folder of the parts, with --workers, --scheduler, --shard or an archive in "
-            f"a store, got {'none' if output is None else printable(output)}; kineme gather makes one file of them"
+            f"a store, got {'none' if output is None else printable(output)}; kineme gather reads all of them"
         )
     if how["workers"] is not None and how["scheduler"] is not None:
         raise click.UsageError("expected --workers or --scheduler, not both")
@@ -88,14 +88,7 @@ def in_pieces(  # noqa: PLR0913 - what a command knows when it hands its work on
         raise click.UsageError("expected recordings that are read one by one, got --join-files; join them first")
     options = {**options, "reading": reading}
     if library is not None:
-        from kineme.library.library import ActionLibrary
-
-        with ActionLibrary(library, read_only=True) as opened:
-            options |= {
-                "library": str(library.absolute()),
-                "library_id": opened.store.id,
-                "library_version": opened.version,
-            }
+        options |= _of_library(library, task)
     archives = tuple(map(str, recordings))
     asked = Asked(task, archives, options, how["piece_size"] * _MIB, bool(reading.get("follow_links")))
     plan = plan_of(asked)
@@ -108,6 +101,7 @@ def in_pieces(  # noqa: PLR0913 - what a command knows when it hands its work on
     failures = [(outcome.piece, outcome.reason) for outcome in outcomes if outcome.state == FAILED]
     problems = [*map(str, part.problems), *(problem for outcome in outcomes for problem in outcome.problems)]
     data = {
+        "task": task,
         "pieces": dict(sorted(Counter(outcome.state for outcome in outcomes).items())),
         "recordings": sum(outcome.recordings for outcome in outcomes),
         "seconds": sum(outcome.seconds for outcome in outcomes),
@@ -120,6 +114,17 @@ def in_pieces(  # noqa: PLR0913 - what a command knows when it hands its work on
         click.get_current_context().exit(UNFINISHED)
 
 
+def _of_library(folder: Path, task: str) -> dict[str, Any]:
+    """The options that say which library parts depend on; to learn, it is created if it does not exist."""
+    from kineme.library.library import ActionLibrary
+
+    with ActionLibrary(folder, create=task == "learn", read_only=task != "learn") as library:
+        said: dict[str, Any] = {"library": str(folder.absolute())}
+        if task == "learn":  # what it holds makes no difference to how movements are described
+            return said | {"specification": library.specification.to_json()}
+        return said | {"library_id": library.store.id, "library_version": library.version}
+
+
 def _text(data: dict[str, Any], summary: str) -> str:
     n = data["recordings"]
     read = f", {counted(n, 'recording')} of {data['seconds']:,.1f} s" if n else ""
@@ -128,4 +133,5 @@ def _text(data: dict[str, Any], summary: str) -> str:
     lines += [f"not read: {printable(problem)}" for problem in data["problems"][:SHOWN]]
     lines += unlisted({"failed": data["failed"], "problems": data["problems"]}, SHOWN)
     again = "; run it again to do what failed" if data["failed"] else ""
-    return "\n".join([*lines, f"parts in {printable(data['output'])}: kineme gather makes one file of them{again}"])
+    gathered = "stores them in the library" if data["task"] == "learn" else "makes one file of them"
+    return "\n".join([*lines, f"parts in {printable(data['output'])}: kineme gather {gathered}{again}"])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -166,10 +166,10 @@ def _reason(path: Path) -> str:
         return "its reason cannot be read"
 
 
-def tables_of(job: Job, of: Checked) -> Iterator[Any]:
-    """Yield the rows of all parts, one part in memory at a time, in the order of the plan."""
+def tables_of(job: Job, of: Checked, columns: Sequence[str] | None = None) -> Iterator[Any]:
+    """Yield the rows of all parts, or some columns of them, one part in memory at a time, in the order of the plan."""
     from pyarrow import parquet
 
     for piece, part in of.parts:
         if part.rows:
-            yield parquet.read_table(job.path(piece))
+            yield parquet.read_table(job.path(piece), columns=columns)

@@ -23,6 +23,7 @@ from kineme.library.storage.store import Store
 from kineme.movements.channels.channel import recorded_names
 from kineme.movements.tables.layout import Known
 from kineme.pieces.archive import local_copy
+from kineme.pieces.described import described
 from kineme.pieces.run import Job, Source, recordings_of
 from kineme.recognition.answer import KnownClasses
 
@@ -155,6 +156,7 @@ TASKS: dict[str, Task] = {
     "find": Task(annotated, frozenset({"error_rate", "symbols"}), by_library=True),
     "audit": Task(measurements, frozenset({"rate", "error_rate"})),
     "inspect": Task(inspections, frozenset()),
+    "learn": Task(described, frozenset({"label", "no_labels", "person", "by_person", "several", "specification"})),
 }
 
 
@@ -177,7 +179,7 @@ def _work(task: str, options: Options, source: Source) -> Iterable[Any]:
 
 def plain(options: Options) -> dict[str, Any]:
     """Return options of reading as JSON holds them, without those that are not given."""
-    return {name: _plain(value) for name, value in sorted(options.items()) if value not in (None, False, ())}
+    return {name: _plain(value) for name, value in sorted(options.items()) if value is not None}
 
 
 def _plain(value: Any) -> Any:

@@ -107,7 +107,7 @@ def movements(store: Store, ids: Ids, labels: Sequence[str | None] | None = None
         _check_finite("raw", rows, block, lengths[part])
         stamps.update((done + k, row[3]) for k, row in enumerate(rows) if row[3] is not None)
         done = part.stop
-    times = _times(stamps, offsets, t0, durations) if stamps or t0.any() else None
+    times = times_of(stamps, offsets, t0, durations) if stamps or t0.any() else None
     if times is not None:
         increasing = times[1:] > times[:-1]
         increasing[offsets[1:-1] - 1] = True  # from one movement to the next
@@ -130,7 +130,7 @@ def _check_finite(table: str, rows: Sequence[Row], block: NDArray[Any], lengths:
         raise strange(table, rows[int(np.searchsorted(first, np.argmin(good), side="right"))])
 
 
-def _times(stamps: dict[int, bytes], offsets: NDArray[np.intp], t0: Array, durations: Array) -> Array:
+def times_of(stamps: dict[int, bytes], offsets: NDArray[np.intp], t0: Array, durations: Array) -> Array:
     """Return the time stamps of all samples: the stored ones, and even ones for movements without."""
     lengths = np.diff(offsets)
     k = np.arange(offsets[-1]) - np.repeat(offsets[:-1], lengths)
