@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable
-from pathlib import Path
 from functools import partial as partial_of
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import click
 
 from kineme.cli.audit import AuditFiles, audit_text
-from kineme.cli.options import FILE, FOLDER, GroupedCommand, force_option, heading, json_option
 from kineme.cli.learn import joined_since, learned_text, named_of
+from kineme.cli.options import FILE, FOLDER, GroupedCommand, force_option, heading, json_option
 from kineme.cli.output import check_new, progress, say, table, unlisted
 from kineme.cli.pieces import SHOWN, UNFINISHED
 from kineme.reporting.text import counted, printable
@@ -158,7 +158,7 @@ def _learned(asked: Any, tables: Callable[..., Iterable[Any]], files: Files, dat
 
     if files.output is not None or files.mask is not None:
         raise click.UsageError("expected no --output and no --train-mask, learn stores movements in its library")
-    of = survey(tables, asked)
+    of = survey(tables, asked, data["problems"])
     data["notes"] = list(of.notes)
     with ActionLibrary(asked.options["library"]) as library, progress(total=of.rows, desc="learning") as bar:
         before, n = library.version, 0

@@ -179,6 +179,7 @@ def named_of(library: Any, ids: Any, labels: list[Any]) -> dict[str, Any]:
 
 
 def learned_text(data: dict[str, Any], problems: list[str]) -> str:
+    """Say what was learned, what was not and why, and what to know of it."""
     new = f", {counted(len(data['symbols']), 'new symbol')}" if data["symbols"] else ""
     joined = f" ({data['joined']:,} joined the symbol of its label)" if data["joined"] else ""
     stored = f", {data['duplicates']:,} stored already{joined}" if data["duplicates"] else ""

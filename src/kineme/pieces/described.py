@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -25,7 +24,7 @@ from kineme.io.reading.recordings import HowToRead, how_to_read, read_entries
 from kineme.io.records import Problem
 from kineme.library.commit import Tables, check, evenly_sampled, serialize
 from kineme.library.learn import as_names, batches, digests
-from kineme.library.storage.channels import channels_of_text, channels_to_text, other_columns, with_channels
+from kineme.library.storage.channels import channels_to_text, other_columns, with_channels
 from kineme.library.storage.read import times_of
 from kineme.library.storage.specification import Specification
 from kineme.movements.channels.channel import Channels
@@ -138,7 +137,9 @@ def _read(entries: Sequence[Entry], how: HowToRead, numbers: range | None) -> It
 
 def _set_of(entries: Sequence[Entry], how: HowToRead) -> Recordings | Problem:
     try:
-        return read_entries(entries, how.layout, how.rule, **how.switches)
+        return read_entries(
+            entries, how.layout, how.rule, follow_links=how.switches["follow_links"], trim=how.switches["trim"]
+        )
     except (KinemeError, OSError) as error:
         name = entries[0].name
         return Problem(name, None, str(error).removeprefix(f"{entries[0].path}: ").removeprefix(f"{name}: "))
@@ -187,7 +188,9 @@ def check_rows(rows: Any, specification: Specification, n_dims: int, channels: C
     stamps = compute.binary_length(rows.column("times")).fill_null(0).to_numpy()
     fits = (stamps == 0) | (stamps == 4 * n) | (stamps == 8 * n)
     if not (fits.all() and all((lengths[name] == size).all() for name, size in expected.items())):
-        raise DataError("expected a part with rows as kineme learn writes them, got others; learn once more with --force")
+        raise DataError(
+            "expected a part with rows as kineme learn writes them, got others; learn once more with --force"
+        )
 
 
 def tables_of_rows(rows: Any) -> Tables:
@@ -209,7 +212,7 @@ def movements_of_rows(rows: Any, n_dims: int, channels: Channels | None) -> Demo
         np.frombuffer(b"".join(rows.column(name).to_pylist()), kind).reshape(-1, n_dims)
         for name, kind in (("start", np.float64), ("positions", np.float32))
     )
-    positions = relative + np.repeat(starts, lengths, axis=0)
+    positions = np.asarray(relative + np.repeat(starts, lengths, axis=0), dtype=np.float64)
     t0, durations = (rows.column(name).to_numpy() for name in ("t0", "duration"))
     stamps = {i: blob for i, blob in enumerate(rows.column("times").to_pylist()) if blob is not None}
     times = times_of(stamps, offsets, t0, durations) if stamps or t0.any() else None

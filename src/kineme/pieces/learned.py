@@ -93,7 +93,7 @@ class Survey:
     notes: tuple[str, ...]
 
 
-def survey(tables: Tables, asked: Asked) -> Survey:
+def survey(tables: Tables, asked: Asked, problems: Sequence[str] = ()) -> Survey:
     """Read what parts say of files. Raises `DataError`: an option names a column that no file has, or nobody."""
     counts: Counter[str] = Counter()
     paths: Counter[str] = Counter()
@@ -107,7 +107,8 @@ def survey(tables: Tables, asked: Asked) -> Survey:
         for row in rows.select(["path", "files"]).drop_null().to_pylist():
             files.setdefault(row["path"], {}).update(json.loads(row["files"]))
     if not counts:
-        raise DataError("expected movements in the parts, got none; kineme inspect says what the archive holds")
+        first = f"; the first problem: {problems[0]}" if problems else ""
+        raise DataError(f"expected movements in the parts, got none{first}")
     layout = how_to_read(asked.options["reading"]).layout
     heads = {text: _parsed(text) for text in counts}
     where = ", ".join(asked.archives)
@@ -115,14 +116,16 @@ def survey(tables: Tables, asked: Asked) -> Survey:
     check_asked(layout, of_files, bool(people), where)
     if asked.options.get("by_person") and not people:
         raise DataError(
-            f"expected {where} to say who showed its movements, by folders person/label/recording or an array people in "
-            "an archive, got neither; name them with --person"
+            f"expected {where} to say who showed its movements, by folders person/label/recording or an array people "
+            "in an archive, got neither; name them with --person"
         )
     most, notes = _most([(heads[text], n, paths[text]) for text, n in counts.items()])
     reasons = {text: each.unlike(most, layout.by_number) for text, each in heads.items()}
     others = any(each.names != most.names and reasons[text] is None for text, each in heads.items())
     sources = {path: _checksum(several) for path, several in files.items()}
-    return Survey(heads, reasons, most, None if others else most.channels, sources, counts.total(), sorted(people), notes)
+    return Survey(
+        heads, reasons, most, None if others else most.channels, sources, counts.total(), sorted(people), notes
+    )
 
 
 def _parsed(text: str) -> Heads:
@@ -140,13 +143,13 @@ def _most(counts: list[tuple[Heads, int, int]]) -> tuple[Heads, tuple[str, ...]]
     of most files.
     """
 
-    def frequent(of: Callable[[Heads], Any], among: list[tuple[Heads, int, int]], k: int = 2) -> Any:
+    def frequent(of: Callable[[Heads], Any], among: Sequence[tuple[Heads, int, int]], by_files: bool = True) -> Any:
         totals: Counter[Any] = Counter()
-        for each in among:
-            totals[of(each[0])] += int(each[k])
+        for heads, n_movements, n_files in among:
+            totals[of(heads)] += n_files if by_files else n_movements
         return totals.most_common(1)[0][0]
 
-    width = frequent(lambda heads: heads.width, counts, 1)
+    width = frequent(lambda heads: heads.width, counts, by_files=False)
     alike = [each for each in counts if each[0].width == width]
     named = [each for each in alike if each[0].names] or alike
     names, sensors = frequent(lambda heads: (heads.names, heads.sensors), named)
@@ -171,7 +174,9 @@ def _most(counts: list[tuple[Heads, int, int]]) -> tuple[Heads, tuple[str, ...]]
         moving = [kind for kind, _ in kinds[name].most_common() if kind != "discrete"]
         kind = moving[0] if moving else "discrete"
         if len(kinds[name]) > 1:
-            notes.append(f"{channel.name} is {listed(sorted(kinds[name]))} by pieces, and read as {kind}; say --kind")
+            notes.append(
+                f"{channel.name} is {' or '.join(sorted(kinds[name]))} by pieces, and read as {kind}; say --kind"
+            )
         period = max(periods[name])
         known = channel._replace(kind=kind)
         return known if channel.period is None else known._replace(period=0.0 if period == np.inf else period)
@@ -262,7 +267,7 @@ _SAID = (("label", "label"), ("group", "person"))
 
 
 def _sources(asked: Asked, of: Survey) -> Callable[[str, str, int], Source]:
-    """Return a function of the name, the checksum and the bytes of a file: its source, as `learn_recordings` says it."""
+    """Return a function from name, checksum and bytes of a file to its source, as `learn_recordings` says it."""
     now = datetime.now(UTC).isoformat(timespec="seconds")
     first = asked.archives[0]
     root = "" if len(asked.archives) > 1 or is_remote(first) else root_of(Path(first.removeprefix("file://")))
