@@ -166,7 +166,7 @@ def test_gathering_again_adds_nothing_and_one_undo_takes_back_all(archive, tmp_p
     monkeypatch.setattr("kineme.pieces.learned._ROWS", 8)
     folder = tmp_path / "library"
     before, said = by_pieces(folder, [archive], by=[("--shard", "1/1")])
-    assert said["version"] > 3
+    assert said["version"] == 3
     again = kineme("gather", f"{folder}-parts", "--json")
     assert (again["added"], again["version"], stored(folder)) == (0, said["version"], before)
     with ActionLibrary(folder) as library:

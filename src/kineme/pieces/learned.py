@@ -251,8 +251,7 @@ def _batch(store: Store, specification: Specification, rows: Any, heads: Heads, 
     demos = movements_of_rows(rows, heads.n_dims, own)
     if not is_same:
         demos = by_names(demos, of.most.channels or ())
-        if of.learned is None:
-            demos = Demonstrations.of_movements(replace(demos.movements, channels=None, dimensions=None))
+        demos = Demonstrations.of_movements(replace(demos.movements, channels=of.learned))
     if not is_ours:
         demos = in_columns_of(store, demos)
     check_channels(store, demos)
