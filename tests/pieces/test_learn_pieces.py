@@ -268,6 +268,7 @@ def test_what_cannot_be_done_by_pieces_is_refused(archive, tmp_path):
         (("-o", tmp_path / "out", "--person", "ann", "--person-column", "who"), "not both"),
     ):
         assert words in kineme(*command, *options, status=2)
+    assert "found nothing" in kineme("learn", tmp_path / "none", *command[2:], "-o", tmp_path / "none-out", status=1)
     assert not (tmp_path / "library").exists()
     kineme(*command, "-o", tmp_path / "out", "--person-column", "who")
     assert "expected movements in the parts, got none; the first" in kineme("gather", tmp_path / "out", status=1)

@@ -36,6 +36,9 @@ def gather(parts: Path, partial: bool, output: Path | None, mask: Path | None, a
     Pieces are compared with the archive as it is now: one whose files have changed since is stale, and its command,
     called again, does it anew. This is the only step that reads all parts.
 
+    Parts of kineme learn are stored in the library, as one process would have learned them: one change, which one undo
+    takes back. Movements that are stored already are not stored again.
+
     The exit status is 0 if all pieces are there, and 3 if some are missing, stale or failed; then nothing is written
     without --partial.
 

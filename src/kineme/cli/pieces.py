@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -87,11 +88,12 @@ def in_pieces(  # noqa: PLR0913 - what a command knows when it hands its work on
     if reading.get("join_files"):
         raise click.UsageError("expected recordings that are read one by one, got --join-files; join them first")
     options = {**options, "reading": reading}
-    if library is not None:
-        options |= _of_library(library, task)
     archives = tuple(map(str, recordings))
     asked = Asked(task, archives, options, how["piece_size"] * _MIB, bool(reading.get("follow_links")))
     plan = plan_of(asked)
+    if library is not None:  # it is created for an archive that is there
+        options = options | _of_library(library, task)
+        asked = replace(asked, options=options)
     write_run(output, asked, replace=force)
     part = plan if how["shard"] is None else plan.shard(*how["shard"])
     job = job_of(task, str(output), options)

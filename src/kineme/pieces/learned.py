@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from functools import cache
+from functools import lru_cache
 from pathlib import Path, PurePath, PurePosixPath
 from typing import Any, NamedTuple
 
@@ -29,7 +29,7 @@ from kineme.movements.tables.layout import listed
 from kineme.movements.trajectories.as_learned import by_names
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.pieces.archive import is_remote
-from kineme.pieces.described import check_rows, movements_of_rows, tables_of_rows
+from kineme.pieces.described import address_of, check_rows, movements_of_rows, tables_of_rows
 from kineme.pieces.gather import Asked
 
 Tables = Callable[..., Iterable[Any]]  # columns, by default all -> the rows of part after part
@@ -212,7 +212,7 @@ def learned(
 
     def described() -> Iterator[Batch]:
         unlike: set[str] = set()
-        source_of = cache(_sources(asked, of))
+        source_of = lru_cache(_ROWS)(_sources(asked, of))
         is_ours = store.n_dims is None or (
             store.n_dims == of.most.n_dims
             and (same_columns(store.channels, of.learned) or (store.channels is None and is_plain(of.learned or ())))
@@ -269,17 +269,13 @@ def _sources(asked: Asked, of: Survey) -> Callable[[str, str, int], Source]:
     """Return a function from name, checksum and bytes of a file to its source, as `learn_recordings` says it."""
     now = datetime.now(UTC).isoformat(timespec="seconds")
     first = asked.archives[0]
-    root = "" if len(asked.archives) > 1 or is_remote(first) else root_of(Path(first.removeprefix("file://")))
+    several = len(asked.archives) > 1
+    root = Path() if several or is_remote(first) else root_of(Path(first.removeprefix("file://")))
 
     def source(name: str, sha256: str, size: int) -> Source:
-        path = PurePath(root, name)
-        if is_remote(first) and len(asked.archives) == 1:
-            base = first.rstrip("/")
-            where = base if base.endswith(f"/{name}") else f"{base}/{name}"
-        else:
-            where = path.as_posix()
+        where = address_of(first, name) if is_remote(first) and not several else PurePath(root, name).as_posix()
         sha256, size = of.sources.get(name, (sha256, size))
-        return Source(where, sha256, size, path.suffix.lower().lstrip("."), asked.options["reading"], now)
+        return Source(where, sha256, size, PurePath(name).suffix.lower().lstrip("."), asked.options["reading"], now)
 
     return source
 
