@@ -244,11 +244,25 @@ def test_a_library_that_is_there_keeps_its_columns(archive, tmp_path, small_piec
     assert "choose the columns" in kineme("gather", tmp_path / "out", status=1)
 
 
-def test_parts_depend_on_how_a_library_describes_not_on_what_it_holds(archive, tmp_path, small_pieces):
+def test_an_angle_wraps_alike_in_all_pieces(tmp_path, small_pieces):
+    """Degrees by the values of some files; those of others alone could be radians."""
+    t, u = np.arange(60) / 50, np.linspace(0, 1, 60)
+    for k in range(6):
+        for label, turn in (("far", 100.0), ("near", 3.0)):
+            write_csv(tmp_path / "archive" / label / f"{k}.csv", t, {"x": u**2 + k, "yaw": turn * u + k / 10})
+    rows, _ = by_pieces(tmp_path / "library", [tmp_path / "archive"])
+    assert_same(rows, of_one_process(tmp_path / "one", [tmp_path / "archive"]))
+    assert '"period": 360.0' in dict(rows["meta"])["channels"]
+
+
+def test_parts_depend_on_how_a_library_describes_not_on_what_it_holds(archive, tmp_path, small_pieces, monkeypatch):
     folder = tmp_path / "library"
     command = ("learn", archive, "--library", folder, "-o", tmp_path / "out", "--piece-size", 1, "--shard", "1/1")
     first = kineme(*command, "--json")
-    kineme("gather", tmp_path / "out")
+    with monkeypatch.context() as patch:  # gathering describes nothing
+        patch.setattr("kineme.library.commit.serialize", None)
+        patch.setattr("kineme.pieces.learned.digests", None)
+        kineme("gather", tmp_path / "out")
     assert kineme(*command, "--json")["pieces"] == {"skipped": first["pieces"]["done"]}
     assert "other options (label)" in kineme(*command, "--label", "wave", status=1)
     shutil.rmtree(folder)
@@ -313,3 +327,15 @@ def test_a_part_of_other_bytes_is_refused(archive, tmp_path):
     short = [blob[:-4] for blob in table.column("weights").to_pylist()]
     parquet.write_table(table.set_column(table.schema.get_field_index("weights"), "weights", [short]), path)
     assert "as kineme learn writes them" in kineme("gather", parts, status=1)
+
+
+def test_archives_in_a_store_are_learned_too(archive, one, tmp_path, small_pieces):
+    system = pytest.importorskip("fsspec").filesystem("memory")
+    system.put(str(archive), "/fleet", recursive=True)
+    try:
+        rows, _ = by_pieces(tmp_path / "library", ["memory://fleet"])
+    finally:
+        system.rm("/fleet", recursive=True)
+    assert sorted(row[1] for row in rows["source"])[0].startswith("memory://fleet/ann/")
+    assert [row[4:8] for row in rows["movement"]] == [row[4:8] for row in one["movement"]]
+    assert rows["raw"] == one["raw"]

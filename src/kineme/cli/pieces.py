@@ -119,8 +119,10 @@ def in_pieces(  # noqa: PLR0913 - what a command knows when it hands its work on
 def _of_library(folder: Path, task: str) -> dict[str, Any]:
     """The options that say which library parts depend on; to learn, it is created if it does not exist."""
     from kineme.library.library import ActionLibrary
+    from kineme.library.storage.connection import FILE
 
-    with ActionLibrary(folder, create=task == "learn", read_only=task != "learn") as library:
+    is_new = task == "learn" and not (folder / FILE).exists()
+    with ActionLibrary(folder, create=is_new, read_only=not is_new) as library:
         said: dict[str, Any] = {"library": str(folder.absolute())}
         if task == "learn":  # what it holds makes no difference to how movements are described
             return said | {"specification": library.specification.to_json()}
