@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable
-from functools import partial as partial_of
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -64,7 +63,11 @@ def gather(parts: Path, partial: bool, output: Path | None, mask: Path | None, a
     }  # fmt: skip
     words = [found.in_words()]
     if found.is_complete or partial:
-        words.append(_ANSWERS[asked.task](asked, partial_of(tables_of, job, found), Files(output, mask, force), data))
+        words.append(
+            _ANSWERS[asked.task](
+                asked, lambda columns=None: tables_of(job, found, columns), Files(output, mask, force), data
+            )
+        )
     words += [f"not read: {printable(problem)}" for problem in data["problems"][:SHOWN]]
     words += unlisted({"problems": data["problems"]}, SHOWN)
     say(as_json, data, lambda: "\n".join(words))

@@ -6,7 +6,6 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -93,7 +92,7 @@ def in_pieces(  # noqa: PLR0913 - what a command knows when it hands its work on
     plan = plan_of(asked)
     if library is not None:  # it is created for an archive that is there
         options = options | _of_library(library, task)
-        asked = replace(asked, options=options)
+        asked = Asked(**(vars(asked) | {"options": options}))
     write_run(output, asked, replace=force)
     part = plan if how["shard"] is None else plan.shard(*how["shard"])
     job = job_of(task, str(output), options)

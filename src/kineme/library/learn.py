@@ -296,6 +296,18 @@ def _other_columns(demos: Demonstrations) -> list[bytes] | None:
     ]
 
 
+def source_at(options: Mapping[str, Any], root: str | PurePath = "") -> Callable[[str, str, int], Source]:
+    """Return a function from name, checksum and bytes of a file in a folder to its source, as it is read now."""
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    chosen = {name: value for name, value in options.items() if value is not None}
+
+    def source(name: str, sha256: str, size: int) -> Source:
+        path = PurePath(root) / name
+        return Source(path.as_posix(), sha256, size, path.suffix.lower().lstrip("."), chosen, now)
+
+    return source
+
+
 def learn_recordings(  # noqa: PLR0913, PLR0917 - those of `ActionLibrary.learn`
     store: Store,
     recordings: Recordings,
@@ -311,13 +323,8 @@ def learn_recordings(  # noqa: PLR0913, PLR0917 - those of `ActionLibrary.learn`
     read, stored before the names of the files. By default the labels are those of the movements; groups and progress
     are as for `ActionLibrary.learn`.
     """
-    now = datetime.now(UTC).isoformat(timespec="seconds")
-    chosen = {name: value for name, value in (options or {}).items() if value is not None}
-    files = {}
-    for file in recordings.sources:
-        path = PurePath(root) / file.path
-        kind = path.suffix.lower().lstrip(".")
-        files[file.path] = Source(path.as_posix(), file.sha256, file.size, kind, chosen, now)
+    of_file = source_at(options or {}, root)
+    files = {file.path: of_file(file.path, file.sha256, file.size) for file in recordings.sources}
     return learn(
         store,
         recordings.demonstrations,

@@ -7,10 +7,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack
-from functools import cache
-from pathlib import Path
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
@@ -24,13 +22,13 @@ from kineme.io.reading.recordings import HowToRead, how_to_read, read_entries
 from kineme.io.records import Problem
 from kineme.library.commit import Tables, check, evenly_sampled, serialize
 from kineme.library.learn import as_names, batches, digests
-from kineme.library.storage.channels import channels_to_text, other_columns, with_channels
+from kineme.library.storage.channels import channels_of_text, channels_to_text, other_columns, with_channels
 from kineme.library.storage.read import times_of
 from kineme.library.storage.specification import Specification
 from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import Movements
-from kineme.pieces.archive import Unit, is_remote, local_copy
+from kineme.pieces.archive import Unit, is_remote, local_copies, local_copy
 from kineme.pieces.run import Source
 
 #: Table of a library -> the columns of a part that are its columns, without the key.
@@ -62,7 +60,7 @@ def described(source: Source, options: Options) -> Iterator[Any]:
             yield _table({
                 "path": [each.path for each in origins], "place": [each.place for each in origins],
                 "sha256": [each.sha256 for each in origins], "size": [each.size for each in origins],
-                "files": [files, *[None] * (len(part) - 1)], "heads": [heads(each.path) for each in origins],
+                "files": [files, *[None] * (len(part) - 1)], "heads": [heads[each.path] for each in origins],
                 "name": part.names, "label": said[0][rows], "person": said[1][rows],
                 "digest": digests(part, even), "samples": part.lengths, "duration": part.durations,
                 "t0": np.zeros(len(part)) if part.movements.times is None else part.times[part.offsets[:-1]],
@@ -85,8 +83,7 @@ def _table(columns: Mapping[str, Any], tables: Tables) -> Any:
 def _recordings(source: Source, options: Options) -> Iterator[tuple[Recordings, Sequence[str | None] | None]]:
     """Yield the recordings of a piece with who showed them; what cannot be read is added to its problems."""
     how = how_to_read(options["reading"])
-    with ExitStack() as stack:
-        folders = [stack.enter_context(local_copy(unit)) for unit in source.piece.units]
+    with local_copies(source.piece.units) as folders:
         entries = [
             Entry(folder / unit.name, Path(unit.name), name_of(unit, bool(options.get("several"))))
             for folder, unit in zip(folders, source.piece.units, strict=True)
@@ -153,20 +150,16 @@ def _set_of(entries: Sequence[Entry], how: HowToRead) -> Recordings | Problem:
         return Problem(name, None, str(error).removeprefix(f"{entries[0].path}: ").removeprefix(f"{name}: "))
 
 
-def _heads_of(recordings: Recordings) -> Any:
-    """Return a function of the name of a file: what its columns are, as a text that is the same for files alike."""
+def _heads_of(recordings: Recordings) -> dict[str, str]:
+    """Return name of a file -> the columns that it is read in, as a text that is the same for files alike."""
     channels = recordings.demonstrations.channels
     columns = {
         "n_dims": recordings.demonstrations.n_dims,
         "channels": None if channels is None else channels_to_text(channels),
         "aside": sorted({name for how, _ in recordings.detected for name in how.ignored}),
     }
-
-    @cache
-    def heads(path: str) -> str:
-        return json.dumps(columns | {"sensors": sorted(sensors_of(path))}, ensure_ascii=True)
-
-    return heads
+    paths = dict.fromkeys(source.path for source in recordings.sources)
+    return {path: json.dumps(columns | {"sensors": sorted(sensors_of(path))}) for path in paths}
 
 
 def _checksums(unit: Unit) -> str:
@@ -179,6 +172,23 @@ def _checksums(unit: Unit) -> str:
                 inside = path.relative_to(folder / unit.name).as_posix()
                 checksums[as_text(inside)] = [hashlib.file_digest(opened, "sha256").hexdigest(), file.size]
     return json.dumps(checksums, ensure_ascii=True)
+
+
+def heads_of_text(text: str) -> tuple[int, Channels | None, tuple[str, ...], frozenset[str]]:
+    """Return what is said of the columns of a file: n_dims, channels, columns left aside, sensors in its name."""
+    said = json.loads(text)
+    channels = None if said["channels"] is None else channels_of_text(said["channels"], said["n_dims"], Path("a part"))
+    return int(said["n_dims"]), channels, tuple(said["aside"]), frozenset(said["sensors"])
+
+
+def checksum_of(texts: Iterable[str]) -> tuple[str, int]:
+    """Return the checksum of a data set, as a reader of all of it computes it, and its bytes, by those of its files."""
+    files: dict[str, tuple[str, int]] = {}
+    for text in texts:
+        files.update(json.loads(text))
+    names = sorted(files, key=lambda name: PurePosixPath(name).parts)
+    lines = "".join(f"{files[name][0]}  {name}\n" for name in names)
+    return hashlib.sha256(lines.encode()).hexdigest(), sum(size for _, size in files.values())
 
 
 def check_rows(rows: Any, specification: Specification, n_dims: int, channels: Channels | None) -> None:
@@ -201,7 +211,7 @@ def check_rows(rows: Any, specification: Specification, n_dims: int, channels: C
         )
 
 
-def tables_of_rows(rows: Any) -> Tables:
+def rows_by_table(rows: Any) -> Tables:
     """Return the rows of the tables of a library, without their keys."""
     tables: Tables = {
         table: list(zip(*(rows.column(name).to_pylist() for name in names), strict=True))

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
-from functools import lru_cache
-from pathlib import Path, PurePath, PurePosixPath
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,18 +14,13 @@ from kineme.errors import DataError
 from kineme.io.reading.formats import root_of
 from kineme.io.reading.recordings import check_asked, how_to_read
 from kineme.library.commit import Batch, Committed, check, evenly_sampled
-from kineme.library.learn import as_names, batches, check_channels, commit_batches, digests, in_columns_of
-from kineme.library.storage.channels import channels_of_text
-from kineme.library.storage.source import Source
-from kineme.library.storage.specification import Specification
+from kineme.library.learn import as_names, batches, check_channels, commit_batches, digests, in_columns_of, source_at
 from kineme.library.storage.store import Store
 from kineme.movements.channels.channel import Channel, Channels, is_plain, recorded_names, same_columns
 from kineme.movements.channels.column_match import columns_recorded
-from kineme.movements.tables.layout import listed
 from kineme.movements.trajectories.as_learned import by_names
-from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.pieces.archive import is_remote
-from kineme.pieces.described import address_of, check_rows, movements_of_rows, tables_of_rows
+from kineme.pieces.described import address_of, check_rows, checksum_of, heads_of_text, movements_of_rows, rows_by_table
 from kineme.pieces.gather import Asked
 
 Tables = Callable[..., Iterable[Any]]  # columns, by default all -> the rows of part after part
@@ -67,7 +58,7 @@ class Heads(NamedTuple):
             return "the file of another sensor by its name than most files; read them apart"
         if self.names == most.names or ((by_number or not self.names) and is_plain(most.channels or ())):
             return None
-        here, there = (listed(recorded_names(heads.channels or ())) for heads in (self, most))
+        here, there = (", ".join(recorded_names(heads.channels or ())) for heads in (self, most))
         return f"{f'the columns {here}' if self.names else 'no names of columns'} where most files have {there}"
 
 
@@ -97,7 +88,7 @@ def survey(tables: Tables, asked: Asked, problems: Sequence[str] = ()) -> Survey
     """Read what parts say of files. Raises `DataError`: an option names a column that no file has, or nobody."""
     counts: Counter[str] = Counter()
     paths: Counter[str] = Counter()
-    files: dict[str, dict[str, tuple[str, int]]] = {}
+    files: dict[str, list[str]] = {}
     people: set[str] = set()
     for rows in tables(["heads", "files", "path", "person"]):
         for group in rows.group_by(["heads", "path"], use_threads=False).aggregate([([], "count_all")]).to_pylist():
@@ -105,12 +96,12 @@ def survey(tables: Tables, asked: Asked, problems: Sequence[str] = ()) -> Survey
             paths[group["heads"]] += 1
         people.update(rows.column("person").drop_null().unique().to_pylist())
         for row in rows.select(["path", "files"]).drop_null().to_pylist():
-            files.setdefault(row["path"], {}).update(json.loads(row["files"]))
+            files.setdefault(row["path"], []).append(row["files"])
     if not counts:
         first = f"; the first problem: {problems[0]}" if problems else ""
         raise DataError(f"expected movements in the parts, got none{first}")
     layout = how_to_read(asked.options["reading"]).layout
-    heads = {text: _parsed(text) for text in counts}
+    heads = {text: Heads(*heads_of_text(text)) for text in counts}
     where = ", ".join(asked.archives)
     of_files = [(each.aside, recorded_names(each.channels or ())) for each in heads.values()]
     check_asked(layout, of_files, bool(people), where)
@@ -122,17 +113,10 @@ def survey(tables: Tables, asked: Asked, problems: Sequence[str] = ()) -> Survey
     most, notes = _most([(heads[text], n, paths[text]) for text, n in counts.items()])
     reasons = {text: each.unlike(most, layout.by_number) for text, each in heads.items()}
     others = any(each.names != most.names and reasons[text] is None for text, each in heads.items())
-    sources = {path: _checksum(several) for path, several in files.items()}
+    sources = {path: checksum_of(several) for path, several in files.items()}
     return Survey(
         heads, reasons, most, None if others else most.channels, sources, counts.total(), sorted(people), notes
     )
-
-
-def _parsed(text: str) -> Heads:
-    said = json.loads(text)
-    n_dims, channels = int(said["n_dims"]), said["channels"]
-    own = None if channels is None else channels_of_text(channels, n_dims, Path("a part"))
-    return Heads(n_dims, own, tuple(said["aside"]), frozenset(said["sensors"]))
 
 
 def _most(counts: list[tuple[Heads, int, int]]) -> tuple[Heads, tuple[str, ...]]:
@@ -185,13 +169,6 @@ def _most(counts: list[tuple[Heads, int, int]]) -> tuple[Heads, tuple[str, ...]]
     return Heads(sum(len(channel.coordinates) for channel in channels), channels, (), sensors), tuple(notes)
 
 
-def _checksum(files: Mapping[str, tuple[str, int]]) -> tuple[str, int]:
-    """Return the checksum of a data set, as a reader of all of it computes it, and its bytes."""
-    names = sorted(files, key=lambda name: PurePosixPath(name).parts)
-    lines = "".join(f"{files[name][0]}  {name}\n" for name in names)
-    return hashlib.sha256(lines.encode()).hexdigest(), sum(size for _, size in files.values())
-
-
 def learned(
     store: Store, tables: Tables, asked: Asked, of: Survey, problems: list[str]
 ) -> Iterator[tuple[list[str | None], Committed]]:
@@ -202,8 +179,7 @@ def learned(
     everything. Raises `DataError`: the library describes movements otherwise; `TrajectoryError`: it has other columns.
     """
     store.check_writable()
-    specification = Specification.from_json(dict(asked.options["specification"]), store.path)
-    if specification != store.specification:
+    if store.specification.to_json() != asked.options["specification"]:
         raise DataError(
             f"expected the library in {store.folder} to describe movements as its parts do, got another specification; "
             "run kineme learn once more with --force"
@@ -212,7 +188,7 @@ def learned(
 
     def described() -> Iterator[Batch]:
         unlike: set[str] = set()
-        source_of = lru_cache(_ROWS)(_sources(asked, of))
+        source_of = _sources(asked, of)
         is_ours = store.n_dims is None or (
             store.n_dims == of.most.n_dims
             and (same_columns(store.channels, of.learned) or (store.channels is None and is_plain(of.learned or ())))
@@ -225,8 +201,10 @@ def learned(
                         problems.append(f"{path}: {reason}")
                         unlike.add(path)
                 continue
-            batch = _batch(store, specification, rows, of.heads[text], of, is_ours)
-            batch.sources = [source_of(*row) for row in zip(*(_texts(rows, name) for name in _ORIGIN), strict=True)]
+            batch = _batch(store, rows, of.heads[text], of, is_ours)
+            origins = list(zip(*(_texts(rows, name) for name in _ORIGIN), strict=True))
+            sources = {origin: source_of(*origin) for origin in dict.fromkeys(origins)}
+            batch.sources = [sources[origin] for origin in origins]
             labels.append(batch.labels)
             yield batch
 
@@ -241,23 +219,23 @@ def _texts(rows: Any, name: str) -> list[Any]:
     return list(rows.column(name).to_pylist())
 
 
-def _batch(store: Store, specification: Specification, rows: Any, heads: Heads, of: Survey, is_ours: bool) -> Batch:
+def _batch(store: Store, rows: Any, heads: Heads, of: Survey, is_ours: bool) -> Batch:
     """Return movements to be stored, without their sources: as they are described, or in the columns of the library."""
     is_same = heads.n_dims == of.most.n_dims and (
         same_columns(heads.channels, of.learned) or (of.learned is None and is_plain(heads.channels or ()))
     )
     own = of.learned if is_same else heads.channels
-    check_rows(rows, specification, heads.n_dims, own)
+    check_rows(rows, store.specification, heads.n_dims, own)
     demos = movements_of_rows(rows, heads.n_dims, own)
     if not is_same:
         demos = by_names(demos, of.most.channels or ())
-        demos = Demonstrations.of_movements(replace(demos.movements, channels=of.learned))
+        demos = demos.of_movements(replace(demos.movements, channels=of.learned))
     if not is_ours:
         demos = in_columns_of(store, demos)
     check_channels(store, demos)
     labels, people = (as_names(demos, what, _texts(rows, name)) for what, name in _SAID)
     if is_same and is_ours:
-        return Batch(demos, _texts(rows, "digest"), labels, people, [], _texts(rows, "place"), tables_of_rows(rows))
+        return Batch(demos, _texts(rows, "digest"), labels, people, [], _texts(rows, "place"), rows_by_table(rows))
     check(demos)
     return Batch(demos, digests(demos, evenly_sampled(demos)), labels, people, [], _texts(rows, "place"))
 
@@ -265,17 +243,16 @@ def _batch(store: Store, specification: Specification, rows: Any, heads: Heads, 
 _SAID = (("label", "label"), ("group", "person"))
 
 
-def _sources(asked: Asked, of: Survey) -> Callable[[str, str, int], Source]:
+def _sources(asked: Asked, of: Survey) -> Callable[[str, str, int], Any]:
     """Return a function from name, checksum and bytes of a file to its source, as `learn_recordings` says it."""
-    now = datetime.now(UTC).isoformat(timespec="seconds")
     first = asked.archives[0]
     several = len(asked.archives) > 1
     root = Path() if several or is_remote(first) else root_of(Path(first.removeprefix("file://")))
+    of_file = source_at(asked.options["reading"], root)
 
-    def source(name: str, sha256: str, size: int) -> Source:
-        where = address_of(first, name) if is_remote(first) and not several else PurePath(root, name).as_posix()
-        sha256, size = of.sources.get(name, (sha256, size))
-        return Source(where, sha256, size, PurePath(name).suffix.lower().lstrip("."), asked.options["reading"], now)
+    def source(name: str, sha256: str, size: int) -> Any:
+        own = of_file(name, *of.sources.get(name, (sha256, size)))
+        return replace(own, path=address_of(first, name)) if is_remote(first) and not several else own
 
     return source
 
