@@ -28,7 +28,7 @@ from kineme.library.storage.specification import Specification
 from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import Movements
-from kineme.pieces.archive import Unit, is_remote, local_copies, local_copy
+from kineme.pieces.archive import Unit, is_remote, local_copies
 from kineme.pieces.run import Source
 
 #: Table of a library -> the columns of a part that are its columns, without the key.
@@ -45,14 +45,13 @@ Options = Mapping[str, Any]
 def described(source: Source, options: Options) -> Iterator[Any]:
     """Yield rows of the movements of a piece, described by the specification of a library."""
     specification = Specification.from_json(options["specification"], Path(options["library"]))
-    for recordings, people in _recordings(source, options):
+    for recordings, people, files in _recordings(source, options):
         demos = recordings.demonstrations
         check(demos)
         label = options.get("label")
         labels = [None if options.get("no_labels") else own if label is None else label for own in recordings.labels]
         said = as_names(demos, "label", labels), as_names(demos, "group", people)
         heads = _heads_of(recordings)
-        files = _checksums(source.piece.units[0]) if source.piece.numbers is not None else None
         for rows in batches(demos.lengths):
             part = Demonstrations.of_movements(demos.movements.between(rows.start, rows.stop))
             origins = recordings.sources[rows]
@@ -80,14 +79,20 @@ def _table(columns: Mapping[str, Any], tables: Tables) -> Any:
     return pa.table(arrays)
 
 
-def _recordings(source: Source, options: Options) -> Iterator[tuple[Recordings, Sequence[str | None] | None]]:
-    """Yield the recordings of a piece with who showed them; what cannot be read is added to its problems."""
+def _recordings(
+    source: Source, options: Options
+) -> Iterator[tuple[Recordings, Sequence[str | None] | None, str | None]]:
+    """Yield the recordings of a piece with who showed them, and of a data set the checksums of its files.
+
+    What cannot be read is added to the problems of the source.
+    """
     how = how_to_read(options["reading"])
     with local_copies(source.piece.units) as folders:
         entries = [
             Entry(folder / unit.name, Path(unit.name), name_of(unit, bool(options.get("several"))))
             for folder, unit in zip(folders, source.piece.units, strict=True)
         ]
+        files = None if source.piece.numbers is None else _checksums(source.piece.units[0], folders[0])
         for recordings in _read(entries, how, source.piece.numbers):
             if isinstance(recordings, Problem):
                 source.problems.append(recordings)
@@ -102,7 +107,7 @@ def _recordings(source: Source, options: Options) -> Iterator[tuple[Recordings, 
                 people = [options["person"]] * len(recordings)
             elif options.get("by_person"):
                 people = each_person(Path() if options.get("several") else folders[0], recordings.sources)
-            yield recordings, people
+            yield recordings, people, files
 
 
 def name_of(unit: Unit, several: bool) -> str:
@@ -162,16 +167,15 @@ def _heads_of(recordings: Recordings) -> dict[str, str]:
     return {path: json.dumps(columns | {"sensors": sorted(sensors_of(path))}) for path in paths}
 
 
-def _checksums(unit: Unit) -> str:
+def _checksums(unit: Unit, folder: Path) -> str:
     """Return name -> [SHA-256, bytes] of the files of a data set that a piece reads, as JSON."""
     checksums = {}
-    with local_copy(unit) as folder:
-        for file in unit.files:
-            path = folder / unit.name / file.name if unit.is_archive else folder / file.name
-            with path.open("rb") as opened:
-                inside = path.relative_to(folder / unit.name).as_posix()
-                checksums[as_text(inside)] = [hashlib.file_digest(opened, "sha256").hexdigest(), file.size]
-    return json.dumps(checksums, ensure_ascii=True)
+    for file in unit.files:
+        path = folder / unit.name / file.name if unit.is_archive else folder / file.name
+        with path.open("rb") as opened:
+            inside = path.relative_to(folder / unit.name).as_posix()
+            checksums[as_text(inside)] = [hashlib.file_digest(opened, "sha256").hexdigest(), file.size]
+    return json.dumps(checksums)
 
 
 def heads_of_text(text: str) -> tuple[int, Channels | None, tuple[str, ...], frozenset[str]]:
