@@ -202,11 +202,12 @@ def test_columns_of_the_archive_are_those_of_most_files_whatever_is_in_a_piece(t
         write_csv(archive / "aaa" / f"{k}.csv", t, {"x": u + k, "y": u**2, "z": np.sin(u)})  # as many columns
         write_csv(archive / "bbb" / f"{k}.csv", t, {"x": u + k, "y": u**2})
         write_csv(archive / "ccc" / f"{k}.csv", t, {"gripper": u > 0.5, "y": u**2 + k, "x": u})
+        write_csv(archive / "ddd" / f"{k}.csv", t, {"x [mm]": u + k, "y": u**2, "gripper": u > 0.5})  # x has no unit
     rows, said = by_pieces(tmp_path / "library", [archive])
     assert_same(
         rows, of_one_process(tmp_path / "one", [archive]), (1e-6, 1e-5)
     )  # those in another order: described again
-    assert {problem.partition("/")[0] for problem in said["problems"]} == {"aaa", "bbb"}
+    assert {problem.partition("/")[0] for problem in said["problems"]} == {"aaa", "bbb", "ddd"}
     assert "2 dimensions where most have 3" in "".join(said["problems"])
 
 

@@ -10,14 +10,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from kineme.errors import DataError
+from kineme.errors import DataError, TrajectoryError
 from kineme.io.reading.formats import root_of
 from kineme.io.reading.recordings import check_asked, how_to_read
 from kineme.library.commit import Batch, Committed, check, evenly_sampled
 from kineme.library.learn import as_names, batches, check_channels, commit_batches, digests, in_columns_of, source_at
 from kineme.library.storage.store import Store
 from kineme.movements.channels.channel import Channel, Channels, is_plain, recorded_names, same_columns
-from kineme.movements.channels.column_match import columns_recorded
+from kineme.movements.channels.column_match import columns_like, columns_recorded
 from kineme.movements.trajectories.as_learned import by_names
 from kineme.pieces.archive import is_remote
 from kineme.pieces.described import address_of, check_rows, checksum_of, heads_of_text, movements_of_rows, rows_by_table
@@ -56,6 +56,12 @@ class Heads(NamedTuple):
             return f"{self.width} dimensions where most have {most.width}"
         if self.sensors != most.sensors and not by_number:
             return "the file of another sensor by its name than most files; read them apart"
+        if self.names == most.names and self.channels is not None and most.channels is not None:
+            try:  # their units may be those of other quantities
+                columns_like(np.ones((1, self.width)), columns_recorded(self.channels), columns_recorded(most.channels))
+            except TrajectoryError as error:
+                return str(error)
+            return None
         if self.names == most.names or ((by_number or not self.names) and is_plain(most.channels or ())):
             return None
         here, there = (", ".join(recorded_names(heads.channels or ())) for heads in (self, most))
@@ -82,6 +88,11 @@ class Survey:
     rows: int
     people: Sequence[str]
     notes: tuple[str, ...]
+
+    def is_described(self, heads: Heads) -> bool:
+        """Tell whether a file is described in the columns that are learned."""
+        plain = self.learned is None and is_plain(heads.channels or ())
+        return heads.n_dims == self.most.n_dims and (plain or same_columns(heads.channels, self.learned))
 
 
 def survey(tables: Tables, asked: Asked, problems: Sequence[str] = ()) -> Survey:
@@ -193,7 +204,7 @@ def learned(
             store.n_dims == of.most.n_dims
             and (same_columns(store.channels, of.learned) or (store.channels is None and is_plain(of.learned or ())))
         )
-        for rows in _blocks(tables):
+        for rows in _blocks(tables, of):
             text = rows.column("heads")[0].as_py()
             if (reason := of.unlike[text]) is not None:
                 for path in rows.column("path").unique().to_pylist():
@@ -221,9 +232,7 @@ def _texts(rows: Any, name: str) -> list[Any]:
 
 def _batch(store: Store, rows: Any, heads: Heads, of: Survey, is_ours: bool) -> Batch:
     """Return movements to be stored, without their sources: as they are described, or in the columns of the library."""
-    is_same = heads.n_dims == of.most.n_dims and (
-        same_columns(heads.channels, of.learned) or (of.learned is None and is_plain(heads.channels or ()))
-    )
+    is_same = of.is_described(heads)
     own = of.learned if is_same else heads.channels
     check_rows(rows, store.specification, heads.n_dims, own)
     demos = movements_of_rows(rows, heads.n_dims, own)
@@ -257,7 +266,7 @@ def _sources(asked: Asked, of: Survey) -> Callable[[str, str, int], Any]:
     return source
 
 
-def _blocks(tables: Tables) -> Iterator[Any]:
+def _blocks(tables: Tables, of: Survey) -> Iterator[Any]:
     """Yield rows of all parts in their order, some thousand at a time, all of the same columns."""
     import pyarrow as pa
 
@@ -267,14 +276,20 @@ def _blocks(tables: Tables) -> Iterator[Any]:
         held.append(rows.replace_schema_metadata(None))
         n += rows.num_rows
         if n >= _ROWS:
-            yield from _cut(pa.concat_tables(held))
+            yield from _cut(pa.concat_tables(held), of)
             held, n = [], 0
     if held:
-        yield from _cut(pa.concat_tables(held))
+        yield from _cut(pa.concat_tables(held), of)
 
 
-def _cut(rows: Any) -> Iterator[Any]:
-    codes = rows.column("heads").combine_chunks().dictionary_encode().indices.to_numpy()
+def _cut(rows: Any, of: Survey) -> Iterator[Any]:
+    texts = rows.column("heads").combine_chunks().dictionary_encode()
+    heads = [of.heads[text] for text in texts.dictionary.to_pylist()]
+    alike_in = [
+        (of.unlike[text], None if of.is_described(each) else each.channels)
+        for text, each in zip(texts.dictionary.to_pylist(), heads, strict=True)
+    ]
+    codes = np.array([alike_in.index(each) for each in alike_in])[texts.indices.to_numpy()]
     ends = [*(np.flatnonzero(np.diff(codes)) + 1).tolist(), len(codes)]
     for first, stop in zip([0, *ends[:-1]], ends, strict=True):
         alike = rows.slice(first, stop - first)
