@@ -6,7 +6,6 @@ Even times are not stored, but computed from the duration.
 
 from __future__ import annotations
 
-import sqlite3
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
@@ -18,7 +17,7 @@ from kineme.dmp.discrete.encode import check_movement
 from kineme.errors import TrajectoryError
 from kineme.library.storage.channels import channels_to_text, to_bytes
 from kineme.library.storage.read import people_by_movement
-from kineme.library.storage.rows import Row, among, as_text, listed, next_key
+from kineme.library.storage.rows import Database, Row, among, as_text, listed, next_key
 from kineme.library.storage.schema import CONTINUES
 from kineme.library.storage.source import Source
 from kineme.library.storage.specification import Specification
@@ -60,14 +59,17 @@ def commit(store: Store, batch: Batch, continues: int | None = None) -> Committe
     """
     if not batch.row_of and (ids := _all_stored(store, batch)) is not None:
         return Committed(0, (), ids, None)
-    with store.writing("learn") as change:
+    with store.writing("learn", ahead=batch.tables) as change:
         stored = find_stored(change.connection, batch)  # again, since another process may have written meanwhile
         _insert_sources(change, batch, stored)
         keys, new = _keys(change, batch, stored)
+        stored_ahead = change.keep_ahead({key: batch.row_of.get(i) for key, i in new.items()})
         if new:
             if not batch.row_of.keys() >= set(new.values()):  # what was stored has been deleted meanwhile
                 serialize_new(store, batch.demos, batch, list(new.values()))
             _insert_movements(change, batch, new, stored)
+            for table, rows in () if stored_ahead else batch.tables.items():
+                change.insert(table, [(key, *rows[batch.row_of[i]]) for key, i in new.items()])
         labeled = _without_symbol(change.connection, batch, keys)  # movements that have a symbol keep it
         symbols, new_symbols = keys_by_name(change, dict.fromkeys(labeled.values()))
         add_members(change, [(movement, symbols[label]) for movement, label in labeled.items()], "label")
@@ -136,8 +138,6 @@ def _insert_movements(change: Change, batch: Batch, new: dict[int, int], stored:
         about = (batch.digests[i], name, batch.labels[i], lengths[i], t0[i], durations[i])
         movements.append((key, source, place, *about, change.version, None))
     change.insert("movement", movements)
-    for table, rows in batch.tables.items():
-        change.insert(table, [(key, *rows[batch.row_of[i]]) for key, i in new.items()])
 
 
 def _without_symbol(connection: Any, batch: Batch, keys: list[int]) -> dict[int, str]:
@@ -199,7 +199,7 @@ class Stored:
             self.by_place[where] = key
 
 
-def find_stored(connection: sqlite3.Connection, batch: Batch) -> Stored:
+def find_stored(connection: Database, batch: Batch) -> Stored:
     """Find the movements of a batch that the library holds already."""
     hashes = {source.sha256 for source in batch.sources if source is not None}
     query = f"SELECT sha256, options, id FROM source WHERE {among('sha256')}"

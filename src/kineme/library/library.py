@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import SpecificationError
 from kineme.library.storage import changes, export_import, read, symbols, undo, verify
-from kineme.library.storage.connection import FILE, as_folder
+from kineme.library.storage.address import Address, as_location
+from kineme.library.storage.connection import FILE
 from kineme.library.storage.read import Ids
 from kineme.library.storage.specification import Specification
 from kineme.library.storage.store import Store, history
@@ -104,7 +105,11 @@ class ActionLibrary:
         wait: float = 10.0,
     ) -> None:
         specification = Specification.of(recognizer, dmp) if create else None
-        self.store = Store(as_folder(folder) / FILE, specification, read_only=read_only, wait=wait)
+        location, kind = as_location(folder), Store
+        if isinstance(location, Address):
+            from kineme.library.storage.postgres_store import PostgresStore as kind  # noqa: N813
+        path = location if isinstance(location, Address) else location / FILE
+        self.store = kind(path, specification, read_only=read_only, wait=wait)
         if Specification.of(recognizer, dmp, self.specification) != self.specification:
             self.close()
             raise SpecificationError(
@@ -360,7 +365,7 @@ class ActionLibrary:
     def at(self, version: int) -> ActionLibrary:
         """Open the library as it was at a version, for reading."""
         past = object.__new__(ActionLibrary)
-        past.store = Store(self.store.path, read_only=True, as_of=version, wait=self.store.wait)
+        past.store = type(self.store)(self.store.path, read_only=True, as_of=version, wait=self.store.wait)
         return past
 
     def verify(self) -> list[Problem]:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-import sqlite3
 from collections.abc import Sequence
 from typing import Any
 
 from kineme.errors import SpecificationError
 from kineme.library.storage.read import as_ids
-from kineme.library.storage.rows import Row, among, check_text, listed, next_key, parsed_column, select
+from kineme.library.storage.rows import Database, Row, among, check_text, listed, next_key, parsed_column, select
 from kineme.library.storage.schema import COLUMNS, MAX_DOCUMENT
 from kineme.library.storage.store import NOW, Change, Store
 from kineme.library.storage.symbols import HOW, add_members, check_name, make, state_of
@@ -184,14 +183,14 @@ def _move_members(change: Change, members: Sequence[Row], key: int) -> None:
         add_members(change, [(row[1], key) for row in members if row[3] == how], how)
 
 
-def _find(connection: sqlite3.Connection, who: str) -> Row | None:
+def _find(connection: Database, who: str) -> Row | None:
     try:
         return state_of(connection, who, NOW)
     except SpecificationError:
         return None
 
 
-def _ids_of(connection: sqlite3.Connection, states: Sequence[Row]) -> list[str]:
+def _ids_of(connection: Database, states: Sequence[Row]) -> list[str]:
     keys = listed(state[1] for state in states)
     return [row[1] for row in select(connection, "symbol", among("key"), {"keys": keys})]
 
@@ -202,7 +201,7 @@ def _check_description(text: Any) -> None:
     check_text("a description", text, MAX_DOCUMENT // 2)  # the history repeats it, in JSON
 
 
-def _check_free(connection: sqlite3.Connection, name: str) -> None:
+def _check_free(connection: Database, name: str) -> None:
     if select(connection, "symbol_state", "removed IS NULL AND name = :name", {"name": name}):
         raise SpecificationError(f"expected a name that no symbol has, got {name!r}; merge the two, or choose another")
     if select(connection, "symbol", "id = :name", {"name": name}):

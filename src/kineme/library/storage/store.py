@@ -6,7 +6,7 @@ import json
 import sqlite3
 import uuid
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from numbers import Integral
@@ -26,9 +26,16 @@ from kineme.library.storage.connection import (
     migrate,
     transaction,
 )
-from kineme.library.storage.rows import Row, damaged, insert, parsed_column, seal, select
+from kineme.library.storage.rows import Database, Row, damaged, has_table, insert, parsed_column, seal, select
 from kineme.library.storage.safety import size_of
-from kineme.library.storage.schema import COUNTED, LARGEST_ID, READABLE, SCHEMA_VERSION
+from kineme.library.storage.schema import (
+    BLOBS,
+    COUNTED,
+    LARGEST_ID,
+    OPTIONAL_BLOBS,
+    READABLE,
+    SCHEMA_VERSION,
+)
 from kineme.library.storage.specification import Specification, as_n_dims
 from kineme.movements.channels.channel import Channels
 
@@ -42,9 +49,11 @@ class Store:
     reading. `wait` is the time for which it waits for another writer [s].
     """
 
+    path: Any  # of the file; of a library on a server, its address
+
     def __init__(
         self,
-        path: Path,
+        path: Any,
         specification: Specification | None = None,
         *,
         read_only: bool = False,
@@ -60,14 +69,19 @@ class Store:
         # SQLite would free memory of a running statement.
         self._read_turn = RLock()
         self._n_reading = 0  # nesting depth of the thread that reads
-        self._writer: sqlite3.Connection | None = None
+        self._writer: Any = None
         self._waking, self._asleep, self._closed = Lock(), False, False
         self._n_dims: int | None = None  # these two are written once
         self._channels: Channels | None = None
-        if not self.path.exists():
-            self._create(specification)
+        if not self._exists():
+            if specification is None or self.read_only:
+                raise DataError(
+                    f"expected a library in {self.folder}, found {self._missing()} there; "
+                    "make one by learning (in Python, with create=True), or correct the path"
+                )
+            self._create({"id": str(uuid.uuid4()), **specification.to_json()})
         with in_plain_words(self.path, wait), safety.awake():
-            self._reader = self._connect()
+            self._reader: Any = self._connect()
             try:
                 self._check_kind()
                 meta = checked_meta(self._reader, self.path)
@@ -82,7 +96,16 @@ class Store:
                 raise
             safety.register(self)
 
-    def _connect(self) -> sqlite3.Connection:
+    def _exists(self) -> bool:
+        return bool(self.path.exists())
+
+    def _missing(self) -> str:
+        return f"no {self.path.name}"
+
+    def _create(self, meta: dict[str, str]) -> None:
+        create(self.path, meta)
+
+    def _connect(self) -> Database:
         safety.refuse_if_lost(self.path)
         return connect(self.path, "ro" if self.read_only else "rw", self.wait).allow_forks()
 
@@ -95,7 +118,7 @@ class Store:
                     connection.close()
             self._writer = None
 
-    def carried_over(self) -> list[sqlite3.Connection]:
+    def carried_over(self) -> list[Database]:
         """Return the connections that were open at a fork; see `safety`."""
         if self._closed or self._asleep:
             return []
@@ -108,18 +131,9 @@ class Store:
                 self._reader = self._connect()
                 self._asleep = False
 
-    def _create(self, specification: Specification | None) -> None:
-        if specification is None or self.read_only:
-            raise DataError(
-                f"expected a library in {self.path.parent}, found no {self.path.name} there; "
-                "make one by learning (in Python, with create=True), or correct the path"
-            )
-        create(self.path, {"id": str(uuid.uuid4()), **specification.to_json()})
-
     def _check_kind(self) -> None:
-        """Refuse a file that is not a library; migrate an older one, unless it is only read and can be as it is."""
-        self._file = self.path.stat().st_ino
-        version = check_kind(self._reader, self.path)
+        """Refuse what is not a library; migrate an older one, unless it is only read and can be as it is."""
+        version = self._kind()
         if version == SCHEMA_VERSION or (self.read_only and version >= READABLE):
             return
         if self.read_only:
@@ -127,12 +141,45 @@ class Store:
                 f"expected {self.path} to have schema version {SCHEMA_VERSION}, got an earlier one; "
                 "open it once without read_only to bring it up to date"
             )
+        self._migrate()
+
+    def _kind(self) -> int:
+        """Return the version of the schema; refused if it is a later one, or no library."""
+        self._file = self.path.stat().st_ino
+        return check_kind(self._reader, self.path)
+
+    def _migrate(self) -> None:
         migrate(self._reader, self.path)
 
     @property
-    def folder(self) -> Path:
-        """The folder of the library."""
+    def folder(self) -> Any:
+        """The folder of the library; of one on a server, its address."""
         return self.path.parent
+
+    @property
+    def name(self) -> str:
+        """The name of the library's folder; of one on a server, that of its schema."""
+        return str(self.folder.resolve().name)
+
+    def cache_path(self, name: str) -> Path | None:
+        """Return the path of a cache file; None where no file of this user's own can be."""
+        return Path(self.folder / name)
+
+    @contextmanager
+    def database(self, copy: Path) -> Iterator[sqlite3.Connection]:
+        """Context manager: the library as a database of SQLite of which a copy is written, within limits."""
+        with (
+            closing(connect(self.path, "ro", self.wait)) as connection,
+            safety.limited_copy(connection, self.path, copy),
+        ):
+            yield connection
+
+    @contextmanager
+    def snapshot(self) -> Iterator[Database]:
+        """Context manager: a connection of its own that sees the library at one moment, within limits."""
+        with closing(connect(self.path, "ro", self.wait)) as connection, safety.limited(connection, self.path):
+            connection.execute("BEGIN")
+            yield connection
 
     @property
     def size(self) -> int:
@@ -168,7 +215,7 @@ class Store:
         return rows[0][1] if rows else None
 
     @contextmanager
-    def reading(self) -> Iterator[sqlite3.Connection]:
+    def reading(self) -> Iterator[Database]:
         """Context manager: the connection to read from, which sees only committed versions.
 
         One thread reads at a time; it may nest readings.
@@ -186,7 +233,7 @@ class Store:
                 finally:
                     self._n_reading -= 1
 
-    def moment(self, connection: sqlite3.Connection) -> Moment:
+    def moment(self, connection: Database) -> Moment:
         """Return the shown version, which stays the same while new ones are added."""
         last = connection.execute("SELECT max(id) FROM version WHERE id <= :v", {"v": self.as_of}).fetchone()[0]
         if last is None:
@@ -203,8 +250,19 @@ class Store:
             return self.moment(connection)
 
     @contextmanager
-    def writing(self, action: str, detail: dict[str, Any] | None = None) -> Iterator[Change]:
-        """Context manager: one transaction, which becomes one version; its `detail` is stored in the history."""
+    def _transaction(self, writer: Any, ahead: Mapping[str, Sequence[Row]]) -> Iterator[range]:
+        """Return a transaction, and the ids of the movements whose rows `ahead` it has stored: none."""
+        with transaction(writer):
+            yield range(0)
+
+    @contextmanager
+    def writing(
+        self, action: str, detail: dict[str, Any] | None = None, ahead: Mapping[str, Sequence[Row]] | None = None
+    ) -> Iterator[Change]:
+        """Context manager: one transaction, which becomes one version; its `detail` is stored in the history.
+
+        `ahead` are rows of new movements without their ids, by table, which a server may take while others write.
+        """
         with safety.awake(), in_plain_words(self.path, self.wait):
             # Before the lock: in a forked child, a thread that does not exist may hold it.
             safety.refuse_if_lost(self.path)
@@ -213,12 +271,12 @@ class Store:
                 self._wake()
                 self.check_writable()
                 if self._writer is None:
-                    self._writer = connect(self.path, "rw", self.wait).allow_forks()
-                with transaction(self._writer):
+                    self._writer = self._connect()
+                with self._transaction(self._writer, ahead or {}) as ids:
                     self.check_writable()  # again: waiting for the turn may have taken long
                     last = self.moment(self._writer)
                     counts = {name: getattr(last, name) for name in COUNTED.values()}
-                    change = Change(self._writer, last.version + 1, counts, detail or {})
+                    change = Change(self._writer, last.version + 1, counts, detail or {}, ids)
                     yield change
                     at = datetime.now(UTC).isoformat(timespec="milliseconds")
                     text = json.dumps(change.detail, ensure_ascii=False)
@@ -309,15 +367,25 @@ class Moment(NamedTuple):
 class Change:
     """An open transaction."""
 
-    connection: sqlite3.Connection
+    connection: Database
     version: int
     counts: dict[str, int]
     detail: dict[str, Any]  # of the version, for the history
+    ahead: range = range(0)  # ids of new movements whose rows in `BLOBS` are stored already
 
     def insert(self, table: str, rows: Sequence[Row]) -> None:
         """Add rows to a table."""
         insert(self.connection, table, rows)
         self._count(table, len(rows))
+
+    def keep_ahead(self, rows: Mapping[int, int | None]) -> bool:
+        """Tell whether new movements, id -> row, are just those whose rows are stored already; others are deleted."""
+        if self.ahead and rows != dict(zip(self.ahead, range(len(self.ahead)), strict=True)):
+            for table in (*BLOBS, *OPTIONAL_BLOBS):  # some of them have been learned by another process meanwhile
+                if has_table(self.connection, table):
+                    self.connection.execute(f"DELETE FROM {table} WHERE movement >= ?", (self.ahead[0],))
+            return False
+        return bool(self.ahead)
 
     def retire(self, table: str, rows: Sequence[Row]) -> None:
         """Mark selected rows, whose last column is ``removed``, as removed from this version on."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import difflib
 import json
 import secrets
-import sqlite3
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -17,6 +16,7 @@ from kineme.errors import SpecificationError
 from kineme.library.storage.read import groups, movements, records
 from kineme.library.storage.rows import (
     ALIVE,
+    Database,
     Row,
     among,
     check_text,
@@ -100,7 +100,7 @@ def exists(store: Store, who: object) -> bool:
         return False
 
 
-def state_of(connection: sqlite3.Connection, who: str, version: int) -> Row:
+def state_of(connection: Database, who: str, version: int) -> Row:
     """Return the row of `symbol_state` of a name or, where no symbol has that name, of an id."""
     conditions = ("name = :who", "symbol IN (SELECT key FROM symbol WHERE id = :who)")
     for condition in conditions if isinstance(who, str) else ():
@@ -116,7 +116,7 @@ def state_of(connection: sqlite3.Connection, who: str, version: int) -> Row:
     raise SpecificationError(f"expected the name or id of a symbol, got {who!r}; {others}")
 
 
-def _with_members(connection: sqlite3.Connection, moment: Moment, states: Sequence[Row]) -> list[Symbol]:
+def _with_members(connection: Database, moment: Moment, states: Sequence[Row]) -> list[Symbol]:
     keys = [row[1] for row in states]
     about = {row[0]: row[1:] for row in select(connection, "symbol", among("key"), {"keys": listed(keys)})}
     if lost := set(keys) - about.keys():
@@ -130,7 +130,7 @@ def _with_members(connection: sqlite3.Connection, moment: Moment, states: Sequen
     return every
 
 
-def _members(connection: sqlite3.Connection, keys: list[int], moment: Moment) -> dict[int, NDArray[np.int64]]:
+def _members(connection: Database, keys: list[int], moment: Moment) -> dict[int, NDArray[np.int64]]:
     rows = select(connection, "member", f"{among('symbol')} AND {ALIVE}", {"keys": listed(keys), "v": moment.version})
     n = connection.execute(f"SELECT count(*) FROM member WHERE {ALIVE}", {"v": moment.version}).fetchone()[0]
     if n != moment.members:
