@@ -6,6 +6,7 @@ Even times are not stored, but computed from the duration.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
@@ -16,13 +17,14 @@ from numpy.typing import NDArray
 from kineme.dmp.discrete.encode import check_movement
 from kineme.errors import TrajectoryError
 from kineme.library.storage.channels import channels_to_text, to_bytes
+from kineme.library.storage.connection import ConflictError
 from kineme.library.storage.read import people_by_movement
-from kineme.library.storage.rows import Database, Row, among, as_text, listed, next_key
+from kineme.library.storage.rows import Database, Row, among, as_text, listed
 from kineme.library.storage.schema import CONTINUES
 from kineme.library.storage.source import Source
 from kineme.library.storage.specification import Specification
-from kineme.library.storage.store import NOW, Change, Store
-from kineme.library.storage.symbols import add_members, keys_by_name
+from kineme.library.storage.store import NOW, Change, Store, repeated
+from kineme.library.storage.symbols import add_members, keys_by_name, stored_keys
 from kineme.movements.channels.coordinates import with_periods
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.similarity.describe import feature_rows
@@ -52,6 +54,7 @@ def serialize_new(store: Store, demos: Demonstrations, batch: Batch, new: list[i
     batch.row_of = dict(zip(new, range(len(new)), strict=True))
 
 
+@repeated
 def commit(store: Store, batch: Batch, continues: int | None = None) -> Committed:
     """Store what is new, and assign it to the symbols of its labels; where nothing changes, no version is made.
 
@@ -59,17 +62,35 @@ def commit(store: Store, batch: Batch, continues: int | None = None) -> Committe
     """
     if not batch.row_of and (ids := _all_stored(store, batch)) is not None:
         return Committed(0, (), ids, None)
-    with store.writing("learn", ahead=batch.tables) as change:
+    if store.many_write:
+        with suppress(ConflictError):  # others learn the same at the same time: once more, alone
+            return _commit(store, batch, continues, _n_rows(store, batch))
+    return _commit(store, batch, continues, None)
+
+
+def _n_rows(store: Store, batch: Batch) -> dict[str, int]:
+    """Return how many rows a batch adds to each table whose rows are numbered, if nothing changes meanwhile."""
+    with store.reading() as connection:
+        stored = find_stored(connection, batch)
+        keys, new = _keys(-len(batch.digests), batch, stored)  # of new ones below 0
+        labeled = _without_symbol(connection, batch, keys)
+        names = set(labeled.values())
+        n_symbols = len(names - stored_keys(connection, names).keys())
+    sources = {(source.sha256, source.options_json) for source in batch.sources if source is not None}
+    n_sources = len(sources - stored.sources.keys())
+    counts = {"version": 1, "source": n_sources, "movement": len(new), "member": len(labeled)}
+    return counts | {"symbol": n_symbols, "symbol_state": n_symbols}
+
+
+def _commit(store: Store, batch: Batch, continues: int | None, reserve: dict[str, int] | None) -> Committed:
+    with store.writing("learn", reserve=reserve) as change:
         stored = find_stored(change.connection, batch)  # again, since another process may have written meanwhile
         _insert_sources(change, batch, stored)
-        keys, new = _keys(change, batch, stored)
-        stored_ahead = change.keep_ahead({key: batch.row_of.get(i) for key, i in new.items()})
+        keys, new = _keys(change.next_key("movement"), batch, stored)
         if new:
             if not batch.row_of.keys() >= set(new.values()):  # what was stored has been deleted meanwhile
                 serialize_new(store, batch.demos, batch, list(new.values()))
             _insert_movements(change, batch, new, stored)
-            for table, rows in () if stored_ahead else batch.tables.items():
-                change.insert(table, [(key, *rows[batch.row_of[i]]) for key, i in new.items()])
         labeled = _without_symbol(change.connection, batch, keys)  # movements that have a symbol keep it
         symbols, new_symbols = keys_by_name(change, dict.fromkeys(labeled.values()))
         add_members(change, [(movement, symbols[label]) for movement, label in labeled.items()], "label")
@@ -93,9 +114,8 @@ def _all_stored(store: Store, batch: Batch) -> NDArray[np.int64] | None:
         return np.array(ids, dtype=np.int64)
 
 
-def _keys(change: Change, batch: Batch, stored: Stored) -> tuple[list[int], dict[int, int]]:
-    """Return the id of every movement of the batch, and new id -> movement of the batch."""
-    key = next_key(change.connection, "movement")
+def _keys(key: int, batch: Batch, stored: Stored) -> tuple[list[int], dict[int, int]]:
+    """Return the id of every movement of the batch, and new id, from `key` on, -> movement of the batch."""
     keys: list[int] = []
     new: dict[int, int] = {}
     for i in range(len(batch.digests)):
@@ -109,7 +129,7 @@ def _keys(change: Change, batch: Batch, stored: Stored) -> tuple[list[int], dict
 
 
 def _insert_sources(change: Change, batch: Batch, stored: Stored) -> None:
-    key = next_key(change.connection, "source")
+    key = change.next_key("source")
     rows: list[Row] = []
     unknown: dict[tuple[str, str], Source] = {
         (source.sha256, source.options_json): source for source in batch.sources if source is not None
@@ -138,6 +158,8 @@ def _insert_movements(change: Change, batch: Batch, new: dict[int, int], stored:
         about = (batch.digests[i], name, batch.labels[i], lengths[i], t0[i], durations[i])
         movements.append((key, source, place, *about, change.version, None))
     change.insert("movement", movements)
+    for table, rows in batch.tables.items():
+        change.insert(table, [(key, *rows[batch.row_of[i]]) for key, i in new.items()])
 
 
 def _without_symbol(connection: Any, batch: Batch, keys: list[int]) -> dict[int, str]:

@@ -113,12 +113,7 @@ def learn(  # noqa: PLR0913, PLR0917 - those of `ActionLibrary.learn`
             batch = Batch(part, digests(part, even), names[rows], people[rows], sources[rows], where[rows])
             with store.reading() as connection:
                 stored = find_stored(connection, batch)
-            new = []
-            for i in range(len(part)):  # only new ones are serialized
-                if stored.id_of(batch, i) is None:
-                    stored.remember(batch, i, 0)
-                    new.append(i)
-            if new:
+            if new := [i for i in range(len(part)) if stored.id_of(batch, i) is None]:  # only these are serialized
                 serialize_new(store, part, batch, new)
             if pending is not None:  # one batch is written while the next one is described
                 version = finish(pending)

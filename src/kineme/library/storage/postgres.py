@@ -4,10 +4,11 @@ The rest of the storage speaks the SQL of SQLite; here its statements are transl
 
 - Columns have types, so that a check of a type becomes one of presence.
 - Rows are added by COPY.
-- Writers take turns by advisory locks. The lock of the library is for whoever numbers rows. Rows of samples, primitives
-  and features, nearly all bytes of a movement, may be written ahead: a writer takes the lock only to choose ids behind
-  those of all writers under way, each of which holds a lock of its own that says where its ids end. Then it writes,
-  beside them, waits for the one before it, and commits, if that one did. So versions follow one another, and their ids.
+- Writers take turns by advisory locks. Whoever changes what is there holds the lock of the library throughout. Whoever
+  learns holds it only to reserve keys, behind those of all who learn: each of these holds locks that say where its keys
+  end. Then it writes, beside them, waits for the one before it, and commits if that one did. So versions follow one
+  another, and the keys of all rows, without gaps. Where two learn the same at the same time, or one fails, the unique
+  indexes and the order of versions show it: it is written again, alone.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from kineme.errors import DataError, KinemeError
 from kineme.io.records import needs
 from kineme.library.storage.address import Address
 from kineme.library.storage.connection import BusyError, ConflictError
-from kineme.library.storage.rows import Row, next_key, seal
+from kineme.library.storage.rows import Row, next_key
 from kineme.library.storage.schema import CREATE, MIGRATIONS
 
 _CUT = (
@@ -162,7 +163,8 @@ class ServerConnection:
         self._driver, self.address, self.wait, self._read_only = psycopg, address, wait, read_only
         digest = sha256(address.schema.encode()).digest()
         self._lock = int.from_bytes(digest[:8], signed=True)
-        self._class = int.from_bytes(digest[8:12]) % _KEYS  # of the locks of writers under way
+        number = int.from_bytes(digest[8:12]) % _KEYS // len(_COPY) * len(_COPY)
+        self._places = {table: number + k for k, table in enumerate(_COPY)}  # of the locks of writers under way
         self._version: int | None = None
         self._scans = 0
         self._session: Any = None
@@ -301,73 +303,51 @@ class ServerConnection:
         return list(self.run(query, [self.address.schema, list(_COPY)]).fetchall())
 
     @contextmanager
-    def transaction(self, ahead: Mapping[str, Sequence[Row]]) -> Iterator[range]:
-        """Return a transaction in which no other writes rows with ids, and the ids of the movements written `ahead`."""
-        ids = self._begun_ahead(ahead) if any(ahead.values()) else range(0)
-        if not ids:
-            self.run("BEGIN")
+    def transaction(self, reserve: Mapping[str, int]) -> Iterator[dict[str, int]]:
+        """Return a transaction in which no other writes; or beside others, with the first of its keys in each table."""
+        self.run("BEGIN")
         try:
-            if not ids:
-                self._lock_all()
+            first = self._reserved(reserve) if reserve else {}
+            if not first:
+                self.run("SELECT pg_advisory_xact_lock(%s)", [self._lock])
+                for place, end in self._ends():  # of writers under way, which need this lock no more
+                    self.run("SELECT pg_advisory_xact_lock_shared(%s, %s)", [place, end])
             transaction_id = self.run("SELECT pg_current_xact_id()::text").fetchone()[0]
-            yield ids
+            yield first
             self._commit(transaction_id)
         except BaseException:
             self._roll_back()
             raise
 
-    def _lock_all(self) -> None:
-        """Wait for the lock of the library, and then for all writers under way, which do not take it."""
-        self.run("SELECT pg_advisory_xact_lock(%s)", [self._lock])
-        for end in self._ends():
-            self.run("SELECT pg_advisory_xact_lock_shared(%s, %s)", [self._class, end])
-
-    def _ends(self) -> list[int]:
-        """Return the keys of the locks of writers under way: where their ids end, modulo `_KEYS`."""
-        query = """SELECT objid::int FROM pg_locks JOIN pg_database ON pg_database.oid = database
-            WHERE datname = current_database() AND locktype = 'advisory' AND classid::bigint = %s AND objsubid = 2
+    def _ends(self) -> list[tuple[int, int]]:
+        """Return the locks of writers under way: number of the table, and the last key reserved in it, `% _KEYS`."""
+        query = """SELECT classid::bigint, objid::int FROM pg_locks JOIN pg_database ON pg_database.oid = database
+            WHERE datname = current_database() AND locktype = 'advisory' AND classid::bigint = ANY(%s) AND objsubid = 2
             AND mode = 'ExclusiveLock' AND granted"""
-        return [end for (end,) in self.run(query, [self._class])]
+        return list(self.run(query, [list(self._places.values())]).fetchall())
 
-    def _begun_ahead(self, tables: Mapping[str, Sequence[Row]]) -> range:
-        """Begin a transaction with the rows of new movements; return their ids, or roll back and return none.
-
-        They get the ids behind those of all writers under way. That is right if the last of these commits as many
-        movements as it reserved ids for.
-        """
-        n = max(map(len, tables.values()))
-        self.run("BEGIN")
-        try:
-            first, previous = self._reserved(n)
-            for table, rows in tables.items():
-                keyed = ((first + k, *row) for k, row in enumerate(rows))
-                self.copy_rows(table, [(*row, seal(table, row)) for row in keyed])
-            if previous is not None:
-                self.run("SELECT pg_advisory_xact_lock_shared(%s, %s)", [self._class, previous])
-            if next_key(self, "movement") == first:
-                return range(first, first + n)
-        except ConflictError:
-            pass
-        except BaseException:
-            self._roll_back()
-            raise
-        self._roll_back()
-        return range(0)
-
-    def _reserved(self, n: int) -> tuple[int, int | None]:
-        """Return the first of n ids behind all others, and the key of the lock of the writer before."""
+    def _reserved(self, reserve: Mapping[str, int]) -> dict[str, int]:
+        """Return the first of so many keys in each table, behind those of all writers under way."""
         self.run("SELECT pg_advisory_lock(%s)", [self._lock])
         try:
-            ends = self._ends()  # before the rows that are committed: none is in neither
-            last = next_key(self, "movement") - 1
-            beyond = {(end - last) % _KEYS: end for end in ends if (end - last) % _KEYS < _KEYS // 2}
-            reach = max(beyond, default=0)
-            first = last + reach + 1
-            self.run("SELECT pg_advisory_xact_lock(%s, %s)", [self._class, (first + n - 1) % _KEYS])
+            ends = self._ends()  # before the rows that are committed: no key is in neither
+            first = {}
+            for table, n in reserve.items():
+                last, place = next_key(self, table) - 1, self._places[table]
+                beyond = [(end - last) % _KEYS for there, end in ends if there == place]
+                first[table] = last + 1 + max((reach for reach in beyond if reach < _KEYS // 2), default=0)
+                if n:
+                    self.run("SELECT pg_advisory_xact_lock(%s, %s)", [place, (first[table] + n - 1) % _KEYS])
         finally:
             with suppress(KinemeError):  # an error before, or a connection that is cut, which releases it
                 self.run("SELECT pg_advisory_unlock(%s)", [self._lock])
-        return first, beyond.get(reach)
+        return first
+
+    def wait_for_turn(self, version: int) -> None:
+        """Wait until the version before is committed; a ConflictError if it is not."""
+        self.run("SELECT pg_advisory_xact_lock_shared(%s, %s)", [self._places["version"], (version - 1) % _KEYS])
+        if next_key(self, "version") != version:
+            raise ConflictError(_CONFLICT.format(path=self.address, error="a writer before it failed"))
 
     def _roll_back(self) -> None:
         with suppress(KinemeError):  # of a connection that is cut nothing is stored

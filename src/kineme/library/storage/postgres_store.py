@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sqlite3
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager, suppress
 from hashlib import sha256
 from itertools import islice
@@ -38,9 +38,12 @@ class PostgresStore(Store):
     """
 
     path: Address
+    many_write = True
 
-    def _exists(self) -> bool:
-        with closing(self._connect()) as connection:
+    @classmethod
+    def exists(cls, path: Address, wait: float = 10.0) -> bool:
+        """Tell whether there is a library."""
+        with closing(ServerConnection(path, wait, read_only=True)) as connection:
             return connection.schema_version > 0
 
     def _missing(self) -> str:
@@ -105,11 +108,11 @@ class PostgresStore(Store):
         """Leave it to each statement, and to the id of the library in each transaction."""
 
     @contextmanager
-    def _transaction(self, writer: Any, ahead: Mapping[str, Sequence[Row]]) -> Iterator[range]:
-        with writer.transaction(ahead) as ids:
+    def _transaction(self, writer: Any, reserve: Mapping[str, int]) -> Iterator[dict[str, int]]:
+        with writer.transaction(reserve) as first:
             if select(writer, "meta", "key = 'id'") != [("id", self.id)]:
                 raise DataError(f"expected {self.path} as it was opened, but it was replaced; open the library again")
-            yield ids
+            yield first
 
     @contextmanager
     def snapshot(self) -> Iterator[ServerConnection]:

@@ -5,19 +5,21 @@ from __future__ import annotations
 import json
 import sqlite3
 import uuid
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager, suppress
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from functools import wraps
 from numbers import Integral
 from pathlib import Path
 from threading import Lock, RLock
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from kineme.errors import DataError, SpecificationError
 from kineme.library.storage import safety
 from kineme.library.storage.channels import channels_of_text
 from kineme.library.storage.connection import (
+    ConflictError,
     check_kind,
     checked_meta,
     connect,
@@ -26,18 +28,15 @@ from kineme.library.storage.connection import (
     migrate,
     transaction,
 )
-from kineme.library.storage.rows import Database, Row, damaged, has_table, insert, parsed_column, seal, select
+from kineme.library.storage.rows import Database, Row, damaged, insert, next_key, parsed_column, seal, select
 from kineme.library.storage.safety import size_of
-from kineme.library.storage.schema import (
-    BLOBS,
-    COUNTED,
-    LARGEST_ID,
-    OPTIONAL_BLOBS,
-    READABLE,
-    SCHEMA_VERSION,
-)
+from kineme.library.storage.schema import COUNTED, LARGEST_ID, READABLE, SCHEMA_VERSION
 from kineme.library.storage.specification import Specification, as_n_dims
 from kineme.movements.channels.channel import Channels
+
+Result = TypeVar("Result")
+
+_TRIES = 4  # of a change that others get in the way of
 
 NOW = LARGEST_ID  # later than every version: the current state
 
@@ -50,6 +49,7 @@ class Store:
     """
 
     path: Any  # of the file; of a library on a server, its address
+    many_write = False
 
     def __init__(
         self,
@@ -73,7 +73,7 @@ class Store:
         self._waking, self._asleep, self._closed = Lock(), False, False
         self._n_dims: int | None = None  # these two are written once
         self._channels: Channels | None = None
-        if not self._exists():
+        if not self.exists(path, wait):
             if specification is None or self.read_only:
                 raise DataError(
                     f"expected a library in {self.folder}, found {self._missing()} there; "
@@ -96,8 +96,10 @@ class Store:
                 raise
             safety.register(self)
 
-    def _exists(self) -> bool:
-        return bool(self.path.exists())
+    @classmethod
+    def exists(cls, path: Any, wait: float = 10.0) -> bool:
+        """Tell whether there is a library."""
+        return bool(path.exists())
 
     def _missing(self) -> str:
         return f"no {self.path.name}"
@@ -250,18 +252,19 @@ class Store:
             return self.moment(connection)
 
     @contextmanager
-    def _transaction(self, writer: Any, ahead: Mapping[str, Sequence[Row]]) -> Iterator[range]:
-        """Return a transaction, and the ids of the movements whose rows `ahead` it has stored: none."""
+    def _transaction(self, writer: Any, reserve: Mapping[str, int]) -> Iterator[dict[str, int]]:
+        """Return a transaction, and the first keys that are reserved in each table: none."""
         with transaction(writer):
-            yield range(0)
+            yield {}
 
     @contextmanager
     def writing(
-        self, action: str, detail: dict[str, Any] | None = None, ahead: Mapping[str, Sequence[Row]] | None = None
+        self, action: str, detail: dict[str, Any] | None = None, reserve: Mapping[str, int] | None = None
     ) -> Iterator[Change]:
         """Context manager: one transaction, which becomes one version; its `detail` is stored in the history.
 
-        `ahead` are rows of new movements without their ids, by table, which a server may take while others write.
+        `reserve` is how many rows it adds to each table whose rows are numbered, if that is known, for stores in which
+        `many_write`: a ConflictError if it adds others, or if what others write does not fit; nothing is stored then.
         """
         with safety.awake(), in_plain_words(self.path, self.wait):
             # Before the lock: in a forked child, a thread that does not exist may hold it.
@@ -272,15 +275,24 @@ class Store:
                 self.check_writable()
                 if self._writer is None:
                     self._writer = self._connect()
-                with self._transaction(self._writer, ahead or {}) as ids:
+                with self._transaction(self._writer, reserve or {}) as first:
                     self.check_writable()  # again: waiting for the turn may have taken long
-                    last = self.moment(self._writer)
-                    counts = {name: getattr(last, name) for name in COUNTED.values()}
-                    change = Change(self._writer, last.version + 1, counts, detail or {}, ids)
+                    version = first.get("version") or self.moment(self._writer).version + 1
+                    change = Change(self._writer, version, detail or {}, dict(first))
                     yield change
+                    if first:
+                        self._writer.wait_for_turn(change.version)
+                    last = self.moment(self._writer)
+                    counts = (getattr(last, name) + change.counts.get(name, 0) for name in COUNTED.values())
                     at = datetime.now(UTC).isoformat(timespec="milliseconds")
                     text = json.dumps(change.detail, ensure_ascii=False)
-                    insert(self._writer, "version", [(change.version, at, action, text, *change.counts.values())])
+                    change.insert("version", [(version, at, action, text, *counts)])
+                    if (
+                        reserve
+                        and first
+                        and any(change.reserved[table] != first[table] + reserve[table] for table in first)
+                    ):
+                        raise ConflictError(f"expected {dict(reserve)} rows, got others; run it again")
 
     def check_writable(self) -> None:
         """Refuse to write if opened for reading, or if the file is no longer the one that was opened.
@@ -323,6 +335,19 @@ class Store:
             with self._write_turn:  # not nested: a thread that reads may want to write
                 if self._writer is not None:
                     self._writer.close()
+
+
+def repeated(change: Callable[..., Result]) -> Callable[..., Result]:
+    """Let a change of a store that another writer got in the way of be made again, a few times."""
+
+    @wraps(change)
+    def again(*arguments: Any, **options: Any) -> Result:
+        for _ in range(_TRIES - 1):
+            with suppress(ConflictError):  # nothing of it was stored
+                return change(*arguments, **options)
+        return change(*arguments, **options)
+
+    return again
 
 
 def history(store: Store) -> tuple[Version, ...]:
@@ -369,23 +394,20 @@ class Change:
 
     connection: Database
     version: int
-    counts: dict[str, int]
     detail: dict[str, Any]  # of the version, for the history
-    ahead: range = range(0)  # ids of new movements whose rows in `BLOBS` are stored already
+    reserved: dict[str, int]  # table -> its next key, where keys were reserved before
+    counts: dict[str, int] = field(default_factory=dict)  # by how much the numbers of alive rows change
 
     def insert(self, table: str, rows: Sequence[Row]) -> None:
         """Add rows to a table."""
         insert(self.connection, table, rows)
         self._count(table, len(rows))
+        if table in self.reserved:
+            self.reserved[table] += len(rows)
 
-    def keep_ahead(self, rows: Mapping[int, int | None]) -> bool:
-        """Tell whether new movements, id -> row, are just those whose rows are stored already; others are deleted."""
-        if self.ahead and rows != dict(zip(self.ahead, range(len(self.ahead)), strict=True)):
-            for table in (*BLOBS, *OPTIONAL_BLOBS):  # some of them have been learned by another process meanwhile
-                if has_table(self.connection, table):
-                    self.connection.execute(f"DELETE FROM {table} WHERE movement >= ?", (self.ahead[0],))
-            return False
-        return bool(self.ahead)
+    def next_key(self, table: str) -> int:
+        """Return the key of the next row of a table."""
+        return self.reserved[table] if self.reserved else next_key(self.connection, table)
 
     def retire(self, table: str, rows: Sequence[Row]) -> None:
         """Mark selected rows, whose last column is ``removed``, as removed from this version on."""
@@ -396,4 +418,4 @@ class Change:
 
     def _count(self, table: str, more: int) -> None:
         if table in COUNTED:
-            self.counts[COUNTED[table]] += more
+            self.counts[COUNTED[table]] = self.counts.get(COUNTED[table], 0) + more

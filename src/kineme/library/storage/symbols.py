@@ -23,7 +23,6 @@ from kineme.library.storage.rows import (
     damage,
     damaged,
     listed,
-    next_key,
     parsed_column,
     select,
 )
@@ -159,22 +158,28 @@ def check_name(name: Any) -> str:
 def keys_by_name(change: Change, names: Iterable[str]) -> tuple[dict[str, int], tuple[str, ...]]:
     """Return the name or id -> key of its symbol, and the names whose symbols were created."""
     names = list(names)
-    alive = "FROM symbol_state JOIN symbol ON symbol.key = symbol_state.symbol WHERE removed IS NULL"
-    keys: dict[str, int] = {}
-    for column in ("symbol.id", "name"):  # a name takes precedence over an id, as in `state_of`
-        query = f"SELECT {column}, symbol.key {alive} AND {among(column)}"
-        keys |= dict(change.connection.execute(query, {"keys": listed(names)}))
+    keys = stored_keys(change.connection, names)
     new = tuple(name for name in names if name not in keys)
     for name in new:
         keys[name] = make(change, name)
     return keys, new
 
 
+def stored_keys(connection: Database, names: Iterable[str]) -> dict[str, int]:
+    """Return the name or id -> key of its symbol, of those that there are."""
+    alive = "FROM symbol_state JOIN symbol ON symbol.key = symbol_state.symbol WHERE removed IS NULL"
+    keys: dict[str, int] = {}
+    for column in ("symbol.id", "name"):  # a name takes precedence over an id, as in `state_of`
+        query = f"SELECT {column}, symbol.key {alive} AND {among(column)}"
+        keys |= dict(connection.execute(query, {"keys": listed(names)}))
+    return keys
+
+
 def make(change: Change, name: str, parents: Sequence[str] = ()) -> int:
     """Create a symbol; return its key."""
-    key = next_key(change.connection, "symbol")
+    key = change.next_key("symbol")
     change.insert("symbol", [(key, f"sym-{secrets.token_hex(6)}", change.version)])
-    state = next_key(change.connection, "symbol_state")
+    state = change.next_key("symbol_state")
     text = json.dumps(list(parents))
     change.insert("symbol_state", [(state, key, name, "", None, None, text, change.version, None)])
     return key
@@ -182,7 +187,7 @@ def make(change: Change, name: str, parents: Sequence[str] = ()) -> int:
 
 def add_members(change: Change, pairs: Sequence[tuple[int, int]], how: str) -> None:
     """Add movements without a symbol as members: pairs (movement, key of the symbol)."""
-    first = next_key(change.connection, "member")
+    first = change.next_key("member")
     rows = [(first + k, movement, key, how, change.version, None) for k, (movement, key) in enumerate(pairs)]
     change.insert("member", rows)
 

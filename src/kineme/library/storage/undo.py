@@ -9,7 +9,7 @@ from typing import NamedTuple
 from kineme.errors import SpecificationError
 from kineme.library.storage.rows import ALIVE, Database, Row, among, has_table, listed, next_key, parsed_column, select
 from kineme.library.storage.schema import BLOBS, COLUMNS, CONTINUES, OPTIONAL_BLOBS, RESTORE, RETURNS, UNDO
-from kineme.library.storage.store import NOW, Change, Store
+from kineme.library.storage.store import NOW, Change, Store, repeated
 
 _DIGEST, _PROTOTYPE = COLUMNS["movement"].index("digest"), COLUMNS["symbol_state"].index("prototype")
 
@@ -25,6 +25,7 @@ class Undone(NamedTuple):
     action: str
 
 
+@repeated
 def undo(store: Store, expected: int | None = None, to: int | None = None) -> Undone:
     """Take back the last change that was not taken back yet, or restore a version; see `ActionLibrary.undo`."""
     with store.writing(UNDO if to is None else RESTORE) as change:
