@@ -100,6 +100,6 @@ def running_server(*settings: str) -> Iterator[Server]:
         try:
             yield server
         finally:
-            server.stop()
+            server.stop(signal.SIGQUIT)  # at once: nothing of it stays
     finally:
         shutil.rmtree(folder, ignore_errors=True)

@@ -105,7 +105,6 @@ _DIALECT = (
 )
 
 _COMMENT = re.compile(r"library of kineme, schema version (\d+)")
-_OLDEST_SERVER = 130000  # the first with pg_xact_status
 _KEYS = 1 << 31  # keys of locks, from 0
 _FETCHED = 256  # rows of a scan that are fetched at a time
 _PAUSE = 0.1  # seconds between two questions
@@ -167,6 +166,8 @@ class ServerConnection:
         self._places = {table: number + k for k, table in enumerate(_COPY)}  # of the locks of writers under way
         self._version: int | None = None
         self._scans = 0
+        self._inside = False  # of a transaction
+        self._version_row: Row | None = None  # that this transaction has written
         self._session: Any = None
         self._session = self._open()
 
@@ -189,11 +190,6 @@ class ServerConnection:
         try:
             with self._in_plain_words():
                 session.execute(f"SELECT {changes}", [text for pair in settings.items() for text in pair])
-            if session.info.server_version < _OLDEST_SERVER:
-                raise DataError(
-                    f"expected a server of PostgreSQL 13 or later at {self.address}, got "
-                    f"{session.info.parameter_status('server_version')}; upgrade it"
-                )
         except BaseException:
             session.close()
             raise
@@ -224,12 +220,13 @@ class ServerConnection:
 
     def run(self, query: str, parameters: Any = None) -> Any:
         """Execute a statement of PostgreSQL."""
-        idle = not self.in_transaction
+        if self._session.closed and not self._inside:
+            self._session = self._open()
         with self._in_plain_words():
             try:
                 return self._session.execute(query, parameters, binary=True)
             except self._driver.OperationalError:
-                if not (idle and self._session.closed) or query == "COMMIT":
+                if self._inside or not self._session.closed:
                     raise
         self._session = self._open()  # it was cut before, as by a restart of the server
         with self._in_plain_words():
@@ -256,16 +253,13 @@ class ServerConnection:
         """Add rows with their seals to a table."""
         if not rows:
             return
+        if table == "version":
+            self._version_row = rows[0]
         statement = f"COPY {table} FROM STDIN (FORMAT BINARY)"
         with self._in_plain_words(), self._session.cursor() as cursor, cursor.copy(statement) as copy:
             copy.set_types(_COPY[table])
             for row in rows:
                 copy.write_row(row)
-
-    @property
-    def in_transaction(self) -> bool:
-        """Tell whether a transaction is open."""
-        return bool(self._session.info.transaction_status != self._driver.pq.TransactionStatus.IDLE)
 
     @property
     def quoted_schema(self) -> str:
@@ -302,22 +296,31 @@ class ServerConnection:
             ORDER BY relname, attnum"""
         return list(self.run(query, [self.address.schema, list(_COPY)]).fetchall())
 
+    def begin(self, how: str = "") -> None:
+        """Begin a transaction, which ends with the connection unless `transaction` ends it."""
+        self.run(f"BEGIN {how}")
+        self._inside, self._version_row = True, None
+
     @contextmanager
     def transaction(self, reserve: Mapping[str, int]) -> Iterator[dict[str, int]]:
         """Return a transaction in which no other writes; or beside others, with the first of its keys in each table."""
-        self.run("BEGIN")
+        self.begin()
         try:
             first = self._reserved(reserve) if reserve else {}
             if not first:
-                self.run("SELECT pg_advisory_xact_lock(%s)", [self._lock])
-                for place, end in self._ends():  # of writers under way, which need this lock no more
-                    self.run("SELECT pg_advisory_xact_lock_shared(%s, %s)", [place, end])
-            transaction_id = self.run("SELECT pg_current_xact_id()::text").fetchone()[0]
+                self._lock_all()
             yield first
-            self._commit(transaction_id)
+            self._commit()
+            self._inside = False
         except BaseException:
             self._roll_back()
             raise
+
+    def _lock_all(self) -> None:
+        """Wait for the lock of the library, and for all writers under way, which need that no more."""
+        self.run("SELECT pg_advisory_xact_lock(%s)", [self._lock])
+        for place, end in self._ends():
+            self.run("SELECT pg_advisory_xact_lock_shared(%s, %s)", [place, end])
 
     def _ends(self) -> list[tuple[int, int]]:
         """Return the locks of writers under way: number of the table, and the last key reserved in it, `% _KEYS`."""
@@ -329,18 +332,15 @@ class ServerConnection:
     def _reserved(self, reserve: Mapping[str, int]) -> dict[str, int]:
         """Return the first of so many keys in each table, behind those of all writers under way."""
         self.run("SELECT pg_advisory_lock(%s)", [self._lock])
-        try:
-            ends = self._ends()  # before the rows that are committed: no key is in neither
-            first = {}
-            for table, n in reserve.items():
-                last, place = next_key(self, table) - 1, self._places[table]
-                beyond = [(end - last) % _KEYS for there, end in ends if there == place]
-                first[table] = last + 1 + max((reach for reach in beyond if reach < _KEYS // 2), default=0)
-                if n:
-                    self.run("SELECT pg_advisory_xact_lock(%s, %s)", [place, (first[table] + n - 1) % _KEYS])
-        finally:
-            with suppress(KinemeError):  # an error before, or a connection that is cut, which releases it
-                self.run("SELECT pg_advisory_unlock(%s)", [self._lock])
+        ends = self._ends()  # before the rows that are committed: no key is in neither
+        first = {}
+        for table, n in reserve.items():
+            last, place = next_key(self, table) - 1, self._places[table]
+            beyond = [(end - last) % _KEYS for there, end in ends if there == place]
+            first[table] = last + 1 + max((reach for reach in beyond if reach < _KEYS // 2), default=0)
+            if n:
+                self.run("SELECT pg_advisory_xact_lock(%s, %s)", [place, (first[table] + n - 1) % _KEYS])
+        self.run("SELECT pg_advisory_unlock(%s)", [self._lock])
         return first
 
     def wait_for_turn(self, version: int) -> None:
@@ -350,39 +350,43 @@ class ServerConnection:
             raise ConflictError(_CONFLICT.format(path=self.address, error="a writer before it failed"))
 
     def _roll_back(self) -> None:
-        with suppress(KinemeError):  # of a connection that is cut nothing is stored
-            if not self._session.closed and self.in_transaction:
+        with suppress(KinemeError):  # of a connection that is cut nothing is stored, and no lock is left
+            if not self._session.closed:
                 self.run("ROLLBACK")
+                self.run("SELECT pg_advisory_unlock_all()")  # which a transaction does not hold
+        self._inside = False
 
-    def _commit(self, transaction_id: str) -> None:
-        """Commit; where the connection is cut meanwhile, ask the server whether it did, by another one."""
+    def _commit(self) -> None:
+        """Commit; where the connection is cut meanwhile, look by another one whether the version is there."""
         try:
             self.run("COMMIT")
         except DataError as error:
             if not self._session.closed:
                 raise
-            status = self._status(transaction_id)
-            if status == "aborted":
-                raise
-            if status != "committed":
+            stored = self._is_stored()
+            if stored is None:
                 raise DataError(
                     f"expected {self.address} to answer whether the last step was stored, got a connection that was "
                     "cut and no other; it was stored as a whole or not at all: look at kineme library history, and "
                     "run it again where it is missing; what is learned again is stored once"
                 ) from error
+            if not stored:
+                raise
 
-    def _status(self, transaction_id: str) -> str:
-        """Return "committed" or "aborted"; another text if the server cannot be asked in time."""
-        late, status = time.monotonic() + max(_PATIENCE, self.wait), ""
-        while time.monotonic() < late and status not in {"committed", "aborted"}:
+    def _is_stored(self) -> bool | None:
+        """Tell whether the version of the last transaction is stored; None if the server cannot be asked in time."""
+        late = time.monotonic() + max(_PATIENCE, self.wait)
+        while self._version_row is not None and time.monotonic() < late:
             with suppress(DataError):
-                if self._session.closed:
-                    self._session = self._open()
-                query = "SELECT pg_xact_status(%s::xid8)"
-                status = str(self.run(query, [transaction_id]).fetchone()[0])
-            if status not in {"committed", "aborted"}:
-                time.sleep(_PAUSE)
-        return status
+                self._session = self._open()
+                self.run("BEGIN")
+                self._lock_all()  # which whatever is left of that transaction holds until it ends
+                row = self.run("SELECT * FROM version WHERE id = %s", self._version_row[:1]).fetchone()
+                self.run("ROLLBACK")
+                return bool(row == self._version_row)
+            self._session.close()
+            time.sleep(_PAUSE)
+        return None
 
     def close(self) -> None:
         """Close the connection."""

@@ -118,7 +118,7 @@ class PostgresStore(Store):
     def snapshot(self) -> Iterator[ServerConnection]:
         """Context manager: a connection of its own that sees the library at one moment."""
         with closing(ServerConnection(self.path, self.wait, read_only=True)) as connection:
-            connection.run("BEGIN ISOLATION LEVEL REPEATABLE READ")
+            connection.begin("ISOLATION LEVEL REPEATABLE READ")
             yield connection
 
     @contextmanager
