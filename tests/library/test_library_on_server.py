@@ -8,6 +8,7 @@ import re
 import signal
 import sys
 import threading
+import warnings
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
 from pathlib import Path
@@ -22,12 +23,15 @@ from kineme import ActionLibrary
 from kineme.cli.main import main
 from kineme.errors import DataError, SpecificationError
 from kineme.library import calibration_cache
+from kineme.library.library import is_library
 from kineme.library.recognize import LibraryRecognizer
 from kineme.library.storage.address import Address, as_location
 from kineme.library.storage.connection import BusyError, ConflictError
 from kineme.library.storage.postgres import ServerConnection, translated
 from kineme.library.storage.schema import SCHEMA_VERSION
 from kineme.library.storage.store import repeated
+from kineme.studio.page.write_page import write_page
+from kineme.studio.server.app import create_app
 
 
 @contextmanager
@@ -110,13 +114,12 @@ def test_a_library_answers_alike_in_both_places_and_keeps_its_caches_to_its_user
 
 
 def test_eight_writers_at_once_lose_and_duplicate_nothing(address):
-    """Each learns movements of its own, and some that two learn; some also rename and undo meanwhile."""
-    ActionLibrary(address, create=True).close()
+    """Each learns movements of its own, and some that two learn; one also names movements meanwhile."""
     demos = draw_movements(8 * 30, labels=[f"kind {k % 5}" for k in range(8 * 30)], n_samples=12)
     ids = {}
 
     def write(k):
-        with ActionLibrary(address, wait=60.0) as library:
+        with ActionLibrary(address, create=True, wait=60.0) as library:
             for first in range(30 * k, 30 * k + 30, 10):
                 rows = [*range(first, first + 10), (first + 30) % len(demos)]  # the last one is another's, too
                 ids.update(zip(rows, library.learn(demos[rows]).ids.tolist(), strict=True))
@@ -487,6 +490,24 @@ def test_commands_take_an_address(address, tmp_path, monkeypatch):
     assert "secret" not in result.output
     with ActionLibrary(secret) as library, ActionLibrary(secret + "2") as copy:
         assert contents(copy) == contents(library)
+
+
+def test_a_studio_shows_a_library_on_a_server(address, tmp_path):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # as in the tests of the studio
+        from fastapi.testclient import TestClient
+    secret = address.replace("kineme@", "kineme:secret@")
+    assert not is_library(secret)
+    app = create_app(secret, "t" * 32)
+    with TestClient(app, "http://127.0.0.1:8420", headers={"Authorization": f"Bearer {'t' * 32}"}) as client:
+        with ActionLibrary(secret) as library:
+            library.learn(draw_movements(4, labels=["wave", "nod"] * 2))
+            page = write_page(tmp_path / "page.html", library)
+        text = client.get("/api/library").text
+    assert json.loads(text)["n_movements"] == page.header["n_movements"] == 4
+    assert "secret" not in text
+    assert f"<title>{as_location(address).name}" in (tmp_path / "page.html").read_text()
+    assert is_library(secret)
 
 
 def test_statements_are_translated():
