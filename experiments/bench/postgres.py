@@ -1,17 +1,19 @@
 """A library on a PostgreSQL server beside one in a folder: learning, and eight writers beside one.
 
 Movements are those of the subject ``library``, learned by both stores in turns. Writers are processes that have
-described their movements before: what is measured is storing. On few cores they wait for these, and not for each other:
-the share of the time in which one keeps the others waiting says how many could work side by side.
+described their movements before: what is measured is storing. On few cores they wait for these, and not for each other.
+Whether they do is told by the share of its time in which one keeps the others waiting, and by writers whose lines are
+slow, which leave the cores idle.
 """
 
 from __future__ import annotations
 
+import math
 import os
 import subprocess
 import sys
 import tempfile
-from time import perf_counter
+from time import perf_counter, sleep
 from typing import Any
 
 import numpy as np
@@ -26,6 +28,7 @@ from kineme.library.learn import digests
 from kineme.library.storage.postgres import ServerConnection
 
 _WRITERS, _BATCH = 8, 2048
+_LINE = 2e6  # bytes per second of a slow line
 _SETTINGS = ("shared_buffers=512MB", "max_wal_size=4GB")
 
 
@@ -33,12 +36,14 @@ def measure(quick: bool) -> list[Row]:
     if programs() is None:
         print("no PostgreSQL server here (apt-get install postgresql): nothing is measured")
         return []
-    n, batches = (4_000, 2) if quick else (80_000, 12)
+    n, batches = (4_000, 2) if quick else (40_000, 6)
     with running_server(*_SETTINGS) as server, tempfile.TemporaryDirectory() as folder:
         places = {"SQLite": f"{folder}/actions", "PostgreSQL": server.address("learned")}
         rates = _learn(places, n, n // 4)
         one, share = _write(server.address("single"), 1, batches)
         many, _ = _write(server.address("many"), _WRITERS, batches)
+        one_slow, _ = _write(server.address("slow"), 1, 2, _LINE)
+        many_slow, _ = _write(server.address("slow%20too"), _WRITERS, 2, _LINE)
         one_file, _ = _write(f"{folder}/single", 1, batches)
         many_file, _ = _write(f"{folder}/many", _WRITERS, batches)
     cores = len(os.sched_getaffinity(0))
@@ -50,6 +55,8 @@ def measure(quick: bool) -> list[Row]:
         Row("store what is described, one writer", "/s", one, one_file, "SQLite", one / one_file),
         Row(f"  {_WRITERS} writers at once", "/s", many, many_file, f"SQLite, {_WRITERS} writers", many / many_file),
         Row(f"  {_WRITERS} writers beside one", "/s", many, one, "one writer", many / one, target),
+        Row(f"  {_WRITERS} writers beside one, lines of 2 MB/s", "/s", many_slow, one_slow, "one writer",
+            many_slow / one_slow, (">=", 3.0)),
         Row("  share in which one keeps others waiting", "", share, target=("<=", 1 / 3)),
     ]  # fmt: skip
 
@@ -73,12 +80,15 @@ def _learn(places: dict[str, str], n: int, call: int) -> dict[str, float]:
     return {name: n / seconds[name] for name in places}
 
 
-def _write(place: str, writers: int, batches: int) -> tuple[float, float]:
-    """Movements stored per second by processes at once, and the share of their time in which others have to wait."""
+def _write(place: str, writers: int, batches: int, line: float = math.inf) -> tuple[float, float]:
+    """Movements stored per second by processes at once, and the share of their time in which others have to wait.
+
+    Each takes its bytes through a line of so many bytes per second.
+    """
     kineme.ActionLibrary(place, create=True).close()
     command = [sys.executable, "-m", "bench.postgres", place]
     pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
-    processes = [subprocess.Popen([*command, str(k), str(batches)], **pipes) for k in range(writers)]
+    processes = [subprocess.Popen([*command, str(k), str(batches), str(line)], **pipes) for k in range(writers)]
     for process in processes:
         assert process.stdout.readline() == "described\n"
     begin = perf_counter()
@@ -96,7 +106,7 @@ def _write(place: str, writers: int, batches: int) -> tuple[float, float]:
     return writers * batches * _BATCH / seconds, float(np.mean(shares))
 
 
-def _store_described(place: str, writer: int, batches: int) -> None:
+def _store_described(place: str, writer: int, batches: int, line: float) -> None:
     """Describe batches of movements of this writer's own, wait for a word, and store them."""
     turn, waited = [0.0], ServerConnection.wait_for_turn
 
@@ -104,7 +114,14 @@ def _store_described(place: str, writer: int, batches: int) -> None:
         waited(*arguments)
         turn[0] = perf_counter()
 
+    copied = ServerConnection.copy_rows
+
+    def copy_rows(connection: ServerConnection, table: str, rows: Any) -> None:
+        sleep(sum(len(value) for row in rows for value in row if isinstance(value, bytes)) / line)
+        copied(connection, table, rows)
+
     ServerConnection.wait_for_turn = wait_for_turn  # type: ignore[method-assign]
+    ServerConnection.copy_rows = copy_rows  # type: ignore[method-assign]
     paths = kinds(20, 2)
     with kineme.ActionLibrary(place, wait=600.0) as library:
         described = [_described(library, paths, 1 + writer * batches + k) for k in range(batches)]
@@ -128,4 +145,4 @@ def _described(library: kineme.ActionLibrary, paths: Any, seed: int) -> Batch:
 
 
 if __name__ == "__main__":
-    _store_described(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]))
+    _store_described(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]), float(sys.argv[4]))

@@ -21,8 +21,9 @@ from library_samples import contents, draw_movements, tables
 from bench.postgres_server import PASSWORD
 from kineme import ActionLibrary
 from kineme.cli.main import main
-from kineme.errors import DataError, SpecificationError
+from kineme.errors import DataError, SpecificationError, TrajectoryError
 from kineme.library import calibration_cache
+from kineme.library import learn as learning
 from kineme.library.library import is_library
 from kineme.library.recognize import LibraryRecognizer
 from kineme.library.storage.address import Address, as_location
@@ -150,39 +151,101 @@ def test_writers_overlap_and_one_that_fails_stops_no_other(library):
             assert go.wait(20)
             raise ZeroDivisionError
 
-    reserved = []
-
     def learn():
-        with ActionLibrary(library.folder, wait=20.0) as second:
-            reserve = second.store._transaction
-
-            @contextmanager
-            def noted(*arguments):
-                with reserve(*arguments) as first:
-                    reserved.append(first)
-                    yield first
-
-            second.store._transaction = noted
-            return second.learn(draw_movements(3, seed=8))
+        with ActionLibrary(library.folder, wait=20.0) as second, _noted(second) as reserved:
+            return second.learn(draw_movements(3, seed=8)), reserved
 
     with ThreadPoolExecutor(2) as pool:
         failing = pool.submit(fail)
         assert begun.wait(20)
         learning = pool.submit(learn)
-        with _asking(library.folder) as connection:
-            waiting = "SELECT count(*) FROM pg_locks WHERE locktype = 'advisory' AND NOT granted"
-            while not connection.run(waiting).fetchone()[0]:
-                pass
+        _until_locks_are_waited_for(library.folder, "advisory")
         assert library.version == 1
         go.set()
         with pytest.raises(ZeroDivisionError):
             failing.result()
-        report = learning.result()
-    assert reserved[0]["movement"] == 9  # behind those of the first
-    assert reserved[1] == {}  # again, alone
+        report, reserved = learning.result()
+    assert [first["movement"] for first in reserved] == [9, 7]  # behind those of the first; and again, in their place
     assert report.ids.tolist() == [7, 8, 9]
     assert report.version == 2
     assert library.verify() == []
+
+
+@contextmanager
+def _noted(library):
+    """The first keys that each transaction of a library reserves."""
+    reserved, transaction = [], library.store._transaction
+
+    @contextmanager
+    def noted(*arguments):
+        with transaction(*arguments) as first:
+            reserved.append(first)
+            yield first
+
+    library.store._transaction = noted
+    yield reserved
+
+
+def _until_locks_are_waited_for(address, kind):
+    with _asking(address) as connection:
+        waiting = f"SELECT count(*) FROM pg_locks WHERE locktype = '{kind}' AND NOT granted"
+        while not connection.run(waiting).fetchone()[0]:
+            pass
+
+
+def test_writers_of_the_same_new_symbol_learn_beside_each_other(address):
+    """The second waits for the first, which makes the symbol, and then writes beside a third that is under way."""
+    demos = draw_movements(9, labels=["new"] * 9)
+    ActionLibrary(address, create=True).close()
+    begun, go = threading.Event(), threading.Event()
+
+    def hold(library):
+        insert = library.store.writing
+
+        @contextmanager
+        def held(*arguments, **options):
+            with insert(*arguments, **options) as change:
+                yield change
+                if not begun.is_set():
+                    begun.set()
+                    assert go.wait(20)
+
+        library.store.writing = held
+
+    def learn(k):
+        with ActionLibrary(address, wait=20.0) as library, _noted(library) as reserved:
+            if k == 0:
+                hold(library)
+            library.learn(demos[3 * k : 3 * k + 3])
+            return reserved
+
+    with ThreadPoolExecutor(3) as pool:
+        writing = [pool.submit(learn, 0)]
+        assert begun.wait(20)
+        writing += [pool.submit(learn, k) for k in (1, 2)]
+        _until_locks_are_waited_for(address, "transactionid")
+        go.set()
+        reserved = [future.result() for future in writing]
+    assert all(first for firsts in reserved for first in firsts)  # nobody had to write alone
+    with ActionLibrary(address) as library:
+        assert len(library["new"]) == 9
+        assert library.verify() == []
+
+
+def test_movements_of_other_dimensions_are_refused_also_if_they_come_at_the_same_time(place, monkeypatch):
+    commit = learning.commit
+    with ActionLibrary(place, create=True) as library:
+
+        def after_another(*arguments):
+            monkeypatch.undo()
+            with ActionLibrary(library.folder) as other:
+                other.learn(draw_movements(2, d=3))
+            return commit(*arguments)
+
+        monkeypatch.setattr(learning, "commit", after_another)
+        with pytest.raises(TrajectoryError, match="expected movements of 3 dimensions, as another process"):
+            library.learn(draw_movements(2))
+        assert library.verify() == []
 
 
 def test_who_waits_too_long_for_a_turn_is_told_so(library):
@@ -217,10 +280,7 @@ def test_a_deadlock_with_another_program_is_tried_again(library):
         other.begin()
         other.run("LOCK TABLE symbol_state IN EXCLUSIVE MODE")
         renaming = pool.submit(library.rename, "wave", "hello")
-        waiting = "SELECT count(*) FROM pg_locks WHERE locktype = 'relation' AND NOT granted"
-        with _asking(library.folder) as looking:
-            while not looking.run(waiting).fetchone()[0]:
-                pass
+        _until_locks_are_waited_for(library.folder, "relation")
         other.run("SELECT pg_advisory_xact_lock(%s)", [other._lock])
         other.run("COMMIT")
         renaming.result(20)

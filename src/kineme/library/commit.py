@@ -33,6 +33,7 @@ from kineme.validation import Array, describe
 #: Table -> its rows of a batch, without their keys.
 Tables = dict[str, list[Row]]
 
+_TRIES = 3  # to write a batch beside others, before it is written alone
 _EVEN = 1e-9  # of a step: stamps closer to an even grid are not stored
 _SMALL, _LARGE = 1e-30, 1e30  # between which single precision keeps its relative error
 
@@ -62,8 +63,8 @@ def commit(store: Store, batch: Batch, continues: int | None = None) -> Committe
     """
     if not batch.row_of and (ids := _all_stored(store, batch)) is not None:
         return Committed(0, (), ids, None)
-    if store.many_write:
-        with suppress(ConflictError):  # others learn the same at the same time: once more, alone
+    for _ in range(_TRIES if store.many_write else 0):
+        with suppress(ConflictError):  # others learn the same at the same time, or have failed: once more
             return _commit(store, batch, continues, _n_rows(store, batch))
     return _commit(store, batch, continues, None)
 
@@ -100,6 +101,8 @@ def _commit(store: Store, batch: Batch, continues: int | None, reserve: dict[str
             change.detail["people"] = sorted(set(people.values()))
         if continues is not None:
             change.detail[CONTINUES] = continues
+        for table, rows in batch.tables.items() if new else ():  # last: what others learn, too, shows before
+            change.insert(table, [(key, *rows[batch.row_of[i]]) for key, i in new.items()])
     return Committed(len(new), new_symbols, np.array(keys, dtype=np.int64), change.version)
 
 
@@ -144,7 +147,13 @@ def _insert_sources(change: Change, batch: Batch, stored: Stored) -> None:
 
 def _insert_movements(change: Change, batch: Batch, new: dict[int, int], stored: Stored) -> None:
     demos = batch.demos
-    if change.connection.execute("SELECT 1 FROM meta WHERE key = 'n_dims'").fetchone() is None:
+    stored_dims = change.connection.execute("SELECT value FROM meta WHERE key = 'n_dims'").fetchone()
+    if stored_dims is not None and stored_dims[0] != str(demos.n_dims):
+        raise TrajectoryError(
+            f"expected movements of {stored_dims[0]} dimensions, as another process has learned meanwhile, got "
+            f"{demos.n_dims}; choose the columns, or make another library"
+        )
+    if stored_dims is None:
         change.insert("meta", [("n_dims", str(demos.n_dims))])
         if demos.channels is not None:
             change.insert("meta", [("channels", channels_to_text(with_periods(demos.channels, demos.recorded)))])
@@ -158,8 +167,6 @@ def _insert_movements(change: Change, batch: Batch, new: dict[int, int], stored:
         about = (batch.digests[i], name, batch.labels[i], lengths[i], t0[i], durations[i])
         movements.append((key, source, place, *about, change.version, None))
     change.insert("movement", movements)
-    for table, rows in batch.tables.items():
-        change.insert(table, [(key, *rows[batch.row_of[i]]) for key, i in new.items()])
 
 
 def _without_symbol(connection: Any, batch: Batch, keys: list[int]) -> dict[int, str]:

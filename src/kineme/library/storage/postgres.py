@@ -8,7 +8,7 @@ The rest of the storage speaks the SQL of SQLite; here its statements are transl
   learns holds it only to reserve keys, behind those of all who learn: each of these holds locks that say where its keys
   end. Then it writes, beside them, waits for the one before it, and commits if that one did. So versions follow one
   another, and the keys of all rows, without gaps. Where two learn the same at the same time, or one fails, the unique
-  indexes and the order of versions show it: it is written again, alone.
+  indexes and the order of versions show it: it is written again, with other keys.
 """
 
 from __future__ import annotations
@@ -332,16 +332,28 @@ class ServerConnection:
     def _reserved(self, reserve: Mapping[str, int]) -> dict[str, int]:
         """Return the first of so many keys in each table, behind those of all writers under way."""
         self.run("SELECT pg_advisory_lock(%s)", [self._lock])
-        ends = self._ends()  # before the rows that are committed: no key is in neither
+        while True:
+            ends = self._ends()  # before the rows that are committed: no key is in neither
+            beyond = self._beyond("version", ends)
+            if {reach for reach, _ in beyond} == set(range(1, len(beyond) + 1)):
+                break
+            for _, end in beyond:  # one has failed, and so will those behind it
+                self.run("SELECT pg_advisory_lock_shared(%s, %s)", [self._places["version"], end])
+                self.run("SELECT pg_advisory_unlock_shared(%s, %s)", [self._places["version"], end])
         first = {}
         for table, n in reserve.items():
-            last, place = next_key(self, table) - 1, self._places[table]
-            beyond = [(end - last) % _KEYS for there, end in ends if there == place]
-            first[table] = last + 1 + max((reach for reach in beyond if reach < _KEYS // 2), default=0)
+            place = self._places[table]
+            first[table] = next_key(self, table) + max((reach for reach, _ in self._beyond(table, ends)), default=0)
             if n:
                 self.run("SELECT pg_advisory_xact_lock(%s, %s)", [place, (first[table] + n - 1) % _KEYS])
         self.run("SELECT pg_advisory_unlock(%s)", [self._lock])
         return first
+
+    def _beyond(self, table: str, ends: list[tuple[int, int]]) -> list[tuple[int, int]]:
+        """Return how far the keys of a table that are reserved reach beyond the committed ones, with their locks."""
+        last = next_key(self, table) - 1
+        reaches = [((end - last) % _KEYS, end) for place, end in ends if place == self._places[table]]
+        return [(reach, end) for reach, end in reaches if 0 < reach < _KEYS // 2]
 
     def wait_for_turn(self, version: int) -> None:
         """Wait until the version before is committed; a ConflictError if it is not."""
