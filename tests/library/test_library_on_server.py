@@ -193,6 +193,27 @@ def _until_locks_are_waited_for(address, kind):
             pass
 
 
+@pytest.mark.parametrize(("held", "first"), [({"movement": 20}, [7]), ({"version": 2, "movement": 20}, [21, 7])])
+def test_locks_of_a_writer_that_stores_nothing_leave_no_gap(library, monkeypatch, held, first):
+    """Those of one that is about to end do not count; behind one that is under way, keys are reserved anew."""
+    waited = ServerConnection.wait_for_turn
+    with _asking(library.folder) as other, _noted(library) as reserved:
+        other.begin()
+        for table, end in held.items():
+            other.run("SELECT pg_advisory_xact_lock(%s, %s)", [other._places[table], end])
+
+        def released(self, keys):
+            if other._inside:
+                other.run("COMMIT")
+                other._inside = False
+            waited(self, keys)
+
+        monkeypatch.setattr(ServerConnection, "wait_for_turn", released)
+        assert library.learn(draw_movements(2, seed=3)).ids.tolist() == [7, 8]
+    assert [keys["movement"] for keys in reserved] == first
+    assert library.verify() == []
+
+
 def test_writers_of_the_same_new_symbol_learn_beside_each_other(address):
     """The second waits for the first, which makes the symbol, and then writes beside a third that is under way."""
     demos = draw_movements(9, labels=["new"] * 9)

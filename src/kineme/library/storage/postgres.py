@@ -28,7 +28,7 @@ from kineme.io.records import needs
 from kineme.library.storage.address import Address
 from kineme.library.storage.connection import BusyError, ConflictError
 from kineme.library.storage.rows import Row, next_key
-from kineme.library.storage.schema import CREATE, MIGRATIONS
+from kineme.library.storage.schema import COLUMNS, CREATE, MIGRATIONS
 
 _CUT = (
     "expected the connection to {path} to last, got it cut ({error}); nothing of this step was stored, and what was "
@@ -323,11 +323,16 @@ class ServerConnection:
             self.run("SELECT pg_advisory_xact_lock_shared(%s, %s)", [place, end])
 
     def _ends(self) -> list[tuple[int, int]]:
-        """Return the locks of writers under way: number of the table, and the last key reserved in it, `% _KEYS`."""
-        query = """SELECT classid::bigint, objid::int FROM pg_locks JOIN pg_database ON pg_database.oid = database
-            WHERE datname = current_database() AND locktype = 'advisory' AND classid::bigint = ANY(%s) AND objsubid = 2
-            AND mode = 'ExclusiveLock' AND granted"""
-        return list(self.run(query, [list(self._places.values())]).fetchall())
+        """Return the locks of writers under way: number of the table, and the last key reserved in it, `% _KEYS`.
+
+        One that ends releases its locks one after another; without that of its version it is under way no more.
+        """
+        query = """WITH held AS (
+            SELECT pid, classid::bigint AS place, objid::int AS key FROM pg_locks
+            JOIN pg_database ON pg_database.oid = database WHERE datname = current_database() AND granted
+            AND locktype = 'advisory' AND classid::bigint = ANY(%s) AND objsubid = 2 AND mode = 'ExclusiveLock')
+            SELECT place, key FROM held WHERE pid IN (SELECT pid FROM held WHERE place = %s)"""
+        return list(self.run(query, [list(self._places.values()), self._places["version"]]).fetchall())
 
     def _reserved(self, reserve: Mapping[str, int]) -> dict[str, int]:
         """Return the first of so many keys in each table, behind those of all writers under way."""
@@ -355,11 +360,15 @@ class ServerConnection:
         reaches = [((end - last) % _KEYS, end) for place, end in ends if place == self._places[table]]
         return [(reach, end) for reach, end in reaches if 0 < reach < _KEYS // 2]
 
-    def wait_for_turn(self, version: int) -> None:
-        """Wait until the version before is committed; a ConflictError if it is not."""
-        self.run("SELECT pg_advisory_xact_lock_shared(%s, %s)", [self._places["version"], (version - 1) % _KEYS])
-        if next_key(self, "version") != version:
-            raise ConflictError(_CONFLICT.format(path=self.address, error="a writer before it failed"))
+    def wait_for_turn(self, first: Mapping[str, int]) -> None:
+        """Wait until the version before is committed; a ConflictError if it is not, or left other keys in a table."""
+        before = (first["version"] - 1) % _KEYS
+        self.run("SELECT pg_advisory_xact_lock_shared(%s, %s)", [self._places["version"], before])
+        for table, key in first.items():
+            column = COLUMNS[table][0]
+            query = f"SELECT coalesce(max({column}), 0) FROM {table} WHERE {column} < %s"
+            if self.run(query, [key]).fetchone()[0] != key - 1:
+                raise ConflictError(_CONFLICT.format(path=self.address, error="a writer before it failed"))
 
     def _roll_back(self) -> None:
         with suppress(KinemeError):  # of a connection that is cut nothing is stored, and no lock is left

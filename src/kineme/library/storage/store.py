@@ -280,8 +280,8 @@ class Store:
                     version = first.get("version") or self.moment(self._writer).version + 1
                     change = Change(self._writer, version, detail or {}, dict(first))
                     yield change
-                    if first:
-                        self._writer.wait_for_turn(change.version)
+                    if reserve and first:
+                        self._writer.wait_for_turn({table: key for table, key in first.items() if reserve[table]})
                     last = self.moment(self._writer)
                     counts = (getattr(last, name) + change.counts.get(name, 0) for name in COUNTED.values())
                     at = datetime.now(UTC).isoformat(timespec="milliseconds")
