@@ -38,7 +38,7 @@ _SHOWN = 10  # problems that are listed
 @click.option("--output", "-o", type=FOLDER, help="Of a large archive, the folder of the parts.")
 @force_option
 @pieces_options
-def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
+def learn(recordings: tuple[Path, ...], folder: Any, **options: Any) -> None:
     """Learn RECORDINGS, files, folders or patterns of them, or - for CSV from the standard input, into a library.
 
     The library is created if it does not exist. In a folder, the name of the innermost folder is the label. Movements

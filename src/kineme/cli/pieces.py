@@ -61,7 +61,7 @@ def in_pieces(  # noqa: PLR0913 - what a command knows when it hands its work on
     output: Path | None,
     how: Mapping[str, Any],
     options: dict[str, Any],
-    library: Path | None = None,
+    library: Any = None,
     *,
     force: bool = False,
     as_json: bool = False,
@@ -115,14 +115,20 @@ def in_pieces(  # noqa: PLR0913 - what a command knows when it hands its work on
         click.get_current_context().exit(UNFINISHED)
 
 
-def _of_library(folder: Path, task: str) -> dict[str, Any]:
+def _of_library(folder: Any, task: str) -> dict[str, Any]:
     """The options that say which library parts depend on; to learn, it is created if it does not exist."""
-    from kineme.library.library import ActionLibrary
-    from kineme.library.storage.connection import FILE
+    from kineme.library.library import ActionLibrary, is_library
+    from kineme.library.storage.address import Address, as_location
 
-    is_new = task == "learn" and not (folder / FILE).exists()
+    location = as_location(folder)
+    if isinstance(location, Address):
+        if location.without_secrets(location.uri) != location.uri:  # it would be written beside the parts
+            raise click.UsageError(f"expected an address without a password, got {location}; say it in PGPASSWORD")
+        said: dict[str, Any] = {"library": str(folder)}
+    else:
+        said = {"library": str(location.absolute())}
+    is_new = task == "learn" and not is_library(folder)
     with ActionLibrary(folder, create=is_new, read_only=not is_new) as library:
-        said: dict[str, Any] = {"library": str(folder.absolute())}
         if task == "learn":  # what it holds makes no difference to how movements are described
             return said | {"specification": library.specification.to_json()}
         return said | {"library_id": library.store.id, "library_version": library.version}

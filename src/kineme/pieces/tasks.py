@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache, partial
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,10 +15,9 @@ from kineme.io.reading.episodes import read_episodes
 from kineme.io.records import Problem
 from kineme.io.writing.annotations import Annotation
 from kineme.library.annotate import annotate_by
+from kineme.library.library import ActionLibrary
 from kineme.library.recognize import some_of_each_symbol
-from kineme.library.storage.connection import FILE
 from kineme.library.storage.source import known_sources
-from kineme.library.storage.store import Store
 from kineme.movements.channels.channel import recorded_names
 from kineme.movements.tables.layout import Known
 from kineme.pieces.archive import local_copy
@@ -40,11 +38,8 @@ class Learned(NamedTuple):
 @lru_cache(maxsize=1)
 def learned_at(folder: str, version: int) -> Learned:
     """Return the symbols of a library as they were at a version, whatever is learned meanwhile."""
-    store = Store(Path(folder) / FILE, read_only=True, as_of=version)
-    try:
-        return Learned(some_of_each_symbol(store), known_sources(store))
-    finally:
-        store.close()
+    with ActionLibrary(folder, read_only=True) as library, library.at(version) as past:
+        return Learned(some_of_each_symbol(past.store), known_sources(past.store))
 
 
 def annotated(source: Source, options: Options) -> Iterator[Any]:
