@@ -5,11 +5,10 @@ from __future__ import annotations
 import os
 import pickle
 import signal
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
-from functools import partial
 from itertools import islice
 from multiprocessing import get_context
 from threading import Thread
@@ -28,7 +27,7 @@ _ENDED = "the process that worked on it was ended by the system, twice: it may n
 _THREADS = ("KINEME_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
-def execute(job: Job, pieces: Sequence[Piece], workers: int | None = None, client: Any = None) -> Iterator[Outcome]:
+def execute(job: Job, pieces: Sequence[Piece], workers: int | None = None, client: Any = None) -> Generator[Outcome, None, None]:
     """Yield the outcomes of pieces as they are done: in this process, in `workers` others, or by a client of Dask.
 
     Raises `SpecificationError`: both are given, or fewer than one worker; `DataError`: workers of a cluster have other
@@ -39,13 +38,13 @@ def execute(job: Job, pieces: Sequence[Piece], workers: int | None = None, clien
     if client is not None:
         return _on_cluster(job, pieces, client)
     if workers is None:
-        return map(partial(run_piece, job), pieces)
+        return (run_piece(job, piece) for piece in pieces)
     if workers < 1:
         raise SpecificationError(f"expected at least one worker, got {workers}")
     return _in_processes(job, pieces, workers)
 
 
-def _in_processes(job: Job, pieces: Sequence[Piece], workers: int) -> Iterator[Outcome]:
+def _in_processes(job: Job, pieces: Sequence[Piece], workers: int) -> Generator[Outcome, None, None]:
     """Yield outcomes of processes with one thread each.
 
     What is under way ends with this process, and when it is interrupted. When a process is ended from outside, nobody knows by which piece: those under way are done again, each alone, and
@@ -146,7 +145,7 @@ def _check_job(data: bytes) -> None:
     pickle.loads(data)
 
 
-def _on_cluster(job: Job, pieces: Sequence[Piece], client: Any) -> Iterator[Outcome]:
+def _on_cluster(job: Job, pieces: Sequence[Piece], client: Any) -> Generator[Outcome, None, None]:
     """Yield outcomes of the workers of a cluster; the scheduler holds some thousand pieces at a time."""
     from distributed import as_completed
 

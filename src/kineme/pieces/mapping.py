@@ -7,6 +7,7 @@ import pickle
 import secrets
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import closing
 from functools import partial
 from pathlib import Path
 from types import CodeType
@@ -125,10 +126,11 @@ def run(
     Path(job.output).mkdir(parents=True, exist_ok=True)
     sweep(Path(job.output), time.time() - _IDLE)
     outcomes = {}
-    for outcome in execute(job, pieces, workers, client):
-        outcomes[outcome.piece.key] = outcome
-        if progress is not None:
-            progress(outcome)
+    with closing(execute(job, pieces, workers, client)) as done:  # what is under way ends with an error here, too
+        for outcome in done:
+            outcomes[outcome.piece.key] = outcome
+            if progress is not None:
+                progress(outcome)
     return [outcomes[piece.key] for piece in pieces]
 
 

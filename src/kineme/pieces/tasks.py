@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kineme.audit.run import Measurement, measure_episode
-from kineme.errors import DataError
+from kineme.errors import DataError, KinemeError
 from kineme.io.inspection.inspect import Measures, measures_of
 from kineme.io.reading.episodes import read_episodes
 from kineme.io.records import Problem
@@ -52,7 +52,11 @@ def annotated(source: Source, options: Options) -> Iterator[Any]:
 
     learned = learned_at(options["library"], options["library_version"])
     for recordings in recordings_of(source, options["reading"], learned.known):
-        report = annotate_by(learned.classes, recordings, options["error_rate"])
+        try:
+            report = annotate_by(learned.classes, recordings, options["error_rate"])
+        except KinemeError as error:  # other columns than learned, as one file among many has them
+            source.problems.append(Problem(recordings.sources[0].path, None, str(error)))
+            continue
         source.problems.extend(report.problems)
         wanted = options.get("symbols")
         rows = [note for note in report.annotations if wanted is None or note.symbol in wanted]
