@@ -52,7 +52,7 @@ def is_remote(archive: str) -> bool:
     return bool(_REMOTE.match(archive)) and not archive.startswith("file://")
 
 
-def _path_at(archive: str) -> Path:
+def path_at(archive: str) -> Path:
     """Return the path of an archive of this machine."""
     return Path(unquote(archive.removeprefix("file://")) if archive.startswith("file://") else archive)
 
@@ -64,7 +64,7 @@ def check_apart(output: str | Path, archives: Sequence[str]) -> None:
     """
     folder = Path(output).resolve()
     for archive in archives:
-        if not is_remote(archive) and _path_at(archive).resolve() in (folder, *folder.parents):
+        if not is_remote(archive) and path_at(archive).resolve() in (folder, *folder.parents):
             raise SpecificationError(
                 f"expected a folder for the parts outside of the archive {archive}, got {output}; its files would be "
                 "read as recordings"
@@ -89,7 +89,7 @@ def units_of(archives: Sequence[str], follow_links: bool = False) -> tuple[list[
                 within = base if unit.is_archive else f"{base}/{unit.name}"
                 units.append(unit._replace(shown=within if several else unit.name))
             continue
-        path = _path_at(archive)
+        path = path_at(archive)
         entries, odd = entries_of([path], follow_links)
         if not is_alone([path]):
             raise DataError(f"expected a file or folder, got the pattern {archive!r}; name the folder that holds them")
@@ -115,7 +115,7 @@ def _local_unit(archive: str, entry: Entry) -> Unit:
         return Unit(archive, name, (File(name, status.st_size, str(status.st_mtime_ns)),))
     data_set = data_set_of(entry.path)
     paths = [entry.path] if data_set is None else data_set.files(entry.path)
-    is_archive = data_set is not None and entry.path == _path_at(archive)
+    is_archive = data_set is not None and entry.path == path_at(archive)
     files = []
     for path in paths:
         status = os.stat(path)
@@ -134,7 +134,7 @@ def local_copy(unit: Unit) -> Iterator[Path]:
     """
     archive = unit.archive
     if not is_remote(archive):
-        path = _path_at(archive)
+        path = path_at(archive)
         yield path.absolute().parent if unit.is_archive or not path.is_dir() else path
         return
     system, base = _open(archive)

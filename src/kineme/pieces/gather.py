@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from kineme.errors import DataError
+from kineme.pieces.archive import is_remote, path_at
 from kineme.pieces.planning import PIECE_BYTES, Piece, plan
 from kineme.pieces.run import Job, Part, read_part
 from kineme.pieces.tasks import job_of
@@ -115,6 +116,8 @@ def read_run(output: Path) -> Asked:
     """Return what was asked for. Raises `DataError`: there is nothing that pieces left."""
     try:
         asked = json.loads((output / RUN).read_text(encoding="utf-8"))
+        if not isinstance(asked["archives"], list):
+            raise TypeError("no list")
         return Asked(
             str(asked["task"]), tuple(map(str, asked["archives"])), dict(asked["options"]), int(asked["size"]),
             bool(asked["follow_links"]),
@@ -138,7 +141,13 @@ def check(output: str | Path) -> Checked:
 
 
 def plan_of(asked: Asked) -> Any:
-    """Return the plan of its archives."""
+    """Return the plan of its archives. Raises `DataError`: one is not there."""
+    for archive in asked.archives:
+        if not is_remote(archive) and not path_at(archive).exists():
+            raise DataError(
+                f"expected the archive {archive}, found nothing there; where it has moved, call its command again with "
+                "the place where it is now"
+            )
     return plan(asked.archives, asked.size, follow_links=asked.follow_links)
 
 

@@ -115,6 +115,8 @@ def plan(archive: str | Sequence[str], size: int = PIECE_BYTES, *, follow_links:
         else:
             bundle.append(unit)
             n_bytes += unit.files[0].size
+    if not pieces:
+        raise DataError(f"expected recordings in {', '.join(archives)}, found none; the first problem: {problems[0]}")
     return Plan(tuple(pieces), tuple(problems))
 
 
