@@ -20,6 +20,8 @@ from kineme.io.records import needs
 from kineme.pieces.planning import Piece
 from kineme.pieces.run import Job, Outcome, failed, run_piece
 
+Outcomes = Generator[Outcome, None, None]
+
 _AHEAD = 2  # pieces of each worker that wait for it
 _SUBMITTED = 10_000  # pieces that a scheduler holds at once
 _RETRIES = 3
@@ -27,7 +29,7 @@ _ENDED = "the process that worked on it was ended by the system, twice: it may n
 _THREADS = ("KINEME_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
-def execute(job: Job, pieces: Sequence[Piece], workers: int | None = None, client: Any = None) -> Generator[Outcome, None, None]:
+def execute(job: Job, pieces: Sequence[Piece], workers: int | None = None, client: Any = None) -> Outcomes:
     """Yield the outcomes of pieces as they are done: in this process, in `workers` others, or by a client of Dask.
 
     Raises `SpecificationError`: both are given, or fewer than one worker; `DataError`: workers of a cluster have other
@@ -44,11 +46,12 @@ def execute(job: Job, pieces: Sequence[Piece], workers: int | None = None, clien
     return _in_processes(job, pieces, workers)
 
 
-def _in_processes(job: Job, pieces: Sequence[Piece], workers: int) -> Generator[Outcome, None, None]:
+def _in_processes(job: Job, pieces: Sequence[Piece], workers: int) -> Outcomes:
     """Yield outcomes of processes with one thread each.
 
-    What is under way ends with this process, and when it is interrupted. When a process is ended from outside, nobody knows by which piece: those under way are done again, each alone, and
-    the one that ends its process a second time fails.
+    What is under way ends with this process, and when it is interrupted. When a process is ended from outside, nobody
+    knows by which piece: those under way are done again, each alone, and the one that ends its process a second time
+    fails.
     """
     alone: list[Piece] = []
     waiting = iter(pieces)
@@ -145,7 +148,7 @@ def _check_job(data: bytes) -> None:
     pickle.loads(data)
 
 
-def _on_cluster(job: Job, pieces: Sequence[Piece], client: Any) -> Generator[Outcome, None, None]:
+def _on_cluster(job: Job, pieces: Sequence[Piece], client: Any) -> Outcomes:
     """Yield outcomes of the workers of a cluster; the scheduler holds some thousand pieces at a time."""
     from distributed import as_completed
 

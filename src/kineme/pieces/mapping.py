@@ -112,7 +112,7 @@ def _lines(code: Any) -> Any:
     """Return what code does, without where it stands."""
     if isinstance(code, CodeType):
         return [code.co_code, code.co_names, [_lines(each) for each in code.co_consts]]
-    return sorted(map(repr, code)) if isinstance(code, frozenset) else repr(code)
+    return sorted(repr(each) for each in code) if isinstance(code, frozenset) else repr(code)
 
 
 def run(

@@ -191,7 +191,9 @@ def job_of(task: str, output: str, options: Options) -> Job:
     The folder of a library says where it is; parts depend on what it holds: its id and its version.
     """
     if task not in TASKS:
-        raise DataError(f"expected a command over pieces ({', '.join(TASKS)}), got {task!r:.40}; a later kineme may know it")
+        raise DataError(
+            f"expected a command over pieces ({', '.join(TASKS)}), got {task!r:.40}; a later kineme may know it"
+        )
     row = TASKS[task]
     if unknown := sorted(set(options) - row.takes - {"reading", "library", "library_id", "library_version"}):
         raise DataError(f"expected options of {task} ({', '.join(sorted(row.takes)) or 'none'}), got {unknown[0]!r}")
