@@ -36,6 +36,7 @@ SUBJECTS = (
     "outliers",
     "defaults",
     "library",
+    "postgres",
     "million",
     "lerobot",
     "bags",

@@ -54,7 +54,7 @@ def _format(text: str) -> str:
 @rerun_option
 @force_option
 @pieces_options
-def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, form: str | None, **options: Any) -> None:
+def annotate(recordings: tuple[Path, ...], folder: Any, output: Path | None, form: str | None, **options: Any) -> None:
     """Annotate RECORDINGS, files, folders or patterns of them, or - for CSV from the standard input: what happens when.
 
     Every movement is searched for those of the library's symbols, with rests or without between them. Motion that is

@@ -31,7 +31,7 @@ _SHOWN = 20  # hits, and problems, that are listed; --output and --json have all
 @json_option
 @force_option
 @pieces_options
-def find(symbol: str, recordings: tuple[Path, ...], folder: Path, also: tuple[str, ...], **options: Any) -> None:
+def find(symbol: str, recordings: tuple[Path, ...], folder: Any, also: tuple[str, ...], **options: Any) -> None:
     """Find where RECORDINGS, files, folders, data sets or patterns of them, show SYMBOL, the surest hits first.
 
     Each recording is searched for all symbols of the library, as by kineme annotate: a stretch that is more like

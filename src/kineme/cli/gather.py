@@ -10,8 +10,9 @@ from typing import Any, NamedTuple
 import click
 
 from kineme.cli.audit import AuditFiles, audit_text
+from kineme.cli.learn import joined_since, learned_text, named_of
 from kineme.cli.options import FILE, FOLDER, GroupedCommand, force_option, heading, json_option
-from kineme.cli.output import check_new, say, table, unlisted
+from kineme.cli.output import check_new, progress, say, table, unlisted
 from kineme.cli.pieces import SHOWN, UNFINISHED
 from kineme.reporting.text import counted, printable
 
@@ -33,6 +34,9 @@ def gather(parts: Path, partial: bool, output: Path | None, mask: Path | None, a
 
     Pieces are compared with the archive as it is now: one whose files have changed since is stale, and its command,
     called again, does it anew. This is the only step that reads all parts.
+
+    Parts of kineme learn are stored in the library, as one process would have learned them: one change, which one undo
+    takes back. Movements that are stored already are not stored again.
 
     The exit status is 0 if all pieces are there, and 3 if some are missing, stale or failed; then nothing is written
     without --partial.
@@ -61,7 +65,11 @@ def gather(parts: Path, partial: bool, output: Path | None, mask: Path | None, a
     }  # fmt: skip
     words = [found.in_words()]
     if found.parts and (found.is_complete or partial):
-        words.append(_ANSWERS[asked.task](asked, tables_of(job, found), Files(output, mask, force), data))
+        words.append(
+            _ANSWERS[asked.task](
+                asked, lambda columns=None: tables_of(job, found, columns), Files(output, mask, force), data
+            )
+        )
     words += [f"not read: {printable(problem)}" for problem in data["problems"][:SHOWN]]
     words += unlisted({"problems": data["problems"]}, SHOWN)
     say(as_json, data, lambda: "\n".join(words))
@@ -77,7 +85,7 @@ class Files(NamedTuple):
     force: bool
 
 
-def _annotated(asked: Any, tables: Iterable[Any], files: Files, data: dict[str, Any]) -> str:
+def _annotated(asked: Any, tables: Callable[..., Iterable[Any]], files: Files, data: dict[str, Any]) -> str:
     """Write the annotations of all parts; those of kineme find the surest first."""
     from kineme.io.writing.annotations import Annotation, write_annotations, write_csv_stream, writer_of
 
@@ -86,7 +94,7 @@ def _annotated(asked: Any, tables: Iterable[Any], files: Files, data: dict[str, 
     seconds: dict[str, float] = defaultdict(float)
 
     def several() -> Iterable[list[Any]]:
-        for rows in tables:
+        for rows in tables():
             notes = [Annotation(**row) for row in rows.to_pylist()]
             for note in notes:
                 name = "unknown" if note.unknown else printable(str(note.symbol))
@@ -112,13 +120,13 @@ def _annotated(asked: Any, tables: Iterable[Any], files: Files, data: dict[str, 
     return "\n".join([*lines, *(f"written to {printable(path)}" for path in written)])
 
 
-def _audited(asked: Any, tables: Iterable[Any], files: Files, data: dict[str, Any]) -> str:
+def _audited(asked: Any, tables: Callable[..., Iterable[Any]], files: Files, data: dict[str, Any]) -> str:
     """Compare the episodes of all parts; those that are drawn are read again."""
     from kineme.audit.run import audit_measured
     from kineme.io.reading.episodes import read_episodes
     from kineme.pieces.tasks import measured, numbered
 
-    rows = (row for part in tables for row in measured(part))
+    rows = (row for part in tables() for row in measured(part))
     result = audit_measured(numbered(rows), asked.options["error_rate"])
     dataset = Path(asked.archives[0])
     reports = AuditFiles(files.output, files.mask)
@@ -128,7 +136,7 @@ def _audited(asked: Any, tables: Iterable[Any], files: Files, data: dict[str, An
     return audit_text(result, said)
 
 
-def _inspected(asked: Any, tables: Iterable[Any], files: Files, data: dict[str, Any]) -> str:
+def _inspected(asked: Any, tables: Callable[..., Iterable[Any]], files: Files, data: dict[str, Any]) -> str:
     """Summarize movements by label."""
     import pyarrow as pa
 
@@ -138,7 +146,7 @@ def _inspected(asked: Any, tables: Iterable[Any], files: Files, data: dict[str, 
     from kineme.io.inspection.inspect import labels_as_words, summaries, summary_as_data
     from kineme.pieces.tasks import inspected
 
-    parts = [part.drop_columns(["path", "place"]) for part in tables]
+    parts = [part.drop_columns(["path", "place"]) for part in tables()]
     if not parts:
         return "no movements"
     rows = pa.concat_tables(parts, promote_options="permissive")
@@ -149,10 +157,45 @@ def _inspected(asked: Any, tables: Iterable[Any], files: Files, data: dict[str, 
     return labels_as_words(labels, f"{counted(rows.num_rows, 'movement')}")
 
 
+def _learned(asked: Any, tables: Callable[..., Iterable[Any]], files: Files, data: dict[str, Any]) -> str:
+    """Store all movements in the library, in the order of the archive."""
+    from kineme.library.library import ActionLibrary
+    from kineme.pieces.learned import learned, survey
+
+    if files.output is not None or files.mask is not None:
+        raise click.UsageError("expected no --output and no --train-mask, learn stores movements in its library")
+    of = survey(tables, asked, data["problems"])
+    data["notes"] = list(of.notes)
+    with ActionLibrary(asked.options["library"]) as library, progress(total=of.rows, desc="learning") as bar:
+        before, n = library.version, 0
+        totals: Counter[str] = Counter()
+        symbols: dict[str, None] = {}
+        kept: Counter[tuple[str, str]] = Counter()
+        for labels, report in learned(library.store, tables, asked, of, data["problems"]):
+            n = len(report.ids)
+            named = named_of(library, report.ids, labels)
+            totals.update(added=report.added, duplicates=n - report.added, without_symbol=named["without_symbol"])
+            kept.update({(row["symbol"], row["label"]): row["movements"] for row in named["kept"]})
+            symbols |= dict.fromkeys(report.symbols)
+            bar.update(n)
+        data |= {
+            "library": asked.options["library"],
+            **{name: totals[name] for name in ("added", "duplicates", "without_symbol")},
+            "joined": joined_since(library, before) if totals["duplicates"] else 0,
+            "kept": [{"symbol": symbol, "label": label, "movements": k} for (symbol, label), k in kept.items()],
+            "symbols": list(symbols),
+            "movements": len(library),
+            "people": of.people,
+            "version": library.version,
+        }
+    return learned_text(data, [])
+
+
 #: Task -> what makes one answer of the rows of all parts; it adds to the data of the answer, and returns its words.
-_ANSWERS: dict[str, Callable[[Any, Iterable[Any], Files, dict[str, Any]], str]] = {
+_ANSWERS: dict[str, Callable[[Any, Callable[..., Iterable[Any]], Files, dict[str, Any]], str]] = {
     "annotate": _annotated,
     "find": _annotated,
     "audit": _audited,
     "inspect": _inspected,
+    "learn": _learned,
 }

@@ -61,7 +61,7 @@ def in_pieces(  # noqa: PLR0913 - what a command knows when it hands its work on
     output: Path | None,
     how: Mapping[str, Any],
     options: dict[str, Any],
-    library: Path | None = None,
+    library: Any = None,
     *,
     force: bool = False,
     as_json: bool = False,
@@ -81,7 +81,7 @@ def in_pieces(  # noqa: PLR0913 - what a command knows when it hands its work on
     if output is None or output.is_file() or (output.suffix[1:].isalpha() and not output.is_dir()):
         raise click.UsageError(
             "expected --output FOLDER, the folder of the parts, with --workers, --scheduler, --shard or an archive in "
-            f"a store, got {'none' if output is None else printable(output)}; kineme gather makes one file of them"
+            f"a store, got {'none' if output is None else printable(output)}; kineme gather reads all of them"
         )
     if how["workers"] is not None and how["scheduler"] is not None:
         raise click.UsageError("expected --workers or --scheduler, not both")
@@ -95,17 +95,11 @@ def in_pieces(  # noqa: PLR0913 - what a command knows when it hands its work on
     if len(archives) == 1 and not is_remote(archives[0]):  # kineme gather finds it from everywhere
         archives = (str(path_at(archives[0]).absolute()),)
     options = {**options, "reading": reading}
-    if library is not None:
-        from kineme.library.library import ActionLibrary
-
-        with ActionLibrary(library, read_only=True) as opened:
-            options |= {
-                "library": str(library.absolute()),
-                "library_id": opened.store.id,
-                "library_version": opened.version,
-            }
     asked = Asked(task, archives, options, how["piece_size"] * _MIB, bool(reading.get("follow_links")))
     planned = plan(archives, asked.size, follow_links=asked.follow_links)
+    if library is not None:  # it is created for an archive that is there
+        options = options | _of_library(library, task)
+        asked = Asked(**(vars(asked) | {"options": options}))
     write_run(output, asked, replace=force)
     part = planned if how["shard"] is None else planned.shard(*how["shard"])
     job = job_of(task, str(output), options)
@@ -115,6 +109,7 @@ def in_pieces(  # noqa: PLR0913 - what a command knows when it hands its work on
     failures = [(outcome.piece, outcome.reason) for outcome in outcomes if outcome.state == FAILED]
     problems = [*map(str, part.problems), *(problem for outcome in outcomes for problem in outcome.problems)]
     data = {
+        "task": task,
         "pieces": dict(sorted(Counter(outcome.state for outcome in outcomes).items())),
         "recordings": sum(outcome.recordings for outcome in outcomes),
         "seconds": sum(outcome.seconds for outcome in outcomes),
@@ -127,6 +122,25 @@ def in_pieces(  # noqa: PLR0913 - what a command knows when it hands its work on
         click.get_current_context().exit(UNFINISHED)
 
 
+def _of_library(folder: Any, task: str) -> dict[str, Any]:
+    """The options that say which library parts depend on; to learn, it is created if it does not exist."""
+    from kineme.library.library import ActionLibrary, is_library
+    from kineme.library.storage.address import Address, as_location
+
+    location = as_location(folder)
+    if isinstance(location, Address):
+        if location.without_secrets(location.uri) != location.uri:  # it would be written beside the parts
+            raise click.UsageError(f"expected an address without a password, got {location}; say it in PGPASSWORD")
+        said: dict[str, Any] = {"library": str(folder)}
+    else:
+        said = {"library": str(location.absolute())}
+    is_new = task == "learn" and not is_library(folder)
+    with ActionLibrary(folder, create=is_new, read_only=not is_new) as library:
+        if task == "learn":  # what it holds makes no difference to how movements are described
+            return said | {"specification": library.specification.to_json()}
+        return said | {"library_id": library.store.id, "library_version": library.version}
+
+
 def _text(data: dict[str, Any], summary: str) -> str:
     n = data["recordings"]
     read = f", {counted(n, 'recording')} of {data['seconds']:,.1f} s" if n else ""
@@ -135,4 +149,5 @@ def _text(data: dict[str, Any], summary: str) -> str:
     lines += [f"not read: {printable(problem)}" for problem in data["problems"][:SHOWN]]
     lines += unlisted({"failed": data["failed"], "problems": data["problems"]}, SHOWN)
     again = "; run it again to do what failed" if data["failed"] else ""
-    return "\n".join([*lines, f"parts in {printable(data['output'])}: kineme gather makes one file of them{again}"])
+    gathered = "stores them in the library" if data["task"] == "learn" else "makes one file of them"
+    return "\n".join([*lines, f"parts in {printable(data['output'])}: kineme gather {gathered}{again}"])

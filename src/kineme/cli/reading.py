@@ -293,7 +293,7 @@ def _chosen(several: Any, options: dict[str, Any]) -> Any:
     return several[index or 0]
 
 
-def _is_symbol(source: str, folder: Path | None) -> bool:
+def _is_symbol(source: str, folder: Any) -> bool:
     """Tell whether SOURCE is a symbol: with --library always; with one from the environment, unless a file exists."""
     given = click.get_current_context().get_parameter_source("folder")
     return folder is not None and (given != ParameterSource.ENVIRONMENT or not Path(source).exists())

@@ -7,7 +7,7 @@ import os
 import re
 import stat
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from fnmatch import fnmatch
 from functools import lru_cache
 from pathlib import Path, PurePosixPath
@@ -144,6 +144,13 @@ def local_copy(unit: Unit) -> Iterator[Path]:
             target.parent.mkdir(parents=True, exist_ok=True)
             _copy(system, _path_of(base, file.name, archive), target, file)
         yield Path(folder)
+
+
+@contextmanager
+def local_copies(units: Sequence[Unit]) -> Iterator[list[Path]]:
+    """Context manager: `local_copy` of each of some units, all at once."""
+    with ExitStack() as stack:
+        yield [stack.enter_context(local_copy(unit)) for unit in units]
 
 
 def _within(folder: Path, name: str) -> Path:

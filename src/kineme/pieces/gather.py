@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -179,8 +179,8 @@ def _reason(path: Path) -> str:
         return "its reason cannot be read"
 
 
-def tables_of(job: Job, of: Checked) -> Iterator[Any]:
-    """Yield the rows of all parts, one part in memory at a time, in the order of the plan.
+def tables_of(job: Job, of: Checked, columns: Sequence[str] | None = None) -> Iterator[Any]:
+    """Yield the rows of all parts, or some columns of them, one part in memory at a time, in the order of the plan.
 
     Raises `DataError`: a part has damaged rows.
     """
@@ -192,7 +192,7 @@ def tables_of(job: Job, of: Checked) -> Iterator[Any]:
             path = job.path(piece)
             try:
                 with parquet.ParquetFile(path) as file:  # no columns of the names of folders, as a=1/
-                    table = file.read()
+                    table = file.read(columns)
             except (OSError, pa.ArrowException) as error:
                 raise DataError(
                     f"expected the rows of a piece in {path}, got a damaged file; remove it and call its command again"

@@ -51,7 +51,7 @@ class Piece:
 
     @property
     def key(self) -> str:
-        """Sixteen hexadecimal digits that name it: of what it is, not of where the archive lies, if it is the only one."""
+        """Sixteen hexadecimal digits that name it: of what it is, not of where the archive lies if it is alone."""
         names = [[unit.shown, self.first, self.last] for unit in self.units[:1]]
         return hashlib.blake2b(json.dumps(names).encode(), digest_size=8).hexdigest()
 

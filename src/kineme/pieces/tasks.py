@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache, partial
 from itertools import chain
-from pathlib import Path, PurePosixPath
+from pathlib import PurePosixPath
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,14 +18,14 @@ from kineme.io.reading.episodes import read_episodes
 from kineme.io.records import Problem
 from kineme.io.writing.annotations import Annotation
 from kineme.library.annotate import annotate_by
+from kineme.library.library import ActionLibrary
 from kineme.library.recognize import some_of_each_symbol
-from kineme.library.storage.connection import FILE
 from kineme.library.storage.source import known_sources
-from kineme.library.storage.store import Store
 from kineme.movements.channels.channel import recorded_names
 from kineme.movements.episodes import Episode
 from kineme.movements.tables.layout import Known
 from kineme.pieces.archive import local_copy
+from kineme.pieces.described import described
 from kineme.pieces.run import Job, Source, recordings_of
 from kineme.recognition.answer import KnownClasses
 
@@ -42,11 +42,8 @@ class Learned(NamedTuple):
 @lru_cache(maxsize=1)
 def learned_at(folder: str, version: int) -> Learned:
     """Return the symbols of a library as they were at a version, whatever is learned meanwhile."""
-    store = Store(Path(folder) / FILE, read_only=True, as_of=version)
-    try:
-        return Learned(some_of_each_symbol(store), known_sources(store))
-    finally:
-        store.close()
+    with ActionLibrary(folder, read_only=True) as library, library.at(version) as past:
+        return Learned(some_of_each_symbol(past.store), known_sources(past.store))
 
 
 def annotated(source: Source, options: Options) -> Iterator[Any]:
@@ -182,6 +179,7 @@ TASKS: dict[str, Task] = {
     "find": Task(annotated, frozenset({"error_rate", "symbols"}), by_library=True),
     "audit": Task(measurements, frozenset({"rate", "error_rate"})),
     "inspect": Task(inspections, frozenset()),
+    "learn": Task(described, frozenset({"label", "no_labels", "person", "by_person", "several", "specification"})),
 }
 
 
@@ -208,7 +206,7 @@ def _work(task: str, options: Options, source: Source) -> Iterable[Any]:
 
 def plain(options: Options) -> dict[str, Any]:
     """Return options of reading as JSON holds them, without those that are not given."""
-    return {name: _plain(value) for name, value in sorted(options.items()) if value not in (None, False, ())}
+    return {name: _plain(value) for name, value in sorted(options.items()) if value is not None}
 
 
 def _plain(value: Any) -> Any:

@@ -11,7 +11,7 @@ from kineme.io.lerobot.info import MARKER
 from kineme.io.reading.formats import Entry, Format, data_set_of, entries_of
 from kineme.io.reading.merge_files import Recordings, merge_files
 from kineme.io.reading.read_file import parsed_file
-from kineme.io.reading.recordings import NameRule, read_entries, trimmed
+from kineme.io.reading.recordings import NameRule, check_asked, heads_of, read_entries, trimmed
 from kineme.io.records import Problem, needs
 from kineme.movements.episodes import number_at
 from kineme.movements.tables.layout import Layout
@@ -61,7 +61,9 @@ def read_entry(
         if is_episodic(entry.path):
             yield from _of_data_set(entry, layout, rule, trim, numbers)
         else:
-            yield read_entries([entry], layout, rule, follow_links=follow_links, trim=trim)
+            recordings = read_entries([entry], layout, rule, follow_links=follow_links, trim=trim)
+            check_asked(layout, heads_of(recordings), recordings.people is not None, entry.name)
+            yield recordings
     except (KinemeError, OSError) as error:
         reason = str(error).removeprefix(f"{entry.path}: ").removeprefix(f"{entry.name}: ")
         yield Problem(entry.name, None, reason, type(error) if isinstance(error, KinemeError) else KinemeError)

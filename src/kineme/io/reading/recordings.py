@@ -182,7 +182,7 @@ def read_paths(  # noqa: PLR0913 - those of `read_recordings`, in records
     max_file_bytes()
     _check_rule(rule, layout)
     entries, problems = entries_of(paths, follow_links)
-    return read_entries(
+    recordings = read_entries(
         entries,
         layout,
         rule,
@@ -194,6 +194,9 @@ def read_paths(  # noqa: PLR0913 - those of `read_recordings`, in records
         where=paths,
         problems=problems,
     )
+    given = [] if standard_input is None else [Path(standard_input[0])]
+    check_asked(layout, heads_of(recordings), recordings.people is not None, in_words([*paths, *given]))
+    return recordings
 
 
 def _check_rule(rule: NameRule, layout: Layout) -> None:
@@ -249,18 +252,28 @@ def read_entries(  # noqa: PLR0913 - those of `read_paths`, and what it has foun
     read += [rule.apply(file, entry.path) for file, entry in files]
     recordings = merge_files(read, in_words(places), problems, layout.kinds, layout.skip, layout.by_number)
     recordings = replace(recordings, notes=notes)
-    # Refuse a column to exclude that no file has: it is most likely misspelled.
-    left_aside = sorted({name for how, _ in recordings.detected for name in how.ignored})
+    return trimmed(recordings) if trim else recordings
+
+
+Heads = tuple[tuple[str, ...], tuple[str, ...]]  # columns that are left aside, and those that are read
+
+
+def heads_of(recordings: Recordings) -> list[Heads]:
+    """Return the heads of the columns of files."""
+    return [(how.ignored, how.columns) for how, _ in recordings.detected]
+
+
+def check_asked(layout: Layout, heads: Sequence[Heads], has_people: bool, where: str) -> None:
+    """Refuse a column to exclude, or one of people, that no file at `where` has: it is most likely misspelled."""
+    aside, read = (sorted({name for file in heads for name in file[k]}) for k in (0, 1))
     for column in layout.excluded:
-        if not isinstance(column, int) and not column.isdecimal() and not excluded_numbers(left_aside, [column]):
-            others = sorted({name for how, _ in recordings.detected for name in how.columns})
-            raise DataError(f"expected columns like {column!r} to exclude, got none but {listed(others)}")
-    if layout.person is not None and recordings.people is None:
+        if not isinstance(column, int) and not column.isdecimal() and not excluded_numbers(aside, [column]):
+            raise DataError(f"expected columns like {column!r} to exclude, got none but {listed(read)}")
+    if layout.person is not None and not has_people:
         raise DataError(
-            f"expected a column {layout.person!r} of a table that names people, found none in {in_words(places)}; "
+            f"expected a column {layout.person!r} of a table that names people, found none in {where}; "
             "say who showed them with label_pattern=, in the shell also with --by-person or --person"
         )
-    return trimmed(recordings) if trim else recordings
 
 
 def trimmed(recordings: Recordings) -> Recordings:
