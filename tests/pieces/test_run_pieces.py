@@ -10,7 +10,6 @@ import signal
 import subprocess
 import sys
 import time
-from functools import partial
 
 import piece_work
 import pytest
@@ -21,8 +20,8 @@ from kineme.errors import SpecificationError
 from kineme.pieces import map as map_pieces
 from kineme.pieces import plan, run
 from kineme.pieces.executors import execute
-from kineme.pieces.mapping import _rows
-from kineme.pieces.run import Job, read_part, sweep
+from kineme.pieces.mapping import job_of_function
+from kineme.pieces.run import read_part, sweep
 
 SIZE = 6000
 
@@ -58,7 +57,7 @@ def test_processes_write_the_same_bytes(archive, parts, tmp_path, workers):
 
 
 def test_shards_write_the_same_bytes(archive, parts, tmp_path):
-    job = Job("map", partial(_rows, lengths, {}), str(tmp_path), {"function": "piece_work.lengths", "reading": {}})
+    job = job_of_function(lengths, tmp_path, {})
     for rank in (4, 1, 3, 5, 2):
         assert {o.state for o in execute(job, plan(str(archive), SIZE).shard(rank, 5).pieces)} == {"done"}
     assert parts_of(tmp_path) == parts
@@ -141,7 +140,7 @@ def test_files_that_cannot_be_read_are_problems_and_vanished_ones_fail(tmp_path)
     assert [problem.partition(":")[0].partition(",")[0] for problem in outcomes[0].problems] == ["arc/0000.csv"]
     pieces = plan(str(archive), 1).pieces
     (archive / "line" / "0001.csv").unlink()
-    job = Job("map", partial(_rows, lengths, {}), str(tmp_path / "out"))
+    job = job_of_function(lengths, tmp_path / "out", {})
     states = {str(outcome.piece): outcome.state for outcome in execute(job, pieces)}
     assert states["line/0001.csv"] == "failed"
     assert list(states.values()).count("done") == 5

@@ -58,11 +58,14 @@ def audit(dataset: Path, error_rate: float, output: Path | None, mask: Path | No
     """
     from kineme.audit.run import audit_episodes
     from kineme.io.reading.episodes import read_episodes
+    from kineme.pieces.archive import is_remote
 
     how = how_divided(options, [dataset])
     if how is not None:
         if given := [name for name in ("mask", "rerun") if {"mask": mask, **options}[name] is not None]:
             raise click.UsageError(f"expected --{given[0].replace('mask', 'train-mask')} with kineme gather")
+        if not is_remote(str(dataset)):
+            read_episodes(dataset, rate=options["rate"])  # refuses what is none, or several, before any is read
         asked = {"reading": {}, "error_rate": error_rate, "rate": options["rate"]}
         in_pieces("audit", [dataset], output, how, asked, force=options["force"], as_json=options["as_json"])
         return

@@ -47,6 +47,8 @@ def gather(parts: Path, partial: bool, output: Path | None, mask: Path | None, a
     from kineme.pieces.tasks import job_of
 
     asked = read_run(parts)
+    if mask is not None and asked.task != "audit":
+        raise click.UsageError(f"expected --train-mask with the parts of kineme audit, got those of {asked.task}")
     if output is not None:
         check_new(output, force, *(path for path in asked.archives if Path(path).exists()))
     job, plan = job_of(asked.task, str(parts), asked.options), plan_of(asked)
@@ -62,7 +64,7 @@ def gather(parts: Path, partial: bool, output: Path | None, mask: Path | None, a
         "problems": [*map(str, plan.problems), *found.problems],
     }  # fmt: skip
     words = [found.in_words()]
-    if found.is_complete or partial:
+    if found.parts and (found.is_complete or partial):
         words.append(
             _ANSWERS[asked.task](
                 asked, lambda columns=None: tables_of(job, found, columns), Files(output, mask, force), data
@@ -108,11 +110,9 @@ def _annotated(asked: Any, tables: Callable[..., Iterable[Any]], files: Files, d
     elif output is not None and output.suffix.lower() == ".csv":
         written = [write_csv_stream(output, several())]
     else:
-        notes = [note for rows in several() for note in rows] if output is not None else []
+        notes = [note for rows in several() for note in rows if output is not None]
         if output is not None:
             written = write_annotations(output, notes, [Path(path) for path in asked.archives])
-        for _ in several():
-            pass
     data["symbols"] = {name: {"times": n, "seconds": seconds[name]} for name, n in counts.most_common()}
     data["written"] = list(map(str, written))
     rows = [(name, f"{n:,}", f"{seconds[name]:,.1f}") for name, n in counts.most_common()]

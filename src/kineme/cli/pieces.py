@@ -68,15 +68,17 @@ def in_pieces(  # noqa: PLR0913 - what a command knows when it hands its work on
 ) -> None:
     """Do a command piece by piece: each part of its answer becomes a file in the folder `output`."""
     from kineme.io.records import needs
+    from kineme.pieces.archive import check_apart, is_remote, path_at
     from kineme.pieces.executors import cluster_client
-    from kineme.pieces.gather import Asked, plan_of, write_run
+    from kineme.pieces.gather import Asked, write_run
     from kineme.pieces.mapping import run
+    from kineme.pieces.planning import plan
     from kineme.pieces.run import FAILED, summary_of
     from kineme.pieces.tasks import job_of, plain
 
     with needs("pyarrow", "write parts in Parquet", "parquet"):
         import pyarrow  # noqa: F401 - before anything is read
-    if output is None or output.suffix or output.is_file():
+    if output is None or output.is_file() or (output.suffix[1:].isalpha() and not output.is_dir()):
         raise click.UsageError(
             "expected --output FOLDER, the folder of the parts, with --workers, --scheduler, --shard or an archive in "
             f"a store, got {'none' if output is None else printable(output)}; kineme gather reads all of them"
@@ -86,15 +88,20 @@ def in_pieces(  # noqa: PLR0913 - what a command knows when it hands its work on
     reading = plain(options.pop("reading"))
     if reading.get("join_files"):
         raise click.UsageError("expected recordings that are read one by one, got --join-files; join them first")
-    options = {**options, "reading": reading}
     archives = tuple(map(str, recordings))
+    if "-" in archives:
+        raise click.UsageError("expected files or folders to divide into pieces, got the standard input")
+    check_apart(output, archives)
+    if len(archives) == 1 and not is_remote(archives[0]):  # kineme gather finds it from everywhere
+        archives = (str(path_at(archives[0]).absolute()),)
+    options = {**options, "reading": reading}
     asked = Asked(task, archives, options, how["piece_size"] * _MIB, bool(reading.get("follow_links")))
-    plan = plan_of(asked)
+    planned = plan(archives, asked.size, follow_links=asked.follow_links)
     if library is not None:  # it is created for an archive that is there
         options = options | _of_library(library, task)
         asked = Asked(**(vars(asked) | {"options": options}))
     write_run(output, asked, replace=force)
-    part = plan if how["shard"] is None else plan.shard(*how["shard"])
+    part = planned if how["shard"] is None else planned.shard(*how["shard"])
     job = job_of(task, str(output), options)
     connected = nullcontext(None) if how["scheduler"] is None else cluster_client(how["scheduler"])
     with connected as client, progress(total=len(part.pieces), desc=task, unit="piece") as bar:

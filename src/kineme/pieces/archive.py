@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import stat
@@ -12,6 +13,7 @@ from functools import lru_cache
 from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
+from urllib.parse import unquote
 
 from kineme.errors import DataError, SpecificationError
 from kineme.io.reading.formats import DATA_SETS, DataSet, Entry, as_text, data_set_of, entries_of, is_alone
@@ -39,6 +41,7 @@ class Unit(NamedTuple):
     files: tuple[File, ...]
     marker: str = ""  # of a data set: the row of `DATA_SETS` that it is
     is_archive: bool = False
+    shown: str = ""  # its name in results, which can be stored; with the archive where several are given
 
 
 def is_remote(archive: str) -> bool:
@@ -49,28 +52,57 @@ def is_remote(archive: str) -> bool:
     return bool(_REMOTE.match(archive)) and not archive.startswith("file://")
 
 
+def path_at(archive: str) -> Path:
+    """Return the path of an archive of this machine."""
+    return Path(unquote(archive.removeprefix("file://")) if archive.startswith("file://") else archive)
+
+
+def check_apart(output: str | Path, archives: Sequence[str]) -> None:
+    """Refuse a folder of parts within an archive, whose files would become recordings of it.
+
+    Raises `SpecificationError`.
+    """
+    folder = Path(output).resolve()
+    for archive in archives:
+        if not is_remote(archive) and path_at(archive).resolve() in (folder, *folder.parents):
+            raise SpecificationError(
+                f"expected a folder for the parts outside of the archive {archive}, got {output}; its files would be "
+                "read as recordings"
+            )
+
+
 def units_of(archives: Sequence[str], follow_links: bool = False) -> tuple[list[Unit], list[Problem]]:
     """List what is to be read in archives, sorted by name, and what cannot be listed.
 
-    Only names, sizes and times are looked at, and of folders whether they are data sets. Raises `DataError`: nothing is
-    there, a store that does not answer, or a package that reads it is missing.
+    Only names, sizes and times are looked at, and of folders whether they are data sets. What is in two archives is
+    listed once. Raises `DataError`: nothing is there, a store that does not answer, or a package that reads it is
+    missing.
     """
     units: list[Unit] = []
     problems: list[Problem] = []
-    for archive in archives:
+    listed: set[Path] = set()
+    several = len(archives) > 1
+    for archive in dict.fromkeys(archives):
         if is_remote(archive):
-            units += _remote_units(archive)
+            base = archive.partition("?")[0].rstrip("/")
+            for unit in _remote_units(archive):
+                within = base if unit.is_archive else f"{base}/{unit.name}"
+                units.append(unit._replace(shown=within if several else unit.name))
             continue
-        path = Path(archive.removeprefix("file://"))
+        path = path_at(archive)
         entries, odd = entries_of([path], follow_links)
         if not is_alone([path]):
             raise DataError(f"expected a file or folder, got the pattern {archive!r}; name the folder that holds them")
-        problems += odd
+        problems += [problem._replace(file=as_text(path / problem.file)) for problem in odd] if several else odd
         for entry in entries:
+            if entry.path in listed:
+                continue
+            listed.add(entry.path)
+            shown = as_text(entry.path) if several else entry.name
             try:
-                units.append(_local_unit(archive, entry))
+                units.append(_local_unit(archive, entry)._replace(shown=shown))
             except OSError as error:
-                problems.append(Problem(entry.name, None, f"expected a file, got {error.strerror or error}"))
+                problems.append(Problem(shown, None, f"expected a file, got {error.strerror or error}"))
     if not units and not problems:
         raise DataError(f"expected recordings in {', '.join(archives)}, found none")
     return units, problems
@@ -79,19 +111,19 @@ def units_of(archives: Sequence[str], follow_links: bool = False) -> tuple[list[
 def _local_unit(archive: str, entry: Entry) -> Unit:
     status = os.stat(entry.path)
     if not stat.S_ISDIR(status.st_mode):
-        name = as_text(entry.relative)
+        name = entry.relative.as_posix()
         return Unit(archive, name, (File(name, status.st_size, str(status.st_mtime_ns)),))
     data_set = data_set_of(entry.path)
     paths = [entry.path] if data_set is None else data_set.files(entry.path)
-    is_archive = data_set is not None and entry.path == Path(archive.removeprefix("file://"))
+    is_archive = data_set is not None and entry.path == path_at(archive)
     files = []
     for path in paths:
         status = os.stat(path)
         inside = path.relative_to(entry.path)
         relative = inside if is_archive else entry.relative / inside
-        files.append(File(as_text(relative), status.st_size, str(status.st_mtime_ns)))
+        files.append(File(relative.as_posix(), status.st_size, str(status.st_mtime_ns)))
     marker = "" if data_set is None else data_set.marker
-    return Unit(archive, as_text(entry.relative), tuple(files), marker, is_archive)
+    return Unit(archive, entry.relative.as_posix(), tuple(files), marker, is_archive)
 
 
 @contextmanager
@@ -102,7 +134,7 @@ def local_copy(unit: Unit) -> Iterator[Path]:
     """
     archive = unit.archive
     if not is_remote(archive):
-        path = Path(archive.removeprefix("file://"))
+        path = path_at(archive)
         yield path.absolute().parent if unit.is_archive or not path.is_dir() else path
         return
     system, base = _open(archive)
@@ -142,6 +174,8 @@ def _copy(system: Any, path: str, target: Path, file: File) -> None:
     except FileNotFoundError as error:
         raise DataError(f"expected {file.name} in the archive, it has vanished since it was listed") from error
     except OSError as error:
+        if error.errno == errno.ENOSPC:  # here, not in the store
+            raise
         raise DataError(f"expected to read {file.name}, the store refuses ({_reason(error)})") from error
     if target.stat().st_size != file.size:
         raise DataError(f"expected {file.size:,} bytes of {file.name}, got {target.stat().st_size:,}; read it again")

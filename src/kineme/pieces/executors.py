@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+import pickle
+import signal
+from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
-from functools import partial
+from contextlib import contextmanager, suppress
 from itertools import islice
 from multiprocessing import get_context
+from threading import Thread
 from typing import Any
 
 import kineme
@@ -18,6 +20,8 @@ from kineme.io.records import needs
 from kineme.pieces.planning import Piece
 from kineme.pieces.run import Job, Outcome, failed, run_piece
 
+Outcomes = Generator[Outcome, None, None]
+
 _AHEAD = 2  # pieces of each worker that wait for it
 _SUBMITTED = 10_000  # pieces that a scheduler holds at once
 _RETRIES = 3
@@ -25,7 +29,7 @@ _ENDED = "the process that worked on it was ended by the system, twice: it may n
 _THREADS = ("KINEME_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
-def execute(job: Job, pieces: Sequence[Piece], workers: int | None = None, client: Any = None) -> Iterator[Outcome]:
+def execute(job: Job, pieces: Sequence[Piece], workers: int | None = None, client: Any = None) -> Outcomes:
     """Yield the outcomes of pieces as they are done: in this process, in `workers` others, or by a client of Dask.
 
     Raises `SpecificationError`: both are given, or fewer than one worker; `DataError`: workers of a cluster have other
@@ -36,23 +40,24 @@ def execute(job: Job, pieces: Sequence[Piece], workers: int | None = None, clien
     if client is not None:
         return _on_cluster(job, pieces, client)
     if workers is None:
-        return map(partial(run_piece, job), pieces)
+        return (run_piece(job, piece) for piece in pieces)
     if workers < 1:
         raise SpecificationError(f"expected at least one worker, got {workers}")
     return _in_processes(job, pieces, workers)
 
 
-def _in_processes(job: Job, pieces: Sequence[Piece], workers: int) -> Iterator[Outcome]:
+def _in_processes(job: Job, pieces: Sequence[Piece], workers: int) -> Outcomes:
     """Yield outcomes of processes with one thread each.
 
-    When a process is ended from outside, nobody knows by which piece: those under way are done again, each alone, and
-    the one that ends its process a second time fails.
+    What is under way ends with this process, and when it is interrupted. When a process is ended from outside, nobody
+    knows by which piece: those under way are done again, each alone, and the one that ends its process a second time
+    fails.
     """
     alone: list[Piece] = []
     waiting = iter(pieces)
     while True:
         suspects: list[Piece] = []
-        with _pool(workers) as pool:
+        with _pool(job, workers) as pool:
             futures: dict[Future[Outcome], Piece] = {}
             broken = False
             while not broken:
@@ -83,7 +88,7 @@ def _in_processes(job: Job, pieces: Sequence[Piece], workers: int) -> Iterator[O
 
 def _alone(job: Job, piece: Piece) -> Outcome:
     """Return the outcome of a piece in a process of its own."""
-    with _pool(1) as pool:
+    with _pool(job, 1) as pool:
         try:
             return pool.submit(run_piece, job, piece).result()
         except BrokenProcessPool:
@@ -91,17 +96,35 @@ def _alone(job: Job, piece: Piece) -> Outcome:
 
 
 @contextmanager
-def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """Context manager: processes that begin anew, and whose libraries use one thread."""
+def _pool(job: Job, workers: int) -> Iterator[ProcessPoolExecutor]:
+    """Context manager: processes that begin anew, whose libraries use one thread, and which end when this one does.
+
+    Raises `SpecificationError`: they do not find the function of the job.
+    """
     before = {name: os.environ.get(name) for name in _THREADS}
     os.environ.update(dict.fromkeys(_THREADS, "1"))  # they read it when they are imported
-    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
+    context = get_context("spawn")
+    reader, writer = context.Pipe(duplex=False)
+    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_begin, initargs=(reader,))
     try:
-        for _ in range(workers):  # processes are started by work, and have the environment of that moment
-            pool.submit(os.getpid)
+        try:
+            data = pickle.dumps(job)
+            # Processes are started by work, and have the environment of that moment.
+            checks = [pool.submit(_check_job, data) for _ in range(workers)]
+            checks[0].result()
+        except Exception as error:  # whatever pickle and modules raise
+            raise SpecificationError(
+                "expected a function of a module that other processes can import, and a script that calls it below if "
+                f"__name__ == '__main__', got {type(error).__name__}: {error}; or leave out workers"
+            ) from error
         yield pool
+    except BaseException:
+        writer.close()  # ends what is under way, which may take long, or hang
+        raise
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
+        writer.close()
+        reader.close()
         for name, value in before.items():
             if value is None:
                 os.environ.pop(name, None)
@@ -109,7 +132,23 @@ def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
                 os.environ[name] = value
 
 
-def _on_cluster(job: Job, pieces: Sequence[Piece], client: Any) -> Iterator[Outcome]:
+def _begin(reader: Any) -> None:
+    """Let a process end with the one that has started it; a terminal interrupts both, and that one says what ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    Thread(target=_end_with, args=(reader,), daemon=True).start()
+
+
+def _end_with(reader: Any) -> None:
+    with suppress(EOFError, OSError):
+        reader.recv_bytes()  # nothing is sent: it waits until the other end is closed, by whatever
+    os._exit(1)
+
+
+def _check_job(data: bytes) -> None:
+    pickle.loads(data)
+
+
+def _on_cluster(job: Job, pieces: Sequence[Piece], client: Any) -> Outcomes:
     """Yield outcomes of the workers of a cluster; the scheduler holds some thousand pieces at a time."""
     from distributed import as_completed
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from kineme.errors import DataError
+from kineme.pieces.archive import is_remote, path_at
 from kineme.pieces.planning import PIECE_BYTES, Piece, plan
 from kineme.pieces.run import Job, Part, read_part
 from kineme.pieces.tasks import job_of
@@ -84,9 +85,13 @@ def write_run(output: Path, asked: Asked, *, replace: bool = False) -> None:
     with suppress(FileExistsError), whole_file(output / RUN, replace=False) as beside:
         beside.write_text(text, encoding="utf-8")
         return
+    if replace:
+        with whole_file(output / RUN) as beside:
+            beside.write_text(text, encoding="utf-8")
+        return
     before = read_run(output)
     same = (before.task, _without_version(before.options)) == (asked.task, _without_version(asked.options))
-    if not (same or replace):
+    if not same:
         differ = [
             name
             for name in sorted({*before.options, *asked.options})
@@ -111,14 +116,16 @@ def read_run(output: Path) -> Asked:
     """Return what was asked for. Raises `DataError`: there is nothing that pieces left."""
     try:
         asked = json.loads((output / RUN).read_text(encoding="utf-8"))
+        if not isinstance(asked["archives"], list):
+            raise TypeError("no list")
         return Asked(
             str(asked["task"]), tuple(map(str, asked["archives"])), dict(asked["options"]), int(asked["size"]),
             bool(asked["follow_links"]),
         )  # fmt: skip
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, LookupError, TypeError, ArithmeticError, RecursionError) as error:
         raise DataError(
             f"expected a folder that kineme has written with --workers, --scheduler or --shard, got {output}, without "
-            f"a {RUN} that can be read"
+            f"a {RUN} that can be read; its command, called again with --force, writes one"
         ) from error
 
 
@@ -134,7 +141,13 @@ def check(output: str | Path) -> Checked:
 
 
 def plan_of(asked: Asked) -> Any:
-    """Return the plan of its archives."""
+    """Return the plan of its archives. Raises `DataError`: one is not there."""
+    for archive in asked.archives:
+        if not is_remote(archive) and not path_at(archive).exists():
+            raise DataError(
+                f"expected the archive {archive}, found nothing there; where it has moved, call its command again with "
+                "the place where it is now"
+            )
     return plan(asked.archives, asked.size, follow_links=asked.follow_links)
 
 
@@ -162,14 +175,26 @@ def checked(job: Job, pieces: tuple[Piece, ...]) -> Checked:
 def _reason(path: Path) -> str:
     try:
         return str(json.loads(path.read_text(encoding="utf-8"))["reason"])
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, LookupError, TypeError, RecursionError):
         return "its reason cannot be read"
 
 
 def tables_of(job: Job, of: Checked, columns: Sequence[str] | None = None) -> Iterator[Any]:
-    """Yield the rows of all parts, or some columns of them, one part in memory at a time, in the order of the plan."""
+    """Yield the rows of all parts, or some columns of them, one part in memory at a time, in the order of the plan.
+
+    Raises `DataError`: a part has damaged rows.
+    """
+    import pyarrow as pa
     from pyarrow import parquet
 
     for piece, part in of.parts:
         if part.rows:
-            yield parquet.read_table(job.path(piece), columns=columns)
+            path = job.path(piece)
+            try:
+                with parquet.ParquetFile(path) as file:  # no columns of the names of folders, as a=1/
+                    table = file.read(columns)
+            except (OSError, pa.ArrowException) as error:
+                raise DataError(
+                    f"expected the rows of a piece in {path}, got a damaged file; remove it and call its command again"
+                ) from error
+            yield table

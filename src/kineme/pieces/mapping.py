@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import hashlib
+import pickle
+import secrets
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import closing
 from functools import partial
 from pathlib import Path
+from types import CodeType
 from typing import Any
 
+from kineme.errors import DataError
 from kineme.io.reading.merge_files import Recordings
 from kineme.io.records import needs
+from kineme.pieces.archive import check_apart
 from kineme.pieces.executors import execute
 from kineme.pieces.planning import PIECE_BYTES, plan
 from kineme.pieces.run import Job, Outcome, Source, recordings_of, sweep
@@ -66,12 +73,46 @@ def map(  # noqa: A001, PLR0913 - as in the standard library, over movements
     """
     with needs("pyarrow", "write Parquet", "parquet"):
         import pyarrow  # noqa: F401 - before any piece is read
-    archives = [archive] if isinstance(archive, (str, Path)) else list(archive)
-    planned = plan([str(each) for each in archives], size, follow_links=bool(reading.get("follow_links")))
+    archives = [str(each) for each in ([archive] if isinstance(archive, (str, Path)) else archive)]
+    check_apart(output, archives)
+    planned = plan(archives, size, follow_links=bool(reading.get("follow_links")))
+    return run(job_of_function(function, output, reading), planned.pieces, workers, client, progress)
+
+
+def job_of_function(function: Callable[[Recordings], Rows | None], output: Any, reading: Mapping[str, Any]) -> Job:
+    """Return the job of a function; with other code it is another job."""
     name = f"{getattr(function, '__module__', '')}.{getattr(function, '__qualname__', type(function).__qualname__)}"
-    specification = {"function": name, "reading": {key: reading[key] for key in sorted(reading)}}
-    job = Job("map", partial(_rows, function, reading), str(output), specification)
-    return run(job, planned.pieces, workers, client, progress)
+    specification = {"function": name, "code": _checksum(function), "reading": dict(sorted(reading.items()))}
+    return Job("map", partial(_rows, function, reading), str(output), specification)
+
+
+def _checksum(function: Any) -> str:
+    """Return a checksum of the code of a function and of the values that it carries, not of what it calls.
+
+    Where these cannot be written down, it is another one each time.
+    """
+    values: list[Any] = []
+    while isinstance(function, partial):
+        values += [function.args, sorted(function.keywords.items())]
+        function = function.func
+    values.append(getattr(function, "__self__", None))  # of a method, or of what is built in, its module
+    if not hasattr(function, "__code__"):
+        values.append(function)
+        function = type(function).__call__
+    try:
+        values += [getattr(function, name, None) for name in ("__defaults__", "__kwdefaults__")]
+        values += [cell.cell_contents for cell in getattr(function, "__closure__", None) or ()]
+        data = pickle.dumps([_lines(getattr(function, "__code__", None)), values])
+    except Exception:  # whatever pickle raises
+        data = secrets.token_bytes()
+    return hashlib.blake2b(data, digest_size=16).hexdigest()
+
+
+def _lines(code: Any) -> Any:
+    """Return what code does, without where it stands."""
+    if isinstance(code, CodeType):
+        return [code.co_code, code.co_names, [_lines(each) for each in code.co_consts]]
+    return sorted(repr(each) for each in code) if isinstance(code, frozenset) else repr(code)
 
 
 def run(
@@ -85,10 +126,11 @@ def run(
     Path(job.output).mkdir(parents=True, exist_ok=True)
     sweep(Path(job.output), time.time() - _IDLE)
     outcomes = {}
-    for outcome in execute(job, pieces, workers, client):
-        outcomes[outcome.piece.key] = outcome
-        if progress is not None:
-            progress(outcome)
+    with closing(execute(job, pieces, workers, client)) as done:  # what is under way ends with an error here, too
+        for outcome in done:
+            outcomes[outcome.piece.key] = outcome
+            if progress is not None:
+                progress(outcome)
     return [outcomes[piece.key] for piece in pieces]
 
 
@@ -100,5 +142,14 @@ def _rows(function: Callable[[Recordings], Rows | None], reading: Mapping[str, A
 
     for recordings in recordings_of(source, reading):
         rows = function(recordings)
-        if rows is not None:
-            yield rows if isinstance(rows, pa.Table) else pa.table(dict(rows))
+        if isinstance(rows, Mapping):
+            try:
+                yield pa.table(dict(rows))
+            except (pa.ArrowException, TypeError) as error:
+                raise DataError(f"expected columns of equally many values of one kind each, got {error}") from error
+        elif isinstance(rows, pa.Table):
+            yield rows
+        elif rows is not None:
+            raise DataError(
+                f"expected a dictionary of columns, or None for no rows, from the function, got {type(rows).__name__}"
+            )

@@ -51,8 +51,8 @@ class Piece:
 
     @property
     def key(self) -> str:
-        """Sixteen hexadecimal digits that name it: of what it is, not of where the archive lies."""
-        names = [[unit.name, self.first, self.last] for unit in self.units[:1]]
+        """Sixteen hexadecimal digits that name it: of what it is, not of where the archive lies if it is alone."""
+        names = [[unit.shown, self.first, self.last] for unit in self.units[:1]]
         return hashlib.blake2b(json.dumps(names).encode(), digest_size=8).hexdigest()
 
     @property
@@ -64,7 +64,7 @@ class Piece:
     def __str__(self) -> str:
         """Return what it is in a message."""
         if self.numbers is not None:
-            return f"{self.units[0].name}, episodes {self.first} to {self.last}"
+            return f"{self.units[0].shown}, episodes {self.first} to {self.last}"
         return str(self.first) if self.first == self.last else f"{self.first} to {self.last}"
 
 
@@ -101,7 +101,7 @@ def plan(archive: str | Sequence[str], size: int = PIECE_BYTES, *, follow_links:
     for unit in [*units, None]:
         is_new = unit is None or unit.marker or (bundle and bundle[-1].archive != unit.archive)
         if bundle and (is_new or _is_complete(bundle, n_bytes, size)):
-            pieces.append(Piece(bundle[0].archive, bundle[0].name, bundle[-1].name, tuple(bundle)))
+            pieces.append(Piece(bundle[0].archive, bundle[0].shown, bundle[-1].shown, tuple(bundle)))
             bundle, n_bytes = [], 0
         if unit is None:
             break
@@ -109,12 +109,14 @@ def plan(archive: str | Sequence[str], size: int = PIECE_BYTES, *, follow_links:
             try:
                 pieces += _of_episodes(unit, size)
             except DataError as error:
-                problems.append(Problem(unit.name, None, str(error)))
+                problems.append(Problem(unit.shown, None, str(error)))
         elif unit.marker:
-            pieces.append(Piece(unit.archive, unit.name, unit.name, (unit,)))
+            pieces.append(Piece(unit.archive, unit.shown, unit.shown, (unit,)))
         else:
             bundle.append(unit)
             n_bytes += unit.files[0].size
+    if not pieces:
+        raise DataError(f"expected recordings in {', '.join(archives)}, found none; the first problem: {problems[0]}")
     return Plan(tuple(pieces), tuple(problems))
 
 
@@ -122,7 +124,7 @@ def _is_complete(bundle: Sequence[Unit], n_bytes: int, size: int) -> bool:
     """Tell whether a bundle ends here: it is large, or large enough and its last name says so."""
     if n_bytes >= 2 * size or len(bundle) >= _MOST_FILES:
         return True
-    ends = zlib.crc32(bundle[-1].name.encode()) % _ENDS == 0
+    ends = zlib.crc32(bundle[-1].shown.encode()) % _ENDS == 0
     return ends and (2 * n_bytes >= size or 2 * len(bundle) >= _MOST_FILES)
 
 

@@ -31,6 +31,7 @@ DONE, SKIPPED, FAILED = "done", "skipped", "failed"
 
 _ABOUT, _REPORT = b"kineme", b"kineme.report"  # keys of the metadata of a part
 _LEFT = re.compile(r"\.(?:part|failed)-[0-9a-f]{16}\.\w+\.\d+\.[0-9a-f]{8}")  # what a killed process leaves
+_FULL = (errno.ENOSPC, errno.EDQUOT)  # the disk, or what a user may take of it
 _LONGEST = 500  # letters of a reason that are kept
 
 
@@ -69,13 +70,15 @@ class Job:
 
     def about(self, piece: Piece) -> dict[str, Any]:
         """Return what a part of a piece says of itself: a part that says otherwise is stale."""
-        return {
+        said = {
             "task": self.task,
             "specification": dict(self.specification),
             "version": kineme.__version__,
-            "piece": [piece.units[0].name, piece.first, piece.last],
+            "piece": [piece.units[0].shown, piece.first, piece.last],
             "sources": piece.sources,
         }
+        about: dict[str, Any] = json.loads(json.dumps(said, default=repr))  # as it is read: of tuples, lists
+        return about
 
 
 @dataclass(frozen=True)
@@ -128,7 +131,7 @@ def run_piece(job: Job, piece: Piece) -> Outcome:
         problems = tuple(str(problem) for problem in source.problems)
         rows = _write(path, tables, {_ABOUT: about, _REPORT: {"problems": problems, **source.counts}})
     except Exception as error:  # one poisoned piece must not stop the others, whatever is wrong with it
-        if isinstance(error, OSError) and error.errno == errno.ENOSPC:  # all others would fail, after as much work
+        if isinstance(error, OSError) and error.errno in _FULL:  # all others would fail, after as much work
             raise
         return failed(job, piece, _in_words(error), time.process_time() - before)
     with suppress(OSError):
@@ -202,8 +205,9 @@ def read_part(path: Path) -> Part | None:
         about, report = (json.loads((metadata or {})[key]) for key in (_ABOUT, _REPORT))
         if rows < 0:
             rows = int(report["rows"])
-        return Part(about, tuple(report["problems"]), int(report["recordings"]), float(report["seconds"]), rows)
-    except (OSError, ValueError, KeyError, TypeError, pa.ArrowException):
+        problems = tuple(map(str, report["problems"]))
+        return Part(about, problems, int(report["recordings"]), float(report["seconds"]), rows)
+    except (OSError, ValueError, LookupError, TypeError, ArithmeticError, RecursionError, pa.ArrowException):
         return None
 
 
@@ -212,7 +216,7 @@ def _write(path: Path, tables: Sequence[Any], metadata: Mapping[bytes, Mapping[s
     import pyarrow as pa
     from pyarrow import ipc, parquet
 
-    table = pa.concat_tables(tables) if tables else pa.table({})
+    table = pa.concat_tables(tables, promote_options="permissive") if tables else pa.table({})
     said = {key: dict(value) for key, value in metadata.items()}
     said[_REPORT]["rows"] = table.num_rows
     own = {key: json.dumps(value, ensure_ascii=False, sort_keys=True).encode() for key, value in said.items()}
@@ -242,11 +246,9 @@ def recordings_of(source: Source, options: Mapping[str, Any], reference: Known |
     layout, rule, switches, join = how_to_read(options, reference)
     if join:
         raise DataError("expected recordings that are read one by one, got --join-files; join them first")
-    several = len({unit.archive for unit in source.piece.units}) > 1
     for unit in source.piece.units:
         with local_copy(unit) as folder:
-            name = f"{unit.archive}/{unit.name}" if several else unit.name
-            entry = Entry(folder / unit.name, Path(unit.name), name)
+            entry = Entry(folder / unit.name, Path(unit.name), unit.shown)
             for recordings in read_entry(entry, layout, rule, **switches, numbers=source.piece.numbers):
                 if isinstance(recordings, Problem):
                     source.problems.append(recordings)

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache, partial
+from itertools import chain
+from pathlib import PurePosixPath
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from kineme.audit.run import Measurement, measure_episode
-from kineme.errors import DataError
+from kineme.errors import DataError, KinemeError
+from kineme.io.arrays.robot_sets import HDF5, ZARR, free_number, in_order, robot_episodes
 from kineme.io.inspection.inspect import Measures, measures_of
 from kineme.io.reading.episodes import read_episodes
 from kineme.io.records import Problem
@@ -19,6 +22,7 @@ from kineme.library.library import ActionLibrary
 from kineme.library.recognize import some_of_each_symbol
 from kineme.library.storage.source import known_sources
 from kineme.movements.channels.channel import recorded_names
+from kineme.movements.episodes import Episode
 from kineme.movements.tables.layout import Known
 from kineme.pieces.archive import local_copy
 from kineme.pieces.described import described
@@ -48,7 +52,11 @@ def annotated(source: Source, options: Options) -> Iterator[Any]:
 
     learned = learned_at(options["library"], options["library_version"])
     for recordings in recordings_of(source, options["reading"], learned.known):
-        report = annotate_by(learned.classes, recordings, options["error_rate"])
+        try:
+            report = annotate_by(learned.classes, recordings, options["error_rate"])
+        except KinemeError as error:  # other columns than learned, as one file among many has them
+            source.problems.append(Problem(recordings.sources[0].path, None, str(error)))
+            continue
         source.problems.extend(report.problems)
         wanted = options.get("symbols")
         rows = [note for note in report.annotations if wanted is None or note.symbol in wanted]
@@ -65,21 +73,31 @@ def annotation_schema() -> Any:
 
 
 def measurements(source: Source, options: Options) -> Iterator[Any]:
-    """Yield a row for each episode with what an audit compares: some numbers of it, not its signals."""
+    """Yield a row for each episode with what an audit compares: some numbers of it, not its signals.
+
+    Files of a folder are those that hold episodes; one of them that cannot be read is an episode with a problem.
+    """
     import pyarrow as pa
 
     schema = measurement_schema()
     for unit in source.piece.units:
+        if not unit.marker and ("/" in unit.name or PurePosixPath(unit.name).suffix.lower() not in (*HDF5, *ZARR)):
+            continue
         try:
             with local_copy(unit) as folder:
                 path = folder / unit.name
-                for episode in read_episodes(path, rate=options.get("rate"), numbers=source.piece.numbers):
+                read = partial(read_episodes, numbers=source.piece.numbers) if unit.marker else robot_episodes
+                for episode in read(path, rate=options.get("rate")):
                     row = measure_episode(episode)
                     source.counts["recordings"] += episode.number >= 0
                     source.counts["seconds"] += row.seconds
-                    yield pa.Table.from_pylist([row._asdict()], schema)
+                    yield pa.Table.from_pylist([{"file": unit.name, **row._asdict()}], schema)
         except DataError as error:
-            source.problems.append(Problem(unit.name, None, str(error)))
+            if unit.marker:
+                source.problems.append(Problem(unit.shown, None, str(error)))
+            else:
+                unread = measure_episode(Episode(0, np.empty(0), {}, {}, problems=(str(error),), place=unit.name))
+                yield pa.Table.from_pylist([{"file": unit.name, **unread._asdict()}], schema)
 
 
 def measurement_schema() -> Any:
@@ -91,27 +109,37 @@ def measurement_schema() -> Any:
         "values": pa.list_(pa.float32()), "drawn": pa.list_(pa.float32()), "problems": pa.list_(pa.string()),
         "notes": pa.list_(pa.string()), "names": pa.list_(pa.string()),
     }  # fmt: skip
-    return pa.schema([(name, kinds.get(name, pa.string())) for name in Measurement._fields])
+    return pa.schema([(name, kinds.get(name, pa.string())) for name in ("file", *Measurement._fields)])
 
 
-def measured(table: Any) -> Iterator[Measurement]:
-    """Yield the measurements in the rows of a table."""
+def measured(table: Any) -> Iterator[tuple[str, Measurement]]:
+    """Yield the file of each row of a table, and its measurement."""
     for row in table.to_pylist():
+        file = row.pop("file")
         texts = {name: tuple(row[name]) for name in ("problems", "notes", "names", "sizes")}
         arrays = {name: np.array(row[name], dtype=np.float32) for name in ("values", "drawn")}
-        yield Measurement(**(row | texts | arrays))
+        yield file, Measurement(**(row | texts | arrays))
 
 
-def numbered(episodes: Iterable[Measurement]) -> Iterator[Measurement]:
-    """Yield episodes with numbers of their own, where files of one set count alike: the next free ones."""
-    taken: set[int] = set()
-    largest = -1
-    for episode in episodes:
-        number = largest + 1 if episode.number in taken else episode.number
-        if number >= 0:
-            taken.add(number)
-            largest = max(largest, number)
-        yield episode._replace(number=number)
+def numbered(rows: Iterable[tuple[str, Measurement]]) -> Iterator[Measurement]:
+    """Yield episodes with the numbers and places that `read_episodes` gives them, in its order.
+
+    The files of a folder are sorted by the numbers in their names, in memory.
+    """
+    rows = iter(rows)
+    first = next(rows, None)
+    if first is None or not first[0].lower().endswith(HDF5):
+        yield from (episode for _, episode in chain([] if first is None else [first], rows))
+        return
+    ordered = sorted([first, *rows], key=lambda row: in_order(PurePosixPath(row[0]).stem))
+    several = len({file for file, _ in ordered}) > 1
+    taken, number = set[int](), 0
+    for file, episode in ordered:
+        alone = episode.place == file  # in its file
+        number = free_number(episode.number if (alone and episode.seconds) or not several else number, taken)
+        place = episode.place if alone or not several else f"{file}/{episode.place}"
+        yield episode._replace(number=number, place=place)
+        number += 1
 
 
 def inspections(source: Source, options: Options) -> Iterator[Any]:
@@ -160,6 +188,10 @@ def job_of(task: str, output: str, options: Options) -> Job:
 
     The folder of a library says where it is; parts depend on what it holds: its id and its version.
     """
+    if task not in TASKS:
+        raise DataError(
+            f"expected a command over pieces ({', '.join(TASKS)}), got {task!r:.40}; a later kineme may know it"
+        )
     row = TASKS[task]
     if unknown := sorted(set(options) - row.takes - {"reading", "library", "library_id", "library_version"}):
         raise DataError(f"expected options of {task} ({', '.join(sorted(row.takes)) or 'none'}), got {unknown[0]!r}")

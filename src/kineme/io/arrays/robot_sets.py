@@ -129,18 +129,18 @@ def robot_episodes(path: Path, features: Sequence[str] | None = None, rate: floa
                 place = "/".join(text for text in (beside, part.place) if text) or source.name
                 # Numbers in several files of many episodes would repeat.
                 own = _NUMBER.search(part.place or source.stem) if row is ALOHA or not beside else None
-                number = _free(int(own[1]) if own else number, taken)
+                number = free_number(int(own[1]) if own else number, taken)
                 yield _episode(row, part, features, number, place, rate)
                 number += 1
         except DataError as error:
             if not beside or features is not None:
                 raise
-            number = _free(number, taken)
+            number = free_number(number, taken)
             yield Episode(number, np.empty(0), {}, {}, problems=(str(error),), place=beside)
             number += 1
 
 
-def _free(number: int, taken: set[int]) -> int:
+def free_number(number: int, taken: set[int]) -> int:
     """Return a number, or the next one where files of several names count alike, and add it to those taken."""
     number = max(taken) + 1 if number in taken else number
     taken.add(number)
@@ -172,7 +172,7 @@ def _in_hdf5(file: Any, row: RobotLayout) -> Iterator[_Part]:
     hertz = _described(data, "env_args", "env_kwargs", "control_freq")
     task = _described(data, "problem_info", "language_instruction") or _described(data, "env_args", "env_name")
     subsets = {name: {*texts_of(masks[name])} for name in masks if getattr(masks[name], "ndim", 0) == 1}
-    for name in sorted((name for name in data if _NUMBER.search(name)), key=_in_order):
+    for name in sorted((name for name in data if _NUMBER.search(name)), key=in_order):
         part = _Part(
             f"data/{name}",
             {},
@@ -371,10 +371,11 @@ def _sources(path: Path) -> list[Path]:
     top = path.resolve()
     files = [file for file in path.iterdir() if file.suffix.lower() in HDF5 and not file.name.startswith(".")]
     # No link leads to other files.
-    return sorted((file for file in files if file.resolve().is_relative_to(top)), key=lambda file: _in_order(file.stem))
+    return sorted((file for file in files if file.resolve().is_relative_to(top)), key=lambda file: in_order(file.stem))
 
 
-def _in_order(name: str) -> tuple[str, int, str]:
+def in_order(name: str) -> tuple[str, int, str]:
+    """Return a key that sorts names by the numbers at their ends."""
     match = _NUMBER.search(name)
     return (name[: match.start()], int(match[1]), name) if match else (name, -1, name)
 
