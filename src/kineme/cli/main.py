@@ -26,6 +26,7 @@ from kineme.cli.move import move
 from kineme.cli.output import write
 from kineme.cli.recognize import recognize, why
 from kineme.cli.segment import segment
+from kineme.cli.serve import serve
 from kineme.cli.studio import page, studio
 from kineme.errors import KinemeError
 from kineme.reporting.text import printable, printable_lines
@@ -89,6 +90,6 @@ def main() -> None:
 
 for command in (
     anchor, annotate, audit, correct, discover, evaluate, find, gather, generate, move, inspect, learn, library, page,
-    recognize, reproduce, segment, studio, why,
+    recognize, reproduce, segment, serve, studio, why,
 ):  # fmt: skip
     main.add_command(command)
