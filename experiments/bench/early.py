@@ -23,6 +23,8 @@ from kineme_experiments.evaluation.trials import Settings
 FRACTIONS = (0.25, 0.5, 0.75, 0.9, 1.0)
 SHOTS = (3, 8, None)
 DRAWS = 3
+OTHERS = ("strokes2d", "multistrokes2d", "exercises6d")
+EARLIER = 100  # movements of a person in one stream, at most
 SURE = 0.9  # the default confidence of a decision
 RATE = 30.0  # of the streams that decide [Hz]
 
@@ -46,6 +48,10 @@ def measure(quick: bool) -> list[Row]:
         digits = np.char.isdigit(gestures.labels)
         for name, chosen in (("digits", digits), ("solids", ~digits)):
             rows += [row for shots in SHOTS for row in _by_share(name, gestures.take(chosen), shots, draws)]
+        rows += _after_earlier(
+            {"digits": gestures.take(digits), "solids": gestures.take(~digits), "twenty kinds": gestures}
+            | {name: made for name in OTHERS if (made := recorded(f"{name}.npz")) is not None}
+        )
         both = gestures.take(digits), gestures.take(~digits)
         decided |= {"digits by others": [both], "digits by the same person": [both]}
     for name, sets in decided.items():
@@ -86,6 +92,32 @@ def _by_share(name: str, one: Recorded, shots: int | None, draws: int) -> list[R
         Row(f"{name}, {shown} of each by others, {where}", "of 1", mean, details=details | {"where": where})
         for where, mean in zip(wheres, np.mean(right, axis=0).tolist(), strict=True)
     ]
+
+
+def _after_earlier(sets: dict[str, Recorded]) -> list[Row]:
+    """Halves that a stream names right before and after it has seen others of the person, three examples by others.
+
+    A person's movements come in random order, at most 100, each as a half and then to its end. What the earlier ones
+    were the stream says itself.
+    """
+    rows = []
+    for name, one in sets.items():
+        right: list[list[float]] = []
+        for k, (_, train, test) in enumerate(splits(one, 3, 1)):
+            recognizer = kineme.Recognizer().fit(one.demos[train], one.labels[train])
+            order = np.random.default_rng(k).permutation(test)[:EARLIER]
+            halves, live, said = cut(one.demos[order], 0.5), recognizer.stream(), []
+            for i, half in zip(order.tolist(), halves, strict=True):
+                said.append(live.update(half.times, half.positions).ranked[0].label == one.labels[i])
+                live.reset()
+                live.update(one.demos[i].times, one.demos[i].positions)
+                live.next()
+            new = recognizer.predict_partial(halves) == one.labels[order]
+            right.append([float(np.mean(new)), float(np.mean(said)), float(np.mean(said[len(said) // 2 :]))])
+        for where, value in zip(("alone", "after earlier", "second half"), np.mean(right, axis=0), strict=True):
+            details = {"name": name, "earlier": where}
+            rows.append(Row(f"{name}, 3 of each by others, halves {where}", "of 1", float(value), details=details))
+    return rows
 
 
 def _decisions(name: str, sets: list[tuple[Recorded, Recorded]], own: bool) -> list[Row]:

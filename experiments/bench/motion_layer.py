@@ -25,7 +25,7 @@ import numpy as np
 from bench.rows import Row
 from bench.work_faults import FAULTS, plant
 from bench.work_rivals import RIVALS, Verdicts
-from bench.work_scores import Segment, auroc, rate, score_boundaries, score_names
+from bench.work_scores import Segment, auroc, edges_within, rate, score_boundaries, score_names
 from bench.work_sets import FPS, KINDS, examples, work_episodes, write_labels, write_set
 from kineme.movements.episodes import Episode
 
@@ -54,9 +54,10 @@ def measure(quick: bool) -> list[Row]:
 
 
 def _named(arms: int, first_seed: int, sets: int, count: int) -> Iterator[Row]:
-    """Names and boundaries of ``kineme annotate`` from three examples of each kind."""
+    """Names and boundaries of ``kineme annotate`` from three examples of each kind, and how sure these are."""
     truth: list[Sequence[Segment]] = []
     found: list[Sequence[Segment]] = []
+    doubts: list[list[float]] = []
     for seed in range(first_seed, first_seed + sets):
         works = list(work_episodes(count, seed, _TESTED, arms))
         with tempfile.TemporaryDirectory() as name:
@@ -64,6 +65,7 @@ def _named(arms: int, first_seed: int, sets: int, count: int) -> Iterator[Row]:
             write_set(Path(name) / "set", (work.episode for work in works))
             _run("annotate", Path(name) / "set", "--library", library, "-o", Path(name) / "labels.csv")
             found += annotated(Path(name) / "labels.csv", count)
+            doubts += uncertainties(Path(name) / "labels.csv", count)
         truth += [work.truth for work in works]
     names, boundaries = score_names(truth, found), score_boundaries(truth, found)
     what = f"{arms} arm{'s' if arms == 2 else ''}, {_SHOTS} examples of each of 6 kinds"
@@ -75,6 +77,10 @@ def _named(arms: int, first_seed: int, sets: int, count: int) -> Iterator[Row]:
     yield Row(f"{what}: named right", "of 1", names.accuracy, target=(">=", 0.9), details=details)
     details = {"precision": boundaries.hits / boundaries.found, "recall": boundaries.hits / boundaries.true}
     yield Row(f"{what}: boundaries within 0.25 s", "F1", boundaries.f1, target=(">=", 0.85), details=details)
+    share, low, high = rate(*edges_within(truth, found, doubts))
+    seconds = np.quantile(np.concatenate(doubts), (0.05, 0.5, 0.95)).tolist()
+    details = {"interval": (low, high), "uncertainty_5_50_95_percent": seconds, "stated": 0.95}
+    yield Row(f"{what}: starts and ends within their uncertainty", "of 1", share, details=details)
 
 
 def _taught(folder: Path, seed: int, arms: int) -> Path:
@@ -117,11 +123,23 @@ def _discovered(first_seed: int, sets: int, count: int) -> Iterator[Row]:
 def annotated(table: Path, count: int) -> list[list[Segment]]:
     """Read what ``kineme annotate`` wrote: the segments of each episode."""
     segments: list[list[Segment]] = [[] for _ in range(count)]
-    with table.open(encoding="utf-8", newline="") as file:
-        for row in csv.DictReader(file):
-            name = None if row["symbol"] in {"", "unknown"} else row["symbol"]
-            segments[int(row["place"].split()[-1])].append((float(row["start"]), float(row["end"]), name))
+    for row in _table(table):
+        name = None if row["symbol"] in {"", "unknown"} else row["symbol"]
+        segments[int(row["place"].split()[-1])].append((float(row["start"]), float(row["end"]), name))
     return segments
+
+
+def uncertainties(table: Path, count: int) -> list[list[float]]:
+    """Read the uncertainties [s] of the segments of each episode."""
+    doubts: list[list[float]] = [[] for _ in range(count)]
+    for row in _table(table):
+        doubts[int(row["place"].split()[-1])].append(float(row["uncertainty"]))
+    return doubts
+
+
+def _table(table: Path) -> list[dict[str, str]]:
+    with table.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
 
 
 def _audited(first_seed: int, sets: int, count: int) -> Iterator[Row]:

@@ -88,6 +88,23 @@ def score_names(truth: Sequence[Sequence[Segment]], found: Sequence[Sequence[Seg
     return Names(total, right, matched, matched_right, confused)
 
 
+def edges_within(
+    truth: Sequence[Sequence[Segment]], found: Sequence[Sequence[Segment]], uncertainties: Sequence[Sequence[float]]
+) -> tuple[int, int]:
+    """Count starts and ends of found segments that are within their uncertainty [s] of the true ones, and all of them.
+
+    Those are of the true segment of the same name that shares half of the union or more; others do not count.
+    """
+    inside = total = 0
+    for true, segments, doubts in zip(truth, found, uncertainties, strict=True):
+        for (start, end, name), doubt in zip(segments, doubts, strict=True):
+            for a, b, given in true:
+                if given == name and _shared(start, end, a, b) >= 0.5:
+                    inside += (abs(start - a) <= doubt) + (abs(end - b) <= doubt)
+                    total += 2
+    return inside, total
+
+
 def auroc(scores: Sequence[float], bad: Sequence[bool]) -> float:
     """Return the probability that a bad episode scores above a good one, ties counting half."""
     from scipy.stats import rankdata

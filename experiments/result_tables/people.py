@@ -15,6 +15,14 @@ DECIDED = {
     "LASA": "13 shapes of LASA",
     "letters": "17 letters",
 }
+EARLIER = {
+    "digits": "digits",
+    "solids": "solids",
+    "twenty kinds": "digits and solids together",
+    "strokes2d": "single strokes, at three speeds",
+    "multistrokes2d": "symbols of several strokes",
+    "exercises6d": "exercises, a sensor at the wrist",
+}
 SPOTTED = ("with rests", "without", "with rests, among unknown", "without, among unknown")
 
 
@@ -26,6 +34,7 @@ def tables() -> dict[str, str]:
         "earliness": _earliness(),
         "beginnings": _beginnings(),
         "halves": _halves(),
+        "earlier": _earlier(),
         "decided": _decided(),
         "sure": _sure(),
         "spotting": _spotting(),
@@ -100,6 +109,18 @@ def _halves() -> str:
         f"{known[0]:.2f} of the halves of digits with three demonstrations and {known[1]:.2f} with all 40, instead of "
         f"{unknown[0]:.2f} and {unknown[1]:.2f}."
     )
+
+
+def _earlier() -> str:
+    found = _by_details("early", "name", "earlier")
+    lines = [
+        "| halves of | a new stream | after earlier movements | in the second half of the stream |",
+        "|---" * 4 + "|",
+    ]
+    for name, said in EARLIER.items():
+        values = " | ".join(f"{found[name, when]:.2f}" for when in ("alone", "after earlier", "second half"))
+        lines.append(f"| {said} | {values} |")
+    return "\n".join(lines)
 
 
 def _decided() -> str:

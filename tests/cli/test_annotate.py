@@ -11,6 +11,7 @@ import pytest
 from commands import answer, run, start
 
 import kineme
+from kineme.io.lerobot.motions import read_motions
 from kineme.io.writing.write_movement import write_movement
 
 RATE = 100.0
@@ -77,6 +78,8 @@ def test_pandas_reads_what_happens_when(recording, library, truth, tmp_path):
     np.testing.assert_allclose(table["start"], [one["start"] for one in said["annotations"]])
     assert set(table["recording"]) == {"long.csv"}
     assert table["unknown"].tolist() == [one["unknown"] for one in said["annotations"]]
+    np.testing.assert_allclose(table["uncertainty"], [one["uncertainty"] for one in said["annotations"]])
+    assert (table["uncertainty"] > 0.0).all()
 
 
 def test_elan_and_audacity_count_from_the_first_sample(recording, library, truth, tmp_path):
@@ -206,6 +209,8 @@ def test_a_lerobot_set_is_copied_with_its_annotations(demos, library, tmp_path):
         named = [row["content"] for row in rows if row["content"] != "rest"]
         assert named == [one["symbol"] or "unknown" for one in said["annotations"]]
     _right(_long(demos)[2], said["annotations"])
+    doubts = [motion.uncertainty for motion in read_motions(tmp_path / "named")]
+    assert doubts == [one["uncertainty"] for one in said["annotations"]]
     again = run("annotate", source, "-l", library, "-o", tmp_path / "named", "--force")
     assert again.returncode
     assert "is there; name another, or remove it" in " ".join(again.stderr.split())

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import replace
 
+import numpy as np
 import pytest
 from commands import answer, run, start
 
 from bench.work_sets import write_set
-from work_samples import TASKS, work_episodes
+from robot_array_sets import write_buffer
+from work_samples import NAMES, TASKS, work_episodes
 
 pytest.importorskip("pyarrow")
 N_KINDS = sum(map(len, TASKS.values()))
@@ -91,3 +94,63 @@ def test_another_feature_and_what_is_no_data_set(dataset, tmp_path):
 def test_fewer_boundaries_for_a_larger_penalty(dataset):
     few, many = (len(answer("discover", dataset, "--penalty", penalty)["segments"]) for penalty in (4.0, 1.5))
     assert few < many
+
+
+def _robomimic(path, states):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(path.with_suffix(".hdf5"), "w") as file:
+        for k, state in enumerate(states):
+            demo = file.create_group(f"data/demo_{k}")
+            demo["actions"], demo["obs/object"] = state, state[:, :2]
+            demo["obs/robot0_eef_pos"], demo["obs/robot0_joint_pos"] = state[:, :3], state[:, 3:6]
+            demo["obs/robot0_gripper_qpos"] = np.column_stack((state[:, 6], -state[:, 6]))
+    return path.with_suffix(".hdf5")
+
+
+def _aloha(path, states):
+    h5py = pytest.importorskip("h5py")
+    path.mkdir()
+    for k, state in enumerate(states):
+        with h5py.File(path / f"episode_{k}.hdf5", "w") as file:
+            file["action"], file["observations/qpos"] = state, state
+    return path
+
+
+def _umi(path, states):
+    pytest.importorskip("zarr")
+    rows = np.concatenate(states)
+    arrays = {"robot0_eef_pos": rows[:, :3], "robot0_eef_rot_axis_angle": rows[:, 3:6], "action": rows}
+    arrays |= {"robot0_gripper_width": rows[:, 6:]}
+    return write_buffer(path.with_suffix(".zarr"), arrays, [*map(len, states)])
+
+
+def _buffer(path, states):
+    pytest.importorskip("zarr")
+    rows = np.concatenate(states)
+    return write_buffer(path.with_suffix(".zarr"), {"state": rows, "action": rows}, [*map(len, states)])
+
+
+def _lerobot(path, states):
+    """Data sets without ``observation.state``: what was observed of an arm, and its commands."""
+    episodes = [
+        replace(
+            episode,
+            signals={"observation.robot0_eef_pos": state[:, :3], "observation.robot0_joint_pos": state[:, 3:6],
+                     "observation.robot0_gripper_width": state[:, 6:], "action": state},
+            names={"observation.robot0_eef_pos": ("x", "y", "z"), "observation.robot0_joint_pos": ("a", "b", "c"),
+                   "observation.robot0_gripper_width": ("width",), "action": NAMES},
+        )
+        for episode, state in zip(work_episodes(len(states))[0], states, strict=True)
+    ]  # fmt: skip
+    return write_set(path, episodes, [*episodes[0].signals])
+
+
+@pytest.mark.parametrize("write", [_robomimic, _aloha, _umi, _buffer, _lerobot])
+def test_what_was_discovered_in_any_layout_annotates_it_without_options(write, tmp_path):
+    states = [episode.signals["observation.state"] for episode in work_episodes(8)[0]]
+    path = write(tmp_path / "work", states)
+    discovered = answer("discover", path, "--library", tmp_path / "actions")
+    answer("anchor", "--library", tmp_path / "actions", "--accept", "all", cwd=tmp_path)
+    named = answer("annotate", path, "--library", tmp_path / "actions", "-o", tmp_path / "labels.csv")
+    assert {row["symbol"] for row in named["annotations"]} & {kind["name"] for kind in discovered["kinds"]}
+    assert not any("compared in their order" in note for note in named["notes"])

@@ -9,7 +9,7 @@ from kineme import read_recordings
 from kineme.errors import DataError
 from kineme.io.reading.episode_recordings import episode_recordings, heads_of
 from kineme.io.reading.episodes import read_episodes
-from kineme.movements.episodes import Episode
+from kineme.movements.episodes import Episode, default_features
 from lerobot_sets import NAMES, TASKS, write_v2, write_v3
 
 
@@ -53,3 +53,12 @@ def test_stamps_that_go_back_are_refused(tmp_path):
     odd = Episode(7, episode.times[::-1].copy(), episode.signals, episode.names)
     with pytest.raises(DataError, match="episode 7"):
         episode_recordings(odd, "demos")
+
+
+def test_features_that_are_read_by_default():
+    positions = {"observation.robot0_eef_pos": 3, "observation.robot0_gripper_width": 1}
+    assert default_features({"action": 7, "observation.state": 7}) == ("observation.state",)
+    assert default_features({"action": 7, "observation.robot0_joint_vel": 7} | positions) == tuple(positions)
+    assert default_features({"action": 7, "reward": 1}) == ("action",)
+    assert default_features({"x": 1}) == ("x",)
+    assert default_features({"x": 1, "y": 1}) == default_features({"action": 7, "velocity": 7}) == ()

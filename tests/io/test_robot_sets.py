@@ -340,3 +340,16 @@ def test_episodes_that_need_a_missing_package_say_which(tmp_path, monkeypatch):
     for path in paths:
         with pytest.raises(DataError, match=r"pip install 'kineme\[hdf5\]'"):
             read_episodes(path)
+
+
+def test_columns_may_be_called_as_episodes_call_them(tmp_path):
+    path = write_robomimic(tmp_path / "demos.hdf5")
+    columns = ("observation.robot0_eef_pos.y", "observation.robot0_gripper_qpos.1")
+    recordings = kineme.read_recordings(path, columns=columns)
+    episode = next(robot_episodes(path))
+    expected = [
+        episode.signals["observation.robot0_eef_pos"][:, 1],
+        episode.signals["observation.robot0_gripper_qpos"][:, 1],
+    ]
+    np.testing.assert_array_equal(recordings.demonstrations[0].recorded, np.column_stack(expected))
+    assert [channel.name for channel in recordings.demonstrations.channels] == [*columns]

@@ -228,3 +228,18 @@ def test_damaged_proposals_are_problems(wrong):
     }  # fmt: skip
     assert not list(strange_versions([(1, "", "discover", json.dumps(detail))]))
     assert list(strange_versions([(1, "", "discover", json.dumps(detail | wrong))]))
+
+
+def test_linear_algebra_of_few_numbers_runs_in_one_thread(worked):
+    """A second thread waits actively: discovering an hour took nine times as many core-seconds with two."""
+    from threadpoolctl import threadpool_info
+
+    threads = []
+
+    def watched():
+        for episode in worked[0]:
+            threads.extend(pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas")
+            yield episode
+
+    discover(watched())
+    assert set(threads) == {1}

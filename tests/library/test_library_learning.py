@@ -21,8 +21,8 @@ SINGLE = 2.0**-24  # relative error of a rounding to single precision
 
 
 @pytest.fixture
-def library(tmp_path):
-    with ActionLibrary(tmp_path / "actions", create=True) as actions:
+def library(place):
+    with ActionLibrary(place, create=True) as actions:
         yield actions
 
 

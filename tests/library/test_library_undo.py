@@ -13,10 +13,10 @@ from kineme.library.storage.undo import can_undo
 
 
 @pytest.fixture
-def library(tmp_path):
+def library(place):
     demos = draw_movements(12, 2, 3)
     labels = [["wave", "push", None][i % 3] for i in range(12)]
-    with ActionLibrary(tmp_path / "actions", create=True) as library:
+    with ActionLibrary(place, create=True) as library:
         library.learn(demos, labels, groups=["Ann"] * 6 + [None] * 6)
         yield library
 

@@ -61,7 +61,7 @@ EXEMPT = {
     "recognition.answer_figure.View.points": "one picture",
     "recognition.coarse_windows.coarse_distances": "windows of one recording by contract",
     "recognition.compared_windows.Templates.levels": "windows of one recording by contract",
-    "recognition.compared_windows.Templates.scores": "windows of one recording by contract",
+    "recognition.compared_windows.Templates.level_scores": "windows of one recording by contract",
     "recognition.levels.level_scores": "windows of one recording by contract",
     "reporting.figures.flat": "of pictures",
     "similarity.describe.describe": "takes principal points of many from the batch, unlike `Comparison.describe`",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from kineme import Demonstrations, Recognizer, Trajectory
 from kineme.movements.channels.channel import Channel
 from kineme.movements.segmentation.table import observe
 from kineme.movements.trajectories.movements import of_channels
+from kineme.recognition import compared_windows, spotting
 from kineme.recognition.levels import gripper_levels, level_scores
 
 RATE = 50.0
@@ -58,6 +61,10 @@ def test_open_and_closed_fingers_tell_a_reach_from_a_carry():
     spotted = [one for one in recognizer.spot(_recording(channels, openings)) if one.end - one.start > 0.6]
     assert [one.label for one in spotted] == ["reach" if opening > 0.5 else "carry" for opening in openings]
     assert min(one.confidence for one in spotted) > 0.9  # the path alone leaves it at even odds
+    begins = (110 * np.arange(5) + 25) / RATE
+    for one, begin in zip(spotted, begins, strict=True):
+        assert (one.start, one.end) == pytest.approx((begin, begin + 59 / RATE), abs=one.uncertainty)
+        assert 0.0 < one.uncertainty <= 0.2
 
 
 def test_levels_are_those_of_columns_that_are_called_so():
@@ -93,3 +100,72 @@ def test_a_gripper_that_never_moves_beside_one_that_does_is_no_evidence():
     levels = gripper_levels(references, channels, 0.04)
     assert levels is not None
     assert levels.columns == (3,)
+
+
+@pytest.mark.parametrize("slower", [0.6, 1.0, 2.2])
+def test_movements_are_the_same_although_windows_are_not_compared_with_classes_that_cannot_be(monkeypatch, slower):
+    """The tempo of the recording is learned while it is searched: windows that matter by it are compared then."""
+    channels = _channels()
+    demos, labels = _demonstrations(channels)
+    recognizer = Recognizer().fit(demos, labels)
+    recording = _recording(channels, [0.9, 0.35, 0.35, 0.9])
+    recording = Demonstrations.of_movements(
+        replace(recording.movements, times=slower * recording.movements.times, durations=slower * recording.durations)
+    )
+    monkeypatch.setattr(compared_windows, "_COMPLETELY", 64)
+    shares, inner = [], compared_windows.nearest_above
+
+    def above(*given):
+        shares.append(np.isfinite(given[-1]).mean())
+        return inner(*given)
+
+    monkeypatch.setattr(compared_windows, "nearest_above", above)
+    spotted = recognizer.spot(recording)
+    assert sum(one.label is not None for one in spotted) >= 3
+    assert np.mean(shares) < 0.8  # of windows and classes
+    shares.clear()
+    monkeypatch.setattr(spotting, "most_nonconformity", lambda compared, *_: np.full(compared.scores.shape, np.inf))
+    every = recognizer.spot(recording)
+    assert [one[:3] for one in every] == [one[:3] for one in spotted]
+    np.testing.assert_allclose([one[3:] for one in every], [one[3:] for one in spotted], atol=1e-6)
+
+
+def test_windows_that_matter_only_by_the_manner_of_the_recording_are_compared_then(monkeypatch):
+    channels = _channels()
+    demos, labels = _demonstrations(channels)
+    recognizer = Recognizer().fit(demos, labels)
+    recording = _recording(channels, [0.9, 0.35, 0.35, 0.9])
+    monkeypatch.setattr(compared_windows, "_COMPLETELY", 64)
+    counts, compare, inner = [0], spotting.compare_windows, spotting.most_nonconformity
+
+    def counted(templates, motion, rows):
+        counts[-1] += len(rows)
+        return compare(templates, motion, rows)
+
+    monkeypatch.setattr(spotting, "compare_windows", counted)
+    spotted = recognizer.spot(recording)
+    counts.append(0)
+
+    def none_at_first(compared, typical, around, manner, reach):
+        most = inner(compared, typical, around, manner, reach)
+        return most if manner.tempo is not None else np.full(most.shape, -1.0)
+
+    monkeypatch.setattr(spotting, "most_nonconformity", none_at_first)
+    assert [one[:3] for one in recognizer.spot(recording)] == [one[:3] for one in spotted]
+    assert counts[1] > 3 * counts[0]
+
+
+def test_windows_score_above_zero_up_to_the_most_nonconformity():
+    rng = np.random.default_rng(0)
+    n, reach = 200, 3.7
+    compared = compared_windows.ComparedWindows(
+        np.zeros((n, 2), dtype=np.intp), rng.uniform(0.0, reach, (n, 2)), *rng.normal(scale=0.5, size=(2, n)),
+        rng.uniform(0.0, 0.5, n),
+    )  # fmt: skip
+    around = compared_windows.Surroundings(*rng.uniform(0.0, 2.0, (4, n)))
+    typical = spotting.Expected(np.array([0.1, -0.2]), np.zeros(2), np.full(2, 0.1))
+    for manner in (spotting.Manner(), spotting.Manner(tempo=0.4, size=-0.2)):
+        scored = spotting.score_windows(compared, typical, around, manner, reach)
+        most = spotting.most_nonconformity(compared, typical, around, manner, reach)
+        assert 0.2 < (scored.score > 0).mean() < 0.8
+        np.testing.assert_array_equal(scored.score > 0, (compared.scores < most).any(axis=1))

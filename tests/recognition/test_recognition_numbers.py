@@ -161,10 +161,10 @@ def test_a_window_counts_its_duration_in_typical_ones_less_a_sixth():
 def test_another_duration_costs_the_squared_logarithm_of_the_ratio(factor):
     """Half as much, and a tenth for nothing, while the tempo of the recording is unknown."""
     score, closeness = _scored(factor)
-    cost = 0.2 * max(abs(math.log(factor)) - 0.1, 0.0) ** 2
+    cost = 0.025 * max(abs(math.log(factor)) - 0.1, 0.0) ** 2
     assert score == pytest.approx(factor * (closeness - cost) - 0.165)
     score, closeness = _scored(factor, Manner(tempo=math.log(1.5)))
-    cost = 0.4 * math.log(factor / 1.5) ** 2
+    cost = 0.05 * math.log(factor / 1.5) ** 2
     assert score == pytest.approx(factor / 1.5 * (closeness - cost) - 0.165)
 
 

@@ -34,7 +34,7 @@ from kineme.recognition.spotting import (
     Expected,
     Manner,
     Spotted,
-    _complete_scores,
+    _completed,
     _left_over,
     best_chain,
     closest_classes,
@@ -245,7 +245,7 @@ def test_windows_that_start_earlier_or_later_are_alike_too():
     assert closest_classes(compared, compared.scores, SAME, Manner(), spans, [0, 1, 2]).tolist() == [1, 1, 1]
 
 
-def test_a_quarter_of_what_durations_and_sizes_cost_decides_between_classes_that_are_as_close():
+def test_durations_and_sizes_decide_between_classes_that_are_as_close():
     compared = _compared([[0.5, 0.5]], [2.0])
     typical = Expected(np.log([1.0, 2.0]), np.zeros(2), np.zeros(2))
     spans, asked = np.array([[0.0, 2.0]]), Manner(tempo=0.0)
@@ -293,7 +293,7 @@ def test_windows_within_reach_are_compared_completely_and_no_other_seems_to_be(m
     assert (scores <= exact * (1 + 1e-5)).all()
     assert not np.allclose(scores, exact)
     chosen = np.arange(0, len(windows), 7)
-    complete = _complete_scores(known, windows.motion, some, chosen)
+    complete = _completed(known, windows.motion, some, chosen).compared.scores[chosen]
     np.testing.assert_allclose(complete, every.compared.scores[chosen], rtol=1e-5)
     for name in ("rows", "log_durations", "log_sizes", "slowness"):
         np.testing.assert_allclose(getattr(some.compared, name), getattr(every.compared, name))
@@ -426,3 +426,24 @@ def test_a_robot_that_repeats_its_movements_exactly_is_recognized(noise, rest):
     found = recognizer.spot(recorded(x))
     assert [one.label for one in found] == shown
     assert min(one.p_known for one in found) > 1e-3
+
+
+def test_demonstrations_of_few_samples_are_found():
+    shown = kineme.load_lasa(["CShape", "NShape", "Sshape"])
+    sparse = [kineme.Trajectory(movement.times[::170], movement.positions[::170], movement.label) for movement in shown]
+    recognizer = Recognizer().fit([sparse[k] for k in (0, 1, 7, 8, 14, 15)])
+    asked = shown[[3, 10, 17]]
+    recording, truth, _ = concatenate(asked, asked.labels, np.random.default_rng(0))
+    assert count_spotted(recognizer.spot(recording), truth) == Counts(3, 3, 3)
+
+
+def test_movements_of_one_recording_may_differ_in_pace():
+    shown = kineme.load_lasa(["CShape", "NShape", "Sshape", "WShape"])
+    recognizer = Recognizer().fit(shown[[k for k in range(28) if k % 7 < 3]])
+    asked = shown[[k for k in range(28) if k % 7 > 2]]
+    paced = [
+        kineme.Trajectory(movement.times * pace, movement.positions, movement.label)
+        for movement, pace in zip(asked, np.resize([0.5, 1.0, 2.0], len(asked)), strict=True)
+    ]
+    recording, truth, _ = concatenate(kineme.Demonstrations(paced), asked.labels, np.random.default_rng(0))
+    assert count_spotted(recognizer.spot(recording), truth).n_right == len(truth)

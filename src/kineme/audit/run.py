@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from kineme.audit import calibrate
 from kineme.audit.checks import CHECKS, Check
-from kineme.audit.motion import FEWEST_FRAMES, PATH, Motion, motion_of, path_of
+from kineme.audit.motion import FEWEST_FRAMES, PATH, motion_of, path_of
 from kineme.errors import DataError
 from kineme.movements.episodes import Episode
 from kineme.recognition.conformal import check_error_rate
@@ -112,6 +112,42 @@ class _Spool:
         return np.frombuffer(self.file.read(4 * self.width), dtype=np.float32)
 
 
+class Measurement(NamedTuple):
+    """Numbers of one episode, which its comparison with others takes; not its signals."""
+
+    number: int
+    seconds: float
+    task: str | None
+    place: str
+    fps: float
+    problems: tuple[str, ...]
+    notes: tuple[str, ...]
+    names: tuple[str, ...]  # of its channels; none without motion that can be compared
+    sizes: tuple[int, ...]  # numbers of values of the checks that measure an episode alone
+    values: NDArray[np.float32]  # of these checks, one after the other
+    drawn: NDArray[np.float32]  # its way (d * 64), and the stretch of each value [s]
+
+
+def measure_episode(episode: Episode) -> Measurement:
+    """Measure one episode alone."""
+    motion, problems = motion_of(episode), tuple(shortened(problem, _LONGEST) for problem in episode.problems)
+    empty = np.empty(0, dtype=np.float32)
+    if motion is None:
+        seconds = len(episode) / episode.fps if episode.fps > 0 else 0.0
+        few = f"has {counted(len(episode), 'frame')} of motion; at least {FEWEST_FRAMES} are needed"
+        problems = problems or (few,)
+        about = episode.task, episode.place, episode.fps, problems, episode.notes
+        return Measurement(episode.number, seconds, *about, (), (), empty, empty)
+    with np.errstate(all="ignore"):  # damaged values are huge
+        measures = [check.measure(motion) for check in CHECKS if check.measure is not None]
+    values = np.concatenate([measure.values for measure in measures]).astype(np.float32)
+    spans = np.concatenate([measure.spans for measure in measures]).astype(np.float32)
+    sizes = tuple(len(measure.values) for measure in measures)
+    drawn = np.concatenate([path_of(motion).ravel(), spans.ravel()]).astype(np.float32)
+    about = episode.task, episode.place, episode.fps, problems, episode.notes
+    return Measurement(episode.number, motion.seconds, *about, motion.names, sizes, values, drawn)
+
+
 class _Measured:
     """All that is kept of the episodes while they are read."""
 
@@ -126,56 +162,51 @@ class _Measured:
         self.notes: list[str] = []  # on the set
         self.remarks: Counter[str] = Counter()  # of the reader, on single episodes
         self.names: tuple[str, ...] | None = None  # of the channels, those of the first episode that has some
-        self.sizes: list[int] = []  # values of each check
+        self.sizes: tuple[int, ...] = ()  # values of each check
         self.rows = bytearray()  # float32, of `sizes` values each
         self.spool: _Spool | None = None
 
-    def add(self, episode: Episode) -> None:
-        """Measure an episode; of what belongs to none, which has a negative number, keep the problems."""
+    def add(self, episode: Measurement) -> None:
+        """Add an episode; of what belongs to none, which has a negative number, keep the problems."""
         if episode.number < 0:
-            self.notes += [shortened(problem, _LONGEST) for problem in episode.problems]
+            self.notes += episode.problems
             return
-        at, motion, problem = len(self.numbers), motion_of(episode), "; ".join(episode.problems)
-        if motion is None:
-            problem = problem or f"has {counted(len(episode), 'frame')} of motion; at least {FEWEST_FRAMES} are needed"
-        elif self.names is None:
-            self.names = motion.names
-        elif motion.names != self.names:
-            problem = problem or f"has the channels {first_names(motion.names, 3)}; others {first_names(self.names, 3)}"
-            motion = None
+        at, is_usable, problem = len(self.numbers), bool(episode.names), "; ".join(episode.problems)
+        if is_usable and self.names is None:
+            self.names = episode.names
+        elif is_usable and episode.names != self.names:
+            channels = f"has the channels {first_names(episode.names, 3)}; others {first_names(self.names or (), 3)}"
+            problem, is_usable = problem or channels, False
         if problem:
             self.problems[at] = shortened(problem, _LONGEST)
-        if motion is None:
+        if not is_usable:
             self.unusable.append(at)
         self.remarks.update(episode.notes)
         self.numbers.append(episode.number)
-        self.seconds.append(motion.seconds if motion else len(episode) / episode.fps if episode.fps > 0 else 0.0)
+        self.seconds.append(episode.seconds)
         self.tasks.append(episode.task)
         self.places.append(episode.place)
         self.rates.append(episode.fps)
-        self._keep(motion, at)
+        self._keep(episode if is_usable else None, at)
 
     def close(self) -> None:
         """Remove the temporary file."""
         if self.spool is not None:
             self.spool.file.close()
 
-    def _keep(self, motion: Motion | None, at: int) -> None:
-        if motion is None:
+    def _keep(self, episode: Measurement | None, at: int) -> None:
+        if episode is None:
             if self.spool is not None:
                 self.rows += np.full(sum(self.sizes), np.nan, dtype=np.float32).tobytes()
                 self.spool.append(np.zeros(self.spool.width, dtype=np.float32))
             return
-        with np.errstate(all="ignore"):  # damaged values are huge
-            measures = [check.measure(motion) for check in CHECKS if check.measure is not None]
         if self.spool is None:
-            self.sizes = [len(measure.values) for measure in measures]
-            self.spool = _Spool(len(motion.names) * PATH + 2 * sum(self.sizes))
+            self.sizes = episode.sizes
+            self.spool = _Spool(len(episode.drawn))
             for _ in range(at):
                 self._keep(None, at)
-        self.rows += np.concatenate([measure.values for measure in measures]).astype(np.float32).tobytes()
-        spans = np.concatenate([measure.spans for measure in measures]).astype(np.float32)
-        self.spool.append(np.concatenate([path_of(motion).ravel(), spans.ravel()]))
+        self.rows += episode.values.tobytes()
+        self.spool.append(episode.drawn)
 
     def ways(self, rows: NDArray[np.intp]) -> Array:
         """Return the ways (m, d, 64) of some episodes."""
@@ -231,9 +262,16 @@ def audit_episodes(
     SpecificationError
         An error rate that is not between 0 and 1.
     """
+    return audit_measured(map(measure_episode, episodes), error_rate, progress)
+
+
+def audit_measured(
+    measurements: Iterable[Measurement], error_rate: float = 0.05, progress: Callable[[int], object] | None = None
+) -> Audit:
+    """Compare episodes that are measured already; as `audit_episodes`."""
     check_error_rate(error_rate)
     with closing(_Measured()) as measured:
-        for episode in episodes:
+        for episode in measurements:
             measured.add(episode)
             if progress is not None:
                 progress(1)

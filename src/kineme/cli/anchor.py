@@ -59,7 +59,7 @@ _CHOICE = Parsed("1,2,...|all", _choice)
 @click.option("--pictures", type=FOLDER, default="proposals", show_default=True,
               help="Folder for a picture of every proposal.")  # fmt: skip
 @json_option
-def anchor(folder: Path, **options: Any) -> None:
+def anchor(folder: Any, **options: Any) -> None:
     """Propose symbols among the unlabeled movements, and accept them.
 
     On a terminal it asks about each proposal. With --accept or --reject it does not ask. Otherwise it changes nothing

@@ -21,6 +21,7 @@ from kineme.cli.options import (
     rerun_option,
 )
 from kineme.cli.output import check_new, progress, say, stretch_cells, table, write
+from kineme.cli.pieces import how_divided, in_pieces, pieces_options
 from kineme.cli.reading import layout_options, notes_beside, pieces, problem_lines, recordings_argument, seconds_of
 from kineme.reporting.text import counted, printable
 
@@ -52,7 +53,8 @@ def _format(text: str) -> str:
 @click.option("--csv", "as_csv", is_flag=True, help="Answer in CSV.")
 @rerun_option
 @force_option
-def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, form: str | None, **options: Any) -> None:
+@pieces_options
+def annotate(recordings: tuple[Path, ...], folder: Any, output: Path | None, form: str | None, **options: Any) -> None:
     """Annotate RECORDINGS, files, folders or patterns of them, or - for CSV from the standard input: what happens when.
 
     Every movement is searched for those of the library's symbols, with rests or without between them. Motion that is
@@ -70,6 +72,13 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
     as_json, as_csv, force, rerun, error_rate = (
         options.pop(name) for name in ("as_json", "as_csv", "force", "rerun", "error_rate")
     )
+    how = how_divided(options, recordings)
+    if how is not None:
+        if as_csv or form is not None or rerun is not None:
+            raise click.UsageError("expected --csv, --format and --rerun with kineme gather, or without pieces")
+        asked = {"reading": options, "error_rate": error_rate}
+        in_pieces("annotate", recordings, output, how, asked, folder, force=force, as_json=as_json)
+        return
     if as_csv and (as_json or output is not None):
         raise click.UsageError("expected --csv alone, or --json, or --output")
     if output is None and form is not None:

@@ -31,7 +31,7 @@ _SHOWN = 20  # changes and problems that are listed; --json has all
 @error_rate_option("That with which they were annotated.")
 @layout_options
 @json_option
-def correct(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
+def correct(recordings: tuple[Path, ...], folder: Any, **options: Any) -> None:
     """Learn what a person corrected in annotated RECORDINGS, files, folders or data sets, as examples of symbols.
 
     Stretches with another symbol or other boundaries than annotated, those that were unknown and have a name, and those
@@ -120,7 +120,7 @@ def _annotated(paths: tuple[Path, ...], parsed: Any, library: Any, error_rate: f
     return as_labels(report.annotations)
 
 
-def _text(data: dict[str, Any], folder: Path, problems: list[str]) -> str:
+def _text(data: dict[str, Any], folder: Any, problems: list[str]) -> str:
     from kineme.library.correct import CHANGES
 
     changes = data["changes"]

@@ -30,7 +30,7 @@ _PROBLEMS = 10  # that are printed one by one
 )  # fmt: skip
 @json_option
 @force_option
-def discover(dataset: Path, folder: Path | None, output: Path | None, **options: Any) -> None:
+def discover(dataset: Path, folder: Any, output: Path | None, **options: Any) -> None:
     """Find the kinds of movements in the episodes of DATASET, without any example.
 
     Episodes are cut where the arm slows down or turns, the gripper begins or ceases to move, contacts are made.
@@ -67,13 +67,12 @@ def discover(dataset: Path, folder: Path | None, output: Path | None, **options:
     say(options["as_json"], data, lambda: _text(data))
 
 
-def opened_to_discover(folder: Path) -> Any:
+def opened_to_discover(folder: Any) -> Any:
     """Open the library in a folder; one that is new compares movements where they are, and in their size."""
-    from kineme.library.library import ActionLibrary
-    from kineme.library.storage.connection import FILE
+    from kineme.library.library import ActionLibrary, is_library
     from kineme.recognition.recognizer import Recognizer
 
-    if (folder / FILE).exists():
+    if is_library(folder):
         return ActionLibrary(folder)
     return ActionLibrary(folder, create=True, recognizer=Recognizer(translation=False, scale="none", max_angle=0.0))
 

@@ -7,16 +7,9 @@ from typing import Any
 
 import click
 
-from kineme.cli.options import (
-    FILE,
-    GroupedCommand,
-    error_rate_option,
-    force_option,
-    heading,
-    json_option,
-    library_option,
-)
+from kineme.cli.options import GroupedCommand, error_rate_option, force_option, heading, json_option, library_option
 from kineme.cli.output import check_new, progress, say, stretch_cells, table, unlisted
+from kineme.cli.pieces import how_divided, in_pieces, pieces_options
 from kineme.cli.reading import files_of, layout_options, problem_lines, recordings_argument
 from kineme.reporting.text import counted, printable
 
@@ -31,10 +24,14 @@ _SHOWN = 20  # hits, and problems, that are listed; --output and --json have all
 @error_rate_option("The smaller, the more a movement may differ from those of its symbol.")
 @layout_options
 @heading("Output")
-@click.option("--output", "-o", type=FILE, help="A table of all hits to write, .csv or .json.")
+@click.option(
+    "--output", "-o", type=click.Path(path_type=Path),
+    help="A table of all hits to write, .csv or .json; of a large archive, the folder of the parts.",
+)  # fmt: skip
 @json_option
 @force_option
-def find(symbol: str, recordings: tuple[Path, ...], folder: Path, also: tuple[str, ...], **options: Any) -> None:
+@pieces_options
+def find(symbol: str, recordings: tuple[Path, ...], folder: Any, also: tuple[str, ...], **options: Any) -> None:
     """Find where RECORDINGS, files, folders, data sets or patterns of them, show SYMBOL, the surest hits first.
 
     Each recording is searched for all symbols of the library, as by kineme annotate: a stretch that is more like
@@ -50,11 +47,18 @@ def find(symbol: str, recordings: tuple[Path, ...], folder: Path, also: tuple[st
     from kineme.recognition.answer import certainty
 
     as_json, force, error_rate, output = (options.pop(name) for name in ("as_json", "force", "error_rate", "output"))
+    how = how_divided(options, recordings)
+    symbols = (symbol, *also)
+    if how is not None:
+        with ActionLibrary(folder, read_only=True) as library:
+            search.check_symbols(library.store, symbols)
+        asked = {"reading": options, "error_rate": error_rate, "symbols": list(symbols)}
+        in_pieces("find", recordings, output, how, asked, folder, force=force, as_json=as_json)
+        return
     check_new(output, force, *recordings)
     writer = None if output is None else writer_of(output, None, [])
     if writer is not None and not writer.several:
         raise click.UsageError(f"expected a table to write, .csv or .json, got {printable(output)}")
-    symbols = (symbol, *also)
     with ActionLibrary(folder, read_only=True) as library:
         search.check_symbols(library.store, symbols)
         with progress(desc="searching", unit=" s of recordings", bar_format="{l_bar}{n:.0f}{unit} [{elapsed}]") as bar:

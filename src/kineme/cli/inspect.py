@@ -7,8 +7,9 @@ from typing import Any
 
 import click
 
-from kineme.cli.options import GroupedCommand, error_rate_option, json_option, plot_option
+from kineme.cli.options import FOLDER, GroupedCommand, error_rate_option, force_option, json_option, plot_option
 from kineme.cli.output import progress, say
+from kineme.cli.pieces import how_divided, in_pieces, pieces_options
 from kineme.cli.reading import layout_options, read, recordings_argument
 
 
@@ -21,6 +22,9 @@ from kineme.cli.reading import layout_options, read, recordings_argument
 @error_rate_option("Share of false alarms among the outliers.")
 @plot_option
 @json_option
+@click.option("--output", "-o", type=FOLDER, help="Of a large archive, the folder of the parts.")
+@force_option
+@pieces_options
 def inspect(
     recordings: tuple[Path, ...], plot: Path | None, outliers: bool, error_rate: float, as_json: bool, **options: Any
 ) -> None:
@@ -47,6 +51,12 @@ def inspect(
     from kineme.io.inspection.inspect import inspect as summarize
     from kineme.io.reading.formats import in_words
 
+    how, output, force = how_divided(options, recordings), options.pop("output"), options.pop("force")
+    if how is not None:
+        in_pieces("inspect", recordings, output, how, {"reading": options}, force=force, as_json=as_json)
+        return
+    if output is not None:
+        raise click.UsageError("expected --output with --workers, --scheduler or --shard; for a picture say --plot")
     files = [recording for recording in recordings if str(recording) != "-"]
     contents = contents_of_all(files, options["follow_links"])
     unlike: tuple[int, ...] = ()

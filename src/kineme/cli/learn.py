@@ -8,8 +8,9 @@ from typing import Any
 
 import click
 
-from kineme.cli.options import GroupedCommand, json_option, library_option
+from kineme.cli.options import FOLDER, GroupedCommand, force_option, json_option, library_option
 from kineme.cli.output import progress, say
+from kineme.cli.pieces import how_divided, in_pieces, pieces_options
 from kineme.cli.reading import layout_options, problem_lines, read, recordings_argument
 from kineme.reporting.text import counted, printable
 
@@ -34,7 +35,10 @@ _SHOWN = 10  # problems that are listed
 )
 @layout_options
 @json_option
-def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
+@click.option("--output", "-o", type=FOLDER, help="Of a large archive, the folder of the parts.")
+@force_option
+@pieces_options
+def learn(recordings: tuple[Path, ...], folder: Any, **options: Any) -> None:
     """Learn RECORDINGS, files, folders or patterns of them, or - for CSV from the standard input, into a library.
 
     The library is created if it does not exist. In a folder, the name of the innermost folder is the label. Movements
@@ -46,6 +50,9 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
 
     A long recording is cut by a table of what happens when, with --labels: CSV, JSON, a document of ELAN or its
     tab-delimited export, or labels of Audacity. Stretches without label are stored without.
+
+    With --workers, --scheduler or --shard, movements are described in parts, in the folder --output, and kineme gather
+    stores them: the library is that of one process.
 
     Example: kineme learn recordings/ --library actions/
     """
@@ -59,6 +66,14 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
         raise click.UsageError("expected --label or --no-labels, not both")
     if person is not None and by_person:
         raise click.UsageError("expected --person or --by-person, not both")
+    how, output, force = how_divided(options, recordings), options.pop("output"), options.pop("force")
+    if how is not None:
+        said = {"label": label, "no_labels": no_labels, "person": person, "by_person": by_person}
+        asked = _of_pieces(recordings, said, options, table)
+        in_pieces("learn", recordings, output, how, asked, folder, force=force, as_json=as_json)
+        return
+    if output is not None:
+        raise click.UsageError("expected --output with --workers, --scheduler or --shard; the library is --library")
     parsed = read(recordings, options)
     if table is not None:
         from kineme.io.reading.read_labels import labeled_pieces, read_labels
@@ -77,8 +92,8 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
             "library": str(folder),
             "added": report.added,
             "duplicates": report.duplicates,
-            "joined": _joined(library, before) if report.duplicates else 0,
-            **_named(library, report.ids, labels),
+            "joined": joined_since(library, before) if report.duplicates else 0,
+            **named_of(library, report.ids, labels),
             "symbols": list(report.symbols),
             "movements": len(library),
             "people": sorted({name for name in people or () if name is not None}),
@@ -86,7 +101,25 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
             "problems": list(map(str, parsed.problems)),
             "notes": _notes(parsed),
         }
-    say(as_json, data, lambda: _text(data, problem_lines(parsed.problems, "left out ")))
+    say(as_json, data, lambda: learned_text(data, problem_lines(parsed.problems, "left out ")))
+
+
+def _of_pieces(
+    recordings: tuple[Any, ...], said: dict[str, Any], reading: dict[str, Any], table: Path | None
+) -> dict[str, Any]:
+    """The options of the parts of an archive, without those that are not given."""
+    from kineme.io.reading.recordings import how_to_read
+
+    if table is not None:
+        raise click.UsageError(
+            "expected --labels, which cuts one long recording, without --workers, --scheduler or --shard; learn the "
+            "recording alone"
+        )
+    how = how_to_read(reading)
+    if said["person"] is not None and (how.layout.person is not None or how.rule.names_person):
+        raise click.UsageError("expected --person, or people from --person-column or --label-pattern, not both")
+    given = {name: value for name, value in said.items() if value not in (None, False)}
+    return given | {"reading": reading} | ({"several": True} if len(recordings) > 1 else {})
 
 
 def _notes(recordings: Any) -> list[str]:
@@ -122,14 +155,14 @@ def _people(root: Path, recordings: Any, person: str | None, by_person: bool) ->
     return people
 
 
-def _joined(library: Any, before: int) -> int:
+def joined_since(library: Any, before: int) -> int:
     """Count stored movements that were unlabeled and got a symbol, since their copy has a label."""
     import numpy as np
 
     return len(np.setdiff1d(library.at(before).unlabeled(), library.unlabeled()))
 
 
-def _named(library: Any, ids: Any, labels: list[Any]) -> dict[str, Any]:
+def named_of(library: Any, ids: Any, labels: list[Any]) -> dict[str, Any]:
     """Count movements without symbol, and the labels that were not taken since a movement has another symbol."""
     from kineme.library.storage.read import names_of
 
@@ -145,7 +178,8 @@ def _named(library: Any, ids: Any, labels: list[Any]) -> dict[str, Any]:
     }
 
 
-def _text(data: dict[str, Any], problems: list[str]) -> str:
+def learned_text(data: dict[str, Any], problems: list[str]) -> str:
+    """Say what was learned, what was not and why, and what to know of it."""
     new = f", {counted(len(data['symbols']), 'new symbol')}" if data["symbols"] else ""
     joined = f" ({data['joined']:,} joined the symbol of its label)" if data["joined"] else ""
     stored = f", {data['duplicates']:,} stored already{joined}" if data["duplicates"] else ""

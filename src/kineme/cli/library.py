@@ -22,7 +22,7 @@ def library() -> None:
     """Show and edit an action library."""
 
 
-def opened(folder: Path, *, read_only: bool = True) -> Any:
+def opened(folder: Any, *, read_only: bool = True) -> Any:
     """Open the library in a folder."""
     from kineme.library.library import ActionLibrary
 
@@ -37,7 +37,7 @@ def _command(*names: str, read_only: bool = True, **options: Any) -> Callable[[C
 
     def add(answer: Callable[..., _Answer]) -> click.Command:
         @wraps(answer)
-        def run(folder: Path, as_json: bool, **arguments: Any) -> None:
+        def run(folder: Any, as_json: bool, **arguments: Any) -> None:
             with opened(folder, read_only=read_only) as actions:
                 data, text = answer(actions, **arguments)
             say(as_json, data, text)
@@ -121,7 +121,7 @@ def annotate(actions: Any, symbol: str, text: str) -> _Answer:
 @click.option("--yes", "-y", is_flag=True, help="Do not ask.")
 @library_option
 @json_option
-def delete(symbol: str | None, movements: tuple[int, ...], yes: bool, folder: Path, as_json: bool) -> None:
+def delete(symbol: str | None, movements: tuple[int, ...], yes: bool, folder: Any, as_json: bool) -> None:
     """Delete a symbol, whose movements stay as unlabeled ones, or single movements.
 
     Earlier versions still contain them, see kineme library history.
@@ -182,7 +182,7 @@ def undo(actions: Any, expected: int | None, to: int | None) -> _Answer:
 @library_option
 @json_option
 @click.pass_context
-def verify(ctx: click.Context, folder: Path, as_json: bool) -> None:
+def verify(ctx: click.Context, folder: Any, as_json: bool) -> None:
     """Check every byte of a library; the exit status is 1 if something is wrong."""
     with opened(folder) as actions:
         problems = [str(problem) for problem in actions.verify()]
@@ -205,7 +205,7 @@ def export(actions: Any, path: Path) -> _Answer:
 @click.argument("path", type=click.Path(exists=True, dir_okay=False, path_type=Path))
 @library_option
 @json_option
-def import_(path: Path, folder: Path, as_json: bool) -> None:
+def import_(path: Path, folder: Any, as_json: bool) -> None:
     """Create a library from an exported file."""
     from kineme.library.library import ActionLibrary
 
@@ -255,7 +255,7 @@ def _point(point: list[float], member: dict[str, Any]) -> str:
 @click.option("--units", help="Units of the positions, as mm; one, or one per dimension separated by commas.")
 @click.option("--output", "-o", type=click.Path(dir_okay=False, allow_dash=True, path_type=Path), default="-",
               show_default=True, help="A .json file; - for the screen.")  # fmt: skip
-def ground(symbol: str, folder: Path, by: str, units: str | None, output: Path) -> None:
+def ground(symbol: str, folder: Any, by: str, units: str | None, output: Path) -> None:
     """Write a symbol for a planner: primitive, parameters and their demonstrated ranges, as JSON.
 
     kineme library schema prints the JSON Schema of this output.

@@ -16,7 +16,9 @@ from kineme.cli.audit import audit
 from kineme.cli.correct import correct
 from kineme.cli.discover import discover
 from kineme.cli.evaluate import evaluate, reproduce
+from kineme.cli.features import features
 from kineme.cli.find import find
+from kineme.cli.gather import gather
 from kineme.cli.generate import generate
 from kineme.cli.inspect import inspect
 from kineme.cli.learn import learn
@@ -88,7 +90,7 @@ def main() -> None:
 
 
 for command in (
-    anchor, annotate, audit, correct, discover, evaluate, find, generate, move, inspect, learn, library, page,
-    recognize, reproduce, segment, serve, studio, why,
+    anchor, annotate, audit, correct, discover, evaluate, features, find, gather, generate, move, inspect, learn,
+    library, page, recognize, reproduce, segment, serve, studio, why,
 ):  # fmt: skip
     main.add_command(command)

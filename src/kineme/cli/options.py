@@ -154,7 +154,7 @@ class SymbolName(click.ParamType):  # type: ignore[type-arg]
         from kineme.library.library import ActionLibrary
 
         if folder := ctx.params.get("folder") or ctx.lookup_default("folder"):
-            with suppress(KinemeError, OSError), ActionLibrary(Path(folder), read_only=True) as library:
+            with suppress(KinemeError, OSError), ActionLibrary(folder, read_only=True) as library:
                 names = (symbol.name if _PLAIN.fullmatch(symbol.name) else symbol.id for symbol in library.symbols())
                 return [CompletionItem(name) for name in names if name.startswith(incomplete)]
         return []
@@ -164,15 +164,29 @@ class SymbolName(click.ParamType):  # type: ignore[type-arg]
 FILE, FOLDER = click.Path(dir_okay=False, path_type=Path), click.Path(file_okay=False, path_type=Path)
 
 
+class LibraryLocation(click.Path):
+    """The folder of a library, or its address on a server, postgresql://user@host/database?schema=name."""
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        """The path of a folder, or an address, which is text without its password."""
+        if not isinstance(value, str) or "://" not in value:
+            return super().convert(value, param, ctx)
+        from kineme.library.storage.address import as_location
+
+        return as_location(value)
+
+
 def library_option_of(*, required: bool, words: str) -> Callable[[Any], Any]:
     """The option ``--library``, also from the environment."""
     return click.option(
         "--library", "-l", "folder", required=required, envvar="KINEME_LIBRARY", is_eager=True, show_envvar=True,
-        type=FOLDER, help=words,
+        type=LibraryLocation(file_okay=False, path_type=Path), help=words,
     )  # fmt: skip
 
 
-library_option = library_option_of(required=True, words="Folder of the action library.")
+library_option = library_option_of(
+    required=True, words="Folder of the action library, or its address, postgresql://user@host/database."
+)
 force_option = under(
     "Output", click.option("--force", is_flag=True, help="Write over files that are there; never over the input.")
 )

@@ -21,15 +21,19 @@ STANDARD_INPUT = "standard input.csv"
 
 
 class Recording(click.Path):
-    """A file, a folder or a pattern of them."""
+    """A file, a folder or a pattern of them; of commands that work in pieces, the URI of an archive, too."""
 
-    def __init__(self) -> None:
-        super().__init__(allow_dash=True, path_type=Path)
+    def __init__(self, allow_dash: bool = True) -> None:
+        super().__init__(allow_dash=allow_dash, path_type=Path)
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Any:
-        """The path; of an empty text none, since it would mean the current folder."""
+        """The path; of an empty text none, since it would mean the current folder. A URI stays a text."""
         if str(value) == "":
             self.fail("expected a file or a folder, got an empty name; the current folder is .", param, ctx)
+        if "://" in str(value) and not Path(value).exists():  # a path would lose a slash
+            if not any(option.name == "shard" for option in ctx.command.params):
+                self.fail(f"expected a file or folder of this machine, got {value}; copy it first", param, ctx)
+            return str(value)
         return super().convert(value, param, ctx)
 
 
@@ -196,24 +200,16 @@ def _data_sets(paths: Sequence[Path]) -> list[Path] | None:
     return folders if all(map(is_episodic, folders)) else None
 
 
-def _how(options: dict[str, Any], library: Any) -> tuple[Any, Any, dict[str, bool], bool]:
+def _how(options: dict[str, Any], library: Any) -> Any:
     """The layout and the rule of names that the `layout_options` say, the switches, and whether files are joined."""
-    from kineme.io.reading.recordings import NameRule
-    from kineme.movements.tables.layout import Layout
+    from kineme.io.reading.recordings import how_to_read
 
-    layout_options = {name.removesuffix("_column"): value for name, value in options.items()}
-    rule = NameRule(layout_options.pop("label_pattern", None), layout_options.pop("label_by", None))
-    how = {name: layout_options.pop(name, False) for name in ("follow_links", "trim")}
-    join = bool(layout_options.pop("join_files", False))
-    for name in ("fill_gaps", "rows"):  # libraries store what was given
-        if layout_options.get(name) is None:
-            layout_options.pop(name, None)
+    reference = None
     if library is not None:
         from kineme.library.storage.source import known_sources
 
-        layout_options["reference"] = known_sources(library.store)
-    layout_options["kinds"] = dict(layout_options.get("kinds") or ()) or None
-    return Layout(**layout_options), rule, how, join
+        reference = known_sources(library.store)
+    return how_to_read(options, reference)
 
 
 def notes_beside(parsed: Any, options: dict[str, Any], learned: Any) -> list[str]:
@@ -297,7 +293,7 @@ def _chosen(several: Any, options: dict[str, Any]) -> Any:
     return several[index or 0]
 
 
-def _is_symbol(source: str, folder: Path | None) -> bool:
+def _is_symbol(source: str, folder: Any) -> bool:
     """Tell whether SOURCE is a symbol: with --library always; with one from the environment, unless a file exists."""
     given = click.get_current_context().get_parameter_source("folder")
     return folder is not None and (given != ParameterSource.ENVIRONMENT or not Path(source).exists())

@@ -24,7 +24,7 @@ _AT_ONCE = 250  # movements recognized between two steps of the progress bar: fe
 @layout_options
 @json_option
 def recognize(
-    recordings: tuple[Path, ...], folder: Path, error_rate: float, top: int, as_json: bool, **options: Any
+    recordings: tuple[Path, ...], folder: Any, error_rate: float, top: int, as_json: bool, **options: Any
 ) -> None:
     """Recognize the movements in RECORDINGS: files, folders, patterns of them, or - for CSV from the standard input.
 
@@ -110,7 +110,7 @@ def _text(data: dict[str, Any], error_rate: float, problems: list[str]) -> str:
 @json_option
 @force_option
 def why(
-    recordings: tuple[Path, ...], folder: Path, index: int | None, error_rate: float, as_json: bool, **options: Any
+    recordings: tuple[Path, ...], folder: Any, index: int | None, error_rate: float, as_json: bool, **options: Any
 ) -> None:
     """Explain what a movement in RECORDINGS is recognized as.
 

@@ -6,6 +6,7 @@ import os
 import sys
 import webbrowser
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -26,7 +27,7 @@ _PORTS = click.IntRange(1, 65535)
 @click.option("--read-only", is_flag=True, help="Show the library, and refuse every change.")
 @click.option("--host", default="127.0.0.1", show_default=True,
               help="Address to listen at. Another one lets others on the network in who know the token.")  # fmt: skip
-def studio(folder: Path, recordings: Path | None, port: int | None, no_open: bool, read_only: bool, host: str) -> None:
+def studio(folder: Any, recordings: Path | None, port: int | None, no_open: bool, read_only: bool, host: str) -> None:
     """Draw movements and be told what they are, name them, move them, in the browser.
 
     Only this machine reaches the studio, and only who knows the token in the address, which is new each time (or taken
@@ -65,7 +66,7 @@ def studio(folder: Path, recordings: Path | None, port: int | None, no_open: boo
 @click.option("--most", type=whole(1), help="Movements in the page.  [default: as many as fit into 2 MB]")
 @json_option
 @force_option
-def page(folder: Path, output: Path, title: str | None, most: int | None, as_json: bool, force: bool) -> None:
+def page(folder: Any, output: Path, title: str | None, most: int | None, as_json: bool, force: bool) -> None:
     """Write one HTML file in which a library recognizes drawings and moves again, without server and network.
 
     The file holds the movements of the library: whoever has it can read them. Of large libraries some movements of each

@@ -16,6 +16,7 @@ from kineme.recognition.answer import KnownClasses
 from kineme.recognition.compared_windows import Templates
 from kineme.recognition.spotting import spot
 from kineme.reporting.text import first_names
+from kineme.runtime.parallel import single_threaded_blas
 
 _MAX_PIECES = 8  # most stretches between rests that a movement may consist of, as in `Recognizer.spot`
 
@@ -42,6 +43,7 @@ def annotate(
     return annotate_by(some_of_each_symbol(store), recordings, error_rate, progress)
 
 
+@single_threaded_blas()  # of few rows at a time: a second thread mostly waits
 def annotate_by(
     classes: KnownClasses, recordings: Recordings, error_rate: float = 0.05, progress: Progress | None = None
 ) -> Annotated:
@@ -69,7 +71,8 @@ def annotate_by(
                 times = movement.start, movement.end
                 certainty = movement.p_known, movement.confidence
                 origin = float(recording.times[0])
-                annotations.append(Annotation(source.path, source.place, *times, label, *certainty, origin))
+                place = source.path, source.place
+                annotations.append(Annotation(*place, *times, label, *certainty, origin, movement.uncertainty))
         done += recording.duration
         tell(1.0)
     return Annotated(annotations, problems, bool(classes.calibration.calibrated(error_rate).all()))

@@ -64,12 +64,12 @@ def calibrated_once(
 
 def _cached(store: Store, name: str, key: str, members: Members, make: Callable[[], Calibration]) -> Calibration:
     """Return the calibration in that file of the folder, if it has this key; else made, and written there."""
-    path = store.folder / name
-    if path.is_file():  # not a pipe, which would block
+    path = store.cache_path(name)
+    if path is not None and path.is_file():  # not a pipe, which would block
         with suppress(*_SPOILED):
             return _deserialized(path.read_bytes(), key, len(members.names))
     calibration = make()
-    if not store.read_only:
+    if path is not None and not store.read_only:
         with suppress(OSError):  # disk full or no permission: it is computed again next time
             write_atomically(path, _serialized(calibration, key))
     return calibration

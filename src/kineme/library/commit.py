@@ -6,7 +6,7 @@ Even times are not stored, but computed from the duration.
 
 from __future__ import annotations
 
-import sqlite3
+from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
@@ -17,13 +17,14 @@ from numpy.typing import NDArray
 from kineme.dmp.discrete.encode import check_movement
 from kineme.errors import TrajectoryError
 from kineme.library.storage.channels import channels_to_text, to_bytes
+from kineme.library.storage.connection import ConflictError
 from kineme.library.storage.read import people_by_movement
-from kineme.library.storage.rows import Row, among, as_text, listed, next_key
+from kineme.library.storage.rows import Database, Row, among, as_text, listed
 from kineme.library.storage.schema import CONTINUES
 from kineme.library.storage.source import Source
 from kineme.library.storage.specification import Specification
-from kineme.library.storage.store import NOW, Change, Store
-from kineme.library.storage.symbols import add_members, keys_by_name
+from kineme.library.storage.store import NOW, Change, Store, repeated
+from kineme.library.storage.symbols import add_members, keys_by_name, stored_keys
 from kineme.movements.channels.coordinates import with_periods
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.similarity.describe import feature_rows
@@ -32,6 +33,7 @@ from kineme.validation import Array, describe
 #: Table -> its rows of a batch, without their keys.
 Tables = dict[str, list[Row]]
 
+_TRIES = 3  # to write a batch beside others, before it is written alone
 _EVEN = 1e-9  # of a step: stamps closer to an even grid are not stored
 _SMALL, _LARGE = 1e-30, 1e30  # between which single precision keeps its relative error
 
@@ -53,6 +55,7 @@ def serialize_new(store: Store, demos: Demonstrations, batch: Batch, new: list[i
     batch.row_of = dict(zip(new, range(len(new)), strict=True))
 
 
+@repeated
 def commit(store: Store, batch: Batch, continues: int | None = None) -> Committed:
     """Store what is new, and assign it to the symbols of its labels; where nothing changes, no version is made.
 
@@ -60,10 +63,31 @@ def commit(store: Store, batch: Batch, continues: int | None = None) -> Committe
     """
     if not batch.row_of and (ids := _all_stored(store, batch)) is not None:
         return Committed(0, (), ids, None)
-    with store.writing("learn") as change:
+    for _ in range(_TRIES if store.many_write else 0):
+        with suppress(ConflictError):  # others learn the same at the same time, or have failed: once more
+            return _commit(store, batch, continues, _n_rows(store, batch))
+    return _commit(store, batch, continues, None)
+
+
+def _n_rows(store: Store, batch: Batch) -> dict[str, int]:
+    """Return how many rows a batch adds to each table whose rows are numbered, if nothing changes meanwhile."""
+    with store.reading() as connection:
+        stored = find_stored(connection, batch)
+        keys, new = _keys(-len(batch.digests), batch, stored)  # of new ones below 0
+        labeled = _without_symbol(connection, batch, keys)
+        names = set(labeled.values())
+        n_symbols = len(names - stored_keys(connection, names).keys())
+    sources = {(source.sha256, source.options_json) for source in batch.sources if source is not None}
+    n_sources = len(sources - stored.sources.keys())
+    counts = {"version": 1, "source": n_sources, "movement": len(new), "member": len(labeled)}
+    return counts | {"symbol": n_symbols, "symbol_state": n_symbols}
+
+
+def _commit(store: Store, batch: Batch, continues: int | None, reserve: dict[str, int] | None) -> Committed:
+    with store.writing("learn", reserve=reserve) as change:
         stored = find_stored(change.connection, batch)  # again, since another process may have written meanwhile
         _insert_sources(change, batch, stored)
-        keys, new = _keys(change, batch, stored)
+        keys, new = _keys(change.next_key("movement"), batch, stored)
         if new:
             if not batch.row_of.keys() >= set(new.values()):  # what was stored has been deleted meanwhile
                 serialize_new(store, batch.demos, batch, list(new.values()))
@@ -77,6 +101,8 @@ def commit(store: Store, batch: Batch, continues: int | None = None) -> Committe
             change.detail["people"] = sorted(set(people.values()))
         if continues is not None:
             change.detail[CONTINUES] = continues
+        for table, rows in batch.tables.items() if new else ():  # last: what others learn, too, shows before
+            change.insert(table, [(key, *rows[batch.row_of[i]]) for key, i in new.items()])
     return Committed(len(new), new_symbols, np.array(keys, dtype=np.int64), change.version)
 
 
@@ -91,9 +117,8 @@ def _all_stored(store: Store, batch: Batch) -> NDArray[np.int64] | None:
         return np.array(ids, dtype=np.int64)
 
 
-def _keys(change: Change, batch: Batch, stored: Stored) -> tuple[list[int], dict[int, int]]:
-    """Return the id of every movement of the batch, and new id -> movement of the batch."""
-    key = next_key(change.connection, "movement")
+def _keys(key: int, batch: Batch, stored: Stored) -> tuple[list[int], dict[int, int]]:
+    """Return the id of every movement of the batch, and new id, from `key` on, -> movement of the batch."""
     keys: list[int] = []
     new: dict[int, int] = {}
     for i in range(len(batch.digests)):
@@ -107,7 +132,7 @@ def _keys(change: Change, batch: Batch, stored: Stored) -> tuple[list[int], dict
 
 
 def _insert_sources(change: Change, batch: Batch, stored: Stored) -> None:
-    key = next_key(change.connection, "source")
+    key = change.next_key("source")
     rows: list[Row] = []
     unknown: dict[tuple[str, str], Source] = {
         (source.sha256, source.options_json): source for source in batch.sources if source is not None
@@ -122,7 +147,13 @@ def _insert_sources(change: Change, batch: Batch, stored: Stored) -> None:
 
 def _insert_movements(change: Change, batch: Batch, new: dict[int, int], stored: Stored) -> None:
     demos = batch.demos
-    if change.connection.execute("SELECT 1 FROM meta WHERE key = 'n_dims'").fetchone() is None:
+    stored_dims = change.connection.execute("SELECT value FROM meta WHERE key = 'n_dims'").fetchone()
+    if stored_dims is not None and stored_dims[0] != str(demos.n_dims):
+        raise TrajectoryError(
+            f"expected movements of {stored_dims[0]} dimensions, as another process has learned meanwhile, got "
+            f"{demos.n_dims}; choose the columns, or make another library"
+        )
+    if stored_dims is None:
         change.insert("meta", [("n_dims", str(demos.n_dims))])
         if demos.channels is not None:
             change.insert("meta", [("channels", channels_to_text(with_periods(demos.channels, demos.recorded)))])
@@ -136,8 +167,6 @@ def _insert_movements(change: Change, batch: Batch, new: dict[int, int], stored:
         about = (batch.digests[i], name, batch.labels[i], lengths[i], t0[i], durations[i])
         movements.append((key, source, place, *about, change.version, None))
     change.insert("movement", movements)
-    for table, rows in batch.tables.items():
-        change.insert(table, [(key, *rows[batch.row_of[i]]) for key, i in new.items()])
 
 
 def _without_symbol(connection: Any, batch: Batch, keys: list[int]) -> dict[int, str]:
@@ -199,7 +228,7 @@ class Stored:
             self.by_place[where] = key
 
 
-def find_stored(connection: sqlite3.Connection, batch: Batch) -> Stored:
+def find_stored(connection: Database, batch: Batch) -> Stored:
     """Find the movements of a batch that the library holds already."""
     hashes = {source.sha256 for source in batch.sources if source is not None}
     query = f"SELECT sha256, options, id FROM source WHERE {among('sha256')}"

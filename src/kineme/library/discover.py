@@ -26,14 +26,13 @@ from kineme.library.proposals import NamedProposal, store_proposals
 from kineme.library.storage.store import Store
 from kineme.movements.channels.channel import Channels
 from kineme.movements.channels.detect import find_channels
-from kineme.movements.episodes import LARGEST, LATEST, STATE, Episode, even_stamps, head_of
+from kineme.movements.episodes import LARGEST, LATEST, STATE, Episode, default_features, even_stamps, head_of
 from kineme.movements.segmentation.work import Work, at_rest, boundaries, interpolated, roles_of
 from kineme.movements.trajectories.as_learned import of_columns
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.runtime.parallel import single_threaded_blas
 from kineme.validation import MIN_SAMPLES, Array
 
-#: Features of positions that an arm observes, where there is no ``observation.state``.
-_POSITIONS = re.compile(r"observation\..*(joint_pos|eef_pos|eef_rot_axis_angle|gripper_qpos|gripper_width)")
 _CUES = ("gripper", "contact", "object")  # roles of columns of other features that help to find boundaries
 _LEARNED = 3000  # pieces that kinds are learned from, about
 _VARIANCE = 0.95  # share of that of the joints that their principal axes hold, at least
@@ -118,6 +117,7 @@ class Observation(NamedTuple):
     paths: NDArray[np.float32]  # (n, 3, d) the state at the begin, in the middle, at the end
 
 
+@single_threaded_blas()  # kinds have few features: a second thread mostly waits, and takes ten times as long
 def discover(
     episodes: Iterable[Episode], feature: str | None = None, how: Work | None = None, n_learned: int = _LEARNED
 ) -> Discovery:
@@ -177,16 +177,15 @@ def discover(
 def state_of(episode: Episode, feature: str | None = None) -> tuple[tuple[str, ...], Array]:
     """Return the heads and the values (T, d) that kinds are described by, without columns of NaN.
 
-    By default those of ``observation.state``; else of all observed positions of joints, tips and grippers, as robomimic
-    and UMI name them; else of ``action``.
+    By default those of `default_features`.
     """
-    parts = [name for name in episode.signals if _POSITIONS.fullmatch(name)]
-    usual = ([STATE], parts, ["action"])
-    chosen = [feature] if feature else next((names for names in usual if {*names} & episode.signals.keys()), usual[0])
-    if chosen[0] not in episode.signals:
+    chosen = (
+        (feature,) if feature else default_features({name: values.shape[1] for name, values in episode.signals.items()})
+    )
+    if not chosen or chosen[0] not in episode.signals:
         raise DataError(
-            f"expected the feature {chosen[0]}, got {', '.join(episode.signals) or 'none'}; say which one, in the "
-            "shell with --feature"
+            f"expected the feature {(chosen or (STATE,))[0]}, got {', '.join(episode.signals) or 'none'}; say which "
+            "one, in the shell with --feature"
         )
     values = np.concatenate([_numbers(episode, name) for name in chosen], axis=1)
     usable = np.flatnonzero(np.isfinite(values).any(axis=0))
@@ -348,7 +347,8 @@ def propose_names(of_tasks: Sequence[Sequence[str]], tasks: Iterable[str]) -> tu
 def annotations_of(discovery: Discovery, recording: str) -> list[Annotation]:
     """Return the movements as annotations of a recording of that name, by the names that are proposed.
 
-    The p-value of a movement is the share of its kind whose density is as low or lower.
+    The p-value of a movement is the share of its kind whose density is as low or lower; the uncertainty of its edges is
+    half of the longer interval.
     """
     densities: dict[int | None, list[float]] = {}
     for segment in discovery.segments:
@@ -359,7 +359,7 @@ def annotations_of(discovery: Discovery, recording: str) -> list[Annotation]:
             recording, segment.place, segment.start, segment.end,
             None if segment.kind is None else discovery.kinds[segment.kind].name,
             float(np.searchsorted(ranked[segment.kind], segment.density, side="right") / len(ranked[segment.kind])),
-            segment.confidence, segment.origin,
+            segment.confidence, segment.origin, 0.5 * float(np.ptp(segment.intervals, axis=1).max()),
         )
         for segment in discovery.segments
     ]  # fmt: skip

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -89,37 +89,24 @@ def learn(  # noqa: PLR0913, PLR0917 - those of `ActionLibrary.learn`
     """Store new movements; see `ActionLibrary.learn`."""
     store.check_writable()
     before = store.version
-    demos = _in_columns_of(store, Demonstrations.of(movements))
-    _check_channels(store, demos)
+    demos = in_columns_of(store, Demonstrations.of(movements))
+    check_channels(store, demos)
     check(demos)
-    names = _as_names(demos, "label", demos.labels if labels is None else labels)
-    people = _as_names(demos, "group", groups)
+    names = as_names(demos, "label", demos.labels if labels is None else labels)
+    people = as_names(demos, "group", groups)
     sources, where = _as_origins(source, places, len(demos))
+    described = (
+        Batch(part, digests(part, evenly_sampled(part)), names[rows], people[rows], sources[rows], where[rows])
+        for rows in batches(demos.lengths, min(_BATCH_MOVEMENTS, max(_SMALL_BATCH, -(-len(demos) // 4))))
+        for part in [Demonstrations.of_movements(demos.movements.between(rows.start, rows.stop))]
+    )
     reports: list[Committed] = []
-    with ThreadPoolExecutor(1, "kineme-library") as pool:
-        pending: Future[Committed] | None = None
-        version = None
-
-        def finish(future: Future[Committed]) -> int | None:
-            reports.append(future.result())
-            if progress is not None:
-                progress(sum(len(report.ids) for report in reports), len(demos))
-            return reports[-1].version or version
-
-        for start, stop in _ranges(demos):
-            rows = slice(start, stop)
-            part = Demonstrations.of_movements(demos.movements.between(start, stop))
-            even = evenly_sampled(part)
-            batch = Batch(part, digests(part, even), names[rows], people[rows], sources[rows], where[rows])
-            with store.reading() as connection:
-                stored = find_stored(connection, batch)
-            if new := [i for i in range(len(part)) if stored.id_of(batch, i) is None]:  # only these are serialized
-                serialize_new(store, part, batch, new)
-            if pending is not None:  # one batch is written while the next one is described
-                version = finish(pending)
-            pending = pool.submit(commit, store, batch, version)
-        if pending is not None:
-            finish(pending)
+    done = 0
+    for report in commit_batches(store, described):
+        reports.append(report)
+        done += len(report.ids)
+        if progress is not None:
+            progress(done, len(demos))
     return LearnReport(
         sum(report.added for report in reports),
         sum(len(report.ids) - report.added for report in reports),
@@ -129,18 +116,42 @@ def learn(  # noqa: PLR0913, PLR0917 - those of `ActionLibrary.learn`
     )
 
 
-def _ranges(demos: Demonstrations) -> Iterator[tuple[int, int]]:
-    """Return ranges of movements for batches, limited by movements and samples; each has at least one movement."""
-    start, n = 0, len(demos)
-    most = min(_BATCH_MOVEMENTS, max(_SMALL_BATCH, -(-n // 4)))
+def batches(lengths: NDArray[np.intp], most: int = _BATCH_MOVEMENTS) -> Iterator[slice]:
+    """Yield ranges of movements of these lengths, limited by movements and samples; each has at least one movement."""
+    start, n, ends = 0, len(lengths), np.cumsum(lengths)
     while start < n:
-        limit = int(np.searchsorted(demos.offsets, demos.offsets[start] + _BATCH_SAMPLES, side="right")) - 1
+        limit = int(np.searchsorted(ends, ends[start] - lengths[start] + _BATCH_SAMPLES, side="right"))
         stop = min(max(limit, start + 1), start + most, n)
-        yield start, stop
+        yield slice(start, stop)
         start = stop
 
 
-def _in_columns_of(store: Store, demos: Demonstrations) -> Demonstrations:
+def commit_batches(store: Store, several: Iterable[Batch]) -> Iterator[Committed]:
+    """Commit batches one after the other: one is written while what is new in the next one is serialized.
+
+    An undo takes back all of them. Of a batch that has all of its rows already, none is made.
+    """
+    with ThreadPoolExecutor(1, "kineme-library") as pool:
+        pending: Future[Committed] | None = None
+        version = None
+        for batch in several:
+            with store.reading() as connection:
+                stored = find_stored(connection, batch)
+            new = [i for i in range(len(batch.digests)) if stored.id_of(batch, i) is None]
+            if batch.tables:
+                batch.row_of = {i: i for i in new}
+            elif new:  # only these are serialized
+                serialize_new(store, batch.demos, batch, new)
+            if pending is not None:
+                report = pending.result()
+                version = report.version or version
+                yield report
+            pending = pool.submit(commit, store, batch, version)
+        if pending is not None:
+            yield pending.result()
+
+
+def in_columns_of(store: Store, demos: Demonstrations) -> Demonstrations:
     """Convert columns without channels, or of the same names, to those of the library; generated ones as learned."""
     ours, n_dims = store.channels, store.n_dims
     if demos.channels is None:
@@ -160,7 +171,7 @@ def _in_columns_of(store: Store, demos: Demonstrations) -> Demonstrations:
     return Demonstrations.of_movements(in_coordinates(demos.movements), demos.steps)
 
 
-def _check_channels(store: Store, demos: Demonstrations) -> None:
+def check_channels(store: Store, demos: Demonstrations) -> None:
     """Refuse another number of dimensions, or channels of other kinds, than the library holds."""
     n_dims = store.n_dims
     if n_dims is not None and n_dims != demos.n_dims:
@@ -187,7 +198,7 @@ def _others(store: Store) -> str:
     return "all others" if store.counts.movements else "those of earlier versions, which can be restored,"
 
 
-def _as_names(demos: Demonstrations, what: str, given: Any) -> list[str | None]:
+def as_names(demos: Demonstrations, what: str, given: Any) -> list[str | None]:
     """Return the name of each movement's symbol, from its "label", or of who showed it, its "group"; None without."""
     if given is None:
         return [None] * len(demos)
@@ -285,6 +296,18 @@ def _other_columns(demos: Demonstrations) -> list[bytes] | None:
     ]
 
 
+def source_at(options: Mapping[str, Any], root: str | PurePath = "") -> Callable[[str, str, int], Source]:
+    """Return a function from name, checksum and bytes of a file in a folder to its source, as it is read now."""
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    chosen = {name: value for name, value in options.items() if value is not None}
+
+    def source(name: str, sha256: str, size: int) -> Source:
+        path = PurePath(root) / name
+        return Source(path.as_posix(), sha256, size, path.suffix.lower().lstrip("."), chosen, now)
+
+    return source
+
+
 def learn_recordings(  # noqa: PLR0913, PLR0917 - those of `ActionLibrary.learn`
     store: Store,
     recordings: Recordings,
@@ -300,13 +323,8 @@ def learn_recordings(  # noqa: PLR0913, PLR0917 - those of `ActionLibrary.learn`
     read, stored before the names of the files. By default the labels are those of the movements; groups and progress
     are as for `ActionLibrary.learn`.
     """
-    now = datetime.now(UTC).isoformat(timespec="seconds")
-    chosen = {name: value for name, value in (options or {}).items() if value is not None}
-    files = {}
-    for file in recordings.sources:
-        path = PurePath(root) / file.path
-        kind = path.suffix.lower().lstrip(".")
-        files[file.path] = Source(path.as_posix(), file.sha256, file.size, kind, chosen, now)
+    of_file = source_at(options or {}, root)
+    files = {file.path: of_file(file.path, file.sha256, file.size) for file in recordings.sources}
     return learn(
         store,
         recordings.demonstrations,

@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import SpecificationError
 from kineme.library.storage import changes, export_import, read, symbols, undo, verify
-from kineme.library.storage.connection import FILE, as_folder
+from kineme.library.storage.address import Address, as_location
+from kineme.library.storage.connection import FILE
 from kineme.library.storage.read import Ids
 from kineme.library.storage.specification import Specification
 from kineme.library.storage.store import Store, history
@@ -60,14 +61,31 @@ def _blaming(cls: type[ActionLibrary]) -> type[ActionLibrary]:
     return cls
 
 
+def _store_at(folder: str | Path | Address) -> tuple[type[Store], Path | Address]:
+    """Return the kind of store of a folder or an address, and the path of its file, or the address."""
+    location = as_location(folder)
+    if isinstance(location, Path):
+        return Store, location / FILE
+    from kineme.library.storage.postgres_store import PostgresStore
+
+    return PostgresStore, location
+
+
+def is_library(folder: str | Path | Address) -> bool:
+    """Tell whether a library is in a folder, or at an address."""
+    kind, location = _store_at(folder)
+    return kind.exists(location)
+
+
 @_blaming
 class ActionLibrary:
-    """Movements, their primitives and features, and the symbols they stand for, in one folder.
+    """Movements, their primitives and features, and the symbols they stand for, in one folder or on a server.
 
     Parameters
     ----------
     folder : str or Path
-        Folder of the database ``library.sqlite``.
+        Folder of the database ``library.sqlite``. Or, as text, ``postgresql://user@host/database?schema=name``: a
+        schema, by default "kineme", of a database on a PostgreSQL server, where many learn at once.
     create : bool, default False
         Create the library if it does not exist.
     read_only : bool, default False
@@ -89,13 +107,14 @@ class ActionLibrary:
 
     Notes
     -----
-    One process writes at a time, any number read. Every change is a version; `at` shows the library as it was.
+    One process writes at a time, any number read; on a server, many learn beside each other. Every change is a version;
+    `at` shows the library as it was.
     Recordings are kept in single precision relative to their start: an error of at most 6e-8 of the distance from it.
     """
 
     def __init__(
         self,
-        folder: str | Path,
+        folder: str | Path | Address,
         *,
         create: bool = False,
         read_only: bool = False,
@@ -104,7 +123,8 @@ class ActionLibrary:
         wait: float = 10.0,
     ) -> None:
         specification = Specification.of(recognizer, dmp) if create else None
-        self.store = Store(as_folder(folder) / FILE, specification, read_only=read_only, wait=wait)
+        kind, location = _store_at(folder)
+        self.store = kind(location, specification, read_only=read_only, wait=wait)
         if Specification.of(recognizer, dmp, self.specification) != self.specification:
             self.close()
             raise SpecificationError(
@@ -139,9 +159,10 @@ class ActionLibrary:
         )
 
     @property
-    def folder(self) -> Path:
-        """Folder of the library."""
-        return self.store.folder
+    def folder(self) -> Path | Address:
+        """Folder of the library; of one on a server its address, which shows no password."""
+        folder: Path | Address = self.store.folder
+        return folder
 
     @property
     def version(self) -> int:
@@ -360,7 +381,7 @@ class ActionLibrary:
     def at(self, version: int) -> ActionLibrary:
         """Open the library as it was at a version, for reading."""
         past = object.__new__(ActionLibrary)
-        past.store = Store(self.store.path, read_only=True, as_of=version, wait=self.store.wait)
+        past.store = type(self.store)(self.store.path, read_only=True, as_of=version, wait=self.store.wait)
         return past
 
     def verify(self) -> list[Problem]:
@@ -372,8 +393,11 @@ class ActionLibrary:
         return export_import.export(self.store, path)
 
     @classmethod
-    def import_(cls, path: str | Path, folder: str | Path, **options: Any) -> Self:
-        """Create a library in `folder` from a file of `export`, after checking every byte of it, and open it."""
+    def import_(cls, path: str | Path, folder: str | Path | Address, **options: Any) -> Self:
+        """Create a library in `folder` from a file of `export`, after checking every byte of it, and open it.
+
+        So a library moves from a folder to a server, and back: `export` there, and import here.
+        """
         export_import.import_(path, folder)
         return cls(folder, **options)
 

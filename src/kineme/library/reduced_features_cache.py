@@ -53,7 +53,7 @@ class ReducedMovements:
 
 def open_cache(store: Store, held: ReducedMovements | None = None) -> ReducedMovements:
     """Return reduced features of all movements ever stored: held or in the cache, and computed for those not in it."""
-    path = store.folder / FILE
+    path = store.cache_path(FILE)
     reduced = held or _load(store, path)
     last = int(reduced.ids[-1]) if reduced is not None else -1
     later = _ids_after(store, last)
@@ -62,7 +62,7 @@ def open_cache(store: Store, held: ReducedMovements | None = None) -> ReducedMov
     if held is not None:
         return open_cache(store)
     everything = _ids_after(store, -1)
-    if not store.read_only:
+    if path is not None and not store.read_only:
         with suppress(OSError):  # disk full or no permission: kept in memory only
             _write(store, path, everything)
             if (reduced := _load(store, path)) is not None:
@@ -157,9 +157,9 @@ def _validity_key(store: Store, version: int) -> dict[str, Any]:
     return {**library, "version": version, "at": at}
 
 
-def _load(store: Store, path: Path) -> ReducedMovements | None:
+def _load(store: Store, path: Path | None) -> ReducedMovements | None:
     """Return the reduced features in a file; None if there is no valid one."""
-    if not path.is_file():  # not a pipe, which would block
+    if path is None or not path.is_file():  # not a pipe, which would block
         return None
     try:
         buffer: Any = np.memmap(path, np.uint8, "r")

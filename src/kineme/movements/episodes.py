@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -9,7 +10,9 @@ import numpy as np
 
 from kineme.validation import Array
 
-STATE = "observation.state"  # the feature that is read by default, as LeRobot calls it
+STATE = "observation.state"  # as LeRobot calls what the arm is
+#: Features of positions that an arm observes, where there is no ``observation.state``.
+_POSITIONS = re.compile(r"observation\..*(joint_pos|eef_pos|eef_rot_axis_angle|gripper_qpos|gripper_width)")
 STAMP_TOLERANCE = 1e-4  # [s] between stored stamps and those of the declared rate, as LeRobot allows
 LARGEST, LATEST = 1e30, 1e10  # a value, and a stamp [s]: what is beyond is a fault, and no number
 _PLACE = "episode "
@@ -49,6 +52,18 @@ class Episode:
     def label(self) -> str:
         """The place, or the number where that is empty."""
         return self.place or place_of(self.number)
+
+
+def default_features(widths: Mapping[str, int]) -> tuple[str, ...]:
+    """Return the features that say how an arm moved, where nobody chooses; none if that is not clear.
+
+    That is ``observation.state``; else all observed positions of joints, tips and grippers, as robomimic and UMI name
+    them; else the only one of several numbers, such as ``action``; else the only one. `widths`: feature -> how many
+    numbers it has.
+    """
+    positions = tuple(name for name in widths if _POSITIONS.fullmatch(name))
+    vectors = tuple(name for name, width in widths.items() if width > 1) or tuple(widths)
+    return (STATE,) if STATE in widths else positions or (vectors if len(vectors) == 1 else ())
 
 
 def place_of(number: int) -> str:

@@ -1,4 +1,4 @@
-"""Archives beyond the memory of one machine: shards of features, and the nearest movements among all of them."""
+"""Archives beyond the memory of one machine: pieces, each done by a pure function, on any executor."""
 
 from kineme._lazy import lazy_names as _lazy_names
 

@@ -11,7 +11,7 @@ import hashlib
 import json
 import mmap
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -32,6 +32,7 @@ from kineme.library.storage.channels import channels_of_text, channels_to_text
 from kineme.library.storage.specification import Specification
 from kineme.library.storage.store import Store
 from kineme.reporting.atomic import whole_file
+from kineme.runtime.compiled import compiled_always
 from kineme.sampling import evenly_spaced
 from kineme.similarity.bounds import fit_bases, reduce_features
 from kineme.similarity.comparison import Comparison
@@ -135,6 +136,27 @@ def write_reduction(folder: Path, reduction: Reduction) -> Path:
     with whole_file(path, replace=False) as beside, beside.open("wb") as file:
         np.savez(file, **arrays)
     return path
+
+
+def shared_reduction(folder: Path, store: Store, *, renew: bool = False) -> Reduction:
+    """Return what ``bases.npz`` in a folder says; written first if there is none, or `renew` asks for another.
+
+    All jobs that begin at once get the same: that of the first one that has written it. Raises `DataError`: it is of
+    another library.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    if renew:
+        (folder / BASES).unlink(missing_ok=True)
+    if not (folder / BASES).exists():
+        with suppress(FileExistsError), compiled_always():
+            write_reduction(folder, fit_reduction(store))
+    reduction = read_reduction(folder)
+    if reduction.library != store.id:
+        raise DataError(
+            f"expected shards of this library in {folder}, got {BASES} of another one; take a new folder, or say "
+            "--force to make all of them again"
+        )
+    return reduction
 
 
 def read_reduction(folder: Path) -> Reduction:

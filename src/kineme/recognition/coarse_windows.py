@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.kernels.procrustes import Prepared
+from kineme.movements.preparation.resample import Resample
 from kineme.movements.segmentation.table import Motion, Rows, observe
+from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.runtime.parallel import single_threaded_blas
 from kineme.sampling import evenly_spaced
 from kineme.similarity.comparison import Comparison, References
@@ -41,8 +43,12 @@ def coarse_references(comparison: Comparison, references: References, resolution
     coarse: CoarseReferences | None = vars(references).get("_coarse")
     if coarse is None:
         chosen = [own.start + evenly_spaced(own.stop - own.start, _OF_EACH) for own in references.slices()]
-        movements = references.all_movements()
-        motions = [observe(movements[int(i)], resolution) for i in np.concatenate(chosen)]
+        movements = references.all_movements()[np.concatenate(chosen)]
+        even = Demonstrations.of_movements(Resample(_N_POINTS).apply(movements))
+        motions = [  # too few samples do not tell noise from motion
+            observe(movement if len(movement) >= _N_POINTS else even[i], resolution)
+            for i, movement in enumerate(movements)
+        ]
         rows = [_coarse_rows(comparison, motion, np.array([[0, len(motion.times) - 1]])) for motion in motions]
         prepared, counts = comparison.procrustes.prepare(np.concatenate(rows)), np.array([len(some) for some in chosen])
         first = np.cumsum(counts) - counts

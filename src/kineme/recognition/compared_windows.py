@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -28,7 +28,8 @@ from kineme.runtime.compiled import compiled_module, use_compiled
 from kineme.runtime.parallel import for_tiles
 from kineme.sampling import evenly_spaced
 from kineme.similarity.comparison import Comparison, References
-from kineme.similarity.scores import Compared, Score, nearest, nearest_above, score
+from kineme.similarity.describe import Tile
+from kineme.similarity.scores import Compared, for_compared, nearest_above
 from kineme.validation import Array
 
 MIN_SAMPLES = 8  # of a window
@@ -71,10 +72,11 @@ class Templates(NamedTuple):
         levels: Levels | None = held["_levels"]
         return levels
 
-    def scores(self, nearest: Array, motion: Motion, rows: Rows) -> Array:
-        """Return the nonconformity (n, C) of windows with these log similarities: by their paths, and by levels."""
-        scores = self.calibration.scores(nearest)
-        return scores if self.levels is None else np.hypot(scores, level_scores(self.levels, motion, rows))
+    def level_scores(self, motion: Motion, rows: Rows) -> Array:
+        """Return the nonconformity (n, C) of windows by their levels: 0 where these are no evidence."""
+        if self.levels is None:
+            return np.zeros((len(rows), len(self.references.classes)))
+        return level_scores(self.levels, motion, rows)
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,34 +115,41 @@ class Candidates(NamedTuple):
 
 
 def compare_candidates(
-    templates: Templates, motion: Motion, rows: Rows, reach: float, progress: Progress | None = None
+    templates: Templates,
+    motion: Motion,
+    rows: Rows,
+    reach: float,
+    progress: Progress | None = None,
+    most: Callable[[ComparedWindows], Array] | None = None,
 ) -> Candidates:
     """Compare the windows from sample rows[:, 0] to rows[:, 1] with the references.
 
     `rows` (n, 2); `reach`: weighted nonconformity beyond which a window counts as far, however far it is; `progress`:
-    called now and then with the share of the windows that is compared.
+    called now and then with the share of the windows that is compared; `most`: from windows, whose scores are 0, to
+    the weighted nonconformity (n, C) beyond which they do not matter as each class, where that is below the reach.
     """
     completely = np.zeros(len(rows), dtype=bool)
     completely[evenly_spaced(len(rows), _COMPLETELY)] = True
     sample, others = np.flatnonzero(completely), np.flatnonzero(~completely)
-    parts = [compare_windows(templates, motion, rows[sample], progress=_part(progress, 0.0, completely.mean()))]
-    weights = rarity_weights(parts[0].scores * templates.calibration.scales)
+    windows = _not_compared(templates, motion, rows)
+    within = None if most is None else most(windows)
+    scores = windows.scores
+    scores[sample] = _scores(templates, motion, rows[sample], None, _part(progress, 0.0, completely.mean()))
+    weights = rarity_weights(scores[sample] * templates.calibration.scales)
+    bars = reach / weights
+    scores[others] = bars * (1.0 + _ABOVE)
+    within = np.broadcast_to(bars, scores.shape) if within is None else np.minimum(within, reach) / weights
     order, near = _by_coarse_distance(templates, motion, rows[others], weights)
-    others = others[order]
-    bars, size = reach / weights, int(np.clip(len(rows) // _STEPS, _LEAST_TILE, _TILE))
+    others, size = others[order], int(np.clip(len(rows) // _STEPS, _LEAST_TILE, _TILE))
     for begin in range(0, near, size):
-        some = rows[others[begin : min(begin + size, near)]]
+        some = others[begin : min(begin + size, near)]
         tell = _part(progress, 1.0 - (len(others) - begin) / len(rows), len(some) / len(rows))
-        parts.append(compare_windows(templates, motion, some, bars, tell))
-        if (parts[-1].scores > bars).all():  # none is within reach: of those that are coarsely farther none is, either
-            near = begin + len(some)
+        scores[some] = _scores(templates, motion, rows[some], within[some], tell)
+        if (scores[some] > bars).all():  # none is within reach: of those that are coarsely farther none is, either
             break
-    parts.append(_beyond(motion, rows[others[near:]], bars))
     if progress is not None:
         progress(1.0)
-    order = np.argsort(np.concatenate((sample, others)))
-    columns = (np.concatenate([getattr(part, attribute.name) for part in parts]) for attribute in fields(parts[0]))
-    return Candidates(ComparedWindows(*columns).take(order), weights, completely)
+    return Candidates(windows, weights, completely)
 
 
 def _by_coarse_distance(
@@ -171,8 +180,8 @@ def _by_coarse_distance(
     return np.lexsort((distances.min(axis=1), far)), int(len(rows) - far.sum())
 
 
-def _beyond(motion: Motion, rows: Rows, bars: Array) -> ComparedWindows:
-    """Return windows that are not compared: their scores are just above the bar (C,) of each class."""
+def _not_compared(templates: Templates, motion: Motion, rows: Rows) -> ComparedWindows:
+    """Return windows with scores of 0."""
     start, end = motion.times[rows].T
     sizes, slowness = np.empty((2, len(rows)))
 
@@ -182,7 +191,7 @@ def _beyond(motion: Motion, rows: Rows, bars: Array) -> ComparedWindows:
         sizes[tile], slowness[tile] = size_and_slowness(paths.transpose(0, 2, 1))
 
     for_tiles(fill, len(rows), _TILE)
-    scores = np.broadcast_to(bars * (1.0 + _ABOVE), (len(rows), len(bars)))
+    scores = np.zeros((len(rows), len(templates.references.classes)))
     return ComparedWindows(rows, scores, np.log(end - start), sizes, slowness)
 
 
@@ -191,43 +200,48 @@ def _part(progress: Progress | None, begin: float, share: float) -> Progress | N
     return None if progress is None else lambda done: progress(min(1.0, begin + done * share))
 
 
-def compare_windows(
-    templates: Templates, motion: Motion, rows: Rows, within: Array | None = None, progress: Progress | None = None
-) -> ComparedWindows:
-    """Compare windows with the references, tile by tile, in threads.
+def compare_windows(templates: Templates, motion: Motion, rows: Rows) -> ComparedWindows:
+    """Compare windows with all references."""
+    return replace(_not_compared(templates, motion, rows), scores=_scores(templates, motion, rows))
 
-    With `within` (C,), scores above that of the class may be lower bounds, which exceed it too.
+
+def _scores(
+    templates: Templates, motion: Motion, rows: Rows, within: Array | None = None, progress: Progress | None = None
+) -> Array:
+    """Return the nonconformity (n, C) of windows to each class, tile by tile, in threads.
+
+    Scores above `within` (n, C) may be lower bounds, which exceed it too.
     """
+    comparison, references, calibration = templates
     start, end = motion.times[rows].T
-    scores = np.empty((len(rows), len(templates.references.classes)))
-    sizes, slowness = np.empty((2, len(rows)))
-    by = nearest if within is None else _nearest_within(templates, within)
+    levels = templates.level_scores(motion, rows)
+    logs, bars = np.empty(levels.shape), np.full(levels.shape, np.inf)
+    if within is not None:  # of both parts of a score, the levels are known: what they leave is how far the path may be
+        possible = levels <= within
+        paths = np.sqrt(np.where(possible, within**2 - levels**2, 0.0))
+        bars[possible] = np.exp(-0.5 * (paths * calibration.scales) ** 2)[possible]
 
     def fill(begin: int, first: int, last: int) -> None:
         tile = slice(begin + first, begin + last)
+
+        def compare(part: Tile, compared: Compared) -> None:
+            own = slice(tile.start + part.start, tile.start + part.stop)
+            described, known = compared.described, references.described
+            logs[own] = (
+                compared.nearest
+                if within is None
+                else nearest_above(comparison.similarity, described, known, references.first, bars[own])
+            )
+
         demos = Demonstrations.of_movements(resampled(motion, start[tile], end[tile]))
-        paths = demos.positions.reshape(len(demos), N_POINTS, -1).transpose(0, 2, 1)
-        sizes[tile], slowness[tile] = size_and_slowness(paths)
-        logs = score(templates.comparison, templates.references, demos, by)[0]
-        scores[tile] = templates.scores(logs, motion, rows[tile])
+        for_compared(comparison, references, demos, compare)
 
     for begin in range(0, len(rows), _TILE):
         n = min(_TILE, len(rows) - begin)
         for_tiles(partial(fill, begin), n, _AT_ONCE)
         if progress is not None:
             progress((begin + n) / len(rows))
-    return ComparedWindows(rows, scores, np.log(end - start), sizes, slowness)
-
-
-def _nearest_within(templates: Templates, within: Array) -> Score:
-    """Return a score: log similarity to each class, exact where the nonconformity is within a bar (C,)."""
-    bars = np.exp(-0.5 * (within * templates.calibration.scales) ** 2)
-    similarity, references = templates.comparison.similarity, templates.references
-
-    def by(compared: Compared) -> Array:
-        return nearest_above(similarity, compared.described, references.described, references.first, bars)
-
-    return by
+    return np.hypot(calibration.scores(logs), levels)
 
 
 def size_and_slowness(paths: Array) -> tuple[Array, Array]:

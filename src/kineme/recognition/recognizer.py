@@ -356,8 +356,9 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         Returns
         -------
         list of Spotted
-            ``(start, end, label, confidence, p_known)`` in order of time; label None is motion of no known class.
-            `confidence` and `p_known` are those of an `Answer`. Rests are left out. Without time stamps in fit,
+            ``(start, end, label, confidence, p_known, uncertainty)`` in order of time; label None is motion of no known
+            class. `confidence` and `p_known` are those of an `Answer`, the uncertainty is half of the 95 % interval of
+            start and end [s]. Rests are left out. Without time stamps in fit,
             movements are looked for between a quarter of the typical stretch between rests and four times it.
         """
         from kineme.recognition.compared_windows import Templates

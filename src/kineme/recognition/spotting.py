@@ -35,6 +35,7 @@ from kineme.recognition.compared_windows import (
     surroundings,
 )
 from kineme.recognition.conformal import Calibration, check_error_rate, class_probabilities, distances
+from kineme.recognition.edges import placed
 from kineme.recognition.levels import level_scores
 from kineme.sampling import evenly_spaced
 from kineme.similarity.comparison import References
@@ -46,13 +47,15 @@ _REACH = 0.975  # nonconformity at which a window counts as far, in that which m
 #: show little of it. Of simulated work, three examples of each of six kinds, 0.6 of the movements are named right at
 #: 0.975, 0.9 at 1.9. Of wiping that was not shown all stays unknown, of pressing 0.9 and 0.4: the rest are reaches.
 _REACH_AT_WORK = 1.9
-_TEMPO, _SIZE = 0.4, 0.2  # cost of a duration, or a size, e times what is expected
+#: Costs of a duration, and of a size, e times what is expected, of a window. People change pace from one movement to
+#: the next: at 0.4 for durations, 0.71 of single strokes at three speeds are found instead of 0.83.
+_OF_WINDOWS = 0.05, 0.2
+_OF_CLASSES = 0.1, 0.05  # the same where the class of a window is chosen
 _DEAD = 0.1  # logarithm of a ratio of durations that costs nothing while the tempo of the recording is unknown
 _EDGE, _FAR_FROM_REST, _SPANNED = 0.14, 0.03, 0.02  # costs of what surrounds a window
 _REST_INSIDE = 1.2  # cost of a share of rest beyond the demonstrated one
 _PER_MOVEMENT = 0.165  # cost of one more movement, in typical durations
 _ALIKE = 0.9  # intersection over union from which two windows are about one movement
-_MANNER = 0.25  # share of the costs of duration and size that counts when the class is chosen
 
 #: Shares of the duration that are cut off at the start and at the end: windows end at samples some hundredths apart.
 _CUTS = ((0.03, 0.0), (0.0, 0.03), (0.03, 0.03))
@@ -77,6 +80,8 @@ class Spotted(NamedTuple):
     p_known : float
         As `Answer.p_known`: share of movements of known classes that would be as novel or more. It may be below the
         error rate: a movement in a recording is cut by the search itself, which makes it somewhat more novel.
+    uncertainty : float
+        Half of the 95 % interval of start and end [s], of the less certain one; see `kineme.recognition.edges`.
     """
 
     start: float
@@ -84,6 +89,7 @@ class Spotted(NamedTuple):
     label: Label | None
     confidence: float
     p_known: float = math.nan  # of records that were stored without
+    uncertainty: float = math.nan
 
 
 def spot(
@@ -111,6 +117,8 @@ def spot(
     least = 0.0 if lasting is None else _LEAST_UNKNOWN * float(lasting.min())
     unknown = _left_over(chosen, windows.bouts, timed.times, least)
     rows = np.concatenate((chosen, unknown))
+    longest = None if lasting is None else float(lasting.max())
+    rows, doubts = placed(windows.motion, rows, np.arange(len(rows)) < len(best), templates.levels, longest)
     if not len(rows):
         return []
     logs, similar = score(comparison, references, pieces_of(timed, rows), nearest, nearest_each)
@@ -122,11 +130,11 @@ def spot(
     confidence = 1.0 - p_known
     confidence[: len(best)] = class_probabilities(similar, calibration.exponent)[np.arange(len(best)), best]
     classes = references.classes.tolist()
-    labels = [*(classes[c] for c in best.tolist()), *([None] * len(unknown))]
-    t = timed.times
+    labels = [*(classes[c] for c in best.tolist()), *([None] * (len(rows) - len(best)))]
+    start, end = timed.times[rows - (0, 1)].T.tolist()
+    certainties = np.column_stack((confidence, p_known, doubts)).tolist()
     return [
-        Spotted(float(t[rows[i, 0]]), float(t[rows[i, 1] - 1]), labels[i], float(confidence[i]), float(p_known[i]))
-        for i in np.argsort(rows[:, 0], kind="stable").tolist()
+        Spotted(start[i], end[i], labels[i], *certainties[i]) for i in np.argsort(rows[:, 0], kind="stable").tolist()
     ]
 
 
@@ -150,32 +158,44 @@ def _chosen(
         return np.empty((0, 2), dtype=np.intp), np.empty(0, dtype=np.intp)
     motion, typical = windows.motion, expected(templates.references)
     reach = far(error_rate, at_work=templates.levels is not None)
-    candidates = compare_candidates(templates, motion, windows.rows, reach, progress)
-    compared = candidates.weighted()
-    around = surroundings(motion, windows.bouts, compared.rows)
+    around = surroundings(motion, windows.bouts, windows.rows)
     manner = Manner()
-    for _ in range(_PASSES - 1):
+
+    def matters(compared: ComparedWindows) -> Array:
+        return most_nonconformity(compared, typical, around, manner, reach)
+
+    at_work = templates.levels is not None  # the reach is wide then, and holds many windows that cannot be chosen
+    candidates = compare_candidates(templates, motion, windows.rows, reach, progress, matters if at_work else None)
+    exact = matters(candidates.compared) if at_work else np.inf
+    compared, chosen = candidates.weighted(), list[int]()
+    for k in range(_PASSES):
         progress(1.0)
         scored = score_windows(compared, typical, around, manner, reach)
         chosen = _best_windows(compared.rows, scored)
-        manner = manner_of(compared, typical, chosen, scored.best)
-    chosen = _best_windows(compared.rows, score_windows(compared, typical, around, manner, reach))
+        if k < _PASSES - 1:
+            manner = manner_of(compared, typical, chosen, scored.best)
+            doubtful = (compared.scores > exact) & (compared.scores < matters(compared))
+            candidates = _completed(templates, motion, candidates, np.flatnonzero(doubtful.any(axis=1)))
+            compared = candidates.weighted()
     rows = compared.rows[chosen]
     spans = motion.times[compared.rows]
     alike = np.unique(np.concatenate((chosen, *alike_windows(spans, chosen)))).astype(np.intp)
-    distances = _complete_scores(templates, motion, candidates, alike) * templates.calibration.scales
+    distances = _completed(templates, motion, candidates, alike).compared.scores[alike] * templates.calibration.scales
     distances /= reach * np.exp(np.log(templates.calibration.scales).mean())
     again = np.searchsorted(alike, chosen).tolist()
     classes = closest_classes(compared.take(alike), distances, typical, manner, spans[alike], again)
     return np.column_stack((rows[:, 0], rows[:, 1] + 1)), classes
 
 
-def _complete_scores(templates: Templates, motion: Motion, candidates: Candidates, chosen: NDArray[np.intp]) -> Array:
-    """Return the nonconformity of chosen windows to every class, (n, C)."""
-    scores = candidates.compared.scores[chosen]
-    partly = ~candidates.completely[chosen]
-    scores[partly] = compare_windows(templates, motion, candidates.compared.rows[chosen[partly]]).scores
-    return scores
+def _completed(templates: Templates, motion: Motion, candidates: Candidates, chosen: NDArray[np.intp]) -> Candidates:
+    """Return the candidates, the chosen ones of them compared with every reference."""
+    partly = chosen[~candidates.completely[chosen]]
+    if not len(partly):
+        return candidates
+    scores, completely = candidates.compared.scores.copy(), candidates.completely.copy()
+    scores[partly] = compare_windows(templates, motion, candidates.compared.rows[partly]).scores
+    completely[partly] = True
+    return candidates._replace(compared=replace(candidates.compared, scores=scores), completely=completely)
 
 
 def _best_windows(rows: Rows, scored: ScoredWindows) -> list[int]:
@@ -324,12 +344,12 @@ def closest_classes(
 
     Which window is chosen depends on its duration, its size, and what surrounds it; these differ between people. The
     class is that of the nearest demonstration, wherever exactly the movement starts and ends: the distance, not over
-    the scale of the class, and a quarter of the costs of duration and size.
+    the scale of the class, and small costs of duration and size.
 
     `compared`: n windows, sorted by starts; `distances` (n, C): to the nearest demonstration of each class, in that at
     which a window counts as far; `spans` (n, 2): start and end of each window [s]; `chosen`: windows.
     """
-    costs = distances + _MANNER * _manner_costs(compared, typical, manner)
+    costs = distances + _manner_costs(compared, typical, manner, *_OF_CLASSES)
     return np.array([costs[near].min(axis=0).argmin() for near in alike_windows(spans, chosen)], dtype=np.intp)
 
 
@@ -338,17 +358,17 @@ def far(error_rate: float, at_work: bool = False) -> float:
     return (_REACH_AT_WORK if at_work else _REACH) * math.sqrt(-4.0 / math.pi * math.log(error_rate))
 
 
-def _manner_costs(compared: ComparedWindows, typical: Expected, manner: Manner) -> Array:
+def _manner_costs(compared: ComparedWindows, typical: Expected, manner: Manner, tempo: float, size: float) -> Array:
     """Return costs (n, C) of another duration, and another size, than those of the class in this recording."""
     costs = np.zeros(compared.scores.shape)
     if typical.log_durations is not None:
         ratio = compared.log_durations[:, None] - typical.log_durations
         if manner.tempo is None:
-            costs += 0.5 * _TEMPO * np.maximum(np.abs(ratio) - _DEAD, 0.0) ** 2
+            costs += 0.5 * tempo * np.maximum(np.abs(ratio) - _DEAD, 0.0) ** 2
         else:
-            costs += _TEMPO * (ratio - manner.tempo) ** 2
+            costs += tempo * (ratio - manner.tempo) ** 2
     if manner.size is not None:
-        costs += _SIZE * (compared.log_sizes[:, None] - typical.log_sizes - manner.size) ** 2
+        costs += size * (compared.log_sizes[:, None] - typical.log_sizes - manner.size) ** 2
     return costs
 
 
@@ -362,16 +382,34 @@ def score_windows(
     inside. The score is ``(1 - cost) * duration / typical duration`` where positive, less a cost per movement: so that
     a whole movement is preferred to its parts, and no part of it is a movement by chance.
     """
-    costs = compared.scores / reach + _manner_costs(compared, typical, manner)
+    others, counts = _other_costs(compared, typical, around, manner)
+    costs = compared.scores / reach + others
+    best = costs.argmin(axis=1)
+    closeness = np.maximum(1.0 - costs[np.arange(len(best)), best], 0.0)
+    return ScoredWindows(best, closeness * counts - _PER_MOVEMENT)
+
+
+def most_nonconformity(
+    compared: ComparedWindows, typical: Expected, around: Surroundings, manner: Manner, reach: float
+) -> Array:
+    """Return the nonconformity (n, C) from which on windows have no score above 0 as each class, see `score_windows`.
+
+    The scores of the windows themselves have no part in it.
+    """
+    others, counts = _other_costs(compared, typical, around, manner)
+    return np.asarray(reach * (1.0 - others - (_PER_MOVEMENT / counts)[:, None]))
+
+
+def _other_costs(
+    compared: ComparedWindows, typical: Expected, around: Surroundings, manner: Manner
+) -> tuple[Array, Array]:
+    """Return costs (n, C) beside the nonconformity, and durations (n,) in typical ones."""
+    costs = _manner_costs(compared, typical, manner, *_OF_WINDOWS)
+    costs += _REST_INSIDE * np.maximum(compared.slowness[:, None] - typical.slowness, 0.0)
+    edges = _EDGE * around.edge_speeds + _FAR_FROM_REST * around.far_from_rest + _SPANNED * around.rests_inside
     lasting = compared.log_durations
     usual = float(np.median(lasting)) if typical.log_durations is None else float(np.median(typical.log_durations))
-    usual += manner.tempo or 0.0
-    costs += _REST_INSIDE * np.maximum(compared.slowness[:, None] - typical.slowness, 0.0)
-    best = costs.argmin(axis=1)
-    closeness = 1.0 - costs[np.arange(len(best)), best]
-    closeness -= _EDGE * around.edge_speeds + _FAR_FROM_REST * around.far_from_rest
-    closeness -= _SPANNED * around.rests_inside
-    return ScoredWindows(best, np.maximum(closeness, 0.0) * np.exp(lasting - usual) - _PER_MOVEMENT)
+    return costs + edges[:, None], np.exp(lasting - (usual + (manner.tempo or 0.0)))
 
 
 def manner_of(compared: ComparedWindows, typical: Expected, chosen: list[int], best: NDArray[np.intp]) -> Manner:
@@ -379,8 +417,12 @@ def manner_of(compared: ComparedWindows, typical: Expected, chosen: list[int], b
     if not chosen:
         return Manner()
     classes = best[chosen]
-    manner = Manner(size=float(np.median(compared.log_sizes[chosen] - typical.log_sizes[classes])))
+    manner = Manner(size=shrunk_median(compared.log_sizes[chosen] - typical.log_sizes[classes], 0.0))
     if typical.log_durations is None:
         return manner
-    ratio = float(np.median(compared.log_durations[chosen] - typical.log_durations[classes]))
-    return replace(manner, tempo=ratio * len(chosen) / (len(chosen) + 1.0))
+    return replace(manner, tempo=shrunk_median(compared.log_durations[chosen] - typical.log_durations[classes], 1.0))
+
+
+def shrunk_median(log_ratios: Array, prior: float) -> float:
+    """Return the median of logarithms of ratios (n,), towards 0 as if by so many more movements: n / (n + prior)."""
+    return float(np.median(log_ratios)) * len(log_ratios) / (len(log_ratios) + prior)

@@ -25,11 +25,14 @@ def write_atomically(path: Path, data: bytes) -> Path:
 
 
 @contextmanager
-def whole_file(path: Path, *, replace: bool = True, companions: Sequence[str] = ()) -> Iterator[Path]:
+def whole_file(
+    path: Path, *, replace: bool = True, companions: Sequence[str] = (), sweep: bool = True
+) -> Iterator[Path]:
     """Context manager: a hidden name beside `path` to write to; on success that file is flushed and named `path`.
 
     Leftovers of killed processes are removed, and so are the `companions`: ends of the names of other files that may be
-    made beside the new one, as "-wal" by SQLite. Without `replace` a file of that name, even one that another process
+    made beside the new one, as "-wal" by SQLite; without `sweep` the folder, which may be large, is not searched for
+    them. Without `replace` a file of that name, even one that another process
     made meanwhile, stays as it is.
     """
     if len(os.fsencode(path.name)) > _LONGEST_NAME:
@@ -44,7 +47,8 @@ def whole_file(path: Path, *, replace: bool = True, companions: Sequence[str] = 
     if not path.parent.is_dir():
         there = "a file of that name is there" if path.parent.exists() else "there is none"
         raise FileNotFoundError(f"expected a folder {path.parent} to write {path.name} into, {there}; create it")
-    remove_leftovers(path)
+    if sweep:
+        remove_leftovers(path)
     beside = name_beside(path)
     try:
         with _named(path, beside):

@@ -25,6 +25,7 @@ from typing import Any
 from kineme.errors import SpecificationError, warn
 from kineme.runtime.forks import at_fork
 
+CHOICE = "KINEME_COMPILED"  # the variable of the environment
 CHOICES = ("auto", "always", "never")
 
 # Elementary operations that take NumPy about as long as importing Numba and loading a cached
@@ -102,8 +103,20 @@ def jit(function: Callable[..., Any], *, cache: bool = True, reorder: bool = Tru
     return dispatcher
 
 
+@contextmanager
+def compiled_always() -> Iterator[None]:
+    """Context manager: loops are compiled, however little work there is, so that all processes get the same digits."""
+    before = os.environ.get(CHOICE)
+    os.environ[CHOICE] = before or "always"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[CHOICE]
+
+
 def _choice() -> str:
-    choice = os.environ.get("KINEME_COMPILED", "auto")
+    choice = os.environ.get(CHOICE, "auto")
     if choice not in CHOICES:
         raise SpecificationError(
             f"expected the environment variable KINEME_COMPILED to be one of {CHOICES}, got {choice!r}; "

@@ -32,9 +32,9 @@ from kineme.validation import Array
 Single = NDArray[np.float32]
 Indices = NDArray[np.intp]
 
-_LEAST_ASKED, _LEAST_PAIRS = 16, 1000  # with fewer it is faster to compare all
+_LEAST_ASKED, _LEAST_PAIRS = 16, 500  # with fewer it is faster to compare all
 _ROUNDING, _SMALLEST = 1e-3, 1e-30  # of a bar: bounds are computed in single precision
-_MANY, _MOST = 0.15, 0.8  # shares of pairs in doubt from which it is faster to bound them, and to compare all
+_MANY, _MOST = 0.4, 0.8  # shares of pairs in doubt from which it is faster to bound them, and to compare all
 
 _TILE_PAIRS = 1_000_000  # similarities at a time: memory stays linear in the stored movements
 
@@ -168,21 +168,23 @@ def nearest_above(similarity: AveragedSimilarity, A: Described, B: Described, fi
     Elsewhere it is an upper bound, which does not reach the bar either.
 
     `A`: n movements; `B`: m movements of C classes, ordered by class; `first` (C,): index of the first movement of each
-    class; `bars` (C,): averaged kernels K, from 0 to 1.
+    class; `bars` (C,), or (n, C) for each movement its own: averaged kernels K, from 0 to 1; infinite ones are never
+    reached.
     """
     if not _can_skip(similarity, A, B):
         return _nearest(similarity, A, B, first)
     assert B.pairs is not None
     # Bars are higher here: elastic and turning bounds decide most pairs at a quarter of the price of those with clouds.
     clouds = np.array(B.pairs.measures) % len(PAIR_QUANTITIES) == PAIR_QUANTITIES.index("cloud")
-    if (bars <= float(_shares(similarity)[len(B.blocks) :][clouds].sum())).all():  # no K below it can be ruled out
+    low = bars <= float(_shares(similarity)[len(B.blocks) :][clouds].sum())
+    if low.all():  # no K below it can be ruled out
         return _nearest(similarity, A, B, first)
     search, kernels = _by_rows(similarity, A, B)
     classes = np.repeat(np.arange(len(first)), np.diff(first, append=len(B)))
-    least = _rounded(bars).astype(np.float32)[classes]
+    least = _rounded(bars).astype(np.float32)[..., classes]
     bounds = kernels + search.others
     doubtful = bounds >= least
-    if doubtful.mean() > _MANY:
+    if (doubtful & ~low[..., classes]).mean() > _MANY:
         bounds = kernels + search.upper_bounds(clouds=False)
         doubtful = bounds >= least
     if doubtful.mean() > _MOST:

@@ -7,7 +7,7 @@ pytest.importorskip("mujoco")
 
 from bench.work_faults import FAULTS, plant
 from bench.work_rivals import RIVALS
-from bench.work_scores import auroc, boundaries_of, rate, score_boundaries, score_names
+from bench.work_scores import auroc, boundaries_of, edges_within, rate, score_boundaries, score_names
 from bench.work_sets import (
     ACTION,
     CONTACT,
@@ -143,3 +143,9 @@ def test_rates_and_areas():
     share, low, high = rate(0, 100)
     assert (share, low) == (0.0, 0.0)
     assert high == pytest.approx(1.0 - 0.025 ** (1 / 100))
+
+
+def test_edges_within_their_uncertainty_are_counted_of_movements_that_match():
+    truth = [[(0.0, 1.0, "a"), (2.0, 3.0, "b")], [(0.0, 1.0, "a")]]
+    found = [[(0.1, 1.3, "a"), (2.0, 3.0, None), (2.7, 3.0, "b")], [(0.05, 1.0, "a")]]
+    assert edges_within(truth, found, [[0.2, 1.0, 1.0], [0.01]]) == (2, 4)

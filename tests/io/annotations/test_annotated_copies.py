@@ -17,7 +17,7 @@ TOPIC = "/kineme/annotations"
 
 
 def one(start, end, symbol, place="", origin=1.7e9):
-    return Annotation("run", place, start, end, symbol, 0.25, 0.75, origin)
+    return Annotation("run", place, start, end, symbol, 0.25, 0.75, origin, 0.125)
 
 
 def bag(tmp_path, kind):
@@ -47,7 +47,7 @@ def test_a_bag_has_a_message_at_the_end_of_each_movement(tmp_path, kind, name):
     first, second = (content for _, content in contents)
     assert first == {
         "place": "", "start": 1.7e9 + 0.1, "end": 1.7e9 + 0.25, "symbol": "wavé", "p_value": 0.25, "confidence": 0.75,
-        "unknown": False,
+        "unknown": False, "uncertainty": 0.125,
     }  # fmt: skip
     assert (second["symbol"], second["unknown"]) == (None, True)
 

@@ -13,20 +13,22 @@ from kineme.errors import DataError
 from kineme.io.writing.annotations import WRITERS, Annotation, Writer, write_annotations, writer_of
 
 LONG = Path("long.csv")
-WAVE = Annotation("long.csv", "", 1000.5, 1001.75, 'wave, "big"\nü', 0.4, 0.93, origin=1000.0)
+WAVE = Annotation("long.csv", "", 1000.5, 1001.75, 'wave, "big"\nü', 0.4, 0.93, 1000.0, 0.125)
 UNKNOWN = Annotation("long.csv", "", 1002.0, 1004.0, None, 0.01, 0.99, origin=1000.0)
 
 
 def test_pandas_reads_the_table(tmp_path):
     (path,) = write_annotations(tmp_path / "what.csv", [WAVE, UNKNOWN], [LONG])
     table = pandas.read_csv(path)
-    assert [*table] == ["recording", "place", "start", "end", "symbol", "p_value", "confidence", "unknown"]
+    heads = ["recording", "place", "start", "end", "symbol", "p_value", "confidence", "unknown", "uncertainty"]
+    assert [*table] == heads
     assert table["start"].tolist() == [1000.5, 1002.0]
     assert table["end"].tolist() == [1001.75, 1004.0]
     assert table["symbol"].tolist()[0] == WAVE.symbol
     assert table["symbol"].isna().tolist() == [False, True]
     assert table["unknown"].tolist() == [False, True]
     assert table["p_value"].tolist() == [0.4, 0.01]
+    assert table["uncertainty"].tolist() == pytest.approx([0.125, float("nan")], nan_ok=True)
 
 
 def test_json_has_the_same(tmp_path):
@@ -35,6 +37,7 @@ def test_json_has_the_same(tmp_path):
     assert first["symbol"] == WAVE.symbol
     assert second["symbol"] is None
     assert second["unknown"] is True
+    assert (first["uncertainty"], second["uncertainty"]) == (0.125, None)
     assert len(pandas.read_json(path)) == 2
 
 

@@ -62,6 +62,23 @@ def test_intervals_hold_the_truth_and_confidence_is_a_probability():
     assert np.mean(inside) >= 0.9
 
 
+def test_a_second_gripper_that_stays_as_it_is_changes_nothing():
+    (episode,), _ = work_episodes(1)
+    state = episode.signals["observation.state"]
+    still = 0.5 + np.random.default_rng(0).normal(scale=1e-3, size=len(state))
+    heads = (*NAMES, "left_gripper.pos")
+    cuts, beside = (
+        boundaries(episode.times, columns, names)
+        for columns, names in ((state, NAMES), (np.column_stack((state, still)), heads))
+    )
+    assert len(cuts.times) >= 3
+    for before, after in zip(cuts, beside, strict=True):
+        np.testing.assert_array_equal(before, after)
+    edges = np.concatenate((episode.times[:1], cuts.times, episode.times[-1:]))
+    rests = at_rest(episode.times, state, NAMES, edges)
+    assert (at_rest(episode.times, np.column_stack((state, still)), heads, edges) == rests).all()
+
+
 def test_they_do_not_depend_on_the_clock_nor_on_units():
     (episode,), _ = work_episodes(1)
     state = episode.signals["observation.state"]

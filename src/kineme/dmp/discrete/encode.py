@@ -56,7 +56,8 @@ def encode(dmp: Specification, movements: MovementsLike) -> dict[str, Any]:
         rows = even_rows(demos, start, stop) if demos.even_length else relative_rows(demos, start, stop, n_samples)
         flat = rows.reshape(-1, n_samples)  # one product; a stack of matrices would be as many small products
         np.matmul(flat, operator.weights, out=weights[start:stop].reshape(len(flat), -1))
-        np.matmul(flat, operator.velocity, out=velocities[start:stop].reshape(-1))
+        # Row by row, with the same last digits whatever movements are beside it: libraries store them.
+        np.einsum("ij,j->i", flat, operator.velocity, out=velocities[start:stop].reshape(-1))
         extents[start:stop] = extents_of(demos, start, stop)
 
     for_tiles(learn_tile, n, max(1, _TILE_SAMPLES // (n_dims * n_samples)))

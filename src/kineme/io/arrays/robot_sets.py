@@ -21,12 +21,12 @@ import numpy as np
 
 from kineme.errors import DataError
 from kineme.io.arrays.hdf5 import DAMAGE, hdf5_file, hdf5_group, hdf5_tree, texts_of
-from kineme.io.arrays.tree_movements import tree_movements
+from kineme.io.arrays.tree_movements import heads_of_array, tree_movements
 from kineme.io.arrays.trees import GROUPS, flat, rate_of
 from kineme.io.arrays.zarr_arrays import ZarrArray, zarr_arrays
 from kineme.io.limits import check_expanded
 from kineme.io.records import damaged_as
-from kineme.movements.episodes import Episode, place_of
+from kineme.movements.episodes import Episode, head_of, place_of
 from kineme.movements.tables.layout import Layout, Parsed, listed
 from kineme.movements.tables.time_stamps import words_of
 from kineme.validation import Array, check_number
@@ -129,18 +129,18 @@ def robot_episodes(path: Path, features: Sequence[str] | None = None, rate: floa
                 place = "/".join(text for text in (beside, part.place) if text) or source.name
                 # Numbers in several files of many episodes would repeat.
                 own = _NUMBER.search(part.place or source.stem) if row is ALOHA or not beside else None
-                number = _free(int(own[1]) if own else number, taken)
+                number = free_number(int(own[1]) if own else number, taken)
                 yield _episode(row, part, features, number, place, rate)
                 number += 1
         except DataError as error:
             if not beside or features is not None:
                 raise
-            number = _free(number, taken)
+            number = free_number(number, taken)
             yield Episode(number, np.empty(0), {}, {}, problems=(str(error),), place=beside)
             number += 1
 
 
-def _free(number: int, taken: set[int]) -> int:
+def free_number(number: int, taken: set[int]) -> int:
     """Return a number, or the next one where files of several names count alike, and add it to those taken."""
     number = max(taken) + 1 if number in taken else number
     taken.add(number)
@@ -172,7 +172,7 @@ def _in_hdf5(file: Any, row: RobotLayout) -> Iterator[_Part]:
     hertz = _described(data, "env_args", "env_kwargs", "control_freq")
     task = _described(data, "problem_info", "language_instruction") or _described(data, "env_args", "env_name")
     subsets = {name: {*texts_of(masks[name])} for name in masks if getattr(masks[name], "ndim", 0) == 1}
-    for name in sorted((name for name in data if _NUMBER.search(name)), key=_in_order):
+    for name in sorted((name for name in data if _NUMBER.search(name)), key=in_order):
         part = _Part(
             f"data/{name}",
             {},
@@ -341,10 +341,15 @@ def _movements(
         if not entry.isdecimal()
     }
     of_file = {entry: head for head, entry in joints.items()}
+    for name, path in features.items():  # as `robot_episodes` calls them, and a library that was discovered in these
+        of_array = heads_of_array(path, first.arrays[path].shape)
+        entries = _entries(row, name, len(of_array))
+        of_file |= {head_of(name, entry): head for entry, head in zip(entries, of_array, strict=True)}
+    named = {of_file[str(column)]: str(column) for column in layout.coordinates or () if str(column) in of_file}
     columns = [of_file.get(str(column), column) for column in layout.coordinates or paths.values()]
     parsed = tree_movements(tree, replace(layout, columns=columns or None), kind, GROUPS)
     heads = parsed.detected.columns
-    names = tuple(joints.get(head, head) for head in heads)
+    names = tuple(named.get(head, joints.get(head, head)) for head in heads)
     starts = tuple(f"{path}." for path in paths.values())
     measured = {  # those whose unit is that of the coordinates: of a gripper it is another
         head: head in joints and not joints[head].endswith("gripper") if row is ALOHA else head.startswith(starts)
@@ -366,10 +371,11 @@ def _sources(path: Path) -> list[Path]:
     top = path.resolve()
     files = [file for file in path.iterdir() if file.suffix.lower() in HDF5 and not file.name.startswith(".")]
     # No link leads to other files.
-    return sorted((file for file in files if file.resolve().is_relative_to(top)), key=lambda file: _in_order(file.stem))
+    return sorted((file for file in files if file.resolve().is_relative_to(top)), key=lambda file: in_order(file.stem))
 
 
-def _in_order(name: str) -> tuple[str, int, str]:
+def in_order(name: str) -> tuple[str, int, str]:
+    """Return a key that sorts names by the numbers at their ends."""
     match = _NUMBER.search(name)
     return (name[: match.start()], int(match[1]), name) if match else (name, -1, name)
 

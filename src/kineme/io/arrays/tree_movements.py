@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -143,21 +144,25 @@ def _heads(movement: TreeMovement, names: Sequence[str]) -> tuple[tuple[str, ...
     """Return a head for each column, and the array that it is of."""
     heads, owners = [], []
     for name in names:
-        shape = movement.entries[name].shape
-        width = int(np.prod(shape[1:]))
-        ends: Sequence[Any] = range(width)
-        if len(shape) == 3:
-            heads += [f"{name}.{end}" if name else end for end in point_names(*shape[1:])]
-        elif not name:
-            heads += axis_names(width)
-        elif len(shape) == 1:
-            heads.append(name)
-        else:
-            if words_of(name)[-1:] and words_of(name)[-1] in _POINTS and width in (2, 3):
-                ends = "xyz"[:width]
-            heads += [f"{name}.{end}" for end in ends]
-        owners += [name] * width
+        of_array = heads_of_array(name, movement.entries[name].shape)
+        heads += of_array
+        owners += [name] * len(of_array)
     return tuple(heads), tuple(owners)
+
+
+def heads_of_array(name: str, shape: Sequence[int]) -> list[str]:
+    """Return a head for each column of an array: points by their axes, other columns by their numbers."""
+    width = math.prod(shape[1:])
+    ends: Sequence[Any] = range(width)
+    if len(shape) == 3:
+        return [f"{name}.{end}" if name else end for end in point_names(*shape[1:])]
+    if not name:
+        return [*axis_names(width)]
+    if len(shape) == 1:
+        return [name]
+    if words_of(name)[-1:] and words_of(name)[-1] in _POINTS and width in (2, 3):
+        ends = "xyz"[:width]
+    return [f"{name}.{end}" for end in ends]
 
 
 def _is_text(entry: Any) -> bool:

@@ -34,7 +34,7 @@ def draw_recordings(recordings: Recordings, unlike: Collection[int] = ()) -> Fig
     One dimension is drawn over time, two in the plane, of three and more the first three in space. Every panel has a
     scale of its own, the same for its axes; below it stand the sides of the box around what is drawn.
     """
-    labels = labels_in_order(recordings)
+    labels = labels_in_order(recordings.labels)
     shown = labels[:_PANELS]
     n_dims = recordings.demonstrations.n_dims
     columns = min(_COLUMNS, len(shown), math.ceil(math.sqrt(1.5 * len(shown))))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from kineme.errors import DataError
 from kineme.io.reading.column_order import notes_on_aside, notes_on_order
 from kineme.io.reading.formats import entries_of, format_at
-from kineme.io.reading.merge_files import Recordings, Sampling, notes_on_gaps, notes_on_sampling, sampling_of
+from kineme.io.reading.merge_files import Recordings, notes_on_gaps, notes_on_sampling, sampling_of
 from kineme.io.records import Contents, Problem
 from kineme.movements.channels.channel import Channel, Channels
 from kineme.movements.channels.column_match import columns_recorded
@@ -83,19 +83,45 @@ def nothing_read(file: str, reason: str) -> Inspection:
     return Inspection(0, 0, 0, (), (), None, (), (Problem(file, None, reason),), ())
 
 
+class Measures(NamedTuple):
+    """Numbers of n movements, of which a summary is made; each of shape (n,)."""
+
+    labels: NDArray[np.object_]
+    samples: NDArray[np.intp]
+    durations: Array  # [s]
+    rates: Array  # [Hz]
+    jitters: Array  # see `Sampling`
+    gaps: NDArray[np.intp]
+    longest: Array  # gap [s]
+    extents: Array  # of the longest side of the box around the movement
+
+
+def measures_of(recordings: Recordings) -> Measures:
+    """Measure each movement."""
+    demos = recordings.demonstrations
+    sampling = sampling_of(demos)
+    extents = extents_of(demos).max(axis=1)
+    labels = np.array([*recordings.labels, None], dtype=object)[:-1]
+    return Measures(
+        labels, demos.lengths, demos.durations, sampling.rates, sampling.jitters, sampling.gaps, sampling.longest,
+        extents,
+    )  # fmt: skip
+
+
+def summaries(measures: Measures) -> tuple[LabelSummary, ...]:
+    """Summarize movements by their labels, in alphabetic order, those without a label last."""
+    order = labels_in_order(measures.labels.tolist())
+    number = {label: k for k, label in enumerate(order)}
+    codes = np.array([number[label] for label in measures.labels], dtype=np.intp)
+    return tuple(_summary(label, np.flatnonzero(codes == k), measures) for k, label in enumerate(order))
+
+
 def inspect(recordings: Recordings) -> Inspection:
     """Summarize recordings."""
     demos = recordings.demonstrations
-    sampling = sampling_of(demos)
     names = demos.names or ()
     duplicates = tuple(tuple(str(names[i]) for i in group) for group in duplicates_among(demos))
-    order = labels_in_order(recordings)
-    number = {label: k for k, label in enumerate(order)}
-    codes = np.array([number[label] for label in recordings.labels])
-    extents = extents_of(demos).max(axis=1)
-    labels = tuple(
-        _summary(label, np.flatnonzero(codes == k), demos, sampling, extents) for k, label in enumerate(order)
-    )
+    labels = summaries(measures_of(recordings))
     return Inspection(
         len(demos),
         len({source.path for source in recordings.sources}),
@@ -109,27 +135,25 @@ def inspect(recordings: Recordings) -> Inspection:
     )
 
 
-def labels_in_order(recordings: Recordings) -> list[str | None]:
+def labels_in_order(labels: Iterable[str | None]) -> list[str | None]:
     """Return each label once, in alphabetic order, None last."""
-    labels = set(recordings.labels)
-    named = sorted(label for label in labels if label is not None)
-    return [*named, *([None] if None in labels else [])]
+    distinct = set(labels)
+    named = sorted(label for label in distinct if label is not None)
+    return [*named, *([None] if None in distinct else [])]
 
 
-def _summary(
-    label: str | None, chosen: NDArray[np.intp], demos: Demonstrations, sampling: Sampling, extents: Array
-) -> LabelSummary:
-    gaps = sampling.gaps[chosen]
+def _summary(label: str | None, chosen: NDArray[np.intp], measures: Measures) -> LabelSummary:
+    gaps = measures.gaps[chosen]
     return LabelSummary(
         label,
         len(chosen),
-        _range(demos.lengths[chosen].astype(float)),
-        _range(demos.durations[chosen]),
-        _range(sampling.rates[chosen]),
-        _range(extents[chosen]),
-        float(np.median(sampling.jitters[chosen])),
+        _range(measures.samples[chosen].astype(float)),
+        _range(measures.durations[chosen]),
+        _range(measures.rates[chosen]),
+        _range(measures.extents[chosen]),
+        float(np.median(measures.jitters[chosen])),
         int(gaps.sum()),
-        float(sampling.longest[chosen][gaps > 0].max(initial=0.0)),
+        float(measures.longest[chosen][gaps > 0].max(initial=0.0)),
     )
 
 
@@ -267,10 +291,7 @@ def _group(channel: Channel) -> str:
 def as_data(inspection: Inspection) -> dict[str, Any]:
     """Return nested lists and dictionaries; units as the fields of `Inspection` and `LabelSummary` say."""
     return inspection._asdict() | {
-        "labels": [
-            {name: value._asdict() if isinstance(value, Range) else value for name, value in summary._asdict().items()}
-            for summary in inspection.labels
-        ],
+        "labels": [summary_as_data(summary) for summary in inspection.labels],
         "detected": [{**how._asdict(), "files": n} for how, n in inspection.detected],
         "channels": [channel._asdict() for channel in inspection.channels or ()],
         "duplicates": [list(group) for group in inspection.duplicates],
@@ -281,13 +302,22 @@ def as_data(inspection: Inspection) -> dict[str, Any]:
     }
 
 
+def summary_as_data(summary: LabelSummary) -> dict[str, Any]:
+    """Return the summary of a label as plain data."""
+    return {name: value._asdict() if isinstance(value, Range) else value for name, value in summary._asdict().items()}
+
+
+def labels_as_words(labels: Sequence[LabelSummary], title: str) -> str:
+    """Write a table of labels."""
+    heads = ("label", "movements", "samples", "duration [s]", "rate [Hz]", "jitter", "gaps", "extent")
+    return to_text(Table(title, heads, [_row(summary) for summary in labels]))
+
+
 def as_words(inspection: Inspection) -> str:
     """Write a table of labels, how files were read, duplicates, and what could not be read."""
-    rows = [_row(summary) for summary in inspection.labels]
     movements, dimensions = counted(inspection.movements, "movement"), counted(inspection.dimensions, "dimension")
     title = f"{movements} of {dimensions} in {counted(inspection.files, 'file')}"
-    heads = ("label", "movements", "samples", "duration [s]", "rate [Hz]", "jitter", "gaps", "extent")
-    parts = [to_text(Table(title, heads, rows))]
+    parts = [labels_as_words(inspection.labels, title)]
     lists = {
         "read as": [f"{_understood(how)} ({counted(n, 'file')})" for how, n in inspection.detected],
         "kinds": _kinds(inspection.channels or ()),

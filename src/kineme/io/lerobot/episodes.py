@@ -244,6 +244,7 @@ def episodes(
 ) -> Iterator[Episode]:
     """Yield the episodes of a data set, with all features of numbers, or those named, and all episodes, or some.
 
+    Of a range of numbers, those that the data set declares are read; of others, each must be declared.
     They come in the order of storage, a batch of rows is in memory at a time, and nothing is mended: frames that are
     missing or in another order, doubled episodes and other lengths than declared are `Episode.problems`. An episode
     whose frames cannot be read has none (T = 0). What could not be read of the meta folder comes first, as an episode
@@ -261,7 +262,7 @@ def episodes(
     widths = {name: len(info.heads[name]) for name in names}
     declared, (tasks, unsaid) = read_episodes(folder, info), read_tasks(folder)
     wanted = None if numbers is None else {int(number) for number in numbers}
-    if wanted is not None and (absent := wanted - {*declared.numbers.tolist()}):
+    if wanted is not None and not isinstance(numbers, range) and (absent := wanted - {*declared.numbers.tolist()}):
         raise DataError(f"expected numbers of episodes of the data set, got {min(absent)}")
     videos = read_videos(folder, info)
     entries = {name: info.heads[name] for name in names}

@@ -53,7 +53,7 @@ class Motion(NamedTuple):
     symbol: str | None  # None: motion that is like no symbol
     p_value: float = math.nan  # share of movements of known symbols that would be as novel or more
     confidence: float = math.nan  # probability that the symbol is right
-    uncertainty: float = math.nan  # of the boundaries [s]
+    uncertainty: float = math.nan  # half of the 95 % interval of start and end, of the less certain one [s]
     annotator: str = "kineme"
 
 

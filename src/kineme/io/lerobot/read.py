@@ -16,7 +16,7 @@ from kineme.errors import DataError
 from kineme.io.lerobot.episodes import Frames, check_storage, contradictions, episodes, joined, shard_frames, task_texts
 from kineme.io.lerobot.info import Episodes, Info, read_episodes, read_info, read_tasks
 from kineme.io.limits import check_expanded
-from kineme.movements.episodes import STAMP_TOLERANCE, STATE, Episode, even_stamps, head_of, place_of
+from kineme.movements.episodes import STAMP_TOLERANCE, STATE, Episode, default_features, even_stamps, head_of, place_of
 from kineme.movements.tables.columns import choose_roles, column_numbers
 from kineme.movements.tables.layout import Column, Layout, Parsed, listed, no_lines
 from kineme.movements.tables.table import Segments, Table, table_movements
@@ -53,7 +53,8 @@ def lerobot_parts(
 ) -> Iterator[Callable[[Layout], Parsed]]:
     """Yield parts of a data set, some whole episodes each, as functions from one of `layouts` to its movements.
 
-    A batch of frames and one part are in memory at a time; episodes with these `numbers` are one part. The features are
+    A batch of frames and one part are in memory at a time; episodes with these `numbers` are one part, unless
+    they are a range. The features are
     those of the layouts that the data set can fill. A part whose episodes all are damaged says why in
     `Parsed.left_out`, and has no movements.
     """
@@ -66,9 +67,10 @@ def lerobot_parts(
     if not features:
         _chosen(info, layouts[-1])  # says why
     part: list[Episode] = []
+    in_parts = numbers is None or isinstance(numbers, range)
     for episode in episodes(folder, list(features), numbers):
         part.append(episode)
-        if numbers is None and sum(map(len, part)) * sum(features.values()) >= _NUMBERS:
+        if in_parts and sum(map(len, part)) * sum(features.values()) >= _NUMBERS:
             yield partial(_of_episodes, info, part)
             part = []
     if part:
@@ -141,12 +143,13 @@ def _chosen(info: Info, layout: Layout) -> _Chosen:
     entries = [entry for entries_of_head in info.heads.values() for entry in entries_of_head]
     full = [head_of(name, entry) for name, entry in zip(owners, entries, strict=True)]
     vectors = {name: len(entries) for name, entries in info.heads.items() if entries != ("",)}
-    name = STATE if STATE in info.heads else next(iter(vectors)) if len(vectors) == 1 else None
+    usual = default_features({name: len(entries) for name, entries in info.heads.items()})
+    name = usual[0] if len(usual) == 1 else None
     if layout.coordinates is not None:
         short = [entry if owner == name else head for owner, entry, head in zip(owners, entries, full, strict=True)]
         numbers: Sequence[int] = _numbers_of(full, short, layout.coordinates)
-    elif name is not None:
-        numbers = [k for k, owner in enumerate(owners) if owner == name]
+    elif usual:
+        numbers = [k for k, owner in enumerate(owners) if owner in usual]
     else:
         got = listed(f"{name} ({width})" for name, width in (vectors or dict.fromkeys(info.heads, 1)).items())
         raise DataError(f"expected the feature {STATE!r}, got {got}; say which with columns=, in the shell --columns")

@@ -10,7 +10,7 @@ import numpy as np
 from kineme.io.reading.formats import Format
 from kineme.io.reading.merge_files import Recordings, merge_files
 from kineme.io.reading.read_file import parsed_file
-from kineme.movements.episodes import STATE, Episode, even_stamps, head_of
+from kineme.movements.episodes import Episode, default_features, even_stamps, head_of
 from kineme.movements.tables.columns import choose_roles
 from kineme.movements.tables.layout import Layout, Parsed, no_lines
 from kineme.movements.tables.table import Segments, Table, table_movements
@@ -21,14 +21,15 @@ _STAMP = "timestamp [s]"
 def heads_of(episode: Episode) -> dict[str, tuple[str, ...]]:
     """Name the columns of each feature: by the entry alone in the feature that is read by default, which comes first.
 
-    That is ``observation.state``, else the first of several numbers. Columns of the others are ``feature.entry``, as
-    `kineme.read_recordings` calls them.
+    That is what `default_features` says, else the first of several numbers. Columns of the others, and those of several
+    that are read by default, are ``feature.entry``, as `kineme.read_recordings` calls them.
     """
     widths = {feature: values.shape[1] for feature, values in episode.signals.items()}
     wide = [feature for feature, width in widths.items() if width > 1]
-    default = STATE if STATE in widths else next(iter(wide or widths), None)
+    usual = default_features(widths) or tuple(wide or widths)[:1]
+    default = usual[0] if len(usual) == 1 else None
     heads: dict[str, tuple[str, ...]] = {}
-    for feature in sorted(widths, key=lambda name: name != default):
+    for feature in sorted(widths, key=lambda name: name not in usual):
         entries = episode.names.get(feature) or tuple(map(str, range(widths[feature])))
         short = feature == default and not any(not entry or entry.isdecimal() for entry in entries)
         heads[feature] = entries if short else tuple(head_of(feature, entry) for entry in entries)

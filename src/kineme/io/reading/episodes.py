@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -27,12 +27,14 @@ class EpisodeLayout(NamedTuple):
     read: Callable[[Path, Sequence[str] | None, float | None], Iterator[Episode]]
 
 
-def _lerobot(path: Path, features: Sequence[str] | None, rate: float | None) -> Iterator[Episode]:
+def _lerobot(
+    path: Path, features: Sequence[str] | None, rate: float | None, numbers: Collection[int] | None = None
+) -> Iterator[Episode]:
     if rate is not None:
         raise SpecificationError(f"expected no rate for a data set of LeRobot, which has stamps, got {rate:g}")
     with needs("pyarrow", "read LeRobot", "parquet"):
         from kineme.io.lerobot.episodes import episodes
-    return episodes(path, features)
+    return episodes(path, features, numbers)
 
 
 #: Layouts in the order in which they are tried.
@@ -47,18 +49,24 @@ EPISODE_LAYOUTS: tuple[EpisodeLayout, ...] = (
 
 
 def read_episodes(
-    path: Path | str, features: Sequence[str] | None = None, rate: float | None = None
+    path: Path | str,
+    features: Sequence[str] | None = None,
+    rate: float | None = None,
+    numbers: Collection[int] | None = None,
 ) -> Iterator[Episode]:
     """Yield the episodes of a data set as they are stored, with the features of numbers, or those that are named.
 
     A `rate` [1/s] is that of a layout without stamps, instead of what the set says or the custom is; of another it is a
-    `SpecificationError`. A `DataError` names the layouts if the path has none of them, or says why the data set cannot
-    be read at all; what is wrong with a single episode stands in its `problems`.
+    `SpecificationError`. Of a data set of LeRobot, episodes with these `numbers` alone are read. A `DataError` names
+    the layouts if the path has none of them, or says why the data set cannot be read at all; what is wrong with a
+    single episode stands in its `problems`.
     """
     path = Path(path)
     layout = next((layout for layout in EPISODE_LAYOUTS if layout.fits(path)), None)
     within = sorted(marker.parents[1] for marker in path.glob(f"*/{MARKER}"))
     if layout is not None and (layout is EPISODE_LAYOUTS[0] or not within):
+        if layout is EPISODE_LAYOUTS[0]:
+            return _lerobot(path, features, rate, numbers)
         return layout.read(path, features, rate)
     there = "nothing there" if not path.exists() else "another" if layout is None else "several"
     layouts = ", ".join(layout.name for layout in EPISODE_LAYOUTS)

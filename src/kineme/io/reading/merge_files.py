@@ -157,7 +157,7 @@ def merge_files(
     reported = [*problems, *(problem for file in files for problem in file.problems)]
     full = [file for file in files if file.block.labels]
     if not full:
-        if len(reported) == 1 and reported[0].file == Path(where).name:  # one file alone: it is named once
+        if len(reported) == 1 and reported[0].file in (where, Path(where).name):  # one file alone: it is named once
             raise DataError(str(reported[0]._replace(file=where)))
         first = f"; {len(reported)} could not be read, the first {reported[0]}" if reported else ""
         raise DataError("; ".join([f"expected recordings in {where}, found none{first}", *note_on_missing(reported)]))

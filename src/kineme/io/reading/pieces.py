@@ -11,7 +11,7 @@ from kineme.io.lerobot.info import MARKER
 from kineme.io.reading.formats import Entry, Format, data_set_of, entries_of
 from kineme.io.reading.merge_files import Recordings, merge_files
 from kineme.io.reading.read_file import parsed_file
-from kineme.io.reading.recordings import NameRule, read_paths, trimmed
+from kineme.io.reading.recordings import NameRule, check_asked, heads_of, read_entries, trimmed
 from kineme.io.records import Problem, needs
 from kineme.movements.episodes import number_at
 from kineme.movements.tables.layout import Layout
@@ -39,27 +39,44 @@ def read_pieces(
     """
     entries, problems = entries_of(paths, follow_links)
     yield from problems
+    numbers = None if places is None else {number for place in places if (number := number_at(place)) is not None}
     for entry in entries:
-        try:
-            if is_episodic(entry.path):
-                yield from _of_data_set(entry, layout, rule, trim, places)
-            else:
-                read = read_paths([entry.path], layout, rule, follow_links=follow_links, trim=trim)
-                yield _renamed(read, entry.name)
-        except (KinemeError, OSError) as error:
-            reason = str(error).removeprefix(f"{entry.path}: ")
-            yield Problem(entry.name, None, reason, type(error) if isinstance(error, KinemeError) else KinemeError)
+        yield from read_entry(entry, layout, rule, follow_links=follow_links, trim=trim, numbers=numbers)
+
+
+def read_entry(
+    entry: Entry,
+    layout: Layout,
+    rule: NameRule,
+    *,
+    follow_links: bool = False,
+    trim: bool = False,
+    numbers: Collection[int] | None = None,
+) -> Iterator[Recordings | Problem]:
+    """Yield the recordings of a file or data set, of the latter some episodes at a time, or the problem with it.
+
+    Of a data set, the episodes with these `numbers` are read, all at once unless they are a range.
+    """
+    try:
+        if is_episodic(entry.path):
+            yield from _of_data_set(entry, layout, rule, trim, numbers)
+        else:
+            recordings = read_entries([entry], layout, rule, follow_links=follow_links, trim=trim)
+            check_asked(layout, heads_of(recordings), recordings.people is not None, entry.name)
+            yield recordings
+    except (KinemeError, OSError) as error:
+        reason = str(error).removeprefix(f"{entry.path}: ").removeprefix(f"{entry.name}: ")
+        yield Problem(entry.name, None, reason, type(error) if isinstance(error, KinemeError) else KinemeError)
 
 
 def _of_data_set(
-    entry: Entry, layout: Layout, rule: NameRule, trim: bool, places: Collection[str] | None
+    entry: Entry, layout: Layout, rule: NameRule, trim: bool, numbers: Collection[int] | None
 ) -> Iterator[Recordings | Problem]:
     """Yield the whole episodes of a data set, and why others are not."""
     with needs("pyarrow", "read Parquet", "parquet"):
         from kineme.io.lerobot.read import lerobot_parts
     learned = layout.reference.columns if layout.reference is not None and layout.coordinates is None else ()
     layouts = [replace(layout, columns=learned), layout] if learned else [layout]
-    numbers = None if places is None else {number for place in places if (number := number_at(place)) is not None}
     for parse in lerobot_parts(entry.path, layouts, numbers):
         file = rule.apply(parsed_file(parse, Format(), entry.relative, layout), entry.path).renamed(entry.name)
         if not file.block.labels:
@@ -67,9 +84,3 @@ def _of_data_set(
             continue
         recordings = merge_files([file], entry.name, (), layout.kinds, layout.skip, layout.by_number)
         yield trimmed(recordings) if trim else recordings
-
-
-def _renamed(recordings: Recordings, name: str) -> Recordings:
-    sources = tuple(source._replace(path=name) for source in recordings.sources)
-    problems = tuple(problem._replace(file=name) for problem in recordings.problems)
-    return replace(recordings, sources=sources, problems=problems)

@@ -8,17 +8,18 @@ from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from pathlib import Path
 from string import Formatter
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from kineme.errors import DataError, SpecificationError, warn
 from kineme.io.limits import max_file_bytes
-from kineme.io.reading.formats import as_text, data_set_of, entries_of, in_words, name_of, root_of
+from kineme.io.reading.formats import Entry, as_text, data_set_of, entries_of, in_words, name_of, root_of
 from kineme.io.reading.join_files import Placed, join_files, notes_on_clocks
 from kineme.io.reading.merge_files import Recordings, merge_files, notes_on_gaps
 from kineme.io.reading.read_file import FileRead, format_of, read_bytes, read_file
+from kineme.io.records import Problem
 from kineme.movements.preparation.trim import TrimRest
 from kineme.movements.tables.columns import excluded_numbers
-from kineme.movements.tables.layout import FILL_GAPS, Column, Layout, listed
+from kineme.movements.tables.layout import FILL_GAPS, Column, Known, Layout, listed
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.trajectory import Trajectory
 
@@ -141,6 +142,31 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
     return read_paths(paths, layout, rule, follow_links=follow_links, trim=trim, join=join_files, progress=progress)
 
 
+class HowToRead(NamedTuple):
+    """What `read_recordings` is told by its options."""
+
+    layout: Layout
+    rule: NameRule
+    switches: dict[str, bool]  # follow_links, trim
+    join: bool  # whether the files of a folder are one recording
+
+
+def how_to_read(options: Mapping[str, Any], reference: Known | None = None) -> HowToRead:
+    """Return how to read by options, named as those of `read_recordings` or of the shell; None are not given.
+
+    What is not asked for is as in the `reference`, what a library has learned, where a file has it.
+    """
+    chosen = {name.removesuffix("_column"): value for name, value in options.items()}
+    rule = NameRule(chosen.pop("label_pattern", None), chosen.pop("label_by", None))
+    switches = {name: bool(chosen.pop(name, False)) for name in ("follow_links", "trim")}
+    join = bool(chosen.pop("join_files", False))
+    for name in ("fill_gaps", "rows"):  # libraries store what was given
+        if chosen.get(name) is None:
+            chosen.pop(name, None)
+    chosen["kinds"] = dict(chosen.get("kinds") or ()) or None
+    return HowToRead(Layout(**chosen, reference=reference), rule, switches, join)
+
+
 def read_paths(  # noqa: PLR0913 - those of `read_recordings`, in records
     paths: Sequence[Path],
     layout: Layout,
@@ -154,16 +180,53 @@ def read_paths(  # noqa: PLR0913 - those of `read_recordings`, in records
 ) -> Recordings:
     """Read recordings as `read_recordings` does, and the standard input as a file of some name."""
     max_file_bytes()
+    _check_rule(rule, layout)
+    entries, problems = entries_of(paths, follow_links)
+    recordings = read_entries(
+        entries,
+        layout,
+        rule,
+        follow_links=follow_links,
+        trim=trim,
+        join=join,
+        progress=progress,
+        standard_input=standard_input,
+        where=paths,
+        problems=problems,
+    )
+    given = [] if standard_input is None else [Path(standard_input[0])]
+    check_asked(layout, heads_of(recordings), recordings.people is not None, in_words([*paths, *given]))
+    return recordings
+
+
+def _check_rule(rule: NameRule, layout: Layout) -> None:
+    """Refuse two origins of a label, or of a person."""
     if rule.label_by is not None and layout.label is not None:
         raise SpecificationError("expected label or label_by, not both")
     if rule.names_person and layout.person is not None:
         raise SpecificationError("expected person, a column, or {person} in label_pattern, not both")
-    entries, problems = entries_of(paths, follow_links)
-    read, where = [], list(paths)
+
+
+def read_entries(  # noqa: PLR0913 - those of `read_paths`, and what it has found
+    entries: Sequence[Entry],
+    layout: Layout,
+    rule: NameRule,
+    *,
+    follow_links: bool = False,
+    trim: bool = False,
+    join: bool = False,
+    progress: Progress | None = None,
+    standard_input: tuple[str, bytes] | None = None,
+    where: Sequence[Path] = (),
+    problems: Sequence[Problem] = (),
+) -> Recordings:
+    """Read files and data sets that are listed already; `where` says in messages what was given."""
+    read: list[FileRead] = []
+    places = list(where) or [Path(entry.name) for entry in entries]
     if standard_input is not None:
         name, data = Path(standard_input[0]), standard_input[1]
         read.append(rule.apply(read_bytes(data, name, layout), name))
-        where.append(name)
+        places.append(name)
     by_path = {entry.path: entry for entry in entries}
     parts = layout
     if join:  # their columns are chosen when they are side by side
@@ -187,20 +250,30 @@ def read_paths(  # noqa: PLR0913 - those of `read_recordings`, in records
             for file, entry in joined
         ]
     read += [rule.apply(file, entry.path) for file, entry in files]
-    recordings = merge_files(read, in_words(where), problems, layout.kinds, layout.skip, layout.by_number)
+    recordings = merge_files(read, in_words(places), problems, layout.kinds, layout.skip, layout.by_number)
     recordings = replace(recordings, notes=notes)
-    # Refuse a column to exclude that no file has: it is most likely misspelled.
-    left_aside = sorted({name for how, _ in recordings.detected for name in how.ignored})
+    return trimmed(recordings) if trim else recordings
+
+
+Heads = tuple[tuple[str, ...], tuple[str, ...]]  # columns that are left aside, and those that are read
+
+
+def heads_of(recordings: Recordings) -> list[Heads]:
+    """Return the heads of the columns of files."""
+    return [(how.ignored, how.columns) for how, _ in recordings.detected]
+
+
+def check_asked(layout: Layout, heads: Sequence[Heads], has_people: bool, where: str) -> None:
+    """Refuse a column to exclude, or one of people, that no file at `where` has: it is most likely misspelled."""
+    aside, read = (sorted({name for file in heads for name in file[k]}) for k in (0, 1))
     for column in layout.excluded:
-        if not isinstance(column, int) and not column.isdecimal() and not excluded_numbers(left_aside, [column]):
-            others = sorted({name for how, _ in recordings.detected for name in how.columns})
-            raise DataError(f"expected columns like {column!r} to exclude, got none but {listed(others)}")
-    if layout.person is not None and recordings.people is None:
+        if not isinstance(column, int) and not column.isdecimal() and not excluded_numbers(aside, [column]):
+            raise DataError(f"expected columns like {column!r} to exclude, got none but {listed(read)}")
+    if layout.person is not None and not has_people:
         raise DataError(
-            f"expected a column {layout.person!r} of a table that names people, found none in {in_words(where)}; "
+            f"expected a column {layout.person!r} of a table that names people, found none in {where}; "
             "say who showed them with label_pattern=, in the shell also with --by-person or --person"
         )
-    return trimmed(recordings) if trim else recordings
 
 
 def trimmed(recordings: Recordings) -> Recordings:

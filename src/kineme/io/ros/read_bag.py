@@ -13,26 +13,10 @@ import numpy as np
 
 from kineme.errors import DataError
 from kineme.io.limits import check_expanded
+from kineme.io.ros import streams as bag_streams
 from kineme.io.ros.bags import Bag, Topic, logs_beside, messages_of, open_bag
 from kineme.io.ros.choose import Edge, Step, chain, choose, connected_graph, edge_of, transforms_in
 from kineme.io.ros.number_fields import POSE, TYPES, Heads, decoder_of, nanoseconds_of, transform_row
-from kineme.io.ros.streams import (
-    SECOND,
-    Samples,
-    Stream,
-    are_rotations,
-    check_samples,
-    clock_of,
-    from_ros,
-    in_order,
-    merge_streams,
-    read_streams,
-    stamps_of,
-    stream_of,
-    to_ros,
-    values_at,
-    with_rotations,
-)
 from kineme.movements.rotations import conjugate, continuous, product, rotated
 from kineme.movements.tables.columns import Roles, column_numbers, is_no_coordinate
 from kineme.movements.tables.layout import AS_KNOWN, Layout, Parsed, listed, no_lines
@@ -53,19 +37,19 @@ def read_bag(path: Path, layout: Layout) -> Parsed:
         choice = choose(bag, layout)
         paths = [topic for topic in choice.topics if topic.type in TYPES and TYPES[topic.type].path]
         if not paths:
-            streams: list[Stream] = []
+            streams: list[bag_streams.Stream] = []
             left_out: list[str] = []
             if choice.frames:
                 streams, left_out = read_transforms(bag, choice.transforms, choice.frames, layout.skip)
             if choice.topics:
-                others, lost = read_streams(bag, choice.topics, layout.skip, layout.coordinates)
+                others, lost = bag_streams.read_streams(bag, choice.topics, layout.skip, layout.coordinates)
                 streams, left_out = [*streams, *others], [*left_out, *lost]
-            of_headers, reason = clock_of(streams)
+            of_headers, reason = bag_streams.clock_of(streams)
             if str(layout.time) in _CLOCKS:
                 of_headers = layout.time == _CLOCKS[0]
-            merged, lost = merge_streams(streams, of_headers)
+            merged, lost = bag_streams.merge_streams(streams, of_headers)
             stamps = [merged.recorded if merged.stamped is None else merged.stamped, merged.recorded]
-            columns = [*(each / SECOND for each in stamps), *merged.values.T]
+            columns = [*(each / bag_streams.SECOND for each in stamps), *merged.values.T]
             what = [f"frames {parent}:{child}" for parent, child in choice.frames]
             what += [f"topic {topic.name} of {topic.type}" for topic in choice.topics]
             said_what = ", ".join(what) + (AS_KNOWN if choice.as_known else "")
@@ -107,7 +91,7 @@ def _parsed(table: Table, roles: Roles, layout: Layout, about: tuple[str, str, s
 
 def read_transforms(
     bag: Bag, topics: Sequence[Topic], wanted: Sequence[Edge], skip: str
-) -> tuple[list[Stream], list[str]]:
+) -> tuple[list[bag_streams.Stream], list[str]]:
     """Read the pose of each child frame in its parent frame, and what was left out."""
     if not topics:
         raise DataError("expected a topic of transforms, such as /tf, got none")
@@ -133,12 +117,12 @@ def read_transforms(
 
 def _collect(
     bag: Bag, topics: Sequence[Topic], needed: set[Edge], bad: list[str]
-) -> tuple[dict[Edge, Samples], dict[str, Counter[str]]]:
+) -> tuple[dict[Edge, bag_streams.Samples], dict[str, Counter[str]]]:
     """Return the needed transforms, and for their children how often each parent occurs."""
-    samples_of_edges = {edge: Samples.empty() for edge in needed}
+    samples_of_edges = {edge: bag_streams.Samples.empty() for edge in needed}
     children = {child for _, child in needed}
     counts: Counter[Edge] = Counter()  # by names as they are in messages, of which there are few
-    samples_of: dict[Edge, Samples | None] = {}
+    samples_of: dict[Edge, bag_streams.Samples | None] = {}
     for n, (_, recorded, transform) in enumerate(transforms_in(bag, topics, bad)):
         header = transform.header
         names = header.frame_id, transform.child_frame_id
@@ -150,7 +134,7 @@ def _collect(
             samples.recorded.append(recorded)
             samples.stamped.append(nanoseconds_of(header.stamp))
         if not n % _CHECKED:
-            check_samples(list(samples_of_edges.values()))
+            bag_streams.check_samples(list(samples_of_edges.values()))
     parents: dict[str, Counter[str]] = {child: Counter() for child in children}
     for names, n in counts.items():
         parent, child = (name.removeprefix("/") for name in names)
@@ -159,12 +143,12 @@ def _collect(
     return samples_of_edges, parents
 
 
-def _usable(edge: Edge, samples: Samples, left_out: list[str]) -> Stream:
+def _usable(edge: Edge, samples: bag_streams.Samples, left_out: list[str]) -> bag_streams.Stream:
     """Take the transforms of an edge with valid rotations, each once: some nodes publish the last one again."""
     where = f"transform {edge[0]}:{edge[1]}"
-    stream = stream_of(where, POSE, samples)
+    stream = bag_streams.stream_of(where, POSE, samples)
     assert stream.stamped is not None
-    good = are_rotations(stream.values[:, 3:]) & np.isfinite(stream.values).all(axis=1)
+    good = bag_streams.are_rotations(stream.values[:, 3:]) & np.isfinite(stream.values).all(axis=1)
     if n_bad := int((~good).sum()):
         first = int(np.argmin(good))
         norm = float(np.linalg.norm(stream.values[first, 3:]))
@@ -175,13 +159,15 @@ def _usable(edge: Edge, samples: Samples, left_out: list[str]) -> Stream:
     return stream.at(rows[np.diff(stream.stamped[rows], prepend=stream.stamped[rows[0]] - 1) != 0])
 
 
-def _composed(name: str, way: Sequence[Step], edges: dict[Edge, Stream], left_out: list[str]) -> Stream:
+def _composed(
+    name: str, way: Sequence[Step], edges: dict[Edge, bag_streams.Stream], left_out: list[str]
+) -> bag_streams.Stream:
     moving = [edges[step.edge] for step in way if not _is_fixed(edges[step.edge])]
     if not moving:
         raise DataError(f"frames {name}: expected a frame that moves in the other, got transforms that never change")
-    of_headers, reason = clock_of(moving)
+    of_headers, reason = bag_streams.clock_of(moving)
     # The stamps of the transform that has most of them, within the time in which all others are known too.
-    stamps = [np.unique(stamps_of(stream, of_headers)) for stream in moving]
+    stamps = [np.unique(bag_streams.stamps_of(stream, of_headers)) for stream in moving]
     first, last = max(stamps_of_one[0] for stamps_of_one in stamps), min(times[-1] for times in stamps)
     inside = [times[(times >= first) & (times <= last)] for times in stamps]
     k = max(range(len(inside)), key=lambda i: len(inside[i]))
@@ -194,28 +180,30 @@ def _composed(name: str, way: Sequence[Step], edges: dict[Edge, Stream], left_ou
     if n_lost := len(stamps[k]) - len(most):
         left_out.append(f"frames {name}: {counted(n_lost, 'stamp')} of {moving[k].name}, at which others are not known")
     start = int(most[0])
-    seconds = (most - start) / SECOND
+    seconds = (most - start) / bag_streams.SECOND
     p, q = np.zeros((len(most), 3)), np.tile([1.0, 0.0, 0.0, 0.0], (len(most), 1))
     for step in way:
         # The pose (p, q) followed by transforms (n, 7), or by their inverses.
         transform = _at(seconds, start, edges[step.edge], of_headers)
-        x, r = transform[:, :3], from_ros(transform[:, 3:])
+        x, r = transform[:, :3], bag_streams.from_ros(transform[:, 3:])
         if not step.forward:
             r = conjugate(r)
             x = -rotated(r, x)
         p, q = p + rotated(q, x), product(q, r)
-    return Stream(name, POSE, np.hstack((p, to_ros(continuous(q)))), most, most if of_headers else None, reason)
+    return bag_streams.Stream(
+        name, POSE, np.hstack((p, bag_streams.to_ros(continuous(q)))), most, most if of_headers else None, reason
+    )
 
 
-def _is_fixed(stream: Stream) -> bool:
+def _is_fixed(stream: bag_streams.Stream) -> bool:
     return bool((stream.values == stream.values[0]).all())
 
 
-def _at(seconds: Array, start: int, stream: Stream, of_headers: bool) -> Array:
+def _at(seconds: Array, start: int, stream: bag_streams.Stream, of_headers: bool) -> Array:
     if _is_fixed(stream):
         return np.repeat(stream.values[:1], len(seconds), axis=0)
-    stamps, values = in_order(stream, of_headers)
-    return values_at(seconds, (stamps - start) / SECOND, stream, values)
+    stamps, values = bag_streams.in_order(stream, of_headers)
+    return bag_streams.values_at(seconds, (stamps - start) / bag_streams.SECOND, stream, values)
 
 
 class _Group(NamedTuple):
@@ -241,7 +229,9 @@ def _movements_of_messages(bag: Bag, topic: Topic, layout: Layout) -> Parsed:
     values = np.frombuffer(numbers, np.float64).reshape(-1, len(heads))
     stamps = np.frombuffer(ticks, np.int64)
     where = f"topic {topic.name}: "
-    stream = with_rotations(Stream(topic.name, heads, values, stamps, None), where, layout.skip, left_out)
+    stream = bag_streams.with_rotations(
+        bag_streams.Stream(topic.name, heads, values, stamps, None), where, layout.skip, left_out
+    )
     if len(stream.values) < len(values):
         raise DataError(left_out[-1])
     is_planned = topic.type.endswith("JointTrajectory")
@@ -251,7 +241,7 @@ def _movements_of_messages(bag: Bag, topic: Topic, layout: Layout) -> Parsed:
     names = np.empty(len(stamps), dtype=object)
     names[:] = np.repeat([str(place) for place in places], lengths)
     columns = ("time_from_start" if is_planned else "header.stamp", "message", *stream.heads)
-    times = stamps / SECOND if timed else np.zeros(len(stamps))
+    times = stamps / bag_streams.SECOND if timed else np.zeros(len(stamps))
     table = Table(columns, [times, names, *stream.values.T], len(names), no_lines, dates_in="s")
     roles = _roles(columns, 0, layout)._replace(movement=(1,))
     about = (bag.kind, f"topic {topic.name} of {topic.type}, a movement a message", "stamps of its points")

@@ -6,7 +6,7 @@ import csv
 import io
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -25,7 +25,7 @@ from kineme.movements.episodes import number_at
 from kineme.reporting.atomic import whole_file, whole_folder, write_atomically
 from kineme.reporting.text import as_cell, printable
 
-HEADS = ("recording", "place", "start", "end", "symbol", "p_value", "confidence", "unknown")
+HEADS = ("recording", "place", "start", "end", "symbol", "p_value", "confidence", "unknown", "uncertainty")
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,7 @@ class Annotation:
     p_value: float  # share of movements of known symbols that would be as novel or more
     confidence: float  # probability that the symbol is right if the library has it; if unknown, 1 minus `p_value`
     origin: float = 0.0  # time stamp of the first sample of the recording [s]
+    uncertainty: float = math.nan  # half of the 95 % interval of start and end, of the less certain one [s]
 
     @property
     def unknown(self) -> bool:
@@ -53,8 +54,9 @@ class Annotation:
 
 
 def as_row(annotation: Annotation) -> dict[str, Any]:
-    """Return an annotation as plain data, in the order of `HEADS`."""
-    return {head: getattr(annotation, head) for head in HEADS}
+    """Return an annotation as plain data, in the order of `HEADS`; an uncertainty that nobody knows is None."""
+    row = {head: getattr(annotation, head) for head in HEADS}
+    return row if math.isfinite(annotation.uncertainty) else row | {"uncertainty": None}
 
 
 def to_csv(annotations: Sequence[Annotation]) -> bytes:
@@ -75,6 +77,15 @@ def to_csv(annotations: Sequence[Annotation]) -> bytes:
 def write_csv(path: Path, annotations: Sequence[Annotation], source: Path | None) -> Path:
     """Write `to_csv`."""
     return write_atomically(path, to_csv(annotations))
+
+
+def write_csv_stream(path: Path, parts: Iterable[Sequence[Annotation]]) -> Path:
+    """Write `to_csv` of many annotations, some at a time."""
+    with whole_file(path) as beside, beside.open("wb") as file:
+        file.write(to_csv([]))
+        for annotations in parts:
+            file.write(to_csv(annotations).partition(b"\n")[2])
+    return path
 
 
 def write_json(path: Path, annotations: Sequence[Annotation], source: Path | None) -> Path:
@@ -185,7 +196,8 @@ def write_lerobot(path: Path, annotations: Sequence[Annotation], source: Path | 
         number = number_at(note.place)
         if number is None:
             raise DataError(f"expected annotations of episodes, got one of {note.place!r}")
-        motion = Motion(number, note.start, note.end, note.symbol, note.p_value, note.confidence)
+        certainty = note.p_value, note.confidence, note.uncertainty
+        motion = Motion(number, note.start, note.end, note.symbol, *certainty)
         motions.setdefault(number, []).append(motion)
     if is_in_place(path, [source]):
         name_in_place(source, motions)

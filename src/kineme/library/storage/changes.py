@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import json
-import sqlite3
 from collections.abc import Sequence
 from typing import Any
 
 from kineme.errors import SpecificationError
 from kineme.library.storage.read import as_ids
-from kineme.library.storage.rows import Row, among, check_text, listed, next_key, parsed_column, select
+from kineme.library.storage.rows import Database, Row, among, check_text, listed, next_key, parsed_column, select
 from kineme.library.storage.schema import COLUMNS, MAX_DOCUMENT
-from kineme.library.storage.store import NOW, Change, Store
+from kineme.library.storage.store import NOW, Change, Store, repeated
 from kineme.library.storage.symbols import HOW, add_members, check_name, make, state_of
 from kineme.validation import check_choice, check_number
 
@@ -20,6 +19,7 @@ _NAME = _STATE.index("name")  # the history says names, whatever the symbol was 
 _SAID = ("description", "prototype", "threshold")  # the columns that `annotate` changes
 
 
+@repeated
 def rename(store: Store, old: str, new: str) -> int:
     """Rename a symbol; its id stays."""
     check_name(new)
@@ -31,6 +31,7 @@ def rename(store: Store, old: str, new: str) -> int:
     return change.version
 
 
+@repeated
 def annotate(store: Store, who: str, **values: Any) -> int:
     """Change description, prototype (id of a movement) and threshold of a symbol."""
     for name in values:
@@ -49,6 +50,7 @@ def annotate(store: Store, who: str, **values: Any) -> int:
     return change.version
 
 
+@repeated
 def delete_symbol(store: Store, who: str) -> int:
     """Delete a symbol; its movements stay, without a symbol."""
     with store.writing("delete") as change:
@@ -59,6 +61,7 @@ def delete_symbol(store: Store, who: str) -> int:
     return change.version
 
 
+@repeated
 def delete_movements(store: Store, ids: Any) -> int:
     """Delete movements; a symbol whose prototype is among them loses it."""
     wanted = as_ids(store, ids)
@@ -72,6 +75,7 @@ def delete_movements(store: Store, ids: Any) -> int:
     return change.version
 
 
+@repeated
 def merge(store: Store, names: Sequence[str], into: str) -> int:
     """Merge several symbols into one, see `ActionLibrary.merge`; `into` is its name, or the id of one that exists."""
     if isinstance(names, str) or len(set(names)) < 1:
@@ -100,6 +104,7 @@ def merge(store: Store, names: Sequence[str], into: str) -> int:
     return change.version
 
 
+@repeated
 def split(store: Store, name: str, ids: Any, new: str) -> int:
     """Split a symbol: some of its members become a new symbol, and the old one becomes its parent."""
     check_name(new)
@@ -119,6 +124,7 @@ def split(store: Store, name: str, ids: Any, new: str) -> int:
     return change.version
 
 
+@repeated
 def assign(
     store: Store, ids: Any, who: str, how: str = "anchored", medoid: int | None = None, description: str | None = None
 ) -> int:
@@ -147,6 +153,7 @@ def assign(
     return change.version
 
 
+@repeated
 def release(store: Store, ids: Any) -> int:
     """Remove movements from their symbols."""
     wanted = as_ids(store, ids)
@@ -184,14 +191,14 @@ def _move_members(change: Change, members: Sequence[Row], key: int) -> None:
         add_members(change, [(row[1], key) for row in members if row[3] == how], how)
 
 
-def _find(connection: sqlite3.Connection, who: str) -> Row | None:
+def _find(connection: Database, who: str) -> Row | None:
     try:
         return state_of(connection, who, NOW)
     except SpecificationError:
         return None
 
 
-def _ids_of(connection: sqlite3.Connection, states: Sequence[Row]) -> list[str]:
+def _ids_of(connection: Database, states: Sequence[Row]) -> list[str]:
     keys = listed(state[1] for state in states)
     return [row[1] for row in select(connection, "symbol", among("key"), {"keys": keys})]
 
@@ -202,7 +209,7 @@ def _check_description(text: Any) -> None:
     check_text("a description", text, MAX_DOCUMENT // 2)  # the history repeats it, in JSON
 
 
-def _check_free(connection: sqlite3.Connection, name: str) -> None:
+def _check_free(connection: Database, name: str) -> None:
     if select(connection, "symbol_state", "removed IS NULL AND name = :name", {"name": name}):
         raise SpecificationError(f"expected a name that no symbol has, got {name!r}; merge the two, or choose another")
     if select(connection, "symbol", "id = :name", {"name": name}):

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from kineme.errors import DataError, KinemeError, SpecificationError
-from kineme.library.storage.rows import Row, damage, insert, select
+from kineme.errors import DataError, KinemeError
+from kineme.library.storage.rows import Database, Row, damage, insert, select
 from kineme.library.storage.safety import Connection, defend, open_connection
 from kineme.library.storage.schema import APPLICATION_ID, CREATE, META, MIGRATIONS, PAGE_SIZE, SCHEMA_VERSION
 from kineme.reporting.atomic import whole_file
@@ -107,15 +107,20 @@ def create(path: Path, meta: dict[str, str]) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         check_alone(path)
         with new_database(path) as beside, closing(open_connection(beside, isolation_level=None)) as connection:
-            connection.execute(f"PRAGMA page_size = {PAGE_SIZE}")
-            connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
-            connection.execute("PRAGMA journal_mode = WAL")
-            connection.execute("BEGIN")
-            for statement in _statements(SCHEMA_VERSION):
-                connection.execute(statement)
-            insert(connection, "meta", [*meta.items(), ("schema", schema_seal(connection))])
-            connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
-            connection.execute("COMMIT")
+            define(connection, meta)
+
+
+def define(connection: sqlite3.Connection, meta: dict[str, str]) -> None:
+    """Make an empty database an empty library."""
+    connection.execute(f"PRAGMA page_size = {PAGE_SIZE}")
+    connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
+    connection.execute("PRAGMA journal_mode = WAL")
+    connection.execute("BEGIN")
+    for statement in statements(SCHEMA_VERSION):
+        connection.execute(statement)
+    insert(connection, "meta", [*meta.items(), ("schema", schema_seal(connection))])
+    connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
+    connection.execute("COMMIT")
 
 
 def check_alone(path: Path) -> None:
@@ -151,7 +156,7 @@ def _check_definitions(connection: sqlite3.Connection, path: Path, version: int)
     A trigger could change what is written; a view or a computed column could return anything, or run forever.
     """
     encoding = connection.execute("PRAGMA encoding").fetchone()[0]
-    expected = _definitions(_statements(version))
+    expected = _definitions(statements(version))
     stored = connection.execute(f"{_DEFINITIONS} LIMIT {len(expected) + 1}").fetchall()
     if stored == expected and encoding == "UTF-8":
         return
@@ -164,7 +169,7 @@ def _check_definitions(connection: sqlite3.Connection, path: Path, version: int)
     )
 
 
-def checked_meta(connection: sqlite3.Connection, path: Path) -> dict[str, str]:
+def checked_meta(connection: Database, path: Any) -> dict[str, str]:
     """Return the rows of the table `meta`, after a check that the definitions of the tables are undamaged."""
     try:
         meta: dict[str, str] = dict(select(connection, "meta"))
@@ -176,7 +181,7 @@ def checked_meta(connection: sqlite3.Connection, path: Path) -> dict[str, str]:
     raise damage(f"the definitions of tables in {path}, and its specification, as they were stored", "damaged bytes")
 
 
-def _statements(version: int) -> tuple[str, ...]:
+def statements(version: int) -> tuple[str, ...]:
     """Return the statements that create a library of this schema version, equal in every character to migration's."""
     return (*CREATE, *(statement for earlier in range(1, version) for statement in MIGRATIONS[earlier]))
 
@@ -201,9 +206,11 @@ def migrate(connection: sqlite3.Connection, path: Path) -> None:
         _check_definitions(connection, path, SCHEMA_VERSION)
 
 
-def schema_seal(connection: sqlite3.Connection) -> str:
+def schema_seal(connection: Database) -> str:
     """Return a checksum of the tables' definitions."""
-    return str(zlib.crc32(repr(connection.execute(_DEFINITIONS).fetchall()).encode()))
+    of_server = getattr(connection, "definitions", None)
+    rows = connection.execute(_DEFINITIONS).fetchall() if of_server is None else of_server()
+    return str(zlib.crc32(repr(rows).encode()))
 
 
 @contextmanager
@@ -217,14 +224,6 @@ def transaction(connection: sqlite3.Connection) -> Iterator[None]:
         if connection.in_transaction:
             connection.execute("ROLLBACK")
         raise
-
-
-def as_folder(folder: Any) -> Path:
-    """Return the folder of a library that exists or is to be created."""
-    name = os.fsdecode(folder) if isinstance(folder, str | os.PathLike) else ""
-    if not name.strip() or "\0" in name:
-        raise SpecificationError(f"expected the folder of a library, got {folder!r}; the current one is '.'")
-    return Path(name)
 
 
 @contextmanager
@@ -263,6 +262,10 @@ def _is_library(path: Path) -> bool:
 
 class BusyError(DataError):
     """Another process writes; the same may be tried again later."""
+
+
+class ConflictError(BusyError):
+    """Two writers on a server were in each other's way; the same may be tried again at once."""
 
 
 @contextmanager

@@ -7,12 +7,13 @@ import sqlite3
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from kineme.errors import DataError
+from kineme.library.storage.address import Address, as_location
 from kineme.library.storage.connection import (
     FILE,
     LOGS,
-    as_folder,
     check_alone,
     check_kind,
     connect,
@@ -21,7 +22,7 @@ from kineme.library.storage.connection import (
     new_database,
 )
 from kineme.library.storage.rows import damage
-from kineme.library.storage.safety import defend_foreign, limited, limited_copy
+from kineme.library.storage.safety import defend_foreign, limited
 from kineme.library.storage.schema import SCHEMA_VERSION
 from kineme.library.storage.store import Store
 from kineme.library.storage.verify import verify
@@ -34,7 +35,7 @@ def export(store: Store, path: str | Path) -> Path:
     """
     target = Path(path)
     with _new(target) as beside:
-        with closing(connect(store.path, "ro", store.wait)) as connection, limited_copy(connection, store.path, beside):
+        with store.database(beside) as connection:
             _copy(connection, store, beside)
         with closing(connect(beside, "rw", store.wait)) as copy:
             copy.execute("PRAGMA schema_version = 1")  # a counter of VACUUM, which is not content
@@ -53,15 +54,23 @@ def _copy(connection: sqlite3.Connection, store: Store, beside: Path) -> None:
             raise
 
 
-def import_(path: str | Path, folder: str | Path, wait: float = 10.0) -> Path:
-    """Create a library in `folder` from a file of `export`, after checking every byte and every value.
+def import_(path: str | Path, folder: str | Path | Address, wait: float = 10.0) -> Path | Address:
+    """Create a library in `folder`, or at an address, from a file of `export`, after checking every byte and value.
 
     The file may come from anywhere: a copy of it is checked, by a connection on which nothing in the file can run, and
     becomes a library only if its definitions and values are those of a library.
     """
-    source, target = Path(path), as_folder(folder) / FILE
+    source, location = Path(path), as_location(folder)
+    if isinstance(location, Address):
+        from kineme.library.storage.postgres_store import move_in
+
+        with TemporaryDirectory() as checked:
+            import_(source, checked, wait)
+            with closing(Store(Path(checked) / FILE, read_only=True, wait=wait)) as store:
+                return move_in(store, location)
+    target = location / FILE
     _check_file(source)
-    Path(folder).mkdir(parents=True, exist_ok=True)
+    location.mkdir(parents=True, exist_ok=True)
     check_alone(target)
     with _new(target) as beside:
         # Refuse a file that would fill the disk; a sparse file may be larger than its disk.

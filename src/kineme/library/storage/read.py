@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sqlite3
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
@@ -14,7 +13,7 @@ from kineme.dmp.discrete.dmp import Primitives
 from kineme.dmp.recorded_as import RecordedAs
 from kineme.errors import SpecificationError
 from kineme.library.storage.channels import with_channels
-from kineme.library.storage.rows import ALIVE, Row, among, damage, damaged, has_table, listed, select, strange
+from kineme.library.storage.rows import ALIVE, Database, Row, among, damage, damaged, has_table, listed, select, strange
 from kineme.library.storage.schema import COLUMNS
 from kineme.library.storage.store import Moment, Store
 from kineme.movements.channels.channel import is_plain
@@ -31,20 +30,20 @@ _ROWS = 4096  # rows fetched at a time
 
 def all_ids(store: Store) -> Ids:
     """Return ids of all movements, ascending."""
-    return _ids(store, "TRUE", lambda moment: moment.movements)
+    return _ids(store, "", lambda moment: moment.movements)
 
 
 def unlabeled_ids(store: Store) -> Ids:
     """Return ids of the movements without a symbol, ascending."""
-    without = f"id NOT IN (SELECT movement FROM member WHERE {ALIVE})"
-    return _ids(store, without, lambda moment: moment.movements - moment.members)
+    members = f"EXCEPT SELECT movement FROM member WHERE {ALIVE}"
+    return _ids(store, members, lambda moment: moment.movements - moment.members)
 
 
-def _ids(store: Store, where: str, count_at: Callable[[Moment], int]) -> Ids:
+def _ids(store: Store, without: str, count_at: Callable[[Moment], int]) -> Ids:
     """Return ids of movements, ascending; refused if their number is not that of the moment."""
     with store.reading() as connection:
         moment = store.moment(connection)
-        expected, query = count_at(moment), f"SELECT id FROM movement WHERE {ALIVE} AND {where} ORDER BY id"
+        expected, query = count_at(moment), f"SELECT id FROM movement WHERE {ALIVE} {without} ORDER BY id"
         ids = np.array([key for (key,) in connection.execute(query, {"v": moment.version})], dtype=np.int64)
         last, n = connection.execute("SELECT coalesce(max(id), 0), count(*) FROM movement").fetchone()
     if len(ids) != expected or last != n or (np.diff(ids) <= 0).any():
@@ -107,7 +106,7 @@ def movements(store: Store, ids: Ids, labels: Sequence[str | None] | None = None
         _check_finite("raw", rows, block, lengths[part])
         stamps.update((done + k, row[3]) for k, row in enumerate(rows) if row[3] is not None)
         done = part.stop
-    times = _times(stamps, offsets, t0, durations) if stamps or t0.any() else None
+    times = times_of(stamps, offsets, t0, durations) if stamps or t0.any() else None
     if times is not None:
         increasing = times[1:] > times[:-1]
         increasing[offsets[1:-1] - 1] = True  # from one movement to the next
@@ -130,7 +129,7 @@ def _check_finite(table: str, rows: Sequence[Row], block: NDArray[Any], lengths:
         raise strange(table, rows[int(np.searchsorted(first, np.argmin(good), side="right"))])
 
 
-def _times(stamps: dict[int, bytes], offsets: NDArray[np.intp], t0: Array, durations: Array) -> Array:
+def times_of(stamps: dict[int, bytes], offsets: NDArray[np.intp], t0: Array, durations: Array) -> Array:
     """Return the time stamps of all samples: the stored ones, and even ones for movements without."""
     lengths = np.diff(offsets)
     k = np.arange(offsets[-1]) - np.repeat(offsets[:-1], lengths)
@@ -231,7 +230,7 @@ def groups(store: Store, ids: Ids) -> NDArray[np.object_]:
     return result
 
 
-def people_by_movement(connection: sqlite3.Connection, keys: Sequence[int], version: int) -> dict[int, str]:
+def people_by_movement(connection: Database, keys: Sequence[int], version: int) -> dict[int, str]:
     """Return movement -> who showed it, of those of which that was known at a version."""
     if not has_table(connection, "shown_by") or not connection.execute("SELECT 1 FROM shown_by LIMIT 1").fetchone():
         return {}

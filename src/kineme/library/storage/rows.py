@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import json
-import sqlite3
 import zlib
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Any, Protocol
 
 from kineme.errors import DataError, SpecificationError
 from kineme.library.storage.schema import BLOBS, COLUMNS, GOOD, MAX_TEXT, OPTIONAL_BLOBS, SINCE
@@ -14,6 +13,20 @@ from kineme.library.storage.schema import BLOBS, COLUMNS, GOOD, MAX_TEXT, OPTION
 Row = tuple[Any, ...]
 
 _PARAMETERS = 999  # parameters per statement that every build of SQLite allows
+
+
+class Database(Protocol):
+    """A connection to the tables of a library. Statements are those of SQLite, which that of a server translates."""
+
+    def execute(self, statement: str, parameters: Any = ..., /) -> Any:
+        """Execute a statement."""
+
+    def executemany(self, statement: str, parameters: Any, /) -> Any:
+        """Execute a statement with each of several parameters."""
+
+    def close(self) -> None:
+        """Close the connection."""
+
 
 #: A row at version :v.
 ALIVE = "added <= :v AND (removed IS NULL OR removed > :v)"
@@ -29,12 +42,15 @@ def seal(table: str, row: Row) -> int:
     return zlib.crc32(repr(row).encode())
 
 
-def insert(connection: sqlite3.Connection, table: str, rows: Sequence[Row]) -> None:
+def insert(connection: Database, table: str, rows: Sequence[Row]) -> None:
     """Add rows, in the order of `COLUMNS`, each with its seal.
 
     Many rows per statement: between two statements the GIL changes hands, and with one statement per row the writing
     thread would mostly wait for the thread that describes the next movements.
     """
+    if copy_rows := getattr(connection, "copy_rows", None):  # of a server
+        copy_rows(table, [(*row, seal(table, row)) for row in rows])
+        return
     width = len(COLUMNS[table]) + 1
     step = _PARAMETERS // width
     mark = f"({', '.join('?' * width)})"
@@ -45,7 +61,7 @@ def insert(connection: sqlite3.Connection, table: str, rows: Sequence[Row]) -> N
 
 
 def select(
-    connection: sqlite3.Connection, table: str, where: str = "TRUE", parameters: dict[str, Any] | None = None
+    connection: Database, table: str, where: str = "TRUE", parameters: dict[str, Any] | None = None
 ) -> list[Row]:
     """Return rows of a table ordered by key, with checked seals and values, without the seals."""
     columns = COLUMNS[table]
@@ -57,9 +73,12 @@ def select(
     return [row[:-2] for row in rows]
 
 
-def has_table(connection: sqlite3.Connection, table: str) -> bool:
+def has_table(connection: Database, table: str) -> bool:
     """Tell whether a library has a table: one of an earlier version that is only read lacks the later ones."""
-    return bool(connection.execute("PRAGMA user_version").fetchone()[0] >= SINCE.get(table, 1))
+    version = getattr(connection, "schema_version", None)  # of a server
+    if version is None:
+        version = connection.execute("PRAGMA user_version").fetchone()[0]
+    return bool(version >= SINCE.get(table, 1))
 
 
 def sealed(table: str, row: Row) -> bool:
@@ -128,7 +147,7 @@ def listed(values: Iterable[Any]) -> str:
     return json.dumps([value if isinstance(value, str) else int(value) for value in values])
 
 
-def next_key(connection: sqlite3.Connection, table: str) -> int:
+def next_key(connection: Database, table: str) -> int:
     """Return the key of the next row of a table; keys are never reused."""
     largest = connection.execute(f"SELECT max({COLUMNS[table][0]}) FROM {table}").fetchone()[0]
     return (largest or 0) + 1

@@ -30,6 +30,7 @@ from typing import Any
 from weakref import WeakSet
 
 from kineme.errors import DataError
+from kineme.library.storage.address import Address
 from kineme.runtime import forks
 
 _STEPS = 200_000  # of SQLite's virtual machine between two checks of the limits: some milliseconds
@@ -78,7 +79,7 @@ _PATIENCE = 10.0  # seconds
 _changed = Condition()
 _busy: dict[int, int] = {}  # thread -> number of its nested uses of a library
 _forking: int | None = None  # id of the thread that forks
-_lost: set[tuple[int, int]] = set()  # device and inode of files that are open in the parent
+_lost: set[object] = set()  # device and inode of files, and addresses, that are open in the parent
 _sleepers: WeakSet[Any] = WeakSet()
 
 
@@ -177,13 +178,13 @@ def limited_copy(connection: Connection, path: Path, copy: Path) -> AbstractCont
     return connection.stopping(lambda: size_of(copy) > most)
 
 
-def is_lost(path: Path) -> bool:
-    """Tell whether a library file was open in the parent at the fork, and could not be closed."""
-    return bool(_lost) and path.exists() and _identity(path) in _lost
+def is_lost(path: Path | Address) -> bool:
+    """Tell whether a library was open in the parent at the fork, and could not be closed."""
+    return bool(_lost) and not _lost.isdisjoint(_identity(path))
 
 
-def refuse_if_lost(path: Path) -> None:
-    """Refuse a library file that was open in the parent at the fork."""
+def refuse_if_lost(path: Path | Address) -> None:
+    """Refuse a library that was open in the parent at the fork."""
     if is_lost(path):
         raise DataError(
             f"expected a process that opens {path} itself, got one that was forked while the library was being read or "
@@ -230,19 +231,20 @@ def _in_child() -> None:
     global _changed  # noqa: PLW0603
     _changed = Condition()
     if _busy:  # it is unknown which connections were open
-        _lost.update(_identity(sleeper.path) for sleeper in list(_sleepers) if sleeper.path.exists())
+        _lost.update(*(_identity(sleeper.path) for sleeper in list(_sleepers)))
     for thread in _busy.keys() - {get_ident()}:
         del _busy[thread]
     for sleeper in list(_sleepers):
         for connection in sleeper.carried_over():
             ctypes.pythonapi.Py_IncRef(ctypes.py_object(connection))  # so that even the end of Python does not close it
-            if sleeper.path.exists():
-                _lost.add(_identity(sleeper.path))
+            _lost.update(_identity(sleeper.path))
 
 
-def _identity(path: Path) -> tuple[int, int]:
-    status = path.stat()
-    return status.st_dev, status.st_ino
+def _identity(path: Path | Address) -> set[object]:
+    """Return a set of device and inode of a file, none where there is no file, or of an address on a server."""
+    if isinstance(path, Path) and not path.exists():
+        return set()
+    return {path if isinstance(path, Address) else (path.stat().st_dev, path.stat().st_ino)}
 
 
 forks.at_fork(_all_asleep, _in_child, first=True)

@@ -5,19 +5,21 @@ from __future__ import annotations
 import json
 import sqlite3
 import uuid
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager, suppress
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from functools import wraps
 from numbers import Integral
 from pathlib import Path
 from threading import Lock, RLock
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from kineme.errors import DataError, SpecificationError
 from kineme.library.storage import safety
 from kineme.library.storage.channels import channels_of_text
 from kineme.library.storage.connection import (
+    ConflictError,
     check_kind,
     checked_meta,
     connect,
@@ -26,11 +28,15 @@ from kineme.library.storage.connection import (
     migrate,
     transaction,
 )
-from kineme.library.storage.rows import Row, damaged, insert, parsed_column, seal, select
+from kineme.library.storage.rows import Database, Row, damaged, insert, next_key, parsed_column, seal, select
 from kineme.library.storage.safety import size_of
 from kineme.library.storage.schema import COUNTED, LARGEST_ID, READABLE, SCHEMA_VERSION
 from kineme.library.storage.specification import Specification, as_n_dims
 from kineme.movements.channels.channel import Channels
+
+Result = TypeVar("Result")
+
+_TRIES = 4  # of a change that others get in the way of
 
 NOW = LARGEST_ID  # later than every version: the current state
 
@@ -42,9 +48,12 @@ class Store:
     reading. `wait` is the time for which it waits for another writer [s].
     """
 
+    path: Any  # of the file; of a library on a server, its address
+    many_write = False
+
     def __init__(
         self,
-        path: Path,
+        path: Any,
         specification: Specification | None = None,
         *,
         read_only: bool = False,
@@ -60,14 +69,19 @@ class Store:
         # SQLite would free memory of a running statement.
         self._read_turn = RLock()
         self._n_reading = 0  # nesting depth of the thread that reads
-        self._writer: sqlite3.Connection | None = None
+        self._writer: Any = None
         self._waking, self._asleep, self._closed = Lock(), False, False
         self._n_dims: int | None = None  # these two are written once
         self._channels: Channels | None = None
-        if not self.path.exists():
-            self._create(specification)
+        if not self.exists(path, wait):
+            if specification is None or self.read_only:
+                raise DataError(
+                    f"expected a library in {self.folder}, found {self._missing()} there; "
+                    "make one by learning (in Python, with create=True), or correct the path"
+                )
+            self._create({"id": str(uuid.uuid4()), **specification.to_json()})
         with in_plain_words(self.path, wait), safety.awake():
-            self._reader = self._connect()
+            self._reader: Any = self._connect()
             try:
                 self._check_kind()
                 meta = checked_meta(self._reader, self.path)
@@ -82,7 +96,18 @@ class Store:
                 raise
             safety.register(self)
 
-    def _connect(self) -> sqlite3.Connection:
+    @classmethod
+    def exists(cls, path: Any, wait: float = 10.0) -> bool:
+        """Tell whether there is a library."""
+        return bool(path.exists())
+
+    def _missing(self) -> str:
+        return f"no {self.path.name}"
+
+    def _create(self, meta: dict[str, str]) -> None:
+        create(self.path, meta)
+
+    def _connect(self) -> Database:
         safety.refuse_if_lost(self.path)
         return connect(self.path, "ro" if self.read_only else "rw", self.wait).allow_forks()
 
@@ -95,7 +120,7 @@ class Store:
                     connection.close()
             self._writer = None
 
-    def carried_over(self) -> list[sqlite3.Connection]:
+    def carried_over(self) -> list[Database]:
         """Return the connections that were open at a fork; see `safety`."""
         if self._closed or self._asleep:
             return []
@@ -108,18 +133,9 @@ class Store:
                 self._reader = self._connect()
                 self._asleep = False
 
-    def _create(self, specification: Specification | None) -> None:
-        if specification is None or self.read_only:
-            raise DataError(
-                f"expected a library in {self.path.parent}, found no {self.path.name} there; "
-                "make one by learning (in Python, with create=True), or correct the path"
-            )
-        create(self.path, {"id": str(uuid.uuid4()), **specification.to_json()})
-
     def _check_kind(self) -> None:
-        """Refuse a file that is not a library; migrate an older one, unless it is only read and can be as it is."""
-        self._file = self.path.stat().st_ino
-        version = check_kind(self._reader, self.path)
+        """Refuse what is not a library; migrate an older one, unless it is only read and can be as it is."""
+        version = self._kind()
         if version == SCHEMA_VERSION or (self.read_only and version >= READABLE):
             return
         if self.read_only:
@@ -127,12 +143,45 @@ class Store:
                 f"expected {self.path} to have schema version {SCHEMA_VERSION}, got an earlier one; "
                 "open it once without read_only to bring it up to date"
             )
+        self._migrate()
+
+    def _kind(self) -> int:
+        """Return the version of the schema; refused if it is a later one, or no library."""
+        self._file = self.path.stat().st_ino
+        return check_kind(self._reader, self.path)
+
+    def _migrate(self) -> None:
         migrate(self._reader, self.path)
 
     @property
-    def folder(self) -> Path:
-        """The folder of the library."""
+    def folder(self) -> Any:
+        """The folder of the library; of one on a server, its address."""
         return self.path.parent
+
+    @property
+    def name(self) -> str:
+        """The name of the library's folder; of one on a server, that of its schema."""
+        return str(self.folder.resolve().name)
+
+    def cache_path(self, name: str) -> Path | None:
+        """Return the path of a cache file; None where no file of this user's own can be."""
+        return Path(self.folder / name)
+
+    @contextmanager
+    def database(self, copy: Path) -> Iterator[sqlite3.Connection]:
+        """Context manager: the library as a database of SQLite of which a copy is written, within limits."""
+        with (
+            closing(connect(self.path, "ro", self.wait)) as connection,
+            safety.limited_copy(connection, self.path, copy),
+        ):
+            yield connection
+
+    @contextmanager
+    def snapshot(self) -> Iterator[Database]:
+        """Context manager: a connection of its own that sees the library at one moment, within limits."""
+        with closing(connect(self.path, "ro", self.wait)) as connection, safety.limited(connection, self.path):
+            connection.execute("BEGIN")
+            yield connection
 
     @property
     def size(self) -> int:
@@ -168,7 +217,7 @@ class Store:
         return rows[0][1] if rows else None
 
     @contextmanager
-    def reading(self) -> Iterator[sqlite3.Connection]:
+    def reading(self) -> Iterator[Database]:
         """Context manager: the connection to read from, which sees only committed versions.
 
         One thread reads at a time; it may nest readings.
@@ -186,7 +235,7 @@ class Store:
                 finally:
                     self._n_reading -= 1
 
-    def moment(self, connection: sqlite3.Connection) -> Moment:
+    def moment(self, connection: Database) -> Moment:
         """Return the shown version, which stays the same while new ones are added."""
         last = connection.execute("SELECT max(id) FROM version WHERE id <= :v", {"v": self.as_of}).fetchone()[0]
         if last is None:
@@ -203,8 +252,20 @@ class Store:
             return self.moment(connection)
 
     @contextmanager
-    def writing(self, action: str, detail: dict[str, Any] | None = None) -> Iterator[Change]:
-        """Context manager: one transaction, which becomes one version; its `detail` is stored in the history."""
+    def _transaction(self, writer: Any, reserve: Mapping[str, int]) -> Iterator[dict[str, int]]:
+        """Return a transaction, and the first keys that are reserved in each table: none."""
+        with transaction(writer):
+            yield {}
+
+    @contextmanager
+    def writing(
+        self, action: str, detail: dict[str, Any] | None = None, reserve: Mapping[str, int] | None = None
+    ) -> Iterator[Change]:
+        """Context manager: one transaction, which becomes one version; its `detail` is stored in the history.
+
+        `reserve` is how many rows it adds to each table whose rows are numbered, if that is known, for stores in which
+        `many_write`: a ConflictError if it adds others, or if what others write does not fit; nothing is stored then.
+        """
         with safety.awake(), in_plain_words(self.path, self.wait):
             # Before the lock: in a forked child, a thread that does not exist may hold it.
             safety.refuse_if_lost(self.path)
@@ -213,16 +274,25 @@ class Store:
                 self._wake()
                 self.check_writable()
                 if self._writer is None:
-                    self._writer = connect(self.path, "rw", self.wait).allow_forks()
-                with transaction(self._writer):
+                    self._writer = self._connect()
+                with self._transaction(self._writer, reserve or {}) as first:
                     self.check_writable()  # again: waiting for the turn may have taken long
-                    last = self.moment(self._writer)
-                    counts = {name: getattr(last, name) for name in COUNTED.values()}
-                    change = Change(self._writer, last.version + 1, counts, detail or {})
+                    version = first.get("version") or self.moment(self._writer).version + 1
+                    change = Change(self._writer, version, detail or {}, dict(first))
                     yield change
+                    if reserve and first:
+                        self._writer.wait_for_turn({table: key for table, key in first.items() if reserve[table]})
+                    last = self.moment(self._writer)
+                    counts = (getattr(last, name) + change.counts.get(name, 0) for name in COUNTED.values())
                     at = datetime.now(UTC).isoformat(timespec="milliseconds")
                     text = json.dumps(change.detail, ensure_ascii=False)
-                    insert(self._writer, "version", [(change.version, at, action, text, *change.counts.values())])
+                    change.insert("version", [(version, at, action, text, *counts)])
+                    if (
+                        reserve
+                        and first
+                        and any(change.reserved[table] != first[table] + reserve[table] for table in first)
+                    ):
+                        raise ConflictError(f"expected {dict(reserve)} rows, got others; run it again")
 
     def check_writable(self) -> None:
         """Refuse to write if opened for reading, or if the file is no longer the one that was opened.
@@ -267,6 +337,19 @@ class Store:
                     self._writer.close()
 
 
+def repeated(change: Callable[..., Result]) -> Callable[..., Result]:
+    """Let a change of a store that another writer got in the way of be made again, a few times."""
+
+    @wraps(change)
+    def again(*arguments: Any, **options: Any) -> Result:
+        for _ in range(_TRIES - 1):
+            with suppress(ConflictError):  # nothing of it was stored
+                return change(*arguments, **options)
+        return change(*arguments, **options)
+
+    return again
+
+
 def history(store: Store) -> tuple[Version, ...]:
     """Return every change up to the version shown, the first one first."""
     with store.reading() as connection:
@@ -309,15 +392,22 @@ class Moment(NamedTuple):
 class Change:
     """An open transaction."""
 
-    connection: sqlite3.Connection
+    connection: Database
     version: int
-    counts: dict[str, int]
     detail: dict[str, Any]  # of the version, for the history
+    reserved: dict[str, int]  # table -> its next key, where keys were reserved before
+    counts: dict[str, int] = field(default_factory=dict)  # by how much the numbers of alive rows change
 
     def insert(self, table: str, rows: Sequence[Row]) -> None:
         """Add rows to a table."""
         insert(self.connection, table, rows)
         self._count(table, len(rows))
+        if table in self.reserved:
+            self.reserved[table] += len(rows)
+
+    def next_key(self, table: str) -> int:
+        """Return the key of the next row of a table."""
+        return self.reserved[table] if self.reserved else next_key(self.connection, table)
 
     def retire(self, table: str, rows: Sequence[Row]) -> None:
         """Mark selected rows, whose last column is ``removed``, as removed from this version on."""
@@ -328,4 +418,4 @@ class Change:
 
     def _count(self, table: str, more: int) -> None:
         if table in COUNTED:
-            self.counts[COUNTED[table]] += more
+            self.counts[COUNTED[table]] = self.counts.get(COUNTED[table], 0) + more

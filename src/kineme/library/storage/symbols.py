@@ -5,7 +5,6 @@ from __future__ import annotations
 import difflib
 import json
 import secrets
-import sqlite3
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -17,13 +16,13 @@ from kineme.errors import SpecificationError
 from kineme.library.storage.read import groups, movements, records
 from kineme.library.storage.rows import (
     ALIVE,
+    Database,
     Row,
     among,
     check_text,
     damage,
     damaged,
     listed,
-    next_key,
     parsed_column,
     select,
 )
@@ -100,7 +99,7 @@ def exists(store: Store, who: object) -> bool:
         return False
 
 
-def state_of(connection: sqlite3.Connection, who: str, version: int) -> Row:
+def state_of(connection: Database, who: str, version: int) -> Row:
     """Return the row of `symbol_state` of a name or, where no symbol has that name, of an id."""
     conditions = ("name = :who", "symbol IN (SELECT key FROM symbol WHERE id = :who)")
     for condition in conditions if isinstance(who, str) else ():
@@ -116,7 +115,7 @@ def state_of(connection: sqlite3.Connection, who: str, version: int) -> Row:
     raise SpecificationError(f"expected the name or id of a symbol, got {who!r}; {others}")
 
 
-def _with_members(connection: sqlite3.Connection, moment: Moment, states: Sequence[Row]) -> list[Symbol]:
+def _with_members(connection: Database, moment: Moment, states: Sequence[Row]) -> list[Symbol]:
     keys = [row[1] for row in states]
     about = {row[0]: row[1:] for row in select(connection, "symbol", among("key"), {"keys": listed(keys)})}
     if lost := set(keys) - about.keys():
@@ -130,7 +129,7 @@ def _with_members(connection: sqlite3.Connection, moment: Moment, states: Sequen
     return every
 
 
-def _members(connection: sqlite3.Connection, keys: list[int], moment: Moment) -> dict[int, NDArray[np.int64]]:
+def _members(connection: Database, keys: list[int], moment: Moment) -> dict[int, NDArray[np.int64]]:
     rows = select(connection, "member", f"{among('symbol')} AND {ALIVE}", {"keys": listed(keys), "v": moment.version})
     n = connection.execute(f"SELECT count(*) FROM member WHERE {ALIVE}", {"v": moment.version}).fetchone()[0]
     if n != moment.members:
@@ -159,22 +158,28 @@ def check_name(name: Any) -> str:
 def keys_by_name(change: Change, names: Iterable[str]) -> tuple[dict[str, int], tuple[str, ...]]:
     """Return the name or id -> key of its symbol, and the names whose symbols were created."""
     names = list(names)
-    alive = "FROM symbol_state JOIN symbol ON symbol.key = symbol_state.symbol WHERE removed IS NULL"
-    keys: dict[str, int] = {}
-    for column in ("symbol.id", "name"):  # a name takes precedence over an id, as in `state_of`
-        query = f"SELECT {column}, symbol.key {alive} AND {among(column)}"
-        keys |= dict(change.connection.execute(query, {"keys": listed(names)}))
+    keys = stored_keys(change.connection, names)
     new = tuple(name for name in names if name not in keys)
     for name in new:
         keys[name] = make(change, name)
     return keys, new
 
 
+def stored_keys(connection: Database, names: Iterable[str]) -> dict[str, int]:
+    """Return the name or id -> key of its symbol, of those that there are."""
+    alive = "FROM symbol_state JOIN symbol ON symbol.key = symbol_state.symbol WHERE removed IS NULL"
+    keys: dict[str, int] = {}
+    for column in ("symbol.id", "name"):  # a name takes precedence over an id, as in `state_of`
+        query = f"SELECT {column}, symbol.key {alive} AND {among(column)}"
+        keys |= dict(connection.execute(query, {"keys": listed(names)}))
+    return keys
+
+
 def make(change: Change, name: str, parents: Sequence[str] = ()) -> int:
     """Create a symbol; return its key."""
-    key = next_key(change.connection, "symbol")
+    key = change.next_key("symbol")
     change.insert("symbol", [(key, f"sym-{secrets.token_hex(6)}", change.version)])
-    state = next_key(change.connection, "symbol_state")
+    state = change.next_key("symbol_state")
     text = json.dumps(list(parents))
     change.insert("symbol_state", [(state, key, name, "", None, None, text, change.version, None)])
     return key
@@ -182,7 +187,7 @@ def make(change: Change, name: str, parents: Sequence[str] = ()) -> int:
 
 def add_members(change: Change, pairs: Sequence[tuple[int, int]], how: str) -> None:
     """Add movements without a symbol as members: pairs (movement, key of the symbol)."""
-    first = next_key(change.connection, "member")
+    first = change.next_key("member")
     rows = [(first + k, movement, key, how, change.version, None) for k, (movement, key) in enumerate(pairs)]
     change.insert("member", rows)
 

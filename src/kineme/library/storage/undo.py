@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import sqlite3
 from collections.abc import Mapping
 from numbers import Integral
 from typing import NamedTuple
 
 from kineme.errors import SpecificationError
-from kineme.library.storage.rows import ALIVE, Row, among, has_table, listed, next_key, parsed_column, select
+from kineme.library.storage.rows import ALIVE, Database, Row, among, has_table, listed, next_key, parsed_column, select
 from kineme.library.storage.schema import BLOBS, COLUMNS, CONTINUES, OPTIONAL_BLOBS, RESTORE, RETURNS, UNDO
-from kineme.library.storage.store import NOW, Change, Store
+from kineme.library.storage.store import NOW, Change, Store, repeated
 
 _DIGEST, _PROTOTYPE = COLUMNS["movement"].index("digest"), COLUMNS["symbol_state"].index("prototype")
 
@@ -26,6 +25,7 @@ class Undone(NamedTuple):
     action: str
 
 
+@repeated
 def undo(store: Store, expected: int | None = None, to: int | None = None) -> Undone:
     """Take back the last change that was not taken back yet, or restore a version; see `ActionLibrary.undo`."""
     with store.writing(UNDO if to is None else RESTORE) as change:
@@ -62,7 +62,7 @@ def can_undo(store: Store) -> bool:
         return not store.read_only and _effective(connection, store.moment(connection).version) > 0
 
 
-def _effective(connection: sqlite3.Connection, version: int, returns: tuple[str, ...] = (UNDO,)) -> int:
+def _effective(connection: Database, version: int, returns: tuple[str, ...] = (UNDO,)) -> int:
     """Return the version whose change the library is at: that of the state that an undo returned to, else the version.
 
     With `RETURNS`, the first version that had its state, as far as the history says so.
@@ -76,7 +76,7 @@ def _effective(connection: sqlite3.Connection, version: int, returns: tuple[str,
     return 0
 
 
-def _begin(connection: sqlite3.Connection, version: int) -> int:
+def _begin(connection: Database, version: int) -> int:
     """Return the first of the versions in a row that one call made."""
     while version > 1:
         row = _version(connection, version)
@@ -86,7 +86,7 @@ def _begin(connection: sqlite3.Connection, version: int) -> int:
     return version
 
 
-def _version(connection: sqlite3.Connection, version: int) -> Row:
+def _version(connection: Database, version: int) -> Row:
     return select(connection, "version", "id = :v", {"v": version})[0]
 
 

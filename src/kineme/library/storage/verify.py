@@ -6,9 +6,9 @@ They yield the keys of invalid rows with a description of what is wrong.
 
 from __future__ import annotations
 
+import re
 import sqlite3
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import closing
 from dataclasses import dataclass
 from itertools import islice
 from types import TracebackType
@@ -19,19 +19,19 @@ from numpy.typing import NDArray
 
 from kineme.errors import DataError, KinemeError
 from kineme.library.storage.channels import other_columns
-from kineme.library.storage.connection import connect
-from kineme.library.storage.rows import Row, has_table, parsed, row_name, sealed
-from kineme.library.storage.safety import limited
+from kineme.library.storage.rows import Database, Row, has_table, parsed, row_name, sealed
 from kineme.library.storage.schema import (
     ALL_GOOD,
     BLOBS,
     CHECKS,
     COLUMNS,
     COUNTED,
+    CREATE,
     GOOD,
     LARGEST_ID,
     LATER_META,
     META,
+    MIGRATIONS,
     RETURNS,
 )
 from kineme.library.storage.store import Store
@@ -105,7 +105,7 @@ CONTENTS: dict[str, Callable[[Sequence[Row]], Strange]] = {
 }
 
 
-def samples(connection: sqlite3.Connection, rows: Sequence[Row], n_dims: int) -> Strange:
+def samples(connection: Database, rows: Sequence[Row], n_dims: int) -> Strange:
     """Check ascending rows of the table `raw` like the functions of `CONTENTS`, beside the rows of movements."""
     yield from _not_finite(rows, np.float64, np.float32)
     query = f"SELECT id, n_samples, t0, duration FROM movement WHERE id BETWEEN ? AND ? AND {GOOD['movement']}"
@@ -179,18 +179,23 @@ def verify(store: Store, *, pages: bool = True) -> list[Problem]:
 
     `pages` is False if the pages of the file have been checked already.
     """
-    with closing(connect(store.path, "ro", store.wait)) as connection, limited(connection, store.path):
-        connection.execute("BEGIN")
-        checks = [
-            *((_structure(connection),) if pages else ()),
-            *(_rows(connection, table, store) for table in COLUMNS if has_table(connection, table)),
-            _references(connection),
-            _without(connection, _COMPLETE),
-            _completeness(connection),
-            _without(connection, _sizes(store)),
-        ]
-        problems = [problem for check in checks for problem in _all_of(check)]
-        return problems or _all_of(_without(connection, LIVES))  # of rows that are valid one by one
+    with store.snapshot() as connection:
+        pages = pages and isinstance(connection, sqlite3.Connection)  # a server checks its own
+        return problems_of(connection, store, pages=pages)
+
+
+def problems_of(connection: Database, store: Store, *, pages: bool) -> list[Problem]:
+    """Return the problems of the rows that a connection sees, which are those of a store."""
+    checks = [
+        *((_structure(connection),) if pages else ()),
+        *(_rows(connection, table, store) for table in COLUMNS if has_table(connection, table)),
+        _without(connection, _REFERENCES),
+        _without(connection, _COMPLETE),
+        _completeness(connection),
+        _without(connection, _sizes(store)),
+    ]
+    problems = [problem for check in checks for problem in _all_of(check)]
+    return problems or _all_of(_without(connection, LIVES))  # of rows that are valid one by one
 
 
 def blame(store: Store, error: BaseException) -> None:
@@ -223,18 +228,19 @@ def _all_of(check: Iterator[Problem]) -> list[Problem]:
     return problems
 
 
-def _structure(connection: sqlite3.Connection) -> Iterator[Problem]:
+def _structure(connection: Database) -> Iterator[Problem]:
     for (text,) in connection.execute(f"PRAGMA integrity_check({_SHOWN})"):
         if text != "ok":
             yield Problem("", None, f"the file: {' '.join(text.split())}")
 
 
-def _rows(connection: sqlite3.Connection, table: str, store: Store) -> Iterator[Problem]:
+def _rows(connection: Database, table: str, store: Store) -> Iterator[Problem]:
     """Check the seal of every row, its values, and their contents; contents only of rows without other problems."""
     try:
         good: list[Row] = []
         size = 0
-        for row in connection.execute(f"SELECT {', '.join(COLUMNS[table])}, crc, {ALL_GOOD[table]} FROM {table}"):
+        scan = getattr(connection, "scan", connection.execute)
+        for row in scan(f"SELECT {', '.join(COLUMNS[table])}, crc, {ALL_GOOD[table]} FROM {table}"):
             if not row[-1] or not sealed(table, row[:-1]):
                 yield from _broken(table, row[:-1]) or _strange(connection, table, row[0])
                 continue
@@ -254,7 +260,7 @@ def _broken(table: str, row: Row) -> list[Problem]:
     return [] if sealed(table, row) else [_problem(table, row[0], "damaged bytes")]
 
 
-def _strange(connection: sqlite3.Connection, table: str, key: Any) -> Iterator[Problem]:
+def _strange(connection: Database, table: str, key: Any) -> Iterator[Problem]:
     """Return the problems of a row with invalid values."""
     checks = CHECKS[table]
     fits = ", ".join(f"({check.condition}) IS TRUE" for check in checks.values())
@@ -264,7 +270,7 @@ def _strange(connection: sqlite3.Connection, table: str, key: Any) -> Iterator[P
             yield _problem(table, key, f"{column} is not {check.words}")
 
 
-def _contents(connection: sqlite3.Connection, table: str, rows: list[Row], store: Store) -> Iterator[Problem]:
+def _contents(connection: Database, table: str, rows: list[Row], store: Store) -> Iterator[Problem]:
     if not rows:
         return
     if table == "raw":
@@ -274,7 +280,7 @@ def _contents(connection: sqlite3.Connection, table: str, rows: list[Row], store
     yield from (_problem(table, key, f"holds {words}") for key, words in invalid)
 
 
-def _one_by_one(connection: sqlite3.Connection, table: str) -> Iterator[Problem]:
+def _one_by_one(connection: Database, table: str) -> Iterator[Problem]:
     """Return the movements whose rows cannot be read, in a table that cannot be read as a whole."""
     if table not in BLOBS:
         return
@@ -287,12 +293,7 @@ def _one_by_one(connection: sqlite3.Connection, table: str) -> Iterator[Problem]
             yield from _broken(table, row[:-1]) if row is not None else ()
 
 
-def _references(connection: sqlite3.Connection) -> Iterator[Problem]:
-    for table, key, parent, _ in connection.execute("PRAGMA foreign_key_check"):
-        yield _problem(table, key, f"refers to a row of table {parent} that is not there")
-
-
-def _completeness(connection: sqlite3.Connection) -> Iterator[Problem]:
+def _completeness(connection: Database) -> Iterator[Problem]:
     for table in ("version", "movement"):
         last, n = connection.execute(f"SELECT coalesce(max(id), 0), count(*) FROM {table}").fetchone()
         if last != n:
@@ -314,7 +315,7 @@ class Constraint(NamedTuple):
     words: str
 
 
-def _without(connection: sqlite3.Connection, constraints: Iterable[Constraint]) -> Iterator[Problem]:
+def _without(connection: Database, constraints: Iterable[Constraint]) -> Iterator[Problem]:
     """Check that no row breaks one of these constraints."""
     for table, query, words in constraints:
         if has_table(connection, table):
@@ -323,8 +324,23 @@ def _without(connection: sqlite3.Connection, constraints: Iterable[Constraint]) 
 
 #: Each movement has its samples, primitive and features.
 _COMPLETE = [
-    Constraint(table, f"SELECT id FROM movement WHERE id NOT IN (SELECT movement FROM {table})", "not there")
-    for table in BLOBS
+    Constraint(table, f"SELECT id FROM movement EXCEPT SELECT movement FROM {table}", "not there") for table in BLOBS
+]
+
+
+def _refers(table: str, column: str, parent: str) -> Constraint:
+    """Return the constraint that a column holds the key of a row of another table, or nothing."""
+    there = f"{parent} AS parent ON parent.{COLUMNS[parent][0]} = {table}.{column}"
+    query = f"SELECT {table}.{COLUMNS[table][0]} FROM {table} LEFT JOIN {there} WHERE {table}.{column} IS NOT NULL"
+    words = f"refers to a row of table {parent} that is not there"
+    return Constraint(table, f"{query} AND parent.{COLUMNS[parent][0]} IS NULL", words)
+
+
+_REFERENCES = [
+    _refers(created[1], column, parent)
+    for statement in (*CREATE, *(later for statements in MIGRATIONS.values() for later in statements))
+    if (created := re.match(r"CREATE TABLE (\w+)", statement))
+    for column, parent in re.findall(r"(\w+) INTEGER[^,]*?REFERENCES (\w+)", statement)
 ]
 
 
@@ -353,34 +369,38 @@ _END = f"coalesce(removed, {LARGEST_ID})"
 
 def _counted(table: str, name: str) -> Constraint:
     """Return the constraint that versions state how many rows of a table are alive."""
-    changes = (
-        f"SELECT added AS since, 1 AS n FROM {table} UNION ALL SELECT removed, -1 FROM {table} WHERE removed NOT NULL"
-    )
+    gone = f"SELECT removed, -1 FROM {table} WHERE removed IS NOT NULL"
+    changes = f"SELECT added AS since, 1 AS n FROM {table} UNION ALL {gone}"
     alive = (
         f"SELECT id, {name} AS stated, sum(coalesce(n, 0)) OVER (ORDER BY id) AS alive FROM version "
-        f"LEFT JOIN (SELECT since, sum(n) AS n FROM ({changes}) GROUP BY since) ON since = id"
+        f"LEFT JOIN (SELECT since, sum(n) AS n FROM ({changes}) AS changes GROUP BY since) AS changed ON since = id"
     )
     return Constraint(
-        "version", f"SELECT id FROM ({alive}) WHERE stated != alive", f"counts other {name} than there are"
+        "version", f"SELECT id FROM ({alive}) AS counted WHERE stated != alive", f"counts other {name} than there are"
     )
 
 
 def _apart(table: str, owner: str, words: str, compared: str = "added < before") -> Constraint:
     """Return the constraint on each lifetime of one owner and the one `before` it."""
     before = f"lag({_END}) OVER (PARTITION BY {owner} ORDER BY added, {_END}, id) AS before"
-    return Constraint(table, f"SELECT id FROM (SELECT id, added, {before} FROM {table}) WHERE {compared}", words)
+    return Constraint(
+        table, f"SELECT id FROM (SELECT id, added, {before} FROM {table}) AS lives WHERE {compared}", words
+    )
 
 
 def _within(table: str, column: str, owners: str, whose: str) -> Constraint:
     """Return the constraint that a row is alive only while the row that it refers to is."""
-    alive = f"SELECT id AS key, {column} AS whose, added AS begin, {_END} AS end FROM {table} WHERE {column} NOT NULL"
+    alive = (
+        f"SELECT id AS key, {column} AS whose, added AS begin, {_END} AS until FROM {table} WHERE {column} IS NOT NULL"
+    )
     owned = f"SELECT id AS owner, added AS first, {_END} AS last FROM {owners}"
-    is_there = "begin = end OR (first <= begin AND end <= last)"
-    query = f"SELECT key FROM ({alive}) LEFT JOIN ({owned}) ON owner = whose WHERE owner IS NULL OR NOT ({is_there})"
+    is_there = "begin = until OR (first <= begin AND until <= last)"
+    both = f"({alive}) AS alive LEFT JOIN ({owned}) AS owned ON owner = whose"
+    query = f"SELECT key FROM {both} WHERE owner IS NULL OR NOT ({is_there})"
     return Constraint(table, query, f"is there when {whose} is not")
 
 
-_SYMBOLS = f"(SELECT symbol AS id, min(added) AS added, max({_END}) AS removed FROM symbol_state GROUP BY symbol)"
+_SYMBOLS = f"(SELECT symbol AS id, min(added) AS added, max({_END}) AS removed FROM symbol_state GROUP BY symbol) AS s"
 _RETURNED = f"SELECT id FROM version WHERE action IN ('{RETURNS[0]}', '{RETURNS[1]}')"
 
 #: Constraints on the lifetimes of rows that are valid one by one. A symbol is not there for a while only if it was

@@ -43,7 +43,7 @@ _SHALLOW = 0.3  # prominence in the logarithm of speed [nats] of a minimum that 
 _WINDOW = 0.2  # over which directions before and after are taken [s]
 _BACK = -0.8  # cosine between a stroke and the one before it, at most
 _AS_LONG = 0.3  # the shorter of two strokes by the longer, at least
-_GRIPPED = 0.2  # of a gripper's range: it moves
+_GRIPPED = 0.2  # of a gripper's range, or of the largest range: it moves
 _STILL = 0.12  # extent of a rest, in shares of the extents of the joints, at most
 _STEP = 6.0  # height of a step of a contact, in standard deviations of its noise, at least
 _LARGEST = 3.0  # strength of one event, at most: a cue alone does not outweigh all others
@@ -177,6 +177,8 @@ def observe_work(times: Array, columns: Array, names: Sequence[str]) -> Observed
     even = np.zeros((n, len(names)))
     even[:, usable] = interpolated(t, times - times[0], columns[:, usable])
     roles = {role: own[usable[own]] for role, own in roles_of(names).items()}
+    openings = np.ptp(even[:, roles["gripper"]], axis=0)  # of a hand that stays as it is, it is noise
+    roles["gripper"] = roles["gripper"][openings > _GRIPPED * openings.max(initial=0.0)]
     rate = (n - 1) / duration
     arm = even[:, roles["arm"]]
     extents = np.ptp(arm, axis=0)

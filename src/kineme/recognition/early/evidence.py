@@ -149,7 +149,7 @@ def _add_over(stored: Hypotheses, whole: tuple[Array, Array], evidence: Array, p
         return
     rotations = stored.comparison if stored.early.max_angle is None else stored
     described = describe_paths(*whole, stored.comparison, rotations.procrustes)
-    similar = POWER * stored.comparison.similarity.log_average(described, stored.references.described)[0]
+    similar = POWER * stored.comparison.similarity.log_average(described, stored.wholes)[0]
     log_counts = np.log(counts)
     over = np.logaddexp.reduce(most + similar - np.repeat(log_counts, counts))
     parts = np.split(similar, stored.first[1:])

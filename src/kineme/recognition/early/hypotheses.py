@@ -112,7 +112,7 @@ class Hypotheses(NamedTuple):
     procrustes : Procrustes
     comparison : Comparison
         Of whole movements.
-    references : References
+    wholes : Described
         The whole movements.
     progress : ndarray of shape (G,)
     paths : ndarray of shape (m, d, T)
@@ -135,7 +135,7 @@ class Hypotheses(NamedTuple):
     early: Early
     procrustes: Procrustes
     comparison: Comparison
-    references: References
+    wholes: Described
     progress: Array
     paths: Array
     durations: Array
@@ -189,7 +189,7 @@ def hypotheses(comparison: Comparison, references: References, early: Early) -> 
         early,
         procrustes,
         comparison,
-        references,
+        references.described,
         progress,
         paths,
         demos.durations,

@@ -17,6 +17,7 @@ from kineme.movements.preparation.pauses import cut_pauses
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.recognition.answer import Answer
+from kineme.recognition.early.earlier import Earlier, earlier, remembered, with_earlier
 from kineme.recognition.early.evidence import describe_begun, log_evidence
 from kineme.recognition.early.hypotheses import ALLOWANCE, Hypotheses, Prefixes, smoother
 from kineme.recognition.early.live_state import Guess, LiveState, LiveStatus
@@ -49,7 +50,8 @@ class Live:
         recognize: Callable[[Trajectory], Answer],
     ) -> None:
         self._comparison = comparison
-        self._hypotheses = hypotheses
+        self._stored = self._hypotheses = hypotheses
+        self._earlier: list[Earlier] = []
         self._decision = decision
         self._recognize = recognize
         self._path = BoundedPath(CAPACITY, comparison.n_dims)
@@ -67,8 +69,16 @@ class Live:
         """Channels of the recorded columns that `update` takes; None if they are not known."""
         return self._comparison.channels
 
-    def reset(self) -> None:
-        """Forget the movement; the next sample begins a new one."""
+    def reset(self, person: bool = False) -> None:
+        """Forget the movement; the next sample begins a new one.
+
+        Parameters
+        ----------
+        person : bool, default False
+            Forget the movements that `next` remembers, too: another person goes on.
+        """
+        if person:
+            self._hypotheses, self._earlier = self._stored, []
         self._path.clear()
         self._incoming.clear()
         self._decision.clear()
@@ -108,6 +118,29 @@ class Live:
             Fewer than four samples could be used.
         """
         return self._recognize(self.movement())
+
+    def next(self) -> Answer:
+        """Return the answer of `finish`, and begin the next movement by the same person.
+
+        A movement that the answer names with the confidence at which the stream decides is remembered, the last three
+        of each class: the beginnings of the next ones are compared with it, too, and the demonstrations count as larger
+        and slower by the median ratio of the person's movements to them. What `finish` and `next` answer to a whole
+        movement does not depend on it. See `kineme.recognition.early.earlier`.
+
+        Raises
+        ------
+        TrajectoryError
+            Fewer than four samples could be used. `reset` begins the next movement then.
+        """
+        movement = self.movement()
+        answer = self._recognize(movement)
+        if answer.label is not None and answer.confidence >= self._decision.confidence:
+            label = self._classes.index(answer.label)
+            own = earlier(self._stored, self._comparison.checked([movement]), label)
+            self._earlier = remembered(self._earlier, own)
+            self._hypotheses = with_earlier(self._stored, self._earlier)
+        self.reset()
+        return answer
 
     def movement(self) -> Trajectory:
         """Return the movement so far, as `finish` recognizes it: without what was skipped, averaged after 4096 samples.

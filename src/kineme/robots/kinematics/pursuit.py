@@ -7,16 +7,7 @@ from itertools import product
 import numpy as np
 from scipy.linalg import solveh_banded
 
-from kineme.robots.kinematics.descent import (
-    TaskPath,
-    descend,
-    distances,
-    kinematics,
-    pose_in_words,
-    postures,
-    reaching_postures,
-    step_within,
-)
+from kineme.robots.kinematics import descent
 from kineme.robots.models.robot import Robot
 from kineme.validation import Array
 
@@ -58,7 +49,7 @@ _FOLLOWED = 1e-5  # the same, of a way that is followed
 _NEARLY = 1e-4  # the same, if there is none: arms of few joints turn as far as the position allows
 
 
-def pursue(robot: Robot, path: TaskPath, turn_costs: Array) -> tuple[Array, TaskPath] | None:
+def pursue(robot: Robot, path: descent.TaskPath, turn_costs: Array) -> tuple[Array, descent.TaskPath] | None:
     """Find joint positions (T, n) along a path, and return them with the path at T poses; None if there is no way.
 
     Postures at the beginning, the end and the middle of the path are followed to both ends, all at once, by Newton's
@@ -73,7 +64,7 @@ def pursue(robot: Robot, path: TaskPath, turn_costs: Array) -> tuple[Array, Task
     least, best = np.inf, None
     for share in _BEGINS:
         begin = round(share * last)
-        seeds = postures(robot, path.positions[begin], path.rotations[begin], turn_costs, _SEEDS)
+        seeds = descent.postures(robot, path.positions[begin], path.rotations[begin], turn_costs, _SEEDS)
         starts = np.repeat(seeds.joints[seeds.errors <= _NEARLY][:_WAYS], len(_PULLS), axis=0)
         joints = np.tile(starts, (last + 1, 1, 1))
         errors = np.full(joints.shape[:2], np.inf)
@@ -105,7 +96,7 @@ def _costs(robot: Robot, times: Array, joints: Array, errors: Array) -> Array:
     return costs_of(robot, times, joints, errors) + np.sqrt((bends / robot.acceleration).max(axis=(0, 2)))
 
 
-def _follow(robot: Robot, path: TaskPath, limits: _Limits, order: range, joints: Array, errors: Array) -> None:
+def _follow(robot: Robot, path: descent.TaskPath, limits: _Limits, order: range, joints: Array, errors: Array) -> None:
     """Fill `joints` (T, m, n) and `errors` (T, m) in place, in that order of poses; ways that are lost end."""
     middle, half = (robot.upper + robot.lower) / 2, (robot.upper - robot.lower) / 2
     ways = np.arange(joints.shape[1])
@@ -129,18 +120,18 @@ def _newton(robot: Robot, q: Array, pull: Array, pose: tuple[Array, Array], limi
     weights = np.concatenate((np.ones(3), turn_costs))
     counted = weights >= 1  # less is what arms of few joints follow as far as they can
     for step in range(_STEPS + 1):
-        at, turned, jacobians = kinematics(robot, q)
-        error = distances((at, turned), pose, turn_costs)
+        at, turned, jacobians = descent.kinematics(robot, q)
+        error = descent.distances((at, turned), pose, turn_costs)
         if step < _STEPS:
             near = np.einsum("mi,mi->m", error * weights, error * weights) + _DAMPING
             drift = pull if step == 0 else np.zeros_like(q)
             costs, range_left = (drift, near, np.zeros(len(q))), (lower - q, upper - q)
-            change = step_within(jacobians * weights[:, None], error * weights, costs, range_left)
+            change = descent.step_within(jacobians * weights[:, None], error * weights, costs, range_left)
             q = q + change * np.minimum(1.0, _LARGEST / np.maximum(np.abs(change).max(axis=1, keepdims=True), 1e-12))
     return q, np.linalg.norm(error[:, counted], axis=1)
 
 
-def relaxed(robot: Robot, path: TaskPath, turn_costs: Array, joints: Array) -> Array:
+def relaxed(robot: Robot, path: descent.TaskPath, turn_costs: Array, joints: Array) -> Array:
     """Joint positions (T, n) near others (T, n) along a path: with less bending, hardly farther from the poses.
 
     The method of Gauss and Newton over all T poses at once minimizes
@@ -160,8 +151,8 @@ def relaxed(robot: Robot, path: TaskPath, turn_costs: Array, joints: Array) -> A
             bent[k * n, i : n_poses - 2 + i] += first * second * bending
     q = joints
     for _ in range(_ROUNDS):
-        at, turned, slopes = kinematics(robot, q)
-        error = distances((at, turned), (path.positions, path.rotations), turn_costs) * weights
+        at, turned, slopes = descent.kinematics(robot, q)
+        error = descent.distances((at, turned), (path.positions, path.rotations), turn_costs) * weights
         slopes *= weights[:, None]
         inner = np.clip(q, middle - _MIDDLE * half, middle + _MIDDLE * half)
         gradient = np.einsum("tij,ti->tj", slopes, error) + _STOPS * (inner - q)
@@ -177,40 +168,44 @@ def relaxed(robot: Robot, path: TaskPath, turn_costs: Array, joints: Array) -> A
     return np.asarray(np.clip(q, robot.lower, robot.upper))
 
 
-def choose_posture(robot: Robot, path: TaskPath, turn_costs: Array, stands: Array) -> Array:
+def choose_posture(robot: Robot, path: descent.TaskPath, turn_costs: Array, stands: Array) -> Array:
     """The posture at the start from which the whole movement costs least, with the way to it.
 
     0.1 is added for each radian of the joint that has farthest to go from where it `stands` (n,).
     """
-    starts = reaching_postures(robot, path.positions[0], path.rotations[0], turn_costs, pose_in_words(path, 0))
+    starts = descent.reaching_postures(
+        robot, path.positions[0], path.rotations[0], turn_costs, descent.pose_in_words(path, 0)
+    )
     total = _costs_of_movements(robot, path, starts, np.zeros((len(starts), 3)), turn_costs)
     total += _APPROACH * np.abs(starts - stands).max(axis=1)
     return np.asarray(starts[int(np.argmin(total))])
 
 
-def choose_place(robot: Robot, path: TaskPath, turn_costs: Array) -> TaskPath:
+def choose_place(robot: Robot, path: descent.TaskPath, turn_costs: Array) -> descent.TaskPath:
     """The path shifted, among 27 places around where the tip rests, to where the whole movement costs least.
 
     A meter below z = 0, where the arm stands, or below the resting tip if that is lower, costs 100.
     """
-    tip = kinematics(robot, robot.rest[None])[0][0]
+    tip = descent.kinematics(robot, robot.rest[None])[0][0]
     center = (path.positions.min(axis=0) + path.positions.max(axis=0)) / 2
     shifts = tip - center + np.array(list(product(_OFFSETS, repeat=3))) * np.linalg.norm(tip)
     rest = np.tile(robot.rest, (len(shifts), 1))
-    starts = descend(robot, rest, path.positions[0] + shifts, path.rotations[0], turn_costs, _FIRST_STEPS)
+    starts = descent.descend(robot, rest, path.positions[0] + shifts, path.rotations[0], turn_costs, _FIRST_STEPS)
     costs = _costs_of_movements(robot, path, starts.joints, shifts, turn_costs)
     costs += _BELOW * np.maximum(0.0, min(0.0, tip[2]) - (path.positions[:, 2].min() + shifts[:, 2]))
     return path._replace(positions=path.positions + shifts[int(np.argmin(costs))])
 
 
-def _costs_of_movements(robot: Robot, path: TaskPath, starts: Array, shifts: Array, turn_costs: Array) -> Array:
+def _costs_of_movements(robot: Robot, path: descent.TaskPath, starts: Array, shifts: Array, turn_costs: Array) -> Array:
     """Costs (m,) of the movement from m postures (m, n), each with the path shifted (m, 3), at its key poses."""
     n_samples = len(path.times)
     keys = np.unique(np.linspace(0, n_samples - 1, min(_KEY_POSES, n_samples)).round().astype(int))
     joints, errors = np.empty((len(keys), *starts.shape)), np.empty((len(keys), len(starts)))
     q = starts
     for i, t in enumerate(keys):
-        q, errors[i] = descend(robot, q, path.positions[t] + shifts, path.rotations[t], turn_costs, _BETWEEN_STEPS)
+        q, errors[i] = descent.descend(
+            robot, q, path.positions[t] + shifts, path.rotations[t], turn_costs, _BETWEEN_STEPS
+        )
         joints[i] = q
     return costs_of(robot, path.times[keys], joints, errors)
 

@@ -16,33 +16,15 @@ from kineme.movements.channels.coordinates import as_wxyz
 from kineme.movements.rotations import quaternion_of
 from kineme.movements.segmentation.segment import as_recording
 from kineme.robots.execution.preflight import TRACKED
-from kineme.robots.kinematics.descent import (
-    ORIENTATIONS,
-    PLANES,
-    InverseKinematics,
-    OutOfReachError,
-    TaskPath,
-    check_reached,
-    kinematics,
-    task_path,
-)
+from kineme.robots.kinematics import descent
 from kineme.robots.kinematics.pursuit import choose_place, choose_posture, pursue
 from kineme.robots.models.robot import Robot, check_robot, check_start
-from kineme.robots.planning.robot_movement import (
-    FASTEST_RATE,
-    SLOWEST_RATE,
-    TIMINGS,
-    PlannedPath,
-    RobotMovement,
-    refuse_failed,
-    refuse_outside,
-    with_timing,
-)
+from kineme.robots.planning import robot_movement
 from kineme.robots.planning.roles import JOINT_UNITS, SPACES, check_plausible, roles_of, scales_of, space_of
 from kineme.validation import Array, as_numbers, check_choice, check_number, check_switch
 
 PLACES = ("as given", "free")
-_STRICTER = {follow: list(ORIENTATIONS)[i::-1] for i, follow in enumerate(ORIENTATIONS)}  # itself first
+_STRICTER = {follow: list(descent.ORIENTATIONS)[i::-1] for i, follow in enumerate(descent.ORIENTATIONS)}  # itself first
 _SAMPLES = (150, 600)  # poses at least for which the joints are solved, whatever the duration; more where needed
 _CLOSE = 1e-5  # to the path between them [m]
 
@@ -67,7 +49,7 @@ def move(  # noqa: PLR0913 - one parameter per option
     continuous: Mapping[str, Array] | None = None,
     joint_units: str | None = None,
     force: bool = False,
-) -> RobotMovement:
+) -> robot_movement.RobotMovement:
     """Make a movement of the tip or of the joints executable on an arm, and check it.
 
     Parameters
@@ -126,12 +108,12 @@ def move(  # noqa: PLR0913 - one parameter per option
     """
     check_robot(robot)
     check_choice("space", space, SPACES)
-    check_choice("plane", plane, list(PLANES))
-    check_choice("timing", timing, TIMINGS)
+    check_choice("plane", plane, list(descent.PLANES))
+    check_choice("timing", timing, robot_movement.TIMINGS)
     check_choice("place", place, PLACES)
     if joint_units is not None:
         check_choice("joint_units", joint_units, tuple(JOINT_UNITS))
-    check_number("rate", rate, least=SLOWEST_RATE, most=FASTEST_RATE)
+    check_number("rate", rate, least=robot_movement.SLOWEST_RATE, most=robot_movement.FASTEST_RATE)
     check_switch("force", force)
     request = request_of(movement, robot, space, steps, continuous, joint_units)
     stands = robot.rest
@@ -142,7 +124,7 @@ def move(  # noqa: PLR0913 - one parameter per option
                 f"expected start as the positions of {robot.n_joints} joints, got shape {stands.shape}"
             )
         check_start(robot, stands)
-    planned = PlannedPath(
+    planned = robot_movement.PlannedPath(
         robot,
         CubicSpline(request.times, request.positions),
         None,
@@ -155,25 +137,30 @@ def move(  # noqa: PLR0913 - one parameter per option
     )
     if request.space == "joints":
         if not force:
-            refuse_outside(robot, request.times, request.positions)
-        result = with_timing(planned, timing)
+            robot_movement.refuse_outside(robot, request.times, request.positions)
+        result = robot_movement.with_timing(planned, timing)
         if not force:
-            refuse_failed(result, planned, timing)
+            robot_movement.refuse_failed(result, planned, timing)
         return result
-    ik = InverseKinematics(robot, follow)
+    ik = descent.InverseKinematics(robot, follow)
     # A missing orientation or third coordinate is that of the tip at rest.
     turned = request.orientations if orientation is None else orientation
     turned = quaternion_of(ik.tip_rotation) if turned is None else turned
-    path = task_path(request.times, request.positions, turned, plane, ik.tip_position)
+    path = descent.task_path(request.times, request.positions, turned, plane, ik.tip_position)
     return _along(ik, path, place, planned, timing, force)
 
 
 def _along(
-    ik: InverseKinematics, path: TaskPath, place: str, planned: PlannedPath, timing: str, force: bool
-) -> RobotMovement:
+    ik: descent.InverseKinematics,
+    path: descent.TaskPath,
+    place: str,
+    planned: robot_movement.PlannedPath,
+    timing: str,
+    force: bool,
+) -> robot_movement.RobotMovement:
     """Return the first way along the path that passes its checks, of slow ones the fastest; with `force`, the first."""
-    failed: list[tuple[RobotMovement, PlannedPath]] = []
-    slower: list[RobotMovement] = []
+    failed: list[tuple[robot_movement.RobotMovement, robot_movement.PlannedPath]] = []
+    slower: list[robot_movement.RobotMovement] = []
     errors: list[TrajectoryError] = []
     lost = False
     for way in ways_along(ik, planned.follow):
@@ -182,12 +169,12 @@ def _along(
         try:
             joints, placed = way.joints(path, place, planned.start)
             if not force:
-                check_reached(ik.robot, placed, joints(placed.times), way.ik.costs, TRACKED)
+                descent.check_reached(ik.robot, placed, joints(placed.times), way.ik.costs, TRACKED)
             solved = planned._replace(joints=joints, path=placed)
-            result = with_timing(solved, timing)
+            result = robot_movement.with_timing(solved, timing)
         except TrajectoryError as error:
             errors.append(error)
-            lost |= not isinstance(error, OutOfReachError)
+            lost |= not isinstance(error, descent.OutOfReachError)
             continue
         passed = result.preflight.passed
         if force or (passed and (timing == "generated" or result.factor <= _SLOWER)):
@@ -202,11 +189,11 @@ def _along(
     if not failed:
         raise errors[0]
     nearest = min(failed, key=lambda way: way[0].preflight.slower if _hurries(way[1]) else 0.0)
-    refuse_failed(*nearest, timing)
+    robot_movement.refuse_failed(*nearest, timing)
     return nearest[0]
 
 
-def _hurries(planned: PlannedPath) -> bool:
+def _hurries(planned: robot_movement.PlannedPath) -> bool:
     """Tell whether the joints accelerate many times as hard at one place of the path as along it in the mean."""
     shares = np.abs(planned.joints(planned.joints.x, 2) / planned.robot.acceleration).max(axis=1)
     return bool(shares.max() > _HURRIED * shares.mean())
@@ -215,10 +202,10 @@ def _hurries(planned: PlannedPath) -> bool:
 class Way(NamedTuple):
     """A way in which the joints may follow a movement; it is solved when it is asked for."""
 
-    ik: InverseKinematics
+    ik: descent.InverseKinematics
     sought: bool  # by `pursue`, among many postures: that takes as long as fifty others
 
-    def joints(self, path: TaskPath, place: str, stands: Array) -> tuple[CubicSpline, TaskPath]:
+    def joints(self, path: descent.TaskPath, place: str, stands: Array) -> tuple[CubicSpline, descent.TaskPath]:
         """Solve the joints over time, and place the path, for an arm that stands at `stands` (n,).
 
         The posture at the start, and a place that is free, are those with which the whole movement costs least.
@@ -238,17 +225,17 @@ class Way(NamedTuple):
             self.ik.solve(dense.positions[0], dense.rotations[0])
             joints = CubicSpline(dense.times, self.ik.follow(dense.positions, dense.rotations))
             between = (dense.times[:-1] + dense.times[1:]) / 2
-            off = kinematics(robot, joints(between))[0] - dense.at(between).positions
+            off = descent.kinematics(robot, joints(between))[0] - dense.at(between).positions
             if np.abs(off).max() <= _CLOSE:
                 break
         return joints, dense
 
 
-def ways_along(ik: InverseKinematics, follow: str) -> Iterator[Way]:
+def ways_along(ik: descent.InverseKinematics, follow: str) -> Iterator[Way]:
     """Yield the ways to try, the quickest first; what may be left free may also be followed."""
-    solvers: list[InverseKinematics] = []
+    solvers: list[descent.InverseKinematics] = []
     for stricter in _STRICTER[follow]:
-        solvers.append(InverseKinematics(ik.robot, stricter) if solvers else ik)
+        solvers.append(descent.InverseKinematics(ik.robot, stricter) if solvers else ik)
         yield Way(solvers[-1], False)
     for solver in solvers:
         yield Way(solver, True)

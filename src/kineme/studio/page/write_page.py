@@ -53,7 +53,7 @@ def write_page(
     path: str | Path, library: ActionLibrary, title: str | None = None, most: int | None = None, *, replace: bool = True
 ) -> Snapshot:
     """Write the page of a library, see `library_page`; the title is by default the name of the library's folder."""
-    text, snapshot = library_page(library, title or library.store.folder.resolve().name, most)
+    text, snapshot = library_page(library, title or library.store.name, most)
     with whole_file(Path(path), replace=replace) as beside:
         beside.write_text(text, encoding="utf-8")
     return snapshot

@@ -17,6 +17,7 @@ from fastapi import FastAPI
 from pydantic import BaseModel, Field
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from kineme.library.storage.address import Address
 from kineme.studio.server import (
     change_routes,
     episode_routes,
@@ -112,7 +113,7 @@ ROUTERS = (
 
 
 def create_app(
-    folder: str | Path,
+    folder: str | Path | Address,
     token: str,
     *,
     once: str = "",
@@ -127,7 +128,7 @@ def create_app(
     one, every address too. Read only, it refuses every change. The path `recordings` is a data set or are files whose
     episodes it shows.
     """
-    studio = Studio(Path(folder), read_only, None if recordings is None else Path(recordings))
+    studio = Studio(folder, read_only, None if recordings is None else Path(recordings))
     app = StudioApp(
         title="kineme studio",
         version=version("kineme"),

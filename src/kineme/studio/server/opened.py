@@ -193,7 +193,7 @@ class OpenedRecordings:
             self.total = len(self._numbers)
             try:
                 self.corrections.add(
-                    Annotation(self.name, place_of(motion.episode), *motion[1:6])
+                    Annotation(self.name, place_of(motion.episode), *motion[1:6], uncertainty=motion.uncertainty)
                     for motion in motions.read_motions(path)
                 )
             except DataError as error:

@@ -24,6 +24,7 @@ from typing import Any, NamedTuple
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from kineme.errors import DataError, SpecificationError
+from kineme.library.storage.address import Address
 
 HEAD_SECONDS = 10.0  # that the head of a request may take
 BACKLOG = 64  # connections that wait to be accepted: as many are accepted at once
@@ -43,7 +44,7 @@ _GRACE = 2.0  # seconds for what runs when it is stopped
 class Options(NamedTuple):
     """Options of the server; port None is 8420, or any that is free."""
 
-    folder: Path
+    folder: Path | Address
     host: str = LOOPBACK
     port: int | None = None
     read_only: bool = False

@@ -17,6 +17,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from kineme.errors import KinemeError
 from kineme.library.library import ActionLibrary
+from kineme.library.storage.address import Address
 from kineme.library.storage.symbols import Symbol
 from kineme.recognition.early.stream import Live
 from kineme.studio.server.opened import OpenedRecordings
@@ -46,11 +47,11 @@ class LibraryView(NamedTuple):
 class Studio:
     """An open library and what its clients share; any thread may use it.
 
-    The folder is that of the library, which is made where there is none; read only, every change is refused. Of other
-    files than the library's only those below the path `recordings` are read, which no client names.
+    The folder, or address, is that of the library, which is made where there is none; read only, every change is
+    refused. Of other files than the library's only those below the path `recordings` are read, which no client names.
     """
 
-    def __init__(self, folder: Path, read_only: bool = False, recordings: Path | None = None) -> None:
+    def __init__(self, folder: str | Path | Address, read_only: bool = False, recordings: Path | None = None) -> None:
         self.read_only = read_only
         self.opened = None if recordings is None else OpenedRecordings(recordings)
         self.library = ActionLibrary(folder, create=not read_only, read_only=read_only)

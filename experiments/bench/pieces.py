@@ -1,0 +1,97 @@
+"""Archives in pieces: what planning, processes and more movements cost.
+
+The movements of an archive are 20,000 in each file, a hundred samples in the plane. Ten files differ; the others are
+further names of these, so that ten million movements take the room of two hundred thousand.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from time import process_time
+
+import numpy as np
+
+from bench.motion_layer import Cost, _run, _taught
+from bench.rows import Row
+from bench.work_sets import work_episodes, write_set
+
+_IN_A_FILE, _DISTINCT, _SAMPLES = 20_000, 10, 100
+_MEMORY = 1024.0  # MB of a worker, at most
+_FILES = 100_000
+_SMALL = 1  # MiB of a piece of the data set, so that there are several
+
+
+def measure(quick: bool) -> list[Row]:
+    counts = (100_000, 200_000) if quick else (100_000, 1_000_000, 10_000_000)
+    return [*_planned(), *_by_processes(24 if quick else 80), *_by_movements(counts)]
+
+
+def _planned() -> Iterator[Row]:
+    """Time to plan an archive of small files."""
+    from kineme.pieces import plan
+
+    with tempfile.TemporaryDirectory() as name:
+        for k in range(_FILES):
+            if not k % 1000:
+                folder = Path(name) / f"{k // 1000:03d}"
+                folder.mkdir()
+            (folder / f"{k:06d}.csv").write_text("t,x\n0,0\n1,1\n")
+        before = process_time()
+        pieces = len(plan(name).pieces)
+        taken = process_time() - before
+    yield Row(f"plan {_FILES:,} files", "s", taken, target=("<=", 10.0), details={"pieces": pieces})
+
+
+def _by_processes(count: int) -> Iterator[Row]:
+    """Processor time and memory of annotating a data set, by one process without pieces and by several with them."""
+    costs: dict[str, Cost] = {}
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        library = _taught(folder, 200, 1)
+        write_set(folder / "set", (work.episode for work in work_episodes(count, 200, (0, 1, 2, 3))))
+        command = ("annotate", folder / "set", "--library", library, "--piece-size", _SMALL)
+        costs["one process"] = _run("annotate", folder / "set", "--library", library, "-o", folder / "labels.csv")
+        for workers in (1, 2):
+            costs[f"workers {workers}"] = _run(*command, "-o", folder / f"out{workers}", "--workers", workers)
+        gathered = _run("gather", folder / "out2", "-o", folder / "gathered.csv")
+    seconds = {name: cost.seconds for name, cost in costs.items()}
+    share = seconds["workers 2"] / seconds["workers 1"]
+    details = {**seconds, "gather": gathered.seconds, "episodes": count}
+    yield Row(
+        "annotate by two workers, processor time of one worker's", "x", share, target=("<=", 1.1), details=details
+    )
+    share = seconds["workers 2"] / seconds["one process"]
+    yield Row("  of that without pieces, starting of processes included", "x", share, details=details)
+    yield Row("  memory of a worker", "MB", costs["workers 2"].memory, target=("<=", _MEMORY))
+
+
+def _by_movements(counts: tuple[int, ...]) -> Iterator[Row]:
+    """Processor time of inspecting archives of more and more movements, and how far from a line it is."""
+    taken: dict[int, Cost] = {}
+    with tempfile.TemporaryDirectory() as name:
+        rng = np.random.default_rng(0)
+        originals = []
+        for k in range(_DISTINCT):
+            steps = rng.normal(size=(_IN_A_FILE, _SAMPLES, 2)).astype(np.float32)
+            path = Path(name) / f"original{k}.npz"
+            labels = np.array([f"kind {j % 20}" for j in range(_IN_A_FILE)])
+            np.savez(path, positions=steps.cumsum(axis=1), labels=labels)
+            originals.append(path)
+        for count in counts:
+            folder = Path(name) / str(count)
+            folder.mkdir()
+            for k in range(count // _IN_A_FILE):
+                os.link(originals[k % _DISTINCT], folder / f"{k:06d}.npz")
+            taken[count] = _run("inspect", folder, "--units", 0.01, "-o", f"{folder}-out", "--workers", 2)
+    small, *_, large = counts
+    slope = (taken[large].seconds - taken[small].seconds) / (large - small)
+    for count, cost in taken.items():
+        line = taken[small].seconds + slope * (count - small)
+        details = {"movements": count, "of_the_line": cost.seconds / line - 1.0}
+        yield Row(f"inspect {count:,} movements, two workers", "s of processors", cost.seconds, details=details)
+        yield Row("  memory of a process", "MB", cost.memory, target=("<=", _MEMORY))
+    rate = taken[large].seconds / large / (taken[counts[-2]].seconds / counts[-2])
+    yield Row("  per movement, of that of the archive before", "x", rate, target=("<=", 1.05))

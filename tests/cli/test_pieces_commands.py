@@ -1,0 +1,162 @@
+"""Commands with --workers and --shard answer as they do without, once their parts are gathered."""
+
+from __future__ import annotations
+
+import json
+import shutil
+
+import pytest
+from commands import answer, run
+
+from kineme.cli import pieces as cli_pieces
+from robot_work import write_episodes, write_library
+
+SMALL = 60_000  # bytes of a piece, instead of MiB
+
+
+@pytest.fixture(scope="module")
+def work(tmp_path_factory):
+    """Three data sets with episodes of an arm, and a library of its symbols."""
+    folder = tmp_path_factory.mktemp("work")
+    for k in range(3):
+        write_episodes(folder / "archive" / f"set {k}", 3 + k)
+    write_library(folder / "actions")
+    return folder
+
+
+@pytest.fixture(autouse=True)
+def small_pieces(monkeypatch):
+    monkeypatch.setattr(cli_pieces, "_MIB", SMALL // 16)
+    monkeypatch.setenv("KINEME_COMPILED", "always")  # as pieces do, so that all digits are equal
+
+
+def _shards(output, *command, count=3):
+    for k in range(count, 0, -1):
+        done = run(*command, "-o", output, "--shard", f"{k}/{count}")
+        assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_annotations_of_shards_are_those_of_one_process(work, tmp_path):
+    command = ("annotate", work / "archive", "-l", work / "actions")
+    run(*command, "-o", tmp_path / "here.csv")
+    _shards(tmp_path / "out", *command)
+    done = run("gather", tmp_path / "out", "-o", tmp_path / "there.csv")
+    assert done.returncode == 0
+    assert "3 of 3 pieces done" in done.stdout
+    assert (tmp_path / "there.csv").read_bytes() == (tmp_path / "here.csv").read_bytes()
+    # A copy of a data set, too.
+    _shards(tmp_path / "one", "annotate", work / "archive" / "set 0", "-l", work / "actions", count=1)
+    run("gather", tmp_path / "one", "-o", tmp_path / "copy")
+    assert (tmp_path / "copy" / "meta" / "kineme" / "motions.parquet").is_file()
+
+
+def test_processes_answer_as_shards_do(work, tmp_path):
+    command = ("annotate", work / "archive", "-l", work / "actions")
+    _shards(tmp_path / "shards", *command)
+    said = answer(*command, "-o", tmp_path / "workers", "--workers", 2)
+    assert said["pieces"] == {"done": 3}
+    assert said["recordings"] == 12
+    shards, workers = ({p.name: p.read_bytes() for p in (tmp_path / n).glob("part-*")} for n in ("shards", "workers"))
+    assert shards == workers
+    assert answer(*command, "-o", tmp_path / "workers", "--workers", 1)["pieces"] == {"skipped": 3}
+
+
+def test_hits_are_those_of_find(work, tmp_path):
+    command = ("find", "tap", work / "archive", "-l", work / "actions")
+    run(*command, "-o", tmp_path / "here.csv")
+    _shards(tmp_path / "out", *command)
+    run("gather", tmp_path / "out", "-o", tmp_path / "there.csv")
+    here, there = (sorted((tmp_path / name).read_text().splitlines()) for name in ("here.csv", "there.csv"))
+    assert len(here) > 1
+    assert [line.partition("set ")[2] for line in here] == [line.partition("set ")[2] for line in there]
+
+
+def test_an_audit_is_that_of_one_process(work, tmp_path):
+    write_episodes(tmp_path / "set", 24)
+    direct = run("audit", tmp_path / "set", "-o", tmp_path / "here.html")
+    _shards(tmp_path / "out", "audit", tmp_path / "set")
+    done = run("gather", tmp_path / "out", "-o", tmp_path / "there.html", "--train-mask", tmp_path / "keep.json")
+    assert (tmp_path / "there.html").read_bytes() == (tmp_path / "here.html").read_bytes()
+    assert direct.stdout.splitlines()[0] in done.stdout
+    assert json.loads((tmp_path / "keep.json").read_text())
+
+
+def test_inspect_summarizes_all_parts(work, tmp_path):
+    _shards(tmp_path / "out", "inspect", work / "archive")
+    there, here = answer("gather", tmp_path / "out"), answer("inspect", work / "archive")
+    assert there["labels"] == here["labels"]
+
+
+def test_gather_says_what_is_missing_stale_failed_and_strange(work, tmp_path):
+    shutil.copytree(work / "archive", tmp_path / "archive")
+    command = ("inspect", tmp_path / "archive", "-o", tmp_path / "out")
+    run(*command, "--shard", "1/3")
+    done = run("gather", tmp_path / "out")
+    assert done.returncode == 3
+    assert "1 of 3 pieces done" in done.stdout
+    assert "2 missing: set 1" in done.stdout
+    assert json.loads(run("gather", tmp_path / "out", "--partial", "--json").stdout)["recordings"] == 3
+    run(*command, "--workers", 1)
+    assert run("gather", tmp_path / "out").returncode == 0
+    info = tmp_path / "archive" / "set 1" / "meta" / "info.json"
+    info.write_text(info.read_text() + " ")
+    done = run("gather", tmp_path / "out")
+    assert (done.returncode, "1 stale: set 1" in done.stdout) == (3, True)
+    shutil.rmtree(tmp_path / "archive" / "set 2")
+    assert "1 part of no piece" in run("gather", tmp_path / "out").stdout
+
+
+def test_a_poisoned_piece_ends_with_3_and_is_named(work, tmp_path):
+    shutil.copytree(work / "archive", tmp_path / "archive")
+    next((tmp_path / "archive" / "set 1" / "data").rglob("*.parquet")).write_bytes(b"PAR1 and nothing more")
+    (tmp_path / "archive" / "set 2" / "meta" / "info.json").write_text("{}")
+    done = run("annotate", tmp_path / "archive", "-l", work / "actions", "-o", tmp_path / "out", "--workers", 1)
+    assert "not read: set 2" in done.stdout
+    assert "set 1" in done.stdout
+    assert "damaged" in done.stdout
+
+
+def test_a_folder_is_for_one_command(work, tmp_path):
+    command = ("annotate", work / "archive", "-l", work / "actions", "-o", tmp_path / "out", "--shard", "1/9")
+    run(*command)
+    done = run("inspect", work / "archive", "-o", tmp_path / "out", "--shard", "1/9")
+    assert (done.returncode, "those of kineme annotate" in done.stderr) == (1, True)
+    done = run(*command, "--error-rate", 0.2)
+    assert (done.returncode, "other options (error_rate)" in done.stderr) == (1, True)
+    assert run(*command, "--error-rate", 0.2, "--force").returncode == 0
+    assert json.loads((tmp_path / "out" / "run.json").read_text())["options"]["error_rate"] == 0.2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--workers", 2), "expected --output FOLDER"),
+        (("--workers", 2, "-o", "labels.csv"), "expected --output FOLDER"),
+        (("--workers", 2, "--scheduler", "tcp://127.0.0.1:9", "-o", "out"), "not both"),
+        (("--shard", "4/3", "-o", "out"), "expected a shard as 3/64"),
+        (("--workers", 2, "-o", "out", "--join-files"), "join them first"),
+        (("--workers", 2, "-o", "out", "--csv"), "with kineme gather"),
+    ],
+)
+def test_options_that_do_not_fit_are_refused(work, tmp_path, arguments, words):
+    done = run("annotate", work / "archive", "-l", work / "actions", *arguments, cwd=tmp_path)
+    assert (done.returncode, words in done.stderr) == (2, True)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_without_parts_is_said(tmp_path):
+    done = run("gather", tmp_path)
+    assert done.returncode == 1
+    assert "--workers, --scheduler or --shard" in done.stderr
+
+
+def test_an_archive_elsewhere_needs_a_folder_of_parts(work):
+    done = run("annotate", "s3://fleet/sets", "-l", work / "actions")
+    assert (done.returncode, "an archive in a store" in done.stderr) == (2, True)
+
+
+def test_commands_that_read_at_once_refuse_an_archive_elsewhere(work):
+    done = run("recognize", "s3://fleet/sets", "-l", work / "actions")
+    assert (done.returncode, "of this machine, got s3://fleet/sets" in done.stderr) == (2, True)
+    done = run("audit", "s3://fleet/sets")
+    assert (done.returncode, "an archive in a store" in done.stderr) == (2, True)
