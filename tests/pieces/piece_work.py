@@ -71,6 +71,12 @@ def touching(recordings):
     return lengths(recordings)
 
 
+def hanging(recordings):
+    """Write down which process works, and never end."""
+    Path(os.environ["KINEME_TEST_MARK"]).write_text(str(os.getpid()))
+    time.sleep(600)
+
+
 def refusing(recordings):
     raise DataError("expected something else")
 
