@@ -182,6 +182,25 @@ def test_an_audit_of_files_numbers_episodes_as_one_process_does(tmp_path, monkey
     assert (tmp_path / "there.html").read_bytes() == (tmp_path / "here.html").read_bytes()
 
 
+def test_rows_that_are_none_of_the_command_are_refused(work, tmp_path):
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    for command in (
+        ("annotate", work / "actions-shown", "-l", work / "actions"),
+        ("audit", work / "archive" / "set 0"),
+    ):
+        output = tmp_path / command[0]
+        run(*command, "-o", output, "--shard", "1/1")
+        (path,) = output.glob("part-*")
+        table = parquet.read_table(path)
+        for rows in (pa.table({"x": [1]}), pa.table({name: [1] for name in table.column_names})):
+            parquet.write_table(rows.replace_schema_metadata(table.schema.metadata), path)
+            done = run("gather", output, "-o", tmp_path / "labels.csv")
+            assert (done.returncode, f"expected the rows of kineme {command[0]}" in done.stderr) == (1, True)
+    assert not (tmp_path / "labels.csv").exists()
+
+
 def test_an_audit_of_several_sets_is_refused(work, tmp_path):
     done = run("audit", work / "archive", "-o", tmp_path / "out", "--shard", "1/1")
     assert (done.returncode, "say the folder of one" in done.stderr) == (1, True)
