@@ -169,15 +169,14 @@ class Task(NamedTuple):
 
     work: Callable[[Source, Options], Iterable[Any]]  # source, all options -> tables
     takes: frozenset[str]  # options, besides those of reading
-    by_library: bool = False
     ending: str = ".parquet"
     schema: Callable[[], Any] | None = None  # of its rows, where other ones are refused before they are gathered
 
 
 #: Name -> command over pieces.
 TASKS: dict[str, Task] = {
-    "annotate": Task(annotated, frozenset({"error_rate"}), by_library=True, schema=annotation_schema),
-    "find": Task(annotated, frozenset({"error_rate", "symbols"}), by_library=True, schema=annotation_schema),
+    "annotate": Task(annotated, frozenset({"error_rate"}), schema=annotation_schema),
+    "find": Task(annotated, frozenset({"error_rate", "symbols"}), schema=annotation_schema),
     "audit": Task(measurements, frozenset({"rate", "error_rate"}), schema=measurement_schema),
     "inspect": Task(inspections, frozenset()),
     "learn": Task(described, frozenset({"label", "no_labels", "person", "by_person", "several", "specification"})),
