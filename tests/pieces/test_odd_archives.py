@@ -91,7 +91,7 @@ def _number(number, recordings):
     return {"number": [number]}
 
 
-def _labelled(recordings):
+def _of_label(recordings):
     return {"known": [recordings.labels[0] in {"arc", "line", "wave"}]}
 
 
@@ -119,7 +119,7 @@ def test_functions_are_told_apart_by_what_they_carry(tmp_path, make):
 
 def test_functions_are_told_apart_by_their_code(tmp_path):
     archive = write_archive(tmp_path / "archive", 4)
-    functions = [lambda recordings: {"n": [1]}, lambda recordings: {"n": [2]}, _labelled, _labelled]
+    functions = [lambda recordings: {"n": [1]}, lambda recordings: {"n": [2]}, _of_label, _of_label]
     states = [_states(function, archive, tmp_path / "out") for function in functions]
     assert states == [{"done"}, {"done"}, {"done"}, {"skipped"}]
     held = object()  # pickle writes it; what a lock is, it does not
