@@ -167,7 +167,8 @@ def test_functions_that_no_other_process_finds_are_refused(tmp_path, function):
 
 
 _WAIT = (
-    "import sys; sys.path.insert(0, sys.argv[3]); import piece_work; from kineme.pieces import map\n"
+    "import sys, signal; sys.path.insert(0, sys.argv[3]); import piece_work; from kineme.pieces import map\n"
+    "signal.signal(signal.SIGINT, signal.default_int_handler)  # in the background, shells ignore it\n"
     "if __name__ == '__main__': map(piece_work.hanging, sys.argv[1], output=sys.argv[2], size=6000, workers=1)"
 )
 
