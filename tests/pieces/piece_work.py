@@ -84,3 +84,8 @@ def refusing(recordings):
 def parts_of(folder):
     """Return name of a part -> its bytes."""
     return {path.name: path.read_bytes() for path in sorted(Path(folder).glob("part-*"))}
+
+
+def environment(recordings):
+    """Return what libraries are told of threads and compiling."""
+    return {name: [os.environ.get(name, "")] for name in ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS", "KINEME_COMPILED")}

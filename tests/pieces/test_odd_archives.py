@@ -320,3 +320,71 @@ def test_links_are_followed_when_asked_and_loops_end(tmp_path):
     rows = _rows(map_pieces(lengths, archive, output=tmp_path / "out", follow_links=True), tmp_path / "out")
     assert len(rows) == 4
     assert np.unique([row["samples"] for row in rows]).tolist() == [60]
+
+
+def test_parts_of_another_version_are_done_again(tmp_path, monkeypatch):
+    archive = write_archive(tmp_path / "archive", 3)
+    assert _states(lengths, archive, tmp_path / "out") == {"done"}
+    monkeypatch.setattr("kineme.__version__", "99.0")
+    assert _states(lengths, archive, tmp_path / "out") == {"done"}
+
+
+def test_a_piece_that_fails_keeps_no_former_part(tmp_path):
+    archive = write_archive(tmp_path / "archive", 3)
+    for function, state in ((lengths, "done"), (piece_work.refusing, "failed")):
+        assert _states(function, archive, tmp_path / "out") == {state}
+    assert not list((tmp_path / "out").glob("part-*"))
+
+
+@pytest.mark.parametrize("workers", [None, 1])
+def test_processes_compile_and_use_one_thread(tmp_path, monkeypatch, workers):
+    for name in ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS"):
+        monkeypatch.setenv(name, "7")
+    monkeypatch.delenv("KINEME_COMPILED", raising=False)
+    outcomes = map_pieces(
+        piece_work.environment, write_archive(tmp_path / "archive", 1), output=tmp_path / "out", workers=workers
+    )
+    threads = "7" if workers is None else "1"
+    assert [*_rows(outcomes, tmp_path / "out")[0].values()] == [threads, threads, "always"]
+    assert os.environ["OMP_NUM_THREADS"] == "7"
+    assert "KINEME_COMPILED" not in os.environ
+
+
+def test_problems_of_the_listing_are_those_of_the_first_shard(tmp_path):
+    archive = write_archive(tmp_path / "archive", 3)
+    (archive / "out.csv").symlink_to("/etc/passwd")
+    shards = [plan(str(archive), 1).shard(rank, 3) for rank in (1, 2, 3)]
+    assert [len(shard.problems) for shard in shards] == [1, 0, 0]
+
+
+def test_what_has_failed_is_checked_with_its_reason(tmp_path):
+    archive, asked, job = _inspected(tmp_path)
+    (piece,) = plan(str(archive), asked.size).pieces
+    job.path(piece).unlink()
+    assert check(tmp_path / "out").missing == (piece,)
+    job.failure(piece).write_text(json.dumps({"reason": "poison"}))
+    assert check(tmp_path / "out").failed == ((piece, "poison"),)
+    job.failure(piece).write_text("[" * 100_000)
+    assert check(tmp_path / "out").failed == ((piece, "its reason cannot be read"),)
+
+
+def test_an_archive_may_move_and_a_library_learn_between_calls(tmp_path):
+    options = {"reading": {}, "error_rate": 0.1, "library": "here", "library_id": "1", "library_version": 3}
+    asked = Asked("annotate", ("archive",), options)
+    write_run(tmp_path, asked)
+    later = Asked("annotate", ("elsewhere",), options | {"library": "there", "library_version": 4})
+    write_run(tmp_path, later)
+    assert read_run(tmp_path) == later
+    with pytest.raises(DataError, match=r"other options \(library_id\)"):
+        write_run(tmp_path, Asked("annotate", ("elsewhere",), later.options | {"library_id": "2"}))
+
+
+def test_a_run_sweeps_what_was_left_hours_ago(tmp_path):
+    archive = write_archive(tmp_path / "archive", 1)
+    (tmp_path / "out").mkdir()
+    left = tmp_path / "out" / ".part-0123456789abcdef.parquet.123.01234567"
+    left.write_text("half")
+    for age, is_there in ((60, True), (7200, False)):
+        os.utime(left, (time.time() - age,) * 2)
+        map_pieces(lengths, archive, output=tmp_path / "out")
+        assert left.exists() == is_there
