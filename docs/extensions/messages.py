@@ -24,6 +24,7 @@ _SECTIONS = {
     "recognition": ("Recognizing", "how-to/everything-is-unknown.md", "guide/recognition.md"),
     "anchoring": ("Symbols", "concepts/anchoring.md"),
     "library": ("The action library", "tutorials/action-library.md"),
+    "pieces": ("Archives beyond one machine", "guide/large-archives.md"),
     "robots": ("Arms", "guide/robots.md"),
     "studio": ("The studio and the page", "guide/studio.md", "guide/page.md"),
     "cli": ("The command line", "reference/generated/commands.rst"),

@@ -38,6 +38,7 @@ SUBJECTS = (
     "library",
     "postgres",
     "million",
+    "shards",
     "lerobot",
     "bags",
     "binning",

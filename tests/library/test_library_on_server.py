@@ -29,6 +29,7 @@ from kineme.library.recognize import LibraryRecognizer
 from kineme.library.storage.address import Address, as_location
 from kineme.library.storage.connection import BusyError, ConflictError
 from kineme.library.storage.postgres import ServerConnection, translated
+from kineme.library.storage.rows import insert
 from kineme.library.storage.schema import SCHEMA_VERSION
 from kineme.library.storage.store import repeated
 from kineme.studio.page.write_page import write_page
@@ -193,8 +194,12 @@ def _until_locks_are_waited_for(address, kind):
             pass
 
 
-@pytest.mark.parametrize(("held", "first"), [({"movement": 20}, [7]), ({"version": 2, "movement": 20}, [21, 7])])
-def test_locks_of_a_writer_that_stores_nothing_leave_no_gap(library, monkeypatch, held, first):
+@pytest.mark.parametrize(("held", "stored", "first"), [
+    ({"movement": 20}, [], [7]),
+    ({"version": 2, "movement": 20}, [], [21, 7]),
+    ({"version": 2, "movement": 20}, [(2, "2026-01-01T00:00:00.000", "note", "{}", 6, 6, 2)], [21, 7]),
+])  # fmt: skip
+def test_locks_of_a_writer_that_stores_less_leave_no_gap(library, monkeypatch, held, stored, first):
     """Those of one that is about to end do not count; behind one that is under way, keys are reserved anew."""
     waited = ServerConnection.wait_for_turn
     with _asking(library.folder) as other, _noted(library) as reserved:
@@ -204,6 +209,7 @@ def test_locks_of_a_writer_that_stores_nothing_leave_no_gap(library, monkeypatch
 
         def released(self, keys):
             if other._inside:
+                insert(other, "version", stored)
                 other.run("COMMIT")
                 other._inside = False
             waited(self, keys)
@@ -275,8 +281,12 @@ def test_who_waits_too_long_for_a_turn_is_told_so(library):
             other.learn(draw_movements(2, seed=4))
         with pytest.raises(BusyError, match="got no turn"):
             other.rename("wave", "hello")
-    assert other.store is not None
-    library.rename("wave", "hello")  # no lock is left
+    with _asking(library.folder) as other, ActionLibrary(library.folder, wait=0.2) as second:
+        other.run("SELECT pg_advisory_lock_shared(%s, %s)", [other._places["version"], library.version + 1])
+        with pytest.raises(BusyError, match="got no turn"):
+            second.learn(draw_movements(2, seed=4))
+        other.run("SELECT pg_advisory_unlock_all()")
+        library.rename("wave", "hello")  # no lock is left
 
 
 def test_a_change_that_others_get_in_the_way_of_is_made_again():

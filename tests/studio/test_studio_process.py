@@ -12,7 +12,6 @@ import subprocess
 import sys
 import threading
 from contextlib import suppress
-from pathlib import Path
 
 import httpx
 import pytest
@@ -252,17 +251,17 @@ def test_a_port_that_is_taken_is_refused(folder):
 def test_tokens_are_long_enough_and_fit_into_a_cookie(monkeypatch, token):
     monkeypatch.setenv("KINEME_STUDIO_TOKEN", token)
     with pytest.raises(SpecificationError, match="at most 1,000"):
-        serve._token()
+        serve.token_of_server()
 
 
 def test_an_empty_host_is_not_every_address():
     with pytest.raises(SpecificationError, match="an empty --host"):
-        serve._listening(serve.Options(Path("none"), host=""))
+        serve.listening_at("", None)
 
 
 @pytest.mark.skipif(not socket.has_dualstack_ipv6(), reason="no socket here listens for IPv6 and IPv4")
 def test_every_address_of_ipv6_is_every_address_of_ipv4_too():
-    with serve._listening(serve.Options(Path("none"), host="::", port=None)) as listening:
+    with serve.listening_at("::", None) as listening:
         port = listening.getsockname()[1]
         for address in ("::1", "127.0.0.1"):
             socket.create_connection((address, port), 5).close()

@@ -191,11 +191,20 @@ def _learned(asked: Any, tables: Callable[..., Iterable[Any]], files: Files, dat
     return learned_text(data, [])
 
 
+def _featured(asked: Any, tables: Callable[..., Iterable[Any]], files: Files, data: dict[str, Any]) -> str:
+    """Say how to search the shards, which are read where they lie."""
+    if files.output is not None:
+        raise click.UsageError("expected no --output, shards are searched where they lie: kineme serve")
+    shards = printable(str(asked.options["shards"]))
+    return f"search among them: kineme serve --library {printable(str(asked.options['library']))} --shards {shards}"
+
+
 #: Task -> what makes one answer of the rows of all parts; it adds to the data of the answer, and returns its words.
 _ANSWERS: dict[str, Callable[[Any, Callable[..., Iterable[Any]], Files, dict[str, Any]], str]] = {
     "annotate": _annotated,
     "find": _annotated,
     "audit": _audited,
     "inspect": _inspected,
+    "features": _featured,
     "learn": _learned,
 }

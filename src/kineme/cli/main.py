@@ -16,6 +16,7 @@ from kineme.cli.audit import audit
 from kineme.cli.correct import correct
 from kineme.cli.discover import discover
 from kineme.cli.evaluate import evaluate, reproduce
+from kineme.cli.features import features
 from kineme.cli.find import find
 from kineme.cli.gather import gather
 from kineme.cli.generate import generate
@@ -26,6 +27,7 @@ from kineme.cli.move import move
 from kineme.cli.output import write
 from kineme.cli.recognize import recognize, why
 from kineme.cli.segment import segment
+from kineme.cli.serve import serve
 from kineme.cli.studio import page, studio
 from kineme.errors import KinemeError
 from kineme.reporting.text import printable, printable_lines
@@ -88,7 +90,7 @@ def main() -> None:
 
 
 for command in (
-    anchor, annotate, audit, correct, discover, evaluate, find, gather, generate, move, inspect, learn, library, page,
-    recognize, reproduce, segment, studio, why,
+    anchor, annotate, audit, correct, discover, evaluate, features, find, gather, generate, move, inspect, learn,
+    library, page, recognize, reproduce, segment, serve, studio, why,
 ):  # fmt: skip
     main.add_command(command)

@@ -20,6 +20,10 @@ UNFINISHED = 3  # exit status
 _MIB = 2**20
 
 
+#: Task -> what gather does with its parts, where it writes no file of them.
+_GATHERED = {"learn": "stores them in the library", "features": "checks them, kineme serve answers by them"}
+
+
 def _shard(text: str) -> tuple[int, int]:
     """A shard of all, as ``3/64``: the third of 64."""
     match = re.fullmatch(r"(\d+)/(\d+)", text)
@@ -46,13 +50,13 @@ pieces_options = under(
 PIECES_OPTIONS: tuple[str, ...] = ("workers", "scheduler", "shard", "piece_size")
 
 
-def how_divided(options: dict[str, Any], recordings: Sequence[Any]) -> dict[str, Any] | None:
+def how_divided(options: dict[str, Any], recordings: Sequence[Any], *, always: bool = False) -> dict[str, Any] | None:
     """Take the options of pieces out of all, and return them; None where the command is to read everything itself."""
     from kineme.pieces.archive import is_remote
 
     how = {name: options.pop(name) for name in PIECES_OPTIONS}
     asked = any(how[name] is not None for name in PIECES_OPTIONS[:3]) or any(map(is_remote, map(str, recordings)))
-    return how if asked else None
+    return how if asked or always else None
 
 
 def in_pieces(  # noqa: PLR0913 - what a command knows when it hands its work on
@@ -98,7 +102,7 @@ def in_pieces(  # noqa: PLR0913 - what a command knows when it hands its work on
     asked = Asked(task, archives, options, how["piece_size"] * _MIB, bool(reading.get("follow_links")))
     planned = plan(archives, asked.size, follow_links=asked.follow_links)
     if library is not None:  # it is created for an archive that is there
-        options = options | _of_library(library, task)
+        options = options | _of_library(library, task, output, force)
         asked = Asked(**(vars(asked) | {"options": options}))
     write_run(output, asked, replace=force)
     part = planned if how["shard"] is None else planned.shard(*how["shard"])
@@ -122,10 +126,14 @@ def in_pieces(  # noqa: PLR0913 - what a command knows when it hands its work on
         click.get_current_context().exit(UNFINISHED)
 
 
-def _of_library(folder: Any, task: str) -> dict[str, Any]:
-    """The options that say which library parts depend on; to learn, it is created if it does not exist."""
+def _of_library(folder: Any, task: str, output: Path, force: bool) -> dict[str, Any]:
+    """The options that say which library parts depend on; to learn, it is created if it does not exist.
+
+    Features depend on its specification, and on bases that are fitted once and lie beside the shards.
+    """
     from kineme.library.library import ActionLibrary, is_library
     from kineme.library.storage.address import Address, as_location
+    from kineme.pieces.shards import shared_reduction
 
     location = as_location(folder)
     if isinstance(location, Address):
@@ -138,6 +146,9 @@ def _of_library(folder: Any, task: str) -> dict[str, Any]:
     with ActionLibrary(folder, create=is_new, read_only=not is_new) as library:
         if task == "learn":  # what it holds makes no difference to how movements are described
             return said | {"specification": library.specification.to_json()}
+        if task == "features":
+            bases = shared_reduction(output, library.store, renew=force).digest
+            return said | {"library_id": library.store.id, "bases": bases, "shards": str(output.absolute())}
         return said | {"library_id": library.store.id, "library_version": library.version}
 
 
@@ -149,5 +160,5 @@ def _text(data: dict[str, Any], summary: str) -> str:
     lines += [f"not read: {printable(problem)}" for problem in data["problems"][:SHOWN]]
     lines += unlisted({"failed": data["failed"], "problems": data["problems"]}, SHOWN)
     again = "; run it again to do what failed" if data["failed"] else ""
-    gathered = "stores them in the library" if data["task"] == "learn" else "makes one file of them"
+    gathered = _GATHERED.get(data["task"], "makes one file of them")
     return "\n".join([*lines, f"parts in {printable(data['output'])}: kineme gather {gathered}{again}"])

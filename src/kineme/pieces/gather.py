@@ -109,7 +109,7 @@ def write_run(output: Path, asked: Asked, *, replace: bool = False) -> None:
 
 def _without_version(options: Mapping[str, Any]) -> dict[str, Any]:
     """Leave out what may change between two calls of one command: the library has learned, or has moved."""
-    return {name: value for name, value in options.items() if name not in ("library", "library_version")}
+    return {name: value for name, value in options.items() if name not in ("library", "library_version", "shards")}
 
 
 def read_run(output: Path) -> Asked:

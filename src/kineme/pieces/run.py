@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import errno
 import json
-import os
 import re
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -25,7 +24,7 @@ from kineme.pieces.archive import is_remote, local_copy
 from kineme.pieces.planning import Piece
 from kineme.reporting.atomic import whole_file, write_atomically
 from kineme.reporting.text import counted, shortened
-from kineme.runtime.compiled import CHOICE
+from kineme.runtime.compiled import compiled_always
 
 DONE, SKIPPED, FAILED = "done", "skipped", "failed"
 
@@ -125,7 +124,7 @@ def run_piece(job: Job, piece: Piece) -> Outcome:
         return Outcome(piece, SKIPPED, "", part.rows, part.problems)
     source = Source(piece, [], {"recordings": 0, "seconds": 0.0})
     try:
-        with _compiled_always():
+        with compiled_always():
             tables = list(job.work(source))
         _check_unchanged(piece)
         problems = tuple(str(problem) for problem in source.problems)
@@ -139,18 +138,6 @@ def run_piece(job: Job, piece: Piece) -> Outcome:
     done = time.process_time() - before
     counts = int(source.counts["recordings"]), float(source.counts["seconds"])
     return Outcome(piece, DONE, "", rows, problems, *counts, done)
-
-
-@contextmanager
-def _compiled_always() -> Iterator[None]:
-    """Context manager: loops are compiled, however little work there is, so that all processes get the same digits."""
-    before = os.environ.get(CHOICE)
-    os.environ[CHOICE] = before or "always"
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ[CHOICE]
 
 
 def failed(job: Job, piece: Piece, reason: str, processor: float = 0.0) -> Outcome:
@@ -223,6 +210,7 @@ def _write(path: Path, tables: Sequence[Any], metadata: Mapping[bytes, Mapping[s
     table = table.replace_schema_metadata({**(table.schema.metadata or {}), **own})
     with whole_file(path, sweep=False) as beside:
         if path.suffix == ".arrow":
+            table = table.unify_dictionaries().combine_chunks()  # a file has one dictionary for each column
             with pa.OSFile(str(beside), "wb") as sink, ipc.new_file(sink, table.schema) as writer:
                 writer.write_table(table, 65536)
         else:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache, partial
 from itertools import chain
-from pathlib import PurePosixPath
+from pathlib import Path, PurePosixPath
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,6 +27,7 @@ from kineme.movements.tables.layout import Known
 from kineme.pieces.archive import local_copy
 from kineme.pieces.described import described
 from kineme.pieces.run import Job, Source, recordings_of
+from kineme.pieces.shards import Reduction, read_reduction
 from kineme.recognition.answer import KnownClasses
 
 Options = Mapping[str, Any]
@@ -91,13 +92,13 @@ def measurements(source: Source, options: Options) -> Iterator[Any]:
                     row = measure_episode(episode)
                     source.counts["recordings"] += episode.number >= 0
                     source.counts["seconds"] += row.seconds
-                    yield pa.Table.from_pylist([{"file": unit.name, **row._asdict()}], schema)
+                    yield pa.Table.from_pylist([{"file": unit.shown, **row._asdict()}], schema)
         except DataError as error:
             if unit.marker:
                 source.problems.append(Problem(unit.shown, None, str(error)))
             else:
-                unread = measure_episode(Episode(0, np.empty(0), {}, {}, problems=(str(error),), place=unit.name))
-                yield pa.Table.from_pylist([{"file": unit.name, **unread._asdict()}], schema)
+                unread = measure_episode(Episode(0, np.empty(0), {}, {}, problems=(str(error),), place=unit.shown))
+                yield pa.Table.from_pylist([{"file": unit.shown, **unread._asdict()}], schema)
 
 
 def measurement_schema() -> Any:
@@ -164,6 +165,23 @@ def inspected(table: Any) -> Measures:
     return Measures(**(columns | {"labels": columns["labels"].astype(object)}))
 
 
+@lru_cache(maxsize=1)
+def reduction_at(folder: str, library: str) -> tuple[Reduction, Known]:
+    """Return what all shards of a folder have in common, and the columns of the library that they are made for."""
+    with ActionLibrary(library, read_only=True) as opened:
+        return read_reduction(Path(folder)), known_sources(opened.store)
+
+
+def features(source: Source, options: Options) -> Iterator[Any]:
+    """Yield a row for each movement: its features as the library compares them, for `pieces.search`."""
+    reduction, known = reduction_at(options["shards"], options["library"])
+    for recordings in recordings_of(source, options["reading"], known):
+        try:
+            yield reduction.table(recordings)
+        except KinemeError as error:  # other columns than learned
+            source.problems.append(Problem(recordings.sources[0].path, None, str(error)))
+
+
 class Task(NamedTuple):
     """A command over pieces."""
 
@@ -179,8 +197,12 @@ TASKS: dict[str, Task] = {
     "find": Task(annotated, frozenset({"error_rate", "symbols"}), schema=annotation_schema),
     "audit": Task(measurements, frozenset({"rate", "error_rate"}), schema=measurement_schema),
     "inspect": Task(inspections, frozenset()),
+    "features": Task(features, frozenset({"shards", "bases"}), ending=".arrow"),
     "learn": Task(described, frozenset({"label", "no_labels", "person", "by_person", "several", "specification"})),
 }
+
+
+PLACES = ("library", "shards")  # options that say where something is, which makes no difference to parts
 
 
 def job_of(task: str, output: str, options: Options) -> Job:
@@ -195,7 +217,7 @@ def job_of(task: str, output: str, options: Options) -> Job:
     row = TASKS[task]
     if unknown := sorted(set(options) - row.takes - {"reading", "library", "library_id", "library_version"}):
         raise DataError(f"expected options of {task} ({', '.join(sorted(row.takes)) or 'none'}), got {unknown[0]!r}")
-    said = {name: value for name, value in options.items() if name != "library"}
+    said = {name: value for name, value in options.items() if name not in PLACES}
     return Job(task, partial(_work, task, dict(options)), output, said, row.ending)
 
 

@@ -103,6 +103,18 @@ def jit(function: Callable[..., Any], *, cache: bool = True, reorder: bool = Tru
     return dispatcher
 
 
+@contextmanager
+def compiled_always() -> Iterator[None]:
+    """Context manager: loops are compiled, however little work there is, so that all processes get the same digits."""
+    before = os.environ.get(CHOICE)
+    os.environ[CHOICE] = before or "always"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[CHOICE]
+
+
 def _choice() -> str:
     choice = os.environ.get(CHOICE, "auto")
     if choice not in CHOICES:

@@ -93,34 +93,34 @@ def log_bounds(
       `stored`.
     - `stored`: of m movements.
 
-    Returns (n, m): in single precision, and lower by no rounding error.
+    Returns (n, m): in the precision of `stored`, single or double, and lower by no rounding error.
     """
     n, m = len(queries[0].values), len(stored[0].values)
-    similarity = similarity.by_rows(len(stored))
-    bounds = np.empty((n, m), dtype=np.float32)
+    similarity, precision = similarity.by_rows(len(stored)), stored[0].values.dtype.type
+    bounds = np.empty((n, m), dtype=precision)
     average: Any = LOG_MEANS[similarity.mean]  # Any keeps single precision
     log_weights = similarity.log_weights()
     # Factors that do not depend on the stored movements include 1 / sigma^2.
     scaled = [
-        ReducedFeatures(*(np.asarray(part / width**2, dtype=np.float32) for part in features))
+        ReducedFeatures(*(np.asarray(part / width**2, dtype=precision) for part in features))
         for features, width in zip(queries, similarity.widths, strict=True)
     ]
 
     asked = [similarity.procrustes.by_coordinates(features.values) for features in scaled]
 
     def fill(start: int, stop: int) -> None:
-        logs = np.empty((len(stored), stop - start, n), dtype=np.float32)
+        logs = np.empty((len(stored), stop - start, n), dtype=precision)
         for r, block in enumerate(stored):
-            half = np.float32(0.5 * (1.0 - _ROUNDING) / similarity.widths[r] ** 2)
+            half = precision(0.5 * (1.0 - _ROUNDING) / similarity.widths[r] ** 2)
             # |a| is divided by sigma^2 as a whole, like every other factor of the side that is asked.
-            ours = np.asarray(np.sqrt(scaled[r].squares) / similarity.widths[r], dtype=np.float32)
+            ours = np.asarray(np.sqrt(scaled[r].squares) / similarity.widths[r], dtype=precision)
             norms = np.sqrt(block.squares[start:stop, None]) * ours
             values = similarity.procrustes.by_coordinates(block.values[start:stop])
             most = _alignments(similarity.procrustes, asked[r], values, norms)
             most += block.residual_norms[start:stop, None] * scaled[r].residual_norms
             most -= half * block.squares[start:stop, None]
-            most -= np.float32(0.5 * (1.0 - _ROUNDING)) * scaled[r].squares - np.float32(log_weights[r])
-            np.minimum(most, np.float32(log_weights[r]), out=logs[r])
+            most -= precision(0.5 * (1.0 - _ROUNDING)) * scaled[r].squares - precision(log_weights[r])
+            np.minimum(most, precision(log_weights[r]), out=logs[r])
         bounds[:, start:stop] = average(logs).T
 
     for_tiles(fill, m, max(1, _TILE_ROWS // n))
@@ -140,7 +140,7 @@ def _alignments(procrustes: Procrustes, A: Single, B: Single, norms: Single) -> 
         re, im = B @ A.T, B @ np.concatenate((y, -x), axis=1).T
         if procrustes.prior is None:
             return _within(re, im, procrustes.max_angle)
-        weights = np.float32(np.trace(procrustes.prior.matrix(2))) * norms
+        weights = norms.dtype.type(np.trace(procrustes.prior.matrix(2))) * norms
         re += weights
         return np.asarray(np.sqrt(re * re + im * im) - weights)
     k = A.shape[1] // 3
@@ -148,14 +148,14 @@ def _alignments(procrustes: Procrustes, A: Single, B: Single, norms: Single) -> 
     most = np.linalg.norm(A, axis=1) * np.linalg.norm(B, axis=1)[:, None]
     if procrustes.prior is None:
         return _over_rotations(C, most)
-    F = procrustes.prior.matrix(3).astype(np.float32)
-    trace = np.float32(np.trace(F))
+    F = procrustes.prior.matrix(3).astype(norms.dtype)
+    trace = np.trace(F)
     return _over_rotations(C + F[:, :, None, None] * norms, most + trace * norms) - trace * norms
 
 
 def _within(re: Single, im: Single, max_angle: float) -> Single:
     """Return the largest real part of ``(re + i im) exp(-i angle)`` within the angle, without an arc tangent."""
-    c, s = np.float32(math.cos(max_angle)), np.float32(math.sin(max_angle))
+    c, s = re.dtype.type(math.cos(max_angle)), re.dtype.type(math.sin(max_angle))
     size = np.sqrt(re * re + im * im)
     inside = re >= c * size
     re *= c
@@ -184,4 +184,4 @@ def _over_rotations(C: NDArray[Any], most: Single) -> Single:
         slope = 4.0 * x * over - 8.0 * determinant
         value = over * over - 8.0 * x * determinant - last
         x = x - np.where(slope > 0, np.maximum(value, 0.0) / np.where(slope > 0, slope, 1.0), 0.0)
-    return np.asarray(x, dtype=np.float32)
+    return np.asarray(x, dtype=most.dtype)

@@ -34,8 +34,10 @@ class Guard:
     `--host`; with one, any address.
     """
 
-    def __init__(self, app: ASGIApp, token: str, once: str = "", hosts: tuple[str, ...] = ()) -> None:
-        self.app, self.token, self._once = app, token, once
+    def __init__(
+        self, app: ASGIApp, token: str, once: str = "", hosts: tuple[str, ...] = (), command: str = "kineme studio"
+    ) -> None:
+        self.app, self.token, self._once, self.command = app, token, once, command
         self.names = {"localhost", *map(str.lower, hosts)}
         self.any_address = bool(hosts)
         self.cookie = "kineme_" + hashlib.sha256(token.encode()).hexdigest()[:12]  # two studios on one machine
@@ -57,10 +59,12 @@ class Guard:
     def _refusal(self, scope: Scope, headers: Mapping[str, str]) -> tuple[int, str] | None:
         host = headers.get("host", "")
         if not self._is_ours(host):
-            return 403, f"expected the address that kineme studio printed, got {host[:80]!r}; open that one"
+            return 403, f"expected the address that {self.command} printed, got {host[:80]!r}; open that one"
         if not _same_origin(scope, headers):
             return 403, "expected a request of the studio's own page or of a program, got one of another page"
         if not self._knows_token(scope, headers):
+            if self.command != "kineme studio":  # asked by programs, which send a header
+                return 401, f"expected the token that {self.command} printed, as the header Authorization: Bearer TOKEN"
             text = "expected the token: open the address that kineme studio printed, with ?token= and what follows it"
             return 401, text
         return None

@@ -57,7 +57,7 @@ def serve(options: Options, ready: Callable[[str, str], object]) -> None:
     The second argument of `ready` is an address for the browser of this machine, without the token: it opens once.
     """
     try:
-        import uvicorn
+        import uvicorn  # noqa: F401
         import websockets  # noqa: F401
 
         from kineme.studio.server.app import create_app
@@ -67,43 +67,62 @@ def serve(options: Options, ready: Callable[[str, str], object]) -> None:
         ) from error
     from kineme.studio.server.access import own_names
 
-    for name in ("asyncio", "uvicorn.error"):
-        logging.getLogger(name).addFilter(OncePerInterval())
-    token, once = _token(), secrets.token_urlsafe(24)
-    with closing(_listening(options)) as listening:
+    token, once = token_of_server(), secrets.token_urlsafe(24)
+    with closing(listening_at(options.host, options.port)) as listening:
         hosts = () if is_loopback(options.host) else own_names(options.host)
         app = create_app(
             options.folder, token, once=once, read_only=options.read_only, hosts=hosts, recordings=options.recordings
         )
-        config = config_of(app)
-        address = f"http://{_name(options.host)}:{listening.getsockname()[1]}/"
+        address = f"http://{name_of(options.host)}:{listening.getsockname()[1]}/"
         studio = app.state.studio
 
-        def end_at_once() -> None:
-            """End the process: a thread that computes cannot be ended otherwise, and the library loses nothing."""
-            studio.uploads.close()
-            os._exit(0)
+        def tell() -> None:
+            ready(f"{address}?token={token}", f"{address}?once={once}")
 
-        last_resort = Timer(_GRACE, end_at_once)  # also where the event loop itself waits
+        run(app, listening, tell, studio.join, studio.uploads.close)
 
-        class Server(uvicorn.Server):
-            async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-                await super().startup(sockets)
-                # A closed terminal is an interruption, unless that is ignored, as after `nohup`.
-                if os.name == "posix" and signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:
-                    loop = asyncio.get_running_loop()
-                    loop.add_signal_handler(signal.SIGHUP, lambda: setattr(self, "should_exit", True))
-                ready(f"{address}?token={token}", f"{address}?once={once}")
 
-            async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-                last_resort.daemon = True
-                last_resort.start()
-                await super().shutdown(sockets)
+def run(
+    app: Any,
+    listening: socket.socket,
+    ready: Callable[[], object],
+    join: Callable[[], object],
+    end: Callable[[], object],
+) -> None:
+    """Serve an application at a socket that listens, until interrupted.
 
-        with suppress(KeyboardInterrupt):
-            Server(config).run(sockets=[listening])
-        studio.join()
-        last_resort.cancel()
+    `ready` is called once it can be asked, `join` when it has stopped. What does not stop within two seconds is ended
+    with the process, after `end` was called.
+    """
+    import uvicorn
+
+    def end_at_once() -> None:
+        """End the process: a thread that computes cannot be ended otherwise, and nothing is lost."""
+        end()
+        os._exit(0)
+
+    last_resort = Timer(_GRACE, end_at_once)  # also where the event loop itself waits
+
+    class Server(uvicorn.Server):
+        async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+            await super().startup(sockets)
+            # A closed terminal is an interruption, unless that is ignored, as after `nohup`.
+            if os.name == "posix" and signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:
+                loop = asyncio.get_running_loop()
+                loop.add_signal_handler(signal.SIGHUP, lambda: setattr(self, "should_exit", True))
+            ready()
+
+        async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+            last_resort.daemon = True
+            last_resort.start()
+            await super().shutdown(sockets)
+
+    for name in ("asyncio", "uvicorn.error"):
+        logging.getLogger(name).addFilter(OncePerInterval())
+    with suppress(KeyboardInterrupt):
+        Server(config_of(app)).run(sockets=[listening])
+    join()
+    last_resort.cancel()
 
 
 def config_of(app: Any) -> Any:
@@ -133,7 +152,8 @@ def is_loopback(host: str) -> bool:
         return False
 
 
-def _token() -> str:
+def token_of_server() -> str:
+    """Return the token in the environment, or a new one."""
     token = os.environ.get(TOKEN)
     if token is None:
         return secrets.token_urlsafe(24)
@@ -146,24 +166,22 @@ def _token() -> str:
     return token
 
 
-def _listening(options: Options) -> socket.socket:
-    """Open a socket that listens; on the usual port if that is free."""
-    if not options.host:  # to the system that is every address
+def listening_at(host: str, port: int | None) -> socket.socket:
+    """Open a socket that listens; without a port on the usual one if that is free."""
+    if not host:  # to the system that is every address
         raise SpecificationError(
             "expected an address to listen at, got an empty --host; leave it out for this machine alone, or write "
             "0.0.0.0 for every address"
         )
-    if options.port is None:
+    if port is None:
         with suppress(OSError):
-            return _bound(options.host, PORT)
+            return _bound(host, PORT)
     try:
-        return _bound(options.host, options.port or 0)
+        return _bound(host, port or 0)
     except OSError as error:
         taken = error.errno == errno.EADDRINUSE
         remedy = "choose another --port, or leave it out" if taken else "correct --host and --port"
-        raise DataError(
-            f"expected to serve at {options.host}:{options.port or 0}, got: {error.strerror or error}; {remedy}"
-        ) from error
+        raise DataError(f"expected to serve at {host}:{port or 0}, got: {error.strerror or error}; {remedy}") from error
 
 
 def _bound(host: str, port: int) -> socket.socket:
@@ -175,7 +193,7 @@ def _bound(host: str, port: int) -> socket.socket:
     return bound
 
 
-def _name(host: str) -> str:
+def name_of(host: str) -> str:
     """Write the host in an address that a browser on this machine opens."""
     if host in {"0.0.0.0", "::"}:
         return socket.gethostname()

@@ -1,0 +1,89 @@
+"""What archives of 10^4 to 10^9 movements cost, for the page of the guide: measured where it was, by a line beyond."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from result_tables.measured import DOCS, rows
+
+PAGE = DOCS / "guide" / "large-archives.md"
+_COUNTS = tuple(10**k for k in range(4, 10))
+_DAY = 86_400.0  # s
+
+
+class Law(NamedTuple):
+    """A line through what was measured."""
+
+    measured: dict[int, float]
+    offset: float
+    slope: float  # for each movement
+
+    @classmethod
+    def through(cls, measured: dict[int, float]) -> Law:
+        """Fit a line whose relative errors are smallest in the sum of their squares."""
+        counts, values = (np.array([*each], dtype=float) for each in (measured, measured.values()))
+        design = np.column_stack((np.ones_like(counts), counts)) / values[:, None]
+        offset, slope = np.linalg.lstsq(design, np.ones_like(values))[0]
+        return cls(measured, float(offset), float(slope))
+
+    def at(self, count: int) -> float:
+        """Return what was measured, or the line."""
+        return self.measured.get(count, self.offset + self.slope * count)
+
+    @property
+    def residual(self) -> float:
+        """The largest deviation of what was measured, as a share of the line."""
+        return max(abs(value / (self.offset + self.slope * count) - 1.0) for count, value in self.measured.items())
+
+
+def tables() -> dict[str, str]:
+    """Name of each table or sentence of the page -> its text."""
+    laws = _laws()
+    heads = ["movements", *laws, "cores for a day of inspecting and learning"]
+    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
+    for count in _COUNTS:
+        cells = [_cell(law, count, name) for name, law in laws.items()]
+        seconds = sum(law.at(count) for name, law in laws.items() if name.endswith("[core-s]"))
+        lines.append(f"| {count:,} | {' | '.join(cells)} | {max(1, round(seconds / _DAY + 0.5)):,} |")
+    largest = max(laws.values(), key=lambda law: law.residual)
+    name = next(name for name, law in laws.items() if law is largest)
+    sentence = (
+        "*In italics: by the line through what was measured, not measured.* The largest deviation from a line is "
+        f"{100 * largest.residual:.0f} % ({name}). Times are of processors (`python -m bench --only pieces million "
+        "shards`)."
+    )
+    return {"costs": "\n".join([*lines, "", sentence])}
+
+
+def _laws() -> dict[str, Law]:
+    pieces = {row["details"]["movements"]: row["ours"] for row in rows("pieces") if row["what"].startswith("inspect ")}
+    parts = rows("million")
+    learned = {row["details"]["movements"]: row["ours"] for row in parts if "Put them into a library" in row["what"]}
+    library = {row["details"]["movements"]: row["ours"] / 1000 for row in parts if row["what"].endswith("actions/")}
+    shards = _of_shards("files, a movement")
+    asked = _of_shards("one, processor")
+    return {
+        "inspect [core-s]": Law.through(pieces),
+        "learn [core-s]": Law.through(learned),
+        "library on disk [GB]": Law.through(library),
+        "shards on disk [GB]": Law.through({count: count * value / 1e9 for count, value in shards.items()}),
+        "nearest of all, one [core-s]": Law.through(asked),
+    }
+
+
+def _of_shards(what: str) -> dict[int, float]:
+    """Number of movements -> what was measured of their shards."""
+    measured = {}
+    for row in rows("shards"):
+        count, _, name = row["what"].partition(": ")
+        if name == what:
+            measured[int(count.replace(",", ""))] = row["ours"]
+    return measured
+
+
+def _cell(law: Law, count: int, name: str) -> str:
+    value = law.at(count)
+    text = f"{value:,.0f}" if value >= 100 else f"{value:.2g}"
+    return text if count in law.measured else f"*{text}*"

@@ -1,0 +1,40 @@
+"""``kineme serve``: the nearest of all movements in shards, over HTTP."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from kineme.cli.options import FOLDER, library_option, whole
+from kineme.cli.output import write
+from kineme.io.records import needs
+from kineme.reporting.text import printable
+
+
+@click.command(short_help="Nearest among ten million movements, over HTTP.")
+@library_option
+@click.option("--shards", type=FOLDER, required=True, help="Folder that kineme features has written.")
+@click.option("--port", type=click.IntRange(1, 65535), default=8765, show_default=True, help="Port to serve at.")
+@click.option("--host", default="127.0.0.1", show_default=True,
+              help="Address to listen at. Another one needs a token in KINEME_STUDIO_TOKEN.")  # fmt: skip
+@click.option(
+    "--processes", type=whole(1, 1000), help="That search, each some of the shards.  [default: one a processor]"
+)
+def serve(folder: Path, shards: Path, port: int, host: str, processes: int | None) -> None:
+    """Answer which movements of an archive are nearest to a movement, exactly, for many clients.
+
+    POST /nearest with {"times": [...], "positions": [[...], ...], "n": 10}, or with several as "movements", and the
+    header Authorization: Bearer TOKEN; the token is printed, or taken from KINEME_STUDIO_TOKEN. GET /health says what
+    is searched. Only this machine reaches it, unless --host says otherwise; connections are not encrypted. A process
+    that dies is started again.
+
+    Example: kineme serve --library actions/ --shards out/
+    """
+    with needs("fastapi and uvicorn", "serve", "studio"):
+        from kineme.studio.server.nearest import SearchOptions, serve_search
+
+    def ready(address: str, token: str, count: int) -> None:
+        write(f"{count:,} movements of {printable(shards)} at {address}nearest\ntoken: {token}\nstop it with Ctrl-C")
+
+    serve_search(SearchOptions(folder, shards, host, port, processes), ready)
