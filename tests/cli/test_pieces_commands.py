@@ -9,6 +9,7 @@ import pytest
 from commands import answer, run
 
 from kineme.cli import pieces as cli_pieces
+from robot_array_sets import write_aloha, write_robomimic
 from robot_work import write_episodes, write_library
 
 SMALL = 60_000  # bytes of a piece, instead of MiB
@@ -136,12 +137,99 @@ def test_a_folder_is_for_one_command(work, tmp_path):
         (("--shard", "4/3", "-o", "out"), "expected a shard as 3/64"),
         (("--workers", 2, "-o", "out", "--join-files"), "join them first"),
         (("--workers", 2, "-o", "out", "--csv"), "with kineme gather"),
+        (("-", "--workers", 2, "-o", "out"), "got the standard input"),
     ],
 )
 def test_options_that_do_not_fit_are_refused(work, tmp_path, arguments, words):
     done = run("annotate", work / "archive", "-l", work / "actions", *arguments, cwd=tmp_path)
     assert (done.returncode, words in done.stderr) == (2, True)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_file_of_other_columns_is_a_problem_of_its_piece(work, tmp_path):
+    archive = tmp_path / "archive"
+    shutil.copytree(work / "actions-shown", archive)
+    (archive / "other.csv").write_text("t,x\n" + "".join(f"{k / 50},{k}\n" for k in range(60)))
+    (archive / "none.csv").write_text("words\n")
+    command = ("annotate", archive, "-l", work / "actions")
+    run(*command, "-o", tmp_path / "here.csv")
+    said = answer(*command, "-o", tmp_path / "out", "--shard", "1/1")
+    assert [problem.partition(":")[0] for problem in said["problems"]] == ["none.csv", "other.csv"]
+    assert said["problems"][0].startswith("none.csv: expected one column of times")
+    run("gather", tmp_path / "out", "-o", tmp_path / "there.csv")
+    assert (tmp_path / "there.csv").read_bytes() == (tmp_path / "here.csv").read_bytes()
+
+
+@pytest.mark.parametrize("size", [16, 1])
+@pytest.mark.parametrize("write", [write_robomimic, write_aloha])
+def test_an_audit_of_files_numbers_episodes_as_one_process_does(tmp_path, monkeypatch, write, size):
+    monkeypatch.setattr(cli_pieces, "_MIB", 1000)
+    folder = tmp_path / "set"
+    if write is write_robomimic:
+        folder.mkdir()
+        for name in ("part_10", "part_2", "part_1"):
+            write(folder / f"{name}.hdf5", (60, 80))
+    else:
+        write(folder, (60,) * 11)
+    (folder / "unread_5.hdf5").write_text("no HDF5")
+    (folder / "README.md").write_text("words")
+    command = ("audit", folder)
+    run(*command, "-o", tmp_path / "here.html")
+    run(*command, "-o", tmp_path / "out", "--shard", "1/1", "--piece-size", size)
+    there, here = answer("gather", tmp_path / "out", "-o", tmp_path / "there.html"), answer(*command)
+    assert there["findings"] == here["findings"]
+    assert there["problems"] == []
+    assert (tmp_path / "there.html").read_bytes() == (tmp_path / "here.html").read_bytes()
+
+
+def test_rows_that_are_none_of_the_command_are_refused(work, tmp_path):
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    for command in (
+        ("annotate", work / "actions-shown", "-l", work / "actions"),
+        ("audit", work / "archive" / "set 0"),
+    ):
+        output = tmp_path / command[0]
+        run(*command, "-o", output, "--shard", "1/1")
+        (path,) = output.glob("part-*")
+        table = parquet.read_table(path)
+        for rows in (pa.table({"x": [1]}), pa.table({name: [1] for name in table.column_names})):
+            parquet.write_table(rows.replace_schema_metadata(table.schema.metadata), path)
+            done = run("gather", output, "-o", tmp_path / "labels.csv")
+            assert (done.returncode, f"expected the rows of kineme {command[0]}" in done.stderr) == (1, True)
+    assert not (tmp_path / "labels.csv").exists()
+
+
+def test_an_audit_of_several_sets_is_refused(work, tmp_path):
+    done = run("audit", work / "archive", "-o", tmp_path / "out", "--shard", "1/1")
+    assert (done.returncode, "say the folder of one" in done.stderr) == (1, True)
+    assert not (tmp_path / "out").exists()
+
+
+def test_parts_are_gathered_from_any_folder_and_partly(work, tmp_path):
+    shutil.copytree(work / "actions-shown", tmp_path / "archive")
+    command = ("inspect", "archive/", "-o", "run_1.5")
+    assert run(*command, "--shard", "2/2", cwd=tmp_path).returncode == 0
+    done = run("gather", tmp_path / "run_1.5", "--partial", cwd=work)
+    assert (done.returncode, done.stdout.splitlines()[0]) == (3, "0 of 1 piece done")
+    assert run(*command, "--workers", 1, cwd=tmp_path).returncode == 0
+    assert run("gather", tmp_path / "run_1.5", cwd=work).returncode == 0
+    done = run("gather", tmp_path / "run_1.5", "--train-mask", "keep.csv", cwd=tmp_path)
+    assert (done.returncode, "--train-mask with the parts of kineme audit" in done.stderr) == (2, True)
+
+
+def test_a_folder_of_parts_within_the_archive_is_refused(work, tmp_path):
+    shutil.copytree(work / "actions-shown", tmp_path / "archive")
+    done = run("inspect", ".", "-o", "out", "--shard", "1/1", cwd=tmp_path / "archive")
+    assert (done.returncode, "outside of the archive ." in done.stderr) == (1, True)
+    assert not (tmp_path / "archive" / "out").exists()
+
+
+def test_an_archive_that_is_not_there_is_said_and_leaves_nothing(tmp_path):
+    done = run("inspect", tmp_path / "archive", "-o", tmp_path / "out", "--shard", "1/1")
+    assert (done.returncode, "found nothing at" in done.stderr) == (1, True)
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_folder_without_parts_is_said(tmp_path):

@@ -71,6 +71,12 @@ def touching(recordings):
     return lengths(recordings)
 
 
+def hanging(recordings):
+    """Write down which process works, and never end."""
+    Path(os.environ["KINEME_TEST_MARK"]).write_text(str(os.getpid()))
+    time.sleep(600)
+
+
 def refusing(recordings):
     raise DataError("expected something else")
 
@@ -78,3 +84,8 @@ def refusing(recordings):
 def parts_of(folder):
     """Return name of a part -> its bytes."""
     return {path.name: path.read_bytes() for path in sorted(Path(folder).glob("part-*"))}
+
+
+def environment(recordings):
+    """Return what libraries are told of threads and compiling."""
+    return {name: [os.environ.get(name, "")] for name in ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS", "KINEME_COMPILED")}

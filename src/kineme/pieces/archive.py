@@ -57,6 +57,12 @@ def path_at(archive: str) -> Path:
     return Path(unquote(archive.removeprefix("file://")) if archive.startswith("file://") else archive)
 
 
+def address_of(archive: str, name: str) -> str:
+    """Return the URI of a file or data set in an archive of a store, without options of the store."""
+    base = archive.partition("?")[0].rstrip("/")
+    return base if base.endswith(f"/{name}") else f"{base}/{name}"
+
+
 def check_apart(output: str | Path, archives: Sequence[str]) -> None:
     """Refuse a folder of parts within an archive, whose files would become recordings of it.
 
@@ -84,10 +90,8 @@ def units_of(archives: Sequence[str], follow_links: bool = False) -> tuple[list[
     several = len(archives) > 1
     for archive in dict.fromkeys(archives):
         if is_remote(archive):
-            base = archive.partition("?")[0].rstrip("/")
             for unit in _remote_units(archive):
-                within = base if unit.is_archive else f"{base}/{unit.name}"
-                units.append(unit._replace(shown=within if several else unit.name))
+                units.append(unit._replace(shown=address_of(archive, unit.name) if several else unit.name))
             continue
         path = path_at(archive)
         entries, odd = entries_of([path], follow_links)

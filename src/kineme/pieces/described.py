@@ -28,7 +28,7 @@ from kineme.library.storage.specification import Specification
 from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import Movements
-from kineme.pieces.archive import Unit, is_remote, local_copies
+from kineme.pieces.archive import Unit, local_copies
 from kineme.pieces.run import Source
 
 #: Table of a library -> the columns of a part that are its columns, without the key.
@@ -89,7 +89,7 @@ def _recordings(
     how = how_to_read(options["reading"])
     with local_copies(source.piece.units) as folders:
         entries = [
-            Entry(folder / unit.name, Path(unit.name), name_of(unit, bool(options.get("several"))))
+            Entry(folder / unit.name, Path(unit.name), unit.shown)
             for folder, unit in zip(folders, source.piece.units, strict=True)
         ]
         files = None if source.piece.numbers is None else _checksums(source.piece.units[0], folders[0])
@@ -108,22 +108,6 @@ def _recordings(
             elif options.get("by_person"):
                 people = each_person(Path() if options.get("several") else folders[0], recordings.sources)
             yield recordings, people, files
-
-
-def name_of(unit: Unit, several: bool) -> str:
-    """Return the name of a unit in what is read: where several archives are, with that of its own."""
-    if not several:
-        return unit.name
-    if is_remote(unit.archive):
-        return address_of(unit.archive, unit.name)
-    alone = unit.is_archive or Path(unit.archive).is_file()
-    return as_text(Path(unit.archive) if alone else Path(unit.archive, unit.name))
-
-
-def address_of(archive: str, name: str) -> str:
-    """Return the URI of a file or data set in an archive of a store, without options of the store."""
-    base = archive.partition("?")[0].rstrip("/")
-    return base if base.endswith(f"/{name}") else f"{base}/{name}"
 
 
 def _read(entries: Sequence[Entry], how: HowToRead, numbers: range | None) -> Iterator[Recordings | Problem]:

@@ -13,7 +13,7 @@ from kineme.errors import DataError
 from kineme.pieces.archive import is_remote, path_at
 from kineme.pieces.planning import PIECE_BYTES, Piece, plan
 from kineme.pieces.run import Job, Part, read_part
-from kineme.pieces.tasks import job_of
+from kineme.pieces.tasks import TASKS, job_of
 from kineme.reporting.atomic import whole_file
 from kineme.reporting.text import counted, first_names
 
@@ -197,4 +197,7 @@ def tables_of(job: Job, of: Checked, columns: Sequence[str] | None = None) -> It
                 raise DataError(
                     f"expected the rows of a piece in {path}, got a damaged file; remove it and call its command again"
                 ) from error
+            schema = TASKS[job.task].schema
+            if schema is not None and not table.schema.equals(schema()):
+                raise DataError(f"expected the rows of kineme {job.task} in {path}, got others; remove it")
             yield table

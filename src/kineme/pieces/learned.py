@@ -19,8 +19,8 @@ from kineme.library.storage.store import Store
 from kineme.movements.channels.channel import Channel, Channels, is_plain, recorded_names, same_columns
 from kineme.movements.channels.column_match import columns_like, columns_recorded
 from kineme.movements.trajectories.as_learned import by_names
-from kineme.pieces.archive import is_remote
-from kineme.pieces.described import address_of, check_rows, checksum_of, heads_of_text, movements_of_rows, rows_by_table
+from kineme.pieces.archive import address_of, is_remote, path_at
+from kineme.pieces.described import check_rows, checksum_of, heads_of_text, movements_of_rows, rows_by_table
 from kineme.pieces.gather import Asked
 
 Tables = Callable[..., Iterable[Any]]  # columns, by default all -> the rows of part after part
@@ -256,7 +256,7 @@ def _sources(asked: Asked, of: Survey) -> Callable[[str, str, int], Any]:
     """Return a function from name, checksum and bytes of a file to its source, as `learn_recordings` says it."""
     first = asked.archives[0]
     several = len(asked.archives) > 1
-    root = Path() if several or is_remote(first) else root_of(Path(first.removeprefix("file://")))
+    root = Path() if several or is_remote(first) else root_of(path_at(first))
     of_file = source_at(asked.options["reading"], root)
 
     def source(name: str, sha256: str, size: int) -> Any:

@@ -92,13 +92,13 @@ def measurements(source: Source, options: Options) -> Iterator[Any]:
                     row = measure_episode(episode)
                     source.counts["recordings"] += episode.number >= 0
                     source.counts["seconds"] += row.seconds
-                    yield pa.Table.from_pylist([{"file": unit.name, **row._asdict()}], schema)
+                    yield pa.Table.from_pylist([{"file": unit.shown, **row._asdict()}], schema)
         except DataError as error:
             if unit.marker:
                 source.problems.append(Problem(unit.shown, None, str(error)))
             else:
-                unread = measure_episode(Episode(0, np.empty(0), {}, {}, problems=(str(error),), place=unit.name))
-                yield pa.Table.from_pylist([{"file": unit.name, **unread._asdict()}], schema)
+                unread = measure_episode(Episode(0, np.empty(0), {}, {}, problems=(str(error),), place=unit.shown))
+                yield pa.Table.from_pylist([{"file": unit.shown, **unread._asdict()}], schema)
 
 
 def measurement_schema() -> Any:
@@ -187,17 +187,17 @@ class Task(NamedTuple):
 
     work: Callable[[Source, Options], Iterable[Any]]  # source, all options -> tables
     takes: frozenset[str]  # options, besides those of reading
-    by_library: bool = False
     ending: str = ".parquet"
+    schema: Callable[[], Any] | None = None  # of its rows, where other ones are refused before they are gathered
 
 
 #: Name -> command over pieces.
 TASKS: dict[str, Task] = {
-    "annotate": Task(annotated, frozenset({"error_rate"}), by_library=True),
-    "find": Task(annotated, frozenset({"error_rate", "symbols"}), by_library=True),
-    "audit": Task(measurements, frozenset({"rate", "error_rate"})),
+    "annotate": Task(annotated, frozenset({"error_rate"}), schema=annotation_schema),
+    "find": Task(annotated, frozenset({"error_rate", "symbols"}), schema=annotation_schema),
+    "audit": Task(measurements, frozenset({"rate", "error_rate"}), schema=measurement_schema),
     "inspect": Task(inspections, frozenset()),
-    "features": Task(features, frozenset({"shards", "bases"}), by_library=True, ending=".arrow"),
+    "features": Task(features, frozenset({"shards", "bases"}), ending=".arrow"),
     "learn": Task(described, frozenset({"label", "no_labels", "person", "by_person", "several", "specification"})),
 }
 
