@@ -248,7 +248,7 @@ def read_entries(  # noqa: PLR0913 - those of `read_paths`, and what it has foun
         ]
     read += [rule.apply(file, entry.path) for file, entry in files]
     recordings = merge_files(read, in_words(places), problems, layout.kinds, layout.skip, layout.by_number)
-    recordings = replace(recordings, notes=notes)
+    recordings = replace(recordings, notes=(*recordings.notes, *notes))
     # Refuse a column to exclude that no file has: it is most likely misspelled.
     left_aside = sorted({name for how, _ in recordings.detected for name in how.ignored})
     for column in layout.excluded:
