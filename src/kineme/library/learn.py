@@ -31,12 +31,12 @@ from kineme.library.commit import (
     serialize_new,
     stored_times,
 )
-from kineme.library.storage.channels import columns_of_kinds
 from kineme.library.storage.source import Source
 from kineme.library.storage.store import Store
 from kineme.library.storage.symbols import check_name
 from kineme.movements.channels.channel import in_words, is_plain, learned_names, recorded_names, same_columns
 from kineme.movements.channels.column_match import columns_recorded, may_be
+from kineme.movements.channels.coordinates import columns_of_kinds
 from kineme.movements.tables.layout import listed
 from kineme.movements.trajectories.as_learned import as_recorded, by_names, of_columns
 from kineme.movements.trajectories.demonstrations import Demonstrations
