@@ -155,7 +155,8 @@ def _in_columns_of(store: Store, demos: Demonstrations) -> Demonstrations:
         if len(here.heads) == len(there.heads) and not may_be(demos.channels, ours):
             raise TrajectoryError(
                 f"expected the columns {listed(there.heads)} as {_others(store)} of the library in {store.folder}, got "
-                f"{listed(here.heads)}; choose the columns, in the shell with --columns, or make another library"
+                f"{listed(here.heads)}; choose the columns, in the shell with --columns (--feature of kineme "
+                "discover), or make another library"
             )
     return Demonstrations.of_movements(in_coordinates(demos.movements), demos.steps)
 
@@ -166,7 +167,8 @@ def _check_channels(store: Store, demos: Demonstrations) -> None:
     if n_dims is not None and n_dims != demos.n_dims:
         raise TrajectoryError(
             f"expected movements of {n_dims} dimensions as {_others(store)} of the library in {store.folder}, "
-            f"got {demos.n_dims}; choose the columns, in the shell with --columns, or make another library"
+            f"got {demos.n_dims}; choose the columns, in the shell with --columns (--feature of kineme "
+            "discover), or make another library"
         )
     store.specification.comparison.procrustes(demos.n_dims)  # refuses columns that cannot be its points
     ours = store.channels
