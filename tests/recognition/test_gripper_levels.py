@@ -111,10 +111,10 @@ def test_a_gripper_that_steps_is_evidence_although_it_is_not_learned():
         assert (one.start, one.end) == pytest.approx((begin, begin + 59 / RATE), abs=one.uncertainty)
     # One recording in which the gripper stays as it is has no discrete column by itself: it counts by its name.
     rests = _recording((*_channels()[:3], Channel("gripper.pos", "position", ("gripper.pos",))), [0.9, 0.9])
-    constant = replace(rests.movements, positions=np.column_stack((rests.positions[:, :3], np.ones(len(rests.times)))))
-    open_ones = [one.label for one in recognizer.spot(Demonstrations.of_movements(constant))]
-    assert open_ones.count("reach") == 2
-    assert "carry" not in open_ones
+    for opening, label in ((1.0, "reach"), (0.0, "carry")):
+        columns = np.column_stack((rests.positions[:, :3], np.full(len(rests.times), opening)))
+        spotted = recognizer.spot(Demonstrations.of_movements(replace(rests.movements, positions=columns)))
+        assert [one.label for one in spotted if one.label is not None] == [label, label]
     # Without the column the path alone is compared, as closely as where there is no gripper at all.
     alone = Trajectory(recording.times, recording.positions)
     plain = Recognizer().fit([Trajectory(one.times, one.positions) for one in _stepped(demos)], labels)
