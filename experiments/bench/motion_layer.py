@@ -48,27 +48,29 @@ def measure(quick: bool) -> list[Row]:
     rows: list[Row] = []
     for arms in (1, 2):
         rows += _named(arms, seed, sets, 10 if quick else 20)
+    rows += _named(1, seed, sets, 10 if quick else 20, steps=True)
     rows += _discovered(seed, sets, 10 if quick else 20)
     rows += _audited(seed, sets, 60 if quick else 200)
     return [*rows, *_costs(seed, (20, 40) if quick else (33, 132))]
 
 
-def _named(arms: int, first_seed: int, sets: int, count: int) -> Iterator[Row]:
+def _named(arms: int, first_seed: int, sets: int, count: int, steps: bool = False) -> Iterator[Row]:
     """Names and boundaries of ``kineme annotate`` from three examples of each kind, and how sure these are."""
     truth: list[Sequence[Segment]] = []
     found: list[Sequence[Segment]] = []
     doubts: list[list[float]] = []
     for seed in range(first_seed, first_seed + sets):
-        works = list(work_episodes(count, seed, _TESTED, arms))
+        works = list(work_episodes(count, seed, _TESTED, arms, steps=steps))
         with tempfile.TemporaryDirectory() as name:
-            library = _taught(Path(name), seed, arms)
+            library = _taught(Path(name), seed, arms, steps)
             write_set(Path(name) / "set", (work.episode for work in works))
             _run("annotate", Path(name) / "set", "--library", library, "-o", Path(name) / "labels.csv")
             found += annotated(Path(name) / "labels.csv", count)
             doubts += uncertainties(Path(name) / "labels.csv", count)
         truth += [work.truth for work in works]
     names, boundaries = score_names(truth, found), score_boundaries(truth, found)
-    what = f"{arms} arm{'s' if arms == 2 else ''}, {_SHOTS} examples of each of 6 kinds"
+    gripper = " whose gripper is 0 or 1" if steps else ""
+    what = f"{arms} arm{'s' if arms == 2 else ''}{gripper}, {_SHOTS} examples of each of 6 kinds"
     details: dict[str, Any] = {
         "sets": sets, "episodes": len(truth), "movements": names.true, "first_seed": first_seed,
         "confused": {f"{true} -> {given}": n for (true, given), n in names.confused.most_common() if true != given},
@@ -83,9 +85,9 @@ def _named(arms: int, first_seed: int, sets: int, count: int) -> Iterator[Row]:
     yield Row(f"{what}: starts and ends within their uncertainty", "of 1", share, details=details)
 
 
-def _taught(folder: Path, seed: int, arms: int) -> Path:
+def _taught(folder: Path, seed: int, arms: int, steps: bool = False) -> Path:
     """Learn examples by other operators into a library."""
-    works = list(work_episodes(30, seed + 5000, _TAUGHT, arms))
+    works = list(work_episodes(30, seed + 5000, _TAUGHT, arms, steps=steps))
     write_set(folder / "taught", (work.episode for work in works))
     write_labels(folder / "taught.csv", examples(works, _SHOTS, seed))
     _run("learn", folder / "taught", "--labels", folder / "taught.csv", "--library", folder / "library")

@@ -17,7 +17,7 @@ import csv
 import json
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from operator import itemgetter
 from pathlib import Path
@@ -49,6 +49,7 @@ _HOME = np.array([0.40, 0.0, 0.32, 0.0, 0.0, 0.9])  # x, y, z [m], yaw, tilt [ra
 _ABOVE, _TABLE, _POURED = 0.11, 0.03, 0.24  # heights of the tip [m]
 _FLIPPED = 0.6  # [rad], between the joints at the end and those at the beginning
 _STEP = 2.0 * np.pi / 4096  # quantization of joint sensors [rad]
+_OPEN = 0.65  # more than half of the way from the opening at a held thing to that of empty fingers
 _N_OBJECTS = 3
 _PER_SHARD = 50_000  # frames
 
@@ -109,14 +110,28 @@ def work_episodes(
     operators: Sequence[int] = (0, 1, 2, 3),
     arms: int = 1,
     tasks: Sequence[str] = tuple(TASKS),
+    steps: bool = False,
 ) -> Iterator[Work]:
-    """Yield clean episodes, tasks and operators in turn; each depends on the seed and its number alone."""
+    """Yield clean episodes, tasks and operators in turn; each depends on the seed and its number alone.
+
+    With `steps` the gripper is 0 or 1, as grippers are that only open and close.
+    """
     setup = rig(seed)
     for number in range(count):
         rng = np.random.default_rng([seed, number])
         task = tasks[number % len(tasks)]
         person = operators[(number // len(tasks)) % len(operators)]
-        yield _episode(number, task, person, setup, arms, rng)
+        work = _episode(number, task, person, setup, arms, rng)
+        yield work._replace(episode=_stepped(work.episode)) if steps else work
+
+
+def _stepped(episode: Episode) -> Episode:
+    """Return the episode with grippers that are 1 where they are open by more than half of the way to what is held."""
+    signals = dict(episode.signals)
+    for key in (STATE, ACTION):
+        is_gripper = np.array(["gripper" in name for name in episode.names[key]])
+        signals[key] = np.where(is_gripper, signals[key] > _OPEN, signals[key])
+    return replace(episode, signals=signals)
 
 
 def examples(works: Iterable[Work], each: int = 3, seed: int = 0) -> list[tuple[int, float, float, str]]:

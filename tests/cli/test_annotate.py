@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -11,8 +13,10 @@ import pytest
 from commands import answer, run, start
 
 import kineme
+from kineme.cli import output
 from kineme.io.lerobot.motions import read_motions
 from kineme.io.writing.write_movement import write_movement
+from kineme.library import annotate
 
 RATE = 100.0
 LETTERS = ["CShape", "GShape", "Sshape"]
@@ -213,7 +217,45 @@ def test_a_lerobot_set_is_copied_with_its_annotations(demos, library, tmp_path):
     assert doubts == [one["uncertainty"] for one in said["annotations"]]
     again = run("annotate", source, "-l", library, "-o", tmp_path / "named", "--force")
     assert again.returncode
-    assert "is there; name another, or remove it" in " ".join(again.stderr.split())
+    said = " ".join(again.stderr.split())
+    assert "is there; name another, or remove it: a folder is never written over, with --force neither" in said
+
+
+@pytest.mark.parametrize("change", ["changed", "removed"])
+def test_a_set_that_changes_while_it_is_read_is_not_copied(demos, library, tmp_path, monkeypatch, change):
+    """Its annotations are of other frames than those that would be copied."""
+    source = tmp_path / "set"
+    _lerobot(demos, source)
+    shard = source / "data" / "chunk-000" / "file-000.parquet"
+    search = annotate.annotate_by
+
+    def while_searching(*given):
+        if change == "removed":
+            shard.unlink()
+        else:
+            frames = pandas.read_parquet(shard)
+            frames["observation.state"] = frames["observation.state"].map(lambda state: 2.0 * state)
+            frames.to_parquet(shard)
+        return search(*given)
+
+    monkeypatch.setattr(annotate, "annotate_by", while_searching)
+    done = run("annotate", source, "-l", library, "-o", tmp_path / "named")
+    assert done.returncode
+    said = " ".join(done.stderr.split())
+    assert f"{shard.name} was {change} after it was read; nothing was written, run it again" in said
+    assert not (tmp_path / "named").exists()
+
+
+def test_a_folder_that_cannot_be_written_is_refused_before_anything_is_searched(demos, library, tmp_path, monkeypatch):
+    _lerobot(demos, tmp_path / "set")
+    (tmp_path / "closed").mkdir()
+    # The superuser writes anywhere.
+    monkeypatch.setattr(output, "os", SimpleNamespace(W_OK=os.W_OK, access=lambda path, _: path.name != "closed"))
+    monkeypatch.setattr(annotate, "annotate_by", None)
+    for name in ("named", "named.csv"):
+        done = run("annotate", tmp_path / "set", "-l", library, "-o", tmp_path / "closed" / "of-today" / name)
+        assert done.returncode == 2
+        assert "closed is read-only; allow writing there, or choose another folder" in " ".join(done.stderr.split())
 
 
 def test_a_lerobot_set_in_lance_is_annotated_in_place(demos, library, tmp_path):

@@ -71,6 +71,24 @@ def test_what_was_named_annotates_the_data_set_and_joins_a_library_that_learned_
     assert answer("discover", dataset, "--library", tmp_path / "whole")["version"] > 1
 
 
+def test_a_library_of_another_feature_annotates_the_set_and_says_what_is_missing_in_others(dataset, tmp_path):
+    """Its columns are called by their feature; the set has them although the one read by default is another."""
+    library = tmp_path / "actions"
+    answer("discover", dataset, "--feature", "action", "--library", library)
+    answer("anchor", "--library", library, "--accept", "all", cwd=tmp_path)
+    by_default = answer("annotate", dataset, "--library", library)
+    assert sum(row["symbol"] is not None for row in by_default["annotations"]) > 30
+    assert any("without observation.state" in note for note in by_default["notes"])
+    assert (
+        answer("annotate", dataset, "--library", library, "--columns", "action")["annotations"]
+        == (by_default["annotations"])
+    )
+    refused = run("discover", dataset, "--library", library)
+    assert refused.returncode
+    said = " ".join(refused.stderr.split())
+    assert "in the shell with --columns (--feature of kineme discover), or make another library" in said
+
+
 def test_it_writes_the_movements_of_each_episode_and_nothing_over_a_file(dataset, tmp_path):
     told = answer("discover", dataset, "-o", tmp_path / "movements.csv")
     with (tmp_path / "movements.csv").open(newline="") as file:

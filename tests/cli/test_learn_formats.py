@@ -10,6 +10,7 @@ from commands import answer
 
 import kineme
 from kineme.datasets import lasa
+from lerobot_sets import write_v3
 
 SHAPES = ["CShape", "GShape"]
 
@@ -68,3 +69,26 @@ def test_every_format_gives_the_same_library(folder, name, tmp_path):
 def test_what_comes_in_another_format_is_known(folder, tmp_path):
     learned = answer("learn", *(folder / name for name in WRITERS), "-l", tmp_path / "actions")
     assert (learned["added"], learned["duplicates"], learned["movements"]) == (14, 28, 14)
+
+
+def test_columns_by_numbers_are_named(folder, tmp_path):
+    """Numbers count from 0 over all that a file has; which columns these are is said by every command that reads."""
+    write_v3(tmp_path / "set")
+    for source, numbers, names in (
+        (folder / "demos.csv", "3,4", "['x', 'y']"),
+        (tmp_path / "set", "0,4", "['observation.state.shoulder_pan.pos', 'action.elbow_flex.pos']"),
+    ):
+        library = tmp_path / f"{source.name}-actions"
+        sentence = f"read the columns of these numbers, {names}: counted from 0, over all of a file"
+        by_task = ("--label-by", "task") if source.name == "set" else ()
+        for command in (
+            ("inspect",),
+            ("learn", "-l", library),
+            ("recognize", "-l", library),
+            ("annotate", "-l", library),
+        ):
+            said = answer(*command, source, "--columns", numbers, *(by_task if command[0] == "learn" else ()))
+            assert said["notes"].count(sentence) == 1
+    assert not [
+        note for note in answer("inspect", folder / "demos.csv", "--columns", "x,y")["notes"] if "numbers" in note
+    ]

@@ -89,6 +89,40 @@ def test_distances_of_levels_are_small_for_the_same_and_large_for_others():
     assert scores[:, 0] == pytest.approx(np.sqrt(3.0) / 0.35, rel=0.1)
 
 
+def _stepped(demos):
+    """The same movements, whose gripper is 0 or 1."""
+    columns = np.column_stack((demos.positions[:, :3], demos.positions[:, 3] > 0.6))
+    channels = (*_channels()[:3], Channel("gripper.pos", "discrete", ("gripper.pos",)))
+    raw = replace(demos.movements, positions=columns, channels=None, recorded=None, dimensions=None)
+    return Demonstrations.of_movements(of_channels(raw, channels))
+
+
+def test_a_gripper_that_steps_is_evidence_although_it_is_not_learned():
+    """A discrete column is no coordinate; its levels tell movements apart all the same, where a recording has it."""
+    demos, labels = _demonstrations(_channels())
+    recognizer = Recognizer().fit(_stepped(demos), labels)
+    openings = [0.9, 0.35, 0.35, 0.9, 0.9]
+    recording = _stepped(_recording(_channels(), openings))
+    assert recording.n_dims == recognizer.comparison_.n_dims == 3
+    spotted = [one for one in recognizer.spot(recording) if one.end - one.start > 0.6]
+    assert [one.label for one in spotted] == ["reach" if opening > 0.5 else "carry" for opening in openings]
+    assert min(one.confidence for one in spotted) > 0.9
+    for one, begin in zip(spotted, (110 * np.arange(5) + 25) / RATE, strict=True):
+        assert (one.start, one.end) == pytest.approx((begin, begin + 59 / RATE), abs=one.uncertainty)
+    # One recording in which the gripper stays as it is has no discrete column by itself: it counts by its name.
+    rests = _recording((*_channels()[:3], Channel("gripper.pos", "position", ("gripper.pos",))), [0.9, 0.9])
+    for opening, label in ((1.0, "reach"), (0.0, "carry")):
+        columns = np.column_stack((rests.positions[:, :3], np.full(len(rests.times), opening)))
+        spotted = recognizer.spot(Demonstrations.of_movements(replace(rests.movements, positions=columns)))
+        assert [one.label for one in spotted if one.label is not None] == [label, label]
+    # Without the column the path alone is compared, as closely as where there is no gripper at all.
+    alone = Trajectory(recording.times, recording.positions)
+    plain = Recognizer().fit([Trajectory(one.times, one.positions) for one in _stepped(demos)], labels)
+    for one, expected in zip(recognizer.spot(alone), plain.spot(alone), strict=True):
+        assert one.label == expected.label
+        assert (*one[:2], *one[3:]) == pytest.approx((*expected[:2], *expected[3:]), abs=1e-5)
+
+
 def test_a_gripper_that_never_moves_beside_one_that_does_is_no_evidence():
     rng = np.random.default_rng(0)
     paths = [np.column_stack((_way(opening, rng), rng.normal(scale=0.01, size=60))) for opening in (0.9, 0.9, 0.3, 0.3)]

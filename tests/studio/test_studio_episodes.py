@@ -16,6 +16,7 @@ from kineme import read_recordings
 from kineme.errors import DataError
 from kineme.io.reading.read_labels import labeled_pieces, read_labels
 from kineme.io.writing.annotations import Annotation, write_annotations
+from kineme.library.correct import as_labels, corrections_beside, corrections_of, motions_in
 from kineme.movements.episodes import Episode
 from kineme.studio.server import opened as opened_module
 from kineme.studio.server.opened import OpenedRecordings, opened_at
@@ -122,18 +123,19 @@ def test_corrections_are_a_table_that_kineme_reads(client, demos, tmp_path):
     _put(client, "episode-1", (0.1, 0.9, "kind 2"), corrected=False)
     assert client.get("/api/episodes").json()["saved"] is False
     answer = client.post("/api/episodes/corrections", json={}).json()
-    assert answer == {"file": "demos-corrections.csv", "n_spans": 3}
+    assert answer == {"file": "demos-corrections.csv", "n_spans": 4}  # all of the empty one is unknown
     assert client.get("/api/episodes").json()["saved"] is True
     sent = client.get("/api/episodes/corrections.csv")
     path = tmp_path / "demos-corrections.csv"
     assert path.read_bytes() == sent.content
     assert "demos-corrections.csv" in sent.headers["content-disposition"]
-    rows = list(csv.DictReader(io.StringIO(sent.text)))
+    *rows, empty = csv.DictReader(io.StringIO(sent.text))
     assert {(row["recording"], row["place"]) for row in rows} == {("demos", "episode 2")}
+    assert (empty["place"], empty["start"], empty["symbol"]) == ("episode 0", "0.0", "")
     assert [(row["symbol"], row["unknown"]) for row in rows] == [("mine", "false"), ("", "true"), ("kind 0", "false")]
     pieces = labeled_pieces(read_recordings(demos), read_labels(path))
-    assert list(pieces.labels) == ["mine", None, "kind 0"]
-    for piece, (begin, end) in zip(pieces.demonstrations, spans, strict=True):
+    assert list(pieces.labels) == [None, "mine", None, "kind 0"]
+    for piece, (begin, end) in zip(pieces.demonstrations[1:], spans, strict=True):
         assert (piece.times[0], piece.times[-1]) == (pytest.approx(begin, abs=0.02), pytest.approx(end, abs=0.02))
 
 
@@ -207,6 +209,25 @@ def test_corrections_stand_before_what_kineme_annotate_wrote(folder, demos, open
     client.post("/api/episodes/corrections", json={})
     item = open_studio(folder, recordings=tmp_path / "named").get("/api/episodes").json()["episodes"][1]
     assert ([span["label"] for span in item["spans"]], item["corrected"]) == (["mine"], True)
+
+
+def test_an_episode_of_which_all_was_removed_is_corrected_too(folder, demos, open_studio, tmp_path):
+    """Its row says that it was looked at: what was annotated there is removed, not left as it was."""
+    notes = [Annotation("demos", f"episode {k}", 0.1, 0.7, "kind 2", 0.7, 0.9) for k in (1, 2)]
+    write_annotations(tmp_path / "named", notes, [demos], "lerobot")
+    client = open_studio(folder, recordings=tmp_path / "named")
+    _put(client, "episode-1")
+    assert client.get("/api/episodes").json()["episodes"][1]["spans"] == []
+    client.post("/api/episodes/corrections", json={})
+    table, recordings = read_labels(corrections_beside(tmp_path / "named")), read_recordings(tmp_path / "named")
+    assert [(row.place, row.label, row.start) for row in table.rows] == [("episode 1", None, 0.0)]
+    corrections = corrections_of(recordings, table, as_labels(motions_in(tmp_path / "named")))
+    assert [(change.kind, change.was) for change in corrections.changes] == [("removed", "kind 2")]
+    assert not corrections.examples
+    again = open_studio(folder, recordings=tmp_path / "named").get("/api/episodes").json()["episodes"]
+    assert [(item["corrected"], [span["label"] for span in item["spans"]]) for item in again[1:3]] == [
+        (True, [None]), (False, ["kind 2"]),
+    ]  # fmt: skip
 
 
 def test_spans_are_kept_in_order_and_those_without_a_length_are_not(client):

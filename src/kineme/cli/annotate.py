@@ -65,7 +65,7 @@ def annotate(recordings: tuple[Path, ...], folder: Any, output: Path | None, for
     Example: kineme annotate long.csv --library actions/ -o long-labels.csv
     """
     from kineme.io.reading.formats import expanded
-    from kineme.io.writing.annotations import is_in_place, targets_of, to_csv, write_annotations
+    from kineme.io.writing.annotations import copied_as_read, is_in_place, targets_of, to_csv, write_annotations
     from kineme.io.writing.rerun import recording_scenes, write_rerun
     from kineme.library.library import ActionLibrary
 
@@ -95,11 +95,13 @@ def annotate(recordings: tuple[Path, ...], folder: Any, output: Path | None, for
                     f"expected a new folder to write, {printable(target)} is there; write over it with --force"
                 )
 
+    check_copied = copied_as_read(output, sources, form)
     with ActionLibrary(folder, read_only=True) as library:
         held: list[Any] | None = None if rerun is None else []
         answer = _annotated(library, recordings, options, error_rate, check, held)
     if output is not None and answer.streamed:
         check(answer.movements)
+    check_copied()
     written = [] if output is None else write_annotations(output, answer.annotations, sources, form, answer.movements)
     if rerun is not None:
         scenes = (scene for piece, notes in held or () for scene in recording_scenes(piece, notes))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -30,7 +31,15 @@ def write(text: Any = "", *, err: bool = False) -> None:
 
 def check_new(path: Path | None, force: bool, *inputs: str | Path, remedy: str = "--force") -> None:
     """Refuse to write over an input, or a file in one, and without --force, or what `remedy` names, over any file."""
-    if path is None or str(path) == "-" or not path.exists():
+    if path is None or str(path) == "-":
+        return
+    if not path.exists():
+        parent = next(folder for folder in path.absolute().parents if folder.exists())
+        if not os.access(parent, os.W_OK):
+            raise click.UsageError(
+                f"expected a folder that can be written, {printable(parent)} is read-only; allow writing there, or "
+                "choose another folder"
+            )
         return
     if any(Path(source).exists() and path.samefile(source) for source in inputs):
         raise click.UsageError(f"expected another file to write than the input {printable(path)}")

@@ -235,7 +235,8 @@ def notes_beside(parsed: Any, options: dict[str, Any], learned: Any) -> list[str
             f"Read the columns of the library alone, {_some(columns or ())}, without {_some(aside)}; say --columns for "
             "others"
         )
-    return sentences + notes_on_gaps(parsed) + _differences(learned, parsed.demonstrations.channels)
+    sentences += notes_on_gaps(parsed) + _differences(learned, parsed.demonstrations.channels)
+    return [*parsed.notes, *sentences]
 
 
 def problem_lines(problems: Any, lost: str = "not read: ") -> list[str]:

@@ -31,12 +31,12 @@ from kineme.library.commit import (
     serialize_new,
     stored_times,
 )
-from kineme.library.storage.channels import columns_of_kinds
 from kineme.library.storage.source import Source
 from kineme.library.storage.store import Store
 from kineme.library.storage.symbols import check_name
 from kineme.movements.channels.channel import in_words, is_plain, learned_names, recorded_names, same_columns
 from kineme.movements.channels.column_match import columns_recorded, may_be
+from kineme.movements.channels.coordinates import columns_of_kinds
 from kineme.movements.tables.layout import listed
 from kineme.movements.trajectories.as_learned import as_recorded, by_names, of_columns
 from kineme.movements.trajectories.demonstrations import Demonstrations
@@ -166,7 +166,8 @@ def in_columns_of(store: Store, demos: Demonstrations) -> Demonstrations:
         if len(here.heads) == len(there.heads) and not may_be(demos.channels, ours):
             raise TrajectoryError(
                 f"expected the columns {listed(there.heads)} as {_others(store)} of the library in {store.folder}, got "
-                f"{listed(here.heads)}; choose the columns, in the shell with --columns, or make another library"
+                f"{listed(here.heads)}; choose the columns, in the shell with --columns (--feature of kineme "
+                "discover), or make another library"
             )
     return Demonstrations.of_movements(in_coordinates(demos.movements), demos.steps)
 
@@ -177,7 +178,8 @@ def check_channels(store: Store, demos: Demonstrations) -> None:
     if n_dims is not None and n_dims != demos.n_dims:
         raise TrajectoryError(
             f"expected movements of {n_dims} dimensions as {_others(store)} of the library in {store.folder}, "
-            f"got {demos.n_dims}; choose the columns, in the shell with --columns, or make another library"
+            f"got {demos.n_dims}; choose the columns, in the shell with --columns (--feature of kineme "
+            "discover), or make another library"
         )
     store.specification.comparison.procrustes(demos.n_dims)  # refuses columns that cannot be its points
     ours = store.channels

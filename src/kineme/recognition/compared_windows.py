@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.movements.segmentation.segment import moving
-from kineme.movements.segmentation.table import Motion, Rest, Rows, observe
+from kineme.movements.segmentation.table import Motion, Rest, Rows, observe, steps_of
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import Movements
 from kineme.movements.trajectories.trajectory import Trajectory
@@ -62,14 +62,20 @@ class Templates(NamedTuple):
     comparison: Comparison
     references: References
     calibration: Calibration
+    steps: bool = True  # whether recordings have the discrete columns of the references
+
+    def of(self, recording: Trajectory) -> Templates:
+        """Return templates for one recording."""
+        n = sum(channel.kind == "discrete" for channel in self.comparison.channels or ())
+        return self._replace(steps=steps_of(recording).shape[1] == n)
 
     @property
     def levels(self) -> Levels | None:
         """Levels of grippers of the references; kept with them."""
-        held = vars(self.references)
-        if "_levels" not in held:
-            held["_levels"] = gripper_levels(self.references, self.comparison.channels, RESOLUTION)
-        levels: Levels | None = held["_levels"]
+        held = vars(self.references).setdefault("_levels", {})
+        if self.steps not in held:
+            held[self.steps] = gripper_levels(self.references, self.comparison.channels, RESOLUTION, self.steps)
+        levels: Levels | None = held[self.steps]
         return levels
 
     def level_scores(self, motion: Motion, rows: Rows) -> Array:
@@ -212,7 +218,7 @@ def _scores(
 
     Scores above `within` (n, C) may be lower bounds, which exceed it too.
     """
-    comparison, references, calibration = templates
+    comparison, references, calibration, _ = templates
     start, end = motion.times[rows].T
     levels = templates.level_scores(motion, rows)
     logs, bars = np.empty(levels.shape), np.full(levels.shape, np.inf)

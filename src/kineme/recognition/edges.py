@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from kineme.movements.segmentation.table import Motion, Rows, moving_bouts, weighted_quantile
 from kineme.recognition.compared_windows import MIN_SAMPLES
-from kineme.recognition.levels import Levels
+from kineme.recognition.levels import Levels, openings
 from kineme.validation import Array
 
 _REST = 0.05  # share of the peak speed below which an arm rests
 _CLOSING = 1.875  # least peak speed of a gripper, in its range [1/s]
+_FINGERS = 0.06  # standard deviation of the Gaussian for steps of a gripper [s]: they are commands, fingers follow
 _LATE = 0.1  # longest extrapolation of an onset, as a share of the bout
 _BLUR = 0.25  # time that smoothing moves a crossing outward, in cycles at the cutoff
 _NEAR = 0.2  # distance of an edge from the pause that it is moved to, at most [s]
@@ -55,7 +56,9 @@ def speeds(motion: Motion, levels: Levels) -> tuple[Array, Array]:
     that of grippers is at least 1.875 of their range in the demonstrations in a second: what least jerk over it takes
     (they may not move at all).
     """
-    arm, grippers = np.delete(motion.positions, levels.columns, axis=1), motion.positions[:, levels.columns]
+    n = motion.positions.shape[1]
+    arm = np.delete(motion.positions, [k for k in levels.columns if k < n], axis=1)
+    grippers = openings(motion, levels.columns, _FINGERS)
     ways, least = (arm, grippers / levels.ranges), (np.finfo(float).tiny, _CLOSING)
     rates = [np.linalg.norm(np.gradient(way, motion.times, axis=0), axis=1) for way in ways]
     shares = [rate / max(weighted_quantile(rate, rate, 0.9), slow) for rate, slow in zip(rates, least, strict=True)]

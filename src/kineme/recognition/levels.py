@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy.ndimage import gaussian_filter1d
 
 from kineme.movements.channels.channel import Channels
 from kineme.movements.segmentation.table import Motion, Rows, observe
@@ -25,26 +26,41 @@ _LEAST = 0.2  # of the largest range of a gripper: one that moves less does noth
 class Levels(NamedTuple):
     """Levels of the demonstrations of C classes."""
 
-    columns: tuple[int, ...]  # coordinates of grippers
+    columns: tuple[int, ...]  # of grippers, among the coordinates and, behind these, the discrete columns
     ranges: Array  # (k,), of these in all demonstrations
     levels: Array  # (m, 3 k), of each demonstration, in these ranges
     first: Rows  # (C,), index of the first demonstration of each class
 
 
-def gripper_levels(references: References, channels: Channels | None, resolution: float) -> Levels | None:
-    """Return the levels of the grippers of demonstrations; None if none moves, or no channel is called one."""
-    names = [(channel, name) for channel in channels or () for name in channel.coordinates]
-    columns = [k for k, (channel, _) in enumerate(names) if ROLES["gripper"] & {*words_of(channel.name)}]
+def gripper_levels(
+    references: References, channels: Channels | None, resolution: float, steps: bool = True
+) -> Levels | None:
+    """Return the levels of the grippers of demonstrations; None if none moves, or no channel is called one.
+
+    Without `steps`, those of discrete columns are no evidence.
+    """
+    moving = [channel.name for channel in channels or () for _ in channel.coordinates]
+    discrete = [channel.name for channel in channels or () if channel.kind == "discrete"] if steps else []
+    columns = [k for k, name in enumerate((*moving, *discrete)) if ROLES["gripper"] & {*words_of(name)}]
     if not columns:
         return None
-    movements = references.all_movements()
-    spans = np.ptp(movements.positions, axis=0)
-    columns = [k for k in columns if spans[k] > _LEAST * spans[columns].max()]
+    motions = [observe(movement, resolution) for movement in references.all_movements()]
+    if any(motion.steps.shape[1] < len(discrete) for motion in motions):  # generated ones have none
+        return gripper_levels(references, channels, resolution, steps=False)
+    spans = np.ptp(np.concatenate([openings(motion, columns) for motion in motions]), axis=0)
+    moves = spans > _LEAST * spans.max()
+    columns, spans = np.array(columns)[moves].tolist(), spans[moves]
     if not columns:
         return None
-    motions = [observe(movement, resolution) for movement in movements]
     every = [_levels(motion, np.array([[0, len(motion.times) - 1]]), columns) for motion in motions]
-    return Levels(tuple(columns), spans[columns], np.concatenate(every) / np.tile(spans[columns], 3), references.first)
+    return Levels(tuple(columns), spans, np.concatenate(every) / np.tile(spans, 3), references.first)
+
+
+def openings(motion: Motion, columns: tuple[int, ...] | list[int], lasting: float = 0.0) -> Array:
+    """Return columns (T, k) of grippers, as `Levels.columns` counts them; steps by a Gaussian `lasting` so long [s]."""
+    steps, rate = motion.steps, (len(motion.times) - 1) / (motion.times[-1] - motion.times[0])
+    steps = gaussian_filter1d(steps, lasting * rate, axis=0, mode="nearest") if lasting else steps
+    return np.concatenate((motion.positions, steps), axis=1)[:, columns]
 
 
 def level_scores(references: Levels, motion: Motion, rows: Rows) -> Array:
@@ -61,7 +77,7 @@ def level_scores(references: Levels, motion: Motion, rows: Rows) -> Array:
 def _levels(motion: Motion, rows: Rows, columns: tuple[int, ...] | list[int]) -> Array:
     """Return means at the start, in the middle and at the end of windows, (n, 3 k)."""
     sums = np.zeros((len(motion.times) + 1, len(columns)))
-    np.cumsum(motion.positions[:, columns], axis=0, out=sums[1:])
+    np.cumsum(openings(motion, columns), axis=0, out=sums[1:])
     first, n = rows[:, 0], rows[:, 1] - rows[:, 0] + 1
     ends = np.maximum((_ENDS * n).astype(np.intp), 1)
     quarter = n // 4

@@ -103,11 +103,13 @@ def spot(
     check_error_rate(error_rate)
     check_count("max_pieces", max_pieces, 1)
     tell: Progress = progress or (lambda share: None)
-    comparison, references, calibration = templates = templates._replace(calibration=calibration_of_cut(templates))
+    templates = templates._replace(calibration=calibration_of_cut(templates))
+    comparison, references, calibration, _ = templates
     tell(0.0)
     lasting = durations_of(references)
     timed = _as_timed(recording) if lasting is not None else as_recording(recording)
     timed = comparison.checked([timed], "a recording")[0]
+    templates = templates.of(timed)
     durations = None if lasting is None else Durations(float(lasting.min()) / _FASTER, float(lasting.max()) * _SLOWER)
     windows = candidate_windows(timed, durations, max_pieces)
     tell(0.0)

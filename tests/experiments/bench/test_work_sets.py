@@ -79,6 +79,16 @@ def test_two_arms_have_fourteen_channels_of_which_seven_work():
     assert moved[:3].min() > 3.0 * moved[7:].max()
 
 
+def test_a_gripper_that_steps_is_closed_while_things_are_held(works):
+    stepped = next(iter(work_episodes(1, seed=7, steps=True))).episode
+    for key in (STATE, ACTION):
+        np.testing.assert_array_equal(stepped.signals[key][:, :-1], works[0].episode.signals[key][:, :-1])
+        assert set(stepped.signals[key][:, -1]) == {0.0, 1.0}
+    held = stepped.signals[CONTACT][:, 0] > 0.5
+    assert stepped.signals[ACTION][held, -1].mean() < 0.3
+    assert stepped.signals[ACTION][~held, -1].mean() > 0.9
+
+
 def test_a_set_is_read_back_with_the_examples(works, tmp_path):
     import kineme
     from kineme.io.reading.read_labels import labeled_pieces, read_labels

@@ -156,7 +156,8 @@ def _chosen(info: Info, layout: Layout) -> _Chosen:
     features = {name: len(info.heads[name]) for name in dict.fromkeys(owners[k] for k in numbers)}
     starts = dict(zip(features, np.cumsum([0, *features.values()]).tolist(), strict=False))
     columns = [starts[owners[k]] + k - owners.index(owners[k]) for k in numbers]
-    alone = len(features) == 1
+    reference = () if layout.reference is None else layout.reference.columns
+    alone = len(features) == 1 and not {full[k] for k in numbers} <= {*reference}  # else as a library names its columns
     heads = tuple(entries[k] if alone and entries[k] and not entries[k].isdecimal() else full[k] for k in numbers)
     return _Chosen(features, heads, columns)
 

@@ -21,7 +21,7 @@ from kineme.io.records import Problem, note_on_missing
 from kineme.movements.channels.channel import Channels, is_plain, recorded_names
 from kineme.movements.channels.coordinates import canonical, in_order, off_norm
 from kineme.movements.channels.detect import Given, find_channels
-from kineme.movements.tables.layout import Block, Detected, Layout, Repair
+from kineme.movements.tables.layout import Block, Detected, Layout, Repair, listed
 from kineme.movements.trajectories.demonstrations import Demonstrations, MovementSequence
 from kineme.movements.trajectories.labels import label_array
 from kineme.movements.trajectories.movements import Movements, of_channels
@@ -187,7 +187,12 @@ def merge_files(
     positions = _concatenated([block.positions for block in blocks])
     times = _concatenated([_stamps(block) for block in blocks])
     demonstrations = demonstrations_of(positions, times, _offsets_of(blocks), sources, channels)
-    return Recordings(demonstrations, sources, tuple(reported), tuple(detected.most_common()))
+    understood_as = detected.most_common()
+    taken = [how.columns for how, _ in understood_as if by_number and how.named]
+    notes = (
+        [f"read the columns of these numbers, {listed(taken[0])}: counted from 0, over all of a file"] if taken else []
+    )
+    return Recordings(demonstrations, sources, tuple(reported), tuple(understood_as), tuple(notes))
 
 
 def demonstrations_of(

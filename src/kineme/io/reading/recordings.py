@@ -251,7 +251,7 @@ def read_entries(  # noqa: PLR0913 - those of `read_paths`, and what it has foun
         ]
     read += [rule.apply(file, entry.path) for file, entry in files]
     recordings = merge_files(read, in_words(places), problems, layout.kinds, layout.skip, layout.by_number)
-    recordings = replace(recordings, notes=notes)
+    recordings = replace(recordings, notes=(*recordings.notes, *notes))
     return trimmed(recordings) if trim else recordings
 
 

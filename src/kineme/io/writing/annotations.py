@@ -218,6 +218,34 @@ def is_in_place(path: Path, sources: Sequence[Path]) -> bool:
     )
 
 
+def copied_as_read(path: Path | None, sources: Sequence[Path], name: str | None = None) -> Callable[[], None]:
+    """Return a check that refuses to copy files to `path` that changed since; to be called before they are read.
+
+    It does nothing where nothing is copied, and for data sets in Lance, which have versions.
+    """
+    copies = path is not None and writer_of(path, name, sources).copies is not None
+    has_versions = copies and is_episodic(sources[0]) and read_info(sources[0]).storage == "lance"
+    paths = sources[0].rglob("*") if copies and sources[0].is_dir() else sources if copies else ()
+    states = {file: _state(file) for file in paths if file.is_file() and not has_versions}
+
+    def check() -> None:
+        for file, state in states.items():
+            if _state(file) != state:
+                raise DataError(
+                    f"expected recordings that no program changes meanwhile, {file} was "
+                    f"{'changed' if file.exists() else 'removed'} after it was read; nothing was written, run it again "
+                    "when the other program is done"
+                )
+
+    return check
+
+
+def _state(file: Path) -> tuple[int, int] | None:
+    """Return size [bytes] and time of the last change [ns]; None of a file that is not there."""
+    known = file.stat() if file.exists() else None
+    return known and (known.st_size, known.st_mtime_ns)
+
+
 def check_bag(path: Path, source: Path) -> None:
     """Refuse a path where no copy of that bag can be written, before the bag is read."""
     _check_apart(path, source)
@@ -250,7 +278,10 @@ def _check_new_folder(path: Path, source: Path) -> None:
     if path.suffix.lower() in FORMATS:
         raise DataError(f"expected the name of a folder for a copy of the folder {source}, got {path.name}")
     if path.is_file() or (path.is_dir() and any(path.iterdir())):
-        raise DataError(f"expected a new folder for the copy of {source}, {path} is there; name another, or remove it")
+        raise DataError(
+            f"expected a new folder for the copy of {source}, {path} is there; name another, or remove it: a "
+            "folder is never written over, with --force neither"
+        )
 
 
 def _json(annotation: Annotation) -> str:

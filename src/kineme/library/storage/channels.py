@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from kineme.errors import DataError
 from kineme.library.storage.rows import Row, strange
 from kineme.movements.channels.channel import Channels, channels_from_data, channels_to_data, is_plain, learned_names
-from kineme.movements.channels.coordinates import canonical
+from kineme.movements.channels.coordinates import canonical, columns_of_kinds
 from kineme.movements.trajectories.movements import Movements
 from kineme.validation import Array
 
@@ -33,12 +33,6 @@ def channels_of_text(text: str, n_dims: int, path: Path) -> Channels:
             f"expected {path} to say what the {n_dims} dimensions of its movements were recorded as, got "
             f"{text[:40]!r}; take the file from a backup or an export that you trust"
         ) from error
-
-
-def columns_of_kinds(channels: Channels, *kinds: str) -> list[int]:
-    """Return the columns of channels of these kinds."""
-    every = [channel.kind for channel in channels for _ in channel.columns]
-    return [k for k, kind in enumerate(every) if kind in kinds]
 
 
 def other_columns(channels: Channels) -> list[int]:

@@ -33,6 +33,12 @@ def columns_of(channels: Channels) -> list[slice]:
     return [slice(end - len(channel.columns), end) for end, channel in zip(ends, channels, strict=True)]
 
 
+def columns_of_kinds(channels: Channels, *kinds: str) -> list[int]:
+    """Return the columns of channels of these kinds."""
+    every = [channel.kind for channel in channels for _ in channel.columns]
+    return [k for k, kind in enumerate(every) if kind in kinds]
+
+
 def in_order(columns: Array, heads: Sequence[str], channels: Channels) -> Array:
     """Columns (total, m) of a file in the order of its channels: those of a quaternion side by side."""
     number = {head: k for k, head in enumerate(heads)}

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, median_filter
 
 from kineme.errors import SpecificationError, TrajectoryError
+from kineme.movements.channels.coordinates import columns_of_kinds
 from kineme.movements.preparation.smooth import Smooth
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.trajectory import Trajectory
@@ -325,6 +326,7 @@ class Motion:
     peak: float
     noise: float  # root mean square speed of the noise that remains after smoothing [unit/s]
     cutoff: float  # cutoff frequency of the smoothing [Hz]
+    steps: Array  # shape (T, k); discrete columns, as recorded
 
 
 def observe(recording: Trajectory, resolution: float) -> Motion:
@@ -361,7 +363,12 @@ def observe(recording: Trajectory, resolution: float) -> Motion:
             f"{who}: expected some movement, got {recording.duration:.3g} s at rest: the smoothed positions stay "
             f"within {extent:.3g}, the noise is {sigma:.3g}; check the dimensions and the unit of the recording"
         )
-    return Motion(recording.times, smooth, speed, peak, noise, cutoff)
+    return Motion(recording.times, smooth, speed, peak, noise, cutoff, steps_of(recording))
+
+
+def steps_of(recording: Trajectory) -> Array:
+    """Return the discrete columns (T, k) of a recording; none of one whose channels are not known."""
+    return recording.recorded[:, columns_of_kinds(recording.channels or (), "discrete")]
 
 
 def without_glitches(positions: Array) -> Array:

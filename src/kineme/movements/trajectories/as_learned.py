@@ -69,8 +69,9 @@ def _of_kinds(demos: Demonstrations, learned: Channels | None, n_dims: int, what
     if same_columns(channels, learned):
         return Demonstrations.of_movements(in_coordinates(demos.movements), demos.steps)
     moving = tuple(channel for channel in learned if channel.coordinates)
-    if {*columns_recorded(moving).names} <= {*columns_recorded(channels).names}:
-        return by_names(demos, moving, known_units=False)
+    for wanted in (learned, moving):  # discrete columns, too, where all of them are there
+        if {*columns_recorded(wanted).names} <= {*columns_recorded(channels).names}:
+            return by_names(demos, wanted, known_units=False)
     if moving_kinds(channels) == moving_kinds(learned):
         _check_names(channels, moving, what)
         return _in_units(Demonstrations.of_movements(in_coordinates(demos.movements), demos.steps), learned)

@@ -171,7 +171,8 @@ async def put_spans(studio: Reads, key: EpisodeKey, body: SpansRequest) -> dict[
         for span in sorted(body.spans, key=lambda span: span.begin)
         if span.end > span.begin
     ]
-    opened.corrections.put(item.movement, Lane(tuple(annotations), body.corrected))
+    unknown = item.annotation((0.0, item.duration), None, None, None)
+    opened.corrections.put(item.movement, Lane(tuple(annotations), body.corrected, (unknown,)))
     return _episode(opened, item, int(key.removeprefix(KEY)))
 
 

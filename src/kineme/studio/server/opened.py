@@ -45,6 +45,12 @@ class Lane(NamedTuple):
 
     annotations: tuple[Annotation, ...] = ()
     corrected: bool = False  # whether a person has changed any, and so has looked at all of them
+    unknown: tuple[Annotation, ...] = ()  # the whole movement as one that is like no symbol
+
+    @property
+    def rows(self) -> tuple[Annotation, ...]:
+        """What the table of corrections has of it: where all symbols were removed, that nothing is like one."""
+        return self.annotations or self.unknown
 
 
 def _lanes(annotations: Iterable[Annotation], corrected: bool) -> dict[Movement, Lane]:
@@ -99,7 +105,7 @@ class Corrections:
     @property
     def corrected(self) -> Sequence[Annotation]:
         """All annotations of movements that a person corrected, in the order in which they were first looked at."""
-        return [note for lane in list(self._lanes.values()) if lane.corrected for note in lane.annotations]
+        return [note for lane in list(self._lanes.values()) if lane.corrected for note in lane.rows]
 
     def table(self) -> bytes:
         """Return `corrected` as `kineme annotate` writes annotations."""
