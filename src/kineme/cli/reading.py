@@ -236,7 +236,7 @@ def notes_beside(parsed: Any, options: dict[str, Any], learned: Any) -> list[str
             "others"
         )
     sentences += notes_on_gaps(parsed) + _differences(learned, parsed.demonstrations.channels)
-    return [*parsed.notes, *sentences]
+    return [*sentences, *parsed.notes]
 
 
 def problem_lines(problems: Any, lost: str = "not read: ") -> list[str]:
