@@ -23,7 +23,7 @@ from kineme.pieces.scan import Best, Plan, Query, Single, best_of, plan_of, scan
 from kineme.pieces.shards import PATTERN, Reduction, Shard, open_shard, read_reduction
 from kineme.recognition.answer import Answer
 from kineme.runtime.compiled import load_compiled
-from kineme.runtime.parallel import for_tiles, n_threads, single_threaded_blas
+from kineme.runtime.parallel import for_tiles, n_threads
 from kineme.similarity.bounds import reduce_features
 from kineme.similarity.describe import Described, feature_rows
 from kineme.validation import check_count
@@ -225,9 +225,14 @@ class Shards:
         every = Candidates(*(np.concatenate(part) for part in zip(*candidates, strict=True)))
         for number in np.unique(every.shards).tolist():
             self.shards[number].will_need(np.unique(every.rows[every.shards == number]))
-        with single_threaded_blas():
-            movements = (described.take(slice(i, i + 1)) for i in range(len(described)))
-            return [self._ranked(*pair, n) for pair in zip(movements, candidates, strict=True)]
+        ranked: list[list[Near]] = [[] for _ in candidates]
+
+        def work(start: int, stop: int) -> None:
+            for i in range(start, stop):
+                ranked[i] = self._ranked(described.take(slice(i, i + 1)), candidates[i], n)
+
+        for_tiles(work, len(candidates), 1)
+        return ranked
 
     def _ranked(self, movement: Described, candidates: Candidates, n: int) -> list[Near]:
         if not len(candidates.rows):

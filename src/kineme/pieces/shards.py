@@ -227,6 +227,13 @@ def shard_table(specification: ComparisonSpecification, bases: Sequence[Array], 
     return pa.table(columns).replace_schema_metadata({_BASES: bases_digest(bases)})
 
 
+def merge_tables(tables: Sequence[Any]) -> Any:
+    """Return tables of `shard_table` as one, whose paths are in one dictionary: files of Arrow hold but one."""
+    import pyarrow as pa
+
+    return pa.concat_tables(tables).unify_dictionaries().combine_chunks()
+
+
 def write_shard(path: Path, tables: Sequence[Any], about: Mapping[str, Any] | None = None) -> int:
     """Write tables of `shard_table` as one shard, atomically; return the number of its rows.
 
@@ -235,7 +242,7 @@ def write_shard(path: Path, tables: Sequence[Any], about: Mapping[str, Any] | No
     import pyarrow as pa
 
     with whole_file(path) as beside:
-        merged = pa.concat_tables(tables).unify_dictionaries().combine_chunks()
+        merged = merge_tables(tables)
         said = {_ABOUT: json.dumps({"task": TASK} | dict(about or {})), **(merged.schema.metadata or {})}
         merged = merged.replace_schema_metadata(said)
         with pa.OSFile(str(beside), "wb") as sink, pa.ipc.new_file(sink, merged.schema) as writer:
