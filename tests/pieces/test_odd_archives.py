@@ -189,7 +189,11 @@ def test_processes_end_with_the_one_that_has_started_them(tmp_path, monkeypatch,
         time.sleep(0.02)
     worker = int((tmp_path / "mark").read_text())
     (os.kill if how == signal.SIGKILL else os.killpg)(process.pid, how)
-    _, errors = process.communicate(timeout=30)  # a pipe that the worker holds, too
+    try:
+        _, errors = process.communicate(timeout=30)  # a pipe that the worker holds, too
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+        raise
     assert process.returncode != 0
     assert errors.count(b"Traceback") == (how == signal.SIGINT)  # that of the script alone
     with pytest.raises(ProcessLookupError):
