@@ -119,9 +119,13 @@ def test_functions_are_told_apart_by_what_they_carry(tmp_path, make):
 
 def test_functions_are_told_apart_by_their_code(tmp_path):
     archive = write_archive(tmp_path / "archive", 4)
-    functions = [lambda recordings: {"n": [1]}, lambda recordings: {"n": [2]}, _of_label, _of_label]
+    functions = [
+        lambda recordings: {"n": [1]}, lambda recordings: {"n": [2]},
+        lambda recordings: {"n": [len(recordings) + 2]}, lambda recordings: {"n": [len(recordings) - 2]},
+        _of_label, _of_label,
+    ]  # fmt: skip
     states = [_states(function, archive, tmp_path / "out") for function in functions]
-    assert states == [{"done"}, {"done"}, {"done"}, {"skipped"}]
+    assert states == [{"done"}] * 5 + [{"skipped"}]
     held = object()  # pickle writes it; what a lock is, it does not
     assert _states(lambda recordings: {"n": [id(held)]}, archive, tmp_path / "out") == {"done"}
 
@@ -185,7 +189,11 @@ def test_processes_end_with_the_one_that_has_started_them(tmp_path, monkeypatch,
         time.sleep(0.02)
     worker = int((tmp_path / "mark").read_text())
     (os.kill if how == signal.SIGKILL else os.killpg)(process.pid, how)
-    _, errors = process.communicate(timeout=30)  # a pipe that the worker holds, too
+    try:
+        _, errors = process.communicate(timeout=30)  # a pipe that the worker holds, too
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+        raise
     assert process.returncode != 0
     assert errors.count(b"Traceback") == (how == signal.SIGINT)  # that of the script alone
     with pytest.raises(ProcessLookupError):
