@@ -91,14 +91,15 @@ def test_a_candidate_in_a_recording_is_described_once(monkeypatch):
     asked = []
     from kineme.recognition import compared_windows, spotting
 
-    inner = spotting.score
+    def counting(inner):
+        def counted(comparison, references, movements, *others):
+            asked.append(len(movements))
+            return inner(comparison, references, movements, *others)
 
-    def noted(comparison, references, movements, *scores):
-        asked.append(len(movements))
-        return inner(comparison, references, movements, *scores)
+        return counted
 
-    for module in (spotting, compared_windows):
-        monkeypatch.setattr(module, "score", noted)
+    for module, name in ((spotting, "score"), (compared_windows, "for_compared")):
+        monkeypatch.setattr(module, name, counting(getattr(module, name)))
     counts = _Counts(monkeypatch)
     pieces = [demos[0].positions, np.repeat(demos[0].positions[-1:], 40, axis=0), demos[3].positions]
     positions = np.concatenate(pieces)

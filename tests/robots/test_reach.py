@@ -164,7 +164,7 @@ def test_joints_far_outside_their_limits_are_refused_before_anything_is_solved(n
     from kineme.robots.planning import move as planning
 
     robot = load(name)
-    monkeypatch.setattr(planning, "with_timing", lambda *_: pytest.fail("it is solved"))
+    monkeypatch.setattr(planning.robot_movement, "with_timing", lambda *_: pytest.fail("it is solved"))
     joints = np.tile(robot.rest, (40, 1))
     joints[:, 1] = np.linspace(robot.upper[1] + 1, robot.rest[1], 40)
     with pytest.raises(kineme.robots.InfeasibleError, match=rf"position of {robot.joints[1]} at 0\.00 s: .*, limit"):

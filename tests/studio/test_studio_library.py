@@ -267,8 +267,8 @@ def test_every_change_says_its_own_version_whatever_others_change_meanwhile(clie
     writing = Store.writing
 
     @contextmanager
-    def followed(store, *options):
-        with writing(store, *options) as change:
+    def followed(store, *arguments, **options):
+        with writing(store, *arguments, **options) as change:
             yield change
         with ActionLibrary(folder) as other:
             monkeypatch.setattr(Store, "writing", writing)

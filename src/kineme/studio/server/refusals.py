@@ -20,7 +20,10 @@ from kineme.library.storage.connection import BusyError
 from kineme.reporting.text import in_markup
 
 # Bounded where they repeat: texts hold the names of other people's files and columns, of any length.
-_CHANNELS = r"(?:choose|select) the (?:columns|dimensions)\b.{0,80}?in the shell (?:with )?--columns(?: and --kind)?"
+_CHANNELS = (
+    r"(?:choose|select) the (?:columns|dimensions)\b.{0,80}?in the shell (?:with )?--columns(?: and --kind)?"
+    r"(?: \(--feature [^)]{0,40}\))?"
+)
 _SMALLER = "make the movement smaller"
 _WORDS = tuple(
     (re.compile(library), studio)
