@@ -59,7 +59,7 @@ def test_processes_answer_as_shards_do(work, tmp_path):
     assert said["recordings"] == 12
     shards, workers = ({p.name: p.read_bytes() for p in (tmp_path / n).glob("part-*")} for n in ("shards", "workers"))
     assert shards == workers
-    assert answer(*command, "-o", tmp_path / "workers", "--workers", 1)["pieces"] == {"skipped": 3}
+    assert answer(*command, "-o", tmp_path / "workers", "--shard", "1/1")["pieces"] == {"skipped": 3}
 
 
 def test_hits_are_those_of_find(work, tmp_path):
@@ -97,7 +97,7 @@ def test_gather_says_what_is_missing_stale_failed_and_strange(work, tmp_path):
     assert "1 of 3 pieces done" in done.stdout
     assert "2 missing: set 1" in done.stdout
     assert json.loads(run("gather", tmp_path / "out", "--partial", "--json").stdout)["recordings"] == 3
-    run(*command, "--workers", 1)
+    run(*command, "--shard", "1/1")
     assert run("gather", tmp_path / "out").returncode == 0
     info = tmp_path / "archive" / "set 1" / "meta" / "info.json"
     info.write_text(info.read_text() + " ")
@@ -111,7 +111,7 @@ def test_a_poisoned_piece_ends_with_3_and_is_named(work, tmp_path):
     shutil.copytree(work / "archive", tmp_path / "archive")
     next((tmp_path / "archive" / "set 1" / "data").rglob("*.parquet")).write_bytes(b"PAR1 and nothing more")
     (tmp_path / "archive" / "set 2" / "meta" / "info.json").write_text("{}")
-    done = run("annotate", tmp_path / "archive", "-l", work / "actions", "-o", tmp_path / "out", "--workers", 1)
+    done = run("annotate", tmp_path / "archive", "-l", work / "actions", "-o", tmp_path / "out", "--shard", "1/1")
     assert "not read: set 2" in done.stdout
     assert "set 1" in done.stdout
     assert "damaged" in done.stdout
