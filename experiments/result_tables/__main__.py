@@ -12,14 +12,14 @@ from pathlib import Path
 from result_tables import adapting as adapting_tables
 from result_tables import beside as beside_tables
 from result_tables import concepts as concept_tables
+from result_tables import large_archives, motion_layer
 from result_tables import modulation as modulation_tables
-from result_tables import motion_layer
 from result_tables import outliers as outlier_tables
 from result_tables import people as people_tables
 from result_tables.measured import DOCS, RESULTS, figures, fill, rows, table
 
 #: Pages of the guide besides that one about recognition.
-GUIDES = (adapting_tables, modulation_tables, outlier_tables, people_tables)
+GUIDES = (adapting_tables, modulation_tables, outlier_tables, people_tables, large_archives)
 PAGE = DOCS / "guide" / "recognition.md"
 #: Default -> why, and the other values that were measured.
 DEFAULTS: dict[str, tuple[str, tuple[str, ...]]] = {
