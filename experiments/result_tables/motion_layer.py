@@ -64,12 +64,18 @@ def _named(measured: dict[str, dict[str, Any]]) -> str:
         [measured[f"{arms}, 3 examples of each of 6 kinds: {what}"]["ours"] for arms in ("1 arm", "2 arms")]
         for what in ("named right", "boundaries within 0.25 s")
     )
+    edges = [
+        measured[f"{arms}, 3 examples of each of 6 kinds: starts and ends within their uncertainty"]
+        for arms in ("1 arm", "2 arms")
+    ]
+    one_edge, two_edges = (edge["ours"] for edge in edges)
     cost = measured[f"kineme annotate{_SIGNALS}"]["ours"]
     memory = measured[f"kineme annotate{_SIGNALS}: memory"]["ours"]
     return (
         "Of simulated arms at work, three examples of each of six kinds, shown by other people, name\n"
         f"{100 * one_arm:.0f} of 100 movements of one arm right, of two arms {100 * two_arms:.0f}; boundaries are\n"
-        f"found within 0.25 s with an F1 of {one_boundary:.3f} and {two_boundaries:.3f}. A thousand hours of\n"
+        f"found within 0.25 s with an F1 of {one_boundary:.3f} and {two_boundaries:.3f}; {100 * one_edge:.0f} and\n"
+        f"{100 * two_edges:.0f} of 100 starts and ends are within their uncertainty. A thousand hours of\n"
         f"14 channels at 50 Hz take {cost:.1f} core-hours and {memory:.0f} MB ({_COMMAND})."
     )
 
