@@ -203,3 +203,11 @@ def test_windows_score_above_zero_up_to_the_most_nonconformity():
         most = spotting.most_nonconformity(compared, typical, around, manner, reach)
         assert 0.2 < (scored.score > 0).mean() < 0.8
         np.testing.assert_array_equal(scored.score > 0, (compared.scores < most).any(axis=1))
+
+
+def test_another_pace_costs_more_where_an_arm_is_at_work():
+    """People change pace from one movement to the next, arms at work hardly."""
+    demos, labels = _demonstrations(_channels())
+    recognizer = Recognizer().fit(demos, labels)
+    at_work = spotting.expected(recognizer.references_, at_work=True).costs
+    assert at_work[0] > 4.0 * spotting.expected(recognizer.references_).costs[0]
