@@ -60,7 +60,35 @@ def tables() -> dict[str, str]:
         f"No process took more than {memory:.0f} MB, whatever the archive; two workers took {more:.2f} times the "
         "processor time of one, their start included."
     )
-    return {"costs": "\n".join([*lines, "", sentence, of_workers])}
+    return {"costs": "\n".join([*lines, "", sentence, of_workers]), "search": _search()}
+
+
+#: Row of the table of searches -> what was measured, and whether it is a time.
+_SEARCHES = {
+    "one movement: processor": ("one, processor", True),
+    "of it the first stage": ("one, of it the first stage, processor", True),
+    "one movement: median until the answer": ("one, median, wall", True),
+    "a stranger, the first stage: processor": ("one stranger, processor", True),
+    "100 movements at once: processor": ("100 at once, processor", True),
+    "until the answers": ("100 at once, wall", True),
+    "movements compared in the first stage": ("movements compared in the first stage, one", False),
+    "for a stranger": ("the same, a stranger", False),
+}
+
+
+def _search() -> str:
+    """Return the table of what a search among movements in shards takes."""
+    counts = sorted(_of_shards("one, processor"))
+    lines = [f"| | {' | '.join(f'{count:,}' for count in counts)} |", "|---" * (len(counts) + 1) + "|"]
+    for title, (what, is_time) in _SEARCHES.items():
+        measured = _of_shards(what)
+        cells = [_time(measured[count]) if is_time else f"{100 * measured[count]:.2g} %" for count in counts]
+        lines.append(f"| {title} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def _time(seconds: float) -> str:
+    return f"{seconds:.1f} s" if seconds >= 1.0 else f"{1000 * seconds:.0f} ms"
 
 
 def _laws() -> dict[str, Law]:
