@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import os
 import re
 import stat
@@ -18,6 +17,7 @@ from urllib.parse import unquote
 from kineme.errors import DataError, SpecificationError
 from kineme.io.reading.formats import DATA_SETS, DataSet, Entry, as_text, data_set_of, entries_of, is_alone
 from kineme.io.records import Problem, needs
+from kineme.reporting.atomic import FULL
 
 _REMOTE = re.compile(r"[a-zA-Z][a-zA-Z0-9+.-]+://")
 _CHUNK = 2**22  # bytes that are copied at a time
@@ -178,7 +178,7 @@ def _copy(system: Any, path: str, target: Path, file: File) -> None:
     except FileNotFoundError as error:
         raise DataError(f"expected {file.name} in the archive, it has vanished since it was listed") from error
     except OSError as error:
-        if error.errno == errno.ENOSPC:  # here, not in the store
+        if error.errno in FULL:  # here, not in the store
             raise
         raise DataError(f"expected to read {file.name}, the store refuses ({_reason(error)})") from error
     if target.stat().st_size != file.size:

@@ -29,7 +29,7 @@ from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import Movements
 from kineme.pieces.archive import Unit, local_copies
-from kineme.pieces.run import Source
+from kineme.pieces.run import Source, noted
 
 #: Table of a library -> the columns of a part that are its columns, without the key.
 BLOBS = {
@@ -93,13 +93,7 @@ def _recordings(
             for folder, unit in zip(folders, source.piece.units, strict=True)
         ]
         files = None if source.piece.numbers is None else _checksums(source.piece.units[0], folders[0])
-        for recordings in _read(entries, how, source.piece.numbers):
-            if isinstance(recordings, Problem):
-                source.problems.append(recordings)
-                continue
-            source.problems.extend(recordings.problems)
-            source.counts["recordings"] += len(recordings)
-            source.counts["seconds"] += float(recordings.demonstrations.durations.sum())
+        for recordings in noted(source, _read(entries, how, source.piece.numbers)):
             people = recordings.people
             if options.get("person") is not None:
                 if people is not None:

@@ -53,9 +53,9 @@ def _in_processes(job: Job, pieces: Sequence[Piece], workers: int) -> Outcomes:
     knows by which piece: those under way are done again, each alone, and the one that ends its process a second time
     fails.
     """
-    alone: list[Piece] = []
     waiting = iter(pieces)
-    while True:
+    broken = True
+    while broken:
         suspects: list[Piece] = []
         with _pool(job, workers) as pool:
             futures: dict[Future[Outcome], Piece] = {}
@@ -78,12 +78,8 @@ def _in_processes(job: Job, pieces: Sequence[Piece], workers: int) -> Outcomes:
                         suspects.append(piece)
                         broken = True
             suspects += futures.values()
-        alone += suspects
-        if not broken:
-            break
-        for piece in alone:
+        for piece in suspects:
             yield _alone(job, piece)
-        alone = []
 
 
 def _alone(job: Job, piece: Piece) -> Outcome:

@@ -11,7 +11,7 @@ from typing import Any
 
 from kineme.errors import DataError
 from kineme.pieces.archive import is_remote, path_at
-from kineme.pieces.planning import PIECE_BYTES, Piece, plan
+from kineme.pieces.planning import PIECE_BYTES, Piece, Plan, plan
 from kineme.pieces.run import Job, Part, read_part
 from kineme.pieces.tasks import TASKS, job_of
 from kineme.reporting.atomic import whole_file
@@ -140,7 +140,7 @@ def check(output: str | Path) -> Checked:
     return checked(job_of(asked.task, str(output), asked.options), plan_of(asked).pieces)
 
 
-def plan_of(asked: Asked) -> Any:
+def plan_of(asked: Asked) -> Plan:
     """Return the plan of its archives. Raises `DataError`: one is not there."""
     for archive in asked.archives:
         if not is_remote(archive) and not path_at(archive).exists():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import json
 import re
 import time
@@ -22,7 +21,7 @@ from kineme.io.records import Problem
 from kineme.movements.tables.layout import Known
 from kineme.pieces.archive import is_remote, local_copy
 from kineme.pieces.planning import Piece
-from kineme.reporting.atomic import whole_file, write_atomically
+from kineme.reporting.atomic import FULL, whole_file, write_atomically
 from kineme.reporting.text import counted, shortened
 from kineme.runtime.compiled import compiled_always
 
@@ -30,7 +29,6 @@ DONE, SKIPPED, FAILED = "done", "skipped", "failed"
 
 _ABOUT, _REPORT = b"kineme", b"kineme.report"  # keys of the metadata of a part
 _LEFT = re.compile(r"\.(?:part|failed)-[0-9a-f]{16}\.\w+\.\d+\.[0-9a-f]{8}")  # what a killed process leaves
-_FULL = (errno.ENOSPC, errno.EDQUOT)  # the disk, or what a user may take of it
 _LONGEST = 500  # letters of a reason that are kept
 
 
@@ -130,7 +128,7 @@ def run_piece(job: Job, piece: Piece) -> Outcome:
         problems = tuple(str(problem) for problem in source.problems)
         rows = _write(path, tables, {_ABOUT: about, _REPORT: {"problems": problems, **source.counts}})
     except Exception as error:  # one poisoned piece must not stop the others, whatever is wrong with it
-        if isinstance(error, OSError) and error.errno in _FULL:  # all others would fail, after as much work
+        if isinstance(error, OSError) and error.errno in FULL:  # all others would fail, after as much work
             raise
         return failed(job, piece, _in_words(error), time.process_time() - before)
     with suppress(OSError):
@@ -160,20 +158,19 @@ def _check_unchanged(piece: Piece) -> None:
     """Refuse a piece whose files are others than when it was planned; of a store, sizes were checked when copying."""
     if is_remote(piece.uri):
         return
-    there = {}
     for unit in piece.units:
         with local_copy(unit) as folder:
             base = folder / unit.name if unit.is_archive else folder
             for file in unit.files:
+                there = None
                 with suppress(OSError):
                     status = (base / file.name).stat()
-                    there[unit.name, file.name] = (status.st_size, str(status.st_mtime_ns))
-    for unit in piece.units:
-        for file in unit.files:
-            if there.get((unit.name, file.name)) != (file.size, file.stamp):
-                raise DataError(
-                    f"expected {file.name} as it was listed, it has changed or vanished while it was read; run it again"
-                )
+                    there = (status.st_size, str(status.st_mtime_ns))
+                if there != (file.size, file.stamp):
+                    raise DataError(
+                        f"expected {file.name} as it was listed, it has changed or vanished while it was read; run it "
+                        "again"
+                    )
 
 
 def read_part(path: Path) -> Part | None:
@@ -201,7 +198,7 @@ def read_part(path: Path) -> Part | None:
 def _write(path: Path, tables: Sequence[Any], metadata: Mapping[bytes, Mapping[str, Any]]) -> int:
     """Write tables as one file, atomically; of none, one without columns. Returns the number of rows."""
     import pyarrow as pa
-    from pyarrow import ipc, parquet
+    from pyarrow import parquet
 
     table = pa.concat_tables(tables, promote_options="permissive") if tables else pa.table({})
     said = {key: dict(value) for key, value in metadata.items()}
@@ -210,9 +207,9 @@ def _write(path: Path, tables: Sequence[Any], metadata: Mapping[bytes, Mapping[s
     table = table.replace_schema_metadata({**(table.schema.metadata or {}), **own})
     with whole_file(path, sweep=False) as beside:
         if path.suffix == ".arrow":
-            table = table.unify_dictionaries().combine_chunks()  # a file has one dictionary for each column
-            with pa.OSFile(str(beside), "wb") as sink, ipc.new_file(sink, table.schema) as writer:
-                writer.write_table(table, 65536)
+            from kineme.pieces.shards import write_arrow  # of features alone; it loads what compares movements
+
+            write_arrow(beside, table)
         else:
             parquet.write_table(table, beside)
     return int(table.num_rows)
@@ -237,14 +234,19 @@ def recordings_of(source: Source, options: Mapping[str, Any], reference: Known |
     for unit in source.piece.units:
         with local_copy(unit) as folder:
             entry = Entry(folder / unit.name, Path(unit.name), unit.shown)
-            for recordings in read_entry(entry, layout, rule, **switches, numbers=source.piece.numbers):
-                if isinstance(recordings, Problem):
-                    source.problems.append(recordings)
-                    continue
-                source.problems.extend(recordings.problems)
-                source.counts["recordings"] += len(recordings)
-                source.counts["seconds"] += float(recordings.demonstrations.durations.sum())
-                yield recordings
+            yield from noted(source, read_entry(entry, layout, rule, **switches, numbers=source.piece.numbers))
+
+
+def noted(source: Source, read: Iterable[Recordings | Problem]) -> Iterator[Recordings]:
+    """Yield what is read of a piece; its problems, and how much there is of it, are added to those of the source."""
+    for recordings in read:
+        if isinstance(recordings, Problem):
+            source.problems.append(recordings)
+            continue
+        source.problems.extend(recordings.problems)
+        source.counts["recordings"] += len(recordings)
+        source.counts["seconds"] += float(recordings.demonstrations.durations.sum())
+        yield recordings
 
 
 def summary_of(outcomes: Sequence[Outcome]) -> str:

@@ -227,11 +227,13 @@ def shard_table(specification: ComparisonSpecification, bases: Sequence[Array], 
     return pa.table(columns).replace_schema_metadata({_BASES: bases_digest(bases)})
 
 
-def merge_tables(tables: Sequence[Any]) -> Any:
-    """Return tables of `shard_table` as one, whose paths are in one dictionary: files of Arrow hold but one."""
+def write_arrow(path: Path, table: Any) -> None:
+    """Write a table as a file of Arrow that can be mapped into memory: it holds but one dictionary for each column."""
     import pyarrow as pa
 
-    return pa.concat_tables(tables).unify_dictionaries().combine_chunks()
+    table = table.unify_dictionaries().combine_chunks()
+    with pa.OSFile(str(path), "wb") as sink, pa.ipc.new_file(sink, table.schema) as writer:
+        writer.write_table(table, BATCH)
 
 
 def write_shard(path: Path, tables: Sequence[Any], about: Mapping[str, Any] | None = None) -> int:
@@ -242,11 +244,9 @@ def write_shard(path: Path, tables: Sequence[Any], about: Mapping[str, Any] | No
     import pyarrow as pa
 
     with whole_file(path) as beside:
-        merged = merge_tables(tables)
+        merged = pa.concat_tables(tables)
         said = {_ABOUT: json.dumps({"task": TASK} | dict(about or {})), **(merged.schema.metadata or {})}
-        merged = merged.replace_schema_metadata(said)
-        with pa.OSFile(str(beside), "wb") as sink, pa.ipc.new_file(sink, merged.schema) as writer:
-            writer.write_table(merged, BATCH)
+        write_arrow(beside, merged.replace_schema_metadata(said))
     return int(merged.num_rows)
 
 

@@ -13,6 +13,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+FULL = (errno.ENOSPC, errno.EDQUOT)  # the disk, or what a user may take of it
 _LONGEST_NAME = 228  # bytes: the hidden name beside it is longer, and file systems take 255
 _IDLE = 3600.0  # seconds since the last write after which the file of a process that no longer runs is a leftover
 
@@ -131,7 +132,7 @@ def _named(path: Path, beside: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        if error.errno == errno.ENOSPC:
+        if error.errno in FULL:
             said = "expected room to write, got a full disk; free some space and run it again"
             raise OSError(error.errno, said, str(path)) from error
         if not str(error.filename).startswith(str(beside)):
