@@ -27,6 +27,7 @@ SUBJECTS = (
     "recognize_files",
     "stream",
     "early",
+    "monitor",
     "spotting",
     "by_others",
     "one_shot",
