@@ -39,13 +39,10 @@ _DENSE = 4 * N_PHASES  # samples that demonstrations are followed by: at most on
 _FORWARD = 3  # phases that one step may go on by
 _BEGINNING = 4  # phases at which an execution may begin
 _FORGETTING = 0.8  # of the cost of an alignment, at each step
-_OWN, _COMMON = (
-    0.3,
-    0.02,
-)  # shares of the variance at a phase, and of its mean over phases, that count in all directions
-_PRIOR, _SPREAD = 2.0, 0.05  # demonstrations that are added, and their standard deviation in sizes of the movement
+_OWN, _COMMON = 0.1, 0.02  # of the variance at a phase, and of its mean over phases: added in all directions
+_PRIOR, _SPREAD = 2.0, 0.1  # demonstrations that are added, and their standard deviation in sizes of the movement
 _FOLDS = 20  # without groups
-_GUESS, _MARGIN = 4.0, 1.5  # threshold from one demonstration; times the largest distance of two to too few
+_GUESS, _MARGIN = 2.0, 1.5  # threshold from one demonstration; times the largest distance of two to too few
 
 
 class Spread(NamedTuple):
