@@ -60,6 +60,11 @@ def measure(quick: bool) -> list[Row]:
         if name in ("letters2d", "strokes2d", "digits"):
             rows += _rows(name, data, "same person", OF_FEW, _by_the_same(data, most))
             rows += _rows(name, data, "robot", OF_FEW, _by_a_robot(data, most))
+    alarms = [row for row in rows if row.details["templates"] == "others" and row.details["what"] == "false alarms"]
+    if alarms:
+        numbers = [(row.ours, row.details["executions"]) for row in alarms]
+        raised = [k < round(share * n) for share, n in numbers for k in range(n)]
+        rows.append(_row("all sets, others", "false alarms", raised, {"templates": "others", "error rate": ERROR_RATE}))
     return rows + _cost(quick)
 
 
@@ -121,17 +126,17 @@ def _rows(name: str, data: Recorded, templates: str, error_rate: float, monitors
             shares["any"] += [shares[what][-1] for what in DISTURBED]
     role = "chosen on" if name in CHOSEN else "reported"
     details = {"name": name, "templates": templates, "error rate": error_rate, "role": role}
-    rows = []
-    for what, values in shares.items():
-        target = None
-        if what in {"any", "stopped"}:
-            target = (">=", 0.9)
-        elif what == "false alarms":
-            target = ("<=", 4 / 3 * error_rate)
-        shown = "disturbances noticed before half" if what == "any" else what
-        of = details | {"what": what, "executions": len(values)}
-        rows.append(Row(f"{name}, {templates}, {shown}", "of 1", float(np.mean(values)), target=target, details=of))
-    return rows
+    return [_row(f"{name}, {templates}", what, values, details) for what, values in shares.items()]
+
+
+def _row(name: str, what: str, values: list[bool], details: dict[str, Any]) -> Row:
+    """The share of executions; of false alarms beside the error rate, which they are to keep within a third."""
+    share, details = float(np.mean(values)), details | {"what": what, "executions": len(values)}
+    named = f"{name}, {'disturbances noticed before half' if what == 'any' else what}"
+    if what == "false alarms":
+        off = abs(share / details["error rate"] - 1.0)
+        return Row(named, "of 1", share, ratio=off, target=("<=", 1 / 3), details=details)
+    return Row(named, "of 1", share, target=(">=", 0.9) if what in {"any", "stopped"} else None, details=details)
 
 
 def _watched(monitor: Monitor, executed: Executed) -> tuple[bool, bool, bool]:

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.channels.channel import Channels
@@ -31,11 +31,14 @@ from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.recognition.conformal import check_error_rate
 from kineme.recognition.early.live_state import LiveState, LiveStatus
 from kineme.recognition.early.stream import CAPACITY, BoundedPath, Live, Samples
-from kineme.validation import Array, check_number
+from kineme.validation import LARGEST_POSITION, Array, check_number
+
+Phases = NDArray[np.intp]
 
 N_PHASES = 64  # of a path; a step is the mean length over this
 _LAG = 8  # steps of the displacement
 _DENSE = 4 * N_PHASES  # samples that demonstrations are followed by: at most one step each, up to four mean lengths
+_BEAM = 60.0  # cost above that of the best alignment, up to which one goes on
 _FORWARD = 3  # phases that one step may go on by
 _BEGINNING = 4  # phases at which an execution may begin
 _FORGETTING = 0.8  # of the cost of an alignment, at each step
@@ -176,16 +179,31 @@ def _begin(n: int) -> Array:
     return np.tile(np.where(phases < _BEGINNING, 0.2 * phases, np.inf), (n, 1))
 
 
-def _advance(shown: Spread, costs: Array, features: Array) -> tuple[Array, Array]:
-    """Return costs of each phase (n, P) one step later, and the squared distances (n, P) of features (n, 2 d) there."""
-    errors = features[:, None] - shown.mean
-    whitened = np.matmul(shown.whitening, errors[..., None])[..., 0]
+def _advance(shown: Spread, costs: Array, features: Array) -> tuple[Array, Phases, Array]:
+    """Align one step more, with features (n, 2 d).
+
+    Returns
+    -------
+    costs : ndarray of shape (n, P)
+        Of each phase; infinite where no alignment leads that is worth going on.
+    best : ndarray of shape (n,)
+        The nearest phase.
+    squares : ndarray of shape (n,)
+        Squared distance there.
+    """
+    worth = np.flatnonzero((costs < _BEAM).any(axis=0))
+    near = slice(int(worth[0]), min(int(worth[-1]) + _FORWARD + 1, N_PHASES))
+    reached = costs[:, near].copy()
+    for j in range(1, min(_FORWARD, reached.shape[1] - 1) + 1):
+        np.minimum(reached[:, j:], costs[:, near][:, :-j], out=reached[:, j:])
+    errors = features[:, None] - shown.mean[near]
+    whitened = np.matmul(shown.whitening[near], errors[..., None])[..., 0]
     squares = np.einsum("npk,npk->np", whitened, whitened)
-    reached = costs.copy()
-    for j in range(1, _FORWARD + 1):
-        np.minimum(reached[:, j:], costs[:, :-j], out=reached[:, j:])
-    reached = _FORGETTING * reached + 0.5 * (squares + shown.log_determinants)
-    return reached - reached.min(axis=1, keepdims=True), squares
+    reached = _FORGETTING * reached + 0.5 * (squares + shown.log_determinants[near])
+    rows, best = np.arange(len(reached)), reached.argmin(axis=1)
+    after = np.full(costs.shape, np.inf)
+    after[:, near] = reached - reached[rows, best][:, None]
+    return after, best + near.start, squares[rows, best]
 
 
 def _follow(shown: Spread, paths: Array) -> tuple[Array, Array, Array]:
@@ -197,9 +215,7 @@ def _follow(shown: Spread, paths: Array) -> tuple[Array, Array, Array]:
     step = shown.step
     last = paths[:, 0].copy()
     recent = np.tile(last[:, None], (1, _LAG + 1, 1))
-    costs, squares = _advance(shown, _begin(n), np.hstack((last, np.zeros_like(last))))
-    rows = np.arange(n)
-    largest = squares[rows, costs.argmin(axis=1)]
+    costs, phases, largest = _advance(shown, _begin(n), np.hstack((last, np.zeros_like(last))))
     for t in range(1, n_samples):
         gaps = paths[:, t] - last
         lengths = np.sqrt(np.einsum("nd,nd->n", gaps, gaps))
@@ -210,12 +226,10 @@ def _follow(shown: Spread, paths: Array) -> tuple[Array, Array, Array]:
         recent[moved, :-1] = recent[moved, 1:]
         recent[moved, -1] = last[moved]
         features = np.hstack((last[moved], last[moved] - recent[moved, 0]))
-        costs[moved], squares = _advance(shown, costs[moved], features)
-        here = squares[np.arange(len(moved)), costs[moved].argmin(axis=1)]
-        largest[moved] = np.maximum(largest[moved], here)
+        costs[moved], phases[moved], squares = _advance(shown, costs[moved], features)
+        largest[moved] = np.maximum(largest[moved], squares)
     ends = np.hstack((paths[:, -1], paths[:, -1] - recent[:, 0]))
-    phases = costs.argmin(axis=1) / (N_PHASES - 1)
-    return np.sqrt(largest), _end_distance(shown, ends), phases
+    return np.sqrt(largest), _end_distance(shown, ends), phases / (N_PHASES - 1)
 
 
 def _end_distance(shown: Spread, features: Array) -> Array:
@@ -400,7 +414,7 @@ class Monitor:
         self._state = self._state._replace(status=status, skipped=self._state.skipped + skipped)
         for time, position in zip(times.tolist(), positions, strict=True):
             self._path.append(time, position)
-            self._take(time, position)
+            self._take(time, np.clip(position, -LARGEST_POSITION, LARGEST_POSITION))
         return self._state
 
     def _take(self, time: float, position: Array) -> None:
@@ -424,9 +438,8 @@ class Monitor:
     def _measure(self, time: float) -> None:
         """Advance the alignment to the last step."""
         features = np.concatenate((self._last, self._last - self._recent[0]))
-        self._costs, squares = _advance(self.shown.spread, self._costs, features[None])
-        best = int(self._costs[0].argmin())
-        distance = math.sqrt(float(squares[0, best]))
+        self._costs, phases, squares = _advance(self.shown.spread, self._costs, features[None])
+        best, distance = int(phases[0]), math.sqrt(float(squares[0]))
         gap = self._last - self.shown.spread.mean[best, : len(self._last)]
         state = self._state
         left = distance > self.shown.threshold and math.isnan(state.since)
