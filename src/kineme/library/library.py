@@ -356,12 +356,11 @@ class ActionLibrary:
         symbol : str
             Name or id.
         start, goal : array_like of shape (d,), optional
-            Of the execution: it is compared with the demonstrations as their primitives carry them there; where one is
-            None, each is the demonstrated one. By default it may begin anywhere, and is compared relative to its first
-            sample. Size and orientation are those that were shown, and as far as they varied.
+            Of the execution: it is compared with the demonstrations as their primitives carry them there. By default it
+            may begin anywhere. Size and orientation are those that were shown, as far as they varied.
         error_rate : float, default 0.05
-            Share of such movements that are called outside: by people who showed none if `learn` was told groups, where
-            at least ``1 / error_rate - 1`` demonstrations were learned; else the monitor is not `calibrated`.
+            Share of such movements that are called outside, by other people if `learn` was told groups. It takes
+            ``1 / error_rate - 1`` demonstrations; with fewer the monitor is not `calibrated`.
         noise : float, optional
             Standard deviation of measured positions, in their unit; by default the jitter of the demonstrations.
 

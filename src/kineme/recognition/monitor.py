@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.channels.channel import Channels
-from kineme.movements.preparation.resample import relative_rows, resample_by_arc_length
+from kineme.movements.preparation.resample import resample_by_arc_length
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.recognition.conformal import check_error_rate
@@ -66,19 +66,12 @@ class Spread(NamedTuple):
 class Corridor:
     """What was shown of a movement at each phase, and the distances that demonstrations reach that were left out.
 
-    Attributes
-    ----------
-    spread : Spread
-        Mean and covariance.
-    threshold, end_threshold : float
-        The largest distance inside what was shown; and the largest from the end, for which a movement has ended.
-    least_end : float
-        The least phase at which one has ended.
-    calibrated : bool
-        Tells whether at most about a share `error_rate` of such movements exceed the threshold. Else it is a guess:
-        fewer than ``1 / error_rate - 1`` demonstrations were there.
-    relative : bool
-        Tells whether positions count from the first sample of an execution.
+    - `spread`: mean and covariance.
+    - `threshold`, `end_threshold`: the largest distance inside what was shown; and from the end, where one has ended.
+    - `least_end`: the least phase at which one has ended.
+    - `calibrated`: tells whether at most about a share `error_rate` of such movements exceed the threshold. Else it is
+      a guess: fewer than ``1 / error_rate - 1`` demonstrations were there.
+    - `relative`: tells whether positions count from the first sample of an execution.
     """
 
     spread: Spread
@@ -182,14 +175,8 @@ def _begin(n: int) -> Array:
 def _advance(shown: Spread, costs: Array, features: Array) -> tuple[Array, Phases, Array]:
     """Align one step more, with features (n, 2 d).
 
-    Returns
-    -------
-    costs : ndarray of shape (n, P)
-        Of each phase; infinite where no alignment leads that is worth going on.
-    best : ndarray of shape (n,)
-        The nearest phase.
-    squares : ndarray of shape (n,)
-        Squared distance there.
+    Return the cost of each phase (n, P), infinite where no alignment leads that is worth going on; the nearest phase
+    (n,); and the squared distance there (n,).
     """
     worth = np.flatnonzero((costs < _BEAM).any(axis=0))
     near = slice(int(worth[0]), min(int(worth[-1]) + _FORWARD + 1, N_PHASES))
@@ -237,6 +224,20 @@ def _end_distance(shown: Spread, features: Array) -> Array:
     return np.asarray(np.linalg.norm((features - shown.mean[-1]) @ shown.whitening[-1].T, axis=1))
 
 
+def _by_arc_length(demos: Demonstrations) -> Array:
+    """Return positions at even shares of the length, relative to the first: (n, `_DENSE`, d).
+
+    Linear, as executions are followed: a spline through stamps that are far apart leads elsewhere.
+    """
+    positions, offsets = demos.positions, demos.offsets
+    steps = np.linalg.norm(np.diff(positions, axis=0), axis=1)
+    steps[offsets[1:-1] - 1] = steps.max()  # between movements
+    lengths = np.concatenate(([0.0], np.cumsum(steps)))
+    targets = np.linspace(lengths[offsets[:-1]], lengths[offsets[1:] - 1], _DENSE, axis=1)
+    rows = np.stack([np.interp(targets, lengths, column) for column in positions.T], axis=2)
+    return np.asarray(rows - rows[:, :1])
+
+
 def jitter(movements: MovementsLike) -> float:
     """Return the standard deviation of the noise of samples, in the unit of positions, from their third differences."""
     demos = Demonstrations.of(movements)
@@ -247,29 +248,17 @@ def jitter(movements: MovementsLike) -> float:
 class MonitorState(NamedTuple):
     """An execution so far.
 
-    Attributes
-    ----------
-    time : float
-        Time stamp of the last sample that could be used [s]; NaN before the first.
-    phase : float
-        Share of the path of the mean that is done, 0 to 1, at the nearest phase.
-    distance : float
-        Distance from the mean at that phase, in standard deviations of the demonstrations (Mahalanobis, of position
-        and displacement). It changes with each step of a 64th of the path; where nothing moves it stays.
-    deviation : float
-        Distance of the position from the mean there, in the unit of the movements.
-    largest : float
-        The largest distance so far.
-    threshold : float
-        The largest distance inside what was shown.
-    since : float
-        Time stamp at which a distance was first above the threshold [s]; NaN while none was.
-    calibrated : bool
-        Tells whether the threshold keeps the error rate; see `Corridor`.
-    skipped : int
-        Samples that could not be used so far.
-    status : LiveStatus
-        What was wrong with the samples of this update.
+    - `time`: stamp of the last sample that could be used [s]; NaN before the first.
+    - `phase`: share of the mean path that is done, 0 to 1, at the nearest phase.
+    - `distance`: from the mean there, in standard deviations of the demonstrations (Mahalanobis, of position and
+      displacement). It changes with each step of a 64th of the path; where nothing moves it stays.
+    - `deviation`: the same of the position, in the unit of the movements.
+    - `largest`: the largest distance so far.
+    - `threshold`: the largest distance inside what was shown.
+    - `since`: stamp at which a distance was first above the threshold [s]; NaN while none was.
+    - `calibrated`: tells whether the threshold keeps the error rate; see `Corridor`.
+    - `skipped`: samples that could not be used so far.
+    - `status`: what was wrong with the samples of this update.
     """
 
     time: float
@@ -303,24 +292,14 @@ class MonitorState(NamedTuple):
 class Execution(NamedTuple):
     """A movement that is over: where it ended, and its last state.
 
-    Attributes
-    ----------
-    ended : bool
-        Tells whether it ended where such movements end, as far along the path and as near to its end as they do.
-    end_distance : float
-        Distance from the mean at the end, in standard deviations, up to `end_threshold` in what was shown.
-    end_deviation : float
-        The same in the unit of the movements, of the position.
-    end_threshold : float
-        The largest distance from the end in what was shown.
-    state : MonitorState
-        The last one.
+    - `ended`: tells whether it ended where such movements end, as far along the path and as near to its end as they do.
+    - `end_distance`: from the mean at the end, in standard deviations, up to the corridor's `end_threshold`.
+    - `end_deviation`: the same of the position, in the unit of the movements.
     """
 
     ended: bool
     end_distance: float
     end_deviation: float
-    end_threshold: float
     state: MonitorState
 
     @property
@@ -363,14 +342,12 @@ class Monitor:
         noise: float | None = None,
         stream: Callable[[], Live] | None = None,
     ) -> Monitor:
-        """Monitor by demonstrations of one movement, wherever it begins.
+        """Monitor by demonstrations of one movement, wherever an execution begins.
 
         Parameters
         ----------
-        movements : movements
-            Whatever `Demonstrations.of` accepts. From 19 on, and of several groups or none, thresholds are calibrated.
-        groups, error_rate
-            As for `corridor`.
+        movements, groups, error_rate
+            As for `ActionLibrary.learn` and `corridor`.
         noise : float, optional
             Standard deviation of measured positions, in their unit; by default the jitter of the demonstrations.
         stream : callable, optional
@@ -384,8 +361,7 @@ class Monitor:
         demos = Demonstrations.of(movements)
         if groups is not None and len(groups) != len(demos):
             raise SpecificationError(f"expected a group for each of {len(demos)} movements, got {len(groups)}")
-        paths = relative_rows(demos, 0, len(demos), _DENSE).transpose(0, 2, 1)
-        shown = corridor(paths, groups, error_rate, jitter(demos) if noise is None else noise)
+        shown = corridor(_by_arc_length(demos), groups, error_rate, jitter(demos) if noise is None else noise)
         return cls(shown, demos.channels, stream)
 
     def reset(self) -> None:
@@ -489,7 +465,7 @@ class Monitor:
         distance = float(_end_distance(self.shown.spread, features[None])[0])
         deviation = float(np.linalg.norm(position - self.shown.spread.mean[-1, : len(position)]))
         ended = distance <= self.shown.end_threshold and self._state.phase >= self.shown.least_end - 1e-9
-        return Execution(ended, distance, deviation, self.shown.end_threshold, self._state)
+        return Execution(ended, distance, deviation, self._state)
 
     def plot(self) -> Any:
         """Draw the distance over the phase, and the threshold: a figure of matplotlib."""
