@@ -29,7 +29,7 @@ PUSH, PUSHED = (0.1, 0.2), (0.15, 0.3)  # of the size, the diagonal of the box a
 OTHER_GOAL = (0.3, 0.6)  # of the size
 FREQUENCY = 12.5  # per duration: how fast a critically damped movement turns to another goal
 NOISE = 1e-3  # of the size, of what a robot measures
-MOST = 40  # pairs of a symbol and a person, at most
+MOST = 30  # pairs of a symbol and a person, at most
 DISTURBED = ("pushed", "another goal", "another symbol")
 
 Path = NDArray[np.float64]
