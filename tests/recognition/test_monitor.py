@@ -90,7 +90,8 @@ def test_pace_and_waiting_are_no_alarm(monitor, steps, at, pause):
     times = np.cumsum([*steps, *np.ones(pause)])
     expected = distances(monitor, TIMES, movement)
     assert distances(monitor, times, waiting)[-1] == expected[-1]
-    assert monitor.update(times[-1] + 1, movement[-1]).largest == max(expected)
+    state = monitor.update(times[-1] + 1, movement[-1])
+    assert (state.time, state.largest) == (times[-1] + 1, max(expected))
 
 
 def test_blocks_of_samples_give_what_samples_one_by_one_give(fresh):
@@ -205,6 +206,26 @@ def test_from_nineteen_demonstrations_on_the_threshold_is_calibrated(n):
     assert monitor.finish().ended
     monitor.reset()
     assert not np.isnan(monitor.update(TIMES, pushed(movement, size=1.0)).since)
+
+
+def test_the_guess_of_few_is_half_as_far_again_as_any_went():
+    few = draw(18)
+    farthest = Monitor.of(few, error_rate=1 / 19).shown
+    assert farthest.calibrated
+    assert Monitor.of(few).shown.threshold == pytest.approx(1.5 * farthest.threshold)
+
+
+def test_a_closed_movement_of_which_only_the_end_was_executed_did_not_end():
+    angles, random = np.linspace(0, 2 * np.pi, 200), np.random.default_rng(0)
+    circle = np.column_stack((np.cos(angles), np.sin(angles)))
+    circles = circle * (1 + 0.02 * random.normal(size=(20, 1, 1)))
+    monitor = Monitor(corridor(circles, relative=False))
+    monitor.update(angles[170:], circle[170:])
+    assert monitor.finish().end_distance < monitor.shown.end_threshold
+    assert not monitor.finish().ended
+    monitor.reset()
+    monitor.update(angles, circle)
+    assert monitor.finish().ended
 
 
 def test_those_of_one_group_are_left_out_together():
