@@ -285,3 +285,27 @@ def _frozen(data: Mapping[str, Any]) -> dict[str, Any]:
         return tuple(map(freeze, value)) if isinstance(value, list) else value
 
     return {name: freeze(value) for name, value in data.items()}
+
+
+def operator_schema(domain: Domain, operator: Operator) -> dict[str, Any]:
+    """Return a JSON Schema of the arguments of an operator: which objects, and the box of each place that was shown."""
+    properties: dict[str, Any] = {}
+    for parameter in operator.parameters:
+        properties[parameter.name] = {
+            "type": "string",
+            "description": f"a {parameter.type}: {kinds_in_words(parameter)}",
+        }
+        margin = domain.vocabulary.radius
+        for axis, low, high in zip(domain.vocabulary.axes, parameter.low, parameter.high, strict=False):
+            properties[f"{parameter.name}_{axis}"] = {
+                "type": "number",
+                "minimum": low - margin,
+                "maximum": high + margin,
+            }
+    return {
+        "title": operator.name,
+        "type": "object",
+        "properties": properties,
+        "required": [parameter.name for parameter in operator.parameters],
+        "additionalProperties": False,
+    }

@@ -14,12 +14,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import permutations
-from typing import NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from kineme.library.library import ActionLibrary
 from kineme.planning.domain import CHANGED, Domain, Edit, Evidence, Literal, Operator, Parameter, edited, kind_of
-from kineme.planning.states import States
+from kineme.planning.states import States, states_of
 from kineme.planning.vocabulary import (
     Fact,
     Vocabulary,
@@ -49,34 +51,55 @@ class Example(NamedTuple):
 
 
 def learn_operators(
-    states: States,
-    durations: Sequence[float] | Array,
-    symbol_ids: Mapping[str, str],
+    library: ActionLibrary,
+    table: str | Path | Mapping[str, Sequence[Any]] | None = None,
     *,
     radius: float | None = None,
     error_rate: float = 0.02,
     edits: Sequence[Edit] = (),
 ) -> Domain:
-    """Learn an operator for each symbol from the states before and after its movements; see the module.
+    """Learn an operator for each symbol of a library from the states before and after its movements; see the module.
 
     Parameters
     ----------
-    states : States
-    durations : array_like of shape (n,)
-        Of the movements [s].
-    symbol_ids : mapping of str to str
-        Name of a symbol -> its id.
+    library : ActionLibrary
+    table : str, Path or mapping, optional
+        States beside the recordings; see `states_of`. Without it, the hand and the grippers of the recordings alone.
     radius : float, optional
-        Of places; see `vocabulary_of`.
+        Of places, in the unit of the recordings; by default where distances of the hand from objects part into near
+        and far, see `vocabulary_of`.
     error_rate : float, default 0.02
-        Share of facts that a sensor gets wrong.
+        Share of facts that a sensor gets wrong; 0 takes each fact as it is.
     edits : sequence of Edit, optional
         Of a person, as those of an earlier domain.
 
     Returns
     -------
     Domain
+
+    Raises
+    ------
+    DataError
+        A table that is none, or rows that belong to no movement.
+    SpecificationError
+        No symbol has movements; a radius or an error rate out of range.
     """
+    states = states_of(library, table)
+    durations = library.primitives(ids=states.movements).durations
+    symbol_ids = {symbol.name: symbol.id for symbol in library.symbols()}
+    return operators_of(states, durations, symbol_ids, radius=radius, error_rate=error_rate, edits=edits)
+
+
+def operators_of(
+    states: States,
+    durations: Array,
+    symbol_ids: Mapping[str, str],
+    *,
+    radius: float | None = None,
+    error_rate: float = 0.02,
+    edits: Sequence[Edit] = (),
+) -> Domain:
+    """Learn operators from states, with the durations of their movements (n,) [s] and the ids of the symbols."""
     check_number("error_rate", error_rate, least=0.0, most=0.25)
     vocabulary = vocabulary_of(states, radius)
     examples = [_example(vocabulary, states, row) for row in range(len(states))]

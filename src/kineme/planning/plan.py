@@ -11,7 +11,7 @@ import numpy as np
 
 from kineme.errors import DataError, SpecificationError
 from kineme.io.records import needs
-from kineme.planning.domain import Domain, Operator, domain_from_dict, domain_to_dict, hands_of, is_shown
+from kineme.planning.domain import Domain, Literal, Operator, domain_from_dict, domain_to_dict, hands_of, is_shown
 from kineme.planning.pddl import Names, domain_to_pddl, literals_of, name_of, parsed, problem_to_pddl, read_problem
 from kineme.planning.states import State
 from kineme.planning.vocabulary import Fact, facts_of, places_of, predicates_of
@@ -20,6 +20,8 @@ from kineme.validation import Array, check_number
 
 FORMAT, VERSION = "kineme-plan", 1
 _MOST_GROUND = 200_000  # operators with arguments, at most
+_TRIED = 500  # of them that are looked at for why a goal is not reached
+_DEEPEST = 6  # operators one before the other that this names
 
 
 class Goal(NamedTuple):
@@ -270,11 +272,11 @@ def step_of(operator: Operator, arguments: dict[str, str], places: Mapping[str, 
 
 def _solved(texts: tuple[str, str], planner: str | None, timeout: float) -> tuple[list[tuple[str, list[str]]], str]:
     """Return the actions of a plan and the name of the engine that found it."""
-    needs("unified_planning", "planner", "plans")
-    from unified_planning.engines import CompilationKind, PlanGenerationResultStatus
-    from unified_planning.exceptions import UPException
-    from unified_planning.io import PDDLReader
-    from unified_planning.shortcuts import Compiler, OneshotPlanner, PlanValidator, get_environment
+    with needs("unified-planning", "find plans", "planner"):
+        from unified_planning.engines import CompilationKind, PlanGenerationResultStatus
+        from unified_planning.exceptions import UPException
+        from unified_planning.io import PDDLReader
+        from unified_planning.shortcuts import Compiler, OneshotPlanner, PlanValidator, get_environment
 
     get_environment().credits_stream = None
     problem = PDDLReader().parse_problem_string(*texts)
@@ -308,8 +310,8 @@ def _solved(texts: tuple[str, str], planner: str | None, timeout: float) -> tupl
                 raise DataError(f"expected a plan that is valid, {name} gave {plan}; choose another planner")
         return [(each.action.name, [str(value) for value in each.actual_parameters]) for each in plan.actions], name
     raise DataError(
-        f"expected a planner of unified-planning that takes the problem, got none ({first_names(failures, 3)}); install "
-        "one, as up-aries"
+        f"expected a planner of unified-planning that takes the problem, got none ({first_names(failures, 3)}); "
+        "install one, as up-aries"
     )
 
 
@@ -332,7 +334,7 @@ def unmet(facts: Mapping[Fact, bool], operator: Operator, arguments: Mapping[str
 
 
 def check_plan(plan: Plan) -> None:
-    """Refuse a plan with a step whose preconditions are not known to hold, outside what was shown, or that misses its goal.
+    """Refuse a plan that misses its goal, or with a step that is not known to be possible or was not shown so.
 
     Raises
     ------
@@ -355,64 +357,64 @@ def check_plan(plan: Plan) -> None:
 
 def unreachable(problem: Problem, shown: Sequence[tuple[Operator, dict[str, str]]]) -> list[str]:
     """Say which goals no order of the operators reaches even if nothing were ever undone, and what is missing."""
-    possible = {(fact, value) for fact, value in problem.facts.items()}
+    possible = {*problem.facts.items()}
     left = list(shown)
-    while True:
-        ready = [pair for pair in left if all(each in possible for each in _ground(pair[0].preconditions, pair[1]))]
-        if not ready:
-            break
+    while ready := [pair for pair in left if possible.issuperset(_ground(pair[0].preconditions, pair[1]))]:
         left = [pair for pair in left if pair not in ready]
         possible |= {each for operator, arguments in ready for each in _ground(operator.effects, arguments)}
-    sentences = []
-    for goal in problem.goal:
-        if tuple(goal) in possible:
-            continue
-        ways = [pair for pair in left if tuple(goal) in _ground(pair[0].effects, pair[1])]
-        if ways:
-            operator, arguments = min(
-                ways, key=lambda pair: sum(each not in possible for each in _ground(pair[0].preconditions, pair[1]))
-            )
-            lacking = [str(Goal(*each)) for each in _ground(operator.preconditions, arguments) if each not in possible]
-            text = f"{' '.join((operator.name, *arguments.values()))} would, and lacks {first_names(lacking, 4)}"
-        else:
-            text = _why_not(problem, goal)
-        sentences.append(f"{goal} is not reached: {text}")
-    return sentences
+    return [
+        f"{goal} {_why_not(problem, goal, possible, left, _DEEPEST)}" for goal in problem.goal if goal not in possible
+    ]
 
 
-def _ground(literals: Sequence[Any], arguments: Mapping[str, str]) -> list[tuple[Fact, bool]]:
+def _ground(literals: Sequence[Literal], arguments: Mapping[str, str]) -> list[tuple[Fact, bool]]:
     return [((each.predicate, *(arguments[name] for name in each.arguments)), each.value) for each in literals]
 
 
-def _why_not(problem: Problem, goal: Goal) -> str:
-    """Say what keeps the operators that have such an effect from this goal."""
-    able = [
-        (operator, literal) for operator in problem.domain.operators for literal in operator.effects
-        if operator.usable and literal.predicate == goal.fact[0] and literal.value == goal.value
-    ]  # fmt: skip
-    if not able:
-        return "no operator has such an effect"
-    reasons: list[str] = []
-    for operator, literal in able:
-        for fixed in [dict(zip(literal.arguments, goal.fact[1:], strict=True))]:
-            of_type = {
-                kind: [name for name, each in problem.objects.items() if each == kind] for kind in ("place", "item")
-            }
+def _why_not(
+    problem: Problem,
+    goal: Goal,
+    possible: set[tuple[Fact, bool]],
+    left: Sequence[tuple[Operator, dict[str, str]]],
+    depth: int,
+) -> str:
+    """Say what keeps operators from reaching a fact: what was not shown, what is not known, or what they lack."""
+    if reason := _not_shown(problem, goal, possible):
+        return reason
+    ways = [pair for pair in left if goal in _ground(pair[0].effects, pair[1])]
+    if not ways or not depth:
+        state = "is not known" if goal.fact not in problem.facts else "does not hold now"
+        return state if ways else f"{state}, and no operator that was shown changes that"
+    lacking = [[Goal(*each) for each in _ground(*pair) if each not in possible] for pair in _needs(ways)]
+    k = min(range(len(ways)), key=lambda k: len(lacking[k]))
+    others = [pair for pair in left if pair is not ways[k]]
+    first = min(lacking[k], key=lambda each: each.fact in problem.facts)  # what is not known comes first
+    name = f"({' '.join((ways[k][0].name, *ways[k][1].values()))})"
+    return f"needs {name}; {first} {_why_not(problem, first, possible, others, depth - 1)}"
+
+
+def _needs(ways: Sequence[tuple[Operator, dict[str, str]]]) -> list[tuple[Sequence[Literal], dict[str, str]]]:
+    return [(operator.preconditions, arguments) for operator, arguments in ways]
+
+
+def _not_shown(problem: Problem, goal: Goal, possible: set[tuple[Fact, bool]]) -> str:
+    """Name an operator that would reach a fact from here, and why its arguments lie outside what was shown."""
+    of_type = {kind: [name for name, each in problem.objects.items() if each == kind] for kind in ("place", "item")}
+    reasons = []
+    for operator in problem.domain.operators:
+        names = [parameter.name for parameter in operator.parameters]
+        for literal in operator.effects if operator.usable else ():
+            if (literal.predicate, literal.value) != (goal.fact[0], goal.value):
+                continue
+            fixed = dict(zip(literal.arguments, goal.fact[1:], strict=True))
             choices = [[fixed[p.name]] if p.name in fixed else of_type[p.type] for p in operator.parameters]
-            every = [
-                is_shown(
-                    problem.domain,
-                    operator,
-                    dict(zip([p.name for p in operator.parameters], chosen, strict=True)),
-                    problem.places,
-                )
-                for chosen in itertools.islice(itertools.product(*choices), 500)
-            ]
-            if every:
-                reasons.append(
-                    f"{operator.name} would, but {min(every, key=len)[0]}" if min(every, key=len) else operator.name
-                )
-    return first_names(reasons, 2) if reasons else "no object fits"
+            for chosen in itertools.islice(itertools.product(*choices), _TRIED):
+                arguments = dict(zip(names, chosen, strict=True))
+                if len({*chosen}) == len(chosen) and possible.issuperset(_ground(operator.preconditions, arguments)):
+                    outside = is_shown(problem.domain, operator, arguments, problem.places)
+                    text = f"({' '.join((operator.name, *chosen))}) was not shown so: {first_names(outside, 2)}"
+                    reasons += [(len(outside), text)] if outside else []
+    return f"is not reached, since {min(reasons)[1]}" if reasons else ""
 
 
 def plan_to_dict(plan: Plan) -> dict[str, Any]:
