@@ -46,6 +46,7 @@ SUBJECTS = (
     "annotate",
     "motion_layer",
     "pieces",
+    "operators",
     "page",
     "migrating",
     "studio",

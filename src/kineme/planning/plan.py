@@ -229,14 +229,14 @@ def find_plan(problem: Problem, planner: str | None = None, timeout: float = 30.
         Name of an engine that is installed, as "aries" or "fast-downward"; by default one that takes the problem as it
         is, else one that takes it without costs and negative preconditions.
     timeout : float, default 30.0
-        [s].
+        [s], half of it with costs.
 
     Raises
     ------
     SpecificationError
         There is no plan, with the goals that no order of operators reaches; or a step depends on what is not known.
     DataError
-        The extra ``planner`` is not installed, or no engine.
+        The extra ``planner`` is not installed, no engine takes the problem, or none finds a plan in time.
     """
     check_number("timeout", timeout, least=0.1)
     shown = shown_arguments(problem)
@@ -296,22 +296,23 @@ def _solved(texts: tuple[str, str], planner: str | None, timeout: float) -> tupl
                 if not engine.supports(task.kind):
                     failures.append(f"{engine.name} does not take it")
                     continue
-                result, name = engine.solve(task, timeout=timeout), str(engine.name)
+                result, name = engine.solve(task, timeout=0.5 * timeout), str(engine.name)
         except UPException as error:
             failures.append(str(error).splitlines()[0])
             continue
         if result.plan is None:
-            proven = result.status == PlanGenerationResultStatus.UNSOLVABLE_PROVEN
-            why = "there is none" if proven else f"{name} found none within {timeout:g} s"
-            raise SpecificationError(f"expected a plan, {why}; look at the preconditions of the operators")
+            if result.status == PlanGenerationResultStatus.UNSOLVABLE_PROVEN:
+                raise SpecificationError("expected a plan, there is none; look at the preconditions of the operators")
+            failures.append(f"{name} found none within {0.5 * timeout:g} s")
+            continue
         plan = result.plan if back is None else result.plan.replace_action_instances(back)
         with PlanValidator(name="sequential_plan_validator") as validator:
             if not validator.validate(simple, plan):
                 raise DataError(f"expected a plan that is valid, {name} gave {plan}; choose another planner")
         return [(each.action.name, [str(value) for value in each.actual_parameters]) for each in plan.actions], name
     raise DataError(
-        f"expected a planner of unified-planning that takes the problem, got none ({first_names(failures, 3)}); "
-        "install one, as up-aries"
+        f"expected a plan, got none ({first_names(failures, 3)}); look at the preconditions of the operators, give more "
+        "time, or install another planner of unified-planning, as up-aries"
     )
 
 

@@ -250,8 +250,10 @@ def places_of(
             places[fixture.name] = known[0]
     for name, where in (named or {}).items():
         places.setdefault(name, where)
-    rests = [position_of(item.columns, state) for item in vocabulary.of_kind("item")
-             for state in several if not _is_held(vocabulary, item, state)]  # fmt: skip
+    rests = []
+    for state in several:
+        held = _held(vocabulary, state)
+        rests += [position_of(item.columns, state) for item in vocabulary.of_kind("item") if not held[item.name]]
     for where in [*rests, *(hand_of(vocabulary, state) for state in several)]:
         if np.isfinite(where).all() and nearest_place(vocabulary, places, where) is None:
             number = 1 + sum(name.startswith(f"{prefix}-") for name in places)
@@ -269,15 +271,19 @@ def _is_closed(vocabulary: Vocabulary, state: State) -> bool | None:
     return None if np.isnan(value) else (value > gripper.threshold) == vocabulary.closed_above
 
 
-def _is_held(vocabulary: Vocabulary, item: Variable, state: State) -> bool | None:
-    """Tell whether an item is held; None where the gripper or a position is not known."""
+def _held(vocabulary: Vocabulary, state: State) -> dict[str, bool | None]:
+    """Tell of each item whether it is held: the nearest one, by a closed gripper; None where that is not known."""
+    items = vocabulary.of_kind("item")
     if not vocabulary.tells_grasp:
-        return False
+        return {item.name: False for item in items}
     closed = _is_closed(vocabulary, state)
     if closed is not True:
-        return closed
-    distance = float(np.linalg.norm(position_of(item.columns, state) - hand_of(vocabulary, state)))
-    return None if np.isnan(distance) else distance <= vocabulary.radius
+        return {item.name: closed for item in items}
+    hand = hand_of(vocabulary, state)
+    away = {item.name: float(np.linalg.norm(position_of(item.columns, state) - hand)) for item in items}
+    near = {name: distance for name, distance in away.items() if distance <= vocabulary.radius}
+    nearest = min(near, key=lambda name: near[name], default=None)
+    return {name: None if np.isnan(distance) else name == nearest for name, distance in away.items()}
 
 
 def facts_of(vocabulary: Vocabulary, state: State, places: Mapping[str, Array]) -> dict[Fact, bool]:
@@ -303,7 +309,7 @@ def facts_of(vocabulary: Vocabulary, state: State, places: Mapping[str, Array]) 
 def _facts_of_items(vocabulary: Vocabulary, state: State, places: Mapping[str, Array]) -> dict[Fact, bool]:
     """Return where items lie, what is held, and which places are clear."""
     facts: dict[Fact, bool] = {}
-    held = {item.name: _is_held(vocabulary, item, state) for item in vocabulary.of_kind("item")}
+    held = _held(vocabulary, state)
     where: dict[str, str | None] = {}
     for item in vocabulary.of_kind("item"):
         position = position_of(item.columns, state)
