@@ -13,8 +13,8 @@ A sensor errs, and then nothing holds before every movement. With the share e of
 - anything: what happens in four fifths of the movements is taken, and where nothing does, it cannot be told.
 
 The likeliest of these is taken, with ``log(n + 2) / 2`` off the log likelihood for each free share (G. Schwarz,
-"Estimating the Dimension of a Model", Annals of Statistics 6, 1978), and with odds of 5 to 1 for a precondition: one too
-many is safe. An exception that is seen before and after counts twice.
+"Estimating the Dimension of a Model", Annals of Statistics 6, 1978), and with odds of 5 to 1 for a precondition, since
+one too many is safe. An exception that is seen before and after counts twice.
 """
 
 from __future__ import annotations
@@ -30,13 +30,14 @@ from numpy.typing import NDArray
 from scipy.special import xlogy
 
 from kineme.library.library import ActionLibrary
-from kineme.planning.domain import CHANGED, Domain, Edit, Evidence, Literal, Operator, Parameter, edited, kind_of
+from kineme.planning.domain import CHANGED, Domain, Edit, Evidence, Literal, Operator, Parameter, edited
 from kineme.planning.states import States, states_of
 from kineme.planning.vocabulary import (
     Fact,
     Vocabulary,
     facts_of,
     hand_of,
+    kind_of,
     nearest_place,
     places_of,
     predicates_of,

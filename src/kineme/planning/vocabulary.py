@@ -7,12 +7,14 @@ Facts are literals over names, as ``("in", "cup", "shelf")``:
 - ``holding i``: the gripper is closed around an item, ``hand-empty``: around none;
 - a flag or the word of a column, of an object (``full cup``) or of the world (``door-open``).
 
-A *fixture* is an object that never moved in a demonstration: it is a place, wherever it stands today. An *item* moved.
+A *fixture* is an object of which none of its kind ever moved in a demonstration: it is a place, wherever it stands
+today. *Items* are the others. The kind of an object is its name without the number at its end.
 Other places are positions, as those where a hand or an item came to rest.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -27,6 +29,8 @@ from kineme.validation import Array
 
 Fact = tuple[str, ...]  # a predicate and its arguments
 
+_OWN = ("hand-at", "in", "clear", "holding", "hand-empty")  # predicates that are always there
+_TELLING = ("flag", "word", "gripper")  # kinds of variables that predicates come from
 _GRIPPERS = ("gripper", "grasp", "finger", "grip")
 _TRUE = {"true", "yes", "on", "open", "full", "1"}
 _FALSE = {"false", "no", "off", "closed", "empty", "0"}
@@ -115,9 +119,10 @@ def vocabulary_of(states: States, radius: float | None = None) -> Vocabulary:
     near = _radius(ends, [np.vstack(list(where)) for where in objects.values()]) if radius is None else float(radius)
     variables: list[Variable] = []
     left_out: dict[str, str] = {}
+    ways = {name: np.linalg.norm(where[1] - where[0], axis=1) for name, where in objects.items()}
+    move = {kind_of(name) for name, way in ways.items() if np.nanmax(np.append(way, 0.0)) > near}
     for name, where in objects.items():
-        moved = np.linalg.norm(where[1] - where[0], axis=1)
-        kind = "item" if np.nanmax(np.append(moved, 0.0)) > near else "fixture"
+        kind = "item" if kind_of(name) in move else "fixture"
         stood = np.nanmedian(where.reshape(-1, len(states.axes)), axis=0)
         typical = tuple(stood.tolist()) if kind == "fixture" and np.isfinite(stood).all() else ()
         variables.append(Variable(name, kind, positions[name], typical=typical))
@@ -132,8 +137,14 @@ def vocabulary_of(states: States, radius: float | None = None) -> Vocabulary:
             left_out[column] = variable
         else:
             variables.append(variable)
+    variables = _told_apart(variables)
     vocabulary = Vocabulary(states.axes, tuple(variables), near, None, left_out)
     return Vocabulary(states.axes, tuple(variables), near, _closed_above(states, vocabulary), left_out)
+
+
+def kind_of(name: str) -> str:
+    """Return the kind of an object: its name without the number at its end, so that block_1 and block_2 are blocks."""
+    return re.sub(r"[ _\-]*\d+$", "", name) or name
 
 
 def _columns(states: States, moment: Array, names: Sequence[str]) -> Array:
@@ -193,6 +204,25 @@ def _said_in_words(name: str, column: str, owner: str, words: tuple[str, ...]) -
         true = next((word for word in words if word.lower() in _TRUE), "")
         return Variable(name, "flag", (column,), owner, (false, true))
     return Variable(name, "word", (column,), owner, words)
+
+
+def _told_apart(variables: list[Variable]) -> list[Variable]:
+    """Return variables whose predicates are of one type each: "full" of items and of places become two."""
+    items = {variable.name for variable in variables if variable.kind == "item"}
+
+    def type_of(variable: Variable) -> str:
+        return "world" if not variable.owner else "item" if variable.owner in items else "place"
+
+    types: dict[str, set[str]] = {}
+    for variable in variables:
+        if variable.kind in _TELLING:
+            types.setdefault(variable.name, set()).add(type_of(variable))
+    return [
+        variable._replace(name=f"{variable.name}-{type_of(variable)}")
+        if variable.kind in _TELLING and (len(types[variable.name]) > 1 or variable.name in _OWN)
+        else variable
+        for variable in variables
+    ]
 
 
 def _closed_above(states: States, vocabulary: Vocabulary) -> bool | None:
@@ -295,7 +325,7 @@ def facts_of(vocabulary: Vocabulary, state: State, places: Mapping[str, Array]) 
         facts |= {("hand-at", place): place == at for place in places}
     facts |= _facts_of_items(vocabulary, state, places)
     owners: dict[str, set[str]] = {}
-    for variable in vocabulary.of_kind("flag", "word", "gripper"):
+    for variable in vocabulary.of_kind(*_TELLING):
         facts |= _flags(vocabulary, variable, state)
         for name in _predicates(variable):
             owners.setdefault(name, set()).add(variable.owner)
@@ -366,13 +396,9 @@ def predicates_of(vocabulary: Vocabulary) -> dict[str, tuple[str, ...]]:
         predicates |= {"in": ("item", "place"), "clear": ("place",)}
     if vocabulary.tells_grasp:
         predicates |= {"holding": ("item",), "hand-empty": ()}
-    for variable in vocabulary.of_kind("flag", "word", "gripper"):
+    for variable in vocabulary.of_kind(*_TELLING):
         if variable.kind == "gripper" and vocabulary.tells_grasp:
             continue
         arguments = () if not variable.owner else ("item",) if variable.owner in vocabulary.items else ("place",)
-        for name in _predicates(variable):
-            if predicates.setdefault(name, arguments) != arguments:
-                raise SpecificationError(
-                    f"expected {name!r} of items or of fixtures, got both; name one of the columns otherwise"
-                )
+        predicates |= dict.fromkeys(_predicates(variable), arguments)
     return predicates
