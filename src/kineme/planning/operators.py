@@ -116,12 +116,12 @@ def operators_of(
     check_number("error_rate", error_rate, least=0.0, most=0.25)
     vocabulary = vocabulary_of(states, radius)
     examples = [_example(vocabulary, states, row) for row in range(len(states))]
-    seen: dict[str, set[bool]] = {}
+    values_of: dict[str, set[bool]] = {}
     for example in examples:
         for facts in (example.before, example.after):
             for fact, value in facts.items():
-                seen.setdefault(fact[0], set()).add(value)
-    varied = {predicate for predicate, values in seen.items() if len(values) == 2}
+                values_of.setdefault(fact[0], set()).add(value)
+    varied = {predicate for predicate, values in values_of.items() if len(values) == 2}
     rules = _Rules(predicates_of(vocabulary), varied, error_rate)
     operators = []
     for name in dict.fromkeys(sorted(states.symbols)):
@@ -293,13 +293,13 @@ def _regularity(counts: NDArray[np.int_], error_rate: float) -> tuple[bool | Non
     priors, free = np.array([1.0 - share, share]), float(xlogy(counts, counts / n).sum())
     scores: dict[tuple[bool | None, bool | None], float] = {}
     for rate in (0.0, 0.25 * error_rate, 0.5 * error_rate, error_rate):  # a sensor may be better than is said
-        seen = np.array([[1.0 - rate, rate], [rate, 1.0 - rate]])  # true value -> seen value
+        reading = np.array([[1.0 - rate, rate], [rate, 1.0 - rate]])  # true value -> value of the sensor
         laws: dict[tuple[bool | None, bool | None], Array] = {
-            (before, after): np.outer(seen[int(before)], seen[int(after)])
+            (before, after): np.outer(reading[int(before)], reading[int(after)])
             for before in (False, True) for after in (False, True)
         }  # fmt: skip
-        laws |= {(None, after): np.outer(priors @ seen, seen[int(after)]) for after in (False, True)}
-        laws[None, None] = np.einsum("t,tb,ta->ba", priors, seen, seen)
+        laws |= {(None, after): np.outer(priors @ reading, reading[int(after)]) for after in (False, True)}
+        laws[None, None] = np.einsum("t,tb,ta->ba", priors, reading, reading)
         for law, likelihoods in laws.items():
             score = float(xlogy(counts, likelihoods).sum())
             score -= 0.5 * math.log(n + 2) + _NEEDED if law[0] is None else 0.0

@@ -178,20 +178,20 @@ def _said(column: str, values: Array, words: tuple[str, ...] | None, objects: Se
     """Return the variable that a column is, or why it is none."""
     owner = next((name for name in objects if column.startswith(f"{name}_")), "")
     name = column.removeprefix(f"{owner}_") if owner else column
-    seen = np.unique(values[np.isfinite(values)])
-    if not len(seen):
+    levels = np.unique(values[np.isfinite(values)])
+    if not len(levels):
         return "nothing is known of it"
     if words is not None:
         return _said_in_words(name, column, owner, words)
     kind = "gripper" if any(part in column.lower() for part in _GRIPPERS) else "flag"
-    low, high = float(seen[0]), float(seen[-1])
+    low, high = float(levels[0]), float(levels[-1])
     if low == high:
         if kind == "gripper" or low not in (0.0, 1.0):
             return f"it is always {low:g}"
         return Variable(name, kind, (column,), owner)
     middle = 0.5 * (low + high)
-    if np.minimum(seen - low, high - seen).max() > _SPREAD * (high - low):
-        return f"{len(seen)} different numbers are neither two levels nor a position with all of its axes"
+    if np.minimum(levels - low, high - levels).max() > _SPREAD * (high - low):
+        return f"{len(levels)} different numbers are neither two levels nor a position with all of its axes"
     return Variable(name, kind, (column,), owner, threshold=middle)
 
 
