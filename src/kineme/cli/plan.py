@@ -23,8 +23,8 @@ from kineme.reporting.text import counted, printable
 
 
 @click.command(cls=GroupedCommand, short_help="Find the symbols that reach a goal.")
-@click.argument("domain", type=click.Path(exists=True, dir_okay=False, path_type=Path))
-@click.argument("problem", type=click.Path(exists=True, dir_okay=False, path_type=Path), required=False)
+@click.argument("domain", type=FILE)
+@click.argument("problem", type=FILE, required=False)
 @library_option_of(required=False, words="Folder of the action library: says which demonstration each step follows.")
 @click.option("--state", type=FILE, help="The state now: a table whose columns are those of the states.")
 @click.option("--goal", help="The goal, instead of PROBLEM: (and (sweet cup) (sweet mug)).")

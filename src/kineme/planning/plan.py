@@ -124,7 +124,7 @@ def problem_of(
         if named[name].shape != (len(domain.vocabulary.axes),) or not np.isfinite(named[name]).all():
             axes = ", ".join(domain.vocabulary.axes)
             raise SpecificationError(f"expected the place {name} as finite numbers for {axes}, got {where!r}")
-    at = places_of(domain.vocabulary, [state], named)
+    at = places_of(domain.vocabulary, [state], named, "here")
     problem = Problem(domain, at, facts_of(domain.vocabulary, state, at), ())
     goals = _goals(problem, literals_of(parsed(goal))) if isinstance(goal, str) else tuple(goal)
     _check_goals(problem, goals)
@@ -139,7 +139,7 @@ def problem_from_pddl(domain: Domain, text: str, state: State | None = None) -> 
     """
     objects, facts, goals = read_problem(text)
     named = {name: np.array(where) for name, where in domain.places.items()}
-    at = places_of(domain.vocabulary, [state or {}], named) if state is not None else _typical_places(domain)
+    at = places_of(domain.vocabulary, [state or {}], named, "here") if state is not None else _typical_places(domain)
     problem = Problem(domain, at, {} if state is None else facts_of(domain.vocabulary, state, at), ())
     names = Names(domain, problem.objects)
     for identifier in objects:
@@ -399,9 +399,10 @@ def _why_not(
     depth: int,
 ) -> str:
     """Say what keeps operators from reaching a fact: what was not shown, what is not known, or what they lack."""
-    if reason := _not_shown(problem, goal, possible):
-        return reason
     ways = [pair for pair in left if goal in _ground(pair[0].effects, pair[1])]
+    is_told = not ways and goal.fact in problem.facts  # then what was not shown is the reason, whatever else is missing
+    if reason := _not_shown(problem, goal, possible, len(problem.facts) if is_told else 0):
+        return reason
     if not ways or not depth:
         state = "is not known" if goal.fact not in problem.facts else "does not hold now"
         return state if ways else f"{state}, and no operator that was shown changes that"
@@ -417,7 +418,7 @@ def _needs(ways: Sequence[tuple[Operator, dict[str, str]]]) -> list[tuple[Sequen
     return [(operator.preconditions, arguments) for operator, arguments in ways]
 
 
-def _not_shown(problem: Problem, goal: Goal, possible: set[tuple[Fact, bool]]) -> str:
+def _not_shown(problem: Problem, goal: Goal, possible: set[tuple[Fact, bool]], lacking_most: int) -> str:
     """Name an operator that would reach a fact from here, and why its arguments lie outside what was shown."""
     of_type = {kind: [name for name, each in problem.objects.items() if each == kind] for kind in ("place", "item")}
     reasons = []
@@ -430,11 +431,12 @@ def _not_shown(problem: Problem, goal: Goal, possible: set[tuple[Fact, bool]]) -
             choices = [[fixed[p.name]] if p.name in fixed else of_type[p.type] for p in operator.parameters]
             for chosen in itertools.islice(itertools.product(*choices), _TRIED):
                 arguments = dict(zip(names, chosen, strict=True))
-                if len({*chosen}) == len(chosen) and possible.issuperset(_ground(operator.preconditions, arguments)):
+                lacking = sum(each not in possible for each in _ground(operator.preconditions, arguments))
+                if len({*chosen}) == len(chosen) and lacking <= lacking_most:
                     outside = is_shown(problem.domain, operator, arguments, problem.places)
                     text = f"({' '.join((operator.name, *chosen))}) was not shown so: {first_names(outside, 2)}"
-                    reasons += [(len(outside), text)] if outside else []
-    return f"is not reached, since {min(reasons)[1]}" if reasons else ""
+                    reasons += [(lacking, len(outside), text)] if outside else []
+    return f"is not reached, since {min(reasons)[2]}" if reasons else ""
 
 
 def plan_to_dict(plan: Plan) -> dict[str, Any]:

@@ -28,6 +28,7 @@ _MOVEMENTS, _MOMENTS = ("movement", "id", "file", "recording", "name"), ("moment
 _BEFORE, _AFTER = ("before", "start", "begin"), ("after", "end", "stop")
 _MISSING = frozenset({"", "-", "?", "na", "n/a", "nan", "none", "null", "unknown"})
 _WITHIN = 0.2  # of the movement: a state so long after its start counts as before it, where there is none earlier
+_NEAR = 0.05  # of the movement: so much later than its start, or earlier than its end, is at it; cuts are not exact
 _CELL = 200  # bytes that a character of a table may take in Python, at most
 
 #: A state at one moment: column -> number or word; what is missing or None is not known.
@@ -76,7 +77,8 @@ def states_of(library: ActionLibrary, table: str | Path | Mapping[str, Sequence[
     table : str, Path, or mapping of column to n values (as a data frame), optional
         A row for each moment. Either with the columns ``movement`` (id, or file) and ``moment`` (before or after); or
         with ``time``, in the clock of the recordings, and ``file`` where there are several: the state before is the
-        last row up to a movement's start, the one after the first row from its end on. Empty cells are not known.
+        last row up to a movement's start, the one after the first row from its end on, each within a twentieth of its
+        duration. Empty cells are not known.
 
     Raises
     ------
@@ -240,7 +242,7 @@ def _rows_by_time(
             continue
         rows = rows_of[name][np.argsort(clock[rows_of[name]], kind="stable")]
         times, start, end = clock[rows], record["t0"], record["t0"] + record["duration"]
-        slack = 1e-6 * max(1.0, abs(end))
+        slack = 1e-6 * max(1.0, abs(end)) + _NEAR * record["duration"]
         first = int(np.searchsorted(times, start + slack)) - 1
         last = int(np.searchsorted(times, end - slack))
         if first < 0 and times[0] <= start + _WITHIN * record["duration"]:
