@@ -79,6 +79,18 @@ def test_both_kinds_of_tables_give_the_true_operators(shown, library, table):
     assert all(operator.symbol_id.startswith("sym-") for operator in domain.operators)
 
 
+def test_a_folder_of_tables_is_read_as_one(shown, library, tmp_path):
+    heads, *rows = (shown / "clock.csv").read_text().splitlines()
+    heads = heads.replace("file,", "")
+    for name, part in (("monday", rows), ("tuesday", rows[:2])):
+        lines = [heads, *(row.replace("monday.csv,", "") for row in part)]
+        (tmp_path / f"{name}.csv").write_text("\n".join(lines))
+    states = states_of(library, tmp_path)
+    assert np.array_equal(states.before, states_of(library, shown / "clock.csv").before)
+    with pytest.raises(DataError, match="tables of states"):
+        states_of(library, shown / "actions")
+
+
 def test_without_a_table_the_hand_alone_is_known(library):
     domain = learn_operators(library)
     assert tea.literals(domain.operator("carry")) == (

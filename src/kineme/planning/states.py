@@ -75,10 +75,10 @@ def states_of(library: ActionLibrary, table: str | Path | Mapping[str, Sequence[
     ----------
     library : ActionLibrary
     table : str, Path, or mapping of column to n values (as a data frame), optional
-        A row for each moment. Either with the columns ``movement`` (id, or file) and ``moment`` (before or after); or
-        with ``time``, in the clock of the recordings, and ``file`` where there are several: the state before is the
-        last row up to a movement's start, the one after the first row from its end on, each within a twentieth of its
-        duration. Empty cells are not known.
+        A file in CSV, or a folder of such files, as the recordings themselves, with a row for each moment. Either with
+        the columns ``movement`` (id, or file) and ``moment`` (before or after); or with ``time``, in the clock of the
+        recordings, and ``file`` where there are several: the state before is the last row up to a movement's start, the
+        one after the first row from its end on, each within a twentieth of its duration. Empty cells are not known.
 
     Raises
     ------
@@ -107,7 +107,7 @@ def states_of(library: ActionLibrary, table: str | Path | Mapping[str, Sequence[
         columns += discrete
     words: dict[str, tuple[str, ...]] = {}
     if table is not None:
-        cells, source = (_read(Path(table)), str(table)) if isinstance(table, str | Path) else (table, "the table")
+        cells, source = (_tables(Path(table)), str(table)) if isinstance(table, str | Path) else (table, "the table")
         more, extra_before, extra_after, words = _matched(library, ids, _texts(cells), source, axes)
         columns, before, after = _merged(columns, more, (before, after), (extra_before, extra_after))
     symbols = tuple(name or "" for name in read.names_of(library.store, ids))
@@ -123,6 +123,23 @@ def read_state(source: str | Path | Mapping[str, Any]) -> dict[str, Any]:
         if values and not is_time(head):
             state[_column(head)] = values[-1]
     return state
+
+
+def _tables(path: Path) -> dict[str, list[str]]:
+    """Read a table, or those of a folder one below the other: the column ``file`` then says which, if none does."""
+    if not path.is_dir():
+        return _read(path)
+    tables = [(each, _read(each)) for each in sorted(path.glob("*.csv"))]
+    if not tables:
+        raise DataError(f"expected tables of states, .csv files, in {path}, got none")
+    heads = dict.fromkeys(head for _, cells in tables for head in cells)
+    if not any(head.lower() in _MOVEMENTS for head in heads):
+        tables = [(each, cells | {"file": [each.name] * len(next(iter(cells.values())))}) for each, cells in tables]
+        heads["file"] = None
+    return {
+        head: [text for _, cells in tables for text in cells.get(head, [""] * len(next(iter(cells.values()))))]
+        for head in heads
+    }
 
 
 def _read(path: Path) -> dict[str, list[str]]:
