@@ -16,8 +16,8 @@ _FORMATS = {".pddl": "pddl", ".json": "json", ".xml": "behavior-tree"}
 
 @click.command(cls=GroupedCommand, short_help="Learn what symbols need and do, for a planner.")
 @library_option
-@click.option("--states", type=click.Path(path_type=Path), help="A table of states beside the recordings, or a folder of "
-              "tables.  [default: the hand and grippers of the recordings alone]")  # fmt: skip
+@click.option("--states", type=click.Path(path_type=Path), help="A table of states beside the recordings, or a folder "
+              "of them.  [default: the hand and grippers of the recordings alone]")  # fmt: skip
 @click.option("--radius", type=Finite(0, min_open=True), help="Of a place, in the unit of the recordings.  [default: "
               "where the distances of the hand from objects part into near and far]")  # fmt: skip
 @click.option("--error-rate", type=Finite(0, 0.25), default=0.02, show_default=True,
