@@ -24,7 +24,9 @@ from kineme.cli.inspect import inspect
 from kineme.cli.learn import learn
 from kineme.cli.library import library
 from kineme.cli.move import move
+from kineme.cli.operators import operators
 from kineme.cli.output import write
+from kineme.cli.plan import plan
 from kineme.cli.recognize import recognize, why
 from kineme.cli.segment import segment
 from kineme.cli.serve import serve
@@ -92,6 +94,6 @@ def main() -> None:
 
 for command in (
     anchor, annotate, audit, correct, discover, evaluate, features, find, gather, generate, move, inspect, learn,
-    library, page, recognize, reproduce, segment, serve, skills, studio, why,
+    library, operators, page, plan, recognize, reproduce, segment, serve, skills, studio, why,
 ):  # fmt: skip
     main.add_command(command)

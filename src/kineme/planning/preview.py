@@ -60,17 +60,22 @@ class Preview(NamedTuple):
             "Start, goal, displacement and duration are inside what was shown.",
         ]
         if self.movement is None:
-            lines.append(f"The arm {arm} cannot execute it: {shortened(printable(self.refusal), 1500)}")
+            lines.append(f"The arm {arm} cannot execute it: {clean(self.refusal, 1500)}")
         else:
             report, words = self.movement.preflight, duration_in_words(self.movement)
             lines.append(f"The arm {arm} can execute it, all {len(report.checks)} checks passed: {words}.")
             lines += [f"Not checked: {printable(sentence)}." for sentence in report.unchecked]
-        return "\n".join([*lines, *(f"Note: {shortened(printable(note), 500)}" for note in self.notes)])
+        return "\n".join([*lines, *(f"Note: {clean(note, 500)}" for note in self.notes)])
+
+
+def clean(text: str, longest: int = 120) -> str:
+    """Return a text from a library on one line, shortened."""
+    return printable(shortened(text, longest))
 
 
 def as_data(text: str, longest: int = 80) -> str:
     """Write a text from a library on one line, shortened, in quotes."""
-    return json.dumps(printable(shortened(text, longest)), ensure_ascii=False)
+    return json.dumps(clean(text, longest), ensure_ascii=False)
 
 
 def units_of(skill: Skill) -> list[str]:
@@ -94,6 +99,16 @@ def identifiers(names: Sequence[str], ids: Sequence[str], fallback: str = "skill
 def axes_of(skill: Skill) -> list[str]:
     """Return the coordinates of a skill as identifiers."""
     return identifiers([split_head(axis)[0] for axis in skill.axes], [*map(str, range(len(skill.axes)))], "axis")
+
+
+def ranges_of(skill: Skill) -> dict[str, tuple[float, float, str]]:
+    """Return what was shown, ``{"goal_x": (low, high, unit), ..., "duration": (low, high, "s")}``; goals come first."""
+    ranges = {
+        f"{what}_{axis}": (float(values.min()), float(values.max()), unit)
+        for what in ("goal", "start", "displacement")
+        for axis, values, unit in zip(axes_of(skill), skill.shown[what].T, units_of(skill), strict=True)
+    }
+    return {**ranges, "duration": (float(skill.durations.min()), float(skill.durations.max()), "s")}
 
 
 def in_words(skill: Skill, place: Array) -> str:
@@ -155,7 +170,7 @@ def standing_place(library: ActionLibrary, skill: Skill, robot: Robot, joints: A
     return ((values - scales.offset) / scales.size)[[names.index(axis) for axis in skill.axes]]
 
 
-def preview(  # noqa: PLR0913, PLR0917 - all that a movement depends on
+def preview_skill(  # noqa: PLR0913, PLR0917 - all that a movement depends on
     library: ActionLibrary, skill: Skill, robot: Robot, joints: ArrayLike, start: Array, goal: Array, duration: float
 ) -> Preview:
     """Generate a movement of a skill in `duration` [s], and check it on an arm that stands with `joints` (n,).

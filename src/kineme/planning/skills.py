@@ -14,19 +14,9 @@ from numpy.typing import ArrayLike
 from kineme.errors import KinemeError, SpecificationError
 from kineme.io.records import needs
 from kineme.library.library import ActionLibrary
-from kineme.planning.preview import (
-    OutsideError,
-    Preview,
-    as_data,
-    axes_of,
-    draw_preview,
-    identifiers,
-    preview,
-    standing_place,
-    units_of,
-)
+from kineme.planning import preview as previews
 from kineme.planning.skill import Skill, nearest_demonstration, skill_of
-from kineme.reporting.text import printable, shortened
+from kineme.reporting.text import first_names, printable
 from kineme.robots.models.robot import Robot, check_start
 from kineme.robots.planning.robot_movement import RobotMovement
 from kineme.sampling import evenly_spaced
@@ -75,7 +65,7 @@ class Question(NamedTuple):
 
     number: str
     call: tuple[str, dict[str, Any]]  # name of the tool, arguments
-    preview: Preview
+    preview: previews.Preview
     version: int  # of the library
     time: float  # when it was asked [s]
 
@@ -118,7 +108,7 @@ class SkillTools:
             chosen = [symbol for symbol in self.library.symbols() if len(symbol)]
             if self._offered:
                 chosen = [symbol for symbol in chosen if symbol.id in self._offered]
-            names = identifiers([s.name for s in chosen], [s.id.removeprefix("sym-") for s in chosen])
+            names = previews.identifiers([s.name for s in chosen], [s.id.removeprefix("sym-") for s in chosen])
             skills = {name: skill_of(self.library, s.name) for name, s in zip(names, chosen, strict=True)}
             self._tools = (version, tools_of(skills, moving=self.execute is not None))
         return self._tools[1]
@@ -134,7 +124,8 @@ class SkillTools:
         tools = self.tools()
         if tool not in tools:
             raise SpecificationError(
-                f"expected a tool that is listed, got {as_data(tool)}; the library may have changed: list them again"
+                f"expected a tool that is listed, got {previews.as_data(tool)}; list them again: the library may have "
+                "changed"
             )
         action, skill, _, schema = tools[tool]
         check_arguments(schema, arguments)
@@ -148,12 +139,12 @@ class SkillTools:
             )
         try:
             shown = self._preview(skill, arguments)
-        except OutsideError as error:
+        except previews.OutsideError as error:
             nearest = np.concatenate(error.nearest[::-1]).tolist()  # in the schema the goal is named first
             would_do = dict(zip(schema["properties"], nearest, strict=False))
             return Answer(str(error), {"refused": str(error), "would_do": would_do}, refused=True)
         if action == "preview" or shown.movement is None:
-            return Answer(str(shown), preview_as_data(shown), draw_preview(shown), action == "execute")
+            return Answer(str(shown), preview_as_data(shown), previews.draw_preview(shown), action == "execute")
         self._questions += 1
         self._question = Question(str(self._questions), (tool, arguments), shown, self._tools[0], time.monotonic())
         return self._question
@@ -184,9 +175,9 @@ class SkillTools:
         self.joints = movement.trajectory.positions[-1]
         return Answer(printable(done), {"executed": True, **preview_as_data(question.preview)})
 
-    def _preview(self, skill: Skill, arguments: dict[str, Any]) -> Preview:
-        axes = axes_of(skill)
-        here = standing_place(self.library, skill, self.robot, self.joints)
+    def _preview(self, skill: Skill, arguments: dict[str, Any]) -> previews.Preview:
+        axes = previews.axes_of(skill)
+        here = previews.standing_place(self.library, skill, self.robot, self.joints)
         if here is None and not {f"start_{axis}" for axis in axes} <= set(arguments):
             raise SpecificationError(
                 f"expected {', '.join(f'start_{axis}' for axis in axes)}: where the arm stands is not known in the "
@@ -197,40 +188,28 @@ class SkillTools:
         goal = np.array([arguments[f"goal_{axis}"] for axis in axes], dtype=float)
         usual = skill.durations[nearest_demonstration(skill, start, goal)]
         duration = float(arguments.get("duration", usual))
-        return preview(self.library, skill, self.robot, self.joints, start, goal, duration)
+        return previews.preview_skill(self.library, skill, self.robot, self.joints, start, goal, duration)
 
     def _explained(self, name: str, skill: Skill, at_length: bool) -> tuple[str, dict[str, Any]]:
         """Return the lines and the data that say what was demonstrated of a skill, in short or at length."""
-        text = f"{name}: {as_data(skill.name)}, demonstrated {len(skill.starts)} times"
-        text += f", described as {as_data(skill.description, 2000 if at_length else 120)}" if skill.description else ""
-        data = {"skill": name, "id": skill.id, "name": clean(skill.name), "demonstrations": len(skill.starts),
-                "description": clean(skill.description, 2000)}  # fmt: skip
+        text = f"{name}: {previews.as_data(skill.name)}, demonstrated {len(skill.starts)} times"
+        longest = 2000 if at_length else 120
+        text += f", described as {previews.as_data(skill.description, longest)}" if skill.description else ""
+        data = {"skill": name, "id": skill.id, "name": previews.clean(skill.name), "demonstrations": len(skill.starts),
+                "description": previews.clean(skill.description, longest)}  # fmt: skip
         if not at_length:
             return text, data
-        near: Sequence[Any] = ()
-        if sum(len(symbol) > 0 for symbol in self.library.symbols()[: _MOST_COMPARED + 1]) in range(2, _MOST_COMPARED):
-            near = self.library.nearest(skill.name)
-        ranges = ranges_of(skill)
+        others = sum(len(symbol) > 0 for symbol in self.library.symbols())
+        near: Sequence[Any] = self.library.nearest(skill.name) if 2 <= others <= _MOST_COMPARED else ()
+        ranges = previews.ranges_of(skill)
         lines = [text, *(f"{what}: {low:.6g} to {high:.6g} {unit}" for what, (low, high, unit) in ranges.items())]
-        lines += [f"nearest skill: {as_data(str(other.symbol))}, {other.distance:.3g} kernel widths" for other in near]
+        lines += [
+            f"nearest skill: {previews.as_data(str(other.symbol))}, {other.distance:.3g} kernel widths"
+            for other in near
+        ]
         data["ranges"] = {what: {"low": low, "high": high, "unit": unit} for what, (low, high, unit) in ranges.items()}
-        data["nearest"] = [{"name": clean(str(other.symbol)), "distance": other.distance} for other in near]
+        data["nearest"] = [{"name": previews.clean(symbol), "distance": distance} for symbol, distance in near]
         return "\n".join(lines), data
-
-
-def clean(text: str, longest: int = 120) -> str:
-    """Return a text from a library on one line, shortened."""
-    return shortened(printable(text), longest)
-
-
-def ranges_of(skill: Skill) -> dict[str, tuple[float, float, str]]:
-    """Return what was shown, ``{"goal_x": (low, high, unit), ..., "duration": (low, high, "s")}``; goals come first."""
-    ranges = {
-        f"{what}_{axis}": (float(values.min()), float(values.max()), unit)
-        for what in ("goal", "start", "displacement")
-        for axis, values, unit in zip(axes_of(skill), skill.shown[what].T, units_of(skill), strict=True)
-    }
-    return {**ranges, "duration": (float(skill.durations.min()), float(skill.durations.max()), "s")}
 
 
 def tools_of(skills: dict[str, Skill], *, moving: bool) -> dict[str, Tool]:
@@ -246,15 +225,17 @@ def tools_of(skills: dict[str, Skill], *, moving: bool) -> dict[str, Tool]:
     }  # fmt: skip
     default = {"start": "; by default where the arm stands", "duration": "; by default as in the nearest demonstration"}
     for name, skill in skills.items():
-        heads = dict(zip(axes_of(skill), map(as_data, skill.axes), strict=True))
+        heads = dict(zip(previews.axes_of(skill), map(previews.as_data, skill.axes), strict=True))
         properties = {}
-        for argument, (low, high, unit) in ranges_of(skill).items():
+        for argument, (low, high, unit) in previews.ranges_of(skill).items():
             what, _, axis = argument.partition("_")
             if what != "displacement":
-                words = f"{what} {heads.get(axis, '')} [{unit}], as demonstrated{default.get(what, '')}"
+                words = (
+                    f"{what} {heads.get(axis, '')} [{unit or 'unknown unit'}], as demonstrated{default.get(what, '')}"
+                )
                 properties[argument] = {"type": "number", "minimum": low, "maximum": high, "description": words}
         schema = closed(properties, [f"goal_{axis}" for axis in heads])
-        which = f"the skill {as_data(skill.name)}, which was demonstrated {len(skill.starts)} times"
+        which = f"the skill {previews.as_data(skill.name)}, which was demonstrated {len(skill.starts)} times"
         words = f"Preview {which}: path, duration, a picture, and the checks of the arm. Nothing moves."
         tools[f"preview_{name}"] = Tool("preview", skill, words, schema)
         if moving:
@@ -273,27 +254,28 @@ def check_arguments(schema: dict[str, Any], arguments: dict[str, Any]) -> None:
     properties, required = schema["properties"], schema["required"]
     if not set(required) <= set(arguments) <= set(properties):
         expected = f"the arguments {', '.join(properties)}, of them at least {', '.join(required)}"
-        got = as_data(", ".join(map(str, arguments)) or "none")
+        got = previews.as_data(", ".join(map(str, arguments)) or "none")
         raise SpecificationError(f"expected {expected if properties else 'no arguments'}, got {got}")
     for name, value in arguments.items():
+        got = previews.as_data(value) if isinstance(value, str) else f"a value of type {type(value).__name__}"
         if choices := properties[name].get("enum"):
             if value not in choices:
-                raise SpecificationError(f"expected {name} as one of {', '.join(choices)}, got {as_data(repr(value))}")
+                raise SpecificationError(f"expected {name} as one of {first_names(choices, 20)}, got {got}")
         elif isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < _LARGEST:
-            raise SpecificationError(f"expected {name} as a finite number, got {as_data(repr(value)[:80])}")
+            raise SpecificationError(f"expected {name} as a number, smaller than {_LARGEST:g}, got {got}")
 
 
-def preview_as_data(shown: Preview) -> dict[str, Any]:
+def preview_as_data(shown: previews.Preview) -> dict[str, Any]:
     """Return a preview as plain data; places are in the units of the recordings."""
     chosen, movement = evenly_spaced(len(shown.times), _PATH_POINTS), shown.movement
     return {
-        "name": clean(shown.skill.name),
-        "axes": axes_of(shown.skill),
+        "name": previews.clean(shown.skill.name),
+        "axes": previews.axes_of(shown.skill),
         "times": shown.times[chosen].tolist(),
         "path": shown.path[chosen].tolist(),
         "inside": True,
         "feasible": movement is not None,
-        "refusal": clean(shown.refusal, 1500),
+        "refusal": previews.clean(shown.refusal, 1500),
         "seconds_with_approach": None if movement is None else movement.trajectory.duration,
     }
 
@@ -316,12 +298,14 @@ def skills_server(tools: SkillTools) -> Any:
 
     types, lock = mcp.types, anyio.Lock()
 
-    async def answered(method: Callable[..., Answer | Question], *arguments: Any) -> Answer | Question:
+    async def answered(method: Callable[..., Any], *arguments: Any) -> Any:
         async with lock:
             try:
                 return await anyio.to_thread.run_sync(method, *arguments)
             except (KinemeError, OSError) as error:
-                return Answer(clean(str(error), 2000), {"refused": clean(str(error), 2000)}, refused=True)
+                return Answer(
+                    previews.clean(str(error), 2000), {"refused": previews.clean(str(error), 2000)}, refused=True
+                )
 
     def result(answer: Any) -> mcp.types.CallToolResult:
         content: list[Any] = [types.TextContent(text=answer.text)]
@@ -330,8 +314,9 @@ def skills_server(tools: SkillTools) -> Any:
         return types.CallToolResult(content=content, structured_content=answer.data, is_error=answer.refused)
 
     async def list_tools(ctx: Any, params: Any) -> mcp.types.ListToolsResult:
-        async with lock:
-            listed = await anyio.to_thread.run_sync(tools.tools)
+        listed: Any = await answered(tools.tools)
+        if isinstance(listed, Answer):
+            raise mcp.MCPError(types.INTERNAL_ERROR, listed.text)
         return types.ListToolsResult(tools=[
             types.Tool(name=name, description=tool.description, input_schema=tool.schema,
                        annotations=types.ToolAnnotations(read_only_hint=tool.action != "execute",
