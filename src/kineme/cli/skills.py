@@ -53,14 +53,14 @@ def skills(  # noqa: PLR0913, PLR0917 - one parameter per option
     execute: Callable[..., str] | None = None
     if output is not None:
         output.mkdir(exist_ok=True)
-        execute = _written_to(output)
+        execute = written_to(output)
     if simulate:
         execute = _simulated
     with opened(folder) as library:
         serve_over_stdio(SkillTools(library, arm, execute, joints, symbols))
 
 
-def _written_to(folder: Path) -> Callable[..., str]:
+def written_to(folder: Path) -> Callable[..., str]:
     """Return what writes each movement into a new file of a folder, numbered on from those that are there."""
     from kineme.reporting.atomic import whole_file
     from kineme.robots.export_files import write_action_goal

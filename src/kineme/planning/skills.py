@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import secrets
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -63,7 +64,7 @@ class Answer(NamedTuple):
 class Question(NamedTuple):
     """A movement that waits for the approval of a person."""
 
-    number: str
+    token: str
     call: tuple[str, dict[str, Any]]  # name of the tool, arguments
     preview: previews.Preview
     version: int  # of the library
@@ -98,7 +99,6 @@ class SkillTools:
         check_start(robot, self.joints)
         self._offered = {library[who].id for who in symbols}
         self._question: Question | None = None  # the last one, until it is answered
-        self._questions = 0
         self._tools: tuple[int, dict[str, Tool]] = (-1, {})  # at a version
 
     def tools(self) -> dict[str, Tool]:
@@ -145,22 +145,22 @@ class SkillTools:
             return Answer(str(error), {"refused": str(error), "would_do": would_do}, refused=True)
         if action == "preview" or shown.movement is None:
             return Answer(str(shown), preview_as_data(shown), previews.draw_preview(shown), action == "execute")
-        self._questions += 1
-        self._question = Question(str(self._questions), (tool, arguments), shown, self._tools[0], time.monotonic())
+        token = secrets.token_urlsafe()  # whoever approves has received the question
+        self._question = Question(token, (tool, arguments), shown, self._tools[0], time.monotonic())
         return self._question
 
-    def decide(self, number: str, tool: str, arguments: dict[str, Any], decision: str) -> Answer:
+    def decide(self, token: str, tool: str, arguments: dict[str, Any], decision: str) -> Answer:
         """Execute the movement of the last question if the `decision` is "accept"; a question is answered once.
 
         Raises
         ------
         SpecificationError
-            The number or the call is not that of the last question, that one is too old, or the library has changed.
+            The token or the call is not that of the last question, that one is too old, or the library has changed.
         """
         question, self._question = self._question, None
         if (
             question is None
-            or (question.number, question.call) != (number, (tool, arguments))
+            or (question.token, question.call) != (token, (tool, arguments))
             or time.monotonic() - question.time > PATIENCE
             or self.library.version != question.version
         ):
@@ -217,12 +217,11 @@ def tools_of(skills: dict[str, Skill], *, moving: bool) -> dict[str, Tool]:
 
     The bounds in the schema of a call are the ranges that were shown.
     """
-    choice = {"skill": {"type": "string", "enum": list(skills)}}
-    tools = {
-        "list_skills": Tool("list", None, "List the skills: movements that were demonstrated.", closed({}, [])),
-        "explain_skill": Tool("explain", None, "Say what was demonstrated of a skill: how often, from where to where, "
-                              "how long, and the skills most like it.", closed(choice, ["skill"])),
-    }  # fmt: skip
+    tools = {"list_skills": Tool("list", None, "List the skills: movements that were demonstrated.", closed({}, []))}
+    if skills:
+        choice = {"skill": {"type": "string", "enum": list(skills)}}
+        words = "Say what was demonstrated of a skill: how often, where, how long, and the skills most like it."
+        tools["explain_skill"] = Tool("explain", None, words, closed(choice, ["skill"]))
     default = {"start": "; by default where the arm stands", "duration": "; by default as in the nearest demonstration"}
     for name, skill in skills.items():
         heads = dict(zip(previews.axes_of(skill), map(previews.as_data, skill.axes), strict=True))
@@ -230,9 +229,8 @@ def tools_of(skills: dict[str, Skill], *, moving: bool) -> dict[str, Tool]:
         for argument, (low, high, unit) in previews.ranges_of(skill).items():
             what, _, axis = argument.partition("_")
             if what != "displacement":
-                words = (
-                    f"{what} {heads.get(axis, '')} [{unit or 'unknown unit'}], as demonstrated{default.get(what, '')}"
-                )
+                head = f"{what} {heads[axis]}" if axis else what
+                words = f"{head} [{unit or 'unknown unit'}], as demonstrated{default.get(what, '')}"
                 properties[argument] = {"type": "number", "minimum": low, "maximum": high, "description": words}
         schema = closed(properties, [f"goal_{axis}" for axis in heads])
         which = f"the skill {previews.as_data(skill.name)}, which was demonstrated {len(skill.starts)} times"
@@ -337,12 +335,12 @@ def skills_server(tools: SkillTools) -> Any:
             if ctx.protocol_version >= _QUESTIONS_ARE_ANSWERS:
                 form = types.ElicitRequestFormParams(message=words, requested_schema=_APPROVAL)
                 asking = types.ElicitRequest(params=form)
-                return types.InputRequiredResult(input_requests={"approval": asking}, request_state=answer.number)
+                return types.InputRequiredResult(input_requests={"approval": asking}, request_state=answer.token)
             response = None
             with anyio.move_on_after(PATIENCE), suppress(mcp.MCPError, ValueError):  # no answer, or a wrong one
                 response = await ctx.session.elicit_form(words, _APPROVAL, ctx.request_id)
             decision = decision_of(response)
-        return result(await answered(tools.decide, answer.number, *call, decision))
+        return result(await answered(tools.decide, answer.token, *call, decision))
 
     return mcp.server.Server("kineme", instructions=INSTRUCTIONS, on_list_tools=list_tools, on_call_tool=call_tool)
 
