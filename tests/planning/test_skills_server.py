@@ -13,12 +13,14 @@ import anyio
 import jsonschema
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bench.skills import NAMES, assail, fill
 from kineme import ActionLibrary, read_recordings
 from kineme.cli.main import main
+from kineme.cli.skills import written_to
 from kineme.errors import SpecificationError
 from kineme.planning import OutsideError, SkillTools, outside, skill_of, skills_server
 from kineme.planning.preview import check_inside, identifiers, nearest_inside, standing_place
@@ -289,6 +291,10 @@ def test_an_approval_holds_once_and_for_its_call_alone(skills, library, moves):
                                 input_responses=yes, request_state=question.request_state)  # fmt: skip
         spent = await call_tool("execute_carry", arguments, input_responses=yes, request_state=question.request_state)
         assert not moves
+        earlier = await call_tool("execute_carry", arguments, allow_input_required=True)
+        question = await call_tool("execute_carry", arguments, allow_input_required=True)
+        old = await call_tool("execute_carry", arguments, input_responses=yes, request_state=earlier.request_state)
+        assert not moves
         question = await call_tool("execute_carry", arguments, allow_input_required=True)
         silent = await call_tool("execute_carry", arguments, request_state=question.request_state)
         assert not moves
@@ -299,7 +305,7 @@ def test_an_approval_holds_once_and_for_its_call_alone(skills, library, moves):
         question = await call_tool("execute_carry", arguments, allow_input_required=True)
         good = await call_tool("execute_carry", arguments, input_responses=yes, request_state=question.request_state)
         again = await call_tool("execute_carry", arguments, input_responses=yes, request_state=question.request_state)
-        return (other, spent, silent, late, again), good, second
+        return (other, spent, old, silent, late, again), good, second
 
     refused, good, _ = talk(skills, act)
     assert all(answer.is_error for answer in refused)
@@ -501,6 +507,19 @@ def test_the_command_reads_only_unless_told_otherwise(folder, library):
     assert {path: path.stat().st_mtime_ns for path in folder.iterdir()} == before
 
 
+def test_the_command_opens_the_library_for_reading_and_passes_its_options_on(folder, robot, monkeypatch):
+    served = []
+    monkeypatch.setattr("kineme.planning.skills.serve_over_stdio", lambda tools: served.append((
+        tools.library.store.read_only, list(tools.tools()), tools.joints.tolist(), tools.execute
+    )))  # fmt: skip
+    joints = (robot.rest + 0.1).tolist()
+    options = ["--robot", "panda", "--symbol", "carry", "--from", ",".join(map(str, joints))]
+    result = CliRunner().invoke(main, ["skills", "--library", str(folder), *options])
+    assert result.exit_code == 0, result.output
+    assert result.stdout == ""  # it is the client's
+    assert served == [(True, ["list_skills", "explain_skill", "preview_carry"], joints, None)]
+
+
 def test_the_command_writes_what_was_approved_into_new_files(folder, library, tmp_path):
     goals = tmp_path / "goals"
     goals.mkdir()
@@ -521,8 +540,6 @@ def test_the_command_writes_what_was_approved_into_new_files(folder, library, tm
 
 
 def test_names_of_files_do_not_leave_the_folder(hostile, robot, tmp_path):
-    from kineme.cli.skills import written_to
-
     skills = SkillTools(hostile, robot, written_to(tmp_path))
     for name, tool in skills.tools().items():
         if tool.action == "execute":
@@ -530,6 +547,16 @@ def test_names_of_files_do_not_leave_the_folder(hostile, robot, tmp_path):
     names = [path.name for path in tmp_path.iterdir()]
     assert len(names) == len(NAMES)
     assert all(re.fullmatch(r"\d{4}-[a-z0-9_-]+\.yaml", name) for name in names)
+
+
+def test_a_file_that_another_program_wrote_meanwhile_stays(skills, library, tmp_path, monkeypatch):
+    write = written_to(tmp_path)
+    movement = skills.call("execute_carry", middle(library)).preview.movement
+    (tmp_path / "0001-carry.yaml").write_text("mine")
+    monkeypatch.setattr(type(tmp_path), "iterdir", lambda self: iter(()))  # as it was when the names were read
+    with pytest.raises(FileExistsError):
+        write("carry", movement)
+    assert (tmp_path / "0001-carry.yaml").read_text() == "mine"
 
 
 def test_the_command_simulates_what_was_approved(folder, library):
@@ -550,8 +577,6 @@ def test_the_command_simulates_what_was_approved(folder, library):
     ids=" ".join,
 )
 def test_execution_and_what_executes_are_named_together(folder, options):
-    from click.testing import CliRunner
-
     result = CliRunner().invoke(main, ["skills", "--library", str(folder), "--robot", "panda", *options])
     assert result.exit_code == 2
     assert "--allow-execute with one of --simulate and --output" in " ".join(result.output.split())

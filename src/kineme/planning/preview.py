@@ -119,15 +119,15 @@ def in_words(skill: Skill, place: Array) -> str:
 
 
 def nearest_inside(skill: Skill, start: Array, goal: Array) -> tuple[Array, Array]:
-    """Return the start nearest to `start` from which some goal was shown, then the goal nearest to `goal`, (k,) each.
+    """Return the start nearest to `start` that is inside what was shown, then the goal nearest to `goal`, (k,) each.
 
-    What was shown is a box with at least one demonstration in it, so that there is such a pair, axis by axis.
+    There is such a goal: axis by axis, a start inside is a mean of two that were shown, and the mean of their goals has
+    the mean of their displacements.
     """
-    (low_s, high_s), (low_g, high_g), (low_d, high_d) = (
-        (values.min(axis=0), values.max(axis=0)) for values in skill.shown.values()
-    )
-    begin = np.clip(start, np.maximum(low_s, low_g - high_d), np.minimum(high_s, high_g - low_d))
-    return begin, np.clip(goal, np.maximum(low_g, begin + low_d), np.minimum(high_g, begin + high_d))
+    begin = np.clip(start, skill.starts.min(axis=0), skill.starts.max(axis=0))
+    goals, ways = skill.goals, skill.shown["displacement"]
+    low = np.maximum(goals.min(axis=0), begin + ways.min(axis=0))
+    return begin, np.clip(goal, low, np.minimum(goals.max(axis=0), begin + ways.max(axis=0)))
 
 
 def check_inside(skill: Skill, start: Array, goal: Array, duration: float) -> None:
