@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -55,7 +56,9 @@ def skills(  # noqa: PLR0913, PLR0917 - one parameter per option
         output.mkdir(exist_ok=True)
         execute = written_to(output)
     if simulate:
-        execute = _simulated
+        execute = simulated_by(arm, joints)
+    if sys.stdin.isatty():
+        write("waiting for a client on standard input: clients start this command themselves", err=True)
     with opened(folder) as library:
         serve_over_stdio(SkillTools(library, arm, execute, joints, symbols))
 
@@ -78,8 +81,9 @@ def written_to(folder: Path) -> Callable[..., str]:
     return execute
 
 
-def _simulated(name: str, movement: Any) -> str:
+def simulated_by(arm: Any, joints: list[float] | None) -> Callable[..., str]:
+    """Return what moves an arm in MuJoCo that stands with these joints at first."""
     from kineme.robots.simulation import Simulation
 
-    run = Simulation(movement.robot, start=movement.trajectory.positions[0]).run(movement)
-    return f"Executed {name} in simulation: {run!r}."
+    simulation = Simulation(arm, start=joints)
+    return lambda name, movement: f"Executed {name} in simulation: {simulation.run(movement)!r}."

@@ -204,8 +204,7 @@ class SkillTools:
         ranges = previews.ranges_of(skill)
         lines = [text, *(f"{what}: {low:.6g} to {high:.6g} {unit}" for what, (low, high, unit) in ranges.items())]
         lines += [
-            f"nearest skill: {previews.as_data(str(other.symbol))}, {other.distance:.3g} kernel widths"
-            for other in near
+            f"nearest skill: {previews.as_data(symbol)}, {distance:.3g} kernel widths" for symbol, distance in near
         ]
         data["ranges"] = {what: {"low": low, "high": high, "unit": unit} for what, (low, high, unit) in ranges.items()}
         data["nearest"] = [{"name": previews.clean(symbol), "distance": distance} for symbol, distance in near]
@@ -301,9 +300,8 @@ def skills_server(tools: SkillTools) -> Any:
             try:
                 return await anyio.to_thread.run_sync(method, *arguments)
             except (KinemeError, OSError) as error:
-                return Answer(
-                    previews.clean(str(error), 2000), {"refused": previews.clean(str(error), 2000)}, refused=True
-                )
+                said = previews.clean(str(error), 2000)
+                return Answer(said, {"refused": said}, refused=True)
 
     def result(answer: Any) -> mcp.types.CallToolResult:
         content: list[Any] = [types.TextContent(text=answer.text)]
