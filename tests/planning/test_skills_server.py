@@ -138,7 +138,7 @@ def test_skills_are_listed_and_explained_with_ranges_units_and_neighbors(skills,
     expected = {"low": ways[:, 0].min(), "high": ways[:, 0].max(), "unit": "m"}
     assert data["ranges"]["displacement_x"] == pytest.approx(expected)
     assert data["ranges"]["duration"]["unit"] == "s"
-    assert data["nearest"][0]["name"] == "reach"
+    assert data["nearest"] == [{"name": "reach", "distance": pytest.approx(library.nearest("carry")[0].distance)}]
     assert data["description"] == r"brings a cup\nto the \x1b[31mtable"
     assert "\x1b" not in answer.content[0].text
     assert r"cup\\nto the" in answer.content[0].text  # in quotes, on one line
@@ -369,6 +369,7 @@ def test_a_library_that_changes_while_it_is_served(folder, robot, tmp_path, move
     ):
         skills = SkillTools(library, robot, lambda name, movement: moves.append(name) or "moved")
         arguments = middle(library)
+        call(skills, "explain_skill", {"skill": "reach"})
         question = skills.call("execute_carry", arguments)
         writer.annotate("carry", "other words")
         with pytest.raises(SpecificationError, match="the library as it was then"):
@@ -376,6 +377,8 @@ def test_a_library_that_changes_while_it_is_served(folder, robot, tmp_path, move
         assert not moves
         writer.rename("carry", "Bring It")
         assert "preview_bring_it" in skills.tools()
+        near = call(skills, "explain_skill", {"skill": "reach"}).structured_content["skills"][0]["nearest"]
+        assert near[0]["name"] == "Bring It"
         assert not call(skills, "preview_bring_it", arguments).is_error
         writer.delete("Bring It")
         assert list(skills.tools()) == ["list_skills", "explain_skill", "preview_reach", "execute_reach"]

@@ -12,8 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kineme.anchoring.space import ConceptualSpace
 from kineme.errors import KinemeError, SpecificationError
 from kineme.io.records import needs
+from kineme.library.grounding import space_of
 from kineme.library.library import ActionLibrary
 from kineme.planning import preview as previews
 from kineme.planning.skill import Skill, nearest_demonstration, skill_of
@@ -26,7 +28,7 @@ from kineme.validation import Array, as_numbers
 PATIENCE = 600.0  # seconds after which an approval comes too late: the arm may stand elsewhere
 _PATH_POINTS = 21  # of a path in an answer
 _LARGEST = 1e150  # number in a call: its square is finite
-_MOST_COMPARED = 50  # symbols up to which the nearest ones are named: all prototypes are compared
+_NEAREST, _MOST_COMPARED = 3, 50  # symbols that are named, and up to how many are compared with each other
 _QUESTIONS_ARE_ANSWERS = "2026-07-28"  # version of the protocol since which the person is asked between two calls
 _APPROVAL = {
     "type": "object",
@@ -100,6 +102,7 @@ class SkillTools:
         self._offered = {library[who].id for who in symbols}
         self._question: Question | None = None  # the last one, until it is answered
         self._tools: tuple[int, dict[str, Tool]] = (-1, {})  # at a version
+        self._space: ConceptualSpace | None = None  # of all symbols then
 
     def tools(self) -> dict[str, Tool]:
         """Return the tools by their names, as the library is now."""
@@ -110,7 +113,7 @@ class SkillTools:
                 chosen = [symbol for symbol in chosen if symbol.id in self._offered]
             names = previews.identifiers([s.name for s in chosen], [s.id.removeprefix("sym-") for s in chosen])
             skills = {name: skill_of(self.library, s.name) for name, s in zip(names, chosen, strict=True)}
-            self._tools = (version, tools_of(skills, moving=self.execute is not None))
+            self._tools, self._space = (version, tools_of(skills, moving=self.execute is not None)), None
         return self._tools[1]
 
     def call(self, tool: str, arguments: dict[str, Any]) -> Answer | Question:
@@ -200,7 +203,9 @@ class SkillTools:
         if not at_length:
             return text, data
         others = sum(len(symbol) > 0 for symbol in self.library.symbols())
-        near: Sequence[Any] = self.library.nearest(skill.name) if 2 <= others <= _MOST_COMPARED else ()
+        if self._space is None and 2 <= others <= _MOST_COMPARED:
+            self._space = space_of(self.library.store)
+        near = () if self._space is None else self._space.nearest(skill.name, _NEAREST)
         ranges = previews.ranges_of(skill)
         lines = [text, *(f"{what}: {low:.6g} to {high:.6g} {unit}" for what, (low, high, unit) in ranges.items())]
         lines += [
