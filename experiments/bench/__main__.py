@@ -47,6 +47,7 @@ SUBJECTS = (
     "annotate",
     "motion_layer",
     "pieces",
+    "operators",
     "page",
     "migrating",
     "studio",

@@ -8,8 +8,8 @@ from typing import Any
 import click
 
 from kineme.cli.options import FILE, Finite, GroupedCommand, force_option, heading, json_option, library_option
-from kineme.cli.output import check_new, say, table
-from kineme.reporting.text import printable
+from kineme.cli.output import check_new, say
+from kineme.reporting.text import counted
 
 _FORMATS = {".pddl": "pddl", ".json": "json", ".xml": "behavior-tree"}
 
@@ -40,7 +40,7 @@ def operators(folder: Any, states: Path | None, output: Path | None, form: str |
     Example: kineme operators --library actions/ --states states.csv -o tea.pddl
     """
     from kineme.library.library import ActionLibrary
-    from kineme.planning.domain import domain_to_dict
+    from kineme.planning.domain import domain_to_dict, kinds_in_words
     from kineme.planning.operators import learn_operators
 
     form = form or (_FORMATS.get(output.suffix.lower()) if output is not None else None)
@@ -56,7 +56,7 @@ def operators(folder: Any, states: Path | None, output: Path | None, form: str |
         )
     written = [] if output is None else write_domain(domain, output, str(form))
     data = domain_to_dict(domain) | {"written": [str(path) for path in written]}
-    say(options["as_json"], data, lambda: _text(domain, data["written"]))
+    say(options["as_json"], data, lambda: _text(domain, data["written"], kinds_in_words))
 
 
 def write_domain(domain: Any, output: Path, form: str) -> list[Path]:
@@ -103,29 +103,21 @@ def opened_domain(path: Path) -> Any:
     return edited(read_domain(plain), edits_of(path))
 
 
-def _text(domain: Any, written: list[str]) -> str:
+def _text(domain: Any, written: list[str], kinds_in_words: Any) -> str:
+    lines = []
+    for operator in domain.operators:
+        parameters = ", ".join(f"{each.name} ({kinds_in_words(each)})" for each in operator.parameters)
+        lines.append(f"{operator.name}: {counted(len(operator.movements), 'movement')} of {parameters or 'nothing'}")
+        lines.append(f"  needs {' '.join(map(str, operator.preconditions)) or 'nothing'}")
+        effects = " ".join(map(str, operator.effects)) or "nothing"
+        lines.append(f"  does  {effects if operator.usable else 'cannot tell: a planner does not get it'}")
+        lines += [f"  note  {text}" for text in operator.cannot_tell]
     vocabulary = domain.vocabulary
-    rows = [
-        (
-            printable(operator.name),
-            str(len(operator.movements)),
-            " ".join(parameter.name for parameter in operator.parameters),
-            " ".join(map(str, operator.preconditions)),
-            " ".join(map(str, operator.effects)) if operator.usable else "cannot tell",
-        )
-        for operator in domain.operators
-    ]
-    lines = [table(("operator", "shown", "parameters", "preconditions", "effects"), rows)]
-    lines += [f"a place is within {vocabulary.radius:.3g} of its position"]
-    lines += [
-        f"{printable(operator.name)}: {printable(text)}"
-        for operator in domain.operators
-        for text in operator.cannot_tell
-    ]
-    lines += [f"column {printable(name)} is left out: {printable(why)}" for name, why in vocabulary.left_out.items()]
-    never = {row.predicate for operator in domain.operators for row in operator.evidence if not row.varied}
-    lines += (
-        [f"never varied, so nobody has seen that it counts: {printable(', '.join(sorted(never)))}"] if never else []
-    )
-    lines += [f"{len(domain.edits)} edits of a person kept"] if domain.edits else []
-    return "\n".join([*lines, *(f"wrote {printable(path)}" for path in written)])
+    lines.append(f"a place is what lies within {vocabulary.radius:.3g} of its position")
+    lines += [f"column {name} is left out: {why}" for name, why in vocabulary.left_out.items()]
+    never = sorted({row.predicate for operator in domain.operators for row in operator.evidence if not row.varied})
+    if never:
+        lines.append(f"never varied, so that nobody has seen whether it counts: {', '.join(never)}")
+    if domain.edits:
+        lines.append(f"kept {counted(len(domain.edits), 'edit')} of a person")
+    return "\n".join([*lines, *(f"wrote {path}" for path in written)])

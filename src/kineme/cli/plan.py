@@ -19,7 +19,7 @@ from kineme.cli.options import (
     plot_option,
 )
 from kineme.cli.output import check_new, say, table
-from kineme.reporting.text import printable
+from kineme.reporting.text import counted, printable
 
 
 @click.command(cls=GroupedCommand, short_help="Find the symbols that reach a goal.")
@@ -104,16 +104,15 @@ def _follow(folder: Any, steps: Any, plot: Path | None) -> list[int | None]:
 
 
 def _text(steps: Any, data: dict[str, Any]) -> str:
-    rows = []
-    for number, step in enumerate(steps.steps, 1):
-        follows = data["follows"][number - 1] if data["follows"] else None
-        goal = ", ".join(f"{value:.3g}" for value in step.goal)
-        rows.append((str(number), printable(step.operator), printable(" ".join(step.arguments.values())), goal,
-                     f"{step.duration:.2f}", "" if follows is None else str(follows)))  # fmt: skip
-    heads = ("step", "symbol", "arguments", "goal of the hand", "seconds", "follows movement")
-    shown = len(heads) if data["follows"] else -1
-    lines = [
-        table(heads[:shown] if shown > 0 else heads[:-1], [row[: len(heads) if shown > 0 else -1] for row in rows])
-    ]
-    lines.append(f"{len(steps)} steps, {steps.duration:.1f} s; planned by {printable(steps.planner)}")
+    heads = ["step", "symbol", "arguments", "goal of the hand", "seconds"]
+    rows = [
+        [str(number), printable(step.operator), printable(" ".join(step.arguments.values())),
+         ", ".join(f"{value:.3g}" for value in step.goal), f"{step.duration:.2f}"]
+        for number, step in enumerate(steps.steps, 1)
+    ]  # fmt: skip
+    if data["follows"]:
+        heads.append("as movement")
+        rows = [[*row, str(movement or "")] for row, movement in zip(rows, data["follows"], strict=True)]
+    lines = [table(tuple(heads), rows)] if rows else ["the goal holds already"]
+    lines.append(f"{counted(len(steps), 'step')}, {steps.duration:.1f} s; planned by {printable(steps.planner)}")
     return "\n".join([*lines, *(f"wrote {printable(path)}" for path in data["written"])])

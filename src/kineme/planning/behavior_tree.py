@@ -18,7 +18,8 @@ _ROOT = {"BTCPP_format": "4"}
 #: Nodes that a reader knows itself: a symbol of that name is called otherwise.
 _OWN = {
     "Sequence", "Fallback", "Selector", "Parallel", "Inverter", "SubTree", "Subtree", "BehaviorTree", "Include",
-    "Import", "Action", "Condition", "Control", "Decorator", "Repeat", "Retry", "Timeout", "Delay", "Script", "Switch", "Sleep",
+    "Import", "Action", "Condition", "Control", "Decorator", "Repeat", "Retry", "Timeout", "Delay", "Script",
+    "Switch", "Sleep",
     "ForceSuccess", "ForceFailure", "AlwaysSuccess", "AlwaysFailure", "IfThenElse", "WhileDoElse", "ReactiveSequence",
     "ReactiveFallback", "RetryUntilSuccessful", "KeepRunningUntilFailure", "RunOnce", "SetBlackboard", "TreeNodesModel",
 }  # fmt: skip

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kineme.errors import DataError, SpecificationError
-from kineme.planning.vocabulary import Variable, Vocabulary
+from kineme.planning.vocabulary import Variable, Vocabulary, kind_of
 from kineme.validation import Array
 
 FORMAT, VERSION = "kineme-domain", 1
@@ -133,11 +132,6 @@ class Domain:
                 return operator
         names = ", ".join(operator.name for operator in self.operators)
         raise SpecificationError(f"expected an operator of the domain ({names}), got {name!r}")
-
-
-def kind_of(name: str) -> str:
-    """Return the kind of an object: its name without the number at its end, so that block_1 and block_2 are blocks."""
-    return re.sub(r"[ _\-]*\d+$", "", name) or name
 
 
 def edited(domain: Domain, edits: Sequence[Edit]) -> Domain:

@@ -5,8 +5,16 @@ Approximately Complete Learning of Action Models", IJCAI 2017): a literal over t
 held before every movement of the symbol, and an effect if it changed in one and held after all. An operator is then
 never used where it was not seen to work, as far as the states say everything that counts.
 
-A sensor errs. With an error rate e, k exceptions among n movements are taken as errors where these are more likely than
-chance, ``e^k (1 - e)^(n - k) > 2^-n``; else the literal is not the same in all.
+A sensor errs, and then nothing holds before every movement. With the share e of facts that it gets wrong, a literal is
+
+- the same before all movements, and the same after all: a precondition and, if they differ, an effect;
+- true, or false, after all, whatever it was: an effect;
+- as it was, whatever it was: neither;
+- anything: what happens in four fifths of the movements is taken, and where nothing does, it cannot be told.
+
+The likeliest of these is taken, with ``log(n + 2) / 2`` off the log likelihood for each free share (G. Schwarz,
+"Estimating the Dimension of a Model", Annals of Statistics 6, 1978), and with odds of 5 to 1 for a precondition, since
+one too many is safe. An exception that is seen before and after counts twice.
 """
 
 from __future__ import annotations
@@ -18,15 +26,18 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.special import xlogy
 
 from kineme.library.library import ActionLibrary
-from kineme.planning.domain import CHANGED, Domain, Edit, Evidence, Literal, Operator, Parameter, edited, kind_of
+from kineme.planning.domain import CHANGED, Domain, Edit, Evidence, Literal, Operator, Parameter, edited
 from kineme.planning.states import States, states_of
 from kineme.planning.vocabulary import (
     Fact,
     Vocabulary,
     facts_of,
     hand_of,
+    kind_of,
     nearest_place,
     places_of,
     predicates_of,
@@ -37,6 +48,8 @@ from kineme.validation import Array, check_number
 
 _MOST_PLACES = 60  # places without an object that a domain names, the most visited ones
 _PLACES = ("from", "to", "at")  # roles of places
+_NEEDED = math.log(5.0)  # log odds that a literal is a precondition, before any movement is seen: too many are safe
+_MOSTLY = 0.8  # of the movements: an effect, or that a literal is kept, which has more exceptions cannot be told
 _FEW = 3  # movements of a symbol below which preconditions hold much by chance
 
 
@@ -103,12 +116,12 @@ def operators_of(
     check_number("error_rate", error_rate, least=0.0, most=0.25)
     vocabulary = vocabulary_of(states, radius)
     examples = [_example(vocabulary, states, row) for row in range(len(states))]
-    seen: dict[str, set[bool]] = {}
+    values_of: dict[str, set[bool]] = {}
     for example in examples:
         for facts in (example.before, example.after):
             for fact, value in facts.items():
-                seen.setdefault(fact[0], set()).add(value)
-    varied = {predicate for predicate, values in seen.items() if len(values) == 2}
+                values_of.setdefault(fact[0], set()).add(value)
+    varied = {predicate for predicate, values in values_of.items() if len(values) == 2}
     rules = _Rules(predicates_of(vocabulary), varied, error_rate)
     operators = []
     for name in dict.fromkeys(sorted(states.symbols)):
@@ -230,7 +243,7 @@ def _literals(
     pairs: Sequence[tuple[Example, Mapping[str, str]]], parameters: Sequence[Parameter], rules: _Rules
 ) -> _Literals:
     """Return what held before all movements, what changed, and the counts."""
-    literals, rate = _Literals([], [], [], [], []), rules.error_rate
+    literals = _Literals([], [], [], [], [])
     for predicate, arguments in _candidates(rules.predicates, parameters):
         facts = [(predicate, *(each[argument] for argument in arguments)) for _, each in pairs]
         known = [
@@ -243,21 +256,21 @@ def _literals(
             literals.cannot_tell.append(f"{text}: known in {len(known)} of {counted(len(pairs), 'movement')}")
         if not known:
             continue
-        before, after = (_consensus([bool(row[k]) for row in known], rate) for k in (1, 2))
-        changed = sum(row[1] != row[2] for row in known)
+        counts = np.zeros((2, 2), dtype=int)
+        np.add.at(counts, tuple(np.array([row[1:] for row in known], dtype=int).T), 1)
+        before, after, decided = _regularity(counts, rules.error_rate)
+        changed = int(counts[0, 1] + counts[1, 0])
         if before is not None and 2 * len(known) >= len(pairs):
             literals.preconditions.append(Literal(predicate, arguments, before))
         if after is not None and after != before and changed:
             literals.effects.append(Literal(predicate, arguments, after))
-        if after is None and not (before is None and _accepts(changed, len(known), 2 * rate)):
+        if not decided:
             literals.decided.append(False)
-            literals.cannot_tell.append(
-                f"{text}: {CHANGED} {changed} of {len(known)}, true after {sum(row[2] for row in known)}"
-            )
-        odd = {row[0] for row in known for k, value in ((1, before), (2, after)) if value not in (None, row[k])}
+            literals.cannot_tell.append(f"{text}: {CHANGED} {changed} of {len(known)}, true after {counts[:, 1].sum()}")
+        odd = {row[0] for row in known for k, value in ((1, before), (2, after)) if value is (not row[k])}
         literals.evidence.append(
-            Evidence(predicate, arguments, len(known), sum(row[1] for row in known), sum(row[2] for row in known),
-                     changed, tuple(sorted(odd)), predicate in rules.varied)
+            Evidence(predicate, arguments, len(known), int(counts[1].sum()), int(counts[:, 1].sum()), changed,
+                      tuple(sorted(odd)), predicate in rules.varied)
         )  # fmt: skip
     return literals
 
@@ -271,11 +284,35 @@ def _accepts(exceptions: int, n: int, error_rate: float) -> bool:
     return exceptions * math.log(error_rate) + (n - exceptions) * math.log1p(-error_rate) > -n * math.log(2.0)
 
 
-def _consensus(values: Sequence[bool], error_rate: float) -> bool | None:
-    """Return the value that all have, but for errors of a sensor; None where they differ."""
-    true = sum(values)
-    value = 2 * true >= len(values)
-    return value if _accepts(len(values) - true if value else true, len(values), error_rate) else None
+def _regularity(counts: NDArray[np.int_], error_rate: float) -> tuple[bool | None, bool | None, bool]:
+    """Return the value that a literal always has before, and after; None is any, and kept; and whether it is decided.
+
+    `counts` (2, 2): movements by the value that was seen before, and after.
+    """
+    n, share = int(counts.sum()), float(counts[1].sum() / counts.sum())
+    priors, free = np.array([1.0 - share, share]), float(xlogy(counts, counts / n).sum())
+    scores: dict[tuple[bool | None, bool | None], float] = {}
+    for rate in (0.0, 0.25 * error_rate, 0.5 * error_rate, error_rate):  # a sensor may be better than is said
+        reading = np.array([[1.0 - rate, rate], [rate, 1.0 - rate]])  # true value -> value of the sensor
+        laws: dict[tuple[bool | None, bool | None], Array] = {
+            (before, after): np.outer(reading[int(before)], reading[int(after)])
+            for before in (False, True) for after in (False, True)
+        }  # fmt: skip
+        laws |= {(None, after): np.outer(priors @ reading, reading[int(after)]) for after in (False, True)}
+        laws[None, None] = np.einsum("t,tb,ta->ba", priors, reading, reading)
+        for law, likelihoods in laws.items():
+            score = float(xlogy(counts, likelihoods).sum())
+            score -= 0.5 * math.log(n + 2) + _NEEDED if law[0] is None else 0.0
+            scores[law] = max(scores.get(law, -np.inf), score)
+    best = max(scores, key=lambda law: scores[law])
+    if scores[best] >= free - 1.5 * math.log(n + 2):
+        before, after = best
+        if before is None and after is not None and _accepts(int(counts[int(not after), int(after)]), n, error_rate):
+            before = after  # what changed may be errors alone: it is no effect, and needed
+        return before, after, True
+    kept = {None: counts.trace(), False: counts[:, 0].sum(), True: counts[:, 1].sum()}
+    mostly = max(kept, key=lambda value: kept[value])
+    return None, mostly, kept[mostly] >= _MOSTLY * n
 
 
 def _parameter(role: str, pairs: Sequence[tuple[Example, Mapping[str, str]]]) -> Parameter:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+import tempfile
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -229,16 +231,18 @@ def find_plan(problem: Problem, planner: str | None = None, timeout: float = 30.
         Name of an engine that is installed, as "aries" or "fast-downward"; by default one that takes the problem as it
         is, else one that takes it without costs and negative preconditions.
     timeout : float, default 30.0
-        [s].
+        [s], half of it with costs.
 
     Raises
     ------
     SpecificationError
         There is no plan, with the goals that no order of operators reaches; or a step depends on what is not known.
     DataError
-        The extra ``planner`` is not installed, or no engine.
+        The extra ``planner`` is not installed, no engine takes the problem, or none finds a plan in time.
     """
     check_number("timeout", timeout, least=0.1)
+    if all(problem.facts.get(goal.fact) is goal.value for goal in problem.goal):
+        return Plan(problem, (), "no planner")
     shown = shown_arguments(problem)
     if missing := unreachable(problem, shown):
         raise SpecificationError(f"expected a goal that operators reach within what was shown; {'; '.join(missing)}")
@@ -273,46 +277,62 @@ def step_of(operator: Operator, arguments: dict[str, str], places: Mapping[str, 
 def _solved(texts: tuple[str, str], planner: str | None, timeout: float) -> tuple[list[tuple[str, list[str]]], str]:
     """Return the actions of a plan and the name of the engine that found it."""
     with needs("unified-planning", "find plans", "planner"):
-        from unified_planning.engines import CompilationKind, PlanGenerationResultStatus
-        from unified_planning.exceptions import UPException
         from unified_planning.io import PDDLReader
-        from unified_planning.shortcuts import Compiler, OneshotPlanner, PlanValidator, get_environment
+        from unified_planning.shortcuts import get_environment
 
     get_environment().credits_stream = None
     problem = PDDLReader().parse_problem_string(*texts)
     simple = problem.clone()
     simple.clear_quality_metrics()
-    options = {} if planner is None else {"name": planner}
-    failures = []
+    failures: list[str] = []
     for candidate, compiles in ((problem, False), (simple, False), (simple, True)):
-        try:
-            task, back = candidate, None
-            if compiles:
-                kind = CompilationKind.NEGATIVE_CONDITIONS_REMOVING
-                with Compiler(problem_kind=candidate.kind, compilation_kind=kind) as compiler:
-                    compiled = compiler.compile(candidate, kind)
-                task, back = compiled.problem, compiled.map_back_action_instance
-            with OneshotPlanner(**(options or {"problem_kind": task.kind})) as engine:
-                if not engine.supports(task.kind):
-                    failures.append(f"{engine.name} does not take it")
-                    continue
-                result, name = engine.solve(task, timeout=timeout), str(engine.name)
-        except UPException as error:
-            failures.append(str(error).splitlines()[0])
+        # Engines warn of options that they do not know, and of processes that they leave to be collected.
+        with warnings.catch_warnings(), tempfile.TemporaryFile("w") as log:
+            warnings.simplefilter("ignore")
+            result = _tried(candidate, compiles, planner, 0.5 * timeout, log)
+        if isinstance(result, str):
+            failures.append(result)
             continue
-        if result.plan is None:
-            proven = result.status == PlanGenerationResultStatus.UNSOLVABLE_PROVEN
-            why = "there is none" if proven else f"{name} found none within {timeout:g} s"
-            raise SpecificationError(f"expected a plan, {why}; look at the preconditions of the operators")
-        plan = result.plan if back is None else result.plan.replace_action_instances(back)
-        with PlanValidator(name="sequential_plan_validator") as validator:
-            if not validator.validate(simple, plan):
-                raise DataError(f"expected a plan that is valid, {name} gave {plan}; choose another planner")
+        plan, name = result
         return [(each.action.name, [str(value) for value in each.actual_parameters]) for each in plan.actions], name
     raise DataError(
-        f"expected a planner of unified-planning that takes the problem, got none ({first_names(failures, 3)}); "
-        "install one, as up-aries"
+        f"expected a plan, got none ({first_names(failures, 3)}); look at the preconditions of the operators, give "
+        "more time, or install another planner of unified-planning, as up-aries"
     )
+
+
+def _tried(problem: Any, compiles: bool, planner: str | None, timeout: float, log: Any) -> tuple[Any, str] | str:
+    """Return the plan of an engine and its name, or why there is none; `compiles`: without negative preconditions."""
+    from unified_planning.engines import CompilationKind, PlanGenerationResultStatus
+    from unified_planning.exceptions import UPException
+    from unified_planning.plans import PlanKind
+    from unified_planning.shortcuts import Compiler, OneshotPlanner, PlanValidator
+
+    task, back = problem, None
+    try:
+        if compiles:
+            kind = CompilationKind.NEGATIVE_CONDITIONS_REMOVING
+            with Compiler(problem_kind=problem.kind, compilation_kind=kind) as compiler:
+                compiled = compiler.compile(problem, kind)
+            task, back = compiled.problem, compiled.map_back_action_instance
+        with OneshotPlanner(**({"problem_kind": task.kind} if planner is None else {"name": planner})) as engine:
+            name = str(engine.name)
+            if not engine.supports(task.kind):
+                return f"{name} does not take it"
+            result = engine.solve(task, timeout=timeout, output_stream=log)
+    except UPException as error:
+        return str(error).splitlines()[0]
+    if result.plan is None:
+        if result.status == PlanGenerationResultStatus.UNSOLVABLE_PROVEN:
+            raise SpecificationError("expected a plan, there is none; look at the preconditions of the operators")
+        return f"{name} found none within {timeout:g} s"
+    plan = result.plan if back is None else result.plan.replace_action_instances(back)
+    if plan.kind != PlanKind.SEQUENTIAL_PLAN:
+        plan = plan.convert_to(PlanKind.SEQUENTIAL_PLAN, problem)
+    with PlanValidator(name="sequential_plan_validator") as validator:
+        if not validator.validate(problem, plan):
+            return f"{name} gave a plan that is not valid"
+    return plan, name
 
 
 def facts_after(facts: Mapping[Fact, bool], operator: Operator, arguments: Mapping[str, str]) -> dict[Fact, bool]:

@@ -7,12 +7,14 @@ Facts are literals over names, as ``("in", "cup", "shelf")``:
 - ``holding i``: the gripper is closed around an item, ``hand-empty``: around none;
 - a flag or the word of a column, of an object (``full cup``) or of the world (``door-open``).
 
-A *fixture* is an object that never moved in a demonstration: it is a place, wherever it stands today. An *item* moved.
+A *fixture* is an object of which none of its kind ever moved in a demonstration: it is a place, wherever it stands
+today. *Items* are the others. The kind of an object is its name without the number at its end.
 Other places are positions, as those where a hand or an item came to rest.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -27,6 +29,8 @@ from kineme.validation import Array
 
 Fact = tuple[str, ...]  # a predicate and its arguments
 
+_OWN = ("hand-at", "in", "clear", "holding", "hand-empty")  # predicates that are always there
+_TELLING = ("flag", "word", "gripper")  # kinds of variables that predicates come from
 _GRIPPERS = ("gripper", "grasp", "finger", "grip")
 _TRUE = {"true", "yes", "on", "open", "full", "1"}
 _FALSE = {"false", "no", "off", "closed", "empty", "0"}
@@ -115,9 +119,10 @@ def vocabulary_of(states: States, radius: float | None = None) -> Vocabulary:
     near = _radius(ends, [np.vstack(list(where)) for where in objects.values()]) if radius is None else float(radius)
     variables: list[Variable] = []
     left_out: dict[str, str] = {}
+    ways = {name: np.linalg.norm(where[1] - where[0], axis=1) for name, where in objects.items()}
+    move = {kind_of(name) for name, way in ways.items() if np.nanmax(np.append(way, 0.0)) > near}
     for name, where in objects.items():
-        moved = np.linalg.norm(where[1] - where[0], axis=1)
-        kind = "item" if np.nanmax(np.append(moved, 0.0)) > near else "fixture"
+        kind = "item" if kind_of(name) in move else "fixture"
         stood = np.nanmedian(where.reshape(-1, len(states.axes)), axis=0)
         typical = tuple(stood.tolist()) if kind == "fixture" and np.isfinite(stood).all() else ()
         variables.append(Variable(name, kind, positions[name], typical=typical))
@@ -132,8 +137,14 @@ def vocabulary_of(states: States, radius: float | None = None) -> Vocabulary:
             left_out[column] = variable
         else:
             variables.append(variable)
+    variables = _told_apart(variables)
     vocabulary = Vocabulary(states.axes, tuple(variables), near, None, left_out)
     return Vocabulary(states.axes, tuple(variables), near, _closed_above(states, vocabulary), left_out)
+
+
+def kind_of(name: str) -> str:
+    """Return the kind of an object: its name without the number at its end, so that block_1 and block_2 are blocks."""
+    return re.sub(r"[ _\-]*\d+$", "", name) or name
 
 
 def _columns(states: States, moment: Array, names: Sequence[str]) -> Array:
@@ -167,20 +178,20 @@ def _said(column: str, values: Array, words: tuple[str, ...] | None, objects: Se
     """Return the variable that a column is, or why it is none."""
     owner = next((name for name in objects if column.startswith(f"{name}_")), "")
     name = column.removeprefix(f"{owner}_") if owner else column
-    seen = np.unique(values[np.isfinite(values)])
-    if not len(seen):
+    levels = np.unique(values[np.isfinite(values)])
+    if not len(levels):
         return "nothing is known of it"
     if words is not None:
         return _said_in_words(name, column, owner, words)
     kind = "gripper" if any(part in column.lower() for part in _GRIPPERS) else "flag"
-    low, high = float(seen[0]), float(seen[-1])
+    low, high = float(levels[0]), float(levels[-1])
     if low == high:
         if kind == "gripper" or low not in (0.0, 1.0):
             return f"it is always {low:g}"
         return Variable(name, kind, (column,), owner)
     middle = 0.5 * (low + high)
-    if np.minimum(seen - low, high - seen).max() > _SPREAD * (high - low):
-        return f"{len(seen)} different numbers are neither two levels nor a position with all of its axes"
+    if np.minimum(levels - low, high - levels).max() > _SPREAD * (high - low):
+        return f"{len(levels)} different numbers are neither two levels nor a position with all of its axes"
     return Variable(name, kind, (column,), owner, threshold=middle)
 
 
@@ -193,6 +204,25 @@ def _said_in_words(name: str, column: str, owner: str, words: tuple[str, ...]) -
         true = next((word for word in words if word.lower() in _TRUE), "")
         return Variable(name, "flag", (column,), owner, (false, true))
     return Variable(name, "word", (column,), owner, words)
+
+
+def _told_apart(variables: list[Variable]) -> list[Variable]:
+    """Return variables whose predicates are of one type each: "full" of items and of places become two."""
+    items = {variable.name for variable in variables if variable.kind == "item"}
+
+    def type_of(variable: Variable) -> str:
+        return "world" if not variable.owner else "item" if variable.owner in items else "place"
+
+    types: dict[str, set[str]] = {}
+    for variable in variables:
+        if variable.kind in _TELLING:
+            types.setdefault(variable.name, set()).add(type_of(variable))
+    return [
+        variable._replace(name=f"{variable.name}-{type_of(variable)}")
+        if variable.kind in _TELLING and (len(types[variable.name]) > 1 or variable.name in _OWN)
+        else variable
+        for variable in variables
+    ]
 
 
 def _closed_above(states: States, vocabulary: Vocabulary) -> bool | None:
@@ -250,8 +280,10 @@ def places_of(
             places[fixture.name] = known[0]
     for name, where in (named or {}).items():
         places.setdefault(name, where)
-    rests = [position_of(item.columns, state) for item in vocabulary.of_kind("item")
-             for state in several if not _is_held(vocabulary, item, state)]  # fmt: skip
+    rests = []
+    for state in several:
+        held = _held(vocabulary, state)
+        rests += [position_of(item.columns, state) for item in vocabulary.of_kind("item") if not held[item.name]]
     for where in [*rests, *(hand_of(vocabulary, state) for state in several)]:
         if np.isfinite(where).all() and nearest_place(vocabulary, places, where) is None:
             number = 1 + sum(name.startswith(f"{prefix}-") for name in places)
@@ -269,15 +301,19 @@ def _is_closed(vocabulary: Vocabulary, state: State) -> bool | None:
     return None if np.isnan(value) else (value > gripper.threshold) == vocabulary.closed_above
 
 
-def _is_held(vocabulary: Vocabulary, item: Variable, state: State) -> bool | None:
-    """Tell whether an item is held; None where the gripper or a position is not known."""
+def _held(vocabulary: Vocabulary, state: State) -> dict[str, bool | None]:
+    """Tell of each item whether it is held: the nearest one, by a closed gripper; None where that is not known."""
+    items = vocabulary.of_kind("item")
     if not vocabulary.tells_grasp:
-        return False
+        return {item.name: False for item in items}
     closed = _is_closed(vocabulary, state)
     if closed is not True:
-        return closed
-    distance = float(np.linalg.norm(position_of(item.columns, state) - hand_of(vocabulary, state)))
-    return None if np.isnan(distance) else distance <= vocabulary.radius
+        return {item.name: closed for item in items}
+    hand = hand_of(vocabulary, state)
+    away = {item.name: float(np.linalg.norm(position_of(item.columns, state) - hand)) for item in items}
+    near = {name: distance for name, distance in away.items() if distance <= vocabulary.radius}
+    nearest = min(near, key=lambda name: near[name], default=None)
+    return {name: None if np.isnan(distance) else name == nearest for name, distance in away.items()}
 
 
 def facts_of(vocabulary: Vocabulary, state: State, places: Mapping[str, Array]) -> dict[Fact, bool]:
@@ -289,7 +325,7 @@ def facts_of(vocabulary: Vocabulary, state: State, places: Mapping[str, Array]) 
         facts |= {("hand-at", place): place == at for place in places}
     facts |= _facts_of_items(vocabulary, state, places)
     owners: dict[str, set[str]] = {}
-    for variable in vocabulary.of_kind("flag", "word", "gripper"):
+    for variable in vocabulary.of_kind(*_TELLING):
         facts |= _flags(vocabulary, variable, state)
         for name in _predicates(variable):
             owners.setdefault(name, set()).add(variable.owner)
@@ -303,7 +339,7 @@ def facts_of(vocabulary: Vocabulary, state: State, places: Mapping[str, Array]) 
 def _facts_of_items(vocabulary: Vocabulary, state: State, places: Mapping[str, Array]) -> dict[Fact, bool]:
     """Return where items lie, what is held, and which places are clear."""
     facts: dict[Fact, bool] = {}
-    held = {item.name: _is_held(vocabulary, item, state) for item in vocabulary.of_kind("item")}
+    held = _held(vocabulary, state)
     where: dict[str, str | None] = {}
     for item in vocabulary.of_kind("item"):
         position = position_of(item.columns, state)
@@ -360,13 +396,9 @@ def predicates_of(vocabulary: Vocabulary) -> dict[str, tuple[str, ...]]:
         predicates |= {"in": ("item", "place"), "clear": ("place",)}
     if vocabulary.tells_grasp:
         predicates |= {"holding": ("item",), "hand-empty": ()}
-    for variable in vocabulary.of_kind("flag", "word", "gripper"):
+    for variable in vocabulary.of_kind(*_TELLING):
         if variable.kind == "gripper" and vocabulary.tells_grasp:
             continue
         arguments = () if not variable.owner else ("item",) if variable.owner in vocabulary.items else ("place",)
-        for name in _predicates(variable):
-            if predicates.setdefault(name, arguments) != arguments:
-                raise SpecificationError(
-                    f"expected {name!r} of items or of fixtures, got both; name one of the columns otherwise"
-                )
+        predicates |= dict.fromkeys(_predicates(variable), arguments)
     return predicates
