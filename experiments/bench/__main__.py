@@ -39,6 +39,7 @@ SUBJECTS = (
     "postgres",
     "million",
     "shards",
+    "skills",
     "lerobot",
     "bags",
     "binning",

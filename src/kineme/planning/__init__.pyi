@@ -35,3 +35,8 @@ from kineme.planning.plan import plan_from_dict as plan_from_dict
 from kineme.planning.behavior_tree import plan_to_behavior_tree as plan_to_behavior_tree
 from kineme.planning.behavior_tree import domain_to_behavior_tree as domain_to_behavior_tree
 from kineme.planning.figure import draw_plan as draw_plan
+
+# Skills for a language model
+from kineme.planning.preview import OutsideError as OutsideError
+from kineme.planning.skills import SkillTools as SkillTools
+from kineme.planning.skills import skills_server as skills_server
