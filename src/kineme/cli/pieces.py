@@ -99,8 +99,8 @@ def in_pieces(  # noqa: PLR0913 - what a command knows when it hands its work on
     if len(archives) == 1 and not is_remote(archives[0]):  # kineme gather finds it from everywhere
         archives = (str(path_at(archives[0]).absolute()),)
     options = {**options, "reading": reading}
-    asked = Asked(task, archives, options, how["piece_size"] * _MIB, bool(reading.get("follow_links")))
-    planned = plan(archives, asked.size, follow_links=asked.follow_links)
+    asked = Asked(task, archives, options, how["piece_size"] * _MIB)
+    planned = plan(archives, asked.size, **reading)
     if library is not None:  # it is created for an archive that is there
         options = options | _of_library(library, task, output, force)
         asked = Asked(**(vars(asked) | {"options": options}))

@@ -151,6 +151,18 @@ def local_copy(unit: Unit) -> Iterator[Path]:
 
 
 @contextmanager
+def opened(unit: Unit) -> Iterator[Any]:
+    """Context manager: the one file of a unit as pyarrow reads some of it, here or in a store."""
+    if is_remote(unit.archive):
+        system, base = _open(unit.archive)
+        with system.open_input_file(_path_of(base, unit.name, unit.archive)) as file:
+            yield file
+    else:
+        with local_copy(unit) as folder:
+            yield folder / unit.name
+
+
+@contextmanager
 def local_copies(units: Sequence[Unit]) -> Iterator[list[Path]]:
     """Context manager: `local_copy` of each of some units, all at once."""
     with ExitStack() as stack:

@@ -75,7 +75,7 @@ def map(  # noqa: A001, PLR0913 - as in the standard library, over movements
         import pyarrow  # noqa: F401 - before any piece is read
     archives = [str(each) for each in ([archive] if isinstance(archive, (str, Path)) else archive)]
     check_apart(output, archives)
-    planned = plan(archives, size, follow_links=bool(reading.get("follow_links")))
+    planned = plan(archives, size, **reading)
     return run(job_of_function(function, output, reading), planned.pieces, workers, client, progress)
 
 
