@@ -117,6 +117,11 @@ def test_a_poisoned_piece_ends_with_3_and_is_named(work, tmp_path):
     assert "damaged" in done.stdout
 
 
+def test_a_piece_that_takes_too_long_ends_with_3(work, tmp_path):
+    done = run("inspect", work / "archive", "-o", tmp_path / "out", "--workers", 1, "--time-limit", 1e-6)
+    assert (done.returncode, done.stdout.count("was not done within 1e-06 min")) == (3, 3)
+
+
 def test_a_folder_is_for_one_command(work, tmp_path):
     command = ("annotate", work / "archive", "-l", work / "actions", "-o", tmp_path / "out", "--shard", "1/9")
     run(*command)
@@ -135,6 +140,8 @@ def test_a_folder_is_for_one_command(work, tmp_path):
         (("--workers", 2, "-o", "labels.csv"), "expected --output FOLDER"),
         (("--workers", 2, "--scheduler", "tcp://127.0.0.1:9", "-o", "out"), "not both"),
         (("--shard", "4/3", "-o", "out"), "expected a shard as 3/64"),
+        (("--shard", "1/3", "-o", "out", "--time-limit", 9), "expected --workers with --time-limit"),
+        (("--workers", 2, "-o", "out", "--time-limit", 0), "0.0 is not in the range"),
         (("--workers", 2, "-o", "out", "--join-files"), "join them first"),
         (("--workers", 2, "-o", "out", "--csv"), "with kineme gather"),
         (("-", "--workers", 2, "-o", "out"), "got the standard input"),

@@ -7,23 +7,13 @@ import pyarrow as pa
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from piece_work import lengths
+from piece_work import lengths, write_rows
 from pyarrow import parquet
 
 import kineme
 from kineme.pieces import map as map_pieces
 from kineme.pieces import plan
 from lerobot_sets import change, shard_of, write_v2, write_v3
-
-
-def write_rows(path, counts, group=100, names=None, **more):
-    """Write movements of so many samples one after the other, in groups of so many rows."""
-    keys = range(len(counts)) if names is None else names
-    t = np.concatenate([np.arange(n) / 50 for n in counts])
-    rows = {"episode": np.repeat(np.array(keys), counts), "t": t, "x": np.sin(t), "y": np.arange(len(t)) % 7 * 0.1}
-    path.parent.mkdir(parents=True, exist_ok=True)
-    parquet.write_table(pa.table(rows | more), path, row_group_size=group)
-    return path
 
 
 def _movements(outcomes, output):

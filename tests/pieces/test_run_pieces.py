@@ -121,6 +121,26 @@ def test_a_process_that_is_ended_once_costs_nothing(archive, parts, tmp_path, mo
     assert parts_of(tmp_path / "out").keys() == parts.keys()
 
 
+@pytest.mark.skipif(os.name != "posix", reason="a library of C of POSIX")
+def test_a_process_that_hangs_is_ended_and_its_piece_fails(archive, tmp_path):
+    before = time.monotonic()
+    outcomes = map_pieces(piece_work.stuck, archive, output=tmp_path, size=SIZE, workers=2, time_limit=8.0)
+    assert time.monotonic() - before < 120
+    (bad,) = [outcome for outcome in outcomes if outcome.state == "failed"]
+    assert "not done within 0.133333 min" in bad.reason
+    assert any(unit.name.endswith("0005.csv") for unit in bad.piece.units)
+    assert [json.loads(path.read_text())["reason"] for path in tmp_path.glob("failed-*")] == [bad.reason]
+    assert len(outcomes) == len(plan(str(archive), SIZE).pieces)
+    again = map_pieces(piece_work.stuck, archive, output=tmp_path, size=SIZE, workers=1, time_limit=8.0)
+    assert [outcome.state for outcome in again].count("skipped") == len(outcomes) - 1
+
+
+@pytest.mark.parametrize("limit", [0.0, -1.0, float("nan")])
+def test_a_time_that_is_none_is_refused(archive, tmp_path, limit):
+    with pytest.raises(SpecificationError, match="a time above 0"):
+        map_pieces(lengths, archive, output=tmp_path, size=SIZE, workers=1, time_limit=limit)
+
+
 def test_a_file_that_changes_while_it_is_read_fails_its_piece(tmp_path, monkeypatch):
     archive = write_archive(tmp_path / "archive")
     monkeypatch.setenv("KINEME_TEST_MARK", str(archive))

@@ -17,7 +17,7 @@ from kineme.errors import DataError
 from kineme.io.reading.merge_files import Recordings
 from kineme.io.records import needs
 from kineme.pieces.archive import check_apart
-from kineme.pieces.executors import execute
+from kineme.pieces.executors import TIME_LIMIT, execute
 from kineme.pieces.planning import PIECE_BYTES, plan
 from kineme.pieces.run import Job, Outcome, Source, recordings_of, sweep
 
@@ -32,6 +32,7 @@ def map(  # noqa: A001, PLR0913 - as in the standard library, over movements
     output: str | Path,
     workers: int | None = None,
     size: int = PIECE_BYTES,
+    time_limit: float = TIME_LIMIT,
     progress: Callable[[Outcome], object] | None = None,
     **reading: Any,
 ) -> list[Outcome]:
@@ -56,6 +57,9 @@ def map(  # noqa: A001, PLR0913 - as in the standard library, over movements
         So many processes of this machine; by default the work is done in this process.
     size : int
         Of a piece [bytes], see `plan`.
+    time_limit : float
+        Of a piece [s], six hours by default: a process of `workers` that takes longer is ended, and its piece fails.
+        Work in this process cannot be ended.
     progress : callable, optional
         Called with the outcome of each piece.
     **reading
@@ -76,7 +80,7 @@ def map(  # noqa: A001, PLR0913 - as in the standard library, over movements
     archives = [str(each) for each in ([archive] if isinstance(archive, (str, Path)) else archive)]
     check_apart(output, archives)
     planned = plan(archives, size, **reading)
-    return run(job_of_function(function, output, reading), planned.pieces, workers, client, progress)
+    return run(job_of_function(function, output, reading), planned.pieces, workers, client, time_limit, progress)
 
 
 def job_of_function(function: Callable[[Recordings], Rows | None], output: Any, reading: Mapping[str, Any]) -> Job:
@@ -120,13 +124,16 @@ def run(
     pieces: Sequence[Any],
     workers: int | None = None,
     client: Any = None,
+    time_limit: float = TIME_LIMIT,
     progress: Callable[[Outcome], object] | None = None,
 ) -> list[Outcome]:
     """Do a job on pieces, and return their outcomes in the order of the pieces."""
     Path(job.output).mkdir(parents=True, exist_ok=True)
     sweep(Path(job.output), time.time() - _IDLE)
     outcomes = {}
-    with closing(execute(job, pieces, workers, client)) as done:  # what is under way ends with an error here, too
+    with closing(
+        execute(job, pieces, workers, client, time_limit)
+    ) as done:  # what is under way ends with an error here, too
         for outcome in done:
             outcomes[outcome.piece.key] = outcome
             if progress is not None:
