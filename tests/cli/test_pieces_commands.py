@@ -88,6 +88,27 @@ def test_inspect_summarizes_all_parts(work, tmp_path):
     assert there["labels"] == here["labels"]
 
 
+def test_files_of_other_columns_are_left_out_as_without_pieces(tmp_path):
+    """Each is named with its reason: other columns, dimensions, a sensor, units."""
+    heads = {f"{k}": "t,x,y" for k in range(5)} | {
+        "five": "t,p,q", "six": "t,x", "seven": "t,x,y,z", "eight": "t,x [mm],y [mm]", "left wrist": "t,x,y",
+    }  # fmt: skip
+    for k, (name, head) in enumerate(heads.items()):
+        path = tmp_path / "archive" / ("wave", "nod")[k % 2] / f"{name}.csv"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        rows = [[i / 50, *(10 * (i + j) ** 0.5 for j in range(head.count(",")))] for i in range(30)]
+        path.write_text("\n".join([head, *(",".join(map(str, row)) for row in rows)]) + "\n")
+    direct = answer("inspect", tmp_path / "archive")
+    _shards(tmp_path / "out", "inspect", tmp_path / "archive", "--piece-size", 1)
+    gathered = answer("gather", tmp_path / "out")
+    left_out = {problem["file"] for problem in direct["problems"]}
+    names = sorted(problem.partition(":")[0] for problem in gathered["problems"])
+    assert names == sorted({*left_out, "wave/eight.csv"})
+    assert gathered["columns"] == {"x, y": 10 - len(names)}
+    assert sum(label["movements"] for label in gathered["labels"]) == 10 - len(names)
+    assert len(left_out) >= 3
+
+
 def test_gather_says_what_is_missing_stale_failed_and_strange(work, tmp_path):
     shutil.copytree(work / "archive", tmp_path / "archive")
     command = ("inspect", tmp_path / "archive", "-o", tmp_path / "out")

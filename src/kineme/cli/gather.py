@@ -138,22 +138,19 @@ def _audited(asked: Any, tables: Callable[..., Iterable[Any]], files: Files, dat
 
 def _inspected(asked: Any, tables: Callable[..., Iterable[Any]], files: Files, data: dict[str, Any]) -> str:
     """Summarize movements by label."""
-    import pyarrow as pa
-
     if files.output is not None:
         raise click.UsageError("expected no --output, inspect shows a table; say --json for numbers")
 
     from kineme.io.inspection.inspect import labels_as_words, summaries, summary_as_data
+    from kineme.pieces.learned import inspected_alike
     from kineme.pieces.tasks import inspected
 
-    parts = [part.drop_columns(["path", "place"]) for part in tables()]
-    if not parts:
+    rows, columns = inspected_alike(tables, asked, data["problems"])
+    if rows is None:
         return "no movements"
-    rows = pa.concat_tables(parts, promote_options="permissive")
     labels = summaries(inspected(rows))
-    columns = Counter(rows.column("columns").to_pylist())
     data["labels"] = [summary_as_data(summary) for summary in labels]
-    data["columns"] = dict(columns.most_common())
+    data["columns"] = {columns: rows.num_rows}
     return labels_as_words(labels, f"{counted(rows.num_rows, 'movement')}")
 
 

@@ -52,7 +52,7 @@ def described(source: Source, options: Options) -> Iterator[Any]:
         label = options.get("label")
         labels = [None if options.get("no_labels") else own if label is None else label for own in recordings.labels]
         said = as_names(demos, "label", labels), as_names(demos, "group", people)
-        heads = _heads_of(recordings)
+        heads = heads_of(recordings)
         for rows in batches(demos.lengths):
             part = Demonstrations.of_movements(demos.movements.between(rows.start, rows.stop))
             origins = recordings.sources[rows]
@@ -134,7 +134,7 @@ def _set_of(entries: Sequence[Entry], how: HowToRead) -> Recordings | Problem:
         return Problem(name, None, str(error).removeprefix(f"{entries[0].path}: ").removeprefix(f"{name}: "))
 
 
-def _heads_of(recordings: Recordings) -> dict[str, str]:
+def heads_of(recordings: Recordings) -> dict[str, str]:
     """Return name of a file -> the columns that it is read in, as a text that is the same for files alike."""
     channels = recordings.demonstrations.channels
     columns = {

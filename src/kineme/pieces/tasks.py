@@ -21,11 +21,10 @@ from kineme.library.annotate import annotate_by
 from kineme.library.library import ActionLibrary
 from kineme.library.recognize import some_of_each_symbol
 from kineme.library.storage.source import known_sources
-from kineme.movements.channels.channel import recorded_names
 from kineme.movements.episodes import Episode
 from kineme.movements.tables.layout import Known
 from kineme.pieces.archive import local_copy
-from kineme.pieces.described import described
+from kineme.pieces.described import described, heads_of
 from kineme.pieces.run import Job, Source, recordings_of
 from kineme.pieces.shards import Reduction, read_reduction
 from kineme.recognition.answer import KnownClasses
@@ -151,11 +150,10 @@ def inspections(source: Source, options: Options) -> Iterator[Any]:
         measures = measures_of(recordings)._asdict()
         columns = {name: pa.array(values.tolist() if name == "labels" else values) for name, values in measures.items()}
         columns["labels"] = columns["labels"].cast(pa.string())
-        demos = recordings.demonstrations
-        heads = ", ".join(recorded_names(demos.channels or ())) or f"{demos.n_dims} columns"
+        heads, sources = heads_of(recordings), recordings.sources
         yield pa.table({
-            "path": [each.path for each in recordings.sources], "place": [each.place for each in recordings.sources],
-            **columns, "columns": pa.array([heads] * len(recordings)).dictionary_encode(),
+            "path": [each.path for each in sources], "place": [each.place for each in sources],
+            **columns, "heads": [heads[each.path] for each in sources],
         })  # fmt: skip
 
 
