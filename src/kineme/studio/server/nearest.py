@@ -10,6 +10,7 @@ import asyncio
 import os
 from collections.abc import Callable, Sequence
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -157,8 +158,14 @@ class SearchOptions(NamedTuple):
     processes: int | None = None
 
 
-def serve_search(options: SearchOptions, ready: Callable[[str, str, int], object]) -> None:
+def serve_search(
+    options: SearchOptions,
+    ready: Callable[[str, str, int], object],
+    progress: Callable[[int, int], object] | None = None,
+) -> None:
     """Serve the shards until interrupted; `ready` is called with the address, the token and the count.
+
+    Before, `progress` is called with the number of movements that are ready to be searched, and of all.
 
     Raises `SpecificationError`: an address of a network without a token in the environment, or shards of another
     library; `DataError`: shards that are damaged.
@@ -179,8 +186,10 @@ def serve_search(options: SearchOptions, ready: Callable[[str, str, int], object
                 f"expected shards that were made with the library in {options.library}, got those of another one in "
                 f"{options.shards}; name that library"
             )
+        if progress is not None:
+            progress(0, len(shards))
         hosts = () if is_loopback(options.host) else own_names(options.host)
-        with Processes(shards, options.processes) as processes:
+        with Processes(replace(shards, progress=progress), options.processes) as processes:
             app = create_search_app(shards, processes, library, token, hosts)
             address = f"http://{name_of(options.host)}:{listening.getsockname()[1]}/"
             run(app, listening, lambda: ready(address, token, len(shards)), lambda: None, processes.stop)
