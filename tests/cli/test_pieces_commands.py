@@ -186,6 +186,9 @@ def test_a_file_of_other_columns_is_a_problem_of_its_piece(work, tmp_path):
     assert said["problems"][0].startswith("none.csv: expected one column of times")
     run("gather", tmp_path / "out", "-o", tmp_path / "there.csv")
     assert (tmp_path / "there.csv").read_bytes() == (tmp_path / "here.csv").read_bytes()
+    run(*command, "-o", tmp_path / "here.json")
+    run("gather", tmp_path / "out", "-o", tmp_path / "there.json")
+    assert (tmp_path / "there.json").read_bytes() == (tmp_path / "here.json").read_bytes()
 
 
 @pytest.mark.parametrize("size", [16, 1])
