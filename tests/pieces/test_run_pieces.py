@@ -21,7 +21,7 @@ from kineme.pieces import map as map_pieces
 from kineme.pieces import plan, run
 from kineme.pieces.executors import execute
 from kineme.pieces.mapping import job_of_function
-from kineme.pieces.run import read_part, sweep
+from kineme.pieces.run import read_part
 
 SIZE = 6000
 
@@ -180,18 +180,6 @@ def test_a_full_disk_stops_the_run(archive, tmp_path, monkeypatch):
     monkeypatch.setattr(run, "_write", full)
     with pytest.raises(OSError, match="No space"):
         map_pieces(lengths, archive, output=tmp_path, size=SIZE)
-
-
-def test_half_written_files_are_swept_once_they_are_old(tmp_path):
-    left = tmp_path / ".part-0123456789abcdef.parquet.123.01234567"
-    other = tmp_path / ".hidden"
-    for path in (left, other):
-        path.write_text("half")
-    sweep(tmp_path, left.stat().st_mtime - 1)
-    assert left.exists()
-    sweep(tmp_path, time.time() + 1)
-    assert not left.exists()
-    assert other.exists()
 
 
 def test_two_ways_at_once_are_refused(archive, tmp_path):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import pickle
 import secrets
-import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing
 from functools import partial
@@ -19,7 +18,8 @@ from kineme.io.records import needs
 from kineme.pieces.archive import check_apart
 from kineme.pieces.executors import TIME_LIMIT, execute
 from kineme.pieces.planning import PIECE_BYTES, plan
-from kineme.pieces.run import Job, Outcome, Source, recordings_of, sweep
+from kineme.pieces.run import Job, Outcome, Source, recordings_of
+from kineme.reporting.atomic import remove_leftovers
 
 Rows = Mapping[str, Sequence[Any]]
 
@@ -129,7 +129,7 @@ def run(
 ) -> list[Outcome]:
     """Do a job on pieces, and return their outcomes in the order of the pieces."""
     Path(job.output).mkdir(parents=True, exist_ok=True)
-    sweep(Path(job.output), time.time() - _IDLE)
+    remove_leftovers(Path(job.output), r"(?:part|failed)-[0-9a-f]{16}\.\w+")
     outcomes = {}
     with closing(
         execute(job, pieces, workers, client, time_limit)
@@ -139,9 +139,6 @@ def run(
             if progress is not None:
                 progress(outcome)
     return [outcomes[piece.key] for piece in pieces]
-
-
-_IDLE = 3600.0  # seconds since the last write after which a half-written file is a leftover
 
 
 def _rows(function: Callable[[Recordings], Rows | None], reading: Mapping[str, Any], source: Source) -> Iterable[Any]:
