@@ -46,4 +46,4 @@ def serve(folder: Path, shards: Path, port: int, host: str, processes: int | Non
                 f"{count:,} movements of {printable(shards)} at {address}nearest\ntoken: {token}\nstop it with Ctrl-C"
             )
 
-        serve_search(SearchOptions(folder, shards, host, port, processes), ready, indexed)
+        serve_search(SearchOptions(folder, shards, host, port, processes, indexed), ready)

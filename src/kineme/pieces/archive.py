@@ -150,16 +150,12 @@ def local_copy(unit: Unit) -> Iterator[Path]:
         yield Path(folder)
 
 
-@contextmanager
-def opened(unit: Unit) -> Iterator[Any]:
-    """Context manager: the one file of a unit as pyarrow reads some of it, here or in a store."""
-    if is_remote(unit.archive):
-        system, base = _open(unit.archive)
-        with system.open_input_file(_path_of(base, unit.name, unit.archive)) as file:
-            yield file
-    else:
-        with local_copy(unit) as folder:
-            yield folder / unit.name
+def opened(unit: Unit) -> Any:
+    """Return what pyarrow reads some of: the path of the one file of a unit, or the file opened in its store."""
+    if not is_remote(unit.archive):
+        return path_at(unit.archive) / unit.name if path_at(unit.archive).is_dir() else path_at(unit.archive)
+    system, base = _open(unit.archive)
+    return system.open_input_file(_path_of(base, unit.name, unit.archive))
 
 
 @contextmanager

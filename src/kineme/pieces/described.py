@@ -147,10 +147,7 @@ def heads_of(recordings: Recordings) -> dict[str, str]:
 
 
 def _checksums(piece: Piece, folder: Path) -> str:
-    """Return name -> [SHA-256, bytes] of the files that begin in a piece, as JSON.
-
-    Names are those in a data set; the name of a file alone is ".".
-    """
+    """Return name -> [SHA-256, bytes] of the files that begin in a piece, as JSON; a file alone is named "."."""
     checksums, unit = {}, piece.units[0]
     for file in unit.files:
         if file.name != piece.begun:

@@ -25,7 +25,6 @@ Outcomes = Generator[Outcome, None, None]
 
 TIME_LIMIT = 6 * 3600.0  # s, of a piece: that of the usual size is some minutes of work, a bag alone may take hours
 
-_WAIT = 3600.0  # s that the system is asked to wait at once
 _SUBMITTED = 10_000  # pieces that a scheduler holds at once
 _RETRIES = 3
 _ENDED = "the process that worked on it was ended by the system, twice: it may need more memory than there is"
@@ -101,7 +100,7 @@ def _outcomes(
         if not busy:
             return
         latest = min(began for _, _, began in busy.values()) + time_limit
-        wait(busy, min(max(0.0, latest - monotonic()), _WAIT), return_when=FIRST_COMPLETED)
+        wait(busy, min(max(0.0, latest - monotonic()), 3600.0), return_when=FIRST_COMPLETED)
         for future, (piece, process, began) in list(busy.items()):
             if future.done():
                 has_ended = isinstance(future.exception(), BrokenProcessPool)

@@ -143,33 +143,33 @@ def _compared(
 
 
 def inspected_alike(tables: Tables, asked: Asked, problems: list[str]) -> tuple[Any, str]:
-    """Return the rows of an inspection of files in the columns of most, as one table, and these columns.
+    """Return the rows of an inspection of files in the columns of most, None without any, and these columns.
 
-    Other files are added to the problems, and so are those in other units: their rows are in their own. Without any
-    rows, there is no table.
+    Other files are added to the problems, and so are those in other units: their rows are in their own.
     """
     import pyarrow as pa
     from pyarrow import compute
 
     counts, paths = Counter[str](), Counter[str]()
-    parts = [part.drop_columns(["place"]) for part in tables()]
-    if not parts:
-        return None, ""
-    for part in parts:
+    for part in tables(["heads", "path"]):
         _count(part, counts, paths)
-    rows = pa.concat_tables(parts, promote_options="permissive")
+    if not counts:
+        return None, ""
     heads, most, reasons, _ = _compared(counts, paths, how_to_read(asked.options["reading"]).layout.by_number)
-    units = columns_recorded(most.channels or ()).units
+    units = sorted(map(str, columns_recorded(most.channels or ()).units))
     for text, each in heads.items():
-        own = columns_recorded(each.channels or ()).units
-        if reasons[text] is None and sorted(map(str, own)) != sorted(map(str, units)):
+        if reasons[text] is None and sorted(map(str, columns_recorded(each.channels or ()).units)) != units:
             reasons[text] = "other units than most files have; inspect it apart"
-    unlike = [text for text, reason in reasons.items() if reason is not None]
-    are_unlike = compute.is_in(rows.column("heads"), pa.array(unlike, pa.string()))
-    for row in rows.filter(are_unlike).group_by(["path", "heads"], use_threads=False).aggregate([]).to_pylist():
-        problems.append(f"{row['path']}: {reasons[row['heads']]}")
+    unlike = pa.array([text for text, reason in reasons.items() if reason is not None], pa.string())
+    parts, files = [], dict[str, str]()
+    for part in tables():
+        is_unlike = compute.is_in(part.column("heads"), unlike)
+        names = part.filter(is_unlike).select(["path", "heads"]).to_pydict()
+        files |= zip(names["path"], names["heads"], strict=True)
+        parts.append(part.filter(compute.invert(is_unlike)).drop_columns(["heads", "path", "place"]))
+    problems += [f"{path}: {reasons[text]}" for path, text in files.items()]
     columns = ", ".join(recorded_names(most.channels or ())) or f"{most.width} columns"
-    return rows.filter(compute.invert(are_unlike)), columns
+    return pa.concat_tables(parts, promote_options="permissive"), columns
 
 
 def _most(counts: list[tuple[Heads, int, int]]) -> tuple[Heads, tuple[str, ...]]:

@@ -131,9 +131,8 @@ def run(
     Path(job.output).mkdir(parents=True, exist_ok=True)
     remove_leftovers(Path(job.output), r"(?:part|failed)-[0-9a-f]{16}\.\w+")
     outcomes = {}
-    with closing(
-        execute(job, pieces, workers, client, time_limit)
-    ) as done:  # what is under way ends with an error here, too
+    # What is under way ends with an error here, too.
+    with closing(execute(job, pieces, workers, client, time_limit)) as done:
         for outcome in done:
             outcomes[outcome.piece.key] = outcome
             if progress is not None:

@@ -10,10 +10,11 @@ import hashlib
 import json
 import zlib
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
-from kineme.errors import DataError, KinemeError, SpecificationError
+from kineme.errors import DataError, SpecificationError
 from kineme.io.lerobot.info import MARKER, read_episodes, read_info, read_tasks
 from kineme.io.reading.recordings import how_to_read
 from kineme.io.records import Problem, needs
@@ -145,33 +146,24 @@ def _of_rows(unit: Unit, size: int, layout: Layout) -> list[Piece]:
     if unit.marker or unit.files[0].size <= _CUT * size or not unit.name.lower().endswith(".parquet"):
         return []
     with needs("pyarrow", "read Parquet", "parquet"):
-        from pyarrow import ArrowException, parquet
-
         from kineme.io.tables.parquet import row_groups
-    try:
-        with opened(unit) as source, parquet.ParquetFile(source) as file:
-            groups = row_groups(file, layout)
-    except (KinemeError, ArrowException, OSError, ValueError):  # who reads it says so
+    groups = None
+    with suppress(DataError, OSError):  # who reads it says so
+        groups = row_groups(opened(unit), layout)
+    if groups is None:
         return []
     firsts, n_bytes = [0], 0
-    for group, of_group in enumerate(() if groups is None else groups.sizes):
-        if groups is not None and n_bytes >= size and groups.begins(group):
+    for group, of_group in enumerate(groups.sizes):
+        if n_bytes >= size and groups.highs[group] > groups.highs[group - 1]:  # a movement begins in it
             firsts, n_bytes = [*firsts, group], 0
         n_bytes += of_group
-    if groups is None or len(firsts) == 1:
-        return []
-    lasts = [*(first - 1 for first in firsts[1:]), len(groups.sizes) - 1]
-    return [
-        Piece(unit.archive, first, last, (unit,), unit.files[0].name if first else "")
-        for first, last in zip(firsts, lasts, strict=True)
-    ]
+    parts = zip(firsts, [*firsts[1:], len(groups.sizes)], strict=True)
+    begun = unit.files[0].name
+    return [Piece(unit.archive, first, end - 1, (unit,), begun if first else "") for first, end in parts]
 
 
 def _of_episodes(unit: Unit, size: int, problems: list[Problem]) -> Iterator[Piece]:
-    """Yield pieces of consecutive episodes: whole files of frames, unless one is larger than two pieces.
-
-    What the meta folder does not say, or says of other files than there are, is added to the problems.
-    """
+    """Yield pieces of consecutive episodes: files of frames, unless one is large; problems of meta/ are added."""
     meta, frames = _apart(unit)
     with local_copy(unit._replace(files=tuple(meta))) as folder:
         info = read_info(folder / unit.name)
@@ -181,9 +173,8 @@ def _of_episodes(unit: Unit, size: int, problems: list[Problem]) -> Iterator[Pie
     for file in frames:
         name = file.name.removeprefix(prefix)
         files.setdefault(info.data_path if name.startswith(f"{info.data_path}/") else name, []).append(file)
-    undeclared = [
-        f"expected episodes in {name}, the meta folder names none" for name in files if name not in {*declared.shards}
-    ]
+    others = files.keys() - {*declared.shards}
+    undeclared = [f"expected episodes in {name}, the meta folder names none" for name in sorted(others)]
     problems += [Problem(unit.shown, None, reason) for reason in (*declared.problems, *unsaid, *undeclared)]
     sizes = {shard: sum(file.size for file in of_shard) for shard, of_shard in files.items()}
     n_frames: dict[str, int] = {}

@@ -100,13 +100,12 @@ class Shards:
     @cached_property
     def groups(self) -> tuple[tuple[int, Group], ...]:
         """The indexes, each with the number of its first shard; made, which takes a while, where there are none."""
-        groups, done = [], 0
+        groups = []
         for each in groups_of(self.shards, self.most):
             shards = self.shards[each.start : each.stop]
             groups.append((each.start, open_group(self.folder, *self.plan, self.reduction, shards)))
-            done += sum(map(len, shards))
             if self.progress is not None:
-                self.progress(done, len(self))
+                self.progress(sum(map(len, self.shards[: each.stop])), len(self))
         return tuple(groups)
 
     def prepare(self) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import lru_cache, partial
 from itertools import chain
 from pathlib import Path, PurePosixPath
@@ -226,10 +227,5 @@ def _work(task: str, options: Options, source: Source) -> Iterable[Any]:
 
 def plain(options: Options) -> dict[str, Any]:
     """Return options of reading as JSON holds them, without those that are not given."""
-    return {name: _plain(value) for name, value in sorted(options.items()) if value is not None}
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Sequence) and not isinstance(value, str):
-        return [_plain(each) for each in value]
-    return value
+    given = {name: value for name, value in sorted(options.items()) if value is not None}
+    return dict(json.loads(json.dumps(given)))

@@ -15,7 +15,7 @@ from pathlib import Path
 
 FULL = (errno.ENOSPC, errno.EDQUOT)  # the disk, or what a user may take of it
 _LONGEST_NAME = 228  # bytes: the hidden name beside it is longer, and file systems take 255
-_OF_SQLITE = ("-wal", "-shm", "-journal")  # ends of the names of files that it makes beside a database
+OF_SQLITE = ("-wal", "-shm", "-journal")  # ends of the names of files that it makes beside a database
 _IDLE, _DAY = 3600.0, 86400.0  # seconds since the last write, see `remove_leftovers`
 
 
@@ -107,7 +107,7 @@ def remove_leftovers(folder: Path, name: str, is_ours: Callable[[Path], bool] | 
     that number runs here, or where that cannot be found out. Where the pattern fits files of other programs, too,
     `is_ours` tells them apart, and SQLite's go with those that they are beside.
     """
-    pattern = re.compile(rf"(\.(?:{name})\.(\d+)(?:\.[0-9a-f]{{8}})?)({'|'.join(_OF_SQLITE)})?")
+    pattern = re.compile(rf"(\.(?:{name})\.(\d+)(?:\.[0-9a-f]{{8}})?)({'|'.join(OF_SQLITE)})?")
     with suppress(OSError):
         for entry in os.scandir(folder):
             if match := pattern.fullmatch(entry.name):
@@ -117,10 +117,8 @@ def remove_leftovers(folder: Path, name: str, is_ours: Callable[[Path], bool] | 
                     least = _DAY if _is_at_work(int(match[2])) else _IDLE
                     if not (own and stat.S_ISREG(status.st_mode) and time.time() - status.st_mtime > least):
                         continue
-                    if is_ours is None:
-                        os.unlink(entry.path)
-                    elif not match[3] and is_ours(Path(entry.path)):
-                        for end in ("", *_OF_SQLITE):
+                    if is_ours is None or (not match[3] and is_ours(Path(entry.path))):
+                        for end in ("", *OF_SQLITE):
                             Path(entry.path + end).unlink(missing_ok=True)
 
 

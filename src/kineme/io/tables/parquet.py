@@ -26,6 +26,7 @@ from kineme.validation import ROUNDED, Array, too_long_integer
 
 _SHOWN = 1000  # faults that are told apart; more rows than that are left to their missing numbers
 
+_DAMAGED = "expected a Parquet file, got something foreign, truncated or damaged"
 _ROWS = 2**18  # rows that are decompressed at a time
 _WIDEST = 1000  # numbers in a list; images have more
 _COMMANDS = frozenset({"action"})  # of LeRobot's episodes
@@ -45,31 +46,29 @@ class RowGroups(NamedTuple):
     highs: list[Any]  # the greatest value in each group and all before it
     sizes: list[int]  # bytes of each
 
-    def begins(self, group: int) -> bool:
-        """Tell whether a movement begins in a group, so that a part of the file may begin there."""
-        return group == 0 or self.highs[group] > self.highs[group - 1]
 
-
-def row_groups(file: Any, layout: Layout) -> RowGroups | None:
-    """Return the groups of rows of an open file between which it can be divided; None if it is one part.
+def row_groups(data: Any, layout: Layout) -> RowGroups | None:
+    """Return the groups of rows of a file between which it can be divided; None if it is one part.
 
     It is one part unless a column of whole numbers or texts tells movements apart, of which the metadata say that it
     has a value in each row and never decreases from a group to the next one.
     """
-    names, metadata = file.schema_arrow.names, file.metadata
-    _, _, owners, roles = _columns(file, layout)
-    if roles.movement == (roles.person,) or not metadata.num_row_groups:  # movements begin where the person changes
-        return None
-    groups = [metadata.row_group(g) for g in range(metadata.num_row_groups)]
-    for k in [owners[k] for k in roles.movement]:
-        at = {groups[0].column(i).path_in_schema: i for i in range(groups[0].num_columns)}.get(names[k])
-        bounds = [None if at is None else group.column(at).statistics for group in groups]
-        if any(each is None or not each.has_min_max or each.null_count != 0 for each in bounds):
-            continue
-        lows, highs = ([getattr(each, name) for each in bounds] for name in ("min", "max"))
-        if {*map(type, lows + highs)} in ({int}, {str}) and all(map(le, accumulate(highs, max), lows[1:])):
-            sizes = [sum(group.column(i).total_compressed_size for i in range(group.num_columns)) for group in groups]
-            return RowGroups(names[k], lows, list(accumulate(highs, max)), sizes)
+    with damaged_as(_DAMAGED, pa.ArrowException, OSError), _open(data) as file:
+        names = file.schema_arrow.names
+        _, _, owners, roles = _columns(file, layout)
+        groups = [file.metadata.row_group(g) for g in range(file.num_row_groups)]
+        if roles.movement == (roles.person,) or not groups:  # a movement begins where the person changes
+            return None
+        for k in [owners[k] for k in roles.movement]:
+            at = {groups[0].column(i).path_in_schema: i for i in range(groups[0].num_columns)}.get(names[k])
+            bounds = [None if at is None else group.column(at).statistics for group in groups]
+            if any(each is None or not each.has_min_max or each.null_count != 0 for each in bounds):
+                continue
+            lows, highs = ([getattr(each, name) for each in bounds] for name in ("min", "max"))
+            greatest = list(accumulate(highs, max))
+            if {*map(type, lows + highs)} in ({int}, {str}) and all(map(le, greatest, lows[1:])):
+                sizes = [sum(each.column(i).total_compressed_size for i in range(each.num_columns)) for each in groups]
+                return RowGroups(names[k], lows, greatest, sizes)
     return None
 
 
@@ -98,8 +97,8 @@ def _extent(file: Any, data: bytes | Path, groups: RowGroups | None, part: range
     return max(file.metadata.num_rows, 0), len(data)
 
 
-def _open(data: bytes | Path, **options: Any) -> Any:
-    return parquet.ParquetFile(data if isinstance(data, Path) else io.BytesIO(data), **options)
+def _open(data: Any, **options: Any) -> Any:
+    return parquet.ParquetFile(io.BytesIO(data) if isinstance(data, bytes) else data, **options)
 
 
 def _columns(file: Any, layout: Layout) -> tuple[tuple[str, ...], tuple[str, ...], list[int], Roles]:
@@ -117,13 +116,12 @@ def read_parquet_table(data: bytes | Path, layout: Layout, part: range | None = 
     columns are coordinates only where no plain ones are, and ``observation.state`` always is. Of a path, the movements
     that begin in some groups of rows can be read alone, see `RowGroups`.
     """
-    damaged = "expected a Parquet file, got something foreign, truncated or damaged"
-    with damaged_as(damaged, pa.ArrowException, OSError):
+    with damaged_as(_DAMAGED, pa.ArrowException, OSError):
         file = _open(data)
         names, types = tuple(file.schema_arrow.names), file.schema_arrow.types
         heads, kinds, owners, roles = _columns(file, layout)
         needed = sorted({owners[k] for k in range(len(heads)) if k not in roles.ignored})
-        groups = None if part is None else row_groups(file, layout)
+        groups = None if part is None else row_groups(data, layout)
         n_rows, size = _extent(file, data, groups, part)
         check_expanded(n_bytes := 8 * n_rows * (len(heads) - len(roles.ignored)))
         if n_bytes > _LARGE and n_bytes > _EXPANDED * size:

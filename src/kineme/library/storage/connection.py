@@ -16,7 +16,7 @@ from kineme.errors import DataError, KinemeError
 from kineme.library.storage.rows import Database, Row, damage, insert, select
 from kineme.library.storage.safety import Connection, defend, open_connection
 from kineme.library.storage.schema import APPLICATION_ID, CREATE, META, MIGRATIONS, PAGE_SIZE, SCHEMA_VERSION
-from kineme.reporting.atomic import remove_leftovers, whole_file
+from kineme.reporting.atomic import OF_SQLITE, remove_leftovers, whole_file
 
 _DAMAGED = (
     "expected {path} to be readable, got damaged bytes ({error}); take the file from a backup or an export: where the "
@@ -64,7 +64,6 @@ _WORDS[sqlite3.SQLITE_PERM] = _WORDS[sqlite3.SQLITE_READONLY]
 
 FILE = "library.sqlite"
 LOGS = ("-wal", "-journal")  # suffixes of the files beside a database from which SQLite may change it
-_COMPANIONS = (*LOGS, "-shm")
 
 _WRITER_CACHE_KIB = 65536
 _LOG_BYTES = 1 << 26  # size to which the write-ahead log is truncated
@@ -230,7 +229,7 @@ def new_database(path: Path) -> Iterator[Path]:
     """
     if not path.exists():
         remove_leftovers(path.parent, ".+", _is_library)  # of any name: that of an export is often never used again
-    with whole_file(path, replace=False, companions=_COMPANIONS) as beside:
+    with whole_file(path, replace=False, companions=OF_SQLITE) as beside:
         yield beside
 
 
