@@ -134,8 +134,8 @@ def plan(archive: str | Sequence[str], size: int = PIECE_BYTES, **reading: Any) 
 
 
 def _is_complete(bundle: Sequence[Unit], n_bytes: int, size: int) -> bool:
-    """Tell whether a bundle ends here: it is large, or large enough and its last name says so."""
-    if n_bytes >= 2 * size or len(bundle) >= _MOST_FILES:
+    """Tell whether a bundle ends here: it is large, or its last file is, or large enough and its last name says so."""
+    if n_bytes >= 2 * size or len(bundle) >= _MOST_FILES or 2 * bundle[-1].files[0].size >= size:
         return True
     ends = zlib.crc32(bundle[-1].shown.encode()) % _ENDS == 0
     return ends and (2 * n_bytes >= size or 2 * len(bundle) >= _MOST_FILES)
