@@ -13,7 +13,7 @@ from pyarrow import parquet
 import kineme
 from kineme.pieces import map as map_pieces
 from kineme.pieces import plan
-from lerobot_sets import change, shard_of, write_v2, write_v3
+from lerobot_sets import change, shard_of, write_lance, write_v2, write_v3
 
 
 def _movements(outcomes, output):
@@ -138,6 +138,15 @@ def test_episodes_that_the_meta_folder_does_not_declare_are_said_once(tmp_path, 
     assert len(movements) == 29
     if number != 3:  # which is there twice: direct reading takes neither
         assert [place for place, *_ in movements] == [source.place for source in direct.sources]
+
+
+def test_a_table_of_lance_says_them_too(tmp_path):
+    pytest.importorskip("lance")
+    folder = write_lance(tmp_path / "set", [40] * 12)
+    _without(folder, 7)
+    movements, problems = _by_pieces(folder, tmp_path / "out", 1)
+    assert len(movements) == 11
+    assert problems == ["set: episode 7: expected an episode that the meta folder declares"]
 
 
 def _without(folder, episode):
