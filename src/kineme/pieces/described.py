@@ -53,7 +53,7 @@ def described(source: Source, options: Options) -> Iterator[Any]:
         labels = [None if options.get("no_labels") else own if label is None else label for own in recordings.labels]
         said = as_names(demos, "label", labels), as_names(demos, "group", people)
         heads = heads_of(recordings)
-        for rows in batches(demos.lengths):
+        for rows in batches(demos.lengths * demos.n_dims):  # numbers, which memory holds
             part = Demonstrations.of_movements(demos.movements.between(rows.start, rows.stop))
             origins = recordings.sources[rows]
             even = evenly_sampled(part)
