@@ -26,7 +26,7 @@ DEV ?= .venv-dev
 # Tests start hundreds of commands: where Python writes no bytecode, each of them compiles the package again.
 export PYTHONDONTWRITEBYTECODE =
 
-.PHONY: demo check javascript test lint warm test-pythons test-lowest package ros2 always soak fuzz bench evaluate docs check-docs figures reference tables scene lock clean
+.PHONY: demo check javascript test lint warm collect test-pythons test-lowest package ros2 always soak fuzz bench evaluate docs check-docs figures reference tables scene lock clean
 
 demo: .venv/ready
 	.venv/bin/kineme reproduce --out out/
@@ -38,14 +38,15 @@ CHECKED = $(FIRST:%=tests/test_%.py) tests/properties tests/dmp/discrete tests/d
   $(patsubst %,tests/library/test_library_%.py,learning recognition changes exchange) \
   tests/io/test_read_recordings.py tests/cli/test_learn.py tests/cli/test_recognize_command.py tests/kernels/test_gram_formulas.py
 
-# In the order of the folders: the modules that come last are short, and leave no worker idle.
-PYTEST = $(DEV)/bin/pytest -n 2 --dist loadscope --no-loadscope-reorder
+# In the order of the folders: the modules that come last are short, and leave no worker idle. Threads of BLAS would wait
+# actively for a core that the other worker has.
+PYTEST = OPENBLAS_NUM_THREADS=1 $(DEV)/bin/pytest -n 2 --dist loadscope --no-loadscope-reorder
 
 check: lint
 	$(PYTEST) $(CHECKED)
 
 test: $(DEV)/ready
-	$(MAKE) --no-print-directory -j 2 lint warm
+	$(MAKE) --no-print-directory -j 2 warm lint collect
 	$(PYTEST) -rs
 
 lint: $(DEV)/ready
@@ -53,9 +54,11 @@ lint: $(DEV)/ready
 	$(DEV)/bin/ruff check .
 	$(DEV)/bin/mypy --cache-dir $(DEV)/mypy
 
-# In a new checkout two workers would each compile all of it, to bytecode and to machine code.
+# In a new checkout two workers would each compile all of it, to machine code and to bytecode.
 warm: $(DEV)/ready
 	$(DEV)/bin/python -c "import kineme; kineme.warm_up((1, 2, 3))"
+
+collect: $(DEV)/ready
 	-$(DEV)/bin/pytest --collect-only -q -q -p no:cacheprovider >/dev/null
 
 # Each Python with an environment of its own; all are tried, though one fails.
@@ -70,7 +73,7 @@ test-pythons:
 	test -n "$$found" && test -z "$$failed"
 
 test-lowest: .venv-lowest/ready
-	.venv-lowest/bin/pytest -n 2 --dist loadscope -p no:cacheprovider
+	OPENBLAS_NUM_THREADS=1 .venv-lowest/bin/pytest -n 2 --dist loadscope -p no:cacheprovider
 
 package: .venv-package/ready
 	.venv-package/bin/python -m release $(PYTHONS)
@@ -112,7 +115,7 @@ $(DEV)/ready: requirements/dev.txt pyproject.toml $(DEV)/python
 	test "$$now" = "$$(cat $@ 2>/dev/null)" || echo "$$now" > $@
 
 # The packages of a lock file, each checked against its hash, then this project on top. Two processes compile what pip would
-# compile in one, without the tests of the packages.
+# compile in one, without the tests of the packages and the largest of which the tests load little.
 define environment
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "kineme needs Python 3.11 or later, found " + sys.version.split()[0] + "; choose one with: make PYTHON=python3.12")'
 	@$(PYTHON) -c 'import ensurepip' || { echo "This Python cannot create environments; on Debian: apt-get install python3-venv"; exit 1; }
@@ -120,7 +123,7 @@ define environment
 	$(PYTHON) -m venv --clear $(1)
 	@mv $(1).python $(1)/python
 	$(1)/bin/pip install --quiet --no-compile --require-hashes -r $(2)
-	$(1)/bin/python -m compileall -q -q -j 2 -x 'site-packages/.*/tests?/' $(1)/lib || true
+	$(1)/bin/python -m compileall -q -q -j 2 -x 'site-packages/((sympy|moto|OpenGL|Cython|networkx|pip)/|.*/tests?/)' $(1)/lib || true
 	$(1)/bin/pip install --quiet --no-deps --no-build-isolation --editable .
 	touch $@
 endef

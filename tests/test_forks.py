@@ -10,6 +10,7 @@ import warnings
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_limits
 
 from kineme import DMP, ActionLibrary, Trajectory
 from kineme.errors import DataError
@@ -46,6 +47,13 @@ def fork_by_multiprocessing(work):
     if process.exitcode is None:
         process.kill()
     return process.exitcode == 0
+
+
+@pytest.fixture(autouse=True)
+def two_blas_threads():
+    """As where nothing limits them: with one, OpenBLAS takes no locks that a child could inherit."""
+    with threadpool_limits(limits=2, user_api="blas"):
+        yield
 
 
 @pytest.fixture

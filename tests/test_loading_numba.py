@@ -64,7 +64,9 @@ assert numba.core and recognizer.stream()
 def run(code, **environment):
     done = subprocess.run(
         [sys.executable, "-W", "error", "-c", code],
-        env=os.environ | {"KINEME_COMPILED": "auto", "KINEME_NUM_THREADS": "2"} | environment,
+        env=os.environ
+        | {"KINEME_COMPILED": "auto", "KINEME_NUM_THREADS": "2", "OPENBLAS_NUM_THREADS": "2"}
+        | environment,
         capture_output=True,
         text=True,
         timeout=120,

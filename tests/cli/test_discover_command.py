@@ -23,6 +23,19 @@ def dataset(tmp_path_factory):
     return write_set(tmp_path_factory.mktemp("sets") / "worked", work_episodes(12)[0])
 
 
+@pytest.fixture
+def without_pictures(monkeypatch):
+    """To draw the proposals takes longer than all else; `test_anchor` looks at pictures."""
+    monkeypatch.setattr("kineme.cli.anchor._draw", lambda *_: [])
+
+
+def discovered(dataset, folder, *options):
+    """A library of the kinds that were discovered, all of them accepted."""
+    told = answer("discover", dataset, *options, "--library", folder)
+    answer("anchor", "--library", folder, "--accept", "all")
+    return told
+
+
 def test_it_shows_kinds_and_what_they_follow(dataset):
     shown = start("discover", dataset)
     assert shown.returncode == 0, shown.stderr
@@ -49,10 +62,10 @@ def test_it_stores_proposals_which_anchor_accepts_by_their_names(dataset, tmp_pa
     assert "discover" in run("library", "history", "--library", tmp_path / "actions").stdout
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_movements_are_compared_where_they_are(dataset, tmp_path):
-    """A way there is no way back: what was accepted is recognized, and nothing else."""
-    answer("discover", dataset, "--library", tmp_path / "actions")
-    answer("anchor", "--library", tmp_path / "actions", "--accept", "all", cwd=tmp_path)
+    """A way there is no way back: what was accepted is recognized, and it annotates the data set."""
+    discovered(dataset, tmp_path / "actions")
     symbols = answer("library", "list", "--library", tmp_path / "actions")["symbols"]
     assert sorted(symbol["movements"] for symbol in symbols) == [6] * N_KINDS
     from kineme.library.library import ActionLibrary
@@ -60,22 +73,20 @@ def test_movements_are_compared_where_they_are(dataset, tmp_path):
     with ActionLibrary(tmp_path / "actions", read_only=True) as library:
         normalization = library.specification.comparison.normalization
     assert (normalization.translation, normalization.scale) == (False, "none")
-
-
-def test_what_was_named_annotates_the_data_set_and_joins_a_library_that_learned_from_it(dataset, tmp_path):
-    answer("discover", dataset, "--library", tmp_path / "actions")
-    answer("anchor", "--library", tmp_path / "actions", "--accept", "all", cwd=tmp_path)
     named = answer("annotate", dataset, "--library", tmp_path / "actions", "-o", tmp_path / "named")
     assert {row["symbol"] for row in named["annotations"]} > {"pick the cube 1"}
+
+
+def test_proposals_join_a_library_that_learned_from_the_data_set(dataset, tmp_path):
     answer("learn", dataset, "--library", tmp_path / "whole")
     assert answer("discover", dataset, "--library", tmp_path / "whole")["version"] > 1
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_a_library_of_another_feature_annotates_the_set_and_says_what_is_missing_in_others(dataset, tmp_path):
     """Its columns are called by their feature; the set has them although the one read by default is another."""
     library = tmp_path / "actions"
-    answer("discover", dataset, "--feature", "action", "--library", library)
-    answer("anchor", "--library", library, "--accept", "all", cwd=tmp_path)
+    discovered(dataset, library, "--feature", "action")
     by_default = answer("annotate", dataset, "--library", library)
     assert sum(row["symbol"] is not None for row in by_default["annotations"]) > 30
     assert any("without observation.state" in note for note in by_default["notes"])
@@ -164,11 +175,11 @@ def _lerobot(path, states):
 
 
 @pytest.mark.parametrize("write", [_robomimic, _aloha, _umi, _buffer, _lerobot])
+@pytest.mark.usefixtures("without_pictures")
 def test_what_was_discovered_in_any_layout_annotates_it_without_options(write, tmp_path):
     states = [episode.signals["observation.state"] for episode in work_episodes(8)[0]]
     path = write(tmp_path / "work", states)
-    discovered = answer("discover", path, "--library", tmp_path / "actions")
-    answer("anchor", "--library", tmp_path / "actions", "--accept", "all", cwd=tmp_path)
+    told = discovered(path, tmp_path / "actions")
     named = answer("annotate", path, "--library", tmp_path / "actions", "-o", tmp_path / "labels.csv")
-    assert {row["symbol"] for row in named["annotations"]} & {kind["name"] for kind in discovered["kinds"]}
+    assert {row["symbol"] for row in named["annotations"]} & {kind["name"] for kind in told["kinds"]}
     assert not any("compared in their order" in note for note in named["notes"])

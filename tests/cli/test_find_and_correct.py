@@ -126,7 +126,7 @@ def test_the_command_names_near_symbols_and_shows_a_table(work):
     assert "there are stir" in refused.stderr
     (folder / "alone").mkdir()
     (folder / "alone" / "junk.csv").write_text("a,b\nthis is,no recording\n")
-    nothing = start("find", "tap", folder / "alone", "-l", folder / "actions")
+    nothing = run("find", "tap", folder / "alone", "-l", folder / "actions")
     assert nothing.returncode == 1
     assert "junk.csv" in nothing.stdout + nothing.stderr
     shown = start("find", "tap", folder / "set", "-l", folder / "actions")

@@ -232,7 +232,7 @@ def test_damaged_proposals_are_problems(wrong):
 
 def test_linear_algebra_of_few_numbers_runs_in_one_thread(worked):
     """A second thread waits actively: discovering an hour took nine times as many core-seconds with two."""
-    from threadpoolctl import threadpool_info
+    from threadpoolctl import threadpool_info, threadpool_limits
 
     threads = []
 
@@ -241,5 +241,6 @@ def test_linear_algebra_of_few_numbers_runs_in_one_thread(worked):
             threads.extend(pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas")
             yield episode
 
-    discover(watched())
+    with threadpool_limits(limits=2, user_api="blas"):
+        discover(watched())
     assert set(threads) == {1}

@@ -53,7 +53,9 @@ def turned(demos, n_points, n_dims, seed, axis=None):
 
 
 @pytest.mark.parametrize(("n_points", "n_dims"), [(2, 2), (2, 3), (5, 3), (21, 3)])
-def test_points_that_turn_together_are_the_same_movement(n_points, n_dims):
+def test_points_that_turn_together_are_the_same_movement(n_points, n_dims, monkeypatch):
+    if n_points > 2:  # to compile for these alone would take longer than all else
+        monkeypatch.setenv("KINEME_COMPILED", "never")
     demos = draw_points(n_points, n_dims, seed=n_points)
     like = ComparisonSpecification(max_angle=np.pi, points=n_points)
     squares = squared_distances(describe(demos, like), describe(demos, like))
@@ -106,12 +108,12 @@ def test_pairs_turned_by_the_rotation_of_one_point_are_those_turned_by_all(n_poi
 
 
 def test_bounds_of_points_hold():
-    demos = draw_points(3, 3, seed=5)
-    like = ComparisonSpecification(points=3)
+    demos = draw_points(2, 3, seed=5)
+    like = ComparisonSpecification(points=2)
     comparison, references = fit_comparison(like, demos, np.asarray(demos.labels))
     how = comparison.specification
     rows = feature_rows(demos, how)[: len(how.by_rows)]
-    reduced = reduce_features(fit_bases(rows, 9, 4), rows, 9)
+    reduced = reduce_features(fit_bases(rows, 6, 4), rows, 6)
     similarity = comparison.similarity
     bounds = log_bounds(similarity, reduced, reduced)
     by_rows = similarity.by_rows(len(rows))
@@ -181,7 +183,8 @@ def test_the_angle_of_points_is_that_of_their_common_rotation(n_dims):
     np.testing.assert_allclose(transform.rotation, np.kron(np.eye(2), R), atol=1e-3)
 
 
-def test_many_points_are_compared_by_four():
+def test_many_points_are_compared_by_four(monkeypatch):
+    monkeypatch.setenv("KINEME_COMPILED", "never")
     demos = draw_points(21, 3, seed=10)
     recognizer = kineme.Recognizer(points=21).fit(demos)
     described = recognizer.references_.described
@@ -195,7 +198,8 @@ def test_many_points_are_compared_by_four():
     assert list(symbols) == list(demos.labels[:3])
 
 
-def test_many_columns_that_are_no_points_are_compared_by_twelve():
+def test_many_columns_that_are_no_points_are_compared_by_twelve(monkeypatch):
+    monkeypatch.setenv("KINEME_COMPILED", "never")
     demos = draw_points(21, 3, seed=12)
     recognizer = kineme.Recognizer(points=1).fit(demos)
     assert recognizer.references_.described.pairs.shapes.n_dims == 12

@@ -24,10 +24,13 @@ from kineme.cli.inspect import inspect
 from kineme.cli.learn import learn
 from kineme.cli.library import library
 from kineme.cli.move import move
+from kineme.cli.operators import operators
 from kineme.cli.output import write
+from kineme.cli.plan import plan
 from kineme.cli.recognize import recognize, why
 from kineme.cli.segment import segment
 from kineme.cli.serve import serve
+from kineme.cli.skills import skills
 from kineme.cli.studio import page, studio
 from kineme.errors import KinemeError
 from kineme.reporting.text import printable, printable_lines
@@ -91,6 +94,6 @@ def main() -> None:
 
 for command in (
     anchor, annotate, audit, correct, discover, evaluate, features, find, gather, generate, move, inspect, learn,
-    library, page, recognize, reproduce, segment, serve, studio, why,
+    library, operators, page, plan, recognize, reproduce, segment, serve, skills, studio, why,
 ):  # fmt: skip
     main.add_command(command)

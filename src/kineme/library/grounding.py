@@ -40,8 +40,13 @@ def primitive_of(store: Store, who: str) -> Primitives:
 
 
 def learned_of(store: Store, who: str) -> Learned:
-    """Return the primitive of a symbol's prototype with its recording; one with an orientation is learned anew."""
-    ids = np.array([prototype_of(store, symbol(store, who))])
+    """Return the primitive of a symbol's prototype with its recording; see `learned_movement`."""
+    return learned_movement(store, prototype_of(store, symbol(store, who)))
+
+
+def learned_movement(store: Store, movement: int) -> Learned:
+    """Return the primitive of a movement with its recording; one with an orientation is learned anew."""
+    ids = np.array([movement])
     recording = read.movements(store, ids)[0]
     if has_orientation(recording):
         return learn_one(recording, store.specification.dmp)

@@ -9,10 +9,11 @@ path, which tells a push that the position alone hides where demonstrations diff
 at the phase that an open-end alignment by dynamic programming finds (P. Tormene et al., "Matching incomplete time
 series with dynamic time warping", Artificial Intelligence in Medicine 45, 2009): from one step of the path to the next
 the phase stays, or goes on by up to three steps, and what is long past is forgotten. Time does not count, so a movement
-may wait, or be slow. Measured against alternatives (``python -m bench --only monitor`` measures what remains): the
-displacement doubled the pushes that are noticed, while size and orientation fitted to the beginning, or all that was
-executed as a condition of what comes, noticed fewer. The largest distance of an execution is compared with that of demonstrations that were left out
-(V. Vovk, A. Gammerman, G. Shafer, "Algorithmic Learning in a Random World", Springer 2005, chapter 4).
+may wait, or be slow. In trials on strokes and gestures by other people the displacement doubled the pushes that are
+noticed; size and orientation fitted to the beginning, or the rest conditioned on what was executed, noticed fewer.
+
+The largest distance of an execution is compared with that of demonstrations that were left out (V. Vovk, A. Gammerman,
+G. Shafer, "Algorithmic Learning in a Random World", Springer 2005, chapter 4).
 """
 
 from __future__ import annotations

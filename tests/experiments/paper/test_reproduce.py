@@ -8,6 +8,7 @@ what is stored there; `make soak` runs all draws.
 import copy
 import importlib.util
 import json
+import os
 import re
 import subprocess
 import sys
@@ -39,7 +40,9 @@ def run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("run") / "new" / "out"
     command = [sys.executable, "-W", "error", "-m", "kineme", "reproduce", "--quick"]
     command += ["--draws", str(RUN), "--out", str(folder)]
-    return subprocess.run(command, capture_output=True, text=True, check=False), folder
+    # Of one draw, to load what it needs takes each process about as long as half of the work.
+    environment = os.environ if SOAK else os.environ | {"KINEME_NUM_THREADS": "1"}
+    return subprocess.run(command, capture_output=True, text=True, check=False, env=environment), folder
 
 
 @pytest.fixture(scope="module")

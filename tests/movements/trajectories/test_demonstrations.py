@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -81,6 +82,13 @@ def test_blocks_cannot_be_written(demos):
     ):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = array[-1]
+
+
+def test_positions_are_in_one_order_in_memory(demos):
+    """Whatever is computed from them: compiled loops would be compiled once more for another order."""
+    movements = replace(demos.movements, positions=np.asfortranarray(demos.positions))
+    assert movements.positions.flags.c_contiguous
+    np.testing.assert_array_equal(movements.positions, demos.positions)
 
 
 def test_fields_cannot_be_set(demos):

@@ -58,7 +58,8 @@ class Movements:
     def __post_init__(self) -> None:
         for field in ("positions", "offsets", "durations", "times", "labels", "recorded"):
             if (value := getattr(self, field)) is not None:
-                view = value.view()
+                # Compiled loops are compiled apart for arrays in another order, and for those that can be written to.
+                view = np.ascontiguousarray(value).view()
                 view.setflags(write=False)
                 object.__setattr__(self, field, view)
 
@@ -208,6 +209,7 @@ def spread_close(times: Array, offsets: NDArray[np.intp]) -> Array:
         own = slice(offsets[i], offsets[i + 1])
         missing = least[i] - np.diff(times[own])
         spread[own][1:] += np.cumsum(np.maximum(missing, 0.0))
+    spread.setflags(write=False)
     return spread
 
 

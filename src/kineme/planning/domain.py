@@ -1,0 +1,305 @@
+"""A domain: operators with what was shown of them, places, a person's edits; and its form in JSON."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from kineme.errors import DataError, SpecificationError
+from kineme.planning.vocabulary import Variable, Vocabulary, kind_of
+from kineme.validation import Array
+
+FORMAT, VERSION = "kineme-domain", 1
+#: What says of an effect that it came after some movements and not after others.
+CHANGED = "changed by"
+
+
+class Parameter(NamedTuple):
+    """A parameter of an operator, and what was shown of it."""
+
+    name: str
+    type: str  # "place" or "item"
+    kinds: tuple[str, ...]  # names of objects without their numbers; "" is a place without a fixture
+    low: tuple[float, ...] = ()  # of a place, the box of the positions that were shown
+    high: tuple[float, ...] = ()
+
+
+class Literal(NamedTuple):
+    """A predicate of parameters, true or false."""
+
+    predicate: str
+    arguments: tuple[str, ...]
+    value: bool = True
+
+    def __str__(self) -> str:
+        text = f"({' '.join((self.predicate, *(f'?{argument}' for argument in self.arguments)))})"
+        return text if self.value else f"(not {text})"
+
+
+class Evidence(NamedTuple):
+    """Counts over the movements of a symbol in which a literal was known before and after."""
+
+    predicate: str
+    arguments: tuple[str, ...]
+    n: int
+    true_before: int
+    true_after: int
+    changed: int
+    exceptions: tuple[int, ...]  # ids of movements that were taken as errors of a sensor
+    varied: bool  # whether the predicate was both true and false in the states of any symbol
+
+
+@dataclass(frozen=True)
+class Operator:
+    """One symbol as an action of a planner.
+
+    Attributes
+    ----------
+    name, symbol_id : str
+    parameters : tuple of Parameter
+    preconditions, effects : tuple of Literal
+    duration : float
+        Median [s].
+    begin, end : tuple of k float
+        Hand minus the first place at the start, and minus the last place at the end: medians.
+    displacement : tuple of two tuples of k float
+        Least and largest way of the hand.
+    evidence : tuple of Evidence
+    cannot_tell : tuple of str
+        What the states do not decide.
+    usable : bool
+        Whether a planner gets it: not if an effect came after some movements and not after others.
+    movements : tuple of int
+    """
+
+    name: str
+    symbol_id: str
+    parameters: tuple[Parameter, ...]
+    preconditions: tuple[Literal, ...]
+    effects: tuple[Literal, ...]
+    duration: float
+    begin: tuple[float, ...]
+    end: tuple[float, ...]
+    displacement: tuple[tuple[float, ...], tuple[float, ...]]
+    evidence: tuple[Evidence, ...]
+    cannot_tell: tuple[str, ...]
+    usable: bool
+    movements: tuple[int, ...]
+
+    @property
+    def places(self) -> list[Parameter]:
+        """Parameters that are places."""
+        return [parameter for parameter in self.parameters if parameter.type == "place"]
+
+
+class Edit(NamedTuple):
+    """A person's change of an operator, which survives learning again."""
+
+    operator: str
+    part: str  # "precondition" or "effect"
+    literal: Literal
+    added: bool  # else taken away
+
+
+@dataclass(frozen=True)
+class Domain:
+    """What a planner knows: operators, what can be said of a state, and places.
+
+    Attributes
+    ----------
+    vocabulary : Vocabulary
+    operators : tuple of Operator
+    places : mapping of str to tuple of k float
+        Places without a fixture that were visited, by name.
+    edits : tuple of Edit
+        Of a person, and already made in `operators`.
+    """
+
+    vocabulary: Vocabulary
+    operators: tuple[Operator, ...]
+    places: Mapping[str, tuple[float, ...]]
+    edits: tuple[Edit, ...] = ()
+
+    def operator(self, name: str) -> Operator:
+        """Return the operator of a symbol."""
+        for operator in self.operators:
+            if operator.name == name:
+                return operator
+        names = ", ".join(operator.name for operator in self.operators)
+        raise SpecificationError(f"expected an operator of the domain ({names}), got {name!r}")
+
+
+def edited(domain: Domain, edits: Sequence[Edit]) -> Domain:
+    """Return the domain with a person's edits; those of operators that are not there are kept for when they are.
+
+    An edit of an effect that the movements did not decide decides it.
+    """
+    operators = []
+    for operator in domain.operators:
+        parts = {"precondition": list(operator.preconditions), "effect": list(operator.effects)}
+        decided = set()
+        for edit in edits:
+            if edit.operator != operator.name:
+                continue
+            if edit.part not in parts:
+                raise SpecificationError(f"expected an edit of a precondition or an effect, got {edit.part!r}")
+            parts[edit.part] = [
+                literal
+                for literal in parts[edit.part]
+                if literal[:2] != edit.literal[:2] or (not edit.added and literal != edit.literal)
+            ]
+            if edit.added:
+                parts[edit.part].append(edit.literal)
+            if edit.part == "effect":
+                decided.add(str(edit.literal._replace(value=True)))
+        open_effects = [
+            text for text in operator.cannot_tell if f": {CHANGED} " in text and text.partition(": ")[0] not in decided
+        ]
+        usable = operator.usable or (bool(operator.movements) and not open_effects)
+        operators.append(
+            replace(operator, preconditions=tuple(parts["precondition"]), effects=tuple(parts["effect"]), usable=usable)
+        )
+    return replace(domain, operators=tuple(operators), edits=tuple(edits))
+
+
+def kinds_in_words(parameter: Parameter) -> str:
+    """Say which objects were shown as a parameter."""
+    return ", ".join(kind or "a place without an object" for kind in parameter.kinds)
+
+
+def is_shown(
+    domain: Domain, operator: Operator, arguments: Mapping[str, str], places: Mapping[str, Array]
+) -> list[str]:
+    """List why arguments lie outside what was shown of an operator; empty if they lie inside.
+
+    Each place lies in the box of those shown, and the way of the hand in the box of ways, both larger by the radius.
+    """
+    reasons = []
+    for parameter in operator.parameters:
+        name = arguments[parameter.name]
+        is_fixture = name in domain.vocabulary.fixtures
+        kind = kind_of(name) if parameter.type == "item" or is_fixture else ""
+        if kind not in parameter.kinds:
+            reasons.append(f"{parameter.name} = {name} is none of what was shown: {kinds_in_words(parameter)}")
+        if parameter.type == "place":
+            reasons += _beyond(domain, f"{parameter.name} = {name}", places[name], parameter.low, parameter.high)
+    ends = hands_of(operator, arguments, places)
+    if ends is not None and len(operator.places) > 1:
+        reasons += _beyond(domain, "the way of the hand", ends[1] - ends[0], *operator.displacement)
+    return reasons
+
+
+def hands_of(
+    operator: Operator, arguments: Mapping[str, str], places: Mapping[str, Array]
+) -> tuple[Array, Array] | None:
+    """Return where the hand begins and ends with these arguments; None of an operator without places."""
+    if not operator.places:
+        return None
+    first, last = (places[arguments[operator.places[k].name]] for k in (0, -1))
+    return first + np.array(operator.begin), last + np.array(operator.end)
+
+
+def _beyond(domain: Domain, what: str, where: Array, low: Sequence[float], high: Sequence[float]) -> list[str]:
+    margin = domain.vocabulary.radius
+    return [
+        f"{what}: {axis} = {value:.4g} is {max(a - value, value - b):.3g} outside {a:.4g} to {b:.4g}"
+        for axis, value, a, b in zip(domain.vocabulary.axes, where.tolist(), low, high, strict=True)
+        if not a - margin <= value <= b + margin
+    ]
+
+
+def domain_to_dict(domain: Domain) -> dict[str, Any]:
+    """Return a domain as plain data that JSON can hold; `domain_from_dict` reads it."""
+    data = asdict(domain)
+    for operator in data["operators"]:
+        for part in ("parameters", "preconditions", "effects", "evidence"):
+            operator[part] = [row._asdict() for row in operator[part]]
+    data["vocabulary"]["variables"] = [variable._asdict() for variable in domain.vocabulary.variables]
+    data["edits"] = [edit._asdict() | {"literal": edit.literal._asdict()} for edit in domain.edits]
+    plain: dict[str, Any] = json.loads(json.dumps({"format": FORMAT, "version": VERSION, **data}, allow_nan=False))
+    return plain
+
+
+def domain_from_dict(data: Any) -> Domain:
+    """Return the domain of `domain_to_dict`.
+
+    Raises
+    ------
+    DataError
+        Anything else, or a domain of a later version.
+    """
+    form = data.get("format") if isinstance(data, Mapping) else type(data).__name__
+    if form != FORMAT:
+        raise DataError(
+            f"expected a domain, an object with format {FORMAT!r}, got {form!r}; write one by kineme operators"
+        )
+    if not isinstance(data.get("version"), int) or data["version"] > VERSION:
+        raise DataError(
+            f"expected a domain of version {VERSION} or earlier, got {data.get('version')!r}; upgrade kineme"
+        )
+    try:
+        words = data["vocabulary"]
+        variables = tuple(Variable(**_frozen(variable)) for variable in words["variables"])
+        vocabulary = Vocabulary(**_frozen(words) | {"variables": variables, "left_out": dict(words["left_out"])})
+        operators = tuple(_operator_from(operator) for operator in data["operators"])
+        places = {str(name): tuple(map(float, where)) for name, where in data["places"].items()}
+        edits = tuple(Edit(**edit | {"literal": Literal(**_frozen(edit["literal"]))}) for edit in data["edits"])
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise DataError(
+            f"expected a complete domain, got one that does not fit ({type(error).__name__}: {error}); write it anew "
+            "by kineme operators"
+        ) from error
+    return Domain(vocabulary, operators, places, edits)
+
+
+def read_domain(path: str | Path) -> Domain:
+    """Return the domain in a JSON file."""
+    try:
+        data = json.loads(Path(path).read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as error:
+        raise DataError(f"expected a domain in JSON, {path} is none: {error}") from error
+    return domain_from_dict(data)
+
+
+def _operator_from(data: Mapping[str, Any]) -> Operator:
+    records = {"parameters": Parameter, "preconditions": Literal, "effects": Literal, "evidence": Evidence}
+    rows = {part: tuple(record(**_frozen(row)) for row in data[part]) for part, record in records.items()}
+    return Operator(**_frozen(data) | rows)
+
+
+def _frozen(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return data with lists as tuples."""
+
+    def freeze(value: Any) -> Any:
+        return tuple(map(freeze, value)) if isinstance(value, list) else value
+
+    return {name: freeze(value) for name, value in data.items()}
+
+
+def operator_schema(domain: Domain, operator: Operator) -> dict[str, Any]:
+    """Return a JSON Schema of the arguments of an operator: which objects, and the box of each place that was shown."""
+    properties: dict[str, Any] = {}
+    for parameter in operator.parameters:
+        properties[parameter.name] = {
+            "type": "string",
+            "description": f"a {parameter.type}: {kinds_in_words(parameter)}",
+        }
+        margin = domain.vocabulary.radius
+        for axis, low, high in zip(domain.vocabulary.axes, parameter.low, parameter.high, strict=False):
+            properties[f"{parameter.name}_{axis}"] = {
+                "type": "number",
+                "minimum": low - margin,
+                "maximum": high + margin,
+            }
+    return {
+        "title": operator.name,
+        "type": "object",
+        "properties": properties,
+        "required": [parameter.name for parameter in operator.parameters],
+        "additionalProperties": False,
+    }

@@ -1,0 +1,281 @@
+"""Domains and problems as PDDL, and a person's changes of a domain read back from it.
+
+STRIPS with types, negative preconditions and action costs, which are durations in milliseconds. What was shown of an
+operator is a static predicate over its parameters, ``(shown-carry ?from ?to ?item)``, whose facts a problem lists.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from kineme.errors import DataError, SpecificationError
+from kineme.planning.domain import Domain, Edit, Literal, Operator
+from kineme.planning.vocabulary import Fact, predicates_of
+from kineme.reporting.text import first_names, printable
+
+_RESERVED = frozenset(
+    {"and", "or", "not", "imply", "exists", "forall", "when", "either", "object", "place", "item", "number", "define",
+     "total-cost", "increase", "minimize", "domain", "problem"}
+)  # fmt: skip
+_LONGEST = 60  # characters of an identifier
+_MOST_TOKENS, _DEEPEST = 1_000_000, 200
+_TOKEN = re.compile(r";[^\n]*|[()]|[^\s()]+")
+
+
+def identifiers(names: Iterable[str]) -> dict[str, str]:
+    """Return name -> its identifier in PDDL: small letters, digits and hyphens, each of its own."""
+    result: dict[str, str] = {}
+    for name in sorted({*names}):
+        plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode().lower()
+        stem = re.sub(r"[^a-z0-9_]+", "-", plain).strip("-_")[:_LONGEST] or "name"
+        stem = stem if stem[0].isalpha() and stem not in _RESERVED else f"n-{stem}"
+        text, number = stem, 1
+        while text in result.values():
+            number += 1
+            text = f"{stem}-{number}"
+        result[name] = text
+    return result
+
+
+class Names:
+    """Identifiers of what a domain names, both ways."""
+
+    def __init__(self, domain: Domain, objects: Iterable[str] = ()) -> None:
+        self.types = predicates_of(domain.vocabulary)
+        for operator in domain.operators:
+            kinds = {parameter.name: parameter.type for parameter in operator.parameters}
+            for literal in (*operator.preconditions, *operator.effects):  # a person may add predicates
+                self.types.setdefault(literal.predicate, tuple(kinds[name] for name in literal.arguments))
+        self.operators = identifiers(operator.name for operator in domain.operators)
+        self.predicates = identifiers(self.types)
+        self.objects = identifiers([*objects])
+        prefix = "shown"
+        while any(text.startswith(f"{prefix}-") for text in self.predicates.values()):
+            prefix = f"was-{prefix}"
+        self.shown = {name: f"{prefix}-{text}" for name, text in self.operators.items()}
+
+
+def domain_to_pddl(domain: Domain, name: str = "kineme") -> str:
+    """Return a domain as PDDL; operators that a planner does not get are comments that say why."""
+    names = Names(domain)
+    predicates = [_typed(names.predicates[predicate], types) for predicate, types in names.types.items()]
+    usable = [operator for operator in domain.operators if operator.usable]
+    lines = [
+        f"(define (domain {identifiers([name])[name]})",
+        "  (:requirements :strips :typing :negative-preconditions :action-costs)",
+        "  (:types place item)",
+        "  (:predicates",
+        *(f"    {text}" for text in predicates),
+        *(
+            f"    {_typed(names.shown[operator.name], [parameter.type for parameter in operator.parameters])}"
+            for operator in usable
+        ),
+        "  )",
+        "  (:functions (total-cost) - number)",
+    ]
+    for operator in domain.operators:
+        lines += _action(operator, names) if operator.usable else _left_out(operator)
+    return "\n".join([*lines, ")", ""])
+
+
+def _typed(predicate: str, types: Iterable[str]) -> str:
+    return f"({' '.join([predicate, *(f'?{kind[0]}{k} - {kind}' for k, kind in enumerate(types, 1))])})"
+
+
+def _comment(text: str) -> str:
+    return f"  ; {printable(text)}"
+
+
+def _left_out(operator: Operator) -> list[str]:
+    why = [*operator.cannot_tell] or ["no movement of it has a state"]
+    return [_comment(f"{operator.name} is left out, its effects are not told:"), *map(_comment, why)]
+
+
+def _literal(literal: Literal, names: Names) -> str:
+    return str(literal._replace(predicate=names.predicates[literal.predicate]))
+
+
+def _action(operator: Operator, names: Names) -> list[str]:
+    """Return the lines of an operator, with the counts behind each precondition."""
+    evidence = {row[:2]: row for row in operator.evidence}
+    parameters = " ".join(f"?{parameter.name} - {parameter.type}" for parameter in operator.parameters)
+    shown = f"({' '.join([names.shown[operator.name], *(f'?{p.name}' for p in operator.parameters)])})"
+    lines = [
+        _comment(f"{operator.name}: {len(operator.movements)} movements"),
+        *map(_comment, operator.cannot_tell),
+        f"  (:action {names.operators[operator.name]}",
+        f"    :parameters ({parameters})",
+        f"    :precondition (and {shown}",
+    ]
+    for literal in operator.preconditions:
+        row = evidence.get(literal[:2])
+        said = (
+            "a person's" if row is None else f"{row.true_before if literal.value else row.n - row.true_before}/{row.n}"
+        )
+        never = "" if row is None or row.varied else ", never varied"
+        lines.append(f"      {_literal(literal, names)}  ; {said}{never}")
+    lines += ["    )", "    :effect (and"]
+    lines += [f"      {_literal(literal, names)}" for literal in operator.effects]
+    return [*lines, f"      (increase (total-cost) {max(1, round(1000 * operator.duration))})", "    ))"]
+
+
+def problem_to_pddl(
+    domain: Domain,
+    objects: Mapping[str, str],
+    true: Iterable[Fact],
+    goal: Iterable[tuple[Fact, bool]],
+    shown: Iterable[tuple[str, tuple[str, ...]]],
+) -> str:
+    """Return a problem as PDDL.
+
+    `objects` maps a name to "place" or "item"; `true` are the facts now; `shown` the operators with the arguments that
+    lie inside what was shown of them.
+    """
+    names = Names(domain, objects)
+
+    def ground(fact: Fact) -> str:
+        return f"({' '.join([names.predicates[fact[0]], *(names.objects[name] for name in fact[1:])])})"
+
+    lines = ["(define (problem now)", f"  (:domain {identifiers(['kineme'])['kineme']})", "  (:objects"]
+    lines += [f"    {names.objects[name]} - {kind}" for name, kind in objects.items()]
+    lines += ["  )", "  (:init", "    (= (total-cost) 0)", *(f"    {ground(fact)}" for fact in sorted(true))]
+    lines += [
+        f"    ({' '.join([names.shown[name], *(names.objects[argument] for argument in arguments)])})"
+        for name, arguments in shown
+    ]
+    goals = [ground(fact) if value else f"(not {ground(fact)})" for fact, value in goal]
+    return "\n".join([*lines, "  )", f"  (:goal (and {' '.join(goals)}))", "  (:metric minimize (total-cost)))", ""])
+
+
+def parsed(text: str) -> Any:
+    """Return one expression of PDDL as nested lists of words, in small letters.
+
+    Raises
+    ------
+    DataError
+        Parentheses that do not fit, several expressions, or none.
+    """
+    stack: list[list[Any]] = [[]]
+    for number, token in enumerate(match[0] for match in _TOKEN.finditer(text)):
+        if number > _MOST_TOKENS or len(stack) > _DEEPEST:
+            raise DataError(f"expected PDDL of at most {_MOST_TOKENS:,} words, {_DEEPEST} deep, got more")
+        if token == "(":
+            stack.append([])
+        elif token == ")":
+            if len(stack) == 1:
+                raise DataError("expected PDDL, got a ) without its (")
+            last = stack.pop()
+            stack[-1].append(last)
+        elif not token.startswith(";"):
+            stack[-1].append(token.lower())
+    if len(stack) > 1 or len(stack[0]) != 1 or not isinstance(stack[0][0], list):
+        raise DataError("expected one expression in parentheses, got PDDL whose parentheses do not fit")
+    return stack[0][0]
+
+
+def literals_of(expression: Any) -> list[tuple[tuple[str, ...], bool]]:
+    """Return the literals of a conjunction, as ``(and (in cup shelf) (not (full cup)))``: words, and whether true.
+
+    Raises
+    ------
+    DataError
+        Anything else than a literal or a conjunction of literals.
+    """
+    if isinstance(expression, list) and expression and expression[0] == "and":
+        return [literal for part in expression[1:] for literal in literals_of(part)]
+    if isinstance(expression, list) and len(expression) == 2 and expression[0] == "not":
+        return [(words, not value) for words, value in literals_of(expression[1])]
+    if not (isinstance(expression, list) and expression and all(isinstance(word, str) for word in expression)):
+        raise DataError(f"expected literals and their conjunctions, as (and (in cup shelf)), got {expression!r:.100}")
+    return [(tuple(expression), True)]
+
+
+def _sections(expression: Any, what: str) -> dict[str, list[Any]]:
+    """Return section -> its content, of ``(define (domain ...) (:section ...) ...)``."""
+    if (
+        not isinstance(expression, list)
+        or expression[:1] != ["define"]
+        or not any(part[:1] == [what] for part in expression[1:])
+    ):
+        raise DataError(f"expected (define ({what} ...) ...) in PDDL, got something else")
+    sections: dict[str, list[Any]] = {}
+    for part in expression[1:]:
+        if not isinstance(part, list) or not part or not isinstance(part[0], str):
+            raise DataError(f"expected sections in parentheses in PDDL, got {part!r:.100}")
+        sections.setdefault(part[0], []).append(part[1:])
+    return sections
+
+
+def edits_in(text: str, domain: Domain) -> list[Edit]:
+    """Return a person's changes in the PDDL of a domain: what differs from what `domain_to_pddl` wrote of it.
+
+    Literals of preconditions and effects count; operators and predicates are told by their identifiers.
+    """
+    names = Names(domain)
+    actions = {part[0]: part[1:] for part in _sections(parsed(text), "domain").get(":action", []) if part}
+    predicate_of = {text: name for name, text in names.predicates.items()}
+    edits = []
+    for operator in domain.operators:
+        action = actions.get(names.operators[operator.name])
+        if action is None or not operator.usable:
+            continue
+        content = {action[k]: action[k + 1] for k in range(0, len(action) - 1, 2) if isinstance(action[k], str)}
+        for part, learned in (("precondition", operator.preconditions), ("effect", operator.effects)):
+            expressions = [each for each in _conjuncts(content.get(f":{part}", ["and"])) if each[:1] != ["increase"]]
+            present = [
+                Literal(
+                    predicate_of.get(words[0], words[0]), tuple(name.removeprefix("?") for name in words[1:]), value
+                )
+                for words, value in literals_of(["and", *expressions])
+                if words[0] != names.shown[operator.name]
+            ]
+            parameters = [parameter.name for parameter in operator.parameters]
+            if unknown := next((literal for literal in present if {*literal.arguments} - {*parameters}), None):
+                raise DataError(
+                    f"expected parameters of {operator.name}, {first_names(parameters, 8)}, got {unknown} in its {part}"
+                )
+            edits += [Edit(operator.name, part, literal, True) for literal in present if literal not in learned]
+            edits += [Edit(operator.name, part, literal, False) for literal in learned if literal not in present]
+    return edits
+
+
+def _conjuncts(expression: Any) -> list[Any]:
+    return expression[1:] if isinstance(expression, list) and expression[:1] == ["and"] else [expression]
+
+
+def read_problem(text: str) -> tuple[list[str], list[tuple[str, ...]], list[tuple[tuple[str, ...], bool]]]:
+    """Return objects, facts and goal of a problem in PDDL, in identifiers; costs and metrics are left out.
+
+    Raises
+    ------
+    DataError
+        No problem, or a goal that is no conjunction of literals.
+    """
+    sections = _sections(parsed(text), "problem")
+    if ":goal" not in sections:
+        raise DataError("expected a problem with a goal, got none; add (:goal ...)")
+    words = sections.get(":objects", [[]])[0]
+    objects, position = [], 0
+    while position < len(words):  # a b - place c - item
+        if words[position] == "-":
+            position += 1
+        else:
+            objects.append(words[position])
+        position += 1
+    facts = [tuple(fact) for fact in sections.get(":init", [[]])[0] if isinstance(fact, list) and fact[:1] != ["="]]
+    if any(not all(isinstance(word, str) for word in fact) for fact in facts):
+        raise DataError("expected facts in :init, as (in cup shelf), got something else")
+    return objects, facts, literals_of(sections[":goal"][0][0])
+
+
+def name_of(identifier: str, identifier_of: Mapping[str, str], what: str) -> str:
+    """Return the name behind an identifier, or the name itself; refuse what is neither."""
+    for name, text in identifier_of.items():
+        if identifier in (text, name.lower()):
+            return name
+    raise SpecificationError(
+        f"expected {what} among {first_names([*identifier_of], 12)}, got {printable(identifier)!r}"
+    )

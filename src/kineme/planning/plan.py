@@ -1,0 +1,484 @@
+"""Plans: the state now and a goal as a problem, a planner's steps as places that the hand goes to, and their checks."""
+
+from __future__ import annotations
+
+import itertools
+import tempfile
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from kineme.errors import DataError, SpecificationError
+from kineme.io.records import needs
+from kineme.planning.domain import Domain, Literal, Operator, domain_from_dict, domain_to_dict, hands_of, is_shown
+from kineme.planning.pddl import Names, domain_to_pddl, literals_of, name_of, parsed, problem_to_pddl, read_problem
+from kineme.planning.states import State
+from kineme.planning.vocabulary import Fact, facts_of, places_of, predicates_of
+from kineme.reporting.text import first_names
+from kineme.validation import Array, check_number
+
+FORMAT, VERSION = "kineme-plan", 1
+_MOST_GROUND = 200_000  # operators with arguments, at most
+_TRIED = 500  # of them that are looked at for why a goal is not reached
+_DEEPEST = 6  # operators one before the other that this names
+
+
+class Goal(NamedTuple):
+    """A fact that is to be true, or false."""
+
+    fact: Fact
+    value: bool = True
+
+    def __str__(self) -> str:
+        text = f"({' '.join(self.fact)})"
+        return text if self.value else f"(not {text})"
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """The state now, in a domain's words, and a goal.
+
+    Attributes
+    ----------
+    domain : Domain
+    places : mapping of str to ndarray of shape (k,)
+    facts : mapping of Fact to bool
+        What is not among them is not known.
+    goal : tuple of Goal
+    """
+
+    domain: Domain
+    places: Mapping[str, Array]
+    facts: Mapping[Fact, bool]
+    goal: tuple[Goal, ...]
+
+    @property
+    def objects(self) -> dict[str, str]:
+        """Name -> "place" or "item"."""
+        return dict.fromkeys(self.places, "place") | dict.fromkeys(self.domain.vocabulary.items, "item")
+
+
+class Step(NamedTuple):
+    """One action of a plan."""
+
+    operator: str
+    arguments: dict[str, str]  # parameter -> place or item
+    start: tuple[float, ...]  # of the hand, at the place where it begins; empty of operators without places
+    goal: tuple[float, ...]
+    duration: float  # [s]
+
+    def __str__(self) -> str:
+        return f"({' '.join((self.operator, *self.arguments.values()))})"
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """Steps from the state now to a goal.
+
+    Attributes
+    ----------
+    problem : Problem
+    steps : tuple of Step
+    planner : str
+    """
+
+    problem: Problem
+    steps: tuple[Step, ...]
+    planner: str
+
+    def __len__(self) -> int:
+        return len(self.steps)
+
+    @property
+    def duration(self) -> float:
+        """Sum of the durations of the steps [s]."""
+        return sum(step.duration for step in self.steps)
+
+
+def problem_of(
+    domain: Domain, state: State, goal: str | Iterable[Goal], places: Mapping[str, Any] | None = None
+) -> Problem:
+    """Return a problem.
+
+    Parameters
+    ----------
+    domain : Domain
+    state : mapping of str to number or word
+        The state now, in the columns of the states that the domain was learned from.
+    goal : str or iterable of Goal
+        A conjunction of literals in PDDL, as ``(and (in cup shelf) (not (full cup)))``.
+    places : mapping of str to (k,) positions, optional
+        More places, by name.
+
+    Raises
+    ------
+    SpecificationError
+        Names that the domain does not have, or a place without a position.
+    """
+    named = {name: np.array(where) for name, where in domain.places.items()}
+    for name, where in (places or {}).items():
+        named[name] = np.asarray(where, dtype=np.float64)
+        if named[name].shape != (len(domain.vocabulary.axes),) or not np.isfinite(named[name]).all():
+            axes = ", ".join(domain.vocabulary.axes)
+            raise SpecificationError(f"expected the place {name} as finite numbers for {axes}, got {where!r}")
+    at = places_of(domain.vocabulary, [state], named, "here")
+    problem = Problem(domain, at, facts_of(domain.vocabulary, state, at), ())
+    goals = _goals(problem, literals_of(parsed(goal))) if isinstance(goal, str) else tuple(goal)
+    _check_goals(problem, goals)
+    return Problem(domain, at, problem.facts, goals)
+
+
+def problem_from_pddl(domain: Domain, text: str, state: State | None = None) -> Problem:
+    """Return the problem in a text of PDDL, with the facts that it lists, at the places of `state` or of the domain.
+
+    Facts of the state that the text does not list are added; what neither says is false, as PDDL has it, where the
+    state is not given.
+    """
+    objects, facts, goals = read_problem(text)
+    named = {name: np.array(where) for name, where in domain.places.items()}
+    at = places_of(domain.vocabulary, [state or {}], named, "here") if state is not None else _typical_places(domain)
+    problem = Problem(domain, at, {} if state is None else facts_of(domain.vocabulary, state, at), ())
+    names = Names(domain, problem.objects)
+    for identifier in objects:
+        name_of(identifier, names.objects, "objects whose position is known (give the state)")
+    listed = {
+        (
+            name_of(words[0], names.predicates, "a predicate"),
+            *(name_of(w, names.objects, "an object") for w in words[1:]),
+        )
+        for words in facts
+        if words[0] not in names.shown.values()
+    }
+    known = dict(problem.facts) if state is not None else dict.fromkeys(_all_facts(problem), False)
+    return Problem(domain, at, known | dict.fromkeys(listed, True), _goals(problem, goals))
+
+
+def _typical_places(domain: Domain) -> dict[str, Array]:
+    """Return the places of a domain without a state: fixtures in the middle of where they were shown."""
+    places = {name: np.array(where) for name, where in domain.places.items()}
+    for fixture in domain.vocabulary.of_kind("fixture"):
+        if fixture.typical:
+            places[fixture.name] = np.array(fixture.typical)
+    return places
+
+
+def _all_facts(problem: Problem) -> list[Fact]:
+    of_type = {kind: [name for name, each in problem.objects.items() if each == kind] for kind in ("place", "item")}
+    types = predicates_of(problem.domain.vocabulary)
+    return [
+        (name, *arguments)
+        for name, kinds in types.items()
+        for arguments in itertools.product(*(of_type[k] for k in kinds))
+    ]
+
+
+def _goals(problem: Problem, literals: Sequence[tuple[tuple[str, ...], bool]]) -> tuple[Goal, ...]:
+    names = Names(problem.domain, problem.objects)
+    goals = tuple(
+        Goal(
+            (
+                name_of(words[0], names.predicates, "a predicate"),
+                *(name_of(word, names.objects, "an object") for word in words[1:]),
+            ),
+            value,
+        )
+        for words, value in literals
+    )
+    _check_goals(problem, goals)
+    return goals
+
+
+def _check_goals(problem: Problem, goals: Sequence[Goal]) -> None:
+    types, objects = Names(problem.domain).types, problem.objects
+    for goal in goals:
+        wanted = types.get(goal.fact[0])
+        if wanted is None or tuple(map(objects.get, goal.fact[1:])) != wanted:
+            kinds = "nothing" if wanted is None else f"({' '.join((goal.fact[0], *wanted))})"
+            raise SpecificationError(f"expected goals in the words of the domain, here {kinds}, got {goal}")
+    if not goals:
+        raise SpecificationError("expected a goal, got none; as (and (in cup shelf))")
+
+
+def shown_arguments(problem: Problem) -> list[tuple[Operator, dict[str, str]]]:
+    """Return each usable operator with all arguments that lie inside what was shown of it."""
+    of_type = {kind: [name for name, each in problem.objects.items() if each == kind] for kind in ("place", "item")}
+    result = []
+    for operator in problem.domain.operators:
+        if not operator.usable:
+            continue
+        choices = [of_type[parameter.type] for parameter in operator.parameters]
+        if np.prod([len(names) for names in choices]) > _MOST_GROUND:
+            raise SpecificationError(
+                f"expected at most {_MOST_GROUND:,} choices of arguments of {operator.name}, got more; leave out places"
+            )
+        for chosen in itertools.product(*choices):
+            arguments = dict(zip((parameter.name for parameter in operator.parameters), chosen, strict=True))
+            if len({*chosen}) == len(chosen) and not is_shown(problem.domain, operator, arguments, problem.places):
+                result.append((operator, arguments))
+    return result
+
+
+def find_plan(problem: Problem, planner: str | None = None, timeout: float = 30.0) -> Plan:
+    """Find a plan by a planner of unified-planning, and check each of its steps.
+
+    Parameters
+    ----------
+    problem : Problem
+    planner : str, optional
+        Name of an engine that is installed, as "aries" or "fast-downward"; by default one that takes the problem as it
+        is, else one that takes it without costs and negative preconditions.
+    timeout : float, default 30.0
+        [s], half of it with costs.
+
+    Raises
+    ------
+    SpecificationError
+        There is no plan, with the goals that no order of operators reaches; or a step depends on what is not known.
+    DataError
+        The extra ``planner`` is not installed, no engine takes the problem, or none finds a plan in time.
+    """
+    check_number("timeout", timeout, least=0.1)
+    if all(problem.facts.get(goal.fact) is goal.value for goal in problem.goal):
+        return Plan(problem, (), "no planner")
+    shown = shown_arguments(problem)
+    if missing := unreachable(problem, shown):
+        raise SpecificationError(f"expected a goal that operators reach within what was shown; {'; '.join(missing)}")
+    true = [fact for fact, value in problem.facts.items() if value]
+    texts = (
+        domain_to_pddl(problem.domain),
+        problem_to_pddl(
+            problem.domain, problem.objects, true, problem.goal,
+            [(operator.name, tuple(arguments.values())) for operator, arguments in shown],
+        ),
+    )  # fmt: skip
+    actions, engine = _solved(texts, planner, timeout)
+    names = Names(problem.domain, problem.objects)
+    steps = []
+    for name, objects in actions:
+        operator = problem.domain.operator(name_of(name, names.operators, "an operator"))
+        chosen = [name_of(text, names.objects, "an object") for text in objects]
+        arguments = dict(zip((parameter.name for parameter in operator.parameters), chosen, strict=True))
+        steps.append(step_of(operator, arguments, problem.places))
+    plan = Plan(problem, tuple(steps), engine)
+    check_plan(plan)
+    return plan
+
+
+def step_of(operator: Operator, arguments: dict[str, str], places: Mapping[str, Array]) -> Step:
+    """Return an operator with arguments as a step: where the hand begins and ends."""
+    ends = hands_of(operator, arguments, places)
+    start, goal = ((), ()) if ends is None else (tuple(ends[0].tolist()), tuple(ends[1].tolist()))
+    return Step(operator.name, arguments, start, goal, operator.duration)
+
+
+def _solved(texts: tuple[str, str], planner: str | None, timeout: float) -> tuple[list[tuple[str, list[str]]], str]:
+    """Return the actions of a plan and the name of the engine that found it."""
+    with needs("unified-planning", "find plans", "planner"):
+        from unified_planning.io import PDDLReader
+        from unified_planning.shortcuts import get_environment
+
+    get_environment().credits_stream = None
+    problem = PDDLReader().parse_problem_string(*texts)
+    simple = problem.clone()
+    simple.clear_quality_metrics()
+    failures: list[str] = []
+    for candidate, compiles in ((problem, False), (simple, False), (simple, True)):
+        # Engines warn of options that they do not know, and of processes that they leave to be collected.
+        with warnings.catch_warnings(), tempfile.TemporaryFile("w") as log:
+            warnings.simplefilter("ignore")
+            result = _tried(candidate, compiles, planner, 0.5 * timeout, log)
+        if isinstance(result, str):
+            failures.append(result)
+            continue
+        plan, name = result
+        return [(each.action.name, [str(value) for value in each.actual_parameters]) for each in plan.actions], name
+    raise DataError(
+        f"expected a plan, got none ({first_names(failures, 3)}); look at the preconditions of the operators, give "
+        "more time, or install another planner of unified-planning, as up-aries"
+    )
+
+
+def _tried(problem: Any, compiles: bool, planner: str | None, timeout: float, log: Any) -> tuple[Any, str] | str:
+    """Return the plan of an engine and its name, or why there is none; `compiles`: without negative preconditions."""
+    from unified_planning.engines import CompilationKind, PlanGenerationResultStatus
+    from unified_planning.exceptions import UPException
+    from unified_planning.plans import PlanKind
+    from unified_planning.shortcuts import Compiler, OneshotPlanner, PlanValidator
+
+    task, back = problem, None
+    try:
+        if compiles:
+            kind = CompilationKind.NEGATIVE_CONDITIONS_REMOVING
+            with Compiler(problem_kind=problem.kind, compilation_kind=kind) as compiler:
+                compiled = compiler.compile(problem, kind)
+            task, back = compiled.problem, compiled.map_back_action_instance
+        with OneshotPlanner(**({"problem_kind": task.kind} if planner is None else {"name": planner})) as engine:
+            name = str(engine.name)
+            if not engine.supports(task.kind):
+                return f"{name} does not take it"
+            result = engine.solve(task, timeout=timeout, output_stream=log)
+    except UPException as error:
+        return str(error).splitlines()[0]
+    if result.plan is None:
+        if result.status == PlanGenerationResultStatus.UNSOLVABLE_PROVEN:
+            raise SpecificationError("expected a plan, there is none; look at the preconditions of the operators")
+        return f"{name} found none within {timeout:g} s"
+    plan = result.plan if back is None else result.plan.replace_action_instances(back)
+    if plan.kind != PlanKind.SEQUENTIAL_PLAN:
+        plan = plan.convert_to(PlanKind.SEQUENTIAL_PLAN, problem)
+    with PlanValidator(name="sequential_plan_validator") as validator:
+        if not validator.validate(problem, plan):
+            return f"{name} gave a plan that is not valid"
+    return plan, name
+
+
+def facts_after(facts: Mapping[Fact, bool], operator: Operator, arguments: Mapping[str, str]) -> dict[Fact, bool]:
+    """Return the facts after an operator; what is not known and not an effect stays unknown."""
+    return {**facts} | {
+        (literal.predicate, *(arguments[name] for name in literal.arguments)): literal.value
+        for literal in operator.effects
+    }
+
+
+def unmet(facts: Mapping[Fact, bool], operator: Operator, arguments: Mapping[str, str]) -> list[str]:
+    """List preconditions that do not hold, or are not known to."""
+    reasons = []
+    for literal in operator.preconditions:
+        fact = (literal.predicate, *(arguments[name] for name in literal.arguments))
+        if facts.get(fact) is not literal.value:
+            reasons.append(f"{Goal(fact, literal.value)} {'is not known' if fact not in facts else 'does not hold'}")
+    return reasons
+
+
+def check_plan(plan: Plan) -> None:
+    """Refuse a plan that misses its goal, or with a step that is not known to be possible or was not shown so.
+
+    Raises
+    ------
+    SpecificationError
+    """
+    domain, facts = plan.problem.domain, dict(plan.problem.facts)
+    for number, step in enumerate(plan.steps, 1):
+        operator = domain.operator(step.operator)
+        reasons = unmet(facts, operator, step.arguments) + is_shown(
+            domain, operator, step.arguments, plan.problem.places
+        )
+        if reasons:
+            raise SpecificationError(
+                f"expected steps that can be done, step {number} {step} cannot: {'; '.join(reasons)}"
+            )
+        facts = facts_after(facts, operator, step.arguments)
+    if missed := [str(goal) for goal in plan.problem.goal if facts.get(goal.fact) is not goal.value]:
+        raise SpecificationError(f"expected a plan that reaches its goal, it misses {', '.join(missed)}")
+
+
+def unreachable(problem: Problem, shown: Sequence[tuple[Operator, dict[str, str]]]) -> list[str]:
+    """Say which goals no order of the operators reaches even if nothing were ever undone, and what is missing."""
+    possible = {*problem.facts.items()}
+    left = list(shown)
+    while ready := [pair for pair in left if possible.issuperset(_ground(pair[0].preconditions, pair[1]))]:
+        left = [pair for pair in left if pair not in ready]
+        possible |= {each for operator, arguments in ready for each in _ground(operator.effects, arguments)}
+    return [
+        f"{goal} {_why_not(problem, goal, possible, left, _DEEPEST)}" for goal in problem.goal if goal not in possible
+    ]
+
+
+def _ground(literals: Sequence[Literal], arguments: Mapping[str, str]) -> list[tuple[Fact, bool]]:
+    return [((each.predicate, *(arguments[name] for name in each.arguments)), each.value) for each in literals]
+
+
+def _why_not(
+    problem: Problem,
+    goal: Goal,
+    possible: set[tuple[Fact, bool]],
+    left: Sequence[tuple[Operator, dict[str, str]]],
+    depth: int,
+) -> str:
+    """Say what keeps operators from reaching a fact: what was not shown, what is not known, or what they lack."""
+    ways = [pair for pair in left if goal in _ground(pair[0].effects, pair[1])]
+    is_told = not ways and goal.fact in problem.facts  # then what was not shown is the reason, whatever else is missing
+    if reason := _not_shown(problem, goal, possible, len(problem.facts) if is_told else 0):
+        return reason
+    if not ways or not depth:
+        state = "is not known" if goal.fact not in problem.facts else "does not hold now"
+        return state if ways else f"{state}, and no operator that was shown changes that"
+    lacking = [[Goal(*each) for each in _ground(*pair) if each not in possible] for pair in _needs(ways)]
+    k = min(range(len(ways)), key=lambda k: len(lacking[k]))
+    others = [pair for pair in left if pair is not ways[k]]
+    first = min(lacking[k], key=lambda each: each.fact in problem.facts)  # what is not known comes first
+    name = f"({' '.join((ways[k][0].name, *ways[k][1].values()))})"
+    return f"needs {name}; {first} {_why_not(problem, first, possible, others, depth - 1)}"
+
+
+def _needs(ways: Sequence[tuple[Operator, dict[str, str]]]) -> list[tuple[Sequence[Literal], dict[str, str]]]:
+    return [(operator.preconditions, arguments) for operator, arguments in ways]
+
+
+def _not_shown(problem: Problem, goal: Goal, possible: set[tuple[Fact, bool]], lacking_most: int) -> str:
+    """Name an operator that would reach a fact from here, and why its arguments lie outside what was shown."""
+    of_type = {kind: [name for name, each in problem.objects.items() if each == kind] for kind in ("place", "item")}
+    reasons = []
+    for operator in problem.domain.operators:
+        names = [parameter.name for parameter in operator.parameters]
+        for literal in operator.effects if operator.usable else ():
+            if (literal.predicate, literal.value) != (goal.fact[0], goal.value):
+                continue
+            fixed = dict(zip(literal.arguments, goal.fact[1:], strict=True))
+            choices = [[fixed[p.name]] if p.name in fixed else of_type[p.type] for p in operator.parameters]
+            for chosen in itertools.islice(itertools.product(*choices), _TRIED):
+                arguments = dict(zip(names, chosen, strict=True))
+                lacking = sum(each not in possible for each in _ground(operator.preconditions, arguments))
+                if len({*chosen}) == len(chosen) and lacking <= lacking_most:
+                    outside = is_shown(problem.domain, operator, arguments, problem.places)
+                    text = f"({' '.join((operator.name, *chosen))}) was not shown so: {first_names(outside, 2)}"
+                    reasons += [(lacking, len(outside), text)] if outside else []
+    return f"is not reached, since {min(reasons)[2]}" if reasons else ""
+
+
+def plan_to_dict(plan: Plan) -> dict[str, Any]:
+    """Return a plan with its problem and domain as plain data that JSON can hold; `plan_from_dict` reads it."""
+    problem = plan.problem
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "planner": plan.planner,
+        "duration": plan.duration,
+        "steps": [step._asdict() | {"start": [*step.start], "goal": [*step.goal]} for step in plan.steps],
+        "goal": [{"fact": [*goal.fact], "value": goal.value} for goal in problem.goal],
+        "places": {name: where.tolist() for name, where in problem.places.items()},
+        "facts": [{"fact": [*fact], "value": value} for fact, value in problem.facts.items()],
+        "domain": domain_to_dict(problem.domain),
+    }
+
+
+def plan_from_dict(data: Any) -> Plan:
+    """Return the plan of `plan_to_dict`, checked.
+
+    Raises
+    ------
+    DataError
+        Anything else, or a plan of a later version.
+    SpecificationError
+        A step that cannot be done; see `check_plan`.
+    """
+    form = data.get("format") if isinstance(data, Mapping) else type(data).__name__
+    if form != FORMAT or not isinstance(data.get("version"), int) or data["version"] > VERSION:
+        raise DataError(f"expected a plan, an object with format {FORMAT!r}, of version {VERSION}, got {form!r}")
+    try:
+        domain = domain_from_dict(data["domain"])
+        places = {str(name): np.array(where, dtype=np.float64) for name, where in data["places"].items()}
+        facts = {tuple(map(str, each["fact"])): bool(each["value"]) for each in data["facts"]}
+        goals = tuple(Goal(tuple(map(str, each["fact"])), bool(each["value"])) for each in data["goal"])
+        rows = [(domain.operator(step["operator"]), dict(step["arguments"])) for step in data["steps"]]
+        steps = tuple(step_of(operator, arguments, places) for operator, arguments in rows)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise DataError(
+            f"expected a complete plan, got one that does not fit ({type(error).__name__}: {error})"
+        ) from error
+    plan = Plan(Problem(domain, places, facts, goals), steps, str(data.get("planner", "")))
+    check_plan(plan)
+    return plan

@@ -1,0 +1,182 @@
+"""A symbol as something that can be done: the ranges in which it was shown, and its movement to a new goal."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kineme.dmp.discrete.rollout import Rollout
+from kineme.dmp.pose.pose_rollout import PoseRollout
+from kineme.errors import SpecificationError
+from kineme.library.grounding import learned_movement
+from kineme.library.library import ActionLibrary
+from kineme.movements.channels.channel import Channels, learned_names
+from kineme.validation import Array, as_numbers, check_number
+
+
+@dataclass(frozen=True, eq=False)
+class Skill:
+    """What was shown of a symbol, in the coordinates that are places: positions or, without any, all that move.
+
+    Attributes
+    ----------
+    name, id, description : str
+    movements : ndarray of shape (n,)
+        Ids of its movements in the library.
+    starts, goals : ndarray of shape (n, k)
+    durations : ndarray of shape (n,)
+        [s].
+    axes : tuple of k str
+        Names of the coordinates.
+    units : tuple of k str or None
+        Their units, None where the recordings do not say it.
+    """
+
+    name: str
+    id: str
+    description: str
+    movements: NDArray[np.int64]
+    starts: Array
+    goals: Array
+    durations: Array
+    axes: tuple[str, ...]
+    units: tuple[str | None, ...]
+
+    @property
+    def shown(self) -> dict[str, Array]:
+        """Start, goal and displacement of each movement, (n, k)."""
+        return {"start": self.starts, "goal": self.goals, "displacement": self.goals - self.starts}
+
+
+class Excess(NamedTuple):
+    """One number beyond the range that was shown."""
+
+    what: str  # "start", "goal" or "displacement"
+    axis: str
+    value: float
+    low: float
+    high: float
+    unit: str | None
+
+    @property
+    def distance(self) -> float:
+        """Distance from the range, in its unit."""
+        return max(self.low - self.value, self.value - self.high)
+
+    def __str__(self) -> str:
+        unit = f" {self.unit}" if self.unit else ""
+        return (
+            f"{self.what} {self.axis} = {self.value:.4g}{unit} is {self.distance:.3g}{unit} outside "
+            f"{self.low:.4g} to {self.high:.4g}{unit}"
+        )
+
+
+def skill_of(library: ActionLibrary, who: str) -> Skill:
+    """Return what was shown of a symbol.
+
+    Raises
+    ------
+    SpecificationError
+        No such symbol, or one without movements.
+    """
+    symbol = library[who]
+    if not len(symbol):
+        raise SpecificationError(f"expected a symbol with movements, {symbol.name!r} has none; learn some")
+    primitives = library.primitives(ids=symbol.members)
+    columns, axes, units = place_columns(library.channels, primitives.n_dims)
+    return Skill(
+        symbol.name, symbol.id, symbol.description, symbol.members, primitives.starts[:, columns],
+        primitives.goals[:, columns], primitives.durations, axes, units,
+    )  # fmt: skip
+
+
+def place_columns(channels: Channels | None, n_dims: int) -> tuple[list[int], tuple[str, ...], tuple[str | None, ...]]:
+    """Return the coordinates that are places, their names and their units: positions, else all that move."""
+    if channels is None:
+        return (
+            list(range(n_dims)),
+            tuple("xyz"[:n_dims] if n_dims <= 3 else map("x{}".format, range(n_dims))),
+            (None,) * n_dims,
+        )
+    names = learned_names(channels)
+    unit_of = {channel.name: channel.unit for channel in channels if channel.kind == "position"} or {
+        name: channel.unit for channel in channels for name in channel.coordinates
+    }
+    columns = [k for k, name in enumerate(names) if name in unit_of]
+    return columns, tuple(names[k] for k in columns), tuple(unit_of[names[k]] for k in columns)
+
+
+def outside(skill: Skill, start: ArrayLike, goal: ArrayLike, margin: float = 0.0) -> list[Excess]:
+    """List what lies outside the box of starts, goals and displacements that were shown; empty if nothing does.
+
+    Parameters
+    ----------
+    skill : Skill
+    start, goal : array_like of shape (k,)
+        Places, in the unit of the recordings.
+    margin : float, default 0.0
+        By which the boxes are larger on every side, in that unit.
+    """
+    check_number("margin", margin, least=0.0)
+    begin, end = (_place(skill, place, what) for place, what in ((start, "start"), (goal, "goal")))
+    excesses = []
+    for (what, shown), value in zip(skill.shown.items(), (begin, end, end - begin), strict=True):
+        low, high = shown.min(axis=0) - margin, shown.max(axis=0) + margin
+        slack = 1e-9 * max(1.0, float(np.abs(shown).max()))  # stored and asked for differ by rounding
+        excesses += [
+            Excess(what, skill.axes[k], float(value[k]), float(low[k]), float(high[k]), skill.units[k])
+            for k in np.flatnonzero((value < low - slack) | (value > high + slack))
+        ]
+    return excesses
+
+
+def nearest_demonstration(skill: Skill, start: ArrayLike, goal: ArrayLike) -> int:
+    """Return the row of the movement that went most nearly so: by displacement and, if equal, by start."""
+    begin, end = _place(skill, start, "start"), _place(skill, goal, "goal")
+    ways = np.linalg.norm(skill.goals - skill.starts - (end - begin), axis=1)
+    return int(np.lexsort((np.linalg.norm(skill.starts - begin, axis=1), ways.round(9)))[0])
+
+
+def move_to(  # noqa: PLR0913 - one parameter per option
+    library: ActionLibrary,
+    skill: Skill,
+    start: ArrayLike,
+    goal: ArrayLike,
+    *,
+    duration: float | None = None,
+    rate: float = 100.0,
+    standing: bool = True,
+) -> Rollout | PoseRollout:
+    """Generate the movement of the nearest demonstration from a start to a goal.
+
+    Orientations and discrete channels are those of that demonstration. `standing`: it begins and ends at rest, exactly
+    at the goal. The places are not compared with what was shown: see `outside`.
+    """
+    row = nearest_demonstration(skill, start, goal)
+    learned = learned_movement(library.store, int(skill.movements[row]))
+    primitive = learned.primitive
+    channels = primitive.to_recording.moving if primitive.to_recording is not None else None
+    names = skill.axes if channels is None else learned.moving_columns
+    columns = [names.index(axis) for axis in skill.axes]
+    ends = []
+    for shown, place in (
+        (primitive.starts[0], _place(skill, start, "start")),
+        (primitive.goals[0], _place(skill, goal, "goal")),
+    ):
+        point = shown.copy()
+        point[columns] = place
+        ends.append(point)
+    rest = np.zeros(primitive.n_dims) if standing else None
+    return primitive.rollout(ends[0], ends[1], duration, velocity=rest, end_velocity=rest, rate=rate)
+
+
+def _place(skill: Skill, place: ArrayLike, what: str) -> Array:
+    values = as_numbers(place, what)
+    if values.shape != (len(skill.axes),) or not np.isfinite(values).all():
+        raise SpecificationError(
+            f"expected {what} as {len(skill.axes)} finite numbers, {', '.join(skill.axes)}, got {values.tolist()}"
+        )
+    return values

@@ -1,0 +1,298 @@
+"""States of the world before and after the movements of a library: from their recordings, and a table beside them."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path, PurePath
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.errors import DataError, SpecificationError
+from kineme.io.limits import check_expanded, read_limited
+from kineme.library.library import ActionLibrary
+from kineme.library.storage import read
+from kineme.movements.tables.columns import is_time
+from kineme.planning.skill import place_columns
+from kineme.reporting.text import counted, first_names, text_in
+from kineme.validation import Array
+
+HAND = "hand"
+_HANDS = ("tip", "hand", "tcp", "ee", "end_effector", "tool")  # names of a hand's own columns in a table
+_MOVEMENTS, _MOMENTS = ("movement", "id", "file", "recording", "name"), ("moment", "when", "state")
+_BEFORE, _AFTER = ("before", "start", "begin"), ("after", "end", "stop")
+_MISSING = frozenset({"", "-", "?", "na", "n/a", "nan", "none", "null", "unknown"})
+_WITHIN = 0.2  # of the movement: a state so long after its start counts as before it, where there is none earlier
+_NEAR = 0.05  # of the movement: so much later than its start, or earlier than its end, is at it; cuts are not exact
+_CELL = 200  # bytes that a character of a table may take in Python, at most
+
+#: A state at one moment: column -> number or word; what is missing or None is not known.
+State = Mapping[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class States:
+    """States before and after n movements, in c columns.
+
+    Attributes
+    ----------
+    movements : ndarray of shape (n,)
+        Ids in the library.
+    symbols : tuple of n str
+    axes : tuple of k str
+        Coordinates of places; the columns ``hand_x`` ... are where the hand is.
+    columns : tuple of c str
+    before, after : ndarray of shape (n, c)
+        NaN is not known; of columns of words, the number of the word.
+    words : mapping of str to tuple of str
+        Words of the columns that have some.
+    """
+
+    movements: NDArray[np.int64]
+    symbols: tuple[str, ...]
+    axes: tuple[str, ...]
+    columns: tuple[str, ...]
+    before: Array
+    after: Array
+    words: Mapping[str, tuple[str, ...]]
+
+    def __len__(self) -> int:
+        return len(self.movements)
+
+
+def states_of(library: ActionLibrary, table: str | Path | Mapping[str, Sequence[Any]] | None = None) -> States:
+    """Return the states before and after each movement of a symbol.
+
+    Where the hand is, and discrete channels as of a gripper, come from the recordings. The table adds what else is
+    known: positions of objects (``cup_x, cup_y, cup_z``, in the frame and unit of the recordings), flags and words.
+
+    Parameters
+    ----------
+    library : ActionLibrary
+    table : str, Path, or mapping of column to n values (as a data frame), optional
+        A file in CSV, or a folder of such files, as the recordings themselves, with a row for each moment. Either with
+        the columns ``movement`` (id, or file) and ``moment`` (before or after); or with ``time``, in the clock of the
+        recordings, and ``file`` where there are several: the state before is the last row up to a movement's start, the
+        one after the first row from its end on, each within a twentieth of its duration. Empty cells are not known.
+
+    Raises
+    ------
+    DataError
+        A file that is no table, or rows that belong to no movement.
+    SpecificationError
+        No symbol has movements.
+    """
+    ids = np.concatenate([symbol.members for symbol in library.symbols()] or [np.empty(0, np.int64)])
+    if not len(ids):
+        raise SpecificationError("expected a library with symbols that have movements; learn recordings with labels")
+    ids = np.sort(ids)
+    primitives = library.primitives(ids=ids)
+    places, axes, _ = place_columns(library.channels, primitives.n_dims)
+    columns = [f"{HAND}_{axis}" for axis in axes]
+    before, after = primitives.starts[:, places], primitives.goals[:, places]
+    discrete = [channel.columns[0] for channel in library.channels or () if channel.kind == "discrete"]
+    if discrete:
+        recorded = library.movements(ids=ids)
+        names = [column for channel in library.channels or () for column in channel.columns]
+        chosen = [names.index(column) for column in discrete]
+        before, after = (
+            np.column_stack((moment, [movement.recorded[row, chosen] for movement in recorded]))
+            for moment, row in ((before, 0), (after, -1))
+        )
+        columns += discrete
+    words: dict[str, tuple[str, ...]] = {}
+    if table is not None:
+        cells, source = (_tables(Path(table)), str(table)) if isinstance(table, str | Path) else (table, "the table")
+        more, extra_before, extra_after, words = _matched(library, ids, _texts(cells), source, axes)
+        columns, before, after = _merged(columns, more, (before, after), (extra_before, extra_after))
+    symbols = tuple(name or "" for name in read.names_of(library.store, ids))
+    return States(ids, symbols, axes, tuple(columns), before, after, words)
+
+
+def read_state(source: str | Path | Mapping[str, Any]) -> dict[str, Any]:
+    """Return one state: the last row of a table that knows each column, or a mapping of column to value."""
+    cells = _texts(_read(Path(source))) if isinstance(source, str | Path) else {k: [str(v)] for k, v in source.items()}
+    state: dict[str, Any] = {}
+    for head, texts in cells.items():
+        values = [value for value in map(_value, texts) if value is not None]
+        if values and not is_time(head):
+            state[_column(head)] = values[-1]
+    return state
+
+
+def _tables(path: Path) -> dict[str, list[str]]:
+    """Read a table, or those of a folder one below the other: the column ``file`` then says which, if none does."""
+    if not path.is_dir():
+        return _read(path)
+    tables = [(each, _read(each)) for each in sorted(path.glob("*.csv"))]
+    if not tables:
+        raise DataError(f"expected tables of states, .csv files, in {path}, got none")
+    heads = dict.fromkeys(head for _, cells in tables for head in cells)
+    if not any(head.lower() in _MOVEMENTS for head in heads):
+        tables = [(each, cells | {"file": [each.name] * len(next(iter(cells.values())))}) for each, cells in tables]
+        heads["file"] = None
+    return {
+        head: [text for _, cells in tables for text in cells.get(head, [""] * len(next(iter(cells.values()))))]
+        for head in heads
+    }
+
+
+def _read(path: Path) -> dict[str, list[str]]:
+    """Read a table of texts, column -> cells."""
+    with path.open("rb") as file:
+        data = read_limited(file)
+    try:
+        check_expanded(_CELL * len(data), "a table of states")
+        text = data.decode("utf-8-sig")
+        first = next((line for line in text.splitlines() if line.strip()), "")
+        rows = [
+            row for row in csv.reader(io.StringIO(text, newline=""), delimiter=max("\t;,", key=first.count)) if any(row)
+        ]
+    except (ValueError, csv.Error) as error:
+        raise DataError(f"expected a table of states in CSV, {path}: {error}") from error
+    heads = [text_in(cell.strip()) for cell in rows[0]] if rows else []
+    if len(rows) < 2 or len({*heads}) < len(heads) or "" in heads:
+        raise DataError(f"expected a table of states with a name above each column and rows below, {path} is none")
+    if wrong := next((k for k, row in enumerate(rows, 1) if len(row) != len(heads)), None):
+        raise DataError(f"expected {len(heads)} cells in each row of {path}, row {wrong} has {len(rows[wrong - 1])}")
+    return {head: [text_in(row[k].strip()) for row in rows[1:]] for k, head in enumerate(heads)}
+
+
+def _texts(cells: Mapping[str, Sequence[Any]]) -> dict[str, list[str]]:
+    return {
+        str(head): ["" if value is None else str(value).strip() for value in column] for head, column in cells.items()
+    }
+
+
+def _value(text: str) -> float | str | None:
+    """Return a cell as a number or a word; None where it says nothing."""
+    if text.lower() in _MISSING:
+        return None
+    try:
+        number = float(text)
+    except ValueError:
+        return text
+    return number if math.isfinite(number) else None
+
+
+def _column(head: str) -> str:
+    """Return the name of a column: a hand's own columns are those of the recordings, units in brackets are left out."""
+    name = head.partition("[")[0].strip().replace(" ", "_").replace(".", "_")
+    stem, _, axis = name.rpartition("_")
+    return f"{HAND}_{axis}" if stem.lower() in _HANDS else name
+
+
+def _matched(
+    library: ActionLibrary, ids: NDArray[np.int64], cells: Mapping[str, list[str]], source: str, axes: Sequence[str]
+) -> tuple[list[str], Array, Array, dict[str, tuple[str, ...]]]:
+    """Return columns, states before and after (n, c), and words, of the rows that belong to each movement."""
+    lower = {head.lower(): head for head in cells}
+    who = next((lower[name] for name in _MOVEMENTS if name in lower), None)
+    moment = next((lower[name] for name in _MOMENTS if name in lower), None)
+    time = next((head for head in cells if is_time(head)), None)
+    if time is None and (who is None or moment is None):
+        raise DataError(
+            f"expected columns movement and moment, or time, that say which state is which, {source} has "
+            f"{first_names(list(cells), 12)}"
+        )
+    heads = [head for head in cells if head not in (who, moment, time)]
+    words: dict[str, tuple[str, ...]] = {}
+    values = np.full((len(next(iter(cells.values()))), len(heads)), np.nan)
+    for k, head in enumerate(heads):
+        column = [_value(text) for text in cells[head]]
+        if any(isinstance(value, str) for value in column):
+            column = [value if value is None or isinstance(value, str) else f"{value:g}" for value in column]
+            words[_column(head)] = tuple(sorted({str(value) for value in column if value is not None}))
+            column = [None if value is None else words[_column(head)].index(str(value)) for value in column]
+        values[:, k] = [np.nan if value is None else value for value in column]
+    rows = _rows_by_moment if time is None else _rows_by_time
+    before, after = rows(library, ids, cells, (who, moment, time))
+    if (before < 0).all() and (after < 0).all():
+        raise DataError(
+            f"expected rows of movements in the library, none of {source} fits; it has "
+            f"{first_names([record['name'] or str(record['id']) for record in read.records(library.store, ids)], 5)}"
+        )
+    padded = np.vstack((values, np.full(len(heads), np.nan)))  # row -1: nothing is known
+    return [_column(head) for head in heads], padded[before], padded[after], words
+
+
+def _rows_by_moment(
+    library: ActionLibrary, ids: NDArray[np.int64], cells: Mapping[str, list[str]], heads: tuple[Any, ...]
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    who, moment, _ = heads
+    index = {str(key): row for row, key in enumerate(ids.tolist())}
+    for row, record in enumerate(read.records(library.store, ids)):
+        for name in {record["name"] or "", PurePath(record["name"] or "").name, PurePath(record["name"] or "").stem} - {
+            ""
+        }:
+            index[name] = -2 if name in index and index[name] != row else row
+    before, after = np.full((2, len(ids)), -1)
+    for k, (name, when) in enumerate(zip(cells[who], cells[moment], strict=True)):
+        row, word = index.get(name, -1), when.lower()
+        if row == -2:
+            raise DataError(f"expected a movement by its id, since several are called {name!r}")
+        if word not in (*_BEFORE, *_AFTER):
+            raise DataError(f"expected before or after as the moment of a state, got {when!r}")
+        if row >= 0:
+            (before if word in _BEFORE else after)[row] = k
+    return before, after
+
+
+def _rows_by_time(
+    library: ActionLibrary, ids: NDArray[np.int64], cells: Mapping[str, list[str]], heads: tuple[Any, ...]
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    who, _, time = heads
+    clock = np.array([_number(text, time) for text in cells[time]])
+    files = np.array([PurePath(text).stem for text in cells[who]] if who else [""] * len(clock))
+    rows_of = {name: np.flatnonzero(files == name) for name in dict.fromkeys(files.tolist())}
+    before, after = np.full((2, len(ids)), -1)
+    for i, record in enumerate(read.records(library.store, ids)):
+        own = PurePath(record["name"] or "").stem
+        # Pieces of a recording are called by its name and a number.
+        name = max((name for name in rows_of if own == name or own.startswith(name)), key=len, default=None)
+        if name is None:
+            continue
+        rows = rows_of[name][np.argsort(clock[rows_of[name]], kind="stable")]
+        times, start, end = clock[rows], record["t0"], record["t0"] + record["duration"]
+        slack = 1e-6 * max(1.0, abs(end)) + _NEAR * record["duration"]
+        first = int(np.searchsorted(times, start + slack)) - 1
+        last = int(np.searchsorted(times, end - slack))
+        if first < 0 and times[0] <= start + _WITHIN * record["duration"]:
+            first = 0
+        if last == len(times) and times[-1] >= end - _WITHIN * record["duration"]:
+            last -= 1
+        if first >= 0:
+            before[i] = rows[first]
+        if last < len(times):
+            after[i] = rows[last]
+    return before, after
+
+
+def _number(text: str, head: str) -> float:
+    value = _value(text)
+    if not isinstance(value, float):
+        raise DataError(f"expected numbers [s] in the column {head}, got {text!r}")
+    return value
+
+
+def _merged(
+    columns: list[str], more: list[str], moments: tuple[Array, Array], extra: tuple[Array, Array]
+) -> tuple[list[str], Array, Array]:
+    """Join columns of the recordings and of the table; where both have one, the table counts if it knows it."""
+    if repeated := [name for name in more if more.count(name) > 1]:
+        raise DataError(f"expected {counted(1, 'column')} called {repeated[0]} in the table of states, got several")
+    names = [*columns, *(name for name in more if name not in columns)]
+    results = []
+    for moment, values in zip(moments, extra, strict=True):
+        result = np.full((len(moment), len(names)), np.nan)
+        result[:, : len(columns)] = moment
+        for k, name in enumerate(more):
+            column = result[:, names.index(name)]
+            column[:] = np.where(np.isnan(values[:, k]), column, values[:, k])
+        results.append(result)
+    return names, results[0], results[1]
