@@ -20,6 +20,7 @@ SUBJECTS = (
     "control",
     "arms",
     "arm_timing",
+    "execution",
     "modulation",
     "via_points",
     "joining",
