@@ -22,7 +22,7 @@ _USABLE = 0.998  # of the limits of velocity and acceleration: they hold at the 
 _UNLIMITED = 1e9  # [Nm, N]
 
 _PEAK_VELOCITY, _PEAK_ACCELERATION = 15 / 8, 10 / np.sqrt(3)  # of the polynomial, per distance and duration
-_SHORTEST = 0.5  # [s]
+_SHORTEST = 0.5  # of an approach where samples are few [s]
 
 STANDS = 1e-8  # of the limit of velocity: what counts as standing, also for controllers of ROS
 _GENTLE = 0.02, 0.1  # from such a share of the limit of velocity on a ramp takes so long at least [s]
@@ -217,12 +217,13 @@ def approach(robot: Robot, start: Array, end: Array, rate: float, factor: float 
     """All joints together from `start` to `end` (n,), standing at both, at half the velocity and acceleration allowed.
 
     The polynomial of least jerk, ``q(u) = start + (end - start) (10 u^3 - 15 u^4 + 6 u^5)``, u from 0 to 1; Flash and
-    Hogan 1985. Sampled at `rate` [1/s]; `factor` times as long as those limits allow.
+    Hogan 1985. Sampled at `rate` [1/s], four times at least; `factor` times as long as those limits allow.
     """
     distance = np.abs(end - start)
     by_velocity = _PEAK_VELOCITY * distance / (_SHARE * robot.velocity)
     by_acceleration = np.sqrt(_PEAK_ACCELERATION * distance / (_SHARE * robot.acceleration))
-    duration = factor * max(_SHORTEST, float(by_velocity.max()), float(by_acceleration.max()))
+    shortest = min(_SHORTEST, (_LEAST - 1) / rate)
+    duration = factor * max(shortest, float(by_velocity.max()), float(by_acceleration.max()))
     u = np.linspace(0.0, 1.0, n_samples(duration, rate))[:, None]
     shape = u**3 * (10 - 15 * u + 6 * u**2)
     velocity = 30 * u**2 * (1 - u) ** 2 / duration
