@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import deque
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -27,6 +28,7 @@ from kineme.planning import (
     read_plan,
     read_state,
     simulation_of,
+    under_way,
 )
 from kineme.planning.execution import frame_of, monitored
 from kineme.planning.figure import write_moving
@@ -93,7 +95,7 @@ def statuses(execution):
 
 def test_a_plan_reaches_its_goal_and_every_movement_keeps_the_limits(table):
     plan, world = begin(table, noise=0.0005)
-    execution = run(table, plan, world, watcher=monitored(table[0], table[2], frame_of(plan)))
+    execution = run(table, plan, world, watcher=monitored(table[0], table[2], frame_of(plan)), join=False)
     assert execution.reached
     assert execution.why == ""
     assert statuses(execution) == [("planned", "done")] * 3
@@ -133,14 +135,19 @@ def test_the_monitor_of_a_symbol_stops_what_leaves_it(table):
     assert "outside what was shown" in execution.attempts[0].reasons[0]
 
 
-def test_an_object_that_is_moved_is_fetched_from_where_it_is(table):
+@pytest.mark.parametrize(
+    ("look_rate", "status", "reason"),
+    [(0.0, "no effect", "(holding cup) is not so"), (10.0, "stopped", "cup has moved by 8.9 cm")],
+)
+def test_an_object_that_is_moved_is_fetched_from_where_it_is(table, look_rate, status, reason):
     plan, world = begin(table)
-    world.place("cup", (0.41, 0.03, 0.2), at=1.0)  # on the way to it: the hand closes on nothing
-    execution = run(table, plan, world)
+    world.place("cup", (0.41, 0.03, 0.2), at=1.5)  # on the way to it: who does not look closes the hand on nothing
+    execution = run(table, plan, world, look_rate=look_rate)
     assert execution.reached
     assert apart(world) < 0.02
-    assert statuses(execution)[:2] == [("planned", "no effect"), ("back", "done")]
-    assert "(holding cup) is not so" in execution.attempts[0].reasons
+    assert statuses(execution)[:2] == [("planned", status), ("back", "done")]
+    assert reason in execution.attempts[0].reasons
+    assert look_rate == 0 or execution.runs[0].stopped < 1.75
     assert len(execution.replans) == 1
     assert len(execution.replans[0].steps) == 3
     went_back = execution.runs[1]
@@ -152,17 +159,17 @@ def test_what_is_taken_out_of_the_hand_is_fetched_again(table):
     world.place("cup", (0.42, 0.0, 0.2), at=4.6)
     execution = run(table, plan, world)
     assert execution.reached
-    assert [attempt.step.split()[0] for attempt in execution.attempts] == [
-        "(fetch", "(bring", "(back)", "(fetch", "(bring", "(drop",
-    ]  # fmt: skip
+    steps = [attempt.step.split()[0] for attempt in execution.attempts]
+    assert steps == ["(fetch", "(bring", "(back)", "(fetch", "(bring"]
+    assert execution.attempts[1].reasons[0].startswith("cup has moved by")
     np.testing.assert_allclose(execution.runs[2].tips[-1], execution.runs[0].tips[0], atol=0.02)  # back by two steps
 
 
 def test_who_is_stopped_on_the_way_back_stays_there(table):
     plan, world = begin(table)
     world.place("cup", (0.41, 0.03, 0.2), at=1.0)
-    world.push((0.0, 35.0, 0.0), at=6.0)
-    execution = run(table, plan, world)
+    world.push((0.0, 35.0, 0.0), at=5.5)
+    execution = run(table, plan, world, look_rate=0.0)
     assert not execution.reached
     assert statuses(execution) == [("planned", "no effect"), ("back", "stopped")]
     assert "the way back was stopped: the tip is" in execution.why
@@ -188,6 +195,79 @@ def test_an_object_that_is_gone_is_said(table, name):
     assert f"not reached: {name} is not seen" in execution.table().reading
     assert f"{name}_x" not in execution.state
     json.dumps(execution.to_dict(), allow_nan=False)
+
+
+def test_who_loses_an_object_on_the_way_stops(table):
+    plan, world = begin(table)
+    world.remove("tray", at=1.0)  # needed later
+    execution = run(table, plan, world)
+    assert execution.why == "tray is not seen"
+    assert execution.attempts[0].reasons == ("tray is not seen",)
+    assert execution.runs[0].stopped < 1.25
+    plan, world = begin(table)
+    seen, missed = world.state, iter([False, False, True, False, True])
+
+    def blinks():
+        gone = {f"cup_{axis}": float("nan") for axis in "xyz"}
+        return seen() | (gone if next(missed, False) else {})
+
+    world.state = blinks
+    assert run(table, plan, world).attempts[0].status == "done"  # one look alone may be an error
+
+
+def test_steps_that_follow_each_other_are_one_movement(table):
+    library, domain, robot = table
+    plan, world = begin(table, noise=0.0005)
+    execution = run(table, plan, world, watcher=monitored(library, robot, frame_of(plan)))
+    assert execution.reached
+    assert apart(world) < 0.02
+    assert statuses(execution) == [("planned", "done"), ("joined", "done")]
+    assert execution.attempts[1].step == f"{plan.steps[1]} {plan.steps[2]}"
+    assert preflight(robot, execution.movements[1].trajectory).passed
+    assert execution.runs[1].tip_error < 1e-3
+    away = np.linalg.norm(execution.runs[1].tips - OBJECTS["tray"], axis=1)
+    assert away.min() < 0.5 * domain.vocabulary.radius
+    stops = run(table, *begin(table), join=False)
+    assert sum(each.duration for each in execution.attempts) < sum(each.duration for each in stops.attempts) - 0.25
+    assert run(table, *begin(table), look_rate=0.0).attempts[1].how == "planned"  # who cannot look does not go on
+
+
+def test_who_is_pushed_in_the_second_of_joined_steps_goes_on_with_it(table):
+    plan, world = begin(table)
+    world.push((0.0, 35.0, 0.0), at=8.0)
+    done = []
+    execution = run(table, plan, world, done=lambda step: done.append(step.operator))
+    assert execution.reached
+    assert statuses(execution) == [("planned", "done"), ("joined", "stopped"), ("resumed", "done")]
+    assert execution.attempts[2].step == str(plan.steps[2])
+    assert done == ["fetch", "bring", "drop"]
+
+
+def test_what_the_next_of_joined_steps_needs_is_looked_at(table):
+    plan, world = begin(table)
+    world.place("cup", (0.42, 0.0, 0.2), at=4.6)
+    execution = run(table, plan, world, look_rate=0.01)
+    assert execution.attempts[1].how == "joined"
+    assert "(holding cup) does not hold" in execution.attempts[1].reasons
+    assert execution.reached
+
+
+def test_no_steps_are_joined_where_an_effect_or_the_gripper_is_between(table):
+    library, _, robot = table
+    plan, _ = begin(table)
+    assert [under_way.n_joinable(plan.problem, plan.steps[k:]) for k in range(3)] == [1, 2, 1]
+    sent = [movement.trajectory for movement in check_steps(plan, library, robot).movements]
+    overlap = under_way.overlap_of(robot, sent[1], sent[2], 0.02)
+    opens = sent[2].times[np.argmax(sent[2].steps["gripper"] < 0.5)]
+    assert 0.05 < overlap <= opens
+    changed = replace(sent[2], steps={"gripper": 1.0 - sent[2].steps["gripper"]})
+    assert under_way.overlap_of(robot, sent[1], changed, 0.02) is None
+    assert under_way.overlap_of(robot, sent[1], sent[2], 0.0) < 0.1 * overlap
+    times, positions, steps, begins = under_way.superposed(sent[1:], [overlap])
+    assert begins == [0.0, pytest.approx(sent[1].duration - overlap)]
+    assert times[-1] == pytest.approx(sent[1].duration + sent[2].duration - overlap)
+    np.testing.assert_allclose(positions[[0, -1]], [sent[1].positions[0], sent[2].positions[-1]], atol=1e-6)
+    assert np.flatnonzero(np.diff(steps["gripper"]))[0] * 0.01 == pytest.approx(begins[1] + opens, abs=0.02)
 
 
 def test_what_was_not_shown_is_not_done(table):
@@ -239,6 +319,10 @@ def test_steps_are_checked_without_a_world(table):
     assert "Nothing was executed" in execution.table().reading
     for before, after in zip(execution.movements, execution.movements[1:], strict=False):
         np.testing.assert_allclose(after.trajectory.positions[0], before.trajectory.positions[-1], atol=1e-9)
+    far = check_steps(plan, library, robot, origin=(0.5, 0.0, 0.0)).attempts[-1]
+    assert far.status == "refused"
+    assert "--origin" in far.reasons[0]
+    assert not any(option in far.reasons[0] for option in ("--at", "--scale", "--rest"))
     assert check_steps(plan, library, load("so101")).attempts[-1].status == "refused"
 
 
@@ -265,7 +349,7 @@ def test_recordings_may_have_an_origin_of_their_own(table):
     origin = (-0.03, 0.04, 0.02)
     world = simulation_of(plan, robot, origin=origin)
     np.testing.assert_allclose([world.state()[f"tray_{axis}"] for axis in "xyz"], np.add(OBJECTS["tray"], origin))
-    execution = execute(plan, library, world, robot, replan=shortest, origin=origin)
+    execution = execute(plan, library, world, robot, replan=shortest, origin=origin, join=False)
     assert execution.reached
     assert not execution.replans
     assert apart(world) < 0.02
@@ -275,36 +359,63 @@ def test_recordings_may_have_an_origin_of_their_own(table):
         check_steps(plan, library, robot, origin=(0, 0))
 
 
-def test_a_plan_in_a_plane(tmp_path):
-    random, robot = np.random.default_rng(0), load("panda")
+@pytest.fixture
+def plane(tmp_path):
+    """A library of movements in a plane, without rests: up, along, and down again."""
+    random = np.random.default_rng(0)
     u = np.linspace(0, 1, 80)[:, None]
     s = 10 * u**3 - 15 * u**4 + 6 * u**5
-    for k in range(12):
-        ends = np.array([[0.4, 0.3], [0.55, 0.4]])[:: 1 if k % 2 else -1] + random.normal(0, 0.003, (2, 2))
-        path = ends[0] + s * (ends[1] - ends[0]) + 0.05 * np.sin(np.pi * s) * [0.0, 1.0]
-        file = tmp_path / "recordings" / ("up" if k % 2 else "down") / f"{k}.csv"
-        file.parent.mkdir(parents=True, exist_ok=True)
-        np.savetxt(file, np.column_stack((2 * u, path)), fmt="%.5f", delimiter=",", header="t,x,z", comments="")
+    corners = {"up": [[0.4, 0.3], [0.55, 0.4]], "along": [[0.55, 0.4], [0.45, 0.5]], "down": [[0.55, 0.4], [0.4, 0.3]]}
+    for name, shown in corners.items():
+        (tmp_path / "recordings" / name).mkdir(parents=True)
+        for k in range(6):
+            ends = np.array(shown) + random.normal(0, 0.003, (2, 2))
+            path = ends[0] + s * (ends[1] - ends[0]) + 0.05 * np.sin(np.pi * s) * [0.0, 1.0]
+            file = tmp_path / "recordings" / name / f"{k}.csv"
+            np.savetxt(file, np.column_stack((2 * u, path)), fmt="%.5f", delimiter=",", header="t,x,z", comments="")
     learn = ["learn", str(tmp_path / "recordings"), "--library", str(tmp_path / "actions")]
     assert CliRunner().invoke(main, learn).exit_code == 0
     with kineme.ActionLibrary(tmp_path / "actions", read_only=True) as library:
-        domain = learn_operators(library)
-        state = {"hand_x": 0.4, "hand_z": 0.3}
-        high = next(name for name, where in domain.places.items() if where[0] > 0.5)
-        plan = shortest(problem_of(domain, state, f"(hand-at {high})"))
-        assert [step.operator for step in plan.steps] == ["up"]
+        yield library
+
+
+def test_a_plan_in_a_plane(plane):
+    domain, robot = learn_operators(plane), load("panda")
+    state = {"hand_x": 0.4, "hand_z": 0.3}
+    high = next(name for name, where in domain.places.items() if where[0] > 0.5)
+    plan = shortest(problem_of(domain, state, f"(hand-at {high})"))
+    assert [step.operator for step in plan.steps] == ["up"]
+    world = simulation_of(plan, robot, origin=(0.0, 0.1, 0.0))
+    execution = execute(plan, plane, world, robot, replan=shortest, origin=(0.0, 0.1, 0.0))
+    assert execution.reached
+    np.testing.assert_allclose(execution.runs[0].tips[-1], (0.55, 0.1, 0.4), atol=0.01)
+    np.testing.assert_allclose(execution.runs[0].tips[:, 1], 0.1, atol=2e-3)
+
+
+def test_joined_steps_do_not_stop_between_them(plane):
+    domain, robot = learn_operators(plane), load("panda")
+    far = next(name for name, where in domain.places.items() if where[1] > 0.45)
+    plan = shortest(problem_of(domain, {"hand_x": 0.4, "hand_z": 0.3}, f"(hand-at {far})"))
+    assert [step.operator for step in plan.steps] == ["up", "along"]
+    executions = {}
+    for join in (True, False):
         world = simulation_of(plan, robot, origin=(0.0, 0.1, 0.0))
-        execution = execute(plan, library, world, robot, replan=shortest, origin=(0.0, 0.1, 0.0))
-        assert execution.reached
-        np.testing.assert_allclose(execution.runs[0].tips[-1], (0.55, 0.1, 0.4), atol=0.01)
-        np.testing.assert_allclose(execution.runs[0].tips[:, 1], 0.1, atol=2e-3)
+        executions[join] = execute(plan, plane, world, robot, replan=shortest, origin=(0.0, 0.1, 0.0), join=join)
+        assert executions[join].reached
+    (going,), (stops, _) = executions[True].runs, executions[False].runs
+    away = np.linalg.norm(going.tips - stops.tips[-1], axis=1)
+    assert away.min() < 0.5 * domain.vocabulary.radius
+    speeds = np.linalg.norm(np.gradient(going.tips, going.times, axis=0), axis=1)
+    assert speeds[50:-80].min() > 0.02
+    assert going.times[-1] < sum(run_.times[-1] for run_ in executions[False].runs) - 0.5
+    np.testing.assert_allclose(going.tips[-1], executions[False].runs[1].tips[-1], atol=2e-3)
 
 
 def test_pictures(table, tmp_path, monkeypatch):
     monkeypatch.setattr("kineme.planning.figure._MOST_FRAMES", 6)
     plan, world = begin(table)
     world.remove("cup", at=0.5)
-    execution = run(table, plan, world)
+    execution = run(table, plan, world, look_rate=0.0)
     assert len(draw_execution(execution, table[2]).axes) == 2
     from PIL import Image
 
@@ -336,6 +447,8 @@ def test_in_the_shell(table, folder, tmp_path):
     assert checked.exit_code == 0, checked.output
     assert len(json.loads(checked.stdout)["written"]) == 4
     assert sorted(file.name for file in (tmp_path / "joints").iterdir())[1:] == [f"step-0{k}.csv" for k in (1, 2, 3)]
+    stops = shell(folder, path, "--simulate", "--stop-at-each-step", "--disturb", "tray:gone@7.5", "--json")
+    assert [attempt["how"] for attempt in json.loads(stops.stdout)["attempts"]] == ["planned"] * 3
     assert "--simulate" in shell(folder, path, "--disturb", "cup:gone@1").output
     assert "a new folder" in shell(folder, path, "-o", tmp_path / "x.json").output
 

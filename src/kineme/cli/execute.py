@@ -22,7 +22,7 @@ from kineme.cli.options import (
 from kineme.cli.output import check_new, say
 from kineme.reporting.text import printable
 
-_SIMULATED = ("disturb", "noise", "seed", "replans", "planner", "plot", "view")  # options of what moves
+_SIMULATED = ("disturb", "noise", "seed", "replans", "planner", "stop_at_each_step", "plot", "view")  # of what moves
 
 
 @click.command(cls=GroupedCommand, short_help="Execute a plan on an arm, in a simulation.")
@@ -43,6 +43,7 @@ _SIMULATED = ("disturb", "noise", "seed", "replans", "planner", "plot", "view") 
 @click.option("--seed", type=whole(0), default=0, help="Of that noise.")
 @click.option("--replans", type=whole(0, 100), default=3, show_default=True, help="Plans more, at most.")
 @click.option("--planner", help="An engine of unified-planning that is installed, as aries.")
+@click.option("--stop-at-each-step", is_flag=True, help="Stand after each step, also where the next may go on.")
 @heading("Output")
 @click.option("--output", "-o", type=click.Path(path_type=Path), help="A .json file for the report; without --simulate "
               "a new folder for it and the joints of each step, in CSV.")  # fmt: skip
@@ -118,7 +119,7 @@ def _simulated(plan: Any, library: Any, robot: Any, options: dict[str, Any]) -> 
     return execute_plan(
         plan, library, world, robot, replan=partial(find_plan, planner=options["planner"]),
         most_replans=options["replans"], done=assume_flags(world, plan), follow=options["follow"],
-        origin=options["origin"],
+        origin=options["origin"], join=not options["stop_at_each_step"],
     )  # fmt: skip
 
 

@@ -1,9 +1,10 @@
-"""A plan on an arm, step by step: look, check, move within what was shown, watch, look again, and plan anew."""
+"""A plan on an arm: look, check, move within what was shown, watch, look again, and plan anew."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -13,11 +14,13 @@ from kineme.errors import KinemeError, SpecificationError
 from kineme.library.grounding import learned_movement
 from kineme.library.library import ActionLibrary
 from kineme.movements.trajectories.trajectory import Trajectory
+from kineme.planning import under_way
 from kineme.planning.domain import hands_of, is_shown
-from kineme.planning.plan import Goal, Plan, Problem, Step, check_plan, facts_after, find_plan, problem_of
+from kineme.planning.plan import Plan, Problem, Step, facts_after, find_plan, problem_of, unmet
 from kineme.planning.skill import nearest_demonstration, outside, skill_of
 from kineme.planning.states import HAND, State, read_state
-from kineme.planning.vocabulary import position_of
+from kineme.planning.under_way import Frame, Options, Part, Watcher, frame_of, monitored
+from kineme.planning.vocabulary import Fact, Variable, hand_of, position_of
 from kineme.reporting.table import Table
 from kineme.reporting.text import first_names
 from kineme.robots.execution.joint_trajectory import JointTrajectory
@@ -27,7 +30,7 @@ from kineme.robots.planning.generate_at import generate_at
 from kineme.robots.planning.move import move
 from kineme.robots.planning.robot_movement import RobotMovement
 from kineme.robots.simulation import Run
-from kineme.validation import Array, as_numbers, check_count, check_number
+from kineme.validation import Array, check_count, check_number
 
 FORMAT, VERSION = "kineme-execution", 1
 NOT_EXECUTED = "nothing was executed, every step passed its checks"
@@ -36,36 +39,11 @@ _LEAST = 8  # samples of a movement that goes on or back
 _NEAR = 0.05  # before it was stopped, an arm does not stand [s]
 _SHARE = 0.2  # of the limits of velocity, on the way back
 _STANDS = 1e-4  # on the way back, samples so near each other count once [s]
+_CORNER = 0.5  # of the radius of a place, by which steps that are joined miss it at most
 
-#: Reason to stop a movement at a time since it began [s] with the tip there [m], or None.
-Watcher = Callable[[float, Array], str | None]
-
-
-class Frame(NamedTuple):
-    """Where the coordinates of a plan lie in the frame of the robot: each axis is that of its letter."""
-
-    axes: list[int]  # of the plan's k coordinates: 0 for x, 1 for y, 2 for z
-    origin: Array  # (3,), of the plan, in the frame of the robot [m]
-
-    def to_robot(self, place: Array) -> Array:
-        """Return a place (k,) in the frame of the robot (3,)."""
-        point = self.origin.copy()
-        point[self.axes] += place
-        return point
-
-    def from_robot(self, point: Array) -> Array:
-        """Return a point (3,) of the robot as a place of the plan (k,)."""
-        return np.asarray((point - self.origin)[self.axes])
-
-
-def frame_of(plan: Plan, origin: ArrayLike = (0.0, 0.0, 0.0)) -> Frame:
-    """Return the frame of a plan whose axes are x, y, z, or two of them: then `origin` says where their plane lies."""
-    axes, where = plan.problem.domain.vocabulary.axes, as_numbers(origin, "origin")
-    if [*axes] != [axis for axis in _AXES if axis in axes] or len(axes) < 2:
-        raise SpecificationError(f"expected a plan in coordinates x, y, z or two of them, got {', '.join(axes)}")
-    if where.shape != (3,) or not np.isfinite(where).all():
-        raise SpecificationError(f"expected origin as three finite numbers, got {origin!r:.80}")
-    return Frame([_AXES.index(axis) for axis in axes], where)
+#: What `robots.move` advises, and what can be done about it here.
+_ELSEWHERE = re.compile(r"choose another (?:place|goal) \(--\w+\).{0,80}?(?:\(--scale\)|\(--rest\)|of the joints)")
+_HERE = "choose another origin of the recordings (--origin), other places, or a freer orientation (--follow)"
 
 
 class World(Protocol):
@@ -83,8 +61,8 @@ class World(Protocol):
 class Attempt(NamedTuple):
     """One movement of an execution."""
 
-    step: str  # as (carry shelf tray cup)
-    how: str  # "planned"; "resumed", the rest after a stop; "back", to where the step began
+    step: str  # as (carry shelf tray cup); of several that were joined, one after another
+    how: str  # "planned"; "joined", several as one; "resumed", the rest after a stop; "back", to where the step began
     status: str  # "done", "stopped", "no effect", or "refused", before anything moved
     reasons: tuple[str, ...]
     plan: int  # number of the plan, from 0
@@ -169,6 +147,8 @@ def execute(  # noqa: PLR0913 - one parameter per option
     done: Callable[[Step], object] | None = None,
     follow: str = "full",
     origin: ArrayLike = (0.0, 0.0, 0.0),
+    join: bool = True,
+    look_rate: float = 10.0,
 ) -> Execution:
     """Execute a plan, and plan anew when the world is not as it should be.
 
@@ -176,7 +156,12 @@ def execute(  # noqa: PLR0913 - one parameter per option
     movement of the nearest demonstration, inside what was shown, on the joints of the arm; what the arm cannot do is
     refused before it moves. Where `watcher` says so, or the tip is too far from what was sent, the arm stops. If the
     rest of the plan still holds then, it goes on; else there is a new plan, from where the arm stands, or from where
-    the step began, to which the arm goes back the way it came. The same happens if an effect of a step is missing.
+    the step began, to which the arm goes back the way it came. The same happens if an effect of a step is missing, or
+    if an object that it needs is gone on the way or farther than the radius of a place from where it was.
+
+    Steps that need no effect of those before but where the hand is are one movement, unless the gripper changes between
+    them: the arm does not stop there, and cuts the corner by half the radius of a place at most. What the next step
+    needs is looked at as it begins.
 
     Parameters
     ----------
@@ -202,6 +187,11 @@ def execute(  # noqa: PLR0913 - one parameter per option
     origin : array_like of shape (3,), default (0, 0, 0)
         Where the recordings have their origin, in the frame of the robot [m]; where they are in x and z alone, y says
         where their plane is.
+    join : bool, default True
+        Make steps as one movement where that is safe and takes no longer; else the arm stops after each.
+    look_rate : float, default 10.0
+        How often the state is looked at while the arm moves [Hz]; 0 for worlds that cannot tell it then: there no steps
+        are joined.
 
     Returns
     -------
@@ -214,40 +204,19 @@ def execute(  # noqa: PLR0913 - one parameter per option
         A plan in other coordinates than x, y, z or two of them.
     """
     check_number("leeway", leeway, above=0.0)
+    check_number("look_rate", look_rate, least=0.0)
     check_count("most_replans", most_replans, 0)
     frame = frame_of(plan, origin)
     watcher = watcher or monitored(library, robot, frame)
-    options = _Options(replan, watcher, done or (lambda step: None), leeway, follow, frame)
+    options = Options(
+        replan, watcher, done or (lambda step: None), leeway, follow, frame, join and look_rate > 0, look_rate
+    )
     log = _Executor(plan, library, world, robot, options)
     why = log.run(most_replans)
     return Execution(
         not why, why, tuple(log.attempts), tuple(log.replans), tuple(map(str, plan.problem.goal)), log.state,
         tuple(log.runs), tuple(log.movements),
     )  # fmt: skip
-
-
-def monitored(
-    library: ActionLibrary, robot: Robot, frame: Frame, error_rate: float = 0.01
-) -> Callable[[Step, RobotMovement], Watcher]:
-    """Return what stops a step where it leaves what was shown of its symbol: `ActionLibrary.monitor`.
-
-    `error_rate` is the share of movements like those shown that are stopped all the same. Movements of more
-    than places, as with orientations, are not watched so: of these the tip does not tell enough.
-    """
-
-    def watcher(step: Step, movement: RobotMovement) -> Watcher:
-        if library.primitives(ids=library[step.operator].members[:1]).n_dims != len(frame.axes):
-            return lambda t, tip: None
-        ends = kinematics(robot, movement.trajectory.positions[[movement.first, -1]])[0]
-        monitor = library.monitor(step.operator, *map(frame.from_robot, ends), error_rate=error_rate)
-
-        def watch(t: float, tip: Array) -> str | None:
-            state = monitor.update(t, frame.from_robot(tip))
-            return None if state.inside else state.in_words
-
-        return watch
-
-    return watcher
 
 
 def check_steps(
@@ -266,7 +235,7 @@ def check_steps(
             start = joints if movements else None
             movements.append(_movement(plan.problem, step, library, robot, start, (frame, follow)))
         except KinemeError as error:
-            attempts.append(Attempt(str(step), "planned", "refused", (str(error),), 0))
+            attempts.append(Attempt(str(step), "planned", "refused", (_refusal(error),), 0))
             break
         joints = movements[-1].trajectory.positions[-1]
         attempts.append(Attempt(str(step), "planned", "checked", (), 0, movements[-1].trajectory.duration))
@@ -310,21 +279,10 @@ def _movement(
     )  # fmt: skip
 
 
-class _Options(NamedTuple):
-    """What `execute` is told besides."""
-
-    replan: Callable[[Problem], Plan]
-    watcher: Callable[[Step, RobotMovement], Watcher]
-    done: Callable[[Step], object]
-    leeway: float  # [m]
-    follow: str
-    frame: Frame
-
-
 class _Stop(NamedTuple):
-    """A step that was stopped on its way."""
+    """A movement that was stopped on its way."""
 
-    step: Step
+    parts: list[Part]  # that were not done; the first is under way
     movement: RobotMovement
     sample: int  # of its trajectory, where the arm stands
 
@@ -345,7 +303,7 @@ class _Executor:
         library: ActionLibrary,
         world: World,
         robot: Robot,
-        options: _Options,
+        options: Options,
     ) -> None:
         self.plan, self.library, self.world, self.robot, self.options = plan, library, world, robot, options
         self.places = dict(plan.problem.places)  # as they were seen last
@@ -355,18 +313,26 @@ class _Executor:
         self.movements: list[RobotMovement] = []
         self.state: dict[str, Any] = {}
         self.ways: list[_Way] = []  # of the steps that were begun
+        self.problem = plan.problem  # as it was when the step was planned
+        self.left: list[Step] = []  # steps to be done
+        self.anchors: dict[str, Array] = {}  # where the objects of the step were seen, or left by the hand
 
     def run(self, left: int) -> str:
         """Execute, with so many plans and continuations more; return why the goal was not reached, or nothing."""
-        steps, stop = list(self.plan.steps), None
+        self.left, stop = list(self.plan.steps), None
         while True:
-            problem = self.look()
+            problem, steps = self.look(), self.left
             if lost := self.unseen(steps):
                 return f"{first_names(lost, 5)} {'is' if len(lost) == 1 else 'are'} not seen"
-            trouble = _trouble(problem, steps)
+            trouble = under_way.trouble_of(problem, steps)
             if trouble is None and not steps:
                 return ""
-            resumes = trouble is not None and stop is not None and _may_go_on(problem, stop.step, steps)
+            resumes = False
+            if trouble is not None and stop is not None:
+                moved = self.moved(
+                    [each for part in stop.parts for each in under_way.objects_of(self.problem, part.step)]
+                )
+                resumes = not moved and under_way.may_go_on(problem, stop.parts[0].step, steps)
             if trouble is not None and not resumes:
                 if left == 0:
                     return f"{trouble}; and no plan more was to be made"
@@ -374,16 +340,13 @@ class _Executor:
                 stop, answer = None, self.plan_anew(problem, trouble)
                 if isinstance(answer, str):
                     return answer
-                steps = answer
+                self.left = answer
                 continue
-            stop = self.attempt(problem, steps[0], stop if resumes else None)
+            stop = self.attempt(problem, stop if resumes else None)
             last = self.attempts[-1]
             if last.status == "refused" or (last.status == "stopped" and left == 0):
                 return f"{last.step} was {last.status}: {first_names(last.reasons, 3)}"
-            if stop is None:
-                steps.pop(0)
-            else:
-                left -= 1
+            left -= stop is not None
 
     def look(self) -> Problem:
         """Return the state now as a problem; a place at which an item lies is where that item is."""
@@ -415,58 +378,123 @@ class _Executor:
             if variable.name in names and not np.isfinite(position_of(variable.columns, self.state)).all()
         ]  # fmt: skip
 
-    def attempt(self, problem: Problem, step: Step, stop: _Stop | None) -> _Stop | None:
-        """Make the movement of a step, or the rest of one that was stopped; return where it was stopped."""
+    def moved(self, objects: Sequence[Variable]) -> list[str]:
+        """Say which objects are neither at the hand nor where they were seen last beside it."""
+        vocabulary = self.plan.problem.domain.vocabulary
+        reasons = []
+        for variable in objects if self.options.look_rate else ():
+            here, hand = position_of(variable.columns, self.state), hand_of(vocabulary, self.state)
+            away = float(np.linalg.norm(here - self.anchors.get(variable.name, here)))
+            if variable.kind == "item" and np.linalg.norm(here - hand) <= vocabulary.radius:
+                self.anchors[variable.name] = here
+            elif away > vocabulary.radius:
+                reasons.append(f"{variable.name} has moved by {100 * away:.1f} cm")
+        return reasons
+
+    def missing(self, steps: Sequence[Step]) -> list[str]:
+        """Look at the state, and say which objects are gone, or have moved and these steps need them."""
+        self.state = self.sensed()
+        objects = [variable for step in steps for variable in under_way.objects_of(self.problem, step)]
+        return [f"{name} is not seen" for name in self.unseen(self.left)] + self.moved(objects)
+
+    def unmet(self, step: Step) -> list[str]:
+        """Look at the state, and list the preconditions of a step that do not hold, but where the hand is."""
+        operator = self.plan.problem.domain.operator(step.operator)
+        needed = unmet(self.look().facts, operator, step.arguments)
+        return [reason for reason in needed if not reason.removeprefix("(not ").startswith(f"({under_way.HAND_AT} ")]
+
+    def attempt(self, problem: Problem, stop: _Stop | None) -> _Stop | None:
+        """Make the movement of the next steps, or the rest of one that was stopped; return where it was stopped."""
         how = "planned" if stop is None else "resumed"
-        how_to = self.options.frame, self.options.follow
         try:
             if stop is None:
-                movement = _movement(problem, step, self.library, self.robot, self.world.joints, how_to)
-                self.ways.append(_Way(_place(problem, step, 0), np.empty((0, self.robot.n_joints))))
+                self.problem = problem
+                movement, parts = self.planned(problem)
+                how = how if len(parts) == 1 else "joined"
+                objects = self.plan.problem.domain.vocabulary.of_kind("item", "fixture")
+                self.anchors = {each.name: position_of(each.columns, self.state) for each in objects}
+                self.ways.append(_Way(parts[0].place, np.empty((0, self.robot.n_joints))))
             else:
-                movement = self.along(stop.movement.trajectory, stop.sample)
-            watcher = self.options.watcher(step, movement) if stop is None else None
+                movement, sent = self.along(stop.movement.trajectory, stop.sample), stop.movement
+                shift = sent.trajectory.times[min(stop.sample, len(sent.trajectory) - _LEAST)] - sent.begins
+                parts = [part.at(shift, movement.factor) for part in stop.parts]
         except KinemeError as error:
-            self.attempts.append(Attempt(str(step), how, "refused", (str(error),), len(self.replans)))
+            step = (self.left if stop is None else [part.step for part in stop.parts])[0]
+            self.attempts.append(Attempt(str(step), how, "refused", (_refusal(error),), len(self.replans)))
             return None
-        sample = self.move(str(step), how, movement, watcher)
-        if sample is not None:
-            return _Stop(step, movement, sample)
-        self.options.done(step)
-        missing = _missing(self.look(), step)
-        if missing:
-            self.attempts[-1] = self.attempts[-1]._replace(status="no effect", reasons=tuple(missing))
-        return None
+        stop = self.move(how, movement, parts)
+        del self.left[: len(parts) - (len(stop.parts) if stop else 0)]
+        if stop is None:
+            self.options.done(parts[-1].step)
+            problem, effects = self.look(), dict[Fact, bool]()
+            for part in parts:
+                effects = facts_after(effects, problem.domain.operator(part.step.operator), part.step.arguments)
+            if missing := under_way.missing_effects(problem, effects):
+                self.attempts[-1] = self.attempts[-1]._replace(status="no effect", reasons=tuple(missing))
+        return stop
 
-    def move(self, step: str, how: str, movement: RobotMovement, watcher: Watcher | None = None) -> int | None:
-        """Execute a movement; where it is stopped, return the sample of its trajectory at which the arm stands."""
-        trajectory, reasons = movement.trajectory, list[str]()
-        times, tips = trajectory.times - movement.begins, kinematics(self.robot, trajectory.positions)[0]
+    def planned(self, problem: Problem) -> tuple[RobotMovement, list[Part]]:
+        """Return the movement of the next step or, where that is safe and takes no longer, of the next steps."""
+        options, joints = self.options, self.world.joints
+        parts, overlaps = list[Part](), list[float]()
+        for step in self.left[: under_way.n_joinable(problem, self.left) if options.join else 1]:
+            try:
+                alone = _movement(problem, step, self.library, self.robot, joints, (options.frame, options.follow))
+                watcher = options.watcher(step, alone)
+            except KinemeError:
+                if not parts:
+                    raise
+                break
+            if parts:
+                corner = _CORNER * problem.domain.vocabulary.radius
+                overlap = under_way.overlap_of(self.robot, parts[-1].alone.trajectory, alone.trajectory, corner)
+                if overlap is None:
+                    break
+                overlaps.append(overlap)
+            joints, lasts = alone.trajectory.positions[-1], alone.trajectory.duration - alone.begins
+            parts.append(Part(step, under_way.place_of(problem, step, 0), alone, watcher, 0.0, lasts))
+        return (self.joined(parts, overlaps) if overlaps else None) or (parts[0].alone, parts[:1])
 
-        def watch(t: float, tip: Array) -> bool:
-            off = float(np.linalg.norm(tip - [np.interp(t, times, column) for column in tips.T]))
-            if off > self.options.leeway:
-                reasons.append(f"the tip is {100 * off:.1f} cm from where it was sent, at {t:.2f} s")
-            elif t >= 0 and watcher is not None and (reason := watcher(t, tip)):
-                reasons.append(reason)
-            return bool(reasons)
+    def joined(self, parts: Sequence[Part], overlaps: Sequence[float]) -> tuple[RobotMovement, list[Part]] | None:
+        """Return the movement of several steps, and when each is made; None where it takes longer or is refused."""
+        trajectories = [part.alone.trajectory for part in parts]
+        times, positions, steps, begins = under_way.superposed(trajectories, overlaps)
+        try:
+            movement = self.in_joints(times, positions, steps)
+        except KinemeError:
+            return None
+        if movement.trajectory.duration > sum(trajectory.duration for trajectory in trajectories):
+            return None
+        begins = [-begin - part.alone.begins for part, begin in zip(parts, begins, strict=True)]
+        return movement, [part.at(begin, movement.factor) for part, begin in zip(parts, begins, strict=True)]
 
+    def move(self, how: str, movement: RobotMovement, parts: Sequence[Part] = ()) -> _Stop | None:
+        """Execute a movement, of steps or back; return where it was stopped."""
+        trajectory = movement.trajectory
+        watch = under_way.Watch(movement, parts, self.options, self.missing, self.unmet)
         run = self.world.run(movement, watch)
         self.runs.append(run)
         self.movements.append(movement)
         status, duration = "done" if run.stopped is None else "stopped", float(run.times[-1] - run.times[0])
-        self.attempts.append(Attempt(step, how, status, tuple(reasons), len(self.replans), duration, run.tip_error))
-        stands = len(trajectory) - 1
+        stands, times = len(trajectory) - 1, trajectory.times - movement.begins
         if run.stopped is not None:
             passed = (times >= run.stopped - _NEAR) & (times <= run.times[-1])
             away = np.linalg.norm(trajectory.positions - self.world.joints, axis=1)
             stands = int(np.argmin(np.where(passed, away, np.inf)))
-        if how != "back":
-            way = self.ways[-1]
-            self.ways[-1] = way._replace(
-                joints=np.vstack((way.joints, trajectory.positions[movement.first : stands + 1]))
-            )
-        return None if run.stopped is None else stands
+        names = " ".join(str(part.step) for part in parts) or "(back)"
+        self.attempts.append(
+            Attempt(names, how, status, tuple(watch.reasons), len(self.replans), duration, run.tip_error)
+        )
+        ends = [int(np.searchsorted(times, part.ends)) for part in parts[:-1]]
+        done = sum(end <= stands for end in ends)
+        watch.finish(done)
+        for k, joints in enumerate(np.split(trajectory.positions[: stands + 1], ends[:done]) if parts else ()):
+            if k:
+                self.ways.append(_Way(parts[k].place, joints))
+            else:
+                before, first = self.ways[-1], movement.first
+                self.ways[-1] = before._replace(joints=np.vstack((before.joints, joints[first:])))
+        return None if run.stopped is None else _Stop(list(parts[done:]), movement, stands)
 
     def along(self, trajectory: JointTrajectory, sample: int) -> RobotMovement:
         """Return the movement along the rest of what was sent before, with what the gripper does there."""
@@ -493,7 +521,7 @@ class _Executor:
                 if place in tried or place not in problem.places:
                     continue
                 tried.add(place)
-                there = _with_hand(problem, place)
+                there = under_way.with_hand(problem, place)
             try:
                 plan = self.options.replan(there)
             except KinemeError as error:
@@ -516,45 +544,11 @@ class _Executor:
         try:
             movement = self.in_joints(lengths[moves] / _SHARE, way[moves])
         except KinemeError as error:
-            self.attempts.append(Attempt("(back)", "back", "refused", (str(error),), len(self.replans)))
+            self.attempts.append(Attempt("(back)", "back", "refused", (_refusal(error),), len(self.replans)))
             return False
-        return self.move("(back)", "back", movement) is None
+        return self.move("back", movement) is None
 
 
-def _trouble(problem: Problem, steps: Sequence[Step]) -> str | None:
-    """Say why steps do not lead to the goal from the state of a problem; None if they do."""
-    lost = {name for step in steps for name in step.arguments.values()} - {*problem.objects}
-    if lost:
-        return f"{first_names(sorted(lost), 5)} cannot be found"
-    try:
-        check_plan(Plan(problem, tuple(steps), ""))
-    except SpecificationError as error:
-        return str(error)
-    return None
-
-
-def _may_go_on(problem: Problem, step: Step, steps: Sequence[Step]) -> bool:
-    """Tell whether nothing but the hand is elsewhere: from the first or the last place of its step all could go on."""
-    ends = ((_place(problem, step, 0), steps), (_place(problem, step, -1), steps[1:]))
-    return any(_trouble(_with_hand(problem, place), rest) is None for place, rest in ends)
-
-
-def _place(problem: Problem, step: Step, k: int) -> str:
-    """Return the name of one of the places of a step; nothing where it has none."""
-    places = problem.domain.operator(step.operator).places
-    return step.arguments[places[k].name] if places else ""
-
-
-def _with_hand(problem: Problem, place: str) -> Problem:
-    hands = {fact: fact[1] == place for fact in problem.facts if fact[0] == "hand-at"}
-    return replace(problem, facts={**problem.facts, **hands})
-
-
-def _missing(problem: Problem, step: Step) -> list[str]:
-    """List the effects of a step that are not seen."""
-    expected = facts_after({}, problem.domain.operator(step.operator), step.arguments)
-    return [
-        f"{Goal(fact, value)} is not {'so' if fact in problem.facts else 'known'}"
-        for fact, value in expected.items()
-        if problem.facts.get(fact) is not value
-    ]
+def _refusal(error: KinemeError) -> str:
+    """Return the words of an error with the options that there are here: the place is given by the plan."""
+    return _ELSEWHERE.sub(_HERE, str(error))
