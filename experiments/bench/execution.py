@@ -33,7 +33,7 @@ _SPREAD = np.array([0.06, 0.06, 0.01])  # in which an object stood about its pla
 _TODAY = 0.6  # of that in the runs: most of what is asked for then lies within what was shown
 _TIMEOUT = 5.0  # of a planner [s]
 _GOAL = "(and (in cup tray) (in mug shelf))"
-_MOVED = 0.05  # in x and in y, at most [m]
+_MOVED, _FAR = 0.05, 0.035  # in x and in y, at most; and so far that it is at another place [m]
 _NOISE = 0.001  # of measured positions [m]
 _REACHED, _MOST_DISTURBED = 0.9, 0.1
 
@@ -55,7 +55,7 @@ def _rows(domain: Domain, library: ActionLibrary, robot: Robot, quick: bool) -> 
         n_runs = few if quick else many
         fates: Counter[str] = Counter()
         kinds: Counter[str] = Counter()
-        errors, steps, replans = [], 0, 0
+        errors, seconds, steps, replans = [], list[float](), 0, 0
         for seed in range(n_runs):
             world = DisturbedWorld(robot, share, seed)
             try:
@@ -66,6 +66,7 @@ def _rows(domain: Domain, library: ActionLibrary, robot: Robot, quick: bool) -> 
             execution = execute(plan, library, world, robot, replan=planned)
             fates[fate(execution, world)] += 1
             kinds.update(kind for kind, _ in world.disturbances)
+            seconds += [sum(attempt.duration for attempt in execution.attempts)] if not world.disturbances else []
             errors += [run.tip_error for run in execution.runs if run.stopped is None]
             steps += len(execution.attempts)
             replans += len(execution.replans)
@@ -74,9 +75,34 @@ def _rows(domain: Domain, library: ActionLibrary, robot: Robot, quick: bool) -> 
                    "plans anew": replans}  # fmt: skip
         target = (">=", _REACHED) if share <= _MOST_DISTURBED else None
         yield Row(f"runs that reach their goal, or say what is gone; {name}", "", right, target=target, details=details)
+        if seconds:
+            yield Row(f"duration of a run without disturbance; {name}", "s", float(np.mean(seconds)))
         yield Row(
             f"tip off what was sent, median of movements to their end; {name}", "mm", 1e3 * float(np.median(errors))
         )
+    yield _stopped(domain, library, robot, 6 if quick else 60)
+
+
+def _stopped(domain: Domain, library: ActionLibrary, robot: Robot, n_runs: int) -> Row:
+    """Count the first movements of a plan, disturbed in their first third, that stop before they are half over."""
+    counts: Counter[str] = Counter()
+    for seed in range(n_runs):
+        world = DisturbedWorld(robot, 0.0, seed)
+        try:
+            plan = plan_in(world, domain)
+        except SpecificationError:
+            continue
+        kind, number = ("pushed", "moved", "gone")[seed % 3], seed // 3 % 2
+        world.next = (number, kind, plan.steps[number].arguments["to" if number else "item"])
+        execution = execute(plan, library, world, robot, replan=planned, most_replans=0)
+        if len(execution.runs) <= number:  # the plan was given up before
+            continue
+        movement, run = execution.movements[number], execution.runs[number]
+        half = 0.5 * movement.trajectory.duration - movement.begins
+        counts[f"{kind}: {'in time' if run.stopped is not None and run.stopped <= half else 'not'}"] += 1
+    share = sum(n for name, n in counts.items() if name.endswith("in time")) / counts.total()
+    what = "movements that stop before they are half over, disturbed in their first third"
+    return Row(what, "", share, target=(">=", _REACHED), details=dict(counts))
 
 
 def fate(execution: Execution, world: DisturbedWorld) -> str:
@@ -107,6 +133,7 @@ class DisturbedWorld:
         objects = {name: stands(place, self.random, _TODAY) for name, place in _STANDS.items()}
         self.simulation = Simulation(robot, objects, noise=_NOISE, seed=seed)
         self.share, self.disturbances = share, list[tuple[str, str]]()
+        self.next = (-1, "", "")  # number of a movement from now on, and what happens to which object in it
 
     @property
     def joints(self) -> Array:
@@ -117,27 +144,44 @@ class DisturbedWorld:
         """Return what the sensors say."""
         return self.simulation.state()
 
-    def run(self, movement: Any, watch: Callable[[float, Array], bool] | None = None) -> Run:
-        """Execute a movement, disturbed or not."""
-        if self.random.uniform() < self.share:
-            self.disturb(float(self.random.uniform(0.0, movement.trajectory.duration)))
-        return self.simulation.run(movement, watch)
+    def run(self, movement: Any, watch: Callable[[float, Array], bool]) -> Run:
+        """Execute a movement, disturbed or not: what happens is drawn when it happens."""
+        lasts, due, (number, kind, name) = movement.trajectory.duration, np.inf, self.next
+        if number == 0 or self.random.uniform() < self.share:
+            due = float(self.random.uniform(0.0, lasts / 3 if number == 0 else lasts)) - movement.begins
+        self.next = number - 1, kind, name
 
-    def disturb(self, at: float) -> None:
-        """Schedule one disturbance of a kind drawn at random."""
+        def watched(t: float, tip: Array) -> bool:
+            nonlocal due
+            if t >= due:
+                due = np.inf
+                if number == 0:
+                    self.happen(kind, name, _FAR)
+                else:
+                    self.disturb()
+            return watch(t, tip)
+
+        return self.simulation.run(movement, watched)
+
+    def disturb(self) -> None:
+        """Let something happen that is drawn at random."""
         free = self.free()
         kind = str(self.random.choice(["pushed", "moved", "gone"], p=[0.45, 0.45, 0.1])) if free else "pushed"
         among = {"pushed": ["tip"], "moved": free, "gone": [*_STANDS]}
-        name = str(self.random.choice(among[kind]))
+        self.happen(kind, str(self.random.choice(among[kind])))
+
+    def happen(self, kind: str, name: str, least: float = 0.0) -> None:
+        """Push the tip, take an object away, or move it so far at least in x and in y [m]."""
         self.disturbances.append((kind, name))
         if kind == "pushed":
             direction = self.random.normal(size=3)
-            self.simulation.push(self.random.uniform(15, 35) * direction / np.linalg.norm(direction), at)
+            self.simulation.push(self.random.uniform(15, 35) * direction / np.linalg.norm(direction))
         elif kind == "gone":
-            self.simulation.remove(name, at)
+            self.simulation.remove(name)
         else:
-            where = self.where(name) + self.random.uniform(-1, 1, 3) * (_MOVED, _MOVED, 0.0)
-            self.simulation.place(name, where, at)
+            way = self.random.uniform(-1, 1, 3) * (_MOVED, _MOVED, 0.0)
+            where = self.where(name) + np.sign(way) * np.maximum(np.abs(way), (least, least, 0.0))
+            self.simulation.place(name, where)
 
     def where(self, name: str) -> Array:
         """Return where an object is."""

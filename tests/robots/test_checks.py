@@ -185,3 +185,5 @@ def test_an_approach_takes_half_of_what_the_joints_can(tmp_path):
             np.gradient(made.positions, made.times, axis=0)[1:-1], made.velocities[1:-1], atol=1e-4
         )
         np.testing.assert_allclose(made.positions[[0, -1]], [[0, 0], end], atol=1e-12)
+    for rate, lasts in ((1000.0, 0.003), (100.0, 0.03), (1.0, 0.5)):  # where it stands already: four samples
+        assert approach(robot, np.zeros(2), np.full(2, 1e-7), rate).duration == pytest.approx(lasts)

@@ -142,7 +142,7 @@ def execute(  # noqa: PLR0913 - one parameter per option
     *,
     replan: Callable[[Problem], Plan] = find_plan,
     most_replans: int = 3,
-    leeway: float = 0.03,
+    leeway: float = 0.015,
     watcher: Callable[[Step, RobotMovement], Watcher] | None = None,
     done: Callable[[Step], object] | None = None,
     follow: str = "full",
@@ -175,7 +175,7 @@ def execute(  # noqa: PLR0913 - one parameter per option
         Returns a plan of a problem, or raises SpecificationError.
     most_replans : int, default 3
         Plans and continuations after the first one.
-    leeway : float, default 0.03
+    leeway : float, default 0.015
         The tip may be so far from what was sent [m].
     watcher : callable, optional
         Returns, of a step and its movement, what watches it; by default `monitored`. The rest of a movement that was
