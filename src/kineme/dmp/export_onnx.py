@@ -79,20 +79,21 @@ def onnx_model(primitive: Primitives, *, double: bool = False) -> bytes:
             "expected a movement that ends elsewhere than it starts in every dimension, which the original "
             'formulation divides by; learn with the "bio-inspired" one, or write a C header'
         )
+    ratio = _RATIOS.get(dmp.formulation)
     if dmp.formulation == "amplitude-scaled":
         learned = np.linalg.norm(learned, axis=1, keepdims=True)
-    unscaled = dmp.formulation not in _RATIOS or (learned <= CLOSED * primitive.extents.max()).all()
+        ratio = ratio if learned.item() > CLOSED * primitive.extents.max() else None
     number = np.float64 if double else np.float32
     text = _MODEL.format(
         kind="double" if double else "float",
         d=primitive.n_dims,
         N=dmp.n_basis,
         T=dmp.n_points,
-        ratio="ratio = Identity(ones)" if unscaled else _RATIOS[dmp.formulation],
+        ratio=ratio or "ratio = Identity(learned)",
     )
     model = parser.parse_model(text)
     constants = {"weights": primitive.scaled_weights, "velocity": primitive.velocities * primitive.durations[:, None]}
-    constants["ones" if unscaled else "learned"] = np.ones((1, 1)) if unscaled else learned
+    constants["learned"] = learned if ratio else np.ones((1, 1))
     for order in (0, 1):
         constants |= {
             f"Phi_{order}": response.Phi[order].T,
