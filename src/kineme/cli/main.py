@@ -16,6 +16,7 @@ from kineme.cli.audit import audit
 from kineme.cli.correct import correct
 from kineme.cli.discover import discover
 from kineme.cli.evaluate import evaluate, reproduce
+from kineme.cli.export import export
 from kineme.cli.features import features
 from kineme.cli.find import find
 from kineme.cli.gather import gather
@@ -92,7 +93,7 @@ def main() -> None:
 
 
 for command in (
-    anchor, annotate, audit, correct, discover, evaluate, features, find, gather, generate, move, inspect, learn,
-    library, operators, page, plan, recognize, reproduce, segment, serve, studio, why,
+    anchor, annotate, audit, correct, discover, evaluate, export, features, find, gather, generate, move, inspect,
+    learn, library, operators, page, plan, recognize, reproduce, segment, serve, studio, why,
 ):  # fmt: skip
     main.add_command(command)

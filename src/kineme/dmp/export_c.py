@@ -44,15 +44,18 @@ _TRANSITIONS = {
 
 #: Formulation -> C of what f is multiplied by for a new g - x0, `a`.
 _RATIOS = {
-    "original": """        if (${p}_learned[k] != 0)
+    "original": """\
+    for (k = 0; k < ${p}_dims; k++)
+        if (${p}_learned[k] != 0)
             ratio[k] = a[k] / ${p}_learned[k];
         else if (a[k] > ${p}_nothing || a[k] < -${p}_nothing)
             return 0; /* the demonstration ends where it starts in this dimension */
 """,
-    "amplitude-scaled": """        for (i = 0, sum = 0; i < ${p}_dims; i++)
-            sum += a[i] * a[i];
-        if (${p}_distance > 0)
-            ratio[k] = (${p}_real)sqrt(sum) / ${p}_distance;
+    "amplitude-scaled": """\
+    for (k = 0; k < ${p}_dims; k++)
+        sum += a[k] * a[k];
+    for (k = 0; k < ${p}_dims && ${p}_distance > 0; k++)
+        ratio[k] = (${p}_real)sqrt(sum) / ${p}_distance;
 """,
 }
 
@@ -178,9 +181,9 @@ static inline int ${p}_usable(${p}_real x)
 static inline int ${p}_aim(${p}_state *s, const ${p}_real *goal, const ${p}_real *velocity)
 {
     const ${p}_real remaining = (${p}_real)(1 - s->u) * (s->rate > 0 ? 1 / s->rate : s->tau);
-    ${p}_real g[$d], v[$d], a[$d], ratio[$d];
+    ${p}_real g[$d], v[$d], a[$d], ratio[$d]$sum;
     int k;
-$locals    for (k = 0; k < ${p}_dims; k++) {
+    for (k = 0; k < ${p}_dims; k++) {
         g[k] = goal ? goal[k] : s->goal[k];
         v[k] = velocity ? velocity[k] : 0;
         a[k] = g[k] + remaining * v[k] - s->start[k];
@@ -188,10 +191,8 @@ $locals    for (k = 0; k < ${p}_dims; k++) {
         if (!${p}_usable(g[k]) || !${p}_usable(v[k]) || !${p}_usable(a[k]))
             return 0;
     }
-    for (k = 0; k < ${p}_dims; k++) {
-$ratio        s->ratio[k] = ratio[k];
-    }
-    for (k = 0; k < ${p}_dims; k++) {
+$ratio    for (k = 0; k < ${p}_dims; k++) {
+        s->ratio[k] = ratio[k];
         s->goal[k] = g[k];
         s->drift[k] = v[k];
     }
@@ -337,13 +338,12 @@ def c_header(primitive: Primitives, name: str = "movement") -> str:
     side = 0 if abs(square) <= _CRITICAL * dmp.K else int(math.copysign(1, square))
     learned = primitive.goals[0] - primitive.starts[0]
     distance = float(np.linalg.norm(learned))
-    about = primitive.recorded_as
     text = Template(_HEADER).safe_substitute(
         coupling=_COUPLINGS[dmp.formulation],
         gate=_GATES[dmp.gating],
         transition=_TRANSITIONS[side],
         ratio=_RATIOS.get(dmp.formulation, ""),
-        locals=f"    {p}_real sum;\n    int i;\n" if dmp.formulation == "amplitude-scaled" else "",
+        sum=", sum = 0" if dmp.formulation == "amplitude-scaled" else "",
     )
     tables: dict[str, Any] = {
         "weights": primitive.scaled_weights[0].T,
@@ -376,7 +376,9 @@ def c_header(primitive: Primitives, name: str = "movement") -> str:
         fit=dmp.fit,
         stiffness=f"{dmp.K:g}",
         gating=dmp.gating,
-        columns=", ".join(re.sub(r"[^\w .()\[\]-]", "_", column, flags=re.ASCII) for column in exported_columns(primitive)),
+        columns=", ".join(
+            re.sub(r"[^\w .()\[\]-]", "_", column, flags=re.ASCII) for column in exported_columns(primitive)
+        ),
         tables="".join(_c_table(p, key, np.asarray(table)) for key, table in used.items()),
     )
 

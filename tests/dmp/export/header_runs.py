@@ -25,13 +25,14 @@ int run(int n, const double *place, const double *commands, double *states)
     enum { d = movement_dims };
     movement_state s;
     movement_real start[d], goal[d], velocity[d];
-    int i, k, used;
+    int i, k, used = 1;
     for (k = 0; k < d; k++) {
         start[k] = (movement_real)place[k];
         goal[k] = (movement_real)place[d + k];
     }
-    used = movement_start(&s, start, goal, (movement_real)place[2 * d]);
-    for (i = 0; used && i <= n; i++) {
+    if (!movement_start(&s, start, goal, (movement_real)place[2 * d]))
+        return 0;
+    for (i = 0; i <= n; i++) {
         for (k = 0; k < d; k++) {
             states[k] = (double)s.position[k];
             states[d + k] = (double)s.velocity[k];
@@ -48,7 +49,7 @@ int run(int n, const double *place, const double *commands, double *states)
                 goal[k] = (movement_real)commands[3 + k];
                 velocity[k] = (movement_real)commands[3 + d + k];
             }
-            used = movement_aim(&s, goal, commands[2] > 1 ? velocity : NULL);
+            used &= movement_aim(&s, goal, commands[2] > 1 ? velocity : NULL);
         }
         used &= movement_step(&s, (movement_real)commands[0]);
         commands += 3 + 2 * d;
