@@ -10,6 +10,7 @@ from commands import run
 import kineme
 from kineme.dmp import c_header
 from kineme.io.writing.write_movement import write_movement
+from kineme.library.grounding import learned_of
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +32,8 @@ def test_a_header_of_a_recording_moves(recording, tmp_path):
     if shutil.which("gcc") is None:
         pytest.skip("no C compiler")
     (tmp_path / "loop.c").write_text(
-        '#include "wave.h"\n#include <stdio.h>\nint main(void)\n{\n    wave_2_state s;\n    wave_2_start(&s, NULL, NULL, 0);\n'
+        '#include "wave.h"\n#include <stdio.h>\nint main(void)\n{\n    wave_2_state s;\n'
+        "    wave_2_start(&s, NULL, NULL, 0);\n"
         '    while (s.u < 1) wave_2_step(&s, 0.01);\n    printf("%.12g %.12g", s.position[0], s.position[1]);\n}\n'
     )
     subprocess.run(["gcc", "-std=c99", "loop.c", "-o", "loop", "-lm"], cwd=tmp_path, check=True)
@@ -49,7 +51,7 @@ def test_a_symbol_and_a_saved_primitive_are_the_same(demos, tmp_path):
     assert done.returncode == 0, done.stderr
     assert "cshape_step" in done.stdout
     with kineme.ActionLibrary(tmp_path / "actions") as actions:
-        primitive = actions.primitive("CShape")
+        primitive = learned_of(actions.store, "CShape").primitive
     assert (tmp_path / "symbol.h").read_text() == c_header(primitive, "CShape")
     primitive.save(tmp_path / "int.kineme")
     for name, words in (("int", []), ("grasp", ["--name", "grasp"])):
