@@ -18,8 +18,9 @@ from kineme.validation import Array
 _LONGEST_NAME = 40
 _WIDTH = 110  # of lines of tables
 _PER_GAP = 8  # Simpson intervals between neighboring centers; a control loop takes one a step
-_PER_TIME_CONSTANT = 6  # and for each time constant of the spring
+_PER_TIME_CONSTANT = 10  # and for each time constant of spring and phase
 _MOST_INTERVALS = 1e6  # in a duration, which a step may take at most
+_LARGEST_SINGLE = 1e15  # of all numbers in a header: squares, and products of two, are numbers of 32 bits
 _CRITICAL = 1e-12  # of K: K - (D / 2)^2 that is rounding
 
 #: Formulation -> C of the coupling at the phase s; see `FORMULATIONS`.
@@ -106,7 +107,7 @@ _HEADER = """\
 #include <stddef.h>
 
 #ifdef KINEME_FLOAT
-typedef float ${p}_real;
+${single}typedef float ${p}_real;
 static const ${p}_real ${p}_limit = 1e30f; /* of positions and rates */
 static inline ${p}_real ${p}_exp(${p}_real x) { return expf(x); }
 #else
@@ -188,7 +189,7 @@ static inline int ${p}_aim(${p}_state *s, const ${p}_real *goal, const ${p}_real
         v[k] = velocity ? velocity[k] : 0;
         a[k] = g[k] + remaining * v[k] - s->start[k];
         ratio[k] = 1;
-        if (!${p}_usable(g[k]) || !${p}_usable(v[k]) || !${p}_usable(a[k]))
+        if (!${p}_usable(v[k]) || !${p}_usable(a[k]))
             return 0;
     }
 $ratio    for (k = 0; k < ${p}_dims; k++) {
@@ -203,7 +204,7 @@ $ratio    for (k = 0; k < ${p}_dims; k++) {
 static inline int ${p}_start(${p}_state *s, const ${p}_real *start, const ${p}_real *goal, ${p}_real tau)
 {
     int k;
-    s->tau = tau > 0 ? tau : ${p}_tau;
+    s->tau = tau != 0 ? tau : ${p}_tau;
     s->rate = 1 / s->tau;
     s->tempo = 1;
     s->time = s->u = 0;
@@ -214,7 +215,7 @@ static inline int ${p}_start(${p}_state *s, const ${p}_real *start, const ${p}_r
         if (!${p}_usable(s->start[k]))
             return 0;
     }
-    if (!${p}_usable(s->tau) || !${p}_usable(s->rate) || !${p}_aim(s, goal ? goal : ${p}_g, NULL))
+    if (!(s->tau > 0) || !${p}_usable(s->tau) || !${p}_usable(s->rate) || !${p}_aim(s, goal ? goal : ${p}_g, NULL))
         return 0;
     for (k = 0; k < ${p}_dims; k++) {
         s->pace[k] = ${p}_v0[k];
@@ -326,11 +327,11 @@ def c_header(primitive: Primitives, name: str = "movement") -> str:
     """
     check_exported(primitive)
     dmp, p = primitive.dmp, c_name(name)
-    gaps = _PER_GAP * (dmp.n_basis - 1)
-    if not (intervals := max(gaps, _PER_TIME_CONSTANT * max(math.sqrt(dmp.K), 0.5 * dmp.D))) <= _MOST_INTERVALS:
+    fastest = max(math.sqrt(dmp.K), 0.5 * dmp.D, dmp.basis.phase.alpha)
+    if not (intervals := max(_PER_GAP * (dmp.n_basis - 1), _PER_TIME_CONSTANT * fastest)) <= _MOST_INTERVALS:
         raise SpecificationError(
-            f"expected a spring that {_MOST_INTERVALS:g} intervals in a duration can follow, got stiffness {dmp.K:g} "
-            f"and damping {dmp.D:g}; learn with a softer one"
+            f"expected a spring and a phase that {_MOST_INTERVALS:g} intervals in a duration can follow, got stiffness "
+            f"{dmp.K:g}, damping {dmp.D:g} and phase_end {dmp.phase_end:g}; learn with a softer spring, a later phase"
         )
     a, extent = 0.5 * dmp.D, float(primitive.extents.max())
     square = dmp.K - a * a
@@ -366,9 +367,11 @@ def c_header(primitive: Primitives, name: str = "movement") -> str:
         "distance": 0.0 if distance <= CLOSED * extent else distance,
         "intervals": intervals,
     }
+    largest = max(np.abs(table).max() for table in tables.values())
     used = {key: table for key, table in tables.items() if re.search(rf"\{{p\}}_{key}\b", text)}
     return Template(text).substitute(
         p=p,
+        single='#error "numbers of this movement need double precision"\n' if largest > _LARGEST_SINGLE else "",
         guard=p.upper(),
         d=primitive.n_dims,
         n=dmp.n_basis,

@@ -65,8 +65,8 @@ def assert_alike(primitive, commands, run, tolerance=1e-5, **place):
 SPECIFICATIONS = st.fixed_dictionaries(
     {"formulation": st.sampled_from(sorted(FORMULATIONS)), "gating": st.sampled_from(GATINGS)},
     optional={
-        "n_basis": st.integers(3, 60), "stiffness": st.sampled_from([10.0, 1000.0]),
-        "damping": st.sampled_from([5.0, 20.0, 50.0]), "phase_end": st.sampled_from([1e-4, 0.3]),
+        "n_basis": st.integers(3, 60), "stiffness": st.sampled_from([10.0, 1e4]),
+        "damping": st.sampled_from([5.0, 20.0, 50.0]), "phase_end": st.sampled_from([1e-5, 0.3]),
         "fit": st.just("forcing"), "overlap": st.sampled_from([0.05, 0.8]),
     },
 )  # fmt: skip
@@ -123,6 +123,28 @@ def test_what_cannot_be_used_changes_nothing(tmp_path):
         assert not used
         np.testing.assert_array_equal(states[1:], run(along)[1])
     assert not run(along, goal=primitive.goals[0] + [0.0, 1.0])[0]
+    for place in ({"tau": -1.0}, {"tau": np.nan}, {"tau": 1e-200}, {"start": [np.nan, 0.0]}, {"goal": [np.inf, 0.0]}):
+        assert not run(along, **place)[0]
+
+
+@needs_gcc
+def test_closed_movements_keep_their_size(tmp_path):
+    angle = np.linspace(0, 2 * np.pi, 80)
+    path = np.column_stack((np.cos(angle), np.sin(angle) + 0.01 * angle))
+    primitive = DMP("amplitude-scaled", n_basis=20).learn([Trajectory(angle / np.pi, path)])[0]
+    run, commands = compiled(primitive, tmp_path), commands_of(primitive, 0.05, "goal that is set")
+    assert_alike(primitive, commands, run, goal=primitive.goals[0] + 1.0)
+
+
+@needs_gcc
+def test_what_leads_out_of_the_range_of_numbers_is_not_done(tmp_path):
+    """In single precision, too, or there is no header."""
+    primitive = learned(2)
+    used, states = compiled(primitive, tmp_path)([Command(0.05)] * 40, goal=np.full(2, 9e149))
+    assert not used
+    assert np.isfinite(states).all()
+    assert "#error" not in c_header(primitive)
+    assert "#error" in c_header(learned(2, phase_end=1e-60))
 
 
 def test_numbers_read_back_exactly():
@@ -161,15 +183,15 @@ def test_names_become_identifiers(name):
 @needs_gcc
 def test_hostile_names_compile(tmp_path):
     """Several headers in one program, of columns with such names."""
-    times, columns = np.linspace(0, 1, 50), NAMES[:2] + NAMES[7:10]
+    times, columns = np.linspace(0, 1, 50), NAMES[:2] + NAMES[5:6] + NAMES[7:10]
     channels = tuple(Channel(name, "position", (name,)) for name in columns)
-    plain = Demonstrations.from_arrays([np.outer(times, np.arange(1.0, 6.0))], times=[times])
+    plain = Demonstrations.from_arrays([np.outer(times, np.arange(1.0, 7.0))], times=[times])
     demos = Demonstrations.of_movements(of_channels(plain.movements, channels))
     primitive, code = DMP(n_basis=5).learn(demos)[0], ""
     for i, name in enumerate(NAMES):
         text = c_header(primitive, name)
         assert "#error" not in text
-        assert "columns: int, __ _error _x_, a__ b, ___, __\n" in text
+        assert "columns: int, __ _error _x_, _, a__ b, ___, __\n" in text
         (tmp_path / f"{i}.h").write_text(text)
         code += f'#include "{i}.h"\n{c_name(name)}_state state{i};\n'
     options = [*WARNINGS, "-std=c99", "-trigraphs", "-fsyntax-only", "-xc", "-"]
