@@ -124,7 +124,9 @@ def test_what_cannot_be_used_changes_nothing(tmp_path):
         np.testing.assert_array_equal(states[1:], run(along)[1])
     assert not run(along, goal=primitive.goals[0] + [0.0, 1.0])[0]
     for place in ({"tau": -1.0}, {"tau": np.nan}, {"tau": 1e-200}, {"start": [np.nan, 0.0]}, {"goal": [np.inf, 0.0]}):
-        assert not run(along, **place)[0]
+        used, states = run(along, **place)
+        assert not used
+        assert not states.any()  # it has not started
 
 
 @needs_gcc
