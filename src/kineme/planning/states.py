@@ -5,7 +5,8 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 from typing import Any
@@ -18,8 +19,9 @@ from kineme.io.limits import check_expanded, read_limited
 from kineme.library.library import ActionLibrary
 from kineme.library.storage import read
 from kineme.movements.tables.columns import is_time
-from kineme.planning.skill import place_columns
+from kineme.planning.skill import is_gripper, place_columns
 from kineme.reporting.text import counted, first_names, text_in
+from kineme.units import split_head, unit_named
 from kineme.validation import Array
 
 HAND = "hand"
@@ -45,7 +47,8 @@ class States:
         Ids in the library.
     symbols : tuple of n str
     axes : tuple of k str
-        Coordinates of places; the columns ``hand_x`` ... are where the hand is.
+        Coordinates of places, ``x`` where the recordings have ``tip_x [mm]``; the columns ``hand_x`` ... are where the
+        hand is.
     columns : tuple of c str
     before, after : ndarray of shape (n, c)
         NaN is not known; of columns of words, the number of the word.
@@ -92,23 +95,29 @@ def states_of(library: ActionLibrary, table: str | Path | Mapping[str, Sequence[
         raise SpecificationError("expected a library with symbols that have movements; learn recordings with labels")
     ids = np.sort(ids)
     primitives = library.primitives(ids=ids)
-    places, axes, _ = place_columns(library.channels, primitives.n_dims)
+    places, names, units = place_columns(library.channels, primitives.n_dims)
+    axes = _axes(names)
     columns = [f"{HAND}_{axis}" for axis in axes]
     before, after = primitives.starts[:, places], primitives.goals[:, places]
-    discrete = [channel.columns[0] for channel in library.channels or () if channel.kind == "discrete"]
+    discrete = [
+        channel.columns[0] for channel in library.channels or ()
+        if channel.kind == "discrete" or (len(channel.columns) == 1 and is_gripper(channel.name)
+                                          and channel.name not in names)
+    ]  # fmt: skip
     if discrete:
         recorded = library.movements(ids=ids)
-        names = [column for channel in library.channels or () for column in channel.columns]
-        chosen = [names.index(column) for column in discrete]
+        heads = [column for channel in library.channels or () for column in channel.columns]
+        chosen = [heads.index(column) for column in discrete]
         before, after = (
             np.column_stack((moment, [movement.recorded[row, chosen] for movement in recorded]))
             for moment, row in ((before, 0), (after, -1))
         )
-        columns += discrete
+        columns += map(_column, discrete)
     words: dict[str, tuple[str, ...]] = {}
     if table is not None:
         cells, source = (_tables(Path(table)), str(table)) if isinstance(table, str | Path) else (table, "the table")
-        more, extra_before, extra_after, words = _matched(library, ids, _texts(cells), source, axes)
+        more, extra_before, extra_after, words = _matched(library, ids, _texts(cells), source)
+        _check_units(cells, dict(zip(axes, units, strict=True)))
         columns, before, after = _merged(columns, more, (before, after), (extra_before, extra_after))
     symbols = tuple(name or "" for name in read.names_of(library.store, ids))
     return States(ids, symbols, axes, tuple(columns), before, after, words)
@@ -180,15 +189,33 @@ def _value(text: str) -> float | str | None:
     return number if math.isfinite(number) else None
 
 
+def _axes(names: Sequence[str]) -> tuple[str, ...]:
+    """Return the axes of the columns of places, ``x`` of ``tip_x [mm]``, so that a table has ``cup_x``."""
+    words = [re.split(r"[_.\s]", _column(name))[-1] for name in names]
+    is_one_point = len({*words}) == len(words) and {*words} <= {"x", "y", "z"}
+    return tuple(words if is_one_point else map(_column, names))
+
+
 def _column(head: str) -> str:
     """Return the name of a column: a hand's own columns are those of the recordings, units in brackets are left out."""
-    name = head.partition("[")[0].strip().replace(" ", "_").replace(".", "_")
+    name = split_head(head)[0].strip().replace(" ", "_").replace(".", "_")
     stem, _, axis = name.rpartition("_")
-    return f"{HAND}_{axis}" if stem.lower() in _HANDS else name
+    axis = axis.lower() if axis in ("X", "Y", "Z") else axis
+    return f"{HAND}_{axis}" if stem.lower() in _HANDS else f"{stem}_{axis}" if stem else axis
+
+
+def _check_units(heads: Iterable[str], unit_of: Mapping[str, str | None]) -> None:
+    """Refuse a position in another unit than that of its axis in the recordings, where both are said."""
+    for head in heads:
+        unit, other = (unit_named(text or "") for text in (split_head(head)[1], unit_of.get(_column(head)[-1:])))
+        if unit is not None and other is not None and unit != other:
+            raise DataError(
+                f"expected {head} in the unit of the recordings, [{other.symbol}], got [{unit.symbol}]; convert the table"
+            )
 
 
 def _matched(
-    library: ActionLibrary, ids: NDArray[np.int64], cells: Mapping[str, list[str]], source: str, axes: Sequence[str]
+    library: ActionLibrary, ids: NDArray[np.int64], cells: Mapping[str, list[str]], source: str
 ) -> tuple[list[str], Array, Array, dict[str, tuple[str, ...]]]:
     """Return columns, states before and after (n, c), and words, of the rows that belong to each movement."""
     lower = {head.lower(): head for head in cells}

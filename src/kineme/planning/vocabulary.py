@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kineme.errors import SpecificationError
+from kineme.planning.skill import is_gripper
 from kineme.planning.states import HAND, State, States
 from kineme.reporting.text import first_names
 from kineme.validation import Array
@@ -31,7 +32,6 @@ Fact = tuple[str, ...]  # a predicate and its arguments
 
 _OWN = ("hand-at", "in", "clear", "holding", "hand-empty")  # predicates that are always there
 _TELLING = ("flag", "word", "gripper")  # kinds of variables that predicates come from
-_GRIPPERS = ("gripper", "grasp", "finger", "grip")
 _TRUE = {"true", "yes", "on", "open", "full", "1"}
 _FALSE = {"false", "no", "off", "closed", "empty", "0"}
 _MOST_WORDS = 12  # different words of a column, at most; more are names or notes
@@ -133,6 +133,9 @@ def vocabulary_of(states: States, radius: float | None = None) -> Vocabulary:
         variable = _said(
             column, np.concatenate((states.before[:, k], states.after[:, k])), states.words.get(column), names
         )
+        if (stem := column.rpartition("_"))[2] in states.axes and stem[0] and column not in states.words:
+            others = ", ".join(f"{stem[0]}_{axis}" for axis in states.axes)
+            variable = f"a position has all of {others}"
         if isinstance(variable, str):
             left_out[column] = variable
         else:
@@ -183,7 +186,7 @@ def _said(column: str, values: Array, words: tuple[str, ...] | None, objects: Se
         return "nothing is known of it"
     if words is not None:
         return _said_in_words(name, column, owner, words)
-    kind = "gripper" if any(part in column.lower() for part in _GRIPPERS) else "flag"
+    kind = "gripper" if is_gripper(column) else "flag"
     low, high = float(levels[0]), float(levels[-1])
     if low == high:
         if kind == "gripper" or low not in (0.0, 1.0):
