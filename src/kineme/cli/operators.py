@@ -114,6 +114,9 @@ def _text(domain: Any, written: list[str], kinds_in_words: Any) -> str:
         lines += [f"  note  {text}" for text in operator.cannot_tell]
     vocabulary = domain.vocabulary
     lines.append(f"a place is what lies within {vocabulary.radius:.3g} of its position")
+    kinds = {kind for operator in domain.operators for each in operator.parameters for kind in each.kinds}
+    if vocabulary.fixtures + vocabulary.items and not any(kinds):
+        lines.append("the hand is at no object in any movement: are positions in the frame and unit of the recordings?")
     lines += [f"column {name} is left out: {why}" for name, why in vocabulary.left_out.items()]
     never = sorted({row.predicate for operator in domain.operators for row in operator.evidence if not row.varied})
     if never:

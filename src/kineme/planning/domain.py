@@ -273,7 +273,7 @@ def read_domain(path: str | Path) -> Domain:
 def _operator_from(data: Mapping[str, Any]) -> Operator:
     records = {"parameters": Parameter, "preconditions": Literal, "effects": Literal, "evidence": Evidence}
     return _record(
-        Operator, data | {part: tuple(_record(of, row) for row in data[part]) for part, of in records.items()}
+        Operator, {**data} | {part: tuple(_record(of, row) for row in data[part]) for part, of in records.items()}
     )
 
 
@@ -319,7 +319,7 @@ def check_positions(axes: Sequence[str], positions: Iterable[ArrayLike]) -> None
     """Refuse positions that are not one finite number for each axis, with a ValueError."""
     for where in positions:
         if np.shape(where) != (len(axes),) or not np.isfinite(where).all():
-            raise ValueError(f"the position {where} is not one finite number for each of {', '.join(axes)}")
+            raise ValueError(f"the position {where!r} is not one finite number for each of {', '.join(axes)}")
 
 
 def operator_schema(domain: Domain, operator: Operator) -> dict[str, Any]:

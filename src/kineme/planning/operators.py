@@ -317,7 +317,7 @@ def _regularity(counts: NDArray[np.int_], error_rate: float) -> tuple[bool | Non
     needed = next(
         (value for value in (False, True) if _accepts(int(counts[int(not value)].sum()), n, error_rate)), None
     )
-    return needed, mostly, bool(error_rate > 0 and kept[mostly] >= _MOSTLY * n)
+    return needed, mostly, bool(kept[mostly] >= (_MOSTLY if error_rate > 0 else 1.0) * n)
 
 
 def _parameter(role: str, pairs: Sequence[tuple[Example, Mapping[str, str]]], fixtures: set[str]) -> Parameter:

@@ -59,9 +59,7 @@ class Names:
                 types = tuple(kinds.get(name, "unknown") for name in literal.arguments)
                 if self.types.setdefault(literal.predicate, types) != types or "unknown" in types:
                     expected = " ".join((literal.predicate, *self.types[literal.predicate]))
-                    raise SpecificationError(
-                        f"expected ({expected}) in {operator.name}, got {literal}; change its PDDL"
-                    )
+                    raise SpecificationError(f"expected ({expected}) in {operator.name}, got {literal}")
         self.predicates = identifiers(self.types)
         self.operators = identifiers((operator.name for operator in domain.operators), self.predicates.values())
         prefix = "shown"

@@ -420,10 +420,12 @@ def _why_not(
         return reason
     if not ways or not depth:
         state = "is not known" if goal.fact not in problem.facts else "does not hold now"
-        return state if ways else f"{state}, and no operator that was shown changes that"
+        effects = {each[::2] for operator in problem.domain.operators if operator.usable for each in operator.effects}
+        is_changed = (goal.fact[0], goal.value) in effects
+        return state if is_changed else f"{state}, and no operator that was shown changes that"
     lacking = [[Goal(*each) for each in _ground(*pair) if each not in possible] for pair in _needs(ways)]
     k = min(range(len(ways)), key=lambda k: len(lacking[k]))
-    others = [pair for pair in left if pair is not ways[k]]
+    others = [pair for pair in left if pair[0] is not ways[k][0]]  # no round trips
     first = min(lacking[k], key=lambda each: each.fact in problem.facts)  # what is not known comes first
     name = f"({' '.join((ways[k][0].name, *ways[k][1].values()))})"
     return f"needs {name}; {first} {_why_not(problem, first, possible, others, depth - 1)}"

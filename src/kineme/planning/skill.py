@@ -97,7 +97,7 @@ def skill_of(library: ActionLibrary, who: str) -> Skill:
 
 
 def place_columns(channels: Channels | None, n_dims: int) -> tuple[list[int], tuple[str, ...], tuple[str | None, ...]]:
-    """Return the coordinates that are places, their names and their units: positions, else all that move; no gripper."""
+    """Return the coordinates that are places, their names and their units: positions, or all but grippers."""
     if channels is None:
         return (
             list(range(n_dims)),

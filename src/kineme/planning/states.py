@@ -173,8 +173,11 @@ def _read(path: Path) -> dict[str, list[str]]:
 
 
 def _texts(cells: Mapping[str, Sequence[Any]]) -> dict[str, list[str]]:
+    if len({0 if isinstance(column, str) else np.size(column) for _, column in cells.items()}) > 1:
+        raise DataError("expected columns of states that are equally long, a value in each for every moment")
     return {
-        str(head): ["" if value is None else str(value).strip() for value in column] for head, column in cells.items()
+        str(head): ["" if value is None else str(value).strip() for value in np.atleast_1d(np.asarray(column, object))]
+        for head, column in cells.items()
     }
 
 
@@ -210,7 +213,7 @@ def _check_units(heads: Iterable[str], unit_of: Mapping[str, str | None]) -> Non
         unit, other = (unit_named(text or "") for text in (split_head(head)[1], unit_of.get(_column(head)[-1:])))
         if unit is not None and other is not None and unit != other:
             raise DataError(
-                f"expected {head} in the unit of the recordings, [{other.symbol}], got [{unit.symbol}]; convert the table"
+                f"expected {head} in the unit of the recordings, [{other.symbol}], got [{unit.symbol}]; convert it"
             )
 
 

@@ -120,11 +120,11 @@ def vocabulary_of(states: States, radius: float | None = None) -> Vocabulary:
     variables: list[Variable] = []
     left_out: dict[str, str] = {}
     ways = {name: np.linalg.norm(where[1] - where[0], axis=1) for name, where in objects.items()}
-    move = {kind_of(name) for name, way in ways.items() if np.nanmax(np.append(way, 0.0)) > near}
+    move = {kind_of(name) for name, way in ways.items() if (way > near).any()}
     for name, where in objects.items():
         kind = "item" if kind_of(name) in move else "fixture"
-        stood = np.nanmedian(where.reshape(-1, len(states.axes)), axis=0)
-        typical = tuple(stood.tolist()) if kind == "fixture" and np.isfinite(stood).all() else ()
+        stood = where[np.isfinite(where).all(axis=2)]
+        typical = tuple(np.median(stood, axis=0).tolist()) if kind == "fixture" and len(stood) else ()
         variables.append(Variable(name, kind, positions[name], typical=typical))
     names = sorted(objects, key=len, reverse=True)
     for column, k in columns.items():
@@ -157,11 +157,9 @@ def _columns(states: States, moment: Array, names: Sequence[str]) -> Array:
 def _radius(ends: Array, objects: list[Array]) -> float:
     """Return the distance that parts near from far: the largest ratio of neighbors among the distances."""
     everything = np.vstack([ends, *objects])
-    diagonal = float(np.linalg.norm(np.nanmax(everything, axis=0) - np.nanmin(everything, axis=0)))
+    diagonal = float(np.linalg.norm(np.fmax.reduce(everything) - np.fmin.reduce(everything)))
     if objects:
-        distances = np.nanmin(
-            np.concatenate([np.linalg.norm(ends - where, axis=1)[:, None] for where in objects], axis=1), axis=1
-        )
+        distances = np.fmin.reduce([np.linalg.norm(ends - where, axis=1) for where in objects])
     else:
         some = ends[np.linspace(0, len(ends) - 1, min(len(ends), 300)).astype(int)]
         distances = np.linalg.norm(some[:, None] - some[None], axis=2)[np.triu_indices(len(some), 1)]
