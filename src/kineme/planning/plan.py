@@ -428,7 +428,8 @@ def _why_not(
     others = [pair for pair in left if pair[0] is not ways[k][0]]  # no round trips
     first = min(lacking[k], key=lambda each: each.fact in problem.facts)  # what is not known comes first
     name = f"({' '.join((ways[k][0].name, *ways[k][1].values()))})"
-    return f"needs {name}; {first} {_why_not(problem, first, possible, others, depth - 1)}"
+    reason = _why_not(problem, first, possible, others, depth - 1)
+    return f"needs {name}; {Goal(first.fact) if reason.startswith('is not known') else first} {reason}"
 
 
 def _needs(ways: Sequence[tuple[Operator, dict[str, str]]]) -> list[tuple[Sequence[Literal], dict[str, str]]]:
