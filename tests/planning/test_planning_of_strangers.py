@@ -5,13 +5,12 @@ from __future__ import annotations
 import copy
 import json
 import re
+import time
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import tea_states as tea
-from hypothesis import given
-from hypothesis import strategies as st
 
 import kineme
 from kineme import ActionLibrary
@@ -37,6 +36,8 @@ from kineme.planning import (
 )
 from kineme.planning.figure import paths_of_plan
 from kineme.planning.operators import operators_of
+from kineme.planning.plan import shown_arguments
+from kineme.planning.states import States
 
 
 def _library(folder, heads, width=None):
@@ -207,15 +208,17 @@ DOMAIN = domain_to_dict(tea.domain(2))
 ODD = [None, 5, "text", [], {}, [[]], float("nan"), True, -1, 10**400, ["a", "b"], [1, 2, 3], [None]]
 
 
-@given(st.sampled_from([path for path in _leaves(DOMAIN) if path]), st.sampled_from(ODD))
-def test_a_damaged_domain_is_refused_or_still_works(path, value):
-    try:
-        domain = domain_from_dict(_changed(DOMAIN, path, value))
-        domain_to_behavior_tree(domain)
-        problem_of(domain, tea.now(), "(sweet cup)")
-        json.dumps([domain_to_dict(domain), [operator_schema(domain, each) for each in domain.operators]])
-    except KinemeError:
-        pass
+@pytest.mark.parametrize("value", ODD, ids=range(len(ODD)))
+def test_a_damaged_domain_is_refused_or_still_works(value):
+    for path in [path for path in _leaves(DOMAIN) if path]:
+        try:
+            domain = domain_from_dict(_changed(DOMAIN, path, value))
+            domain_to_behavior_tree(domain)
+            domain_to_pddl(domain)
+            shown_arguments(problem_of(domain, tea.now(), "(sweet cup)"))
+            json.dumps([domain_to_dict(domain), [operator_schema(domain, each) for each in domain.operators]])
+        except KinemeError:
+            pass
 
 
 @pytest.mark.parametrize("value", [5, None, [1.0, None], [1.0], [10**400, 0.0], float("nan")])
@@ -225,20 +228,21 @@ def test_a_plan_with_a_damaged_place_is_refused(value):
         plan_from_dict(_changed(plan_to_dict(find_plan(problem)), ("places", "cup"), value))
 
 
-def test_many_places_are_the_means_of_their_visits():
-    states = tea.states(20)
-    domain = operators_of(states, np.full(len(states), 2.0), {})
-    homes = states.before[[symbol == "reach" for symbol in states.symbols], :2][::2]
-    assert sum(np.allclose(where, tea.PLACES["home"], atol=0.2) for where in domain.places.values()) >= 1
-    assert all(
-        np.linalg.norm(homes - where, axis=1).min() < domain.vocabulary.radius for where in domain.places.values()
-    )
+def test_thousands_of_movements_to_as_many_places_take_seconds():
+    random, n = np.random.default_rng(0), 4000
+    ends = random.uniform(0, 1, (2, n, 2))
+    ends[:, : n // 2] = random.normal(0.5, 0.001, (2, n // 2, 2))
+    states = States(np.arange(n), ("go",) * n, ("x", "z"), ("hand_x", "hand_z"), ends[0], ends[1], {})
+    began = time.process_time()
+    domain = operators_of(states, np.ones(n), {}, radius=0.01)
+    assert time.process_time() - began < 15  # 0.8 here, and a minute where each place is compared with each
+    assert len(domain.places) == 60
+    assert np.allclose(domain.places["place-1"], 0.5, atol=0.001)  # the mean of most visits
 
 
 def test_why_a_goal_is_not_reached_names_each_operator_once():
-    pytest.importorskip("unified_planning")
-    domain = tea.domain()
-    with pytest.raises(SpecificationError) as caught:
-        find_plan(problem_of(domain, tea.now(spoon_full=1.0, hand_x=3.0), "(and (sweet cup) (sweet mug))"))
-    chain = re.findall(r"needs \((\w+)", str(caught.value).partition("(sweet mug)")[0])
-    assert len(chain) == len({*chain}) > 0
+    now = tea.now()
+    del now["spoon_full"]
+    with pytest.raises(SpecificationError, match="is not known") as caught:
+        find_plan(problem_of(tea.domain(), now, "(sweet cup)"))
+    assert re.findall(r"needs \((\w+)", str(caught.value)) == ["stir", "scoop"]

@@ -248,6 +248,10 @@ def domain_from_dict(data: Any) -> Domain:
         words = data["vocabulary"]
         variables = tuple(_record(Variable, variable) for variable in words["variables"])
         vocabulary = _record(Vocabulary, words | {"variables": variables})
+        for each in variables:
+            n = len(vocabulary.axes) if each.kind in ("fixture", "item") else 1
+            if len(each.columns) != n or (each.kind == "flag" and len(each.words) not in (0, 2)):
+                raise ValueError(f"{each.name} has {len(each.columns)} columns and {len(each.words)} words")
         operators = tuple(_operator_from(operator) for operator in data["operators"])
         places = {name: tuple(map(float, where)) for name, where in data["places"].items()}
         edits = tuple(_record(Edit, edit | {"literal": _record(Literal, edit["literal"])}) for edit in data["edits"])
