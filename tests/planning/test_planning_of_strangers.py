@@ -246,3 +246,23 @@ def test_why_a_goal_is_not_reached_names_each_operator_once():
     with pytest.raises(SpecificationError, match="is not known") as caught:
         find_plan(problem_of(tea.domain(), now, "(sweet cup)"))
     assert re.findall(r"needs \((\w+)", str(caught.value)) == ["stir", "scoop"]
+
+
+def test_a_folder_with_a_folder_for_each_label_is_read_and_equal_names_are_told_apart(tmp_path):
+    with _library(tmp_path, "x,y,z") as library:
+        ids = np.concatenate([symbol.members for symbol in library.symbols()])
+    (tmp_path / "actions").rename(tmp_path / "other")
+    for label, value in (("go", 0), ("back", 1)):
+        for k in range(3):
+            (tmp_path / label / f"{label}{k}.csv").rename(tmp_path / label / f"{k}.csv")
+        (tmp_path / "states" / label).mkdir(parents=True)
+        for k in range(3):
+            table = f"t,lid\n0,{value}\n2,{value}\n"
+            (tmp_path / "states" / label / f"{k}.csv").write_text(table)
+    demonstrations = kineme.read_recordings([tmp_path / "go", tmp_path / "back"])
+    with ActionLibrary(tmp_path / "actions", create=True) as library:
+        library.learn(demonstrations, ["go"] * 3 + ["back"] * 3)
+        states = states_of(library, tmp_path / "states")
+    assert len(states) == len(ids)
+    lid = states.before[:, states.columns.index("lid")]
+    assert [int(value) for value in lid] == [int(symbol == "back") for symbol in states.symbols]

@@ -78,10 +78,11 @@ def states_of(library: ActionLibrary, table: str | Path | Mapping[str, Sequence[
     ----------
     library : ActionLibrary
     table : str, Path, or mapping of column to n values (as a data frame), optional
-        A file in CSV, or a folder of such files, as the recordings themselves, with a row for each moment. Either with
-        the columns ``movement`` (id, or file) and ``moment`` (before or after); or with ``time``, in the clock of the
-        recordings, and ``file`` where there are several: the state before is the last row up to a movement's start, the
-        one after the first row from its end on, each within a twentieth of its duration. Empty cells are not known.
+        A file in CSV, or a folder of such files, also in folders of it, as the recordings themselves, with a row for
+        each moment. Either with the columns ``movement`` (id, or file) and ``moment`` (before or after); or with
+        ``time``, in the clock of the recordings, and ``file`` where there are several: the state before is the last row
+        up to a movement's start, the one after the first row from its end on, each within a twentieth of its duration.
+        Empty cells are not known.
 
     Raises
     ------
@@ -138,12 +139,15 @@ def _tables(path: Path) -> dict[str, list[str]]:
     """Read a table, or those of a folder one below the other: the column ``file`` then says which, if none does."""
     if not path.is_dir():
         return _read(path)
-    tables = [(each, _read(each)) for each in sorted(path.glob("*.csv"))]
+    tables = [(each, _read(each)) for each in sorted(path.rglob("*.csv"))]
     if not tables:
         raise DataError(f"expected tables of states, .csv files, in {path}, got none")
     heads = dict.fromkeys(head for _, cells in tables for head in cells)
     if not any(head.lower() in _MOVEMENTS for head in heads):
-        tables = [(each, cells | {"file": [each.name] * len(next(iter(cells.values())))}) for each, cells in tables]
+        tables = [
+            (each, cells | {"file": [str(each.relative_to(path))] * len(next(iter(cells.values())))})
+            for each, cells in tables
+        ]
         heads["file"] = None
     return {
         head: [text for _, cells in tables for text in cells.get(head, [""] * len(next(iter(cells.values()))))]
@@ -278,16 +282,27 @@ def _rows_by_time(
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     who, _, time = heads
     clock = np.array([_number(text, time) for text in cells[time]])
-    files = np.array([PurePath(text).stem for text in cells[who]] if who else [""] * len(clock))
-    rows_of = {name: np.flatnonzero(files == name) for name in dict.fromkeys(files.tolist())}
+    rows_of: dict[PurePath, list[int]] = {}
+    for row, text in enumerate(cells[who] if who else [""] * len(clock)):
+        rows_of.setdefault(PurePath(text.removesuffix(PurePath(text).suffix)), []).append(row)
+    files: dict[str, list[PurePath]] = {}
+    for file in rows_of:
+        files.setdefault(file.name, []).append(file)
     before, after = np.full((2, len(ids)), -1)
     for i, record in enumerate(read.records(library.store, ids)):
-        own = PurePath(record["name"] or "").stem
-        # Pieces of a recording are called by its name and a number.
-        name = max((name for name in rows_of if own == name or own.startswith(name)), key=len, default=None)
+        own = PurePath(record["name"] or "")
+        name: str | None = own.stem
+        if name not in files:  # pieces of a recording are called by its name and a number
+            name = max((name for name in files if own.stem.startswith(name)), key=len, default=None)
         if name is None:
             continue
-        rows = rows_of[name][np.argsort(clock[rows_of[name]], kind="stable")]
+        several = [file for file in files[name] if file.parent.name == own.parent.name] or files[name]
+        if len(several) > 1:
+            raise DataError(
+                f"expected one recording called {name} in the table of states, got {first_names(several, 3)}"
+            )
+        rows = np.array(rows_of[several[0]])
+        rows = rows[np.argsort(clock[rows], kind="stable")]
         times, start, end = clock[rows], record["t0"], record["t0"] + record["duration"]
         slack = 1e-6 * max(1.0, abs(end)) + _NEAR * record["duration"]
         first = int(np.searchsorted(times, start + slack)) - 1
