@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import itertools
+import json
 import tempfile
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -501,3 +503,12 @@ def plan_from_dict(data: Any) -> Plan:
     plan = Plan(Problem(domain, places, facts, goals), steps, str(data.get("planner", "")))
     check_plan(plan)
     return plan
+
+
+def read_plan(path: str | Path) -> Plan:
+    """Return the plan in a JSON file; see `plan_from_dict`."""
+    try:
+        data = json.loads(Path(path).read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as error:
+        raise DataError(f"expected a plan in JSON, {path} is none: {error}") from error
+    return plan_from_dict(data)
