@@ -266,3 +266,11 @@ def test_a_folder_with_a_folder_for_each_label_is_read_and_equal_names_are_told_
     assert len(states) == len(ids)
     lid = states.before[:, states.columns.index("lid")]
     assert [int(value) for value in lid] == [int(symbol == "back") for symbol in states.symbols]
+
+
+def test_a_recording_without_a_table_takes_none_of_a_similar_name(tmp_path):
+    with _library(tmp_path, "x,y,z") as library:
+        table = {"time": [0, 2, 0, 2], "file": ["go1", "go1", "bac", "bac"], "lid": [0, 1, 0, 1]}
+        states = states_of(library, table)
+    known = np.isfinite(states.before[:, states.columns.index("lid")])
+    assert known.sum() == 1

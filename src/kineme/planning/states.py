@@ -291,9 +291,9 @@ def _rows_by_time(
     before, after = np.full((2, len(ids)), -1)
     for i, record in enumerate(read.records(library.store, ids)):
         own = PurePath(record["name"] or "")
-        name: str | None = own.stem
-        if name not in files:  # pieces of a recording are called by its name and a number
-            name = max((name for name in files if own.stem.startswith(name)), key=len, default=None)
+        # Pieces of a recording are called by its name, a mark and a number: monday-003 is of monday, m10 not of m1.
+        starts = (own.stem[:n] for n in range(len(own.stem), -1, -1) if not (n and own.stem[n : n + 1].isalnum()))
+        name = next((start for start in starts if start in files), None)
         if name is None:
             continue
         several = [file for file in files[name] if file.parent.name == own.parent.name] or files[name]
