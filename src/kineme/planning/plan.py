@@ -375,6 +375,7 @@ def check_plan(plan: Plan) -> None:
     Raises
     ------
     SpecificationError
+        The first such step with all reasons, or the goals that are missed.
     """
     domain, facts = plan.problem.domain, dict(plan.problem.facts)
     for number, step in enumerate(plan.steps, 1):
@@ -425,17 +426,14 @@ def _why_not(
         effects = {each[::2] for operator in problem.domain.operators if operator.usable for each in operator.effects}
         is_changed = (goal.fact[0], goal.value) in effects
         return state if is_changed else f"{state}, and no operator that was shown changes that"
-    lacking = [[Goal(*each) for each in _ground(*pair) if each not in possible] for pair in _needs(ways)]
+    needs_of = [_ground(operator.preconditions, arguments) for operator, arguments in ways]
+    lacking = [[Goal(*each) for each in literals if each not in possible] for literals in needs_of]
     k = min(range(len(ways)), key=lambda k: len(lacking[k]))
     others = [pair for pair in left if pair[0] is not ways[k][0]]  # no round trips
     first = min(lacking[k], key=lambda each: each.fact in problem.facts)  # what is not known comes first
     name = f"({' '.join((ways[k][0].name, *ways[k][1].values()))})"
     reason = _why_not(problem, first, possible, others, depth - 1)
     return f"needs {name}; {Goal(first.fact) if reason.startswith('is not known') else first} {reason}"
-
-
-def _needs(ways: Sequence[tuple[Operator, dict[str, str]]]) -> list[tuple[Sequence[Literal], dict[str, str]]]:
-    return [(operator.preconditions, arguments) for operator, arguments in ways]
 
 
 def _not_shown(problem: Problem, goal: Goal, possible: set[tuple[Fact, bool]], lacking_most: int) -> str:
