@@ -7,6 +7,7 @@ further names of these, so that ten million movements take the room of two hundr
 from __future__ import annotations
 
 import os
+import shutil
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -21,6 +22,7 @@ from bench.work_sets import work_episodes, write_set
 _IN_A_FILE, _DISTINCT, _SAMPLES = 20_000, 10, 100
 _MEMORY = 1024.0  # MB of a worker, at most
 _FILES = 100_000
+_MOST_WRITTEN = 1_000_000  # movements whose parts are on the disk: of ten million they are 30 GB
 _SMALL = 1  # MiB of a piece of the data set, so that there are several
 
 
@@ -76,29 +78,41 @@ def _by_processes(counts: tuple[int, int]) -> Iterator[Row]:
 
 
 def _by_movements(counts: tuple[int, ...]) -> Iterator[Row]:
-    """Processor time of inspecting archives of more and more movements, and how far from a line it is."""
-    taken: dict[int, Cost] = {}
+    """Processor time of commands over archives of more and more movements, and how far from a line it is."""
     with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
         rng = np.random.default_rng(0)
         originals = []
         for k in range(_DISTINCT):
             steps = rng.normal(size=(_IN_A_FILE, _SAMPLES, 2)).astype(np.float32)
-            path = Path(name) / f"original{k}.npz"
+            path = folder / f"original{k}.npz"
             labels = np.array([f"kind {j % 20}" for j in range(_IN_A_FILE)])
             np.savez(path, positions=steps.cumsum(axis=1), labels=labels)
             originals.append(path)
         for count in counts:
-            folder = Path(name) / str(count)
-            folder.mkdir()
+            (folder / str(count)).mkdir()
             for k in range(count // _IN_A_FILE):
-                os.link(originals[k % _DISTINCT], folder / f"{k:06d}.npz")
-            taken[count] = _run("inspect", folder, "--units", 0.01, "-o", f"{folder}-out", "--workers", 2)
+                os.link(originals[k % _DISTINCT], folder / str(count) / f"{k:06d}.npz")
+        yield from _of_counts(folder, "inspect", counts)
+        _run("learn", originals[0], "--units", 0.01, "--library", folder / "actions")
+        written = tuple(count for count in counts if count <= _MOST_WRITTEN)
+        yield from _of_counts(folder, "features", written, "--library", folder / "actions")
+        yield from _of_counts(folder, "learn", written, "--library", folder / "learned")
+
+
+def _of_counts(folder: Path, command: str, counts: tuple[int, ...], *options: object) -> Iterator[Row]:
+    """The same of one command, whose parts are removed again."""
+    taken: dict[int, Cost] = {}
+    for count in counts:
+        output = folder / f"{command}-{count}"
+        taken[count] = _run(command, folder / str(count), *options, "--units", 0.01, "-o", output, "--workers", 2)
+        shutil.rmtree(output)
     small, *_, large = counts
     slope = (taken[large].seconds - taken[small].seconds) / (large - small)
     for count, cost in taken.items():
         line = taken[small].seconds + slope * (count - small)
         details = {"movements": count, "of_the_line": cost.seconds / line - 1.0}
-        yield Row(f"inspect {count:,} movements, two workers", "s of processors", cost.seconds, details=details)
+        yield Row(f"{command} {count:,} movements, two workers", "s of processors", cost.seconds, details=details)
         yield Row("  memory of a process", "MB", cost.memory, target=("<=", _MEMORY))
     rate = taken[large].seconds / large / (taken[counts[-2]].seconds / counts[-2])
     yield Row("  per movement, of that of the archive before", "x", rate, target=("<=", 1.05))

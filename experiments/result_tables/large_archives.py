@@ -11,6 +11,7 @@ from result_tables.measured import DOCS, rows
 PAGE = DOCS / "guide" / "large-archives.md"
 _COUNTS = tuple(10**k for k in range(4, 10))
 _DAY = 86_400.0  # s
+_OF_A_DAY = ("inspect [core-s]", "learn [core-s]", "nearest of all, one [core-s]")
 
 
 class Law(NamedTuple):
@@ -45,7 +46,7 @@ def tables() -> dict[str, str]:
     lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
     for count in _COUNTS:
         cells = [_cell(law, count, name) for name, law in laws.items()]
-        seconds = sum(law.at(count) for name, law in laws.items() if name.endswith("[core-s]"))
+        seconds = sum(laws[name].at(count) for name in _OF_A_DAY)
         lines.append(f"| {count:,} | {' | '.join(cells)} | {max(1, round(seconds / _DAY + 0.5)):,} |")
     largest = max(laws.values(), key=lambda law: law.residual)
     name = next(name for name, law in laws.items() if law is largest)
@@ -92,19 +93,26 @@ def _time(seconds: float) -> str:
 
 
 def _laws() -> dict[str, Law]:
-    pieces = {row["details"]["movements"]: row["ours"] for row in rows("pieces") if row["what"].startswith("inspect ")}
     parts = rows("million")
     learned = {row["details"]["movements"]: row["ours"] for row in parts if "Put them into a library" in row["what"]}
     library = {row["details"]["movements"]: row["ours"] / 1000 for row in parts if row["what"].endswith("actions/")}
     shards = _of_shards("files, a movement")
     asked = _of_shards("one, processor")
+    described = {f"{command} in parts [core-s]": _of_pieces(command) for command in ("features", "learn")}
     return {
-        "inspect [core-s]": Law.through(pieces),
+        "inspect [core-s]": Law.through(_of_pieces("inspect")),
+        **{name: Law.through(measured) for name, measured in described.items() if measured},
         "learn [core-s]": Law.through(learned),
         "library on disk [GB]": Law.through(library),
         "shards on disk [GB]": Law.through({count: count * value / 1e9 for count, value in shards.items()}),
         "nearest of all, one [core-s]": Law.through(asked),
     }
+
+
+def _of_pieces(command: str) -> dict[int, float]:
+    """Number of movements -> seconds of processors that a command over pieces of them took; empty if not measured."""
+    own = [row for row in rows("pieces") if row["what"].startswith(f"{command} ") and row["details"].get("movements")]
+    return {row["details"]["movements"]: row["ours"] for row in own}
 
 
 def _of_shards(what: str) -> dict[int, float]:

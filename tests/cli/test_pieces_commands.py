@@ -88,6 +88,27 @@ def test_inspect_summarizes_all_parts(work, tmp_path):
     assert there["labels"] == here["labels"]
 
 
+def test_files_of_other_columns_are_left_out_as_without_pieces(tmp_path):
+    """Each is named with its reason: other columns, dimensions, a sensor, units."""
+    heads = {f"{k}": "t,x,y" for k in range(5)} | {
+        "five": "t,p,q", "six": "t,x", "seven": "t,x,y,z", "eight": "t,x [mm],y [mm]", "left wrist": "t,x,y",
+    }  # fmt: skip
+    for k, (name, head) in enumerate(heads.items()):
+        path = tmp_path / "archive" / ("wave", "nod")[k % 2] / f"{name}.csv"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        rows = [[i / 50, *(10 * (i + j) ** 0.5 for j in range(head.count(",")))] for i in range(30)]
+        path.write_text("\n".join([head, *(",".join(map(str, row)) for row in rows)]) + "\n")
+    direct = answer("inspect", tmp_path / "archive")
+    _shards(tmp_path / "out", "inspect", tmp_path / "archive", "--piece-size", 1)
+    gathered = answer("gather", tmp_path / "out")
+    left_out = {problem["file"] for problem in direct["problems"]}
+    names = sorted(problem.partition(":")[0] for problem in gathered["problems"])
+    assert names == sorted({*left_out, "wave/eight.csv"})
+    assert gathered["columns"] == {"x, y": 10 - len(names)}
+    assert sum(label["movements"] for label in gathered["labels"]) == 10 - len(names)
+    assert len(left_out) >= 3
+
+
 def test_gather_says_what_is_missing_stale_failed_and_strange(work, tmp_path):
     shutil.copytree(work / "archive", tmp_path / "archive")
     command = ("inspect", tmp_path / "archive", "-o", tmp_path / "out")
@@ -117,6 +138,11 @@ def test_a_poisoned_piece_ends_with_3_and_is_named(work, tmp_path):
     assert "damaged" in done.stdout
 
 
+def test_a_piece_that_takes_too_long_ends_with_3(work, tmp_path):
+    done = run("inspect", work / "archive", "-o", tmp_path / "out", "--workers", 1, "--time-limit", 1e-6)
+    assert (done.returncode, done.stdout.count("was not done within 1e-06 min")) == (3, 3)
+
+
 def test_a_folder_is_for_one_command(work, tmp_path):
     command = ("annotate", work / "archive", "-l", work / "actions", "-o", tmp_path / "out", "--shard", "1/9")
     run(*command)
@@ -135,6 +161,8 @@ def test_a_folder_is_for_one_command(work, tmp_path):
         (("--workers", 2, "-o", "labels.csv"), "expected --output FOLDER"),
         (("--workers", 2, "--scheduler", "tcp://127.0.0.1:9", "-o", "out"), "not both"),
         (("--shard", "4/3", "-o", "out"), "expected a shard as 3/64"),
+        (("--shard", "1/3", "-o", "out", "--time-limit", 9), "expected --workers with --time-limit"),
+        (("--workers", 2, "-o", "out", "--time-limit", 0), "0.0 is not in the range"),
         (("--workers", 2, "-o", "out", "--join-files"), "join them first"),
         (("--workers", 2, "-o", "out", "--csv"), "with kineme gather"),
         (("-", "--workers", 2, "-o", "out"), "got the standard input"),
@@ -158,6 +186,9 @@ def test_a_file_of_other_columns_is_a_problem_of_its_piece(work, tmp_path):
     assert said["problems"][0].startswith("none.csv: expected one column of times")
     run("gather", tmp_path / "out", "-o", tmp_path / "there.csv")
     assert (tmp_path / "there.csv").read_bytes() == (tmp_path / "here.csv").read_bytes()
+    run(*command, "-o", tmp_path / "here.json")
+    run("gather", tmp_path / "out", "-o", tmp_path / "there.json")
+    assert (tmp_path / "there.json").read_bytes() == (tmp_path / "here.json").read_bytes()
 
 
 @pytest.mark.parametrize("size", [16, 1])

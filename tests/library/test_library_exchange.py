@@ -113,11 +113,11 @@ def test_what_a_killed_export_left_is_deleted_by_one_of_another_day(eventful, tm
     with ActionLibrary(eventful) as library:
         library.export(tmp_path / "one")
         exported, long_ago = (tmp_path / "one").read_bytes(), time.time() - 2 * 86400
-        old = [".one.0123abcd", ".other.kinemelib.89abcdef", ".one.0123abcd-journal"]
-        others = [".one.aaaaaaaa", ".mine.0123abcd", ".library.0123abcdef", "one.0123abcd"]
+        old = [".one.1.0123abcd", ".other.kinemelib.1.89abcdef", ".one.1.0123abcd-journal"]
+        others = [".one.1.aaaaaaaa", ".mine.1.0123abcd", ".library.1.0123abcdef", "one.1.0123abcd", ".one.0123abcd"]
         for name in old + others:
-            (tmp_path / name).write_bytes(b"mine" if name == ".mine.0123abcd" else exported)
-            if name != ".one.aaaaaaaa":  # one that another process writes now
+            (tmp_path / name).write_bytes(b"mine" if name == ".mine.1.0123abcd" else exported)
+            if name != ".one.1.aaaaaaaa":  # one that another process writes now
                 os.utime(tmp_path / name, (long_ago, long_ago))
         library.export(tmp_path / "two")
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted([*others, "one", "two"])

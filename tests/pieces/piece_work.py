@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import signal
 import time
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+from pyarrow import parquet
 
 from kineme.errors import DataError
 
@@ -23,6 +26,16 @@ def write_archive(folder, n_files=40, n_samples=60, seed=0):
         lines = [f"{a:.4f},{b:.5f},{c:.5f}" for a, b, c in zip(t, t, y, strict=True)]
         (folder / label / f"{k:04d}.csv").write_text("t,x,y\n" + "\n".join(lines) + "\n")
     return folder
+
+
+def write_rows(path, counts, group=100, names=None, **more):
+    """Write movements of so many samples one after the other, in groups of so many rows."""
+    keys = range(len(counts)) if names is None else names
+    t = np.concatenate([np.arange(n) / 50 for n in counts])
+    rows = {"episode": np.repeat(np.array(keys), counts), "t": t, "x": np.sin(t), "y": np.arange(len(t)) % 7 * 0.1}
+    path.parent.mkdir(parents=True, exist_ok=True)
+    parquet.write_table(pa.table(rows | more), path, row_group_size=group)
+    return path
 
 
 def lengths(recordings):
@@ -75,6 +88,13 @@ def hanging(recordings):
     """Write down which process works, and never end."""
     Path(os.environ["KINEME_TEST_MARK"]).write_text(str(os.getpid()))
     time.sleep(600)
+
+
+def stuck(recordings):
+    """Never end at one file, in foreign code that lets nothing else in its process run."""
+    if any(source.path.endswith("0005.csv") for source in recordings.sources):
+        ctypes.PyDLL(None).sleep(600)
+    return lengths(recordings)
 
 
 def refusing(recordings):

@@ -9,6 +9,7 @@ import sqlite3
 from contextlib import closing
 
 import numpy as np
+import pyarrow as pa
 import pytest
 from click.testing import CliRunner
 from hypothesis import given
@@ -192,6 +193,19 @@ def test_data_sets_of_lerobot_have_the_checksum_of_all_their_files(tmp_path, sma
         assert_same(rows, of_one_process(tmp_path / f"one{len(options)}", several, *options))
     rows, _ = by_pieces(tmp_path / "mixed", [archive / "arc", archive / "robot"], *names)
     assert_same(rows, of_one_process(tmp_path / "mixed-one", [archive / "arc", archive / "robot"], *names))
+
+
+def test_a_file_of_parquet_that_is_divided_is_learned_as_a_whole_one(tmp_path, small_pieces):
+    """One source, with the checksum of its bytes, and the places in it."""
+    counts = [60 + k % 5 for k in range(60)]
+    u = np.concatenate([np.linspace(0, 1, n) for n in counts])
+    episode = np.repeat(np.arange(60), counts)
+    rows = {"episode": episode, "label": [f"kind {k % 3}" for k in episode], "t": u, "x": np.sin(3 * u + episode % 3)}
+    (tmp_path / "archive").mkdir()
+    parquet.write_table(pa.table(rows), tmp_path / "archive" / "all.parquet", row_group_size=500)
+    rows, said = by_pieces(tmp_path / "pieces", [tmp_path / "archive"])
+    assert said["added"] + said["duplicates"] == 60
+    assert_same(rows, of_one_process(tmp_path / "one", [tmp_path / "archive"]))
 
 
 def test_columns_of_the_archive_are_those_of_most_files_whatever_is_in_a_piece(tmp_path, small_pieces):

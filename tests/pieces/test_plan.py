@@ -31,6 +31,14 @@ def test_pieces_of_any_size_hold_each_file_once_in_order(archive, size):
     assert all((piece.first, piece.last) == (piece.units[0].name, piece.units[-1].name) for piece in pieces)
 
 
+def test_a_file_of_half_a_piece_is_the_last_of_its_piece(tmp_path):
+    for k in range(30):
+        (tmp_path / f"{k:02d}.csv").write_text("t,x\n" + "0,0\n" * (1000 if k % 3 else 10))
+    pieces = plan(str(tmp_path), 8000).pieces
+    assert len(pieces) == 20
+    assert all(unit.files[0].size < 3000 for piece in pieces for unit in piece.units[:-1])
+
+
 @given(st.integers(1, 9))
 def test_shards_share_the_pieces(archive, count):
     whole = plan(str(archive), 8000)

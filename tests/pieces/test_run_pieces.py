@@ -21,7 +21,7 @@ from kineme.pieces import map as map_pieces
 from kineme.pieces import plan, run
 from kineme.pieces.executors import execute
 from kineme.pieces.mapping import job_of_function
-from kineme.pieces.run import read_part, sweep
+from kineme.pieces.run import read_part
 
 SIZE = 6000
 
@@ -121,6 +121,26 @@ def test_a_process_that_is_ended_once_costs_nothing(archive, parts, tmp_path, mo
     assert parts_of(tmp_path / "out").keys() == parts.keys()
 
 
+@pytest.mark.skipif(os.name != "posix", reason="a library of C of POSIX")
+def test_a_process_that_hangs_is_ended_and_its_piece_fails(archive, tmp_path):
+    before = time.monotonic()
+    outcomes = map_pieces(piece_work.stuck, archive, output=tmp_path, size=SIZE, workers=2, time_limit=8.0)
+    assert time.monotonic() - before < 120
+    (bad,) = [outcome for outcome in outcomes if outcome.state == "failed"]
+    assert "not done within 0.133333 min" in bad.reason
+    assert any(unit.name.endswith("0005.csv") for unit in bad.piece.units)
+    assert [json.loads(path.read_text())["reason"] for path in tmp_path.glob("failed-*")] == [bad.reason]
+    assert len(outcomes) == len(plan(str(archive), SIZE).pieces)
+    again = map_pieces(piece_work.stuck, archive, output=tmp_path, size=SIZE, workers=1, time_limit=8.0)
+    assert [outcome.state for outcome in again].count("skipped") == len(outcomes) - 1
+
+
+@pytest.mark.parametrize("limit", [0.0, -1.0, float("nan")])
+def test_a_time_that_is_none_is_refused(archive, tmp_path, limit):
+    with pytest.raises(SpecificationError, match="a time above 0"):
+        map_pieces(lengths, archive, output=tmp_path, size=SIZE, workers=1, time_limit=limit)
+
+
 def test_a_file_that_changes_while_it_is_read_fails_its_piece(tmp_path, monkeypatch):
     archive = write_archive(tmp_path / "archive")
     monkeypatch.setenv("KINEME_TEST_MARK", str(archive))
@@ -160,18 +180,6 @@ def test_a_full_disk_stops_the_run(archive, tmp_path, monkeypatch):
     monkeypatch.setattr(run, "_write", full)
     with pytest.raises(OSError, match="No space"):
         map_pieces(lengths, archive, output=tmp_path, size=SIZE)
-
-
-def test_half_written_files_are_swept_once_they_are_old(tmp_path):
-    left = tmp_path / ".part-0123456789abcdef.parquet.123.01234567"
-    other = tmp_path / ".hidden"
-    for path in (left, other):
-        path.write_text("half")
-    sweep(tmp_path, left.stat().st_mtime - 1)
-    assert left.exists()
-    sweep(tmp_path, time.time() + 1)
-    assert not left.exists()
-    assert other.exists()
 
 
 def test_two_ways_at_once_are_refused(archive, tmp_path):

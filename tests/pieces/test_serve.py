@@ -6,6 +6,7 @@ import asyncio
 import json
 import os
 import re
+import shutil
 import signal
 import socket
 import subprocess
@@ -44,26 +45,14 @@ def folders(tmp_path_factory):
 class Served:
     """The command in a process of its own."""
 
-    def __init__(self, library, shards, *more):
+    def __init__(self, library, shards, *more, errors=subprocess.PIPE):
         with socket.create_server(("127.0.0.1", 0)) as free:
             port = free.getsockname()[1]
         source = str(Path(__file__).parents[2] / "src")
-        command = [
-            sys.executable,
-            "-m",
-            "kineme",
-            "serve",
-            "--library",
-            library,
-            "--shards",
-            shards,
-            "--port",
-            port,
-            *more,
-        ]
+        command = [sys.executable, "-m", "kineme", "serve", "--library", library, "--shards", shards, "--port", port]
         environment = os.environ | {"PYTHONPATH": source, "KINEME_STUDIO_TOKEN": TOKEN}
         self.process = subprocess.Popen(
-            list(map(str, command)), env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+            list(map(str, [*command, *more])), env=environment, stdout=subprocess.PIPE, stderr=errors, text=True
         )
         self.said = [self.process.stdout.readline() for _ in range(3)]
         self.address = f"http://127.0.0.1:{port}"
@@ -212,6 +201,23 @@ def test_a_process_that_dies_is_started_again_and_the_request_answered(served):
     after = served.health()["processes"]
     assert len(after) == 2
     assert before[0] not in after
+
+
+def test_a_terminal_shows_how_far_indexes_are(folders, tmp_path):
+    shutil.copytree(folders[1], tmp_path / "shards", ignore=shutil.ignore_patterns("search-*"))
+    termios = pytest.importorskip("termios")
+    ours, theirs = os.openpty()
+    termios.tcsetwinsize(theirs, (24, 80))
+    with open(ours, "rb", buffering=0) as terminal:
+        served = Served(folders[0], tmp_path / "shards", errors=theirs)
+        os.close(theirs)
+        os.set_blocking(ours, False)
+        shown = terminal.read(65536) or b""
+        served.process.send_signal(signal.SIGINT)
+        served.process.communicate(timeout=30)
+    assert b"indexing: " in shown
+    assert b"/400 [" in shown
+    assert "400 movements" in served.said[0]
 
 
 def test_it_ends_with_its_processes(folders):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 
 import pytest
-from piece_work import lengths, parts_of, write_archive
+from piece_work import lengths, parts_of, write_archive, write_rows
 
 from kineme.errors import DataError
 from kineme.pieces import archive as stored
@@ -95,6 +95,16 @@ def test_a_data_set_in_a_store_is_divided_like_one_in_a_folder(uri, tmp_path, na
     assert [(piece.first, piece.last) for piece in there] == [(piece.first, piece.last) for piece in here]
     outcomes = map_pieces(lengths, address, output=tmp_path / "out", size=3000)
     assert [outcome.rows for outcome in outcomes] == [len(piece.numbers) for piece in there]
+
+
+def test_a_file_of_rows_in_a_store_is_divided_like_one_in_a_folder(uri, tmp_path):
+    write_rows(tmp_path / "archive" / "all.parquet", [70] * 60)
+    address = uri(tmp_path / "archive", f"rows-{tmp_path.name}")
+    here, there = (plan(where, 4000).pieces for where in (str(tmp_path / "archive"), address))
+    assert len(here) > 3
+    assert [(piece.first, piece.last) for piece in there] == [(piece.first, piece.last) for piece in here]
+    outcomes = map_pieces(lengths, address, output=tmp_path / "out", size=4000)
+    assert sum(outcome.rows for outcome in outcomes) == 60
 
 
 @pytest.mark.parametrize("faults", [["503"], ["503", "503"], ["cut"]])

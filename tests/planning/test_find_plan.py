@@ -50,11 +50,18 @@ def plan(domain):
     return find_plan(problem_of(domain, tea.now(), GOAL))
 
 
+def _makes_tea(plan):
+    """Tell whether a plan is the one of eight steps, whichever of cup and mug comes first."""
+    steps = [str(step) for step in plan.steps]
+    swap = {"cup": "mug", "mug": "cup"}
+    return steps in (STEPS, [re.sub("cup|mug", lambda word: swap[word[0]], step) for step in STEPS])
+
+
 def test_two_cups_of_tea_take_eight_steps(plan):
-    assert [str(step) for step in plan.steps] == STEPS
+    assert _makes_tea(plan)
     assert plan.duration == 16.0
     carry = plan.steps[2]
-    assert np.allclose(carry.goal, tea.PLACES["cup"], atol=0.02)
+    assert np.allclose(carry.goal, tea.PLACES[carry.arguments["to"]], atol=0.02)
 
 
 def test_a_planner_without_costs_and_negative_preconditions_finds_one_too(domain):
@@ -67,8 +74,8 @@ def test_a_planner_without_costs_and_negative_preconditions_finds_one_too(domain
 
 def test_things_may_stand_elsewhere_within_what_was_shown(domain):
     moved = {name: value + 0.03 for name, value in tea.now().items() if name.endswith(("_x", "_z"))}
-    plan = find_plan(problem_of(domain, tea.now(**moved), GOAL))
-    assert np.allclose(plan.steps[2].goal, np.array(tea.PLACES["cup"]) + 0.03, atol=0.02)
+    carry = find_plan(problem_of(domain, tea.now(**moved), GOAL)).steps[2]
+    assert np.allclose(carry.goal, np.array(tea.PLACES[carry.arguments["to"]]) + 0.03, atol=0.02)
 
 
 @pytest.mark.parametrize(
@@ -129,7 +136,7 @@ def test_a_plan_survives_json_and_one_that_was_changed_is_refused(plan):
 def test_a_problem_in_pddl_is_planned_where_things_were_shown(domain):
     text = f"""(define (problem two) (:domain tea) (:objects jar cup mug - place)
         (:init (hand-at place-1) (= (total-cost) 0)) (:goal {GOAL}))"""
-    assert [str(step) for step in find_plan(problem_from_pddl(domain, text)).steps] == STEPS
+    assert _makes_tea(find_plan(problem_from_pddl(domain, text)))
     with pytest.raises(SpecificationError, match="whose position is known"):
         problem_from_pddl(domain, text.replace("mug - place", "mug glass - place"))
     with pytest.raises(DataError, match="goal"):

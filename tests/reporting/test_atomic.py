@@ -58,7 +58,7 @@ def test_left_overs_of_databases_and_of_earlier_versions(tmp_path):
     for end in (f"{gone}", f"{gone}.0123abcd", f"{gone}.0123abcd-wal", f"{gone}.0123abcd-journal"):
         (tmp_path / f".x.{end}").write_bytes(b"")
         age(tmp_path / f".x.{end}")
-    remove_leftovers(tmp_path / "x")
+    remove_leftovers(tmp_path, "x")
     assert names(tmp_path) == []
 
 
@@ -77,8 +77,18 @@ def test_nothing_else_is_removed(tmp_path):
     fresh = tmp_path / f".x.{gone}.00000002"
     fresh.write_bytes(b"")
     before = names(tmp_path)
-    remove_leftovers(tmp_path / "x")
+    remove_leftovers(tmp_path, "x")
     assert names(tmp_path) == before
+
+
+def test_a_process_of_that_number_keeps_a_file_for_a_day(tmp_path):
+    """It may be another one by now, or none that this system tells of."""
+    left = tmp_path / f".x.{os.getpid()}.00000000"
+    for hours, is_there in ((23.0, True), (25.0, False)):
+        left.write_bytes(b"")
+        age(left, hours)
+        remove_leftovers(tmp_path, "x")
+        assert left.exists() == is_there
 
 
 @posix
@@ -87,7 +97,7 @@ def test_files_of_other_users_stay(tmp_path, monkeypatch):
     left.write_bytes(b"")
     age(left)
     monkeypatch.setattr(os, "getuid", lambda: 12345)
-    remove_leftovers(tmp_path / "x")
+    remove_leftovers(tmp_path, "x")
     assert left.exists()
 
 
@@ -104,7 +114,7 @@ def test_writers_of_one_process_do_not_share_a_name(tmp_path):
 
 
 def test_a_folder_that_is_not_there_is_named(tmp_path):
-    remove_leftovers(tmp_path / "nowhere" / "x")
+    remove_leftovers(tmp_path / "nowhere", "x")
     with pytest.raises(FileNotFoundError, match="expected a folder"):
         write_atomically(Path(tmp_path / "nowhere" / "x"), b"")
     (tmp_path / "file").write_bytes(b"")

@@ -43,13 +43,19 @@ def lifted(demos):
     return kineme.Demonstrations.from_arrays(arrays, demos.labels, [movement.times for movement in demos])
 
 
-def perturbed(demos, seed=0):
-    """Turned, elsewhere, in another size, noisy, with other and uneven stamps."""
+def turned(positions, angle, n_points=1, seed=0):
+    """All points by one rotation, in the plane and in space."""
+    d = positions.shape[1] // n_points
+    return positions @ np.kron(np.eye(n_points), turn(angle, d, seed)).T if d in (2, 3) else positions
+
+
+def perturbed(demos, seed=0, n_points=1):
+    """Turned, all points as one, elsewhere, in another size, noisy, with other and uneven stamps."""
     rng, arrays, times = np.random.default_rng(seed), [], []
     for movement in demos:
         size = np.ptp(movement.positions, axis=0).max()
         angle, seed = rng.uniform(-1, 1), int(rng.integers(100))
-        x = movement.positions @ turn(angle, demos.n_dims, seed).T if demos.n_dims in (2, 3) else movement.positions
+        x = turned(movement.positions, angle, n_points, seed)
         x = x * np.exp(0.3 * rng.normal()) + size * rng.normal(size=demos.n_dims)
         x += 0.005 * size * rng.normal(size=x.shape)
         inner = rng.choice(np.arange(1, len(x) - 1), max(len(x) // int(rng.integers(2, 15)), 10), replace=False)
@@ -174,6 +180,14 @@ def test_movements_of_people_are_recognized_as_in_python(name):
         ({"representations": (*DEFAULT_REPRESENTATIONS[:4], replace(DEFAULT_REPRESENTATIONS[0], signal=False))}, 1),
         ({"representations": (kineme.recognition.Representation("forcing", arc_share=1.0, n_points=51),)}, 1),
         ({}, 5),
+        slow({}, 13),
+        ({"points": 2}, 4),
+        slow({"points": 2}, 6),
+        ({"points": 5, "max_angle": np.pi / 3}, 10),
+        ({"points": 15}, 45),
+        slow({"points": 3, "translation": False}, 9),
+        slow({"points": 6, "max_angle": np.pi, "classifier": "prototype"}, 18),
+        slow({"points": 2, "scale": "per-dimension"}, 6),
         ({"representations": (kineme.recognition.Representation("forcing", arc_share=0.0, n_points=70),)}, 2),
         ({"representations": (kineme.recognition.Representation("positions", arc_share=0.4, n_points=50),)}, 2),
     ],
@@ -186,7 +200,7 @@ def test_every_setting_is_that_of_python(settings, d, monkeypatch):
         monkeypatch.setenv("KINEME_COMPILED", "never")
         demos, fresh = draw_shapes([1, 3, 2], d, seed=3), fresh[::4]
     recognizer = kineme.Recognizer(**settings).fit(demos)
-    others = fresh if settings.get("scale") == "none" else perturbed(fresh)
+    others = fresh if settings.get("scale") == "none" else perturbed(fresh, n_points=settings.get("points", 1))
     # In one dimension nothing is rotated, and Python sums products of 100 numbers in single precision.
     worst = compare_answers(answers_of(recognizer, others, 0.05, 0.3))
     assert worst <= (2 * SIMILAR if d == 1 else SIMILAR)
@@ -315,6 +329,26 @@ def test_signals_under_way_are_recognized_as_in_python(signal, monkeypatch):
     assert compare_states(states_of(recognizer, list(fresh))) <= 5 * SIMILAR
 
 
+@pytest.mark.parametrize(
+    ("settings", "d"),
+    [
+        ({"points": 5}, 15),
+        slow({"points": 2}, 4),
+        slow({"points": 3, "max_angle": 0.0}, 6),
+        slow({"points": 5, "max_angle": np.pi / 3}, 10),
+        slow({}, 13),
+    ],
+    ids=str,
+)
+def test_points_under_way_are_recognized_as_in_python(settings, d, monkeypatch):
+    monkeypatch.setenv("KINEME_COMPILED", "never")
+    recognizer = kineme.Recognizer(**settings).fit(draw_shapes([1, 3, 2], d, seed=5))
+    fresh = draw_shapes([1] * 3, d, seed=5, spread=0.2, n_samples=ENDS[-1])
+    points = settings.get("points", 1)
+    movements = [kineme.Trajectory(one.times, turned(one.positions, 0.4, points)) for one in fresh]
+    assert compare_states(states_of(recognizer, movements)) <= 2 * SIMILAR
+
+
 def rollouts_of(demos, formulation):
     """Of stored primitives, and of movements learned in the runtime: to new starts and goals, through via points."""
     snapshot = snapshot_of_recognizer(kineme.Recognizer().fit(demos))
@@ -430,6 +464,16 @@ def worst_turned_answers(runtime):
     return compare_answers(some_turned_answers(), runtime) / SIMILAR
 
 
+@cache
+def some_answers_of_points():
+    recognizer = kineme.Recognizer(points=15).fit(draw_shapes([1, 3, 2], 45, seed=3))
+    return answers_of(recognizer, perturbed(draw_shapes([1] * 3, 45, seed=3, spread=0.3), n_points=15))
+
+
+def worst_answers_of_points(runtime):
+    return compare_answers(some_answers_of_points(), runtime) / SIMILAR
+
+
 def worst_calibrated_answers(runtime):
     return compare_answers(some_calibrated_answers(), runtime) / SIMILAR
 
@@ -444,7 +488,15 @@ def worst_rollouts(runtime):
 
 @pytest.mark.filterwarnings("ignore::kineme.errors.ExtrapolationWarning")
 @pytest.mark.parametrize(
-    "worst", [worst_answers, worst_turned_answers, worst_calibrated_answers, worst_states, worst_rollouts]
+    "worst",
+    [
+        worst_answers,
+        worst_turned_answers,
+        worst_answers_of_points,
+        worst_calibrated_answers,
+        worst_states,
+        worst_rollouts,
+    ],
 )
 def test_right_constants_are_right(worst):
     assert worst(RUNTIME) <= 1
@@ -462,12 +514,16 @@ WRONG = {
     "distances.js": [
         ("how.line_weight ** 0.25", "how.line_weight ** 0.26", worst_answers),
         ("how.turning_weight)", "how.turning_weight * 1.001)", worst_answers),
-        ("how.details.upright ? identity : R", "R", worst_answers),
-        ("how.details.upright ? identity : R", "identity", worst_turned_answers),
+        ("how.details.upright ? null : R", "R", worst_answers),
+        ("how.details.upright ? null : R", "null", worst_turned_answers),
+        ("        point += r;\n", "", worst_answers_of_points),
     ],
     "description.js": [
         ("N_POINTS = 199", "N_POINTS = 198", worst_answers),
         ("0.5 * (ends", "0.501 * (ends", worst_answers),
+        ("((p % d) * J + Math.floor(p / d))", "p", worst_answers_of_points),
+        ("weight * path[", "path[", worst_answers_of_points),
+        ("map((x) => x / extent)", "map((x) => (1.001 * x) / extent)", worst_answers_of_points),
         ("smooth(how.details.cutoff)", "smooth(how.cutoff)", worst_answers),
         ("how.details.positions)", "{ ...how.details.positions, n_points: 66 })", worst_answers),
     ],

@@ -13,12 +13,13 @@ import numpy as np
 import pytest
 from studio_samples import LIVE, make_library, request_of, samples
 
-from kineme import ActionLibrary
-from kineme.errors import DataError, TrajectoryError
+from kineme import ActionLibrary, Recognizer
+from kineme.errors import DataError, SpecificationError, TrajectoryError
 from kineme.studio.page.write_page import library_page
 from kineme.studio.server.live_socket import MOST, Follower, Sources, _Client, _Received, parsed_samples
 from kineme.studio.server.studio import Changes, Studio
 from kineme.studio.snapshot import DRAWN
+from movement_samples import draw_shapes, turn
 
 
 def _said(socket, kind):
@@ -69,6 +70,24 @@ def test_states_are_those_of_a_stream_of_the_library_that_expects_another_tempo(
     assert state["ranked"][0]["probability"] == pytest.approx(ours.ranked[0].confidence / (1 - ours.unknown))
     assert state["certainty"] == ours.certainty
     assert state["progress"] == pytest.approx(ours.progress)
+    assert np.array(state["path"]) == pytest.approx(ours.path)
+
+
+def test_points_that_turn_together_are_named_while_they_move(tmp_path, open_studio, monkeypatch):
+    """As by a stream of the library, turned in space; a page of such a library is refused in words."""
+    monkeypatch.setenv("KINEME_COMPILED", "never")
+    R = np.kron(np.eye(2), turn(0.5, 3))
+    movement, recognizer = draw_shapes([1, 1, 1], 6, spread=0.2)[1], Recognizer(points=2)
+    with ActionLibrary(tmp_path / "hands", create=True, recognizer=recognizer) as library:
+        library.learn(draw_shapes([3, 3, 3], 6))
+        ours = library.stream(early=DRAWN).update(movement.times, movement.positions @ R.T)
+        with pytest.raises(SpecificationError, match="got 6 dimensions, which cannot be drawn"):
+            library_page(library, "hands")
+    with open_studio(tmp_path / "hands").websocket_connect(LIVE) as socket:
+        socket.send_json({"samples": np.column_stack((movement.times, movement.positions @ R.T)).tolist()})
+        state = _said(socket, "state")
+    assert state["ranked"][0]["label"] == movement.label
+    assert state["ranked"][0]["confidence"] == pytest.approx(ours.ranked[0].confidence)
     assert np.array(state["path"]) == pytest.approx(ours.path)
 
 

@@ -87,9 +87,9 @@ class Files(NamedTuple):
 
 def _annotated(asked: Any, tables: Callable[..., Iterable[Any]], files: Files, data: dict[str, Any]) -> str:
     """Write the annotations of all parts; those of kineme find the surest first."""
-    from kineme.io.writing.annotations import Annotation, write_annotations, write_csv_stream, writer_of
+    from kineme.io.writing.annotations import Annotation, write_annotations, writer_of
 
-    output = files.output
+    output, sources = files.output, [Path(path) for path in asked.archives]
     counts: Counter[str] = Counter()
     seconds: dict[str, float] = defaultdict(float)
 
@@ -107,12 +107,12 @@ def _annotated(asked: Any, tables: Callable[..., Iterable[Any]], files: Files, d
         notes = sorted((note for rows in several() for note in rows), key=lambda hit: (-hit.confidence, -hit.p_value))
         if output is not None:  # in this order, not by recordings
             written = [writer_of(output, None, []).write(output, notes, None)]
-    elif output is not None and output.suffix.lower() == ".csv":
-        written = [write_csv_stream(output, several())]
+    elif output is not None and (stream := writer_of(output, None, sources).stream) is not None:
+        written = [stream(output, several())]
     else:
         notes = [note for rows in several() for note in rows if output is not None]
         if output is not None:
-            written = write_annotations(output, notes, [Path(path) for path in asked.archives])
+            written = write_annotations(output, notes, sources)
     data["symbols"] = {name: {"times": n, "seconds": seconds[name]} for name, n in counts.most_common()}
     data["written"] = list(map(str, written))
     rows = [(name, f"{n:,}", f"{seconds[name]:,.1f}") for name, n in counts.most_common()]
@@ -138,22 +138,19 @@ def _audited(asked: Any, tables: Callable[..., Iterable[Any]], files: Files, dat
 
 def _inspected(asked: Any, tables: Callable[..., Iterable[Any]], files: Files, data: dict[str, Any]) -> str:
     """Summarize movements by label."""
-    import pyarrow as pa
-
     if files.output is not None:
         raise click.UsageError("expected no --output, inspect shows a table; say --json for numbers")
 
     from kineme.io.inspection.inspect import labels_as_words, summaries, summary_as_data
+    from kineme.pieces.learned import inspected_alike
     from kineme.pieces.tasks import inspected
 
-    parts = [part.drop_columns(["path", "place"]) for part in tables()]
-    if not parts:
+    rows, columns = inspected_alike(tables, asked, data["problems"])
+    if rows is None:
         return "no movements"
-    rows = pa.concat_tables(parts, promote_options="permissive")
     labels = summaries(inspected(rows))
-    columns = Counter(rows.column("columns").to_pylist())
     data["labels"] = [summary_as_data(summary) for summary in labels]
-    data["columns"] = dict(columns.most_common())
+    data["columns"] = {columns: rows.num_rows}
     return labels_as_words(labels, f"{counted(rows.num_rows, 'movement')}")
 
 

@@ -16,6 +16,7 @@ from kineme.cli.audit import audit
 from kineme.cli.correct import correct
 from kineme.cli.discover import discover
 from kineme.cli.evaluate import evaluate, reproduce
+from kineme.cli.execute import execute
 from kineme.cli.export import export
 from kineme.cli.features import features
 from kineme.cli.find import find
@@ -31,6 +32,7 @@ from kineme.cli.plan import plan
 from kineme.cli.recognize import recognize, why
 from kineme.cli.segment import segment
 from kineme.cli.serve import serve
+from kineme.cli.skills import skills
 from kineme.cli.studio import page, studio
 from kineme.errors import KinemeError
 from kineme.reporting.text import printable, printable_lines
@@ -93,7 +95,7 @@ def main() -> None:
 
 
 for command in (
-    anchor, annotate, audit, correct, discover, evaluate, export, features, find, gather, generate, move, inspect,
-    learn, library, operators, page, plan, recognize, reproduce, segment, serve, studio, why,
+    anchor, annotate, audit, correct, discover, evaluate, execute, export, features, find, gather, generate, move,
+    inspect, learn, library, operators, page, plan, recognize, reproduce, segment, serve, skills, studio, why,
 ):  # fmt: skip
     main.add_command(command)

@@ -43,11 +43,16 @@ pieces_options = under(
         help="Every N-th piece alone, for the I-th of N jobs that share a folder.",
     ),
     click.option(
+        "--time-limit",
+        type=click.FloatRange(0, min_open=True),
+        help="Of a piece [min]: one of --workers that takes longer is ended, and its piece fails.  [default: 360]",
+    ),
+    click.option(
         "--piece-size", type=whole(1, 65536), default=16, show_default=True, help="Size of a piece, about [MiB]."
     ),
 )
 
-PIECES_OPTIONS: tuple[str, ...] = ("workers", "scheduler", "shard", "piece_size")
+PIECES_OPTIONS: tuple[str, ...] = ("workers", "scheduler", "shard", "piece_size", "time_limit")
 
 
 def how_divided(options: dict[str, Any], recordings: Sequence[Any], *, always: bool = False) -> dict[str, Any] | None:
@@ -73,7 +78,7 @@ def in_pieces(  # noqa: PLR0913 - what a command knows when it hands its work on
     """Do a command piece by piece: each part of its answer becomes a file in the folder `output`."""
     from kineme.io.records import needs
     from kineme.pieces.archive import check_apart, is_remote, path_at
-    from kineme.pieces.executors import cluster_client
+    from kineme.pieces.executors import TIME_LIMIT, cluster_client
     from kineme.pieces.gather import Asked, write_run
     from kineme.pieces.mapping import run
     from kineme.pieces.planning import plan
@@ -89,6 +94,8 @@ def in_pieces(  # noqa: PLR0913 - what a command knows when it hands its work on
         )
     if how["workers"] is not None and how["scheduler"] is not None:
         raise click.UsageError("expected --workers or --scheduler, not both")
+    if how["time_limit"] is not None and how["workers"] is None:
+        raise click.UsageError("expected --workers with --time-limit, this process cannot end itself; say --workers 1")
     reading = plain(options.pop("reading"))
     if reading.get("join_files"):
         raise click.UsageError("expected recordings that are read one by one, got --join-files; join them first")
@@ -99,8 +106,8 @@ def in_pieces(  # noqa: PLR0913 - what a command knows when it hands its work on
     if len(archives) == 1 and not is_remote(archives[0]):  # kineme gather finds it from everywhere
         archives = (str(path_at(archives[0]).absolute()),)
     options = {**options, "reading": reading}
-    asked = Asked(task, archives, options, how["piece_size"] * _MIB, bool(reading.get("follow_links")))
-    planned = plan(archives, asked.size, follow_links=asked.follow_links)
+    asked = Asked(task, archives, options, how["piece_size"] * _MIB)
+    planned = plan(archives, asked.size, **reading)
     if library is not None:  # it is created for an archive that is there
         options = options | _of_library(library, task, output, force)
         asked = Asked(**(vars(asked) | {"options": options}))
@@ -109,7 +116,8 @@ def in_pieces(  # noqa: PLR0913 - what a command knows when it hands its work on
     job = job_of(task, str(output), options)
     connected = nullcontext(None) if how["scheduler"] is None else cluster_client(how["scheduler"])
     with connected as client, progress(total=len(part.pieces), desc=task, unit="piece") as bar:
-        outcomes = run(job, part.pieces, how["workers"], client, lambda outcome: bar.update())
+        limit = TIME_LIMIT if how["time_limit"] is None else 60 * how["time_limit"]
+        outcomes = run(job, part.pieces, how["workers"], client, limit, lambda outcome: bar.update())
     failures = [(outcome.piece, outcome.reason) for outcome in outcomes if outcome.state == FAILED]
     problems = [*map(str, part.problems), *(problem for outcome in outcomes for problem in outcome.problems)]
     data = {

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from kineme.cli.options import FOLDER, library_option, whole
-from kineme.cli.output import write
+from kineme.cli.output import progress, write
 from kineme.io.records import needs
 from kineme.reporting.text import printable
 
@@ -34,7 +34,16 @@ def serve(folder: Path, shards: Path, port: int, host: str, processes: int | Non
     with needs("fastapi and uvicorn", "serve", "studio"):
         from kineme.studio.server.nearest import SearchOptions, serve_search
 
-    def ready(address: str, token: str, count: int) -> None:
-        write(f"{count:,} movements of {printable(shards)} at {address}nearest\ntoken: {token}\nstop it with Ctrl-C")
+    with progress(total=0, desc="indexing", unit=" movements", unit_scale=True) as bar:
 
-    serve_search(SearchOptions(folder, shards, host, port, processes), ready)
+        def indexed(done: int, total: int) -> None:
+            bar.total = total
+            bar.update(done - bar.n)
+
+        def ready(address: str, token: str, count: int) -> None:
+            bar.close()
+            write(
+                f"{count:,} movements of {printable(shards)} at {address}nearest\ntoken: {token}\nstop it with Ctrl-C"
+            )
+
+        serve_search(SearchOptions(folder, shards, host, port, processes, indexed), ready)

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from kineme.recognition.answer import Answer
     from kineme.recognition.early.hypotheses import Early
     from kineme.recognition.early.stream import Live
+    from kineme.recognition.monitor import Monitor
     from kineme.recognition.recognizer import Recognizer
 
 
@@ -338,6 +339,41 @@ class ActionLibrary:
             No movement belongs to a symbol, or there is only one movement.
         """
         return self._recognizer.stream(confidence, patience, early)
+
+    def monitor(
+        self,
+        symbol: str,
+        start: ArrayLike | None = None,
+        goal: ArrayLike | None = None,
+        *,
+        error_rate: float = 0.05,
+        noise: float | None = None,
+    ) -> Monitor:
+        """Follow an execution of a symbol: `Monitor`, whose ``update(t, x)`` tells whether it is inside what was shown.
+
+        Parameters
+        ----------
+        symbol : str
+            Name or id.
+        start, goal : array_like of shape (d,), optional
+            Of the execution: it is compared with the demonstrations as their primitives carry them there. By default it
+            may begin anywhere. Size and orientation are those that were shown, as far as they varied.
+        error_rate : float, default 0.05
+            Share of such movements that are called outside, by other people if `learn` was told groups. It takes
+            ``1 / error_rate - 1`` demonstrations; with fewer the monitor is not `calibrated`.
+        noise : float, optional
+            Standard deviation of measured positions, in their unit; by default the jitter of the demonstrations.
+
+        Raises
+        ------
+        SpecificationError
+            No such symbol, or one without movements; an error rate outside 0 to 1, a negative noise.
+        TrajectoryError
+            A start or goal of the wrong shape.
+        """
+        from kineme.library.recognize import monitor
+
+        return monitor(self.store, self[symbol].members, (start, goal), error_rate, noise, self.stream)
 
     @cached_property
     def _recognizer(self) -> LibraryRecognizer:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 from threading import Lock
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from kineme.errors import SpecificationError
 from kineme.library.calibration_cache import calibrated, calibrated_once, sample_comparison
-from kineme.library.members import Members, described_references, members_of, some_of_each
+from kineme.library.members import Members, described_references, groups_of, members_of, some_of_each
 from kineme.library.reduced_features_cache import ReducedMovements, open_cache
 from kineme.library.storage import read
 from kineme.library.storage.read import Ids
@@ -20,7 +23,9 @@ from kineme.recognition.answer import Answer, Calibrates, KnownClasses, Neighbor
 from kineme.recognition.conformal import calibrate
 from kineme.recognition.early.hypotheses import Early, Hypotheses, as_early, hypotheses
 from kineme.recognition.early.stream import Decision, Live
+from kineme.recognition.monitor import Monitor, corridor, jitter
 from kineme.recognition.two_stage_search import TwoStageSearch
+from kineme.sampling import evenly_spaced
 from kineme.similarity.comparison import StoredReferences
 
 #: Movements up to which every one is compared: the answer is then the recognizer's own. Processor time of 2000
@@ -29,6 +34,7 @@ EXHAUSTIVE = 2500
 _MOST = 1000  # movements that recordings, and in a large library movements under way, are compared with
 _OF_EACH = 10  # of each symbol, evenly spaced; more take longer
 _ERROR_RATE = 0.05
+_MONITORED = 500  # movements of a symbol that an execution is compared with, evenly spaced
 
 
 class Current(NamedTuple):
@@ -152,3 +158,27 @@ class Begun(NamedTuple):
     early: Early
     classes: KnownClasses
     hypotheses: Hypotheses
+
+
+def monitor(
+    store: Store,
+    ids: Ids,
+    ends: tuple[ArrayLike | None, ArrayLike | None],
+    error_rate: float,
+    noise: float | None,
+    stream: Callable[[], Live],
+) -> Monitor:
+    """Monitor by at most 500 of the movements, carried to a start and a goal if one is given.
+
+    Carried, positions are absolute, and the paths are those of the primitives, as a robot executes them.
+    """
+    if not len(ids):
+        raise SpecificationError("expected a symbol with movements to monitor by, got one without any")
+    ids = ids[evenly_spaced(len(ids), _MONITORED)]
+    demos, people = read.movements(store, ids), groups_of(store, ids)
+    groups = None if people is None else people.tolist()
+    noise = jitter(demos) if noise is None else noise
+    if all(end is None for end in ends):
+        return Monitor.of(demos, groups, error_rate=error_rate, noise=noise, stream=stream)
+    paths = read.primitives(store, ids).rollout(*ends).positions
+    return Monitor(corridor(paths, groups, error_rate, noise, relative=False), store.channels, stream)

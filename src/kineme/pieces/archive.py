@@ -150,6 +150,14 @@ def local_copy(unit: Unit) -> Iterator[Path]:
         yield Path(folder)
 
 
+def opened(unit: Unit) -> Any:
+    """Return what pyarrow reads some of: the path of the one file of a unit, or the file opened in its store."""
+    if not is_remote(unit.archive):
+        return path_at(unit.archive) / unit.name if path_at(unit.archive).is_dir() else path_at(unit.archive)
+    system, base = _open(unit.archive)
+    return system.open_input_file(_path_of(base, unit.name, unit.archive))
+
+
 @contextmanager
 def local_copies(units: Sequence[Unit]) -> Iterator[list[Path]]:
     """Context manager: `local_copy` of each of some units, all at once."""

@@ -17,7 +17,7 @@ from kineme.errors import DataError, KinemeError
 from kineme.io.reading.column_order import sensors_of
 from kineme.io.reading.formats import Entry, as_text
 from kineme.io.reading.merge_files import Recordings, each_person
-from kineme.io.reading.pieces import is_episodic, read_entry
+from kineme.io.reading.pieces import read_entry
 from kineme.io.reading.recordings import HowToRead, how_to_read, read_entries
 from kineme.io.records import Problem
 from kineme.library.commit import Tables, check, evenly_sampled, serialize
@@ -28,7 +28,8 @@ from kineme.library.storage.specification import Specification
 from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import Movements
-from kineme.pieces.archive import Unit, local_copies
+from kineme.pieces.archive import local_copies
+from kineme.pieces.planning import Piece
 from kineme.pieces.run import Source, noted
 
 #: Table of a library -> the columns of a part that are its columns, without the key.
@@ -51,8 +52,8 @@ def described(source: Source, options: Options) -> Iterator[Any]:
         label = options.get("label")
         labels = [None if options.get("no_labels") else own if label is None else label for own in recordings.labels]
         said = as_names(demos, "label", labels), as_names(demos, "group", people)
-        heads = _heads_of(recordings)
-        for rows in batches(demos.lengths):
+        heads = heads_of(recordings)
+        for rows in batches(demos.lengths * demos.n_dims):  # numbers, which memory holds
             part = Demonstrations.of_movements(demos.movements.between(rows.start, rows.stop))
             origins = recordings.sources[rows]
             even = evenly_sampled(part)
@@ -92,7 +93,7 @@ def _recordings(
             Entry(folder / unit.name, Path(unit.name), unit.shown)
             for folder, unit in zip(folders, source.piece.units, strict=True)
         ]
-        files = None if source.piece.numbers is None else _checksums(source.piece.units[0], folders[0])
+        files = None if source.piece.numbers is None else _checksums(source.piece, folders[0])
         for recordings in noted(source, _read(entries, how, source.piece.numbers)):
             people = recordings.people
             if options.get("person") is not None:
@@ -109,7 +110,7 @@ def _read(entries: Sequence[Entry], how: HowToRead, numbers: range | None) -> It
 
     Which of them are left out is said by the whole archive, not by a piece.
     """
-    if is_episodic(entries[0].path):
+    if numbers is not None:
         yield from read_entry(entries[0], how.layout, how.rule, **how.switches, numbers=numbers)
         return
     together = _set_of(entries, how)
@@ -133,7 +134,7 @@ def _set_of(entries: Sequence[Entry], how: HowToRead) -> Recordings | Problem:
         return Problem(name, None, str(error).removeprefix(f"{entries[0].path}: ").removeprefix(f"{name}: "))
 
 
-def _heads_of(recordings: Recordings) -> dict[str, str]:
+def heads_of(recordings: Recordings) -> dict[str, str]:
     """Return name of a file -> the columns that it is read in, as a text that is the same for files alike."""
     channels = recordings.demonstrations.channels
     columns = {
@@ -145,14 +146,15 @@ def _heads_of(recordings: Recordings) -> dict[str, str]:
     return {path: json.dumps(columns | {"sensors": sorted(sensors_of(path))}) for path in paths}
 
 
-def _checksums(unit: Unit, folder: Path) -> str:
-    """Return name -> [SHA-256, bytes] of the files of a data set that a piece reads, as JSON."""
-    checksums = {}
+def _checksums(piece: Piece, folder: Path) -> str:
+    """Return name -> [SHA-256, bytes] of the files that begin in a piece, as JSON; a file alone is named "."."""
+    checksums, unit = {}, piece.units[0]
     for file in unit.files:
-        path = folder / unit.name / file.name if unit.is_archive else folder / file.name
-        with path.open("rb") as opened:
-            inside = path.relative_to(folder / unit.name).as_posix()
-            checksums[as_text(inside)] = [hashlib.file_digest(opened, "sha256").hexdigest(), file.size]
+        if file.name != piece.begun:
+            path = folder / unit.name / file.name if unit.is_archive else folder / file.name
+            with path.open("rb") as opened:
+                inside = path.relative_to(folder / unit.name).as_posix()
+                checksums[as_text(inside)] = [hashlib.file_digest(opened, "sha256").hexdigest(), file.size]
     return json.dumps(checksums)
 
 
@@ -164,10 +166,12 @@ def heads_of_text(text: str) -> tuple[int, Channels | None, tuple[str, ...], fro
 
 
 def checksum_of(texts: Iterable[str]) -> tuple[str, int]:
-    """Return the checksum of a data set, as a reader of all of it computes it, and its bytes, by those of its files."""
+    """Return the checksum of a data set, or file, as a reader of all of it computes it, and its bytes."""
     files: dict[str, tuple[str, int]] = {}
     for text in texts:
         files.update(json.loads(text))
+    if "." in files:
+        return files["."]
     names = sorted(files, key=lambda name: PurePosixPath(name).parts)
     lines = "".join(f"{files[name][0]}  {name}\n" for name in names)
     return hashlib.sha256(lines.encode()).hexdigest(), sum(size for _, size in files.values())

@@ -5,14 +5,15 @@ from __future__ import annotations
 import os
 import pickle
 import signal
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from itertools import islice
 from multiprocessing import get_context
 from threading import Thread
-from typing import Any
+from time import monotonic
+from typing import Any, NamedTuple
 
 import kineme
 from kineme.errors import DataError, SpecificationError
@@ -22,18 +23,23 @@ from kineme.pieces.run import Job, Outcome, failed, run_piece
 
 Outcomes = Generator[Outcome, None, None]
 
-_AHEAD = 2  # pieces of each worker that wait for it
+TIME_LIMIT = 6 * 3600.0  # s, of a piece: that of the usual size is some minutes of work, a bag alone may take hours
+
 _SUBMITTED = 10_000  # pieces that a scheduler holds at once
 _RETRIES = 3
 _ENDED = "the process that worked on it was ended by the system, twice: it may need more memory than there is"
+_LATE = "it was not done within {:g} min, and the process that worked on it was ended; see --time-limit"
 _THREADS = ("KINEME_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
-def execute(job: Job, pieces: Sequence[Piece], workers: int | None = None, client: Any = None) -> Outcomes:
+def execute(
+    job: Job, pieces: Sequence[Piece], workers: int | None = None, client: Any = None, time_limit: float = TIME_LIMIT
+) -> Outcomes:
     """Yield the outcomes of pieces as they are done: in this process, in `workers` others, or by a client of Dask.
 
-    Raises `SpecificationError`: both are given, or fewer than one worker; `DataError`: workers of a cluster have other
-    versions.
+    A process that works on one piece for longer than the limit [s] is ended, and the piece fails; this process cannot
+    be interrupted, and a cluster has limits of its own. Raises `SpecificationError`: both are given, fewer than one
+    worker, or no time; `DataError`: workers of a cluster have other versions.
     """
     if workers is not None and client is not None:
         raise SpecificationError("expected workers, or a client, not both")
@@ -41,84 +47,111 @@ def execute(job: Job, pieces: Sequence[Piece], workers: int | None = None, clien
         return _on_cluster(job, pieces, client)
     if workers is None:
         return (run_piece(job, piece) for piece in pieces)
-    if workers < 1:
-        raise SpecificationError(f"expected at least one worker, got {workers}")
-    return _in_processes(job, pieces, workers)
+    if workers < 1 or not time_limit > 0:
+        raise SpecificationError(f"expected at least one worker and a time above 0, got {workers} and {time_limit}")
+    return _in_processes(job, pieces, workers, time_limit)
 
 
-def _in_processes(job: Job, pieces: Sequence[Piece], workers: int) -> Outcomes:
+class _Process(NamedTuple):
+    """A pool of one process, so that a piece that ends it, or hangs, is known."""
+
+    pool: ProcessPoolExecutor
+    number: Future[int]  # of the process, once it has begun
+
+    def kill(self) -> None:
+        """End it, also while foreign code runs that gives way to nothing else in it."""
+        with suppress(OSError, BrokenProcessPool):
+            os.kill(self.number.result(), getattr(signal, "SIGKILL", signal.SIGTERM))
+
+
+def _in_processes(job: Job, pieces: Sequence[Piece], workers: int, time_limit: float) -> Outcomes:
     """Yield outcomes of processes with one thread each.
 
-    What is under way ends with this process, and when it is interrupted. When a process is ended from outside, nobody
-    knows by which piece: those under way are done again, each alone, and the one that ends its process a second time
-    fails.
+    What is under way ends with this process, and when it is interrupted. When a process is ended from outside, its
+    piece is done again once all others are, alone, and fails if it ends its process a second time.
     """
-    waiting = iter(pieces)
-    broken = True
-    while broken:
+    with _processes(job) as (start, first):
+        idle = [first, *(start() for _ in range(min(workers, len(pieces)) - 1))]
         suspects: list[Piece] = []
-        with _pool(job, workers) as pool:
-            futures: dict[Future[Outcome], Piece] = {}
-            broken = False
-            while not broken:
-                for piece in islice(waiting, workers * _AHEAD - len(futures)):
-                    try:
-                        futures[pool.submit(run_piece, job, piece)] = piece
-                    except BrokenProcessPool:
-                        suspects.append(piece)
-                        broken = True
-                        break
-                if not futures:
-                    break
-                for future in wait(futures, return_when=FIRST_COMPLETED).done:
-                    piece = futures.pop(future)
-                    try:
-                        yield future.result()
-                    except BrokenProcessPool:
-                        suspects.append(piece)
-                        broken = True
-            suspects += futures.values()
-        for piece in suspects:
-            yield _alone(job, piece)
+        for outcome in _outcomes(job, pieces, idle, start, time_limit):
+            if isinstance(outcome, Piece):
+                suspects.append(outcome)
+            else:
+                yield outcome
+        for outcome in _outcomes(job, suspects, idle[:1], start, time_limit):
+            yield failed(job, outcome, _ENDED) if isinstance(outcome, Piece) else outcome
 
 
-def _alone(job: Job, piece: Piece) -> Outcome:
-    """Return the outcome of a piece in a process of its own."""
-    with _pool(job, 1) as pool:
-        try:
-            return pool.submit(run_piece, job, piece).result()
-        except BrokenProcessPool:
-            return failed(job, piece, _ENDED)
+def _outcomes(
+    job: Job, pieces: Sequence[Piece], idle: list[_Process], start: Callable[[], _Process], time_limit: float
+) -> Iterator[Outcome | Piece]:
+    """Yield outcomes of idle processes, which become others where they end, and pieces that have ended theirs."""
+    waiting = iter(pieces)
+    busy: dict[Future[Outcome], tuple[Piece, _Process, float]] = {}
+    while True:
+        for piece in islice(waiting, len(idle)):
+            process = idle.pop()
+            try:
+                future = process.pool.submit(run_piece, job, piece)
+            except BrokenProcessPool:
+                process = start()
+                future = process.pool.submit(run_piece, job, piece)
+            busy[future] = piece, process, monotonic()
+        if not busy:
+            return
+        latest = min(began for _, _, began in busy.values()) + time_limit
+        wait(busy, min(max(0.0, latest - monotonic()), 3600.0), return_when=FIRST_COMPLETED)
+        for future, (piece, process, began) in list(busy.items()):
+            if future.done():
+                has_ended = isinstance(future.exception(), BrokenProcessPool)
+                idle.append(start() if has_ended else process)
+                yield piece if has_ended else future.result()
+            elif monotonic() - began > time_limit:
+                process.kill()
+                idle.append(start())
+                yield failed(job, piece, _LATE.format(time_limit / 60))
+            else:
+                continue
+            del busy[future]
 
 
 @contextmanager
-def _pool(job: Job, workers: int) -> Iterator[ProcessPoolExecutor]:
-    """Context manager: processes that begin anew, whose libraries use one thread, and which end when this one does.
+def _processes(job: Job) -> Iterator[tuple[Callable[[], _Process], _Process]]:
+    """Context manager: a function that starts a process, and the first one. They use one thread each.
 
-    Raises `SpecificationError`: they do not find the function of the job.
+    They begin anew, and end when this one does. Raises `SpecificationError`: they do not find the function of the job.
     """
     before = {name: os.environ.get(name) for name in _THREADS}
     os.environ.update(dict.fromkeys(_THREADS, "1"))  # they read it when they are imported
     context = get_context("spawn")
     reader, writer = context.Pipe(duplex=False)
-    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_begin, initargs=(reader,))
+    started: list[_Process] = []
+
+    def start() -> _Process:
+        pool = ProcessPoolExecutor(1, mp_context=context, initializer=_begin, initargs=(reader,))
+        # A process is started by work, and has the environment of that moment.
+        started.append(_Process(pool, pool.submit(_number_of, data)))
+        return started[-1]
+
     try:
         try:
             data = pickle.dumps(job)
-            # Processes are started by work, and have the environment of that moment.
-            checks = [pool.submit(_check_job, data) for _ in range(workers)]
-            checks[0].result()
+            first = start()
+            first.number.result()
         except Exception as error:  # whatever pickle and modules raise
             raise SpecificationError(
                 "expected a function of a module that other processes can import, and a script that calls it below if "
                 f"__name__ == '__main__', got {type(error).__name__}: {error}; or leave out workers"
             ) from error
-        yield pool
+        yield start, first
     except BaseException:
-        writer.close()  # ends what is under way, which may take long, or hang
+        writer.close()  # ends what is under way, which may take long
+        for process in started:
+            process.kill()  # or hang
         raise
     finally:
-        pool.shutdown(wait=True, cancel_futures=True)
+        for process in started:
+            process.pool.shutdown(wait=True, cancel_futures=True)
         writer.close()
         reader.close()
         for name, value in before.items():
@@ -140,8 +173,10 @@ def _end_with(reader: Any) -> None:
     os._exit(1)
 
 
-def _check_job(data: bytes) -> None:
+def _number_of(data: bytes) -> int:
+    """Return the number of this process, which has found what a job needs."""
     pickle.loads(data)
+    return os.getpid()
 
 
 def _on_cluster(job: Job, pieces: Sequence[Piece], client: Any) -> Outcomes:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from kineme.errors import DataError
+from kineme.io.reading.recordings import how_to_read
 from kineme.pieces.archive import is_remote, path_at
 from kineme.pieces.planning import PIECE_BYTES, Piece, Plan, plan
 from kineme.pieces.run import Job, Part, read_part
@@ -27,14 +28,13 @@ class Asked:
     """A command over the pieces of archives, as its folder keeps it.
 
     - `task`: a key of `TASKS`; `options` are those of its job.
-    - `archives`, `size`: what `plan` takes, with `follow_links`.
+    - `archives`, `size`: what `plan` takes, with the options of reading.
     """
 
     task: str
     archives: tuple[str, ...]
     options: Mapping[str, Any]
     size: int = PIECE_BYTES
-    follow_links: bool = False
 
 
 @dataclass(frozen=True)
@@ -118,11 +118,10 @@ def read_run(output: Path) -> Asked:
         asked = json.loads((output / RUN).read_text(encoding="utf-8"))
         if not isinstance(asked["archives"], list):
             raise TypeError("no list")
-        return Asked(
-            str(asked["task"]), tuple(map(str, asked["archives"])), dict(asked["options"]), int(asked["size"]),
-            bool(asked["follow_links"]),
-        )  # fmt: skip
-    except (OSError, ValueError, LookupError, TypeError, ArithmeticError, RecursionError) as error:
+        archives, options = tuple(map(str, asked["archives"])), dict(asked["options"])
+        how_to_read(options["reading"])
+        return Asked(str(asked["task"]), archives, options, int(asked["size"]))
+    except (OSError, ValueError, LookupError, TypeError, ArithmeticError, RecursionError, AttributeError) as error:
         raise DataError(
             f"expected a folder that kineme has written with --workers, --scheduler or --shard, got {output}, without "
             f"a {RUN} that can be read; its command, called again with --force, writes one"
@@ -148,7 +147,7 @@ def plan_of(asked: Asked) -> Plan:
                 f"expected the archive {archive}, found nothing there; where it has moved, call its command again with "
                 "the place where it is now"
             )
-    return plan(asked.archives, asked.size, follow_links=asked.follow_links)
+    return plan(asked.archives, asked.size, **asked.options["reading"])
 
 
 def checked(job: Job, pieces: tuple[Piece, ...]) -> Checked:

@@ -102,9 +102,7 @@ def survey(tables: Tables, asked: Asked, problems: Sequence[str] = ()) -> Survey
     files: dict[str, list[str]] = {}
     people: set[str] = set()
     for rows in tables(["heads", "files", "path", "person"]):
-        for group in rows.group_by(["heads", "path"], use_threads=False).aggregate([([], "count_all")]).to_pylist():
-            counts[group["heads"]] += group["count_all"]
-            paths[group["heads"]] += 1
+        _count(rows, counts, paths)
         people.update(rows.column("person").drop_null().unique().to_pylist())
         for row in rows.select(["path", "files"]).drop_null().to_pylist():
             files.setdefault(row["path"], []).append(row["files"])
@@ -112,7 +110,7 @@ def survey(tables: Tables, asked: Asked, problems: Sequence[str] = ()) -> Survey
         first = f"; the first problem: {problems[0]}" if problems else ""
         raise DataError(f"expected movements in the parts, got none{first}")
     layout = how_to_read(asked.options["reading"]).layout
-    heads = {text: Heads(*heads_of_text(text)) for text in counts}
+    heads, most, reasons, notes = _compared(counts, paths, layout.by_number)
     where = ", ".join(asked.archives)
     of_files = [(each.aside, recorded_names(each.channels or ())) for each in heads.values()]
     check_asked(layout, of_files, bool(people), where)
@@ -121,13 +119,57 @@ def survey(tables: Tables, asked: Asked, problems: Sequence[str] = ()) -> Survey
             f"expected {where} to say who showed its movements, by folders person/label/recording or an array people "
             "in an archive, got neither; name them with --person"
         )
-    most, notes = _most([(heads[text], n, paths[text]) for text, n in counts.items()])
-    reasons = {text: each.unlike(most, layout.by_number) for text, each in heads.items()}
     others = any(each.names != most.names and reasons[text] is None for text, each in heads.items())
     sources = {path: checksum_of(several) for path, several in files.items()}
     return Survey(
         heads, reasons, most, None if others else most.channels, sources, counts.total(), sorted(people), notes
     )
+
+
+def _count(rows: Any, counts: Counter[str], paths: Counter[str]) -> None:
+    """Add the movements and the files of rows to those of their columns."""
+    for group in rows.group_by(["heads", "path"], use_threads=False).aggregate([([], "count_all")]).to_pylist():
+        counts[group["heads"]] += group["count_all"]
+        paths[group["heads"]] += 1
+
+
+def _compared(
+    counts: Counter[str], paths: Counter[str], by_number: bool
+) -> tuple[dict[str, Heads], Heads, dict[str, str | None], tuple[str, ...]]:
+    """Return what texts of columns say, the columns of most, what keeps files from being read with these, and notes."""
+    heads = {text: Heads(*heads_of_text(text)) for text in counts}
+    most, notes = _most([(heads[text], n, paths[text]) for text, n in counts.items()])
+    return heads, most, {text: each.unlike(most, by_number) for text, each in heads.items()}, notes
+
+
+def inspected_alike(tables: Tables, asked: Asked, problems: list[str]) -> tuple[Any, str]:
+    """Return the rows of an inspection of files in the columns of most, None without any, and these columns.
+
+    Other files are added to the problems, and so are those in other units: their rows are in their own.
+    """
+    import pyarrow as pa
+    from pyarrow import compute
+
+    counts, paths = Counter[str](), Counter[str]()
+    for part in tables(["heads", "path"]):
+        _count(part, counts, paths)
+    if not counts:
+        return None, ""
+    heads, most, reasons, _ = _compared(counts, paths, how_to_read(asked.options["reading"]).layout.by_number)
+    units = sorted(map(str, columns_recorded(most.channels or ()).units))
+    for text, each in heads.items():
+        if reasons[text] is None and sorted(map(str, columns_recorded(each.channels or ()).units)) != units:
+            reasons[text] = "other units than most files have; inspect it apart"
+    unlike = pa.array([text for text, reason in reasons.items() if reason is not None], pa.string())
+    parts, files = [], dict[str, str]()
+    for part in tables():
+        is_unlike = compute.is_in(part.column("heads"), unlike)
+        names = part.filter(is_unlike).select(["path", "heads"]).to_pydict()
+        files |= zip(names["path"], names["heads"], strict=True)
+        parts.append(part.filter(compute.invert(is_unlike)).drop_columns(["heads", "path", "place"]))
+    problems += [f"{path}: {reasons[text]}" for path, text in files.items()]
+    columns = ", ".join(recorded_names(most.channels or ())) or f"{most.width} columns"
+    return pa.concat_tables(parts, promote_options="permissive"), columns
 
 
 def _most(counts: list[tuple[Heads, int, int]]) -> tuple[Heads, tuple[str, ...]]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import pickle
 import secrets
-import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing
 from functools import partial
@@ -17,9 +16,10 @@ from kineme.errors import DataError
 from kineme.io.reading.merge_files import Recordings
 from kineme.io.records import needs
 from kineme.pieces.archive import check_apart
-from kineme.pieces.executors import execute
+from kineme.pieces.executors import TIME_LIMIT, execute
 from kineme.pieces.planning import PIECE_BYTES, plan
-from kineme.pieces.run import Job, Outcome, Source, recordings_of, sweep
+from kineme.pieces.run import Job, Outcome, Source, recordings_of
+from kineme.reporting.atomic import remove_leftovers
 
 Rows = Mapping[str, Sequence[Any]]
 
@@ -32,6 +32,7 @@ def map(  # noqa: A001, PLR0913 - as in the standard library, over movements
     output: str | Path,
     workers: int | None = None,
     size: int = PIECE_BYTES,
+    time_limit: float = TIME_LIMIT,
     progress: Callable[[Outcome], object] | None = None,
     **reading: Any,
 ) -> list[Outcome]:
@@ -56,6 +57,9 @@ def map(  # noqa: A001, PLR0913 - as in the standard library, over movements
         So many processes of this machine; by default the work is done in this process.
     size : int
         Of a piece [bytes], see `plan`.
+    time_limit : float
+        Of a piece [s], six hours by default: a process of `workers` that takes longer is ended, and its piece fails.
+        Work in this process cannot be ended.
     progress : callable, optional
         Called with the outcome of each piece.
     **reading
@@ -75,8 +79,8 @@ def map(  # noqa: A001, PLR0913 - as in the standard library, over movements
         import pyarrow  # noqa: F401 - before any piece is read
     archives = [str(each) for each in ([archive] if isinstance(archive, (str, Path)) else archive)]
     check_apart(output, archives)
-    planned = plan(archives, size, follow_links=bool(reading.get("follow_links")))
-    return run(job_of_function(function, output, reading), planned.pieces, workers, client, progress)
+    planned = plan(archives, size, **reading)
+    return run(job_of_function(function, output, reading), planned.pieces, workers, client, time_limit, progress)
 
 
 def job_of_function(function: Callable[[Recordings], Rows | None], output: Any, reading: Mapping[str, Any]) -> Job:
@@ -120,21 +124,20 @@ def run(
     pieces: Sequence[Any],
     workers: int | None = None,
     client: Any = None,
+    time_limit: float = TIME_LIMIT,
     progress: Callable[[Outcome], object] | None = None,
 ) -> list[Outcome]:
     """Do a job on pieces, and return their outcomes in the order of the pieces."""
     Path(job.output).mkdir(parents=True, exist_ok=True)
-    sweep(Path(job.output), time.time() - _IDLE)
+    remove_leftovers(Path(job.output), r"(?:part|failed)-[0-9a-f]{16}\.\w+")
     outcomes = {}
-    with closing(execute(job, pieces, workers, client)) as done:  # what is under way ends with an error here, too
+    # What is under way ends with an error here, too.
+    with closing(execute(job, pieces, workers, client, time_limit)) as done:
         for outcome in done:
             outcomes[outcome.piece.key] = outcome
             if progress is not None:
                 progress(outcome)
     return [outcomes[piece.key] for piece in pieces]
-
-
-_IDLE = 3600.0  # seconds since the last write after which a half-written file is a leftover
 
 
 def _rows(function: Callable[[Recordings], Rows | None], reading: Mapping[str, Any], source: Source) -> Iterable[Any]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -28,7 +27,6 @@ from kineme.runtime.compiled import compiled_always
 DONE, SKIPPED, FAILED = "done", "skipped", "failed"
 
 _ABOUT, _REPORT = b"kineme", b"kineme.report"  # keys of the metadata of a part
-_LEFT = re.compile(r"\.(?:part|failed)-[0-9a-f]{16}\.\w+\.\d+\.[0-9a-f]{8}")  # what a killed process leaves
 _LONGEST = 500  # letters of a reason that are kept
 
 
@@ -213,14 +211,6 @@ def _write(path: Path, tables: Sequence[Any], metadata: Mapping[bytes, Mapping[s
         else:
             parquet.write_table(table, beside)
     return int(table.num_rows)
-
-
-def sweep(output: Path, before: float) -> None:
-    """Remove what processes that were killed before a time [s since 1970] left half written in a folder."""
-    for path in output.glob(".*"):
-        with suppress(OSError):
-            if _LEFT.fullmatch(path.name) and path.stat().st_mtime < before:
-                path.unlink()
 
 
 def recordings_of(source: Source, options: Mapping[str, Any], reference: Known | None = None) -> Iterator[Recordings]:

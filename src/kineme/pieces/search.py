@@ -78,6 +78,7 @@ class Shards:
     reduction: Reduction
     shards: tuple[Shard, ...]
     most: int = MOST  # rows that are indexed together
+    progress: Callable[[int, int], object] | None = None  # called with the movements that are indexed, and all
 
     def __len__(self) -> int:
         return sum(map(len, self.shards))
@@ -99,10 +100,13 @@ class Shards:
     @cached_property
     def groups(self) -> tuple[tuple[int, Group], ...]:
         """The indexes, each with the number of its first shard; made, which takes a while, where there are none."""
-        return tuple(
-            (each.start, open_group(self.folder, *self.plan, self.reduction, self.shards[each.start : each.stop]))
-            for each in groups_of(self.shards, self.most)
-        )
+        groups = []
+        for each in groups_of(self.shards, self.most):
+            shards = self.shards[each.start : each.stop]
+            groups.append((each.start, open_group(self.folder, *self.plan, self.reduction, shards)))
+            if self.progress is not None:
+                self.progress(sum(map(len, self.shards[: each.stop])), len(self))
+        return tuple(groups)
 
     def prepare(self) -> None:
         """Make the indexes now, and remove those of shards that are there no more."""

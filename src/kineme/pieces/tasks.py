@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import lru_cache, partial
 from itertools import chain
 from pathlib import Path, PurePosixPath
@@ -21,11 +22,10 @@ from kineme.library.annotate import annotate_by
 from kineme.library.library import ActionLibrary
 from kineme.library.recognize import some_of_each_symbol
 from kineme.library.storage.source import known_sources
-from kineme.movements.channels.channel import recorded_names
 from kineme.movements.episodes import Episode
 from kineme.movements.tables.layout import Known
 from kineme.pieces.archive import local_copy
-from kineme.pieces.described import described
+from kineme.pieces.described import described, heads_of
 from kineme.pieces.run import Job, Source, recordings_of
 from kineme.pieces.shards import Reduction, read_reduction
 from kineme.recognition.answer import KnownClasses
@@ -151,11 +151,10 @@ def inspections(source: Source, options: Options) -> Iterator[Any]:
         measures = measures_of(recordings)._asdict()
         columns = {name: pa.array(values.tolist() if name == "labels" else values) for name, values in measures.items()}
         columns["labels"] = columns["labels"].cast(pa.string())
-        demos = recordings.demonstrations
-        heads = ", ".join(recorded_names(demos.channels or ())) or f"{demos.n_dims} columns"
+        heads, sources = heads_of(recordings), recordings.sources
         yield pa.table({
-            "path": [each.path for each in recordings.sources], "place": [each.place for each in recordings.sources],
-            **columns, "columns": pa.array([heads] * len(recordings)).dictionary_encode(),
+            "path": [each.path for each in sources], "place": [each.place for each in sources],
+            **columns, "heads": [heads[each.path] for each in sources],
         })  # fmt: skip
 
 
@@ -228,10 +227,5 @@ def _work(task: str, options: Options, source: Source) -> Iterable[Any]:
 
 def plain(options: Options) -> dict[str, Any]:
     """Return options of reading as JSON holds them, without those that are not given."""
-    return {name: _plain(value) for name, value in sorted(options.items()) if value is not None}
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Sequence) and not isinstance(value, str):
-        return [_plain(each) for each in value]
-    return value
+    given = {name: value for name, value in sorted(options.items()) if value is not None}
+    return dict(json.loads(json.dumps(given)))

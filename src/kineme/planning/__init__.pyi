@@ -32,6 +32,23 @@ from kineme.planning.plan import Plan as Plan
 from kineme.planning.plan import Step as Step
 from kineme.planning.plan import plan_to_dict as plan_to_dict
 from kineme.planning.plan import plan_from_dict as plan_from_dict
+from kineme.planning.plan import read_plan as read_plan
 from kineme.planning.behavior_tree import plan_to_behavior_tree as plan_to_behavior_tree
 from kineme.planning.behavior_tree import domain_to_behavior_tree as domain_to_behavior_tree
 from kineme.planning.figure import draw_plan as draw_plan
+
+# A plan on an arm
+from kineme.planning.execution import execute as execute
+from kineme.planning.execution import check_steps as check_steps
+from kineme.planning.execution import Execution as Execution
+from kineme.planning.execution import Attempt as Attempt
+from kineme.planning.execution import Replan as Replan
+from kineme.planning.simulated import simulation_of as simulation_of
+from kineme.planning.simulated import disturb as disturb
+from kineme.planning.simulated import assume_flags as assume_flags
+from kineme.planning.figure import draw_execution as draw_execution
+
+# Skills for a language model
+from kineme.planning.preview import OutsideError as OutsideError
+from kineme.planning.skills import SkillTools as SkillTools
+from kineme.planning.skills import skills_server as skills_server

@@ -190,3 +190,16 @@ def _draw_overlay(panel: Any, movement: Array, example: Array, differences: Arra
     panel.add_collection(colored)
     panel.plot(*movement[0], "o", color=BLUE, markersize=5)
     return colored
+
+
+def draw_distances(measured: Array, threshold: float) -> Figure:
+    """Draw the distances of an execution, rows (k, 2) of phase and distance, over the phase, with the threshold."""
+    with matplotlib.rc_context():
+        figure = figure_to_show(4.8, 2.6)
+        axes = figure.subplots()
+        axes.axhline(threshold, color=GRAY, linestyle="--", label="threshold")
+        axes.plot(*measured.T, color=BLUE, label="execution")
+        axes.set(xlim=(0, 1), xlabel="phase", ylabel="standard deviations")
+        axes.set_ylim(bottom=0)
+        axes.legend(loc="upper left")
+    return figure

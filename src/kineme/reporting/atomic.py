@@ -9,13 +9,14 @@ import secrets
 import shutil
 import stat
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 FULL = (errno.ENOSPC, errno.EDQUOT)  # the disk, or what a user may take of it
 _LONGEST_NAME = 228  # bytes: the hidden name beside it is longer, and file systems take 255
-_IDLE = 3600.0  # seconds since the last write after which the file of a process that no longer runs is a leftover
+OF_SQLITE = ("-wal", "-shm", "-journal")  # ends of the names of files that it makes beside a database
+_IDLE, _DAY = 3600.0, 86400.0  # seconds since the last write, see `remove_leftovers`
 
 
 def write_atomically(path: Path, data: bytes) -> Path:
@@ -49,7 +50,7 @@ def whole_file(
         there = "a file of that name is there" if path.parent.exists() else "there is none"
         raise FileNotFoundError(f"expected a folder {path.parent} to write {path.name} into, {there}; create it")
     if sweep:
-        remove_leftovers(path)
+        remove_leftovers(path.parent, re.escape(path.name))
     beside = name_beside(path)
     try:
         with _named(path, beside):
@@ -98,21 +99,27 @@ def name_beside(path: Path) -> Path:
     return path.with_name(f".{path.name}.{os.getpid()}.{secrets.token_hex(4)}")
 
 
-def remove_leftovers(path: Path) -> None:
-    """Remove files of `name_beside` that killed processes left beside `path`, with SQLite's files beside them.
+def remove_leftovers(folder: Path, name: str, is_ours: Callable[[Path], bool] | None = None) -> None:
+    """Remove files of `name_beside` that killed processes left in a folder, with SQLite's files beside them.
 
-    A file is removed if it belongs to this user, its process does not run, and nobody wrote to it for an hour: in a
-    folder that several machines share, the process may run on another one.
+    `name` is a pattern of what they were to be named. A file is removed if it belongs to this user and nobody wrote to
+    it for an hour, as in a folder that several machines share its process may run on another one; for a day if one of
+    that number runs here, or where that cannot be found out. Where the pattern fits files of other programs, too,
+    `is_ours` tells them apart, and SQLite's go with those that they are beside.
     """
-    pattern = re.compile(rf"\.{re.escape(path.name)}\.(\d+)(?:\.[0-9a-f]{{8}})?(?:-wal|-shm|-journal)?")
+    pattern = re.compile(rf"(\.(?:{name})\.(\d+)(?:\.[0-9a-f]{{8}})?)({'|'.join(OF_SQLITE)})?")
     with suppress(OSError):
-        for entry in os.scandir(path.parent):
-            if (match := pattern.fullmatch(entry.name)) and not _is_at_work(int(match[1])):
+        for entry in os.scandir(folder):
+            if match := pattern.fullmatch(entry.name):
                 with suppress(OSError):
                     status = entry.stat(follow_symlinks=False)
                     own = not hasattr(os, "getuid") or status.st_uid == os.getuid()
-                    if own and stat.S_ISREG(status.st_mode) and time.time() - status.st_mtime > _IDLE:
-                        os.unlink(entry.path)
+                    least = _DAY if _is_at_work(int(match[2])) else _IDLE
+                    if not (own and stat.S_ISREG(status.st_mode) and time.time() - status.st_mtime > least):
+                        continue
+                    if is_ours is None or (not match[3] and is_ours(Path(entry.path))):
+                        for end in ("", *OF_SQLITE):
+                            Path(entry.path + end).unlink(missing_ok=True)
 
 
 def _is_at_work(process: int) -> bool:

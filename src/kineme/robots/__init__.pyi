@@ -24,3 +24,7 @@ from kineme.robots.view.write_view import write_view as write_view
 from kineme.robots.arm_controller import ArmController as ArmController
 from kineme.robots.arm_controller import ArmState as ArmState
 from kineme.robots.arm_controller import ArmStatus as ArmStatus
+
+# Without an arm
+from kineme.robots.simulation import Simulation as Simulation
+from kineme.robots.simulation import Run as Run

@@ -60,7 +60,7 @@ _AGAIN = (
 
 _Arrays = dict[str, NDArray[Any]]
 
-FORMAT, VERSION = "kineme-snapshot", 5
+FORMAT, VERSION = "kineme-snapshot", 6
 _KINDS = ("float64", "float32", "int32")
 _ROUNDING = 1e-6  # of a path's size: some units in the last place of single precision
 _ALIGNMENT = 8  # bytes: arrays in JavaScript begin at multiples of the size of their numbers
@@ -179,23 +179,14 @@ def _numbers(module: ModuleType, *names: str) -> dict[str, float]:
 def rotation_rule(procrustes: Procrustes) -> dict[str, Any]:
     """Write how movements are rotated."""
     d, prior = procrustes.n_dims, procrustes.prior
-    if procrustes.n_points > 1:
-        raise SpecificationError(
-            f"expected movements of one point, got {procrustes.n_points} points that turn together, which the page "
-            f"does not have; {_AGAIN.replace('Recognizer()', 'Recognizer(points=1)')}"
-        )
-    if procrustes.mixing is not None:
-        raise SpecificationError(
-            f"expected movements of at most {len(procrustes.mixing)} columns, got {procrustes.n_columns}, whose "
-            "principal ones the page does not have; choose columns"
-        )
     if d == 3 and prior is None and procrustes.max_angle > 0:
         raise SpecificationError(
             "expected movements in space to be compared under a rotation prior, with max_angle=0 or with max_angle=pi, "
             f"got max_angle={procrustes.max_angle:.3g}: the page has no limit in between; {_AGAIN}"
         )
     matrix = None if prior is None else prior.matrix(d).ravel().tolist()
-    return {"n_dims": d, "max_angle": float(procrustes.max_angle), "prior": matrix}
+    how = _fields(procrustes, "n_dims", "n_points", "mixing")
+    return how | {"max_angle": float(procrustes.max_angle), "prior": matrix}
 
 
 def pair_rule(shapes: Shapes) -> dict[str, Any]:

@@ -30,6 +30,7 @@ _BYTES = 2**24  # of the numbers in them
 _READ = 2**20  # bytes of a file of Parquet that are read at a time
 _COUNTERS = ("episode_index", "frame_index", "timestamp", "task_index")
 _SHOWN = 5  # frames of an episode whose faults are named
+_FAR = 2**62  # a number beyond all episodes
 _MOST_NUMBERS = 1000  # episodes that a filter of Lance names; of more, all frames are read
 
 
@@ -49,8 +50,8 @@ class _Shard(NamedTuple):
     """An open file or table of frames."""
 
     columns: Sequence[str]
-    # Names of columns, the most rows of a batch, and numbers of episodes, None for all, -> batches in order, which may
-    # hold other episodes too.
+    # Names of columns, the most rows of a batch, and numbers of episodes that grow, None for all, -> batches in order,
+    # which may hold other episodes too.
     batches: Callable[[Sequence[str], int, Sequence[int] | None], Iterator[Any]]
 
 
@@ -61,9 +62,20 @@ def _parquet(path: Path) -> Iterator[_Shard]:
 
         def batches(columns: Sequence[str], rows: int, numbers: Sequence[int] | None) -> Iterator[Any]:
             for group in range(file.num_row_groups):  # so that damage costs one group
-                yield from file.iter_batches(rows, row_groups=[group], columns=list(columns), use_threads=False)
+                if numbers is None or _may_hold(file.metadata.row_group(group), numbers):
+                    yield from file.iter_batches(rows, row_groups=[group], columns=list(columns), use_threads=False)
 
         yield _Shard(file.schema_arrow.names, batches)
+
+
+def _may_hold(group: Any, numbers: Sequence[int]) -> bool:
+    """Tell whether a group of rows may hold frames of episodes, whose numbers grow, as far as its metadata say."""
+    for k in range(group.num_columns):
+        column = group.column(k)
+        bounds = column.statistics if column.path_in_schema == "episode_index" else None
+        if bounds is not None and bounds.has_min_max and bounds.null_count == 0:
+            return bool(bounds.min <= numbers[-1] and bounds.max >= numbers[0])
+    return True
 
 
 @contextmanager
@@ -71,8 +83,11 @@ def _lance(path: Path) -> Iterator[_Shard]:
     import lance
 
     def batches(columns: Sequence[str], rows: int, numbers: Sequence[int] | None) -> Iterator[Any]:
-        few = numbers is not None and len(numbers) <= _MOST_NUMBERS
-        where = f"episode_index IN ({', '.join(map(str, numbers))})" if few and numbers else None
+        where = None
+        if isinstance(numbers, range):
+            where = f"episode_index BETWEEN {numbers[0]} AND {numbers[-1]} OR episode_index IS NULL"
+        elif numbers and len(numbers) <= _MOST_NUMBERS:
+            where = f"episode_index IN ({', '.join(map(str, numbers))})"
         yield from table.to_batches(
             columns=list(columns), batch_size=rows, filter=where, scan_in_order=True, batch_readahead=1,
             fragment_readahead=1,
@@ -244,7 +259,8 @@ def episodes(
 ) -> Iterator[Episode]:
     """Yield the episodes of a data set, with all features of numbers, or those named, and all episodes, or some.
 
-    Of a range of numbers, those that the data set declares are read; of others, each must be declared.
+    Of a range of numbers, those that the data set declares are read, and frames of numbers that are not declared where
+    they are, at the last declared number below, so that ranges side by side miss none; others must be declared.
     They come in the order of storage, a batch of rows is in memory at a time, and nothing is mended: frames that are
     missing or in another order, doubled episodes and other lengths than declared are `Episode.problems`. An episode
     whose frames cannot be read has none (T = 0). What could not be read of the meta folder comes first, as an episode
@@ -276,19 +292,23 @@ def episodes(
     if wanted is None and (problems := (*declared.problems, *unsaid)):
         yield episode(_no_frames(sum(widths.values())), -1, "meta", problems)
     done: set[int] = set()
+    places = dict(zip(declared.numbers.tolist(), declared.shards, strict=True))
     for shard, numbers_there in declared.by_shard().items():
         expected = [number for number in numbers_there if wanted is None or number in wanted]
         if not expected:
             continue
         broken: list[str] = []
-        parts = shard_frames(folder, info, shard, widths, None if wanted is None else expected)
+        read = None if wanted is None else _around(expected, numbers_there, numbers)
+        parts = shard_frames(folder, info, shard, widths, read)
         for frames in runs(parts, broken):
             number = int(frames.episodes[0])
-            if wanted is not None and number not in wanted:
+            if read is not None and number not in read:
                 continue
             offsets = np.array([0, len(frames.values)], dtype=np.intp)
             reasons = [reason for reasons in contradictions(frames, offsets, declared) for reason in reasons.values()]
             reasons += [f"frame {row}: {reason}" for row, reason in list(frames.faults.items())[:_SHOWN]]
+            if isinstance(numbers, range) and number in places and places[number] != shard:
+                reasons.append(f"expected its frames in {places[number]}, got some in {shard}")
             if number in done:
                 reasons.append("expected its frames in one place, got more of them behind other episodes")
             (task,) = task_texts(frames, offsets, tasks)
@@ -302,6 +322,14 @@ def episodes(
                 reasons = broken or [f"expected frames in {shard}, got none"]
                 yield episode(_no_frames(sum(widths.values())), number, place_of(number), reasons)
                 done.add(number)
+
+
+def _around(expected: Sequence[int], there: Sequence[int], numbers: Collection[int] | None) -> Sequence[int]:
+    """Return the numbers to read of a shard: of a range, with those up to the next one that is declared there."""
+    if not isinstance(numbers, range):
+        return expected
+    after = there.index(expected[-1]) + 1
+    return range(expected[0] if expected[0] != there[0] else -_FAR, there[after] if after < len(there) else _FAR)
 
 
 def _no_frames(width: int) -> Frames:

@@ -75,10 +75,11 @@ def _of_tables(read: Callable[[bytes, Layout], tuple[Table, Roles]], kind: str) 
     return lambda data, layout: table_movements(*read(data, layout), layout, kind)
 
 
-def _read_parquet(data: bytes, layout: Layout) -> Parsed:
+def read_parquet(data: bytes | Path, layout: Layout, part: range | None = None) -> Parsed:
+    """Read a file of Parquet, or of a path the movements that begin in some groups of its rows."""
     with needs("pyarrow", "read Parquet", "parquet"):
         from kineme.io.tables.parquet import read_parquet_table
-    return table_movements(*read_parquet_table(data, layout), layout, "Parquet")
+    return table_movements(*read_parquet_table(data, layout, part), layout, "Parquet")
 
 
 def _read_lerobot(folder: Path, layout: Layout) -> Parsed:
@@ -119,7 +120,7 @@ FORMATS: dict[str, Format] = {
     ".jsonl": Format(json_lines_movements),
     ".ndjson": Format(json_lines_movements),
     ".npy": Format(_read_npy),
-    ".parquet": Format(_read_parquet),
+    ".parquet": Format(read_parquet),
     ".mat": Format(mat_movements, label_is_stem=True),
     ".h5": Format(read_path=hdf5_or_robot_movements),
     ".hdf5": Format(read_path=hdf5_or_robot_movements),

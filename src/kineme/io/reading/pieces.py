@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 from kineme.errors import KinemeError
 from kineme.io.lerobot.info import MARKER
-from kineme.io.reading.formats import Entry, Format, data_set_of, entries_of
+from kineme.io.reading.formats import Entry, Format, data_set_of, entries_of, read_parquet
 from kineme.io.reading.merge_files import Recordings, merge_files
 from kineme.io.reading.read_file import parsed_file
-from kineme.io.reading.recordings import NameRule, check_asked, heads_of, read_entries, trimmed
+from kineme.io.reading.recordings import TASK, NameRule, check_asked, heads_of, read_entries, trimmed
 from kineme.io.records import Problem, needs
 from kineme.movements.episodes import number_at
 from kineme.movements.tables.layout import Layout
@@ -55,11 +57,12 @@ def read_entry(
 ) -> Iterator[Recordings | Problem]:
     """Yield the recordings of a file or data set, of the latter some episodes at a time, or the problem with it.
 
-    Of a data set, the episodes with these `numbers` are read, all at once unless they are a range.
+    Of a data set, the episodes with these `numbers` are read, all at once unless they are a range. Of a file of
+    Parquet, it is a range of groups of rows: the movements that begin in them are read, without a checksum.
     """
     try:
-        if is_episodic(entry.path):
-            yield from _of_data_set(entry, layout, rule, trim, numbers)
+        if isinstance(numbers, range) or is_episodic(entry.path):
+            yield from _in_parts(entry, layout, rule, trim, numbers)
         else:
             recordings = read_entries([entry], layout, rule, follow_links=follow_links, trim=trim)
             check_asked(layout, heads_of(recordings), recordings.people is not None, entry.name)
@@ -69,16 +72,22 @@ def read_entry(
         yield Problem(entry.name, None, reason, type(error) if isinstance(error, KinemeError) else KinemeError)
 
 
-def _of_data_set(
+def _in_parts(
     entry: Entry, layout: Layout, rule: NameRule, trim: bool, numbers: Collection[int] | None
 ) -> Iterator[Recordings | Problem]:
-    """Yield the whole episodes of a data set, and why others are not."""
+    """Yield the whole episodes of a data set, and why others are not; or the movements of some groups of rows."""
     with needs("pyarrow", "read Parquet", "parquet"):
         from kineme.io.lerobot.read import lerobot_parts
     learned = layout.reference.columns if layout.reference is not None and layout.coordinates is None else ()
     layouts = [replace(layout, columns=learned), layout] if learned else [layout]
-    for parse in lerobot_parts(entry.path, layouts, numbers):
-        file = rule.apply(parsed_file(parse, Format(), entry.relative, layout), entry.path).renamed(entry.name)
+    parts: Iterable[Any] = ()
+    if is_episodic(entry.path):
+        parts = lerobot_parts(entry.path, layouts, numbers)
+    elif isinstance(numbers, range):
+        parts = [partial(read_parquet, entry.path, part=numbers)]
+    relative = Path(entry.relative.name) if rule.label_by == TASK else entry.relative
+    for parse in parts:
+        file = rule.apply(parsed_file(parse, Format(), relative, layout), entry.path).renamed(entry.name)
         if not file.block.labels:
             yield from file.problems
             continue

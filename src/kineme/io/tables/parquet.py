@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import io
 from collections import Counter
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
+from itertools import accumulate
+from operator import le
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -23,6 +26,7 @@ from kineme.validation import ROUNDED, Array, too_long_integer
 
 _SHOWN = 1000  # faults that are told apart; more rows than that are left to their missing numbers
 
+_DAMAGED = "expected a Parquet file, got something foreign, truncated or damaged"
 _ROWS = 2**18  # rows that are decompressed at a time
 _WIDEST = 1000  # numbers in a list; images have more
 _COMMANDS = frozenset({"action"})  # of LeRobot's episodes
@@ -30,23 +34,99 @@ _COMMANDS = frozenset({"action"})  # of LeRobot's episodes
 _LARGE, _EXPANDED = 2**26, 1000  # bytes from which on packing is looked at; times as many as repeated rows alone give
 
 
-def read_parquet_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
+class RowGroups(NamedTuple):
+    """The groups of rows of a file in which movements stand one after the other, as its metadata say.
+
+    A movement that begins in one group and goes on in others is of the group in which it begins. All rows of a group
+    whose numbers or names of movements are at most `highs` of the group before belong to groups before.
+    """
+
+    column: str  # it tells movements apart, and never decreases from group to group
+    lows: list[Any]  # the least value in each group
+    highs: list[Any]  # the greatest value in each group and all before it
+    sizes: list[int]  # bytes of each
+
+
+def row_groups(data: Any, layout: Layout) -> RowGroups | None:
+    """Return the groups of rows of a file between which it can be divided; None if it is one part.
+
+    It is one part unless a column of whole numbers or texts tells movements apart, of which the metadata say that it
+    has a value in each row and never decreases from a group to the next one.
+    """
+    with damaged_as(_DAMAGED, pa.ArrowException, OSError), _open(data) as file:
+        names = file.schema_arrow.names
+        _, _, owners, roles = _columns(file, layout)
+        groups = [file.metadata.row_group(g) for g in range(file.num_row_groups)]
+        if roles.movement == (roles.person,) or not groups:  # a movement begins where the person changes
+            return None
+        for k in [owners[k] for k in roles.movement]:
+            at = {groups[0].column(i).path_in_schema: i for i in range(groups[0].num_columns)}.get(names[k])
+            bounds = [None if at is None else group.column(at).statistics for group in groups]
+            if any(each is None or not each.has_min_max or each.null_count != 0 for each in bounds):
+                continue
+            lows, highs = ([getattr(each, name) for each in bounds] for name in ("min", "max"))
+            greatest = list(accumulate(highs, max))
+            if {*map(type, lows + highs)} in ({int}, {str}) and all(map(le, greatest, lows[1:])):
+                sizes = [sum(each.column(i).total_compressed_size for i in range(each.num_columns)) for each in groups]
+                return RowGroups(names[k], lows, greatest, sizes)
+    return None
+
+
+def _batches(file: Any, columns: Sequence[str], groups: RowGroups | None, part: range | None) -> Iterator[Any]:
+    """Yield the rows of a file, or of the movements that begin in some groups, which follow each other."""
+    if groups is None or part is None:
+        yield from file.iter_batches(_ROWS, columns=columns)
+        return
+    last = groups.highs[part.stop - 1]
+    more = [group for group in range(part.stop, len(groups.lows)) if groups.lows[group] <= last]
+    for batch in file.iter_batches(_ROWS, row_groups=[*part, *more], columns=columns):
+        values = batch.column(groups.column)
+        values = values.cast(values.type.value_type) if pa.types.is_dictionary(values.type) else values
+        own = compute.less_equal(values, last)
+        if part.start:
+            own = compute.and_(own, compute.greater(values, groups.highs[part.start - 1]))
+        yield batch.filter(own)
+
+
+def _extent(file: Any, data: bytes | Path, groups: RowGroups | None, part: range | None) -> tuple[int, int]:
+    """Return how many rows are read, and in how many bytes they are."""
+    if groups is not None and part is not None:
+        return sum(file.metadata.row_group(g).num_rows for g in part), sum(groups.sizes[g] for g in part)
+    if isinstance(data, Path):
+        raise DataError("expected a column by which movements stand one after the other, got none; take larger pieces")
+    return max(file.metadata.num_rows, 0), len(data)
+
+
+def _open(data: Any, **options: Any) -> Any:
+    return parquet.ParquetFile(io.BytesIO(data) if isinstance(data, bytes) else data, **options)
+
+
+def _columns(file: Any, layout: Layout) -> tuple[tuple[str, ...], tuple[str, ...], list[int], Roles]:
+    """Return heads and kinds of the columns of an open file, of each the column of the file, and their roles."""
+    names, types = tuple(file.schema_arrow.names), file.schema_arrow.types
+    heads, kinds, owners = _expanded(names, types, _lists_to_read(file, layout), file)
+    shown = _without_commands(heads, kinds, [types[k] for k in owners], layout)
+    return heads, kinds, owners, choose_roles(shown, kinds, layout)
+
+
+def read_parquet_table(data: bytes | Path, layout: Layout, part: range | None = None) -> tuple[Table, Roles]:
     """Read the columns that have a role. Dates and durations are nanoseconds; missing values are NaN.
 
     A column of lists counts as one column for each number in them, ``state.0``, ``state.1``. Without a choice such
-    columns are coordinates only where no plain ones are, and ``observation.state`` always is.
+    columns are coordinates only where no plain ones are, and ``observation.state`` always is. Of a path, the movements
+    that begin in some groups of rows can be read alone, see `RowGroups`.
     """
-    damaged = "expected a Parquet file, got something foreign, truncated or damaged"
-    with damaged_as(damaged, pa.ArrowException, OSError):
-        file = parquet.ParquetFile(io.BytesIO(data))
+    with damaged_as(_DAMAGED, pa.ArrowException, OSError):
+        file = _open(data)
         names, types = tuple(file.schema_arrow.names), file.schema_arrow.types
-        heads, kinds, owners = _expanded(names, types, _lists_to_read(file, layout), file)
-        roles = choose_roles(_without_commands(heads, kinds, [types[k] for k in owners], layout), kinds, layout)
+        heads, kinds, owners, roles = _columns(file, layout)
         needed = sorted({owners[k] for k in range(len(heads)) if k not in roles.ignored})
-        check_expanded(n_bytes := 8 * max(file.metadata.num_rows, 0) * (len(heads) - len(roles.ignored)))
-        if n_bytes > _LARGE and n_bytes > _EXPANDED * len(data):
+        groups = None if part is None else row_groups(data, layout)
+        n_rows, size = _extent(file, data, groups, part)
+        check_expanded(n_bytes := 8 * n_rows * (len(heads) - len(roles.ignored)))
+        if n_bytes > _LARGE and n_bytes > _EXPANDED * size:
             raise DataError(
-                f"expected samples that move, got {file.metadata.num_rows:,} rows in {len(data):,} bytes, which cannot "
+                f"expected samples that move, got {n_rows:,} rows in {size:,} bytes, which cannot "
                 "differ; write the rows that were recorded"
             )
         counts = Counter(names)
@@ -56,11 +136,11 @@ def read_parquet_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
         if nested := [k for k in needed if k in texts and pa.types.is_nested(types[k])]:
             raise DataError(f"expected names in {names[nested[0]]!r}, got {types[nested[0]]}")
         named = [names[k] for k in needed if k in texts]  # kept as dictionaries: few different texts in many rows
-        file = parquet.ParquetFile(io.BytesIO(data), read_dictionary=named)
+        file = _open(data, read_dictionary=named)
         # Some rows at a time, refused once they take more memory than the limit. The metadata about the pages of
         # columns are not used: pyarrow ends the process if they are damaged.
-        batches, n_bytes = [], 0
-        for batch in file.iter_batches(_ROWS, columns=[names[k] for k in needed]):
+        batches, n_bytes, used = [], 0, [names[k] for k in needed]
+        for batch in _batches(file, used, groups, part):
             n_bytes += batch.nbytes
             check_expanded(n_bytes)
             batches.append(batch)

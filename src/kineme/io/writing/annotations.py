@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
@@ -74,12 +75,7 @@ def to_csv(annotations: Sequence[Annotation]) -> bytes:
     return text.getvalue().encode("utf-8", "backslashreplace")
 
 
-def write_csv(path: Path, annotations: Sequence[Annotation], source: Path | None) -> Path:
-    """Write `to_csv`."""
-    return write_atomically(path, to_csv(annotations))
-
-
-def write_csv_stream(path: Path, parts: Iterable[Sequence[Annotation]]) -> Path:
+def stream_csv(path: Path, parts: Iterable[Sequence[Annotation]]) -> Path:
     """Write `to_csv` of many annotations, some at a time."""
     with whole_file(path) as beside, beside.open("wb") as file:
         file.write(to_csv([]))
@@ -88,10 +84,16 @@ def write_csv_stream(path: Path, parts: Iterable[Sequence[Annotation]]) -> Path:
     return path
 
 
-def write_json(path: Path, annotations: Sequence[Annotation], source: Path | None) -> Path:
-    """Write a list of objects, one for each annotation; the symbol of unknown motion is null."""
-    text = json.dumps([as_row(annotation) for annotation in annotations], ensure_ascii=False, allow_nan=False, indent=1)
-    return write_atomically(path, (text + "\n").encode("utf-8", "backslashreplace"))
+def stream_json(path: Path, parts: Iterable[Sequence[Annotation]]) -> Path:
+    """Write a list of objects, one for each annotation, some at a time; the symbol of unknown motion is null."""
+    with whole_file(path) as beside, beside.open("wb") as file:
+        before = "["
+        for annotation in chain.from_iterable(parts):
+            text = json.dumps([as_row(annotation)], ensure_ascii=False, allow_nan=False, indent=1)
+            file.write((before + text[1:-2]).encode("utf-8", "backslashreplace"))
+            before = ","
+        file.write(b"[]\n" if before == "[" else b"\n]\n")
+    return path
 
 
 def write_audacity(path: Path, annotations: Sequence[Annotation], source: Path | None) -> Path:
@@ -304,12 +306,14 @@ class Writer(NamedTuple):
     copies: Callable[[Path], bool] | None = None
     # It takes the path to write and that recording, and raises a `DataError` if no copy can be written there.
     check: Callable[[Path, Path], None] | None = None
+    # It writes the same of the parts of many annotations, of which one is in memory at a time.
+    stream: Callable[[Path, Iterable[Sequence[Annotation]]], Path] | None = None
 
 
 #: Name -> format.
 WRITERS: dict[str, Writer] = {
-    "csv": Writer(write_csv, (".csv",)),
-    "json": Writer(write_json, (".json",)),
+    "csv": Writer(lambda path, notes, _: stream_csv(path, [notes]), (".csv",), stream=stream_csv),
+    "json": Writer(lambda path, notes, _: stream_json(path, [notes]), (".json",), stream=stream_json),
     "elan": Writer(write_elan, (".eaf",), several=False),
     "audacity": Writer(write_audacity, (".txt",), several=False),
     "bag": Writer(write_bag, (".bag", ".mcap", ".db3"), copies=is_bag, check=check_bag),

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import os
-import re
 import sqlite3
-import time
 import zlib
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
@@ -18,7 +16,7 @@ from kineme.errors import DataError, KinemeError
 from kineme.library.storage.rows import Database, Row, damage, insert, select
 from kineme.library.storage.safety import Connection, defend, open_connection
 from kineme.library.storage.schema import APPLICATION_ID, CREATE, META, MIGRATIONS, PAGE_SIZE, SCHEMA_VERSION
-from kineme.reporting.atomic import whole_file
+from kineme.reporting.atomic import OF_SQLITE, remove_leftovers, whole_file
 
 _DAMAGED = (
     "expected {path} to be readable, got damaged bytes ({error}); take the file from a backup or an export: where the "
@@ -66,9 +64,6 @@ _WORDS[sqlite3.SQLITE_PERM] = _WORDS[sqlite3.SQLITE_READONLY]
 
 FILE = "library.sqlite"
 LOGS = ("-wal", "-journal")  # suffixes of the files beside a database from which SQLite may change it
-_COMPANIONS = (*LOGS, "-shm")
-_DAY = 86400.0  # seconds
-_LEFT = re.compile(r"\..+\.[0-9a-f]{8}")
 
 _WRITER_CACHE_KIB = 65536
 _LOG_BYTES = 1 << 26  # size to which the write-ahead log is truncated
@@ -233,22 +228,9 @@ def new_database(path: Path) -> Iterator[Path]:
     A FileExistsError if it does, or if another process was faster; it is unchanged.
     """
     if not path.exists():
-        _remove_old_leftovers(path.parent)
-    with whole_file(path, replace=False, companions=_COMPANIONS) as beside:
+        remove_leftovers(path.parent, ".+", _is_library)  # of any name: that of an export is often never used again
+    with whole_file(path, replace=False, companions=OF_SQLITE) as beside:
         yield beside
-
-
-def _remove_old_leftovers(folder: Path) -> None:
-    """Delete the files of processes that were killed here more than a day ago.
-
-    Unlike `kineme.reporting.atomic.remove_leftovers`, for libraries of any name: an export often has a name that is
-    never used again.
-    """
-    for path in folder.glob(".*"):
-        with suppress(OSError):  # another process was faster, or no permission
-            if _LEFT.fullmatch(path.name) and time.time() - path.lstat().st_mtime > _DAY and _is_library(path):
-                for end in ("", *_COMPANIONS):
-                    path.with_name(path.name + end).unlink(missing_ok=True)
 
 
 def _is_library(path: Path) -> bool:

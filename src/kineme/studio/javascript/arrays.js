@@ -8,7 +8,7 @@
 
 const KINDS = { float64: Float64Array, float32: Float32Array, int32: Int32Array };
 const FORMAT = "kineme-snapshot";
-const VERSION = 5;
+const VERSION = 6;
 const SMALLEST = 2.2250738585072014e-308; // number whose logarithm is taken
 
 /**
@@ -44,6 +44,52 @@ export function product(a, i, b, j, n) {
   let total = 0;
   for (let k = 0; k < n; k++) total += a[i + k] * b[j + k];
   return total;
+}
+
+/**
+ * Inner products of three rows of n numbers with three others, from i and j on, each `step` after the one before; written
+ * from `at` on, N numbers for a row. Each number is read once for three of them, and the nine sums do not wait for each
+ * other, so that this takes a third of the time of `product`.
+ * @param {Float32Array} a
+ * @param {Float32Array} b
+ * @param {Float64Array} into
+ */
+export function ninefold(a, i, b, j, step, n, into, at, N) {
+  let xu = 0;
+  let xv = 0;
+  let xw = 0;
+  let yu = 0;
+  let yv = 0;
+  let yw = 0;
+  let zu = 0;
+  let zv = 0;
+  let zw = 0;
+  for (let t = 0; t < n; t++) {
+    const x = a[i + t];
+    const y = a[i + step + t];
+    const z = a[i + 2 * step + t];
+    const u = b[j + t];
+    const v = b[j + step + t];
+    const w = b[j + 2 * step + t];
+    xu += x * u;
+    xv += x * v;
+    xw += x * w;
+    yu += y * u;
+    yv += y * v;
+    yw += y * w;
+    zu += z * u;
+    zv += z * v;
+    zw += z * w;
+  }
+  into[at] = xu;
+  into[at + 1] = xv;
+  into[at + 2] = xw;
+  into[at + N] = yu;
+  into[at + N + 1] = yv;
+  into[at + N + 2] = yw;
+  into[at + 2 * N] = zu;
+  into[at + 2 * N + 1] = zv;
+  into[at + 2 * N + 2] = zw;
 }
 
 /**

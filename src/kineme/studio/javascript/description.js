@@ -2,7 +2,7 @@
 
 import { arcLengthPhase, evenPath } from "./preparation.js";
 import { withoutPauses } from "./pauses.js";
-import { interpolate, linspace } from "./arrays.js";
+import { interpolate, linspace, product } from "./arrays.js";
 
 const FLAT = 1e-6; // share of the whole extent; flatter dimensions are not scaled up
 const NO_LENGTH = 1e-6; // of a movement of size 1: a shorter vector has no direction
@@ -15,7 +15,15 @@ export const N_POINTS = 199; // even samples from which the phases are computed
  * @property {number} n_points
  * @property {string} name
  *
+ * @typedef {Object} Stored m movements as they are compared
+ * @property {number} m
+ * @property {Float32Array[]} rows of each block, one movement after the other
+ * @property {Float64Array[]} squares their squared norms, (m,) of each block
+ * @property {Shapes|null} shapes
+ * @property {Shapes|null} details
+ *
  * @typedef {Object} Shapes segments and points of m movements, see `shapes`
+ * @property {number} d numbers of a vector
  * @property {Float32Array} segments m times K times (tangent, midpoint, turning angle / pi)
  * @property {Float32Array} points m times P times (point, turning angle / pi, tangent)
  * @property {number} n_segments K
@@ -100,19 +108,47 @@ export function featureRows(path, how, arrays) {
 }
 
 /**
+ * Write a row of J points (J, d, n) with the x of all points first: one movement of J n samples, which turns as one.
+ * @param {Float32Array} into from `at` on
+ * @param {number} at
+ * @param {Float32Array|Float64Array} row
+ * @param {import("./rotation.js").Rule} rule
+ */
+export function setRow(into, at, row, { n_dims: d, n_points: J }) {
+  const n = row.length / (d * J);
+  for (let p = 0; p < d * J; p++)
+    into.set(row.subarray(p * n, (p + 1) * n), at + ((p % d) * J + Math.floor(p / d)) * n);
+}
+
+/** The principal points of a path (J, d, n) at size 1, (q, d, n); of few points all, as they are. */
+function mixed(path, { n_dims, n_points, mixing }) {
+  if (!mixing) return path;
+  const size = path.length / mixing[0].length;
+  const mixture = new Float64Array(mixing.length * size);
+  mixing.forEach((weights, p) => {
+    weights.forEach((weight, j) => {
+      for (let t = 0; t < size; t++) mixture[p * size + t] += weight * path[j * size + t];
+    });
+  });
+  const square = product(mixture, 0, mixture, 0, mixture.length);
+  const extent = Math.sqrt((square * n_dims * n_points) / path.length) || 1;
+  return mixture.map((x) => x / extent);
+}
+
+/**
  * Segments and points of a path of positions over arc length, centered, at size 1; written as number i of the shapes.
- * @param {ArrayLike<number>} path d rows
- * @param {number} d
+ * @param {Float32Array|Float64Array} recorded rows of all columns
+ * @param {import("./rotation.js").Rule} rule
  * @param {Shapes} into
  * @param {number} i
- * @param {number} [factor] by which the path is multiplied
- * @param {boolean} [signal] whether it is one, over time: tangents are slopes, and nothing turns
+ * @param {boolean} signal whether it is one, over time: tangents are slopes, and nothing turns
  */
-export function fillShapes(path, d, into, i, factor = 1, signal = false) {
-  const { n_segments: K, n_points: P } = into;
+export function fillShapes(recorded, rule, into, i, signal) {
+  const { n_segments: K, n_points: P, d } = into;
   const w = 2 * d + 1;
-  const ends = evenly(path, d, K + 1, factor);
-  const points = evenly(path, d, P, factor);
+  const path = mixed(recorded, rule);
+  const ends = evenly(path, d, K + 1);
+  const points = evenly(path, d, P);
   const tangents = units(K, d, (p, k) => ends[(p + 1) * d + k] - ends[p * d + k]);
   const steps = units(P - 1, d, (p, k) => points[(p + 1) * d + k] - points[p * d + k]);
   const slopes = units(P, d, (p, k) => {
@@ -145,17 +181,42 @@ function fillSlopes(ends, { segments, n_segments: K }, i) {
 }
 
 /** Whether movements are compared as signals over time. */
-export const isSignal = (how) => how.n_dims === 1 && how.by_rows[how.rotating]?.signal === true;
+const isSignal = (how) => how.n_dims === 1 && how.by_rows[how.rotating]?.signal === true;
 
 /** Room for the shapes of m movements. @returns {Shapes} */
-export function roomForShapes(m, d, { n_segments, n_points }) {
+export function roomForShapes(m, { n_dims, n_points: J, mixing }, { n_segments, n_points }) {
+  const d = mixing ? mixing.length * (((n_dims * J) / mixing[0].length) | 0) : n_dims * J;
   const w = 2 * d + 1;
   const [segments, points] = [new Float32Array(m * n_segments * w), new Float32Array(m * n_points * w)];
-  return { segments, points, n_segments, n_points };
+  return { segments, points, n_segments, n_points, d };
+}
+
+/** Room for m movements. @returns {Stored} */
+export function roomFor(m, how) {
+  return {
+    m,
+    rows: how.by_rows.map((representation) => new Float32Array(m * how.n_dims * representation.n_points)),
+    squares: how.by_rows.map(() => new Float64Array(m)),
+    shapes: how.shapes && roomForShapes(m, how.rule, how.shapes),
+    details: how.details && roomForShapes(m, how.rule, how.details),
+  };
+}
+
+/**
+ * Write movement number i of its feature rows, and of positions in detail if there are shapes of these.
+ * @param {Stored} into
+ */
+export function describeRows(into, i, rows, details, how) {
+  rows.forEach((row, r) => {
+    setRow(into.rows[r], i * row.length, row, how.rule);
+    into.squares[r][i] = product(row, 0, row, 0, row.length);
+  });
+  if (into.shapes) fillShapes(rows[how.rotating], how.rule, into.shapes, i, isSignal(how));
+  if (into.details) fillShapes(details, how.rule, into.details, i, isSignal(how));
 }
 
 /** Positions at n even values along a path, each d numbers, interpolated linearly. */
-function evenly(path, d, n, factor) {
+function evenly(path, d, n) {
   const T = path.length / d;
   const positions = new Float64Array(n * d);
   for (let p = 0; p < n; p++) {
@@ -163,7 +224,7 @@ function evenly(path, d, n, factor) {
     const before = Math.min(Math.floor(at), T - 2);
     const share = at - before;
     for (let k = 0; k < d; k++) {
-      positions[p * d + k] = factor * (path[k * T + before] * (1 - share) + path[k * T + before + 1] * share);
+      positions[p * d + k] = path[k * T + before] * (1 - share) + path[k * T + before + 1] * share;
     }
   }
   return positions;
@@ -197,12 +258,6 @@ function angle(vectors, p, q, d) {
   return Math.acos(Math.min(Math.max(cosine, -1), 1)) / Math.PI;
 }
 
-/** Segments and points of a path in detail, (d, N_POINTS), as number i of the shapes. */
-function fillDetails(path, how, into, i) {
-  const row = normalized(along(path, how.n_dims, how.details.positions), how.n_dims, how);
-  fillShapes(Float32Array.from(row), how.n_dims, into, i, 1, isSignal(how));
-}
-
 /**
  * A movement as it is compared: its smooth path, rows with their squared norms, and shapes.
  * @param {import("./preparation.js").Movement} movement
@@ -224,15 +279,12 @@ export function smoothly(how, smooth) {
   return { path: smooth(how.cutoff), details: how.details && smooth(how.details.cutoff) };
 }
 
-/** The same of a path, smoothed both ways, relative to a first position. */
+/** The same of a path, smoothed both ways, relative to a first position. @returns {Stored} */
 export function describePath({ path, details: detailed }, start, how, arrays) {
   const d = how.n_dims;
   const place = (own) => (how.translation ? own : own.map((x, j) => x + start[Math.floor(j / N_POINTS)]));
-  const rows = featureRows(place(path), how, arrays);
-  const squares = rows.map((row) => row.reduce((sum, x) => sum + x * x, 0));
-  const shapes = how.shapes ? roomForShapes(1, d, how.shapes) : null;
-  if (shapes) fillShapes(rows[how.rotating], d, shapes, 0, 1, isSignal(how));
-  const details = how.details ? roomForShapes(1, d, how.details) : null;
-  if (details) fillDetails(place(detailed), how, details, 0);
-  return { path, rows, squares, shapes, details };
+  const described = roomFor(1, how);
+  const row = detailed && normalized(along(place(detailed), d, how.details.positions), d, how);
+  describeRows(described, 0, featureRows(place(path), how, arrays), row && Float32Array.from(row), how);
+  return described;
 }

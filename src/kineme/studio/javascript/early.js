@@ -38,11 +38,13 @@ function forecast(stored, evidence, label, begun, duration) {
     interpolate(times, even, path.subarray(k * N_POINTS, (k + 1) * N_POINTS)),
   );
   const R = bestRotation(early.rule, begun.rows, prefixes.rows.subarray(best * d * S, (best + 1) * d * S));
+  const { n_dims: r } = early.rule;
   const size = prefixes.sizes[best] > 0 ? begun.sizes[0] / prefixes.sizes[best] : 1;
   const remaining = Array.from({ length: N_REMAINING }, (_, p) =>
     Array.from({ length: d }, (_, k) => {
       let x = 0;
-      for (let h = 0; h < d; h++) x += R[k * d + h] * (rows[h][p] - rows[h][0]);
+      for (let h = k - (k % r), at = (k % r) * r; at < ((k % r) + 1) * r; h++, at++)
+        x += R[at] * (rows[h][p] - rows[h][0]);
       return size * x;
     }),
   );

@@ -5,7 +5,7 @@ import { argmax, finiteLog, logSumExp, product, softmax } from "./arrays.js";
 import { describePath } from "./description.js";
 import { pairDistances, squaredDistances } from "./distances.js";
 import { kernelLogs, logAverages } from "./recognition.js";
-import { align } from "./rotation.js";
+import { align, rotates } from "./rotation.js";
 
 /**
  * @typedef {Object} Numbers those of kineme.recognition.early, in the header
@@ -73,17 +73,14 @@ function logOdds({ over, before, numbers }, speed) {
  */
 export function logEvidence(stored, begun, whole, start, duration) {
   const { header } = stored.recognizer;
-  const {
-    early,
-    first,
-    comparison: { n_dims: d },
-  } = header;
-  const [G, S, prefixes, numbers] = [early.n_progress, stored.S, stored.prefixes, early.numbers];
+  const { early, first } = header;
+  const [G, prefixes, numbers] = [early.n_progress, stored.prefixes, early.numbers];
+  const size = begun.rows.length;
   const priors = logPriors(stored, begun, duration);
   const [w0, ...pairs] = early.widths.map((width) => 2 * width * width);
   const compare = (h, R) => {
     const norms = Math.sqrt(begun.squares[0] * prefixes.squares[h]);
-    return align(early.rule, begun.rows, 0, prefixes.rows, h * d * S, S, norms, R);
+    return align(early.rule, begun.rows, 0, prefixes.rows, h * size, size / early.rule.n_dims, norms, R);
   };
   const rough = priors.map((prior, h) => {
     const square = Math.max(begun.squares[0] + prefixes.squares[h] - 2 * compare(h, null), 0);
@@ -91,22 +88,18 @@ export function logEvidence(stored, begun, whole, start, duration) {
   });
   const odds = logOdds(early, begun.endSpeeds[0]);
   const evidence = new Float64Array(rough.length).fill(-Infinity);
-  const [measure, R] = [pairDistances(early.shapes, d, begun.shapes), new Float64Array(d * d)];
+  const measure = pairDistances(early.shapes, begun.shapes);
+  const R = rotates(early.rule) ? new Float64Array(early.rule.n_dims ** 2) : null;
   const squares = new Float64Array(3);
   for (const h of choose(rough, first, G, numbers.compared)) {
     compare(h, R);
-    for (let k = 0; k < d * d; k++) R[k] = Math.fround(R[k]);
+    R?.set(R.map(Math.fround));
     measure(prefixes.shapes, h, R, squares);
     const logs = pairs.map((w, k) => -squares[2 * k] / w); // of the elastic path, and of the cloud except for signals
     evidence[h] = logSumExp(logs) - Math.log(logs.length) + logRotation(early, R) + priors[h] - logSumExp([0, odds]);
   }
-  addOver(
-    stored,
-    whole,
-    start,
-    evidence,
-    priors.map((prior) => prior - logSumExp([0, -odds])),
-  );
+  const ended = priors.map((prior) => prior - logSumExp([0, -odds]));
+  addOver(stored, whole, start, evidence, ended);
   return evidence;
 }
 

@@ -1,7 +1,7 @@
 // The beginnings of stored movements, which a movement under way may be; the one under way is described as they are.
 
 import { finiteLog, interpolate, linspace, product } from "./arrays.js";
-import { fillShapes, N_POINTS, roomForShapes } from "./description.js";
+import { fillShapes, N_POINTS, roomForShapes, setRow } from "./description.js";
 import { arcLengthPhase } from "./preparation.js";
 
 /**
@@ -21,11 +21,11 @@ import { arcLengthPhase } from "./preparation.js";
  * `numbers.last` is the share of a beginning's time in which the speed at its end is measured.
  * @returns {Prefixes}
  */
-export function beginnings(paths, d, progress, { shapes: how, numbers, signals }) {
+export function beginnings(paths, d, progress, { shapes: how, rule, numbers, signals }) {
   const [S, G, n] = [how.n_segments + 1, progress.length, paths.length / (d * N_POINTS)];
   const room = (size) => new Float64Array(n * G * size);
   const [squares, sizes, lengths, elapsed, endSpeeds] = [1, 1, 1, 1, 1].map(room);
-  const [rows, timing, shapes] = [new Float32Array(n * G * d * S), room(S), roomForShapes(n * G, d, how)];
+  const [rows, timing, shapes] = [new Float32Array(n * G * d * S), room(S), roomForShapes(n * G, rule, how)];
   const prefixes = { rows, timing, shapes, squares, sizes, lengths, elapsed, endSpeeds };
   const even = linspace(0, 1, N_POINTS);
   for (let i = 0; i < n; i++) {
@@ -39,7 +39,7 @@ export function beginnings(paths, d, progress, { shapes: how, numbers, signals }
       const own = new Float64Array(d * S);
       for (let k = 0; k < d; k++)
         own.set(interpolate(targets, phase, path.subarray(k * N_POINTS, (k + 1) * N_POINTS)), k * S);
-      describeBeginning(prefixes, at, own, times, d, S, signals);
+      describeBeginning(prefixes, at, own, times, d, S, rule, signals);
       const [before, until] = interpolate([(1 - numbers.last) * times[S - 1], times[S - 1]], even, lengths);
       endSpeeds[at] = Math.log(Math.max((1 - before / (until || 1)) / numbers.last, numbers.least_speed));
     }
@@ -48,7 +48,7 @@ export function beginnings(paths, d, progress, { shapes: how, numbers, signals }
 }
 
 /** Write beginning number `at` with its samples (d, S) and their times. */
-function describeBeginning(prefixes, at, own, times, d, S, signals) {
+function describeBeginning(prefixes, at, own, times, d, S, rule, signals) {
   for (let t = 1; t < S; t++) {
     let square = 0;
     for (let k = 0; k < d; k++) square += (own[k * S + t] - own[k * S + t - 1]) ** 2;
@@ -66,12 +66,13 @@ function describeBeginning(prefixes, at, own, times, d, S, signals) {
   prefixes.sizes[at] = Math.sqrt(total / S);
   const per = 1 / ((prefixes.sizes[at] || 1) * Math.sqrt(S));
   for (let t = 0; t < d * S; t++) own[t] *= per;
-  prefixes.rows.set(own, at * d * S);
+  setRow(prefixes.rows, at * d * S, own, rule);
   const single = prefixes.rows.subarray(at * d * S, (at + 1) * d * S);
   prefixes.squares[at] = product(single, 0, single, 0, d * S);
   prefixes.elapsed[at] = times[S - 1];
   for (let t = 0; t < S; t++) prefixes.timing[at * S + t] = times[t] / ((times[S - 1] || 1) * Math.sqrt(S));
-  fillShapes(own, d, prefixes.shapes, at, Math.sqrt(S), signals);
+  const sized = own.map((x) => Math.sqrt(S) * x);
+  fillShapes(sized, rule, prefixes.shapes, at, signals);
 }
 
 /**

@@ -123,7 +123,7 @@ function evaluate(v, x, m, n) {
     const gap = v[j + 1] - v[j];
     const s = (at - v[j]) / gap;
     const r = 1 - s;
-    samples[q] = r * x[j] + s * x[j + 1] + ((gap * gap) / 6) * ((r ** 3 - r) * m[j] + (s ** 3 - s) * m[j + 1]);
+    samples[q] = r * x[j] + s * x[j + 1] + ((gap * gap) / 6) * ((r * r - 1) * r * m[j] + (s * s - 1) * s * m[j + 1]);
   }
   return samples;
 }

@@ -2,7 +2,7 @@
 
 import { argmax, descending, logSumExp, softmax } from "./arrays.js";
 import { certainty } from "./certainty.js";
-import { describeMovement, fillShapes, featureRows, isSignal, N_POINTS, roomForShapes } from "./description.js";
+import { describeMovement, describeRows, featureRows, N_POINTS, roomFor } from "./description.js";
 import { squaredDistances } from "./distances.js";
 
 const SCALE_OF_REACH = Math.sqrt(Math.PI / 4 / Math.log(20)); // by which the broad law is 0.05 at a reach of 1
@@ -30,7 +30,7 @@ const SHARES = {
  * @typedef {Object} Recognizer what classes are told apart by
  * @property {Object} header
  * @property {Object} arrays
- * @property {import("./distances.js").Stored} stored
+ * @property {import("./description.js").Stored} stored
  *
  * @typedef {Object} Calibration in the header, beside other numbers
  * @property {number} least smallest distance that counts, in kernel widths
@@ -63,30 +63,17 @@ const SHARES = {
  */
 export function knownClasses({ header, arrays }) {
   const how = header.comparison;
-  const d = how.n_dims;
-  const m = header.n_movements;
-  const rows = how.by_rows.map((representation) => new Float32Array(m * d * representation.n_points));
-  const squares = how.by_rows.map(() => new Float64Array(m));
-  const shapes = how.shapes ? roomForShapes(m, d, how.shapes) : null;
-  const details = how.details ? roomForShapes(m, d, how.details) : null;
+  const [d, m] = [how.n_dims, header.n_movements];
+  const stored = roomFor(m, how);
+  const size = how.details ? d * how.details.positions.n_points : 0;
   for (let i = 0; i < m; i++) {
     const path = Float64Array.from(arrays.paths.subarray(i * d * N_POINTS, (i + 1) * d * N_POINTS));
     const start = arrays.starts.subarray(i * d, (i + 1) * d);
     const placed = how.translation ? path : path.map((x, j) => x + start[Math.floor(j / N_POINTS)]);
-    featureRows(placed, how, arrays).forEach((row, r) => {
-      rows[r].set(row, i * row.length);
-      squares[r][i] = row.reduce((sum, x) => sum + x * x, 0);
-    });
-    if (shapes) {
-      const size = d * how.by_rows[how.rotating].n_points;
-      fillShapes(rows[how.rotating].subarray(i * size, (i + 1) * size), d, shapes, i, 1, isSignal(how));
-    }
-    if (details) {
-      const size = d * how.details.positions.n_points;
-      fillShapes(arrays["detailed rows"].subarray(i * size, (i + 1) * size), d, details, i, 1, isSignal(how));
-    }
+    const details = arrays["detailed rows"]?.subarray(i * size, (i + 1) * size);
+    describeRows(stored, i, featureRows(placed, how, arrays), details, how);
   }
-  return { header, arrays, stored: { m, rows, squares, shapes, details } };
+  return { header, arrays, stored };
 }
 
 /**

@@ -1,5 +1,7 @@
 // The best rotation of one movement onto another: under a prior, or in the plane by at most an angle.
 
+import { ninefold } from "./arrays.js";
+
 const STEPS = 40; // of Newton's, at most
 const CLOSE = 1e-12; // relative step after which there are no more
 const ROUNDING = 1e-15; // of |M|^4: the quartic is no more exact
@@ -11,17 +13,22 @@ const LEAST_TIE = 1e-9;
 
 /**
  * @typedef {Object} Rule how movements are rotated
- * @property {number} n_dims
+ * @property {number} n_dims of each point
+ * @property {number} n_points J, which turn together
+ * @property {number[][]|null} mixing weights of the points, or columns, that are compared pair by pair; null for all
  * @property {number} max_angle
  * @property {number[]|null} prior F of the matrix Fisher density, row by row; null for none
  */
 
+/** Whether there is a rotation at all. @param {Rule} rule */
+export const rotates = ({ n_dims: d, max_angle }) => max_angle > 0 && (d === 2 || d === 3);
+
 /**
  * The largest inner product of row a with the rotated row b, less what the rotation costs, and that rotation.
  * @param {Rule} rule
- * @param {ArrayLike<number>} a of n numbers for each dimension, from i on
+ * @param {Float32Array} a of n numbers for each dimension, from i on; see `setRow`
  * @param {number} i
- * @param {ArrayLike<number>} b from j on
+ * @param {Float32Array} b from j on
  * @param {number} j
  * @param {number} n
  * @param {number} norms |a| |b|
@@ -30,7 +37,7 @@ const LEAST_TIE = 1e-9;
  */
 export function align(rule, a, i, b, j, n, norms, R) {
   const d = rule.n_dims;
-  if (rule.max_angle === 0 || d === 1 || d > 3) {
+  if (!rotates(rule)) {
     let total = 0;
     for (let t = 0; t < d * n; t++) total += a[i + t] * b[j + t];
     if (R) for (let k = 0; k < d * d; k++) R[k] = k % (d + 1) === 0 ? 1 : 0;
@@ -64,16 +71,9 @@ function inPlane(rule, a, i, b, j, n, norms, R) {
 const C = new Float64Array(9);
 
 function inSpace(rule, a, i, b, j, n, norms, R) {
-  let trace = 0;
-  for (let k = 0; k < 3; k++) {
-    for (let h = 0; h < 3; h++) {
-      let total = 0;
-      for (let t = 0; t < n; t++) total += a[i + k * n + t] * b[j + h * n + t];
-      C[3 * k + h] = total + norms * rule.prior[3 * k + h];
-    }
-    trace += rule.prior[4 * k];
-  }
-  return largestTrace(C, R) - trace * norms;
+  ninefold(a, i, b, j, n, n, C, 0, 3);
+  for (let k = 0; k < 9; k++) C[k] += norms * rule.prior[k];
+  return largestTrace(C, R) - (rule.prior[0] + rule.prior[4] + rule.prior[8]) * norms;
 }
 
 const M = new Float64Array(9);
@@ -144,22 +144,20 @@ function rotate(R, top, square, determinant) {
 /**
  * The rotation that brings b closest to a, whatever it costs; of several equally good ones the smallest.
  * @param {Rule} rule
- * @param {ArrayLike<number>} a d rows of n numbers
- * @param {ArrayLike<number>} b
+ * @param {Float32Array} a d rows of n numbers
+ * @param {Float32Array} b
  * @returns {Float64Array} (d, d)
  */
 export function bestRotation(rule, a, b) {
   const d = rule.n_dims;
   const R = new Float64Array(d * d);
   const n = a.length / d;
-  if (d !== 3 || rule.max_angle === 0) {
+  if (d !== 3 || !rotates(rule)) {
     align({ ...rule, prior: null }, a, 0, b, 0, n, 0, R);
     return R;
   }
   const G = new Float64Array(9);
-  for (let k = 0; k < 3; k++) {
-    for (let h = 0; h < 3; h++) for (let t = 0; t < n; t++) G[3 * k + h] += a[k * n + t] * b[h * n + t];
-  }
+  ninefold(a, 0, b, 0, n, n, G, 0, 3);
   const largest = G.reduce((most, value) => Math.max(most, Math.abs(value)), 0) || 1;
   for (let k = 0; k < 9; k++) M[k] = G[k] /= largest;
   solve(null); // for its cofactors: |adj G| is about the product of the two largest singular values

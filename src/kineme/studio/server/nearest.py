@@ -10,6 +10,7 @@ import asyncio
 import os
 from collections.abc import Callable, Sequence
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -148,13 +149,17 @@ def _refusal(status: int) -> Any:
 
 
 class SearchOptions(NamedTuple):
-    """Options of the server; processes None is one for each processor, at most."""
+    """Options of the server; processes None is one for each processor, at most.
+
+    `progress` is called with the number of movements that are ready to be searched, and of all.
+    """
 
     library: Path
     shards: Path
     host: str = LOOPBACK
     port: int = 8765
     processes: int | None = None
+    progress: Callable[[int, int], object] | None = None
 
 
 def serve_search(options: SearchOptions, ready: Callable[[str, str, int], object]) -> None:
@@ -179,8 +184,10 @@ def serve_search(options: SearchOptions, ready: Callable[[str, str, int], object
                 f"expected shards that were made with the library in {options.library}, got those of another one in "
                 f"{options.shards}; name that library"
             )
+        if options.progress is not None:
+            options.progress(0, len(shards))
         hosts = () if is_loopback(options.host) else own_names(options.host)
-        with Processes(shards, options.processes) as processes:
+        with Processes(replace(shards, progress=options.progress), options.processes) as processes:
             app = create_search_app(shards, processes, library, token, hosts)
             address = f"http://{name_of(options.host)}:{listening.getsockname()[1]}/"
             run(app, listening, lambda: ready(address, token, len(shards)), lambda: None, processes.stop)

@@ -1,0 +1,560 @@
+"""A plan on an arm, step by step: look, check, move within what was shown, watch, look again, and plan anew."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kineme.errors import KinemeError, SpecificationError
+from kineme.library.grounding import learned_movement
+from kineme.library.library import ActionLibrary
+from kineme.movements.trajectories.trajectory import Trajectory
+from kineme.planning.domain import hands_of, is_shown
+from kineme.planning.plan import Goal, Plan, Problem, Step, check_plan, facts_after, find_plan, problem_of
+from kineme.planning.skill import nearest_demonstration, outside, skill_of
+from kineme.planning.states import HAND, State, read_state
+from kineme.planning.vocabulary import position_of
+from kineme.reporting.table import Table
+from kineme.reporting.text import first_names
+from kineme.robots.execution.joint_trajectory import JointTrajectory
+from kineme.robots.kinematics.descent import kinematics
+from kineme.robots.models.robot import Robot
+from kineme.robots.planning.generate_at import generate_at
+from kineme.robots.planning.move import move
+from kineme.robots.planning.robot_movement import RobotMovement
+from kineme.robots.simulation import Run
+from kineme.validation import Array, as_numbers, check_count, check_number
+
+FORMAT, VERSION = "kineme-execution", 1
+NOT_EXECUTED = "nothing was executed, every step passed its checks"
+_AXES = "xyz"
+_LEAST = 8  # samples of a movement that goes on or back
+_NEAR = 0.05  # before it was stopped, an arm does not stand [s]
+_SHARE = 0.2  # of the limits of velocity, on the way back
+_STANDS = 1e-4  # on the way back, samples so near each other count once [s]
+
+#: Reason to stop a movement at a time since it began [s] with the tip there [m], or None.
+Watcher = Callable[[float, Array], str | None]
+
+
+class Frame(NamedTuple):
+    """Where the coordinates of a plan lie in the frame of the robot: each axis is that of its letter."""
+
+    axes: list[int]  # of the plan's k coordinates: 0 for x, 1 for y, 2 for z
+    origin: Array  # (3,), of the plan, in the frame of the robot [m]
+
+    def to_robot(self, place: Array) -> Array:
+        """Return a place (k,) in the frame of the robot (3,)."""
+        point = self.origin.copy()
+        point[self.axes] += place
+        return point
+
+    def from_robot(self, point: Array) -> Array:
+        """Return a point (3,) of the robot as a place of the plan (k,)."""
+        return np.asarray((point - self.origin)[self.axes])
+
+
+def frame_of(plan: Plan, origin: ArrayLike = (0.0, 0.0, 0.0)) -> Frame:
+    """Return the frame of a plan whose axes are x, y, z, or two of them: then `origin` says where their plane lies."""
+    axes, where = plan.problem.domain.vocabulary.axes, as_numbers(origin, "origin")
+    if [*axes] != [axis for axis in _AXES if axis in axes] or len(axes) < 2:
+        raise SpecificationError(f"expected a plan in coordinates x, y, z or two of them, got {', '.join(axes)}")
+    if where.shape != (3,) or not np.isfinite(where).all():
+        raise SpecificationError(f"expected origin as three finite numbers, got {origin!r:.80}")
+    return Frame([_AXES.index(axis) for axis in axes], where)
+
+
+class World(Protocol):
+    """An arm and its sensors, as `kineme.robots.Simulation`."""
+
+    joints: Array  # (n,), where the arm stands
+
+    def state(self) -> State:
+        """Return what the sensors say, in the columns of the states that the domain was learned from."""
+
+    def run(self, movement: RobotMovement, watch: Callable[[float, Array], bool] | None = None) -> Run:
+        """Execute a movement that passed its checks; stop it on its path where `watch` says True."""
+
+
+class Attempt(NamedTuple):
+    """One movement of an execution."""
+
+    step: str  # as (carry shelf tray cup)
+    how: str  # "planned"; "resumed", the rest after a stop; "back", to where the step began
+    status: str  # "done", "stopped", "no effect", or "refused", before anything moved
+    reasons: tuple[str, ...]
+    plan: int  # number of the plan, from 0
+    duration: float = 0.0  # [s]
+    tip_error: float = 0.0  # largest distance from what was sent [m]
+
+
+class Replan(NamedTuple):
+    """Steps that took the place of those that were left."""
+
+    reason: str
+    steps: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Execution:
+    """What became of a plan.
+
+    Attributes
+    ----------
+    reached : bool
+        Whether the goal holds, as far as the sensors say.
+    why : str
+        Why it was not reached; empty if it was.
+    attempts : tuple of Attempt
+    replans : tuple of Replan
+    goal : tuple of str
+    state : dict
+        What was seen last.
+    runs : tuple of Run
+        Of the attempts that moved.
+    movements : tuple of RobotMovement
+        What was sent in them; without a world, what would be.
+    """
+
+    reached: bool
+    why: str
+    attempts: tuple[Attempt, ...]
+    replans: tuple[Replan, ...]
+    goal: tuple[str, ...]
+    state: dict[str, Any]
+    runs: tuple[Run, ...]
+    movements: tuple[RobotMovement, ...]
+
+    def __repr__(self) -> str:
+        end = "reached" if self.reached else "not reached"
+        return f"Execution({end}, {len(self.attempts)} movements, {len(self.replans)} replans)"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the report as plain data that JSON can hold."""
+        return {
+            "format": FORMAT, "version": VERSION, "reached": self.reached, "why": self.why, "goal": [*self.goal],
+            "attempts": [attempt._asdict() | {"reasons": [*attempt.reasons]} for attempt in self.attempts],
+            "replans": [{"reason": each.reason, "steps": [*each.steps]} for each in self.replans],
+            "state": self.state,
+        }  # fmt: skip
+
+    def table(self) -> Table:
+        """List the movements: step, how and with what result, how long, how far off, and why it ended."""
+        rows: list[tuple[str, ...]] = []
+        for k, a in enumerate(self.attempts):
+            if a.plan > (self.attempts[k - 1].plan if k else 0):
+                rows.append(("a new plan", "", "", "", "", self.replans[a.plan - 1].reason))
+            cells = a.step, a.how, a.status, f"{a.duration:.1f}", f"{1e3 * a.tip_error:.1f}", first_names(a.reasons, 3)
+            rows.append(cells)
+        note = "The goal is reached." if self.reached else f"The goal is not reached: {self.why}"
+        if self.why == NOT_EXECUTED:
+            note = f"{NOT_EXECUTED[0].upper()}{NOT_EXECUTED[1:]}."
+        return Table("Execution", ("step", "", "", "[s]", "off [mm]", "why"), rows, note)
+
+
+def execute(  # noqa: PLR0913 - one parameter per option
+    plan: Plan,
+    library: ActionLibrary,
+    world: World,
+    robot: Robot,
+    *,
+    replan: Callable[[Problem], Plan] = find_plan,
+    most_replans: int = 3,
+    leeway: float = 0.03,
+    watcher: Callable[[Step, RobotMovement], Watcher] | None = None,
+    done: Callable[[Step], object] | None = None,
+    follow: str = "full",
+    origin: ArrayLike = (0.0, 0.0, 0.0),
+) -> Execution:
+    """Execute a plan, and plan anew when the world is not as it should be.
+
+    Before each step the state is looked at and all that is left of the plan is checked with it. The step is the
+    movement of the nearest demonstration, inside what was shown, on the joints of the arm; what the arm cannot do is
+    refused before it moves. Where `watcher` says so, or the tip is too far from what was sent, the arm stops. If the
+    rest of the plan still holds then, it goes on; else there is a new plan, from where the arm stands, or from where
+    the step began, to which the arm goes back the way it came. The same happens if an effect of a step is missing.
+
+    Parameters
+    ----------
+    plan : Plan
+    library : ActionLibrary
+        Of its symbols; positions in meters.
+    world : World
+        As `kineme.robots.Simulation`.
+    robot : Robot
+    replan : callable, default find_plan
+        Returns a plan of a problem, or raises SpecificationError.
+    most_replans : int, default 3
+        Plans and continuations after the first one.
+    leeway : float, default 0.03
+        The tip may be so far from what was sent [m].
+    watcher : callable, optional
+        Returns, of a step and its movement, what watches it; by default `monitored`. The rest of a movement that was
+        stopped is not watched so: it begins outside.
+    done : callable, optional
+        Called with each step that came to its end, before its effects are looked at.
+    follow : {"full", "axis", "free"}, default "full"
+        How much of orientations is followed.
+    origin : array_like of shape (3,), default (0, 0, 0)
+        Where the recordings have their origin, in the frame of the robot [m]; where they are in x and z alone, y says
+        where their plane is.
+
+    Returns
+    -------
+    Execution
+        Also where the goal is not reached: `why` says what was missing.
+
+    Raises
+    ------
+    SpecificationError
+        A plan in other coordinates than x, y, z or two of them.
+    """
+    check_number("leeway", leeway, above=0.0)
+    check_count("most_replans", most_replans, 0)
+    frame = frame_of(plan, origin)
+    watcher = watcher or monitored(library, robot, frame)
+    options = _Options(replan, watcher, done or (lambda step: None), leeway, follow, frame)
+    log = _Executor(plan, library, world, robot, options)
+    why = log.run(most_replans)
+    return Execution(
+        not why, why, tuple(log.attempts), tuple(log.replans), tuple(map(str, plan.problem.goal)), log.state,
+        tuple(log.runs), tuple(log.movements),
+    )  # fmt: skip
+
+
+def monitored(
+    library: ActionLibrary, robot: Robot, frame: Frame, error_rate: float = 0.01
+) -> Callable[[Step, RobotMovement], Watcher]:
+    """Return what stops a step where it leaves what was shown of its symbol: `ActionLibrary.monitor`.
+
+    `error_rate` is the share of movements like those shown that are stopped all the same. Movements of more
+    than places, as with orientations, are not watched so: of these the tip does not tell enough.
+    """
+
+    def watcher(step: Step, movement: RobotMovement) -> Watcher:
+        if library.primitives(ids=library[step.operator].members[:1]).n_dims != len(frame.axes):
+            return lambda t, tip: None
+        ends = kinematics(robot, movement.trajectory.positions[[movement.first, -1]])[0]
+        monitor = library.monitor(step.operator, *map(frame.from_robot, ends), error_rate=error_rate)
+
+        def watch(t: float, tip: Array) -> str | None:
+            state = monitor.update(t, frame.from_robot(tip))
+            return None if state.inside else state.in_words
+
+        return watch
+
+    return watcher
+
+
+def check_steps(
+    plan: Plan, library: ActionLibrary, robot: Robot, follow: str = "full", origin: ArrayLike = (0.0, 0.0, 0.0)
+) -> Execution:
+    """Plan the joints of each step and check them, as `execute` would without any disturbance; nothing moves.
+
+    `movements` are those of the steps, each from where the one before ends, up to the first that is refused.
+    """
+    frame = frame_of(plan, origin)
+    attempts: list[Attempt] = []
+    movements: list[RobotMovement] = []
+    joints = robot.rest
+    for step in plan.steps:
+        try:
+            start = joints if movements else None
+            movements.append(_movement(plan.problem, step, library, robot, start, (frame, follow)))
+        except KinemeError as error:
+            attempts.append(Attempt(str(step), "planned", "refused", (str(error),), 0))
+            break
+        joints = movements[-1].trajectory.positions[-1]
+        attempts.append(Attempt(str(step), "planned", "checked", (), 0, movements[-1].trajectory.duration))
+    refused = attempts and attempts[-1].status == "refused"
+    why = f"{attempts[-1].step} is refused" if refused else NOT_EXECUTED
+    return Execution(False, why, tuple(attempts), (), tuple(map(str, plan.problem.goal)), {}, (), tuple(movements))
+
+
+def _movement(
+    problem: Problem,
+    step: Step,
+    library: ActionLibrary,
+    robot: Robot,
+    joints: Array | None,
+    how: tuple[Frame, str],
+) -> RobotMovement:
+    """Return the movement of a step on the arm, from where its joints stand, by default from where the step begins."""
+    domain = problem.domain
+    operator = domain.operator(step.operator)
+    if reasons := is_shown(domain, operator, step.arguments, problem.places):
+        raise SpecificationError(f"{step} is outside what was shown: {'; '.join(reasons)}")
+    skill = skill_of(library, operator.symbol_id or step.operator)
+    if {*skill.units} - {None, "m"}:
+        raise SpecificationError(f"expected movements in meters, {skill.name} is in {', '.join(map(str, skill.units))}")
+    ends = hands_of(operator, step.arguments, problem.places)
+    frame, follow = how
+    if joints is None and ends:
+        start = np.array(ends[0])
+    else:
+        tip = kinematics(robot, (robot.rest if joints is None else joints)[None])[0][0]
+        start = frame.from_robot(tip)
+    goal = start + np.median(skill.shown["displacement"], axis=0) if ends is None else ends[1]
+    if excesses := outside(skill, start, goal, domain.vocabulary.radius):
+        raise SpecificationError(f"{step} is outside what was shown: {'; '.join(map(str, excesses))}")
+    learned = learned_movement(library.store, int(skill.movements[nearest_demonstration(skill, start, goal)]))
+    plane = "".join(_AXES[axis] for axis in frame.axes[:2])
+    generated = generate_at(learned, frame.to_robot(start), frame.to_robot(goal), plane=plane)
+    return move(
+        generated.movement, robot, space="tip", start=joints, timing="slowed", follow=follow, steps=generated.steps,
+        continuous=generated.continuous,
+    )  # fmt: skip
+
+
+class _Options(NamedTuple):
+    """What `execute` is told besides."""
+
+    replan: Callable[[Problem], Plan]
+    watcher: Callable[[Step, RobotMovement], Watcher]
+    done: Callable[[Step], object]
+    leeway: float  # [m]
+    follow: str
+    frame: Frame
+
+
+class _Stop(NamedTuple):
+    """A step that was stopped on its way."""
+
+    step: Step
+    movement: RobotMovement
+    sample: int  # of its trajectory, where the arm stands
+
+
+class _Way(NamedTuple):
+    """Where the arm went in a step."""
+
+    place: str  # at which the step began
+    joints: Array  # (m, n)
+
+
+class _Executor:
+    """The state of one execution."""
+
+    def __init__(
+        self,
+        plan: Plan,
+        library: ActionLibrary,
+        world: World,
+        robot: Robot,
+        options: _Options,
+    ) -> None:
+        self.plan, self.library, self.world, self.robot, self.options = plan, library, world, robot, options
+        self.places = dict(plan.problem.places)  # as they were seen last
+        self.attempts: list[Attempt] = []
+        self.replans: list[Replan] = []
+        self.runs: list[Run] = []
+        self.movements: list[RobotMovement] = []
+        self.state: dict[str, Any] = {}
+        self.ways: list[_Way] = []  # of the steps that were begun
+
+    def run(self, left: int) -> str:
+        """Execute, with so many plans and continuations more; return why the goal was not reached, or nothing."""
+        steps, stop = list(self.plan.steps), None
+        while True:
+            problem = self.look()
+            if lost := self.unseen(steps):
+                return f"{first_names(lost, 5)} {'is' if len(lost) == 1 else 'are'} not seen"
+            trouble = _trouble(problem, steps)
+            if trouble is None and not steps:
+                return ""
+            resumes = trouble is not None and stop is not None and _may_go_on(problem, stop.step, steps)
+            if trouble is not None and not resumes:
+                if left == 0:
+                    return f"{trouble}; and no plan more was to be made"
+                left -= 1
+                stop, answer = None, self.plan_anew(problem, trouble)
+                if isinstance(answer, str):
+                    return answer
+                steps = answer
+                continue
+            stop = self.attempt(problem, steps[0], stop if resumes else None)
+            last = self.attempts[-1]
+            if last.status == "refused" or (last.status == "stopped" and left == 0):
+                return f"{last.step} was {last.status}: {first_names(last.reasons, 3)}"
+            if stop is None:
+                steps.pop(0)
+            else:
+                left -= 1
+
+    def look(self) -> Problem:
+        """Return the state now as a problem; a place at which an item lies is where that item is."""
+        domain = self.plan.problem.domain
+        self.state = self.sensed()
+        problem = problem_of(domain, self.state, self.plan.problem.goal, self.places)
+        columns = {variable.name: variable.columns for variable in domain.vocabulary.of_kind("item")}
+        self.places = dict(problem.places) | {
+            fact[2]: position_of(columns[fact[1]], self.state) for fact, value in problem.facts.items()
+            if value and fact[0] == "in" and fact[2] not in domain.vocabulary.fixtures
+        }  # fmt: skip
+        return problem_of(domain, self.state, self.plan.problem.goal, self.places)
+
+    def sensed(self) -> dict[str, Any]:
+        """Return the state now, positions in the frame of the plan."""
+        vocabulary, state = self.plan.problem.domain.vocabulary, read_state(self.world.state())
+        origin = dict(zip(vocabulary.axes, self.options.frame.origin[self.options.frame.axes].tolist(), strict=True))
+        places = [HAND, *vocabulary.items, *vocabulary.fixtures]
+        columns = {f"{name}_{axis}": origin[axis] for name in places for axis in vocabulary.axes}
+        return state | {name: state[name] - shift for name, shift in columns.items() if name in state}
+
+    def unseen(self, steps: Sequence[Step]) -> list[str]:
+        """List the objects of the goal and of the steps whose position is not known."""
+        vocabulary = self.plan.problem.domain.vocabulary
+        names = {name for goal in self.plan.problem.goal for name in goal.fact[1:]}
+        names |= {name for step in steps for name in step.arguments.values()}
+        return [
+            variable.name for variable in vocabulary.of_kind("item", "fixture")
+            if variable.name in names and not np.isfinite(position_of(variable.columns, self.state)).all()
+        ]  # fmt: skip
+
+    def attempt(self, problem: Problem, step: Step, stop: _Stop | None) -> _Stop | None:
+        """Make the movement of a step, or the rest of one that was stopped; return where it was stopped."""
+        how = "planned" if stop is None else "resumed"
+        how_to = self.options.frame, self.options.follow
+        try:
+            if stop is None:
+                movement = _movement(problem, step, self.library, self.robot, self.world.joints, how_to)
+                self.ways.append(_Way(_place(problem, step, 0), np.empty((0, self.robot.n_joints))))
+            else:
+                movement = self.along(stop.movement.trajectory, stop.sample)
+            watcher = self.options.watcher(step, movement) if stop is None else None
+        except KinemeError as error:
+            self.attempts.append(Attempt(str(step), how, "refused", (str(error),), len(self.replans)))
+            return None
+        sample = self.move(str(step), how, movement, watcher)
+        if sample is not None:
+            return _Stop(step, movement, sample)
+        self.options.done(step)
+        missing = _missing(self.look(), step)
+        if missing:
+            self.attempts[-1] = self.attempts[-1]._replace(status="no effect", reasons=tuple(missing))
+        return None
+
+    def move(self, step: str, how: str, movement: RobotMovement, watcher: Watcher | None = None) -> int | None:
+        """Execute a movement; where it is stopped, return the sample of its trajectory at which the arm stands."""
+        trajectory, reasons = movement.trajectory, list[str]()
+        times, tips = trajectory.times - movement.begins, kinematics(self.robot, trajectory.positions)[0]
+
+        def watch(t: float, tip: Array) -> bool:
+            off = float(np.linalg.norm(tip - [np.interp(t, times, column) for column in tips.T]))
+            if off > self.options.leeway:
+                reasons.append(f"the tip is {100 * off:.1f} cm from where it was sent, at {t:.2f} s")
+            elif t >= 0 and watcher is not None and (reason := watcher(t, tip)):
+                reasons.append(reason)
+            return bool(reasons)
+
+        run = self.world.run(movement, watch)
+        self.runs.append(run)
+        self.movements.append(movement)
+        status, duration = "done" if run.stopped is None else "stopped", float(run.times[-1] - run.times[0])
+        self.attempts.append(Attempt(step, how, status, tuple(reasons), len(self.replans), duration, run.tip_error))
+        stands = len(trajectory) - 1
+        if run.stopped is not None:
+            passed = (times >= run.stopped - _NEAR) & (times <= run.times[-1])
+            away = np.linalg.norm(trajectory.positions - self.world.joints, axis=1)
+            stands = int(np.argmin(np.where(passed, away, np.inf)))
+        if how != "back":
+            way = self.ways[-1]
+            self.ways[-1] = way._replace(
+                joints=np.vstack((way.joints, trajectory.positions[movement.first : stands + 1]))
+            )
+        return None if run.stopped is None else stands
+
+    def along(self, trajectory: JointTrajectory, sample: int) -> RobotMovement:
+        """Return the movement along the rest of what was sent before, with what the gripper does there."""
+        first = min(sample, len(trajectory) - _LEAST)
+        steps = {name: values[first:] for name, values in trajectory.steps.items()}
+        return self.in_joints(trajectory.times[first:] - trajectory.times[first], trajectory.positions[first:], steps)
+
+    def in_joints(self, times: Array, positions: Array, steps: Mapping[str, Array] | None = None) -> RobotMovement:
+        return move(
+            Trajectory(times=times, positions=positions), self.robot, space="joints", timing="slowed",
+            start=self.world.joints, steps=steps,
+        )  # fmt: skip
+
+    def plan_anew(self, problem: Problem, trouble: str) -> list[Step] | str:
+        """Return the steps of a new plan, or why there is none.
+
+        It begins where the arm stands or, where none does, where one of the last steps began: there the arm goes back.
+        """
+        why, tried = "", set[str]()
+        for n_back in range(len(self.ways) + 1):
+            there = problem
+            if n_back:
+                place = self.ways[-n_back].place
+                if place in tried or place not in problem.places:
+                    continue
+                tried.add(place)
+                there = _with_hand(problem, place)
+            try:
+                plan = self.options.replan(there)
+            except KinemeError as error:
+                why = why or str(error)
+                continue
+            if n_back and not self.goes_back(n_back):
+                return f"{trouble}; and the way back was {self.attempts[-1].status}: {self.attempts[-1].reasons[0]}"
+            self.replans.append(Replan(trouble, tuple(map(str, plan.steps))))
+            return list(plan.steps)
+        return f"{trouble}; {why}"
+
+    def goes_back(self, n_steps: int) -> bool:
+        """Go back to where the last steps began, the way they came, at a constant share of the limits of velocity."""
+        way = np.vstack([each.joints for each in self.ways[-n_steps:]])[::-1]
+        del self.ways[-n_steps:]
+        lengths = np.append(0.0, np.linalg.norm(np.diff(way, axis=0) / self.robot.velocity, axis=1).cumsum())
+        moves = np.append(True, np.diff(lengths) > _STANDS)
+        if moves.sum() < _LEAST:
+            return True
+        try:
+            movement = self.in_joints(lengths[moves] / _SHARE, way[moves])
+        except KinemeError as error:
+            self.attempts.append(Attempt("(back)", "back", "refused", (str(error),), len(self.replans)))
+            return False
+        return self.move("(back)", "back", movement) is None
+
+
+def _trouble(problem: Problem, steps: Sequence[Step]) -> str | None:
+    """Say why steps do not lead to the goal from the state of a problem; None if they do."""
+    lost = {name for step in steps for name in step.arguments.values()} - {*problem.objects}
+    if lost:
+        return f"{first_names(sorted(lost), 5)} cannot be found"
+    try:
+        check_plan(Plan(problem, tuple(steps), ""))
+    except SpecificationError as error:
+        return str(error)
+    return None
+
+
+def _may_go_on(problem: Problem, step: Step, steps: Sequence[Step]) -> bool:
+    """Tell whether nothing but the hand is elsewhere: from the first or the last place of its step all could go on."""
+    ends = ((_place(problem, step, 0), steps), (_place(problem, step, -1), steps[1:]))
+    return any(_trouble(_with_hand(problem, place), rest) is None for place, rest in ends)
+
+
+def _place(problem: Problem, step: Step, k: int) -> str:
+    """Return the name of one of the places of a step; nothing where it has none."""
+    places = problem.domain.operator(step.operator).places
+    return step.arguments[places[k].name] if places else ""
+
+
+def _with_hand(problem: Problem, place: str) -> Problem:
+    hands = {fact: fact[1] == place for fact in problem.facts if fact[0] == "hand-at"}
+    return replace(problem, facts={**problem.facts, **hands})
+
+
+def _missing(problem: Problem, step: Step) -> list[str]:
+    """List the effects of a step that are not seen."""
+    expected = facts_after({}, problem.domain.operator(step.operator), step.arguments)
+    return [
+        f"{Goal(fact, value)} is not {'so' if fact in problem.facts else 'known'}"
+        for fact, value in expected.items()
+        if problem.facts.get(fact) is not value
+    ]
