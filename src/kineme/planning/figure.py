@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ from kineme.planning.plan import Plan
 from kineme.planning.skill import move_to, skill_of
 from kineme.reporting.atomic import write_atomically
 from kineme.reporting.colors import BLUE, GRAY, GREEN, ORANGE, PURPLE
-from kineme.reporting.figures import encode_figure, new_figure, principal_axes
+from kineme.reporting.figures import new_figure, principal_axes
 from kineme.reporting.text import drawable, shortened
 from kineme.robots.kinematics.descent import kinematics
 from kineme.robots.models.robot import Robot
@@ -27,7 +28,7 @@ from kineme.validation import Array
 _MOST_FRAMES = 200
 _JUMP, _OFF = 0.02, 0.01  # of an object within a sample, and of the tip from where it was sent [m]: a disturbance
 _SHOWN, _TRAIL = 300, 400  # samples for which a disturbance and the path of the tip are shown
-_LINES, _LONGEST = 4, 76  # of the report, and their characters
+_LINES, _LONGEST = 4, 72  # of the report, and their characters
 _SHADES = 12  # of each color, in a moving picture
 _COLORS = (ORANGE, BLUE, GREEN, PURPLE, GRAY)
 
@@ -112,8 +113,8 @@ class _Film:
         self.robot, self.lines, self.disturbances = robot, _report(execution), self._disturbed()
         self.figure = new_figure(4.8, 4.8)
         self.figure.set_layout_engine("none")
-        self.axes: Any = self.figure.add_axes((-0.06, 0.18, 1.12, 0.84), projection="3d")
-        self.said = [self.figure.text(0.03, 0.133 - 0.036 * k, "", fontsize=9) for k in range(_LINES)]
+        self.axes: Any = self.figure.add_axes((-0.06, 0.2, 1.12, 0.83), projection="3d")
+        self.said = [self.figure.text(0.03, 0.125 - 0.035 * k, "", fontsize=9) for k in range(_LINES)]
         self.title = self.figure.text(0.03, 0.95, "", color=ORANGE, fontsize=12, weight="bold")
         style: dict[str, Any] = {"solid_capstyle": "round", "solid_joinstyle": "round"}
         (self.shadow,) = self.axes.plot([], [], [], color=GRAY, alpha=0.3, linewidth=3, **style)
@@ -123,10 +124,11 @@ class _Film:
         self.things: dict[str, Any] = {}
         for name, where in self.objects.items():
             stays = bool((np.ptp(where, axis=0) < _JUMP).all())
-            color, marker, beside = (GRAY, "D", "top") if stays else (GREEN, "s", "bottom")
+            color, marker, side = (GRAY, "D", "top") if stays else (GREEN, "s", "bottom")
+            text = f"\n{drawable(name)}" if stays else f"{drawable(name)}\n"
             (stem,) = self.axes.plot([], [], [], color=color, linewidth=0.8)
             (square,) = self.axes.plot([], [], [], marker, color=color, markersize=10 if stays else 8)
-            label = self.axes.text(0, 0, 0, f"   {drawable(name)}", fontsize=9, color=color, va=beside, weight="bold")
+            label = self.axes.text(0, 0, 0, text, fontsize=9, color=color, ha="center", va=side, weight="bold")
             self.things[name] = stem, square, label
         self.axes.view_init(elev=22, azim=28)
 
@@ -170,8 +172,8 @@ class _Film:
             self.path.set_data_3d(*self.tips[max(0, row - _TRAIL) : row + 1].T)
             for name, (stem, square, label) in self.things.items():
                 x, y, z = self.objects[name][row]
-                stem.set_data_3d([x, x], [y, y], [low[2], z])
-                square.set_data_3d([x], [y], [z])
+                stem.set_data_3d(*np.array([[x, x], [y, y], [low[2], z]]))
+                square.set_data_3d(*np.array([[x], [y], [z]]))
                 label.set_position_3d((x, y, z))
                 label.set_visible(bool(np.isfinite(z)))
             recent = [each for each in self.disturbances if 0 <= row - each[0] < _SHOWN]
@@ -181,7 +183,9 @@ class _Film:
             lines = self.lines[2 * self.run_of[row] + is_over]
             for text, (line, color) in zip(self.said, lines[-_LINES:], strict=False):
                 text.set(text=line, color=color)
-            canvas.draw()
+            with warnings.catch_warnings():  # a character that the font lacks is drawn as a box
+                warnings.filterwarnings("ignore", r"Glyph \d+", UserWarning)
+                canvas.draw()
             yield np.array(canvas.buffer_rgba())
 
 
@@ -196,11 +200,11 @@ def _report(execution: Execution) -> list[list[tuple[str, str]]]:
             lines.append((f"a new plan of {len(execution.replans[plan - 1].steps)} steps", ORANGE))
         what = {"planned": attempt.step, "resumed": f"{attempt.step}, resumed", "back": "back, the way it came"}
         lines = [(text, GRAY if color == BLUE else color) for text, color in lines]
-        text, reason = drawable(what[attempt.how]), drawable(": ".join((attempt.status, *attempt.reasons[:1])))
-        lines.append((text, BLUE))
+        lines.append((drawable(shortened(what[attempt.how], _LONGEST)), BLUE))
         under_way = [*lines]
         if attempt.status != "done":
-            lines.append((shortened(f"    {reason}", _LONGEST), ORANGE))
+            reason = shortened(": ".join((attempt.status, *attempt.reasons[:1])), _LONGEST)
+            lines.append((f"    {drawable(reason)}", ORANGE))
         if attempt.duration:
             reports += [under_way, [*lines]]
     if reports:
@@ -211,8 +215,9 @@ def _report(execution: Execution) -> list[list[tuple[str, str]]]:
 def write_moving(path: Path, execution: Execution, robot: Robot) -> Path:
     """Write the arm and the objects as they move, four frames for each second, at twice the speed, as a GIF.
 
-    Below it stands which step is under way and how those before ended. A cross shows where an object was moved or taken
-    away, or where the tip is more than 1 cm from where it was sent. At the end of a step that failed the picture stands.
+    Below it stands which step is under way and how those before ended. Crosses show where an object was moved or taken
+    away, and where the tip is more than 1 cm from where it was sent. At the end of a step that failed the picture
+    stands.
     """
     from PIL import Image
 
