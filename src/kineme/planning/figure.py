@@ -6,7 +6,7 @@ import io
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from matplotlib.colors import to_rgb
@@ -113,7 +113,7 @@ class _Film:
         self.robot, self.lines, self.disturbances = robot, _report(execution), self._disturbed()
         self.figure = new_figure(4.8, 4.8)
         self.figure.set_layout_engine("none")
-        self.axes: Any = self.figure.add_axes((-0.06, 0.2, 1.12, 0.83), projection="3d")
+        self.axes = cast("Any", self.figure.add_axes((-0.06, 0.2, 1.12, 0.83), projection="3d"))
         self.said = [self.figure.text(0.03, 0.125 - 0.035 * k, "", fontsize=9) for k in range(_LINES)]
         self.title = self.figure.text(0.03, 0.95, "", color=ORANGE, fontsize=12, weight="bold")
         style: dict[str, Any] = {"solid_capstyle": "round", "solid_joinstyle": "round"}
@@ -136,16 +136,16 @@ class _Film:
         """List what was disturbed: the row, from where to where, and what is said of it."""
         rows = []
         for name, where in self.objects.items():
-            is_there = np.isfinite(where).all(axis=1)
+            is_there = np.asarray(np.isfinite(where).all(axis=1))
             jumps = np.linalg.norm(np.diff(where, axis=0), axis=1) > _JUMP
-            for row in np.flatnonzero(jumps | (is_there[:-1] & ~is_there[1:])) + 1:
+            for row in (np.flatnonzero(jumps | (is_there[:-1] & ~is_there[1:])) + 1).tolist():
                 what = "moved" if is_there[row] else "taken away"
-                rows.append((int(row), where[row - 1], where[row], f"{drawable(name)} is {what}"))
+                rows.append((row, where[row - 1], where[row], f"{drawable(name)} is {what}"))
         off = np.linalg.norm(self.tips - self.sent, axis=1)
         is_off = np.append(False, off > _OFF)
-        for row in np.flatnonzero(is_off[1:] & ~is_off[:-1]):
+        for row in np.flatnonzero(is_off[1:] & ~is_off[:-1]).tolist():
             end = row + int(np.argmax(off[row : row + _SHOWN]))
-            rows.append((int(row), self.sent[end], self.tips[end], f"the tip is {100 * off[end]:.0f} cm off"))
+            rows.append((row, self.sent[end], self.tips[end], f"the tip is {100 * off[end]:.0f} cm off"))
         return rows
 
     def rows(self) -> Array:
@@ -158,7 +158,8 @@ class _Film:
         """Yield a picture (height, width, 4) for each row."""
         from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-        canvas, links = FigureCanvasAgg(self.figure), _links(self.robot, self.joints[rows])
+        canvas: Any = FigureCanvasAgg(self.figure)
+        links = _links(self.robot, self.joints[rows])
         everything = np.vstack((links.reshape(-1, 3), *(w[np.isfinite(w).all(axis=1)] for w in self.objects.values())))
         low, high = everything.min(axis=0), everything.max(axis=0)
         low[2] = min(low[2], 0.0)
@@ -177,7 +178,8 @@ class _Film:
                 label.set_position_3d((x, y, z))
                 label.set_visible(bool(np.isfinite(z)))
             recent = [each for each in self.disturbances if 0 <= row - each[0] < _SHOWN]
-            self.mark.set_data_3d(*np.vstack([[[np.nan] * 3, *each[1:3]] for each in recent] or [[np.nan] * 3]).T)
+            marks = [point for each in recent for point in (np.full(3, np.nan), *each[1:3])]
+            self.mark.set_data_3d(*np.array(marks or [np.full(3, np.nan)]).T)
             self.title.set_text(", ".join(dict.fromkeys(each[3] for each in recent)))
             is_over = row + 1 == len(self.run_of) or self.run_of[row + 1] > self.run_of[row]
             lines = self.lines[2 * self.run_of[row] + is_over]
