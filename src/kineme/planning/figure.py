@@ -42,7 +42,8 @@ def paths_of_plan(plan: Plan, library: ActionLibrary) -> list[tuple[str, Array]]
             start = paths[-1][1][-1] if paths else step.start
             skill = skills[step.operator]
             movement = move_to(library, skill, start, step.goal, rate=100.0)
-            paths.append((step.operator, np.asarray(movement.positions[0][:, : len(skill.axes)])))
+            columns = [movement.axis_names.index(axis) for axis in skill.axes]
+            paths.append((step.operator, np.asarray(movement.positions[0][:, columns])))
     return paths
 
 
