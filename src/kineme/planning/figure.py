@@ -131,6 +131,8 @@ class _Film:
             (square,) = self.axes.plot([], [], [], marker, color=color, markersize=10 if stays else 8)
             label = self.axes.text(0, 0, 0, text, fontsize=9, color=color, ha="center", va=side, weight="bold")
             self.things[name] = stem, square, label
+        for axis in (self.axes.xaxis, self.axes.yaxis, self.axes.zaxis):
+            axis.set_pane_color((1.0, 1.0, 1.0))  # light grays are none of the few colors
         self.axes.view_init(elev=22, azim=28)
 
     def _disturbed(self) -> list[tuple[int, Array, Array, str]]:
