@@ -27,7 +27,7 @@ from kineme.planning.domain import (
 )
 from kineme.planning.pddl import Names, domain_to_pddl, literals_of, name_of, parsed, problem_to_pddl, read_problem
 from kineme.planning.states import State
-from kineme.planning.vocabulary import Fact, facts_of, places_of, predicates_of
+from kineme.planning.vocabulary import Fact, facts_of, places_of, position_of, predicates_of
 from kineme.reporting.text import first_names
 from kineme.validation import Array, as_numbers, check_number
 
@@ -135,7 +135,7 @@ def problem_of(
         if named[name].shape != (len(domain.vocabulary.axes),) or not np.isfinite(named[name]).all():
             axes = ", ".join(domain.vocabulary.axes)
             raise SpecificationError(f"expected the place {name} as finite numbers for {axes}, got {where!r}")
-    at = places_of(domain.vocabulary, [state], named, "here")
+    at = _places_now(domain, state, named)
     problem = Problem(domain, at, facts_of(domain.vocabulary, state, at), ())
     goals = _goals(problem, literals_of(parsed(goal))) if isinstance(goal, str) else tuple(goal)
     _check_goals(problem, goals)
@@ -150,7 +150,7 @@ def problem_from_pddl(domain: Domain, text: str, state: State | None = None) -> 
     """
     objects, facts, goals = read_problem(text)
     named = {name: np.array(where) for name, where in domain.places.items()}
-    at = places_of(domain.vocabulary, [state or {}], named, "here") if state is not None else _typical_places(domain)
+    at = _places_now(domain, state, named) if state is not None else _typical_places(domain)
     problem = Problem(domain, at, {} if state is None else facts_of(domain.vocabulary, state, at), ())
     names = Names(domain, problem.objects)
     for identifier in objects:
@@ -166,6 +166,18 @@ def problem_from_pddl(domain: Domain, text: str, state: State | None = None) -> 
     _check_goals(problem, [Goal(fact) for fact in listed], "facts")
     known = dict(problem.facts) if state is not None else dict.fromkeys(_all_facts(problem), False)
     return Problem(domain, at, known | dict.fromkeys(listed, True), _goals(problem, goals))
+
+
+def _places_now(domain: Domain, state: State, named: Mapping[str, Array]) -> dict[str, Array]:
+    """Return the places of a state; one at which an item lies is where that item is, unless it is a fixture."""
+    vocabulary = domain.vocabulary
+    places = places_of(vocabulary, [state], named, "here")
+    columns = {item.name: item.columns for item in vocabulary.of_kind("item")}
+    return places | {
+        fact[2]: position_of(columns[fact[1]], state)
+        for fact, value in facts_of(vocabulary, state, places).items()
+        if value and fact[0] == "in" and fact[2] not in vocabulary.fixtures
+    }
 
 
 def _typical_places(domain: Domain) -> dict[str, Array]:
