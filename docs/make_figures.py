@@ -34,6 +34,7 @@ DRAWING = {
     "start/first-success": "first",
     "tutorials/action-library": "library",
     "tutorials/unlabeled-to-a-planner": "planner",
+    "tutorials/a-plan-that-recovers": "plan",
 }
 FIGURES = {
     "robots": arm,
@@ -52,13 +53,21 @@ FIGURES = {
 
 
 def pictures_of_page(folder: Path, walked: str, prefix: str) -> None:
-    """PREFIX-NAME.png is NAME.png of a page, drawn as it is walked, in few colors so that it is small."""
+    """PREFIX-NAME.png is NAME.png of a page, drawn as it is walked, in few colors so that it is small.
+
+    PREFIX-NAME.gif is NAME.gif, as it is, and PREFIX-NAME.png then a still of it.
+    """
     page = Path(__file__).parent / f"{walked}.md"
     with TemporaryDirectory() as place:
         for _ in walk(page, Path(place)):
             pass
-        for name in re.findall(rf"\]\(\.\./images/{prefix}-(.+?)\.png\)", page.read_text(encoding="utf-8")):
-            with Image.open(next(Path(place).rglob(f"{name}.png"))) as picture:
+        shown = re.findall(rf"\]\(\.\./images/{prefix}-(.+?)\.(png|gif)\)", page.read_text(encoding="utf-8"))
+        for name, kind in shown:
+            drawn_there = next(Path(place).rglob(f"{name}.{kind}"))
+            with Image.open(drawn_there) as picture:
+                if kind == "gif":
+                    (folder / f"{prefix}-{name}.gif").write_bytes(drawn_there.read_bytes())
+                    picture.seek(picture.n_frames // 2)
                 few = picture.convert("RGB").quantize(_COLORS, dither=Image.Dither.NONE)
                 few.save(folder / f"{prefix}-{name}.png", optimize=True)
 

@@ -2,8 +2,8 @@
 
 A block marked python is executed; all of a page share their names. In a block marked console, a line that begins with
 ``$ `` is a command of kineme, and the lines below it are what it answers. It is called in this process, which saves
-seconds a command; no shell takes part. A Python block that begins with the import of a package in `OPTIONAL` is left
-out where that is not installed.
+seconds a command; no shell takes part. A Python block that begins with the import of a package in `OPTIONAL`, and a
+command with one of its words, is left out where that is not installed.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ from kineme.cli import main
 
 DOCS = Path(__file__).parent
 GENERATED = ("gallery", "reference/generated")  #: folders that the build of the site writes; git ignores them
-OPTIONAL = ("mujoco",)
+#: Package -> words of the commands that need it.
+OPTIONAL = {"mujoco": ("--simulate",), "unified_planning": ("plan", "execute")}
 _BLOCK = re.compile(r"^```(python|console)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 _PRINTED = re.compile(r"^ *print\(.*?\)(?:  # (.+))?((?:\n *# .+)*)$", re.MULTILINE)
 
@@ -53,9 +54,13 @@ def walk(page: Path, folder: Path, names: dict[str, Any] | None = None) -> Itera
     """Run a page in an empty folder, step by step; `names` are what its Python defines."""
     names = {} if names is None else names
     for kind, text in _BLOCK.findall(page.read_text(encoding="utf-8")):
-        if any(text.startswith(f"import {package}\n") and not find_spec(package) for package in OPTIONAL):
+        if kind == "python" and any(text.startswith(f"import {package}\n") for package in _missing()):
             continue
         yield from [_run_python(text, page.name, folder, names)] if kind == "python" else _run_console(text, folder)
+
+
+def _missing() -> list[str]:
+    return [package for package in OPTIONAL if not find_spec(package)]
 
 
 def otherwise(step: Step) -> str | None:
@@ -100,6 +105,8 @@ def _run_console(text: str, folder: Path) -> Iterator[Step]:
         program, *arguments = shlex.split(command, comments=True)
         if program != "kineme":
             raise ValueError(f"expected a command of kineme, got {command!r}")
+        if any({*OPTIONAL[package]} & {*arguments} for package in _missing()):
+            continue
         with contextlib.chdir(folder), warnings.catch_warnings():
             done = CliRunner().invoke(main, arguments, prog_name="kineme", catch_exceptions=False)
         yield Step(command, shown, done.output.splitlines(), done.exit_code)

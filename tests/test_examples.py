@@ -53,6 +53,16 @@ def test_a_page_that_shows_another_result_is_found_out(tmp_path):
     assert next(walk(page, tmp_path)).shown == ["1", "2"]
 
 
+def test_what_needs_a_package_that_is_missing_is_left_out(tmp_path, monkeypatch):
+    page = tmp_path / "page.md"
+    page.write_text(
+        "```python\nimport mujoco\nprint(1)\n```\n```console\n$ kineme execute no.json --simulate\n"
+        "$ kineme plan no.pddl\n$ kineme --version\n```\n"
+    )
+    monkeypatch.setattr("walk_through.find_spec", lambda package: None)
+    assert [step.source for step in walk(page, tmp_path)] == ["kineme --version"]
+
+
 def test_python_of_a_page_means_what_it_means_to_a_reader(tmp_path):
     """Annotations are evaluated, as where the block is copied into a file."""
     page = tmp_path / "page.md"

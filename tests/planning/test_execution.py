@@ -24,6 +24,7 @@ from kineme.planning import (
     execute,
     learn_operators,
     plan_to_dict,
+    problem_from_pddl,
     problem_of,
     read_plan,
     read_state,
@@ -152,6 +153,36 @@ def test_an_object_that_is_moved_is_fetched_from_where_it_is(table, look_rate, s
     assert len(execution.replans[0].steps) == 3
     went_back = execution.runs[1]
     np.testing.assert_allclose(went_back.tips[-1], execution.runs[0].tips[0], atol=0.02)
+    assert execution.attempts[1].duration < 2 * execution.attempts[0].duration
+
+
+def test_a_hand_that_shook_goes_back_as_quickly(table):
+    """What a person shows is not smooth; nearby samples of it say nothing of the way."""
+    plan, world = begin(table)
+    world.place("cup", (0.41, 0.03, 0.2), at=1.0)
+    random = np.random.default_rng(0)
+    steady = world.run
+
+    def run_shaking(movement, watch=None):
+        positions = movement.trajectory.positions
+        positions += 2e-5 * random.normal(size=positions.shape)
+        return steady(movement, watch)
+
+    world.run = run_shaking
+    execution = run(table, plan, world, look_rate=0.0)
+    back = [attempt.duration for attempt in execution.attempts if attempt.how == "back"]
+    assert back
+    assert back[0] < 2 * execution.attempts[0].duration
+
+
+def test_a_plan_goes_to_where_the_item_is_now(table):
+    """Not to where another one stood when it was demonstrated, near by."""
+    _, domain, _ = table
+    world = Simulation(table[2], OBJECTS | {"cup": (0.48, -0.02, 0.205)})
+    state = read_state(world.state())
+    text = f"(define (problem today) (:domain d) (:objects) (:init) (:goal {GOAL}))"
+    for problem in (problem_of(domain, state, GOAL), problem_from_pddl(domain, text, state)):
+        np.testing.assert_allclose(shortest(problem).steps[0].goal, (0.48, -0.02, 0.205), atol=0.005)
 
 
 def test_what_is_taken_out_of_the_hand_is_fetched_again(table):
@@ -420,7 +451,19 @@ def test_pictures(table, tmp_path, monkeypatch):
     from PIL import Image
 
     with Image.open(write_moving(tmp_path / "x.gif", execution, table[2])) as moving:
-        assert moving.n_frames == 6
+        assert 6 <= moving.n_frames <= 6 + len(execution.runs)
+        durations, headings, reports = [], [], []
+        for k in range(moving.n_frames):
+            moving.seek(k)
+            durations.append(moving.info["duration"])
+            pixels = np.asarray(moving.convert("RGB"))
+            is_orange = (pixels == (213, 94, 0)).all(axis=2)
+            headings.append(is_orange[:40].any())
+            reports.append(is_orange[-80:].any())
+    assert durations == [120] * (len(durations) - 1) + [2500]  # in hundredths of a second
+    assert headings[0] is np.False_  # nothing has happened yet
+    assert any(headings)  # the cup is taken away
+    assert [*map(bool, reports)] == [False] * (len(reports) - 1) + [True]  # the goal is not reached
     with pytest.raises(SpecificationError, match="nothing did"):
         write_moving(tmp_path / "y.gif", check_steps(plan, table[0], table[2]), table[2])
 

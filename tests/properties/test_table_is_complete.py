@@ -33,6 +33,8 @@ OTHER_PARTS = {
     "library": "its class is in the table; what lies under it writes and reads rows of a database",
     "movements.segmentation": "one recording by contract",
     "pieces": "whole archives, with and without pieces, and brute force beside bounds; see tests/pieces",
+    "planning": "one domain, one plan and one execution by contract",
+    "recognition.monitor": "what many show is one corridor, and an execution is one movement; see test_monitor.py",
     "robots": "one movement by contract",
     "studio": "its snapshots are a whole library, its server calls the layers below; see tests/studio",
     "validation": "checks that raise",

@@ -62,7 +62,7 @@ def generate(**options: Any) -> None:
     """  # noqa: D301 - a backspace tells click to keep the lines
     import numpy as np
 
-    from kineme.dmp.generation.generate import MovementOptions, checked_point, largest_deviation
+    from kineme.dmp.generation.generate import MovementOptions, checked_point
     from kineme.dmp.generation.generate import generate as make
     from kineme.io.writing.write_movement import encode_movement, write_movement
 
@@ -83,14 +83,7 @@ def generate(**options: Any) -> None:
     for name in ("start", "goal"):
         checked_point(learned, getattr(movement_options, name), f"--{name}")
     movement = make(learned, movement_options)
-    off = largest_deviation(learned)
-    if off is not None and off.share > _BAD_FIT:
-        of = f"in its {printable(off.of)}, " if off.of else ""
-        write(
-            f"warning: the fit is off the recording {of}by up to {off.largest:.3g}, {100 * off.share:.2g} % of its "
-            "extent; see it with --plot, and try more basis functions with --n-basis",
-            err=True,
-        )
+    warn_of_bad_fit(learned)
     if movement_options.goal is not None and movement_options.settle is None:
         _warn_of_missed_goal(learned, movement, movement_options.goal)
     if options["save"]:
@@ -110,6 +103,20 @@ def generate(**options: Any) -> None:
         write_bytes(encode_movement(movement.columns, ending, movement.names))
     else:
         write_movement(options["output"], movement.columns, movement.names)
+
+
+def warn_of_bad_fit(learned: Any) -> None:
+    """Say how far the primitive of a recording is off it, where that is much."""
+    from kineme.dmp.generation.generate import largest_deviation
+
+    off = largest_deviation(learned)
+    if off is not None and off.share > _BAD_FIT:
+        of = f"in its {printable(off.of)}, " if off.of else ""
+        write(
+            f"warning: the fit is off the recording {of}by up to {off.largest:.3g}, {100 * off.share:.2g} % of its "
+            "extent; see it with --plot, and try more basis functions with --n-basis",
+            err=True,
+        )
 
 
 def _warn_of_missed_goal(learned: Any, movement: Any, goals: Any) -> None:

@@ -17,6 +17,7 @@ from kineme.cli.correct import correct
 from kineme.cli.discover import discover
 from kineme.cli.evaluate import evaluate, reproduce
 from kineme.cli.execute import execute
+from kineme.cli.export import export
 from kineme.cli.features import features
 from kineme.cli.find import find
 from kineme.cli.gather import gather
@@ -94,7 +95,7 @@ def main() -> None:
 
 
 for command in (
-    anchor, annotate, audit, correct, discover, evaluate, execute, features, find, gather, generate, move, inspect,
-    learn, library, operators, page, plan, recognize, reproduce, segment, serve, skills, studio, why,
+    anchor, annotate, audit, correct, discover, evaluate, execute, export, features, find, gather, generate, move,
+    inspect, learn, library, operators, page, plan, recognize, reproduce, segment, serve, skills, studio, why,
 ):  # fmt: skip
     main.add_command(command)

@@ -9,7 +9,7 @@ import click
 
 from kineme.cli.options import FILE, Finite, GroupedCommand, force_option, heading, json_option, library_option
 from kineme.cli.output import check_new, say
-from kineme.reporting.text import counted
+from kineme.reporting.text import counted, first_names
 
 _FORMATS = {".pddl": "pddl", ".json": "json", ".xml": "behavior-tree"}
 
@@ -113,7 +113,10 @@ def _text(domain: Any, written: list[str], kinds_in_words: Any) -> str:
         lines.append(f"  does  {effects if operator.usable else 'cannot tell: a planner does not get it'}")
         lines += [f"  note  {text}" for text in operator.cannot_tell]
     vocabulary = domain.vocabulary
-    lines.append(f"a place is what lies within {vocabulary.radius:.3g} of its position")
+    lines.append(f"a place is what lies within {vocabulary.radius:.3g} of its {first_names(vocabulary.axes, 8)}")
+    kinds = {kind for operator in domain.operators for each in operator.parameters for kind in each.kinds}
+    if vocabulary.fixtures + vocabulary.items and not any(kinds):
+        lines.append("the hand is at no object in any movement: are positions in the frame and unit of the recordings?")
     lines += [f"column {name} is left out: {why}" for name, why in vocabulary.left_out.items()]
     never = sorted({row.predicate for operator in domain.operators for row in operator.evidence if not row.varied})
     if never:

@@ -6,4 +6,8 @@ from kineme.dmp.discrete.encode import BasisSelection as BasisSelection
 from kineme.dmp.contextual import Contextual as Contextual
 from kineme.dmp.improve import Improvement as Improvement
 
+# Out of Python
+from kineme.dmp.export_c import c_header as c_header
+from kineme.dmp.export_onnx import onnx_model as onnx_model
+
 __all__: list[str]

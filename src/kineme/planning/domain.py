@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from kineme.errors import DataError, SpecificationError
 from kineme.planning.vocabulary import Variable, Vocabulary, kind_of
@@ -244,17 +246,23 @@ def domain_from_dict(data: Any) -> Domain:
         )
     try:
         words = data["vocabulary"]
-        variables = tuple(Variable(**_frozen(variable)) for variable in words["variables"])
-        vocabulary = Vocabulary(**_frozen(words) | {"variables": variables, "left_out": dict(words["left_out"])})
+        variables = tuple(_record(Variable, variable) for variable in words["variables"])
+        vocabulary = _record(Vocabulary, words | {"variables": variables})
+        for each in variables:
+            n = len(vocabulary.axes) if each.kind in ("fixture", "item") else 1
+            if len(each.columns) != n or (each.kind == "flag" and len(each.words) not in (0, 2)):
+                raise ValueError(f"{each.name} has {len(each.columns)} columns and {len(each.words)} words")
         operators = tuple(_operator_from(operator) for operator in data["operators"])
-        places = {str(name): tuple(map(float, where)) for name, where in data["places"].items()}
-        edits = tuple(Edit(**edit | {"literal": Literal(**_frozen(edit["literal"]))}) for edit in data["edits"])
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        places = {name: tuple(map(float, where)) for name, where in data["places"].items()}
+        edits = tuple(_record(Edit, edit | {"literal": _record(Literal, edit["literal"])}) for edit in data["edits"])
+        domain = Domain(vocabulary, operators, places, edits)
+        check_positions(vocabulary.axes, _positions(domain))
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise DataError(
             f"expected a complete domain, got one that does not fit ({type(error).__name__}: {error}); write it anew "
             "by kineme operators"
         ) from error
-    return Domain(vocabulary, operators, places, edits)
+    return domain
 
 
 def read_domain(path: str | Path) -> Domain:
@@ -268,17 +276,54 @@ def read_domain(path: str | Path) -> Domain:
 
 def _operator_from(data: Mapping[str, Any]) -> Operator:
     records = {"parameters": Parameter, "preconditions": Literal, "effects": Literal, "evidence": Evidence}
-    rows = {part: tuple(record(**_frozen(row)) for row in data[part]) for part, record in records.items()}
-    return Operator(**_frozen(data) | rows)
+    return _record(
+        Operator, {**data} | {part: tuple(_record(of, row) for row in data[part]) for part, of in records.items()}
+    )
 
 
-def _frozen(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return data with lists as tuples."""
+def _record(of: Any, data: Mapping[str, Any]) -> Any:
+    """Return a record of data, with lists as tuples; refuse values of other types than those of its fields."""
 
     def freeze(value: Any) -> Any:
         return tuple(map(freeze, value)) if isinstance(value, list) else value
 
-    return {name: freeze(value) for name, value in data.items()}
+    record = of(**{name: freeze(value) for name, value in data.items()})
+    for name, hint in get_type_hints(of).items():
+        if not _is_of(getattr(record, name), hint):
+            raise ValueError(f"{of.__name__.lower()}.{name} = {getattr(record, name)!r:.80}")
+    return record
+
+
+def _is_of(value: Any, hint: Any) -> bool:
+    """Tell whether a value is of a type: a tuple, a mapping of texts, a union, a finite number, or anything plain."""
+    kinds = get_args(hint)
+    if get_origin(hint) is tuple:
+        several = kinds[:1] * len(value) if kinds[-1] is Ellipsis and isinstance(value, tuple) else kinds
+        return isinstance(value, tuple) and len(several) == len(value) and all(map(_is_of, value, several))
+    if get_origin(hint) is Mapping:
+        return isinstance(value, Mapping) and all(isinstance(text, str) for pair in value.items() for text in pair)
+    if hint is float:
+        return type(value) in (int, float) and math.isfinite(value)
+    return any(_is_of(value, kind) for kind in kinds) if kinds else type(value) is hint
+
+
+def _positions(domain: Domain) -> list[Sequence[float]]:
+    """List the positions that a domain holds."""
+    positions: list[Sequence[float]] = [
+        *domain.places.values(),
+        *(each.typical for each in domain.vocabulary.variables if each.typical),
+    ]
+    for operator in domain.operators:
+        positions += [where for parameter in operator.places for where in (parameter.low, parameter.high)]
+        positions += [operator.begin, operator.end, *operator.displacement] if operator.places else []
+    return positions
+
+
+def check_positions(axes: Sequence[str], positions: Iterable[ArrayLike]) -> None:
+    """Refuse positions that are not one finite number for each axis, with a ValueError."""
+    for where in positions:
+        if np.shape(where) != (len(axes),) or not np.isfinite(where).all():
+            raise ValueError(f"the position {where!r} is not one finite number for each of {', '.join(axes)}")
 
 
 def operator_schema(domain: Domain, operator: Operator) -> dict[str, Any]:

@@ -38,7 +38,7 @@ _AXES = "xyz"
 _LEAST = 8  # samples of a movement that goes on or back
 _NEAR = 0.05  # before it was stopped, an arm does not stand [s]
 _SHARE = 0.2  # of the limits of velocity, on the way back
-_STANDS = 1e-4  # on the way back, samples so near each other count once [s]
+_APART = 0.01  # of samples on the way back, at the limits of velocity [s]: nearer ones would shake
 _CORNER = 0.5  # of the radius of a place, by which steps that are joined miss it at most
 
 #: What `robots.move` advises, and what can be done about it here.
@@ -349,16 +349,11 @@ class _Executor:
             left -= stop is not None
 
     def look(self) -> Problem:
-        """Return the state now as a problem; a place at which an item lies is where that item is."""
-        domain = self.plan.problem.domain
+        """Return the state now as a problem."""
         self.state = self.sensed()
-        problem = problem_of(domain, self.state, self.plan.problem.goal, self.places)
-        columns = {variable.name: variable.columns for variable in domain.vocabulary.of_kind("item")}
-        self.places = dict(problem.places) | {
-            fact[2]: position_of(columns[fact[1]], self.state) for fact, value in problem.facts.items()
-            if value and fact[0] == "in" and fact[2] not in domain.vocabulary.fixtures
-        }  # fmt: skip
-        return problem_of(domain, self.state, self.plan.problem.goal, self.places)
+        problem = problem_of(self.plan.problem.domain, self.state, self.plan.problem.goal, self.places)
+        self.places = dict(problem.places)
+        return problem
 
     def sensed(self) -> dict[str, Any]:
         """Return the state now, positions in the frame of the plan."""
@@ -538,11 +533,13 @@ class _Executor:
         way = np.vstack([each.joints for each in self.ways[-n_steps:]])[::-1]
         del self.ways[-n_steps:]
         lengths = np.append(0.0, np.linalg.norm(np.diff(way, axis=0) / self.robot.velocity, axis=1).cumsum())
-        moves = np.append(True, np.diff(lengths) > _STANDS)
-        if moves.sum() < _LEAST:
+        n = int(lengths[-1] / _APART) + 1
+        if n < _LEAST:
             return True
+        even, moves = np.linspace(0.0, lengths[-1], n), np.append(True, np.diff(lengths) > 0)
+        joints = np.column_stack([np.interp(even, lengths[moves], column) for column in way[moves].T])
         try:
-            movement = self.in_joints(lengths[moves] / _SHARE, way[moves])
+            movement = self.in_joints(even / _SHARE, joints)
         except KinemeError as error:
             self.attempts.append(Attempt("(back)", "back", "refused", (_refusal(error),), len(self.replans)))
             return False

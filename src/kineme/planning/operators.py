@@ -10,7 +10,8 @@ A sensor errs, and then nothing holds before every movement. With the share e of
 - the same before all movements, and the same after all: a precondition and, if they differ, an effect;
 - true, or false, after all, whatever it was: an effect;
 - as it was, whatever it was: neither;
-- anything: what happens in four fifths of the movements is taken, and where nothing does, it cannot be told.
+- anything: what happens in four fifths of the movements is taken, and where nothing does, or where no errors are
+  expected, it cannot be told; what held before them all is a precondition nevertheless.
 
 The likeliest of these is taken, with ``log(n + 2) / 2`` off the log likelihood for each free share (G. Schwarz,
 "Estimating the Dimension of a Model", Annals of Statistics 6, 1978), and with odds of 5 to 1 for a precondition, since
@@ -19,9 +20,9 @@ one too many is safe. An exception that is seen before and after counts twice.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import permutations
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -38,7 +39,6 @@ from kineme.planning.vocabulary import (
     facts_of,
     hand_of,
     kind_of,
-    nearest_place,
     places_of,
     predicates_of,
     vocabulary_of,
@@ -122,7 +122,7 @@ def operators_of(
             for fact, value in facts.items():
                 values_of.setdefault(fact[0], set()).add(value)
     varied = {predicate for predicate, values in values_of.items() if len(values) == 2}
-    rules = _Rules(predicates_of(vocabulary), varied, error_rate)
+    rules = _Rules(predicates_of(vocabulary), varied, error_rate, {*vocabulary.fixtures})
     operators = []
     for name in dict.fromkeys(sorted(states.symbols)):
         rows = [row for row, symbol in enumerate(states.symbols) if symbol == name]
@@ -187,6 +187,7 @@ class _Rules(NamedTuple):
     predicates: Mapping[str, tuple[str, ...]]  # predicate -> types of its arguments
     varied: set[str]  # predicates that were both true and false
     error_rate: float
+    fixtures: set[str]
 
 
 class _Literals(NamedTuple):
@@ -209,7 +210,7 @@ def _operator(name: str, symbol_id: str, examples: list[Example], duration: floa
         others = counted(fits.count(False), "movement")
         cannot_tell.append(f"{others} of {len(fits)} had other places or items and do not count")
     pairs = [(example, each) for example, each, fit in zip(examples, bound, fits, strict=True) if fit]
-    parameters = tuple(_parameter(role, pairs) for role in roles)
+    parameters = tuple(_parameter(role, pairs, rules.fixtures) for role in roles)
     literals = _literals(pairs, parameters, rules)
     places = [role for role in roles if role in _PLACES]
     ends: list[tuple[float, ...]] = [(), ()]
@@ -305,20 +306,24 @@ def _regularity(counts: NDArray[np.int_], error_rate: float) -> tuple[bool | Non
             score -= 0.5 * math.log(n + 2) + _NEEDED if law[0] is None else 0.0
             scores[law] = max(scores.get(law, -np.inf), score)
     best = max(scores, key=lambda law: scores[law])
-    if scores[best] >= free - 1.5 * math.log(n + 2):
+    is_alone = sum(score >= scores[best] - 1e-9 for score in scores.values()) == 1
+    if is_alone and scores[best] >= free - 1.5 * math.log(n + 2):
         before, after = best
         if before is None and after is not None and _accepts(int(counts[int(not after), int(after)]), n, error_rate):
             before = after  # what changed may be errors alone: it is no effect, and needed
         return before, after, True
     kept = {None: counts.trace(), False: counts[:, 0].sum(), True: counts[:, 1].sum()}
     mostly = max(kept, key=lambda value: kept[value])
-    return None, mostly, kept[mostly] >= _MOSTLY * n
+    needed = next(
+        (value for value in (False, True) if _accepts(int(counts[int(not value)].sum()), n, error_rate)), None
+    )
+    return needed, mostly, bool(kept[mostly] >= (_MOSTLY if error_rate > 0 else 1.0) * n)
 
 
-def _parameter(role: str, pairs: Sequence[tuple[Example, Mapping[str, str]]]) -> Parameter:
+def _parameter(role: str, pairs: Sequence[tuple[Example, Mapping[str, str]]], fixtures: set[str]) -> Parameter:
     is_place = role in _PLACES
     names = [each[role] for _, each in pairs]
-    kinds = tuple(sorted({"" if is_place and name.startswith("place-") else kind_of(name) for name in names}))
+    kinds = tuple(sorted({"" if is_place and name not in fixtures else kind_of(name) for name in names}))
     if not is_place:
         return Parameter(role, "item", kinds)
     where = np.array([example.places[each[role]] for example, each in pairs])
@@ -330,25 +335,22 @@ def _candidates(
 ) -> Iterator[tuple[str, tuple[str, ...]]]:
     """Yield each predicate with each choice of parameters of its types."""
     for predicate, types in predicates.items():
-        for chosen in permutations(parameters, len(types)):
+        for chosen in itertools.permutations(parameters, len(types)):
             if tuple(parameter.type for parameter in chosen) == types:
                 yield predicate, tuple(parameter.name for parameter in chosen)
 
 
 def _visited(vocabulary: Vocabulary, examples: Iterable[Example]) -> dict[str, tuple[float, ...]]:
     """Return the places without a fixture that were visited, the means of what lies within the radius."""
-    centers: list[Array] = []
-    visits: list[list[Array]] = []
-    for example in examples:
-        for name, where in example.places.items():
-            if not name.startswith("place-"):
-                continue
-            near = nearest_place(vocabulary, dict(zip(map(str, range(len(centers))), centers, strict=True)), where)
-            if near is None:
-                centers.append(where)
-                visits.append([where])
-            else:
-                visits[int(near)].append(where)
-                centers[int(near)] = np.mean(visits[int(near)], axis=0)
-    order = sorted(range(len(centers)), key=lambda k: -len(visits[k]))[:_MOST_PLACES]
-    return {f"place-{k}": tuple(centers[index].tolist()) for k, index in enumerate(order, 1)}
+    fixtures = {*vocabulary.fixtures}
+    places = [where for each in examples for name, where in each.places.items() if name not in fixtures]
+    centers, visits, n = np.zeros((len(places), len(vocabulary.axes))), np.zeros(len(places), dtype=int), 0
+    for where in places:
+        away = np.linalg.norm(centers[:n] - where, axis=1)
+        k = int(away.argmin()) if n and away.min() <= vocabulary.radius else n
+        n = max(n, k + 1)
+        visits[k] += 1
+        centers[k] += (where - centers[k]) / visits[k]  # their mean
+    order = np.argsort(-visits[:n], kind="stable")[:_MOST_PLACES]
+    names = (name for k in itertools.count(1) if (name := f"place-{k}") not in fixtures)
+    return {name: tuple(centers[k].tolist()) for k, name in zip(order.tolist(), names, strict=False)}

@@ -25,37 +25,50 @@ _MOST_TOKENS, _DEEPEST = 1_000_000, 200
 _TOKEN = re.compile(r";[^\n]*|[()]|[^\s()]+")
 
 
-def identifiers(names: Iterable[str]) -> dict[str, str]:
-    """Return name -> its identifier in PDDL: small letters, digits and hyphens, each of its own."""
+def identifiers(names: Iterable[str], taken: Iterable[str] = ()) -> dict[str, str]:
+    """Return name -> its identifier in PDDL: small letters, digits and hyphens, each of its own, none that is taken."""
     result: dict[str, str] = {}
-    for name in sorted({*names}):
+    others = {*taken}
+    for name in sorted({*names}, key=lambda name: (not name.islower(), name)):  # cup before CUP
         plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode().lower()
         stem = re.sub(r"[^a-z0-9_]+", "-", plain).strip("-_")[:_LONGEST] or "name"
         stem = stem if stem[0].isalpha() and stem not in _RESERVED else f"n-{stem}"
         text, number = stem, 1
-        while text in result.values():
+        while text in others:
             number += 1
             text = f"{stem}-{number}"
+        others.add(text)
         result[name] = text
     return result
 
 
 class Names:
-    """Identifiers of what a domain names, both ways."""
+    """Identifiers of what a domain names, each of its own, as planners want them.
+
+    Raises
+    ------
+    SpecificationError
+        Literals of one predicate whose arguments are of different types, or no parameters.
+    """
 
     def __init__(self, domain: Domain, objects: Iterable[str] = ()) -> None:
         self.types = predicates_of(domain.vocabulary)
         for operator in domain.operators:
             kinds = {parameter.name: parameter.type for parameter in operator.parameters}
             for literal in (*operator.preconditions, *operator.effects):  # a person may add predicates
-                self.types.setdefault(literal.predicate, tuple(kinds[name] for name in literal.arguments))
-        self.operators = identifiers(operator.name for operator in domain.operators)
+                types = tuple(kinds.get(name, "unknown") for name in literal.arguments)
+                if self.types.setdefault(literal.predicate, types) != types or "unknown" in types:
+                    expected = " ".join((literal.predicate, *self.types[literal.predicate]))
+                    raise SpecificationError(f"expected ({expected}) in {operator.name}, got {literal}")
         self.predicates = identifiers(self.types)
-        self.objects = identifiers([*objects])
+        self.operators = identifiers((operator.name for operator in domain.operators), self.predicates.values())
         prefix = "shown"
         while any(text.startswith(f"{prefix}-") for text in self.predicates.values()):
             prefix = f"was-{prefix}"
         self.shown = {name: f"{prefix}-{text}" for name, text in self.operators.items()}
+        self.objects = identifiers(
+            objects, [text for each in (self.predicates, self.operators, self.shown) for text in each.values()]
+        )
 
 
 def domain_to_pddl(domain: Domain, name: str = "kineme") -> str:
@@ -159,7 +172,7 @@ def parsed(text: str) -> Any:
         Parentheses that do not fit, several expressions, or none.
     """
     stack: list[list[Any]] = [[]]
-    for number, token in enumerate(match[0] for match in _TOKEN.finditer(text)):
+    for number, token in enumerate(match[0] for match in _TOKEN.finditer(text.lstrip("\ufeff"))):
         if number > _MOST_TOKENS or len(stack) > _DEEPEST:
             raise DataError(f"expected PDDL of at most {_MOST_TOKENS:,} words, {_DEEPEST} deep, got more")
         if token == "(":
@@ -215,13 +228,20 @@ def edits_in(text: str, domain: Domain) -> list[Edit]:
     Literals of preconditions and effects count; operators and predicates are told by their identifiers.
     """
     names = Names(domain)
-    actions = {part[0]: part[1:] for part in _sections(parsed(text), "domain").get(":action", []) if part}
+    sections = _sections(parsed(text), "domain").get(":action", [])
+    actions = {part[0]: part[1:] for part in sections if part and isinstance(part[0], str)}
+    written = [names.operators[operator.name] for operator in domain.operators if operator.usable]
+    if actions.keys() != {*written} or len(sections) != len(written):
+        raise DataError(
+            f"expected the actions that kineme operators wrote, {first_names(written, 8)}, each once, got "
+            f"{first_names([*actions], 8)}; an action that is not to be used takes a precondition that never holds"
+        )
     predicate_of = {text: name for name, text in names.predicates.items()}
     edits = []
     for operator in domain.operators:
-        action = actions.get(names.operators[operator.name])
-        if action is None or not operator.usable:
+        if not operator.usable:
             continue
+        action = actions[names.operators[operator.name]]
         content = {action[k]: action[k + 1] for k in range(0, len(action) - 1, 2) if isinstance(action[k], str)}
         for part, learned in (("precondition", operator.preconditions), ("effect", operator.effects)):
             expressions = [each for each in _conjuncts(content.get(f":{part}", ["and"])) if each[:1] != ["increase"]]
@@ -237,12 +257,16 @@ def edits_in(text: str, domain: Domain) -> list[Edit]:
                 raise DataError(
                     f"expected parameters of {operator.name}, {first_names(parameters, 8)}, got {unknown} in its {part}"
                 )
+            if both := next((each for each in present if each._replace(value=not each.value) in present), None):
+                raise DataError(f"expected {both} of {operator.name} true or false in its {part}, got both")
             edits += [Edit(operator.name, part, literal, True) for literal in present if literal not in learned]
             edits += [Edit(operator.name, part, literal, False) for literal in learned if literal not in present]
     return edits
 
 
 def _conjuncts(expression: Any) -> list[Any]:
+    if expression == []:  # an empty condition
+        return []
     return expression[1:] if isinstance(expression, list) and expression[:1] == ["and"] else [expression]
 
 
@@ -255,27 +279,29 @@ def read_problem(text: str) -> tuple[list[str], list[tuple[str, ...]], list[tupl
         No problem, or a goal that is no conjunction of literals.
     """
     sections = _sections(parsed(text), "problem")
-    if ":goal" not in sections:
+    if not any(sections.get(":goal", [])):
         raise DataError("expected a problem with a goal, got none; add (:goal ...)")
     words = sections.get(":objects", [[]])[0]
     objects, position = [], 0
     while position < len(words):  # a b - place c - item
         if words[position] == "-":
             position += 1
-        else:
+        elif isinstance(words[position], str):
             objects.append(words[position])
+        else:
+            raise DataError(f"expected names of objects in :objects, got {words[position]!r:.100}")
         position += 1
-    facts = [tuple(fact) for fact in sections.get(":init", [[]])[0] if isinstance(fact, list) and fact[:1] != ["="]]
-    if any(not all(isinstance(word, str) for word in fact) for fact in facts):
+    init = [fact for fact in sections.get(":init", [[]])[0] if fact[:1] != ["="]]
+    if any(not isinstance(fact, list) or not fact or not all(isinstance(word, str) for word in fact) for fact in init):
         raise DataError("expected facts in :init, as (in cup shelf), got something else")
-    return objects, facts, literals_of(sections[":goal"][0][0])
+    return objects, [*map(tuple, init)], literals_of(sections[":goal"][0][0])
 
 
 def name_of(identifier: str, identifier_of: Mapping[str, str], what: str) -> str:
     """Return the name behind an identifier, or the name itself; refuse what is neither."""
-    for name, text in identifier_of.items():
-        if identifier in (text, name.lower()):
-            return name
+    for names in ({text: name for name, text in identifier_of.items()}, {name.lower(): name for name in identifier_of}):
+        if identifier in names:
+            return names[identifier]
     raise SpecificationError(
         f"expected {what} among {first_names([*identifier_of], 12)}, got {printable(identifier)!r}"
     )

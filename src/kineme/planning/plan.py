@@ -15,12 +15,21 @@ import numpy as np
 
 from kineme.errors import DataError, SpecificationError
 from kineme.io.records import needs
-from kineme.planning.domain import Domain, Literal, Operator, domain_from_dict, domain_to_dict, hands_of, is_shown
+from kineme.planning.domain import (
+    Domain,
+    Literal,
+    Operator,
+    check_positions,
+    domain_from_dict,
+    domain_to_dict,
+    hands_of,
+    is_shown,
+)
 from kineme.planning.pddl import Names, domain_to_pddl, literals_of, name_of, parsed, problem_to_pddl, read_problem
 from kineme.planning.states import State
-from kineme.planning.vocabulary import Fact, facts_of, places_of, predicates_of
+from kineme.planning.vocabulary import Fact, facts_of, places_of, position_of, predicates_of
 from kineme.reporting.text import first_names
-from kineme.validation import Array, check_number
+from kineme.validation import Array, as_numbers, check_number
 
 FORMAT, VERSION = "kineme-plan", 1
 _MOST_GROUND = 200_000  # operators with arguments, at most
@@ -122,11 +131,11 @@ def problem_of(
     """
     named = {name: np.array(where) for name, where in domain.places.items()}
     for name, where in (places or {}).items():
-        named[name] = np.asarray(where, dtype=np.float64)
+        named[name] = as_numbers(where, f"place {name}")
         if named[name].shape != (len(domain.vocabulary.axes),) or not np.isfinite(named[name]).all():
             axes = ", ".join(domain.vocabulary.axes)
             raise SpecificationError(f"expected the place {name} as finite numbers for {axes}, got {where!r}")
-    at = places_of(domain.vocabulary, [state], named, "here")
+    at = _places_now(domain, state, named)
     problem = Problem(domain, at, facts_of(domain.vocabulary, state, at), ())
     goals = _goals(problem, literals_of(parsed(goal))) if isinstance(goal, str) else tuple(goal)
     _check_goals(problem, goals)
@@ -141,7 +150,7 @@ def problem_from_pddl(domain: Domain, text: str, state: State | None = None) -> 
     """
     objects, facts, goals = read_problem(text)
     named = {name: np.array(where) for name, where in domain.places.items()}
-    at = places_of(domain.vocabulary, [state or {}], named, "here") if state is not None else _typical_places(domain)
+    at = _places_now(domain, state, named) if state is not None else _typical_places(domain)
     problem = Problem(domain, at, {} if state is None else facts_of(domain.vocabulary, state, at), ())
     names = Names(domain, problem.objects)
     for identifier in objects:
@@ -149,13 +158,26 @@ def problem_from_pddl(domain: Domain, text: str, state: State | None = None) -> 
     listed = {
         (
             name_of(words[0], names.predicates, "a predicate"),
-            *(name_of(w, names.objects, "an object") for w in words[1:]),
+            *(name_of(word, names.objects, "an object whose position is known") for word in words[1:]),
         )
         for words in facts
         if words[0] not in names.shown.values()
     }
+    _check_goals(problem, [Goal(fact) for fact in listed], "facts")
     known = dict(problem.facts) if state is not None else dict.fromkeys(_all_facts(problem), False)
     return Problem(domain, at, known | dict.fromkeys(listed, True), _goals(problem, goals))
+
+
+def _places_now(domain: Domain, state: State, named: Mapping[str, Array]) -> dict[str, Array]:
+    """Return the places of a state; one at which an item lies is where that item is, unless it is a fixture."""
+    vocabulary = domain.vocabulary
+    places = places_of(vocabulary, [state], named, "here")
+    columns = {item.name: item.columns for item in vocabulary.of_kind("item")}
+    return places | {
+        fact[2]: position_of(columns[fact[1]], state)
+        for fact, value in facts_of(vocabulary, state, places).items()
+        if value and fact[0] == "in" and fact[2] not in vocabulary.fixtures
+    }
 
 
 def _typical_places(domain: Domain) -> dict[str, Array]:
@@ -183,7 +205,7 @@ def _goals(problem: Problem, literals: Sequence[tuple[tuple[str, ...], bool]]) -
         Goal(
             (
                 name_of(words[0], names.predicates, "a predicate"),
-                *(name_of(word, names.objects, "an object") for word in words[1:]),
+                *(name_of(word, names.objects, "an object whose position is known") for word in words[1:]),
             ),
             value,
         )
@@ -193,14 +215,16 @@ def _goals(problem: Problem, literals: Sequence[tuple[tuple[str, ...], bool]]) -
     return goals
 
 
-def _check_goals(problem: Problem, goals: Sequence[Goal]) -> None:
+def _check_goals(problem: Problem, goals: Sequence[Goal], what: str = "goals") -> None:
     types, objects = Names(problem.domain).types, problem.objects
     for goal in goals:
         wanted = types.get(goal.fact[0])
         if wanted is None or tuple(map(objects.get, goal.fact[1:])) != wanted:
             kinds = "nothing" if wanted is None else f"({' '.join((goal.fact[0], *wanted))})"
-            raise SpecificationError(f"expected goals in the words of the domain, here {kinds}, got {goal}")
-    if not goals:
+            raise SpecificationError(f"expected {what} in the words of the domain, here {kinds}, got {goal}")
+    if both := next((goal for goal in goals if Goal(goal.fact, not goal.value) in goals), None):
+        raise SpecificationError(f"expected goals that hold together, got {both} both true and false")
+    if not goals and what == "goals":
         raise SpecificationError("expected a goal, got none; as (and (in cup shelf))")
 
 
@@ -306,9 +330,9 @@ def _solved(texts: tuple[str, str], planner: str | None, timeout: float) -> tupl
 def _tried(problem: Any, compiles: bool, planner: str | None, timeout: float, log: Any) -> tuple[Any, str] | str:
     """Return the plan of an engine and its name, or why there is none; `compiles`: without negative preconditions."""
     from unified_planning.engines import CompilationKind, PlanGenerationResultStatus
-    from unified_planning.exceptions import UPException
+    from unified_planning.exceptions import UPException, UPNoRequestedEngineAvailableException
     from unified_planning.plans import PlanKind
-    from unified_planning.shortcuts import Compiler, OneshotPlanner, PlanValidator
+    from unified_planning.shortcuts import Compiler, OneshotPlanner, PlanValidator, get_environment
 
     task, back = problem, None
     try:
@@ -322,8 +346,10 @@ def _tried(problem: Any, compiles: bool, planner: str | None, timeout: float, lo
             if not engine.supports(task.kind):
                 return f"{name} does not take it"
             result = engine.solve(task, timeout=timeout, output_stream=log)
+    except UPNoRequestedEngineAvailableException:
+        return f"there is no engine {planner}, but {', '.join(get_environment().factory.engines)}"
     except UPException as error:
-        return str(error).splitlines()[0]
+        return f"{error}".partition("\n")[0]
     if result.plan is None:
         if result.status == PlanGenerationResultStatus.UNSOLVABLE_PROVEN:
             raise SpecificationError("expected a plan, there is none; look at the preconditions of the operators")
@@ -361,6 +387,7 @@ def check_plan(plan: Plan) -> None:
     Raises
     ------
     SpecificationError
+        The first such step with all reasons, or the goals that are missed.
     """
     domain, facts = plan.problem.domain, dict(plan.problem.facts)
     for number, step in enumerate(plan.steps, 1):
@@ -382,7 +409,8 @@ def unreachable(problem: Problem, shown: Sequence[tuple[Operator, dict[str, str]
     possible = {*problem.facts.items()}
     left = list(shown)
     while ready := [pair for pair in left if possible.issuperset(_ground(pair[0].preconditions, pair[1]))]:
-        left = [pair for pair in left if pair not in ready]
+        done = {*map(id, ready)}
+        left = [pair for pair in left if id(pair) not in done]
         possible |= {each for operator, arguments in ready for each in _ground(operator.effects, arguments)}
     return [
         f"{goal} {_why_not(problem, goal, possible, left, _DEEPEST)}" for goal in problem.goal if goal not in possible
@@ -407,17 +435,17 @@ def _why_not(
         return reason
     if not ways or not depth:
         state = "is not known" if goal.fact not in problem.facts else "does not hold now"
-        return state if ways else f"{state}, and no operator that was shown changes that"
-    lacking = [[Goal(*each) for each in _ground(*pair) if each not in possible] for pair in _needs(ways)]
+        effects = {each[::2] for operator in problem.domain.operators if operator.usable for each in operator.effects}
+        is_changed = (goal.fact[0], goal.value) in effects
+        return state if is_changed else f"{state}, and no operator that was shown changes that"
+    needs_of = [_ground(operator.preconditions, arguments) for operator, arguments in ways]
+    lacking = [[Goal(*each) for each in literals if each not in possible] for literals in needs_of]
     k = min(range(len(ways)), key=lambda k: len(lacking[k]))
-    others = [pair for pair in left if pair is not ways[k]]
+    others = [pair for pair in left if pair[0] is not ways[k][0]]  # no round trips
     first = min(lacking[k], key=lambda each: each.fact in problem.facts)  # what is not known comes first
     name = f"({' '.join((ways[k][0].name, *ways[k][1].values()))})"
-    return f"needs {name}; {first} {_why_not(problem, first, possible, others, depth - 1)}"
-
-
-def _needs(ways: Sequence[tuple[Operator, dict[str, str]]]) -> list[tuple[Sequence[Literal], dict[str, str]]]:
-    return [(operator.preconditions, arguments) for operator, arguments in ways]
+    reason = _why_not(problem, first, possible, others, depth - 1)
+    return f"needs {name}; {Goal(first.fact) if reason.startswith('is not known') else first} {reason}"
 
 
 def _not_shown(problem: Problem, goal: Goal, possible: set[tuple[Fact, bool]], lacking_most: int) -> str:
@@ -473,11 +501,12 @@ def plan_from_dict(data: Any) -> Plan:
     try:
         domain = domain_from_dict(data["domain"])
         places = {str(name): np.array(where, dtype=np.float64) for name, where in data["places"].items()}
+        check_positions(domain.vocabulary.axes, places.values())
         facts = {tuple(map(str, each["fact"])): bool(each["value"]) for each in data["facts"]}
         goals = tuple(Goal(tuple(map(str, each["fact"])), bool(each["value"])) for each in data["goal"])
         rows = [(domain.operator(step["operator"]), dict(step["arguments"])) for step in data["steps"]]
         steps = tuple(step_of(operator, arguments, places) for operator, arguments in rows)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise DataError(
             f"expected a complete plan, got one that does not fit ({type(error).__name__}: {error})"
         ) from error

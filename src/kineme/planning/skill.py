@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -15,6 +16,8 @@ from kineme.library.grounding import learned_movement
 from kineme.library.library import ActionLibrary
 from kineme.movements.channels.channel import Channels, learned_names
 from kineme.validation import Array, as_numbers, check_number
+
+_GRIPPERS = ("grip", "grasp", "finger")
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +97,7 @@ def skill_of(library: ActionLibrary, who: str) -> Skill:
 
 
 def place_columns(channels: Channels | None, n_dims: int) -> tuple[list[int], tuple[str, ...], tuple[str | None, ...]]:
-    """Return the coordinates that are places, their names and their units: positions, else all that move."""
+    """Return the coordinates that are places, their names and their units: positions, or all but grippers."""
     if channels is None:
         return (
             list(range(n_dims)),
@@ -102,11 +105,17 @@ def place_columns(channels: Channels | None, n_dims: int) -> tuple[list[int], tu
             (None,) * n_dims,
         )
     names = learned_names(channels)
-    unit_of = {channel.name: channel.unit for channel in channels if channel.kind == "position"} or {
-        name: channel.unit for channel in channels for name in channel.coordinates
+    moving = [channel for channel in channels if channel.coordinates and not is_gripper(channel.name)] or channels
+    unit_of = {channel.name: channel.unit for channel in moving if channel.kind == "position"} or {
+        name: channel.unit for channel in moving for name in channel.coordinates
     }
     columns = [k for k, name in enumerate(names) if name in unit_of]
     return columns, tuple(names[k] for k in columns), tuple(unit_of[names[k]] for k in columns)
+
+
+def is_gripper(name: str) -> bool:
+    """Tell whether a column is how far a gripper is open; ``gripper_x`` is where it is."""
+    return any(part in name.lower() for part in _GRIPPERS) and not re.search(r"(^|[^a-z])[xyz]\b", name.lower())
 
 
 def outside(skill: Skill, start: ArrayLike, goal: ArrayLike, margin: float = 0.0) -> list[Excess]:

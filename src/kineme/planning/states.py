@@ -5,7 +5,8 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 from typing import Any
@@ -18,8 +19,9 @@ from kineme.io.limits import check_expanded, read_limited
 from kineme.library.library import ActionLibrary
 from kineme.library.storage import read
 from kineme.movements.tables.columns import is_time
-from kineme.planning.skill import place_columns
+from kineme.planning.skill import is_gripper, place_columns
 from kineme.reporting.text import counted, first_names, text_in
+from kineme.units import split_head, unit_named
 from kineme.validation import Array
 
 HAND = "hand"
@@ -45,7 +47,8 @@ class States:
         Ids in the library.
     symbols : tuple of n str
     axes : tuple of k str
-        Coordinates of places; the columns ``hand_x`` ... are where the hand is.
+        Coordinates of places, ``x`` where the recordings have ``tip_x [mm]``; the columns ``hand_x`` ... are where the
+        hand is.
     columns : tuple of c str
     before, after : ndarray of shape (n, c)
         NaN is not known; of columns of words, the number of the word.
@@ -75,10 +78,11 @@ def states_of(library: ActionLibrary, table: str | Path | Mapping[str, Sequence[
     ----------
     library : ActionLibrary
     table : str, Path, or mapping of column to n values (as a data frame), optional
-        A file in CSV, or a folder of such files, as the recordings themselves, with a row for each moment. Either with
-        the columns ``movement`` (id, or file) and ``moment`` (before or after); or with ``time``, in the clock of the
-        recordings, and ``file`` where there are several: the state before is the last row up to a movement's start, the
-        one after the first row from its end on, each within a twentieth of its duration. Empty cells are not known.
+        A file in CSV, or a folder of such files, also in folders of it, as the recordings themselves, with a row for
+        each moment. Either with the columns ``movement`` (id, or file) and ``moment`` (before or after); or with
+        ``time``, in the clock of the recordings, and ``file`` where there are several: the state before is the last row
+        up to a movement's start, the one after the first row from its end on, each within a twentieth of its duration.
+        Empty cells are not known.
 
     Raises
     ------
@@ -92,23 +96,29 @@ def states_of(library: ActionLibrary, table: str | Path | Mapping[str, Sequence[
         raise SpecificationError("expected a library with symbols that have movements; learn recordings with labels")
     ids = np.sort(ids)
     primitives = library.primitives(ids=ids)
-    places, axes, _ = place_columns(library.channels, primitives.n_dims)
+    places, names, units = place_columns(library.channels, primitives.n_dims)
+    axes = _axes(names)
     columns = [f"{HAND}_{axis}" for axis in axes]
     before, after = primitives.starts[:, places], primitives.goals[:, places]
-    discrete = [channel.columns[0] for channel in library.channels or () if channel.kind == "discrete"]
+    discrete = [
+        channel.columns[0] for channel in library.channels or ()
+        if channel.kind == "discrete" or (len(channel.columns) == 1 and is_gripper(channel.name)
+                                          and channel.name not in names)
+    ]  # fmt: skip
     if discrete:
         recorded = library.movements(ids=ids)
-        names = [column for channel in library.channels or () for column in channel.columns]
-        chosen = [names.index(column) for column in discrete]
+        heads = [column for channel in library.channels or () for column in channel.columns]
+        chosen = [heads.index(column) for column in discrete]
         before, after = (
             np.column_stack((moment, [movement.recorded[row, chosen] for movement in recorded]))
             for moment, row in ((before, 0), (after, -1))
         )
-        columns += discrete
+        columns += map(_column, discrete)
     words: dict[str, tuple[str, ...]] = {}
     if table is not None:
         cells, source = (_tables(Path(table)), str(table)) if isinstance(table, str | Path) else (table, "the table")
-        more, extra_before, extra_after, words = _matched(library, ids, _texts(cells), source, axes)
+        more, extra_before, extra_after, words = _matched(library, ids, _texts(cells), source)
+        _check_units(cells, dict(zip(axes, units, strict=True)))
         columns, before, after = _merged(columns, more, (before, after), (extra_before, extra_after))
     symbols = tuple(name or "" for name in read.names_of(library.store, ids))
     return States(ids, symbols, axes, tuple(columns), before, after, words)
@@ -129,12 +139,15 @@ def _tables(path: Path) -> dict[str, list[str]]:
     """Read a table, or those of a folder one below the other: the column ``file`` then says which, if none does."""
     if not path.is_dir():
         return _read(path)
-    tables = [(each, _read(each)) for each in sorted(path.glob("*.csv"))]
+    tables = [(each, _read(each)) for each in sorted(path.rglob("*.csv"))]
     if not tables:
         raise DataError(f"expected tables of states, .csv files, in {path}, got none")
     heads = dict.fromkeys(head for _, cells in tables for head in cells)
     if not any(head.lower() in _MOVEMENTS for head in heads):
-        tables = [(each, cells | {"file": [each.name] * len(next(iter(cells.values())))}) for each, cells in tables]
+        tables = [
+            (each, cells | {"file": [str(each.relative_to(path))] * len(next(iter(cells.values())))})
+            for each, cells in tables
+        ]
         heads["file"] = None
     return {
         head: [text for _, cells in tables for text in cells.get(head, [""] * len(next(iter(cells.values()))))]
@@ -164,8 +177,11 @@ def _read(path: Path) -> dict[str, list[str]]:
 
 
 def _texts(cells: Mapping[str, Sequence[Any]]) -> dict[str, list[str]]:
+    if len({0 if isinstance(column, str) else np.size(column) for _, column in cells.items()}) > 1:
+        raise DataError("expected columns of states that are equally long, a value in each for every moment")
     return {
-        str(head): ["" if value is None else str(value).strip() for value in column] for head, column in cells.items()
+        str(head): ["" if value is None else str(value).strip() for value in np.atleast_1d(np.asarray(column, object))]
+        for head, column in cells.items()
     }
 
 
@@ -180,15 +196,33 @@ def _value(text: str) -> float | str | None:
     return number if math.isfinite(number) else None
 
 
+def _axes(names: Sequence[str]) -> tuple[str, ...]:
+    """Return the axes of the columns of places, ``x`` of ``tip_x [mm]``, so that a table has ``cup_x``."""
+    words = [re.split(r"[_.\s]", _column(name))[-1] for name in names]
+    is_one_point = len({*words}) == len(words) and {*words} <= {"x", "y", "z"}
+    return tuple(words if is_one_point else map(_column, names))
+
+
 def _column(head: str) -> str:
     """Return the name of a column: a hand's own columns are those of the recordings, units in brackets are left out."""
-    name = head.partition("[")[0].strip().replace(" ", "_").replace(".", "_")
+    name = split_head(head)[0].strip().replace(" ", "_").replace(".", "_")
     stem, _, axis = name.rpartition("_")
-    return f"{HAND}_{axis}" if stem.lower() in _HANDS else name
+    axis = axis.lower() if axis in ("X", "Y", "Z") else axis
+    return f"{HAND}_{axis}" if stem.lower() in _HANDS else f"{stem}_{axis}" if stem else axis
+
+
+def _check_units(heads: Iterable[str], unit_of: Mapping[str, str | None]) -> None:
+    """Refuse a position in another unit than that of its axis in the recordings, where both are said."""
+    for head in heads:
+        unit, other = (unit_named(text or "") for text in (split_head(head)[1], unit_of.get(_column(head)[-1:])))
+        if unit is not None and other is not None and unit != other:
+            raise DataError(
+                f"expected {head} in the unit of the recordings, [{other.symbol}], got [{unit.symbol}]; convert it"
+            )
 
 
 def _matched(
-    library: ActionLibrary, ids: NDArray[np.int64], cells: Mapping[str, list[str]], source: str, axes: Sequence[str]
+    library: ActionLibrary, ids: NDArray[np.int64], cells: Mapping[str, list[str]], source: str
 ) -> tuple[list[str], Array, Array, dict[str, tuple[str, ...]]]:
     """Return columns, states before and after (n, c), and words, of the rows that belong to each movement."""
     lower = {head.lower(): head for head in cells}
@@ -248,16 +282,27 @@ def _rows_by_time(
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     who, _, time = heads
     clock = np.array([_number(text, time) for text in cells[time]])
-    files = np.array([PurePath(text).stem for text in cells[who]] if who else [""] * len(clock))
-    rows_of = {name: np.flatnonzero(files == name) for name in dict.fromkeys(files.tolist())}
+    rows_of: dict[PurePath, list[int]] = {}
+    for row, text in enumerate(cells[who] if who else [""] * len(clock)):
+        rows_of.setdefault(PurePath(text.removesuffix(PurePath(text).suffix)), []).append(row)
+    files: dict[str, list[PurePath]] = {}
+    for file in rows_of:
+        files.setdefault(file.name, []).append(file)
     before, after = np.full((2, len(ids)), -1)
     for i, record in enumerate(read.records(library.store, ids)):
-        own = PurePath(record["name"] or "").stem
-        # Pieces of a recording are called by its name and a number.
-        name = max((name for name in rows_of if own == name or own.startswith(name)), key=len, default=None)
+        own = PurePath(record["name"] or "")
+        # Pieces of a recording are called by its name, a mark and a number: monday-003 is of monday, m10 not of m1.
+        starts = (own.stem[:n] for n in range(len(own.stem), -1, -1) if not (n and own.stem[n : n + 1].isalnum()))
+        name = next((start for start in starts if start in files), None)
         if name is None:
             continue
-        rows = rows_of[name][np.argsort(clock[rows_of[name]], kind="stable")]
+        several = [file for file in files[name] if file.parent.name == own.parent.name] or files[name]
+        if len(several) > 1:
+            raise DataError(
+                f"expected one recording called {name} in the table of states, got {first_names(several, 3)}"
+            )
+        rows = np.array(rows_of[several[0]])
+        rows = rows[np.argsort(clock[rows], kind="stable")]
         times, start, end = clock[rows], record["t0"], record["t0"] + record["duration"]
         slack = 1e-6 * max(1.0, abs(end)) + _NEAR * record["duration"]
         first = int(np.searchsorted(times, start + slack)) - 1

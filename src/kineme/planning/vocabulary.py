@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kineme.errors import SpecificationError
+from kineme.planning.skill import is_gripper
 from kineme.planning.states import HAND, State, States
 from kineme.reporting.text import first_names
 from kineme.validation import Array
@@ -31,7 +32,6 @@ Fact = tuple[str, ...]  # a predicate and its arguments
 
 _OWN = ("hand-at", "in", "clear", "holding", "hand-empty")  # predicates that are always there
 _TELLING = ("flag", "word", "gripper")  # kinds of variables that predicates come from
-_GRIPPERS = ("gripper", "grasp", "finger", "grip")
 _TRUE = {"true", "yes", "on", "open", "full", "1"}
 _FALSE = {"false", "no", "off", "closed", "empty", "0"}
 _MOST_WORDS = 12  # different words of a column, at most; more are names or notes
@@ -120,11 +120,11 @@ def vocabulary_of(states: States, radius: float | None = None) -> Vocabulary:
     variables: list[Variable] = []
     left_out: dict[str, str] = {}
     ways = {name: np.linalg.norm(where[1] - where[0], axis=1) for name, where in objects.items()}
-    move = {kind_of(name) for name, way in ways.items() if np.nanmax(np.append(way, 0.0)) > near}
+    move = {kind_of(name) for name, way in ways.items() if (way > near).any()}
     for name, where in objects.items():
         kind = "item" if kind_of(name) in move else "fixture"
-        stood = np.nanmedian(where.reshape(-1, len(states.axes)), axis=0)
-        typical = tuple(stood.tolist()) if kind == "fixture" and np.isfinite(stood).all() else ()
+        stood = where[np.isfinite(where).all(axis=2)]
+        typical = tuple(np.median(stood, axis=0).tolist()) if kind == "fixture" and len(stood) else ()
         variables.append(Variable(name, kind, positions[name], typical=typical))
     names = sorted(objects, key=len, reverse=True)
     for column, k in columns.items():
@@ -133,6 +133,9 @@ def vocabulary_of(states: States, radius: float | None = None) -> Vocabulary:
         variable = _said(
             column, np.concatenate((states.before[:, k], states.after[:, k])), states.words.get(column), names
         )
+        if (stem := column.rpartition("_"))[2] in states.axes and stem[0] and column not in states.words:
+            others = ", ".join(f"{stem[0]}_{axis}" for axis in states.axes)
+            variable = f"a position has all of {others}"
         if isinstance(variable, str):
             left_out[column] = variable
         else:
@@ -154,11 +157,9 @@ def _columns(states: States, moment: Array, names: Sequence[str]) -> Array:
 def _radius(ends: Array, objects: list[Array]) -> float:
     """Return the distance that parts near from far: the largest ratio of neighbors among the distances."""
     everything = np.vstack([ends, *objects])
-    diagonal = float(np.linalg.norm(np.nanmax(everything, axis=0) - np.nanmin(everything, axis=0)))
+    diagonal = float(np.linalg.norm(np.fmax.reduce(everything) - np.fmin.reduce(everything)))
     if objects:
-        distances = np.nanmin(
-            np.concatenate([np.linalg.norm(ends - where, axis=1)[:, None] for where in objects], axis=1), axis=1
-        )
+        distances = np.fmin.reduce([np.linalg.norm(ends - where, axis=1) for where in objects])
     else:
         some = ends[np.linspace(0, len(ends) - 1, min(len(ends), 300)).astype(int)]
         distances = np.linalg.norm(some[:, None] - some[None], axis=2)[np.triu_indices(len(some), 1)]
@@ -183,7 +184,7 @@ def _said(column: str, values: Array, words: tuple[str, ...] | None, objects: Se
         return "nothing is known of it"
     if words is not None:
         return _said_in_words(name, column, owner, words)
-    kind = "gripper" if any(part in column.lower() for part in _GRIPPERS) else "flag"
+    kind = "gripper" if is_gripper(column) else "flag"
     low, high = float(levels[0]), float(levels[-1])
     if low == high:
         if kind == "gripper" or low not in (0.0, 1.0):
