@@ -1,0 +1,2 @@
+# Movements as functions of tensors
+from kineme.torch.primitive import Primitive as Primitive
