@@ -35,6 +35,7 @@ OTHER_PARTS = {
     "pieces": "whole archives, with and without pieces, and brute force beside bounds; see tests/pieces",
     "robots": "one movement by contract",
     "studio": "its snapshots are a whole library, its server calls the layers below; see tests/studio",
+    "torch": "tensors of any batch shape, and each by itself; see tests/tensors",
     "validation": "checks that raise",
 }
 

@@ -86,7 +86,7 @@ class Primitive(torch.nn.Module):
     goal: Tensor | None
     velocity: Tensor | None
 
-    def __init__(  # noqa: PLR0913 - an option per parameter
+    def __init__(
         self,
         dims: int,
         n_weights: int = 25,
@@ -139,11 +139,15 @@ class Primitive(torch.nn.Module):
         learned = (
             primitives.weights.transpose(0, 2, 1), primitives.starts, primitives.goals, primitives.velocities
         )  # fmt: skip
+        n_samples = check_samples(n_samples, dmp.n_basis, "n_samples")
+        named = {name: torch.tensor(values) for name, values in zip(_LEARNED, learned, strict=True)}
+        return cls._new(dmp, primitives.n_dims, n_samples, named, primitives.durations, dtype, device)
+
+    @classmethod
+    def _new(cls, *prepared: Any) -> Self:
         module = cls.__new__(cls)
         torch.nn.Module.__init__(module)
-        n_samples = check_samples(n_samples, dmp.n_basis, "n_samples")
-        named = dict(zip(_LEARNED, learned, strict=True))
-        module._prepare(dmp, primitives.n_dims, n_samples, named, primitives.durations, dtype, device)
+        module._prepare(*prepared)
         return module
 
     def _prepare(  # noqa: PLR0913, PLR0917 - two constructors share it
@@ -151,7 +155,7 @@ class Primitive(torch.nn.Module):
         dmp: DMP,
         dims: int,
         n_samples: int,
-        learned: dict[str, Any],
+        learned: dict[str, Tensor],
         duration: Any,
         dtype: torch.dtype | None,
         device: torch.device | str | None,
@@ -166,10 +170,10 @@ class Primitive(torch.nn.Module):
         dtype = torch.get_default_dtype() if dtype is None else dtype
         for name, values in self._matrices().items():
             self.register_buffer(name, torch.tensor(values, dtype=dtype, device=device), persistent=False)
-        self.register_buffer("duration", torch.tensor(duration, dtype=dtype, device=device), persistent=bool(learned))
+        duration = torch.tensor(duration, dtype=dtype, device=device)
+        self.register_buffer("duration", duration, persistent=bool(learned))
         for name in _LEARNED:
-            values = torch.tensor(learned[name], dtype=dtype, device=device) if learned else None
-            self.register_buffer(name, values)
+            self.register_buffer(name, learned[name].to(dtype=dtype, device=device) if learned else None)
 
     def _matrices(self) -> dict[str, Any]:
         """The matrices in double precision; where scale is K, it is part of them."""
@@ -194,6 +198,25 @@ class Primitive(torch.nn.Module):
             "_u": np.linspace(0.0, 1.0, self.n_samples),
         }
 
+    def at_rate(self, rate: float, duration: float | None = None) -> Self:
+        """Return the same primitive with at least `rate` samples per second, or for another duration [s].
+
+        Weights mean the same: learned at 50 Hz, they move at 1 kHz. Learned durations are replaced by the given one.
+
+        Raises
+        ------
+        SpecificationError
+            A rate too low to follow the dynamics; a duration of 0 or less.
+        """
+        if duration is not None:
+            check_number("duration", duration, above=0.0)
+        seconds = self.duration.cpu().numpy() if duration is None else np.array(float(duration))
+        learned = {name: value for name in _LEARNED if (value := getattr(self, name)) is not None}
+        if duration is not None and learned:
+            learned["velocity"] = learned["velocity"] * (self.duration / duration)[:, None]
+        n_samples = samples_at_rate(rate, seconds, self.dmp)
+        return self._new(self.dmp, self.dims, n_samples, learned, seconds, self._u.dtype, self._u.device)
+
     def _apply(self, fn: Any, recurse: bool = True) -> Self:
         """Convert buffers; matrices of another precision are computed anew, and those that were without memory."""
         before = self._u.dtype, self._u.is_meta
@@ -212,7 +235,7 @@ class Primitive(torch.nn.Module):
         """Times of the samples [s], (T,) or (n, T)."""
         return self._u * self.duration[..., None]
 
-    def forward(  # noqa: PLR0913 - an option per parameter
+    def forward(
         self,
         weights: Tensor | None = None,
         start: Tensor | None = None,
@@ -246,7 +269,7 @@ class Primitive(torch.nn.Module):
         numbers, tau = self._numbers(weights, start, goal, velocity, duration)
         return self._path(numbers, tau, derivative)
 
-    def state(  # noqa: PLR0913 - an option per parameter
+    def state(
         self,
         at: Tensor | float,
         weights: Tensor | None = None,
@@ -306,10 +329,7 @@ class Primitive(torch.nn.Module):
         difference = (now - self._states(numbers, u))[..., None, :, :]  # (..., 1, d, 2)
         h = self._u - u[..., None]
         free = (self._transition(h.clamp(min=0.0))[..., None, :, :] @ difference[..., None])[..., 0]  # (..., T, d, 2)
-        if derivative == 2:
-            change = -self._K * free[..., 0] - self._D * free[..., 1]
-        else:
-            change = free[..., derivative]
+        change = -self._K * free[..., 0] - self._D * free[..., 1] if derivative == 2 else free[..., derivative]
         driven = self._path(numbers, tau, derivative)
         before = position if derivative == 0 else rest
         # Times are rounded: a sample at `at` itself must not count as before.
@@ -340,6 +360,135 @@ class Primitive(torch.nn.Module):
         relative, _ = self._relative(positions)
         tau = self.duration if duration is None else self._number(duration)
         return relative @ self.velocity_row / tau[..., None]
+
+    def distribution(  # noqa: PLR0913 - an option per parameter
+        self,
+        mean: Tensor,
+        chol: Tensor,
+        start: Tensor | None = None,
+        goal: Tensor | None = None,
+        *,
+        velocity: Tensor | None = None,
+        duration: Tensor | float | None = None,
+        joint: bool = False,
+    ) -> tuple[Tensor, Tensor]:
+        """Mean (..., T, d) and covariances of the positions, for weights with a Gaussian distribution.
+
+        Parameters
+        ----------
+        mean : Tensor of shape (..., d, N)
+            Of the weights.
+        chol : Tensor of shape (..., d N, d N)
+            Factor L of their covariance ``L L'``, of all N weights of one dimension after those of another.
+        start, goal, velocity, duration : as in `forward`
+        joint : bool, default False
+            Covariances of all samples with each other, (..., T, d, T, d), which takes T times the memory of those of
+            each sample (..., T, d, d).
+
+        Raises
+        ------
+        TrajectoryError, SpecificationError
+            As in `forward`.
+        """
+        path = self(mean, start, goal, velocity=velocity, duration=duration)
+        decode = self.decode_matrix[0, : self.dmp.n_basis].mT
+        spread = (decode @ self._factor(chol, start, goal)).movedim(-3, -2)  # (..., T, d, d N)
+        if not joint:
+            return path, spread @ spread.mT
+        flat = spread.flatten(-3, -2)
+        shape = (self.n_samples, self.dims)
+        return path, (flat @ flat.mT).unflatten(-1, shape).unflatten(-3, shape)
+
+    def log_prob(  # noqa: PLR0913 - an option per parameter
+        self,
+        positions: Tensor,
+        mean: Tensor,
+        chol: Tensor,
+        start: Tensor | None = None,
+        goal: Tensor | None = None,
+        *,
+        velocity: Tensor | None = None,
+        duration: Tensor | float | None = None,
+        noise: float = 1e-2,
+    ) -> Tensor:
+        """Log density (...) of movements (..., T, d) under weights with a Gaussian distribution, and noise.
+
+        It is that of all T d numbers together, with covariance ``A L L' A' + noise^2 I``. Since paths that weights can
+        make have but d N dimensions, only a matrix of that size is decomposed, whatever T: outside them is noise alone.
+
+        Parameters
+        ----------
+        positions : Tensor of shape (..., T, d)
+        mean, chol : as in `distribution`
+        start, goal : Tensor of shape (..., d), optional
+            By default where the positions begin and end.
+        velocity, duration : as in `forward`
+        noise : float, default 0.01
+            Standard deviation of each number, in the unit of the positions; in single precision not much below a
+            thousandth of the extent.
+
+        Raises
+        ------
+        TrajectoryError, SpecificationError
+            As in `encode` and `forward`; noise that is not above 0.
+        """
+        check_number("noise", noise, above=0.0)
+        self._relative(positions)  # which checks them
+        start = positions[..., 0, :] if start is None else start
+        goal = positions[..., -1, :] if goal is None else goal
+        residual = (positions - self(mean, start, goal, velocity=velocity, duration=duration)).mT  # (..., d, T)
+        inside = residual @ self._span
+        outside = (residual - inside @ self._span.mT).square().sum(dim=(-1, -2))
+        factor = (self._within @ self._factor(chol, start, goal)).flatten(-3, -2)
+        n_inside, n_numbers = factor.shape[-2], self.n_samples * self.dims
+        covariance = factor @ factor.mT + noise**2 * torch.eye(n_inside, dtype=factor.dtype, device=factor.device)
+        L = torch.linalg.cholesky(covariance)
+        whitened = torch.linalg.solve_triangular(L, inside.flatten(-2)[..., None], upper=False)
+        squares = whitened.square().sum(dim=(-1, -2)) + outside / noise**2
+        log_volume = L.diagonal(dim1=-2, dim2=-1).log().sum(-1) + (n_numbers - n_inside) * math.log(noise)
+        return -0.5 * (squares + n_numbers * math.log(2.0 * math.pi)) - log_volume
+
+    def sample(  # noqa: PLR0913 - an option per parameter
+        self,
+        size: int,
+        mean: Tensor,
+        chol: Tensor,
+        start: Tensor | None = None,
+        goal: Tensor | None = None,
+        *,
+        velocity: Tensor | None = None,
+        duration: Tensor | float | None = None,
+        generator: torch.Generator | None = None,
+    ) -> Tensor:
+        """Draw `size` movements (size, ..., T, d) from that distribution, with gradients in mean and factor.
+
+        Parameters
+        ----------
+        size : int
+        mean, chol, start, goal, velocity, duration : as in `distribution`
+        generator : torch.Generator, optional
+            Source of the random numbers.
+
+        Raises
+        ------
+        TrajectoryError, SpecificationError
+            As in `forward`.
+        """
+        chol = self._vector("chol", chol, self.dims * self.dmp.n_basis, self.dims * self.dmp.n_basis)
+        batch = torch.broadcast_shapes(mean.shape[:-2], chol.shape[:-2])
+        shape = (check_count("size", size, 1), *batch, chol.shape[-1], 1)
+        normal = torch.randn(shape, generator=generator, dtype=chol.dtype, device=chol.device)
+        weights = mean + (chol @ normal)[..., 0].unflatten(-1, (self.dims, self.dmp.n_basis))
+        return self(weights, start, goal, velocity=velocity, duration=duration)
+
+    def _factor(self, chol: Tensor, start: Tensor | None, goal: Tensor | None) -> Tensor:
+        """Factor (..., d, N, d N) of the weights as they act, with the amplitude of the original formulation."""
+        size = self.dims * self.dmp.n_basis
+        factor = self._vector("chol", chol, size, size).unflatten(-2, (self.dims, self.dmp.n_basis))
+        if self.dmp.system.divides_by_amplitude:
+            amplitude = self._vector("goal", goal) - self._vector("start", start)
+            factor = factor * amplitude[..., None, None]
+        return factor
 
     def _relative(self, positions: Tensor) -> tuple[Tensor, Tensor]:
         """Positions less their start (..., d, T), and goals."""
