@@ -24,7 +24,7 @@ from kineme.cli import main
 
 DOCS = Path(__file__).parent
 GENERATED = ("gallery", "reference/generated")  #: folders that the build of the site writes; git ignores them
-OPTIONAL = ("mujoco",)
+OPTIONAL = ("mujoco", "torch")
 _BLOCK = re.compile(r"^```(python|console)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 _PRINTED = re.compile(r"^ *print\(.*?\)(?:  # (.+))?((?:\n *# .+)*)$", re.MULTILINE)
 

@@ -47,6 +47,7 @@ SUBJECTS = (
     "motion_layer",
     "pieces",
     "operators",
+    "tensors",
     "page",
     "migrating",
     "studio",

@@ -14,7 +14,17 @@ from typing import Any
 import kineme
 
 RESULTS = Path(__file__).parents[1] / "results"
-_PACKAGES = ("numpy", "scipy", "scikit-learn", "numba", "movement-primitives", "pydmps", "dtaidistance", "dollarpy")
+_PACKAGES = (
+    "numpy",
+    "scipy",
+    "scikit-learn",
+    "numba",
+    "movement-primitives",
+    "pydmps",
+    "dtaidistance",
+    "dollarpy",
+    "mp-pytorch",
+)
 
 
 @dataclass(frozen=True)

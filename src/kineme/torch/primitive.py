@@ -539,9 +539,11 @@ class Primitive(torch.nn.Module):
         amplitude = g - x0
         if self.dmp.system.divides_by_amplitude:
             w = w * amplitude[..., None]
-        batch = torch.broadcast_shapes(w.shape[:-2], amplitude.shape[:-1], v0.shape[:-1])
-        parts = (w, amplitude[..., None], v0[..., None], x0[..., None])
-        return torch.cat([part.expand(*batch, *part.shape[-2:]) for part in parts], dim=-1), tau
+        parts = [w, *(vector[..., None] for vector in (amplitude, v0, x0))]
+        if len({part.shape[:-1] for part in parts}) > 1:
+            batch = torch.broadcast_shapes(*(part.shape[:-2] for part in parts))
+            parts = [part.expand(*batch, *part.shape[-2:]) for part in parts]
+        return torch.cat(parts, dim=-1), tau
 
     def _path(self, numbers: Tensor, tau: Tensor, derivative: int) -> Tensor:
         if derivative not in (0, 1, 2):
