@@ -30,9 +30,8 @@ class Policy(torch.nn.Module):
 
     def __init__(self) -> None:
         super().__init__()
-        self.layers = torch.nn.Sequential(
-            torch.nn.Linear(9, 64), torch.nn.Tanh(), torch.nn.Linear(64, 64), torch.nn.Tanh(), torch.nn.Linear(64, 2 * N + 2)
-        )  # fmt: skip
+        hidden = (torch.nn.Linear(9, 64), torch.nn.Tanh(), torch.nn.Linear(64, 64), torch.nn.Tanh())
+        self.layers = torch.nn.Sequential(*hidden, torch.nn.Linear(64, 2 * N + 2))
 
     def forward(self, at: float, *seen: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         """Weights (n, 2, N) and goals (n, 2)."""

@@ -15,16 +15,9 @@ import kineme
 
 RESULTS = Path(__file__).parents[1] / "results"
 _PACKAGES = (
-    "numpy",
-    "scipy",
-    "scikit-learn",
-    "numba",
-    "movement-primitives",
-    "pydmps",
-    "dtaidistance",
-    "dollarpy",
+    "numpy", "scipy", "scikit-learn", "numba", "movement-primitives", "pydmps", "dtaidistance", "dollarpy", "torch",
     "mp-pytorch",
-)
+)  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import runpy
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -48,6 +51,14 @@ def test_a_policy_learns_through_its_chunks():
         loss.backward()
         optimizer.step()
     assert loss < 1e-3
+
+
+def test_the_policy_of_the_example_learns_to_hit_moving_goals(tmp_path):
+    script = Path(__file__).parents[2] / "examples" / "moving_goal_policy.py"
+    names = runpy.run_path(str(script))
+    policy, misses = names["train"](20, n=32)
+    assert misses[-1] < 0.4 * misses[0]
+    names["draw"](policy, misses).savefig(tmp_path / "policy.png")
 
 
 def test_what_no_chunk_can_be_made_of_is_refused():

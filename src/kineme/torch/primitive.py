@@ -540,7 +540,7 @@ class Primitive(torch.nn.Module):
         if self.dmp.system.divides_by_amplitude:
             w = w * amplitude[..., None]
         parts = [w, *(vector[..., None] for vector in (amplitude, v0, x0))]
-        if len({part.shape[:-1] for part in parts}) > 1:
+        if any(part.shape[:-1] != w.shape[:-1] for part in parts):
             batch = torch.broadcast_shapes(*(part.shape[:-2] for part in parts))
             parts = [part.expand(*batch, *part.shape[-2:]) for part in parts]
         return torch.cat(parts, dim=-1), tau
