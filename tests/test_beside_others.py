@@ -38,7 +38,11 @@ def test_public_names_give_each_feature_that_we_claim(feature):
         if command:
             assert command in commands.commands
         else:
-            assert first.split(".")[1] in kineme.__all__
+            chapter = first.split(".")[1]
+            if chapter == "torch":  # in the package, and not among the names that need no other
+                pytest.importorskip("torch", reason="the extra torch is not installed")
+            else:
+                assert chapter in kineme.__all__
             pkgutil.resolve_name(name)
 
 
@@ -91,6 +95,8 @@ def test_it_is_said_who_is_ahead(ours, theirs, said):
 def test_ours_gives_the_result_that_the_peer_gave(row, tmp_path):
     """The peer's code on the page was run where it is installed: ``python -m bench --only migrating``."""
     page = row["details"]["page"]
+    if page == "mp_pytorch":
+        pytest.importorskip("torch", reason="the extra torch is not installed")
     names = {}
     list(walk(ROOT / "docs" / "migrating" / f"{page}.md", tmp_path, names))
     theirs = row["details"]["theirs"]

@@ -6,6 +6,7 @@ import importlib
 import pkgutil
 import re
 import shlex
+from importlib.util import find_spec
 from pathlib import Path
 
 import click
@@ -18,8 +19,9 @@ from kineme.cli import main
 TUTORIAL = DOCS / "tutorials" / "action-library.md"  # test_tutorial.py runs it, and looks at more
 PAGES = [page for page in pages() if page != TUTORIAL]
 MODULES = [
-    module.name for module in pkgutil.walk_packages(kineme.__path__, "kineme.") if not module.name.endswith("__main__")
-]
+    module.name for module in pkgutil.walk_packages(kineme.__path__, "kineme.")
+    if not module.name.endswith("__main__") and (find_spec("torch") or not module.name.startswith("kineme.torch."))
+]  # fmt: skip
 
 
 @pytest.mark.parametrize("page", PAGES, ids=page_name)

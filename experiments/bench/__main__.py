@@ -50,6 +50,7 @@ SUBJECTS = (
     "motion_layer",
     "pieces",
     "operators",
+    "tensors",
     "page",
     "migrating",
     "studio",

@@ -41,6 +41,7 @@ _DISTANCE = ("largest distance of the paths", "% of the extent", ("<=", 1.0))
 COMPARED: dict[str, tuple[str, Callable[[dict[str, Any]], tuple[float, list[Any]]], str, str, tuple[str, float]]] = {
     "movement_primitives": ("movement_primitives", _paths, *_DISTANCE),
     "pydmps": ("pydmps", _paths, *_DISTANCE),
+    "mp_pytorch": ("mp_pytorch", _paths, *_DISTANCE),
     "dollar": ("dollarpy", _names, "movements that are called the same", "%", (">=", 100.0)),
 }
 

@@ -14,7 +14,10 @@ from typing import Any
 import kineme
 
 RESULTS = Path(__file__).parents[1] / "results"
-_PACKAGES = ("numpy", "scipy", "scikit-learn", "numba", "movement-primitives", "pydmps", "dtaidistance", "dollarpy")
+_PACKAGES = (
+    "numpy", "scipy", "scikit-learn", "numba", "movement-primitives", "pydmps", "dtaidistance", "dollarpy", "torch",
+    "mp-pytorch",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)

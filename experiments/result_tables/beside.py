@@ -146,7 +146,8 @@ def _error(values: dict[str, float]) -> str:
 
 def _migrated(row: dict[str, Any]) -> str:
     versions = content("migrating")["versions"]
-    peer = {"movement_primitives": "movement-primitives", "dollar": "dollarpy"}.get(row["details"]["page"], "pydmps")
+    named = {"movement_primitives": "movement-primitives", "dollar": "dollarpy", "mp_pytorch": "mp-pytorch"}
+    peer = named.get(row["details"]["page"], "pydmps")
     measured = row["what"].partition(": ")[2]
     return f"Measured with {peer} {versions[peer]}: {measured}, {row['ours']:.3g} {row['unit']}."
 

@@ -37,6 +37,7 @@ OTHER_PARTS = {
     "recognition.monitor": "what many show is one corridor, and an execution is one movement; see test_monitor.py",
     "robots": "one movement by contract",
     "studio": "its snapshots are a whole library, its server calls the layers below; see tests/studio",
+    "torch": "tensors of any batch shape, and each by itself; see tests/tensors",
     "validation": "checks that raise",
 }
 

@@ -85,7 +85,7 @@ FORMULATIONS = {
             name="original",
             equation="tau v' = K (g - x) + (g - x0) f(s) - D v  (Eq. 1)",
             divides_by_amplitude=True,
-            coupling=lambda K, s: np.zeros_like(s),
+            coupling=lambda K, s: 0.0 * s,  # of tensors, too
             ratio=_per_dimension,
         ),
         # Eq. (4) multiplied out: s K (f/s + x0 - x) + (1 - s) K (g - x) = K (g - x) + K f - K s (g - x0).

@@ -1,0 +1,149 @@
+"""Primitives as modules of PyTorch beside ProDMPs of MP_PyTorch: rollouts, gradients, learning, replanning.
+
+Both have seven dimensions, 25 weights each and 201 samples, in single precision. A rollout is positions and velocities;
+gradients are those of their squares in all weights. Both run on one thread: on a busy machine, a second one that has to
+be woken takes longer than most of this work. Where a package is missing, nothing is measured, and it says so.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from importlib.util import find_spec
+from typing import Any
+
+import kineme
+from bench.rows import Row
+from bench.timing import medians
+
+DIMS, N, RATE, DURATION, BATCH = 7, 25, 100.0, 2.0, 1024
+LARGE = 100_000  # movements at once on a GPU
+PRODMP = {
+    "num_basis": N, "basis_bandwidth_factor": 3, "num_basis_outside": 0, "alpha_phase": 3, "alpha": 25, "dt": 0.01
+}  # fmt: skip
+PEER = "MP_PyTorch ProDMP"
+
+
+def measure(quick: bool) -> list[Row]:
+    """Rows of one movement and of a batch; targets are how many times faster ours is."""
+    missing = [name for name in ("torch", "mp_pytorch") if not find_spec(name)]
+    if missing:
+        print(f"not measured: {' and '.join(missing)} not installed", file=sys.stderr)
+        return []
+    import torch
+
+    torch.set_num_threads(1)
+    batch = 64 if quick else BATCH
+    rows = [*_rows(1, 5 if quick else 15, (20.0, 20.0, 20.0)), *_rows(batch, 2 if quick else 7, (20.0, 10.0, 500.0))]
+    return [*rows, *_arrays_row(batch, 5 if quick else 20), *_gpu_rows(quick)]
+
+
+def _rows(n: int, repeats: int, targets: tuple[float, float, float]) -> list[Row]:
+    ours, theirs = _ours(n), _theirs(n)
+    rows = []
+    for (name, work), target in zip(ours.items(), targets, strict=True):
+        few = name == "learning" and n > 1  # a peer's takes half a minute
+        calls = 20 if n == 1 else 1  # of a tenth of a millisecond: what a cold start costs is not what is asked
+        rivals = {who: _repeated(one, calls) for who, one in (("ours", work), (PEER, theirs[name]))}
+        seconds = medians(rivals, 1 if few else repeats, warm_up=0 if few else 2)
+        if few:
+            seconds["ours"] = medians({"ours": work}, repeats)["ours"]
+        ms, peer_ms = 1e3 * seconds["ours"] / calls, 1e3 * seconds[PEER] / calls
+        rows.append(Row(f"{name}, {n} at once", "ms", ms, peer_ms, PEER, peer_ms / ms, (">=", target)))
+    return rows
+
+
+def _repeated(work: Callable[[], object], calls: int) -> Callable[[], object]:
+    def several() -> None:
+        for _ in range(calls):
+            work()
+
+    return several
+
+
+def _numbers(n: int, device: str = "cpu") -> tuple[Any, ...]:
+    import torch
+
+    generator = torch.Generator().manual_seed(0)
+    shapes = ((n, DIMS, N), (n, DIMS), (n, DIMS))
+    return tuple(torch.randn(shape, generator=generator).to(device) for shape in shapes)
+
+
+def _ours(n: int, device: str = "cpu") -> dict[str, Callable[[], object]]:
+    mp = kineme.torch.Primitive(DIMS, N, rate=RATE, duration=DURATION, device=device)
+    weights, start, goal = _numbers(n, device)
+    leaf, paths = weights.clone().requires_grad_(), mp(weights, start, goal).contiguous()
+
+    def rollout(w: Any = weights) -> tuple[Any, ...]:
+        return mp(w, start, goal), mp(w, start, goal, derivative=1)
+
+    def gradients() -> None:
+        leaf.grad = None
+        sum(part.square().sum() for part in rollout(leaf)).backward()
+
+    return {"rollout": rollout, "rollout and gradients": gradients, "learning": lambda: mp.encode(paths)}
+
+
+def _theirs(n: int) -> dict[str, Callable[[], object]]:
+    import torch
+    from mp_pytorch.mp import MPFactory
+
+    mp = MPFactory.init_mp("prodmp", PRODMP, num_dof=DIMS, tau=DURATION)
+    weights, start, goal = _numbers(n)
+    params = torch.cat((weights, goal[..., None]), dim=-1).flatten(1)
+    leaf, times = params.clone().requires_grad_(), torch.linspace(0.0, DURATION, 201).expand(n, 201)
+
+    def rollout(given: Any = params) -> tuple[Any, ...]:
+        state = {"init_time": torch.zeros(n), "init_pos": start, "init_vel": torch.zeros(n, DIMS)}
+        mp.update_inputs(times=times, params=given, **state)
+        return mp.get_traj_pos(), mp.get_traj_vel()
+
+    paths = rollout()[0].contiguous()
+
+    def gradients() -> None:
+        leaf.grad = None
+        sum(part.square().sum() for part in rollout(leaf)).backward()
+
+    def learning() -> object:
+        return mp.learn_mp_params_from_trajs(times, paths)
+
+    return {"rollout": rollout, "rollout and gradients": gradients, "learning": learning}
+
+
+def _arrays_row(n: int, repeats: int) -> list[Row]:
+    """The same rollout by NumPy, which has no gradients: how much the module adds."""
+    primitives = kineme.DMP(n_basis=N).learn(_numbers(n)[0].numpy().transpose(0, 2, 1))
+
+    def rollout() -> tuple[Any, ...]:
+        movement = primitives.rollout(n_samples=201)
+        return movement.positions, movement.velocities
+
+    seconds = medians({"tensors": _ours(n)["rollout"], "arrays": rollout}, repeats)
+    tensors, arrays = (1e3 * seconds[name] for name in ("tensors", "arrays"))
+    return [Row(f"rollout, {n} at once, beside arrays in double precision", "ms", tensors, arrays, "kineme.DMP")]
+
+
+def _gpu_rows(quick: bool) -> list[Row]:
+    """A large batch on a GPU beside this machine's processor."""
+    import torch
+
+    if not torch.cuda.is_available():
+        print("GPU: not measured", file=sys.stderr)
+        return []
+    n, device = 10_000 if quick else LARGE, torch.cuda.get_device_name()
+    works = [
+        (name, _ours(n)[name], _ours(n, "cuda")[name]) for name in ("rollout", "rollout and gradients", "learning")
+    ]
+    rows = []
+    for name, here, there in works:
+
+        def finished(work: Callable[[], object] = there) -> object:
+            result = work()
+            torch.cuda.synchronize()
+            return result
+
+        seconds = medians({"gpu": finished, "cpu": here[name]}, 3)
+        ms, cpu_ms = 1e3 * seconds["gpu"], 1e3 * seconds["cpu"]
+        cores = f"{torch.get_num_threads()} cores"
+        rows.append(Row(f"{name}, {n} at once, on {device}", "ms", ms, cpu_ms, cores, cpu_ms / ms, (">=", 50.0)))
+    return rows
