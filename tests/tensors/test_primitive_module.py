@@ -28,7 +28,7 @@ def test_movements_are_those_of_numpy(formulation, gating):
     goals, velocities = np.array([[1.5, 0.2], [0.4, 2.0], [-1.0, 1.0]]), np.array([0.3, -0.2])
     for dtype, tolerance in ((torch.float64, 1e-12), (torch.float32, 1e-5)):
         mp = kineme.torch.Primitive.of(primitives, dtype=dtype)
-        for options in ({}, {"goal": goals}, {"goal": goals, "velocity": velocities, "duration": 0.5}):
+        for options in ({"duration": 0.5}, {"goal": goals}, {"goal": goals, "velocity": velocities, "duration": 0.5}):
             expected = primitives.rollout(**options)
             given_tensors = {name: torch.tensor(value) for name, value in options.items()}
             for k, name in enumerate(ORDERS):

@@ -43,11 +43,12 @@ def test_gradients_of_gram_matrices(kernel):
     assert gradcheck(lambda a, b: gram(kernel, a, b), (A, B), fast_mode=True)
 
 
+@pytest.mark.parametrize("kernel", [kernels.RBF(sigma=0.5), kernels.TruncatedEuclidean(m=1.0)], ids=repr)
 @pytest.mark.parametrize("mean", kernels.MEANS)
-def test_gradients_are_finite_where_a_similarity_is_none(mean):
-    """Far apart in one dimension, where a truncated kernel is 0; and of a row with itself."""
-    A = torch.tensor([[0.0, 0.0], [0.1, 50.0]], dtype=torch.float64, requires_grad=True)
-    gram(kernels.averaged(kernels.TruncatedEuclidean(m=1.0), 2, mean), A).sum().backward()
+def test_gradients_are_finite_where_a_similarity_is_none(mean, kernel):
+    """Far apart in one dimension, where a kernel is 0 or rounds to it; and of a row with itself."""
+    A = torch.tensor([[0.0, 0.0], [0.1, 50.0], [60.0, -60.0]], dtype=torch.float64, requires_grad=True)
+    gram(kernels.averaged(kernel, 2, mean), A).sum().backward()
     assert torch.isfinite(A.grad).all()
 
 
@@ -85,7 +86,7 @@ def test_gradients_of_similarities(d):
     a, b = tensors((2, 9, d), (2, 9, d), grad=True)
     assert gradcheck(similarity, (a, b), fast_mode=True)
     still = torch.zeros(2, 9, d, dtype=torch.float64, requires_grad=True)
-    similarity(still, b).sum().backward()
+    (similarity(still, b) + similarity(still, b, RotationPrior(concentration=0.0))).sum().backward()
     assert torch.isfinite(still.grad).all()
 
 
