@@ -24,7 +24,8 @@ from kineme.cli.operators import write_domain
 from kineme.errors import KinemeError
 from kineme.planning.domain import Domain
 from kineme.planning.operators import operators_of
-from kineme.planning.plan import Plan, find_plan, problem_of
+from kineme.planning.plan import Plan, find_plan
+from kineme.planning.problem import problem_of
 from kineme.planning.states import HAND, States
 from kineme.planning.vocabulary import facts_of, places_of
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from numbers import Real
 from pathlib import Path
 from typing import Any, TypeGuard
@@ -15,7 +15,7 @@ from typing import Any, TypeGuard
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kineme.errors import SpecificationError, TrajectoryError
+from kineme.errors import DataError, SpecificationError, TrajectoryError
 
 Array = NDArray[np.float64]
 
@@ -198,6 +198,17 @@ def as_path(path: Any, expected: str, instead: str = "") -> Path:
     except TypeError:
         hint = f"; {instead}" if instead else ""
         raise TypeError(f"expected {expected}, got {type(path).__name__}{hint}") from None
+
+
+def check_form(data: Any, what: str, form: str, version: int, remedy: str = "") -> None:
+    """Refuse data read from JSON that is not `what`, a mapping of that format and of that version or an earlier one."""
+    name = data.get("format") if isinstance(data, Mapping) else type(data).__name__
+    if name != form:
+        raise DataError(f"expected a {what}, a mapping with format {form!r}, got {name!r}{remedy and f'; {remedy}'}")
+    if not isinstance(data.get("version"), int) or data["version"] > version:
+        raise DataError(
+            f"expected a {what} of version {version} or earlier, got {data.get('version')!r}; upgrade kineme"
+        )
 
 
 def check_choice(name: str, value: str, choices: Sequence[str]) -> None:

@@ -33,7 +33,8 @@ from kineme.planning import (
 )
 from kineme.planning.execution import frame_of, monitored
 from kineme.planning.figure import write_moving
-from kineme.planning.plan import facts_after, shown_arguments, step_of, unmet
+from kineme.planning.plan import step_of
+from kineme.planning.problem import facts_after, shown_arguments, unmet
 from kineme.planning.simulated import assume_flags
 from kineme.robots import Simulation, load
 from kineme.robots.execution.preflight import preflight

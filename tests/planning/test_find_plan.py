@@ -30,7 +30,7 @@ from kineme.planning import (
     problem_of,
 )
 from kineme.planning.pddl import identifiers, parsed
-from kineme.planning.plan import shown_arguments
+from kineme.planning.problem import shown_arguments
 
 pytest.importorskip("unified_planning")
 GOAL = "(and (sweet cup) (sweet mug))"

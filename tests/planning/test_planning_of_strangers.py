@@ -36,7 +36,7 @@ from kineme.planning import (
 )
 from kineme.planning.figure import paths_of_plan
 from kineme.planning.operators import operators_of
-from kineme.planning.plan import shown_arguments
+from kineme.planning.problem import shown_arguments
 from kineme.planning.states import States
 
 

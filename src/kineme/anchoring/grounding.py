@@ -21,7 +21,7 @@ from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.similarity.describe import Described, Maps, describe, maps_onto, moved, paths_of
 from kineme.similarity.similarity import median_distances, similarities
 from kineme.similarity.specification import Compares
-from kineme.validation import check_choice
+from kineme.validation import check_choice, check_form
 
 FORMAT = "kineme-grounding"
 VERSION = 1
@@ -256,13 +256,7 @@ def primitive_from(grounding: Mapping[str, Any], style: ArrayLike | None = None)
     SpecificationError
         A style of a symbol without styles, or outside its range.
     """
-    form = grounding.get("format") if isinstance(grounding, Mapping) else type(grounding).__name__
-    if not isinstance(grounding, Mapping) or form != FORMAT:
-        raise DataError(f"expected a grounding, a mapping with format {FORMAT!r}, got {form!r}")
-    if not isinstance(grounding.get("version"), int) or grounding["version"] > VERSION:
-        raise DataError(
-            f"expected a grounding of version {VERSION} or earlier, got {grounding.get('version')!r}; upgrade kineme"
-        )
+    check_form(grounding, "grounding", FORMAT, VERSION)
     try:
         dmp = specification_from_dict(DMP, grounding["dmp"])
         label = np.array([grounding["symbol"]["name"]])

@@ -45,7 +45,8 @@ def plan(domain: Path, problem: Path | None, folder: Any, output: Path | None, *
     Example: kineme plan tea.pddl --state now.csv --goal "(and (sweet cup))" --library actions/ -o plan.json
     """
     from kineme.errors import SpecificationError
-    from kineme.planning.plan import find_plan, plan_to_dict, problem_from_pddl, problem_of
+    from kineme.planning.plan import find_plan, plan_to_dict
+    from kineme.planning.problem import problem_from_pddl, problem_of
     from kineme.planning.states import read_state
 
     if (problem is None) == (options["goal"] is None):

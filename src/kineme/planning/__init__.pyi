@@ -23,10 +23,10 @@ from kineme.planning.pddl import domain_to_pddl as domain_to_pddl
 from kineme.planning.pddl import edits_in as edits_in
 
 # Plans
-from kineme.planning.plan import problem_of as problem_of
-from kineme.planning.plan import problem_from_pddl as problem_from_pddl
-from kineme.planning.plan import Problem as Problem
-from kineme.planning.plan import Goal as Goal
+from kineme.planning.problem import problem_of as problem_of
+from kineme.planning.problem import problem_from_pddl as problem_from_pddl
+from kineme.planning.problem import Problem as Problem
+from kineme.planning.problem import Goal as Goal
 from kineme.planning.plan import find_plan as find_plan
 from kineme.planning.plan import Plan as Plan
 from kineme.planning.plan import Step as Step

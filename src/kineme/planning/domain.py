@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from kineme.errors import DataError, SpecificationError
 from kineme.planning.vocabulary import Variable, Vocabulary, kind_of
-from kineme.validation import Array
+from kineme.validation import Array, check_form
 
 FORMAT, VERSION = "kineme-domain", 1
 #: What says of an effect that it came after some movements and not after others.
@@ -235,15 +235,7 @@ def domain_from_dict(data: Any) -> Domain:
     DataError
         Anything else, or a domain of a later version.
     """
-    form = data.get("format") if isinstance(data, Mapping) else type(data).__name__
-    if form != FORMAT:
-        raise DataError(
-            f"expected a domain, an object with format {FORMAT!r}, got {form!r}; write one by kineme operators"
-        )
-    if not isinstance(data.get("version"), int) or data["version"] > VERSION:
-        raise DataError(
-            f"expected a domain of version {VERSION} or earlier, got {data.get('version')!r}; upgrade kineme"
-        )
+    check_form(data, "domain", FORMAT, VERSION, "write one by kineme operators")
     try:
         words = data["vocabulary"]
         variables = tuple(_record(Variable, variable) for variable in words["variables"])
@@ -266,12 +258,16 @@ def domain_from_dict(data: Any) -> Domain:
 
 
 def read_domain(path: str | Path) -> Domain:
-    """Return the domain in a JSON file."""
+    """Return the domain in a JSON file; see `domain_from_dict`."""
+    return domain_from_dict(read_json(path, "domain"))
+
+
+def read_json(path: str | Path, what: str) -> Any:
+    """Return the data in a JSON file that should hold `what`."""
     try:
-        data = json.loads(Path(path).read_text(encoding="utf-8"))
+        return json.loads(Path(path).read_text(encoding="utf-8"))
     except (ValueError, RecursionError) as error:
-        raise DataError(f"expected a domain in JSON, {path} is none: {error}") from error
-    return domain_from_dict(data)
+        raise DataError(f"expected a {what} in JSON, {path} is none: {error}") from error
 
 
 def _operator_from(data: Mapping[str, Any]) -> Operator:

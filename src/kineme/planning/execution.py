@@ -16,7 +16,8 @@ from kineme.library.library import ActionLibrary
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.planning import under_way
 from kineme.planning.domain import hands_of, is_shown
-from kineme.planning.plan import Plan, Problem, Step, facts_after, find_plan, problem_of, unmet
+from kineme.planning.plan import Plan, Step, find_plan
+from kineme.planning.problem import Problem, facts_after, problem_of, unmet
 from kineme.planning.skill import nearest_demonstration, outside, skill_of
 from kineme.planning.states import HAND, State, read_state
 from kineme.planning.under_way import Frame, Options, Part, Watcher, frame_of, monitored

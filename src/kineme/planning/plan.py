@@ -1,12 +1,10 @@
-"""Plans: the state now and a goal as a problem, a planner's steps as places that the hand goes to, and their checks."""
+"""Plans: a planner's steps as places that the hand goes to, and their checks."""
 
 from __future__ import annotations
 
-import itertools
-import json
 import tempfile
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,60 +14,21 @@ import numpy as np
 from kineme.errors import DataError, SpecificationError
 from kineme.io.records import needs
 from kineme.planning.domain import (
-    Domain,
-    Literal,
     Operator,
     check_positions,
     domain_from_dict,
     domain_to_dict,
     hands_of,
     is_shown,
-)
-from kineme.planning.pddl import Names, domain_to_pddl, literals_of, name_of, parsed, problem_to_pddl, read_problem
-from kineme.planning.states import State
-from kineme.planning.vocabulary import Fact, facts_of, places_of, position_of, predicates_of
+    read_json,
+)  # fmt: skip
+from kineme.planning.pddl import Names, domain_to_pddl, name_of, problem_to_pddl
+from kineme.planning.problem import Goal, Problem, facts_after, shown_arguments, unmet
+from kineme.planning.reachability import unreachable
 from kineme.reporting.text import first_names
-from kineme.validation import Array, as_numbers, check_number
+from kineme.validation import Array, check_form, check_number
 
 FORMAT, VERSION = "kineme-plan", 1
-_MOST_GROUND = 200_000  # operators with arguments, at most
-_TRIED = 500  # of them that are looked at for why a goal is not reached
-_DEEPEST = 6  # operators one before the other that this names
-
-
-class Goal(NamedTuple):
-    """A fact that is to be true, or false."""
-
-    fact: Fact
-    value: bool = True
-
-    def __str__(self) -> str:
-        text = f"({' '.join(self.fact)})"
-        return text if self.value else f"(not {text})"
-
-
-@dataclass(frozen=True, eq=False)
-class Problem:
-    """The state now, in a domain's words, and a goal.
-
-    Attributes
-    ----------
-    domain : Domain
-    places : mapping of str to ndarray of shape (k,)
-    facts : mapping of Fact to bool
-        What is not among them is not known.
-    goal : tuple of Goal
-    """
-
-    domain: Domain
-    places: Mapping[str, Array]
-    facts: Mapping[Fact, bool]
-    goal: tuple[Goal, ...]
-
-    @property
-    def objects(self) -> dict[str, str]:
-        """Name -> "place" or "item"."""
-        return dict.fromkeys(self.places, "place") | dict.fromkeys(self.domain.vocabulary.items, "item")
 
 
 class Step(NamedTuple):
@@ -107,144 +66,6 @@ class Plan:
     def duration(self) -> float:
         """Sum of the durations of the steps [s]."""
         return sum(step.duration for step in self.steps)
-
-
-def problem_of(
-    domain: Domain, state: State, goal: str | Iterable[Goal], places: Mapping[str, Any] | None = None
-) -> Problem:
-    """Return a problem.
-
-    Parameters
-    ----------
-    domain : Domain
-    state : mapping of str to number or word
-        The state now, in the columns of the states that the domain was learned from.
-    goal : str or iterable of Goal
-        A conjunction of literals in PDDL, as ``(and (in cup shelf) (not (full cup)))``.
-    places : mapping of str to (k,) positions, optional
-        More places, by name.
-
-    Raises
-    ------
-    SpecificationError
-        Names that the domain does not have, or a place without a position.
-    """
-    named = {name: np.array(where) for name, where in domain.places.items()}
-    for name, where in (places or {}).items():
-        named[name] = as_numbers(where, f"place {name}")
-        if named[name].shape != (len(domain.vocabulary.axes),) or not np.isfinite(named[name]).all():
-            axes = ", ".join(domain.vocabulary.axes)
-            raise SpecificationError(f"expected the place {name} as finite numbers for {axes}, got {where!r}")
-    at = _places_now(domain, state, named)
-    problem = Problem(domain, at, facts_of(domain.vocabulary, state, at), ())
-    goals = _goals(problem, literals_of(parsed(goal))) if isinstance(goal, str) else tuple(goal)
-    _check_goals(problem, goals)
-    return Problem(domain, at, problem.facts, goals)
-
-
-def problem_from_pddl(domain: Domain, text: str, state: State | None = None) -> Problem:
-    """Return the problem in a text of PDDL, with the facts that it lists, at the places of `state` or of the domain.
-
-    Facts of the state that the text does not list are added; what neither says is false, as PDDL has it, where the
-    state is not given.
-    """
-    objects, facts, goals = read_problem(text)
-    named = {name: np.array(where) for name, where in domain.places.items()}
-    at = _places_now(domain, state, named) if state is not None else _typical_places(domain)
-    problem = Problem(domain, at, {} if state is None else facts_of(domain.vocabulary, state, at), ())
-    names = Names(domain, problem.objects)
-    for identifier in objects:
-        name_of(identifier, names.objects, "objects whose position is known (give the state)")
-    listed = {
-        (
-            name_of(words[0], names.predicates, "a predicate"),
-            *(name_of(word, names.objects, "an object whose position is known") for word in words[1:]),
-        )
-        for words in facts
-        if words[0] not in names.shown.values()
-    }
-    _check_goals(problem, [Goal(fact) for fact in listed], "facts")
-    known = dict(problem.facts) if state is not None else dict.fromkeys(_all_facts(problem), False)
-    return Problem(domain, at, known | dict.fromkeys(listed, True), _goals(problem, goals))
-
-
-def _places_now(domain: Domain, state: State, named: Mapping[str, Array]) -> dict[str, Array]:
-    """Return the places of a state; one at which an item lies is where that item is, unless it is a fixture."""
-    vocabulary = domain.vocabulary
-    places = places_of(vocabulary, [state], named, "here")
-    columns = {item.name: item.columns for item in vocabulary.of_kind("item")}
-    return places | {
-        fact[2]: position_of(columns[fact[1]], state)
-        for fact, value in facts_of(vocabulary, state, places).items()
-        if value and fact[0] == "in" and fact[2] not in vocabulary.fixtures
-    }
-
-
-def _typical_places(domain: Domain) -> dict[str, Array]:
-    """Return the places of a domain without a state: fixtures in the middle of where they were shown."""
-    places = {name: np.array(where) for name, where in domain.places.items()}
-    for fixture in domain.vocabulary.of_kind("fixture"):
-        if fixture.typical:
-            places[fixture.name] = np.array(fixture.typical)
-    return places
-
-
-def _all_facts(problem: Problem) -> list[Fact]:
-    of_type = {kind: [name for name, each in problem.objects.items() if each == kind] for kind in ("place", "item")}
-    types = predicates_of(problem.domain.vocabulary)
-    return [
-        (name, *arguments)
-        for name, kinds in types.items()
-        for arguments in itertools.product(*(of_type[k] for k in kinds))
-    ]
-
-
-def _goals(problem: Problem, literals: Sequence[tuple[tuple[str, ...], bool]]) -> tuple[Goal, ...]:
-    names = Names(problem.domain, problem.objects)
-    goals = tuple(
-        Goal(
-            (
-                name_of(words[0], names.predicates, "a predicate"),
-                *(name_of(word, names.objects, "an object whose position is known") for word in words[1:]),
-            ),
-            value,
-        )
-        for words, value in literals
-    )
-    _check_goals(problem, goals)
-    return goals
-
-
-def _check_goals(problem: Problem, goals: Sequence[Goal], what: str = "goals") -> None:
-    types, objects = Names(problem.domain).types, problem.objects
-    for goal in goals:
-        wanted = types.get(goal.fact[0])
-        if wanted is None or tuple(map(objects.get, goal.fact[1:])) != wanted:
-            kinds = "nothing" if wanted is None else f"({' '.join((goal.fact[0], *wanted))})"
-            raise SpecificationError(f"expected {what} in the words of the domain, here {kinds}, got {goal}")
-    if both := next((goal for goal in goals if Goal(goal.fact, not goal.value) in goals), None):
-        raise SpecificationError(f"expected goals that hold together, got {both} both true and false")
-    if not goals and what == "goals":
-        raise SpecificationError("expected a goal, got none; as (and (in cup shelf))")
-
-
-def shown_arguments(problem: Problem) -> list[tuple[Operator, dict[str, str]]]:
-    """Return each usable operator with all arguments that lie inside what was shown of it."""
-    of_type = {kind: [name for name, each in problem.objects.items() if each == kind] for kind in ("place", "item")}
-    result = []
-    for operator in problem.domain.operators:
-        if not operator.usable:
-            continue
-        choices = [of_type[parameter.type] for parameter in operator.parameters]
-        if np.prod([len(names) for names in choices]) > _MOST_GROUND:
-            raise SpecificationError(
-                f"expected at most {_MOST_GROUND:,} choices of arguments of {operator.name}, got more; leave out places"
-            )
-        for chosen in itertools.product(*choices):
-            arguments = dict(zip((parameter.name for parameter in operator.parameters), chosen, strict=True))
-            if len({*chosen}) == len(chosen) and not is_shown(problem.domain, operator, arguments, problem.places):
-                result.append((operator, arguments))
-    return result
 
 
 def find_plan(problem: Problem, planner: str | None = None, timeout: float = 30.0) -> Plan:
@@ -363,24 +184,6 @@ def _tried(problem: Any, compiles: bool, planner: str | None, timeout: float, lo
     return plan, name
 
 
-def facts_after(facts: Mapping[Fact, bool], operator: Operator, arguments: Mapping[str, str]) -> dict[Fact, bool]:
-    """Return the facts after an operator; what is not known and not an effect stays unknown."""
-    return {**facts} | {
-        (literal.predicate, *(arguments[name] for name in literal.arguments)): literal.value
-        for literal in operator.effects
-    }
-
-
-def unmet(facts: Mapping[Fact, bool], operator: Operator, arguments: Mapping[str, str]) -> list[str]:
-    """List preconditions that do not hold, or are not known to."""
-    reasons = []
-    for literal in operator.preconditions:
-        fact = (literal.predicate, *(arguments[name] for name in literal.arguments))
-        if facts.get(fact) is not literal.value:
-            reasons.append(f"{Goal(fact, literal.value)} {'is not known' if fact not in facts else 'does not hold'}")
-    return reasons
-
-
 def check_plan(plan: Plan) -> None:
     """Refuse a plan that misses its goal, or with a step that is not known to be possible or was not shown so.
 
@@ -402,71 +205,6 @@ def check_plan(plan: Plan) -> None:
         facts = facts_after(facts, operator, step.arguments)
     if missed := [str(goal) for goal in plan.problem.goal if facts.get(goal.fact) is not goal.value]:
         raise SpecificationError(f"expected a plan that reaches its goal, it misses {', '.join(missed)}")
-
-
-def unreachable(problem: Problem, shown: Sequence[tuple[Operator, dict[str, str]]]) -> list[str]:
-    """Say which goals no order of the operators reaches even if nothing were ever undone, and what is missing."""
-    possible = {*problem.facts.items()}
-    left = list(shown)
-    while ready := [pair for pair in left if possible.issuperset(_ground(pair[0].preconditions, pair[1]))]:
-        done = {*map(id, ready)}
-        left = [pair for pair in left if id(pair) not in done]
-        possible |= {each for operator, arguments in ready for each in _ground(operator.effects, arguments)}
-    return [
-        f"{goal} {_why_not(problem, goal, possible, left, _DEEPEST)}" for goal in problem.goal if goal not in possible
-    ]
-
-
-def _ground(literals: Sequence[Literal], arguments: Mapping[str, str]) -> list[tuple[Fact, bool]]:
-    return [((each.predicate, *(arguments[name] for name in each.arguments)), each.value) for each in literals]
-
-
-def _why_not(
-    problem: Problem,
-    goal: Goal,
-    possible: set[tuple[Fact, bool]],
-    left: Sequence[tuple[Operator, dict[str, str]]],
-    depth: int,
-) -> str:
-    """Say what keeps operators from reaching a fact: what was not shown, what is not known, or what they lack."""
-    ways = [pair for pair in left if goal in _ground(pair[0].effects, pair[1])]
-    is_told = not ways and goal.fact in problem.facts  # then what was not shown is the reason, whatever else is missing
-    if reason := _not_shown(problem, goal, possible, len(problem.facts) if is_told else 0):
-        return reason
-    if not ways or not depth:
-        state = "is not known" if goal.fact not in problem.facts else "does not hold now"
-        effects = {each[::2] for operator in problem.domain.operators if operator.usable for each in operator.effects}
-        is_changed = (goal.fact[0], goal.value) in effects
-        return state if is_changed else f"{state}, and no operator that was shown changes that"
-    needs_of = [_ground(operator.preconditions, arguments) for operator, arguments in ways]
-    lacking = [[Goal(*each) for each in literals if each not in possible] for literals in needs_of]
-    k = min(range(len(ways)), key=lambda k: len(lacking[k]))
-    others = [pair for pair in left if pair[0] is not ways[k][0]]  # no round trips
-    first = min(lacking[k], key=lambda each: each.fact in problem.facts)  # what is not known comes first
-    name = f"({' '.join((ways[k][0].name, *ways[k][1].values()))})"
-    reason = _why_not(problem, first, possible, others, depth - 1)
-    return f"needs {name}; {Goal(first.fact) if reason.startswith('is not known') else first} {reason}"
-
-
-def _not_shown(problem: Problem, goal: Goal, possible: set[tuple[Fact, bool]], lacking_most: int) -> str:
-    """Name an operator that would reach a fact from here, and why its arguments lie outside what was shown."""
-    of_type = {kind: [name for name, each in problem.objects.items() if each == kind] for kind in ("place", "item")}
-    reasons = []
-    for operator in problem.domain.operators:
-        names = [parameter.name for parameter in operator.parameters]
-        for literal in operator.effects if operator.usable else ():
-            if (literal.predicate, literal.value) != (goal.fact[0], goal.value):
-                continue
-            fixed = dict(zip(literal.arguments, goal.fact[1:], strict=True))
-            choices = [[fixed[p.name]] if p.name in fixed else of_type[p.type] for p in operator.parameters]
-            for chosen in itertools.islice(itertools.product(*choices), _TRIED):
-                arguments = dict(zip(names, chosen, strict=True))
-                lacking = sum(each not in possible for each in _ground(operator.preconditions, arguments))
-                if len({*chosen}) == len(chosen) and lacking <= lacking_most:
-                    outside = is_shown(problem.domain, operator, arguments, problem.places)
-                    text = f"({' '.join((operator.name, *chosen))}) was not shown so: {first_names(outside, 2)}"
-                    reasons += [(lacking, len(outside), text)] if outside else []
-    return f"is not reached, since {min(reasons)[2]}" if reasons else ""
 
 
 def plan_to_dict(plan: Plan) -> dict[str, Any]:
@@ -495,9 +233,7 @@ def plan_from_dict(data: Any) -> Plan:
     SpecificationError
         A step that cannot be done; see `check_plan`.
     """
-    form = data.get("format") if isinstance(data, Mapping) else type(data).__name__
-    if form != FORMAT or not isinstance(data.get("version"), int) or data["version"] > VERSION:
-        raise DataError(f"expected a plan, an object with format {FORMAT!r}, of version {VERSION}, got {form!r}")
+    check_form(data, "plan", FORMAT, VERSION)
     try:
         domain = domain_from_dict(data["domain"])
         places = {str(name): np.array(where, dtype=np.float64) for name, where in data["places"].items()}
@@ -517,8 +253,4 @@ def plan_from_dict(data: Any) -> Plan:
 
 def read_plan(path: str | Path) -> Plan:
     """Return the plan in a JSON file; see `plan_from_dict`."""
-    try:
-        data = json.loads(Path(path).read_text(encoding="utf-8"))
-    except (ValueError, RecursionError) as error:
-        raise DataError(f"expected a plan in JSON, {path} is none: {error}") from error
-    return plan_from_dict(data)
+    return plan_from_dict(read_json(path, "plan"))

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.errors import SpecificationError
-from kineme.planning.plan import Plan, Step, facts_after
+from kineme.planning.plan import Plan, Step
+from kineme.planning.problem import facts_after
 from kineme.planning.under_way import frame_of
 from kineme.planning.vocabulary import Fact, Vocabulary
 from kineme.robots.kinematics.descent import InverseKinematics, point_in_words, reaching_postures

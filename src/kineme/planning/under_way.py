@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike
 
 from kineme.errors import SpecificationError
 from kineme.library.library import ActionLibrary
-from kineme.planning.plan import Goal, Plan, Problem, Step, check_plan, facts_after
+from kineme.planning.plan import Plan, Step, check_plan
+from kineme.planning.problem import Goal, Problem, facts_after
 from kineme.planning.vocabulary import Fact, Variable
 from kineme.reporting.text import first_names
 from kineme.robots.execution.joint_trajectory import JointTrajectory, between, n_samples
