@@ -2,7 +2,7 @@
 
 import pytest
 
-from result_tables import motion_layer
+from result_tables import motion_layer, planning
 from result_tables.__main__ import GUIDES
 from result_tables.measured import filled
 
@@ -13,7 +13,10 @@ def test_the_page_shows_what_was_measured(module):
     assert page == filled(page, module.tables()), "run make tables"
 
 
-@pytest.mark.parametrize("page", motion_layer.tables(), ids=lambda page: page.name)
-def test_pages_on_robot_data_show_what_was_measured(page):
+OF_SEVERAL = motion_layer.tables() | planning.tables()
+
+
+@pytest.mark.parametrize("page", OF_SEVERAL, ids=lambda page: page.name)
+def test_pages_of_one_benchmark_show_what_was_measured(page):
     text = page.read_text(encoding="utf-8")
-    assert text == filled(text, motion_layer.tables()[page]), "run make tables"
+    assert text == filled(text, OF_SEVERAL[page]), "run make tables"
