@@ -67,8 +67,9 @@ def _operators() -> str:
     outside = max(row["ours"] for row in rows("operators") if row["what"].endswith("outside what was shown"))
     return (
         f"In 100 generated worlds with known operators, {shares} of the problems that were not shown are solved after "
-        f"{counts} sessions of twelve movements, with noise in positions and 1 % of the flags misread; {100 * outside:.0f} % "
-        "of the plans leave what was shown (`python -m bench --only operators`). More is shown, more is solved."
+        f"{counts} sessions of twelve movements, with noise in positions and 1 % of the flags misread; "
+        f"{100 * outside:.0f} % of the plans leave what was shown (`python -m bench --only operators`). "
+        "More is shown, more is solved."
     )
 
 
