@@ -181,7 +181,9 @@ def test_what_cannot_be_used_is_refused():
     with pytest.raises(SpecificationError, match="got RhythmicPrimitives"):
         kineme.torch.Primitive.of(kineme.RhythmicDMP().learn([np.sin(np.linspace(0, 20, 200))]))
     loop = np.stack([np.cos(np.linspace(0, 2 * np.pi, 50)), np.sin(np.linspace(0, 2 * np.pi, 50))], axis=-1)
-    with pytest.raises(DegenerateMovementError, match="trajectory 0: expected a movement that does not end where it st"):
+    with pytest.raises(
+        DegenerateMovementError, match="trajectory 0: expected a movement that does not end where it st"
+    ):
         kineme.torch.Primitive.of(kineme.DMP("amplitude-scaled").learn([loop]))
     with pytest.raises(DegenerateMovementError, match="g != x0"):
         kineme.torch.Primitive.of(kineme.DMP("original").learn([np.sin(np.linspace(0, 2 * np.pi, 50))]))
