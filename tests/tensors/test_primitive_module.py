@@ -133,6 +133,19 @@ def test_compiled_and_exported_modules_are_the_module():
     assert torch.equal(exported.module()(weights[:3], start[:3], goal[:3]), mp(weights[:3], start[:3], goal[:3]))
 
 
+@pytest.mark.filterwarnings("ignore")  # the exporter is warned by PyTorch itself
+def test_a_module_is_exported_to_onnx(tmp_path):
+    pytest.importorskip("onnxscript", reason="onnxscript, with which PyTorch writes ONNX, is not installed")
+    onnxruntime = pytest.importorskip("onnxruntime", reason="the extra onnx is not installed")
+    mp, names = module("original", dtype=torch.float32), ("weights", "start", "goal")
+    numbers = [part.float() for part in tensors((4, 2, 6), (4, 2), (4, 2))]
+    shapes, path = ({0: "batch"},) * 3, tmp_path / "movements.onnx"
+    torch.onnx.export(mp, tuple(numbers), path, dynamo=True, dynamic_shapes=shapes, input_names=names, verbose=False)
+    some = {name: part[:3] for name, part in zip(names, numbers, strict=True)}
+    exported = onnxruntime.InferenceSession(path).run(None, {name: part.numpy() for name, part in some.items()})[0]
+    assert np.allclose(exported, mp(**some).numpy(), atol=1e-5)
+
+
 def test_nothing_looks_at_values():
     """On the device meta there are none."""
     mp = module(device="meta", dtype=torch.float32)
