@@ -104,7 +104,7 @@ export function follow(stored, { confidence = 0.9, patience = 0.05 } = {}) {
     const remaining = ahead.remaining.map((x) => x.map((value, k) => value + positions[n - 1][k]));
     return {
       label: decided === null ? null : classes[decided],
-      certainty: certainty(least, share[order[0]], { isNew: unknown > share[order[0]], isOver: false }),
+      certainty: unknown > share[order[0]] ? null : certainty(least, share[order[0]], { isNew: false, isOver: false }),
       ranked: order.map((c) => ({
         label: classes[c],
         confidence: share[c],
