@@ -11,7 +11,6 @@ import { hearerOf } from "./drawing.js";
 import { startFollowing } from "./follow.js";
 import { showInvitation } from "./invitation.js";
 import { followKeys } from "./keyboard_pen.js";
-import { describeLiveSource } from "./live_source.js";
 import { startNaming } from "./naming.js";
 import { clear, createSession } from "./session.js";
 
@@ -74,7 +73,7 @@ export function startDraw(send) {
     learned: (name) => showLearned(session, name),
   });
   listen(session);
-  describeLiveSource(byId("live-source-text"));
+  for (const host of document.querySelectorAll("[data-host]")) host.textContent = location.host;
   return {
     state: (/** @type {any} */ state) => showState(session, state),
     answer: (/** @type {any} */ answer) => hearAnswer(session, answer),

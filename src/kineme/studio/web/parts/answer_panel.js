@@ -47,7 +47,7 @@ function differs({ largest_difference: most, from, to }) {
 export class AnswerPanel {
   /** @param {Page} page */
   constructor({ picture, advice = () => "", invitation = () => "" }) {
-    Object.assign(this, { picture, advice, invitation });
+    this.page = { picture, advice, invitation };
     this.rows = [...Array(ROWS)].map(() => row("\u00a0"));
     fill(byId("ranks"), ...this.rows.map((line) => line.element));
     this.nearest = new Overlay(byId("nearest"));
@@ -82,7 +82,7 @@ export class AnswerPanel {
     byId("verdict").parentElement.dataset.state = state;
     if (like === this.like) return;
     this.like = like;
-    this.show(like && this.picture(like));
+    this.show(like && this.page.picture(like));
   }
 
   /** Beside the words: an example. @param {number[][]|null} path */
@@ -95,6 +95,7 @@ export class AnswerPanel {
   why(reasons) {
     byId("why").hidden = !reasons.length;
     byId("why-pictures").hidden = true;
+    this.answer = null;
     fill(byId("why-text"), ...reasons.map((text) => make("p", {}, text)));
   }
 
@@ -139,49 +140,48 @@ export class AnswerPanel {
     line.element.classList.toggle("nothing", value === null);
   }
 
-  /** While it is drawn: it looks like something, or is open, and the end contradicts neither. @param {any} state @param {number} now Time of the last sample [s]. */
-  drawing(state, now) {
-    const best = state.ranked[0];
-    const left = Number.isFinite(state.arrival) && state.arrival !== null ? Math.max(state.arrival - now, 0) : null;
-    const note = [
-      state.progress === null ? "" : `${percent(state.progress)} of the path`,
-      left === null ? "" : `arrives in ${left.toFixed(1)} s`,
-    ]
-      .filter(Boolean)
-      .join(", ");
-    const name = state.label ?? best?.label;
-    const isOpen = !best || (state.label === null && state.progress < BEGUN);
+  /**
+   * While it is drawn: it looks like something, or is open, so that the end contradicts neither.
+   * @param {any} state @param {number} now Time of the last sample [s].
+   */
+  drawing({ ranked, label, certainty, progress, arrival }, now) {
+    const name = label ?? ranked[0]?.label;
+    const left = Number.isFinite(arrival) ? `, arrives in ${Math.max(arrival - now, 0).toFixed(1)} s` : "";
+    const note = progress === null ? "" : `${percent(progress)} of the path${left}`;
+    const isOpen = !name || (label === null && progress < BEGUN);
     if (isOpen) this.words("Still open", "…", note, "open");
-    else if (!state.certainty) this.words("Still open", name, "most like it so far; it may be new", "doubtful", name);
-    else this.words("Looks like, so far", name, note, state.label === null ? "open" : "known", name);
-    this.progress(state.progress ?? 0);
-    this.list(state.ranked);
+    else if (!certainty) this.words("Still open", name, "Most like it so far; it may be new.", "doubtful", name);
+    else this.words("Looks like, so far", name, note, label === null ? "open" : "known", name);
+    this.progress(progress ?? 0);
+    this.list(ranked);
     this.why([]);
-    if (state.label !== null && state.certainty) this.speak(`Looks like ${name}, so far.`);
+    if (label !== null && certainty) this.speak(`Looks like ${name}, so far.`);
   }
 
   /** Of the whole movement. @param {any} answer @param {() => any} explain Its explanation, or a promise of it. */
   final(answer, explain) {
-    const [best] = answer.ranked;
-    const [isNew, word] = [answer.certainty === "new", capital(answer.certainty)];
-    const name = isNew ? best.label : answer.label;
-    const guess = answer.rule === "guess" ? "more drawings of each would say how sure" : "";
-    const phrases = [isNew ? `most like ${name}` : "", guess].filter(Boolean).map((phrase) => `${capital(phrase)}.`);
-    const note = [...phrases, isNew ? "" : this.advice()].join(" ");
-    const state = isNew ? "unknown" : answer.certainty === "looks like" ? "open" : "known";
-    this.words(word, isNew ? "Unknown" : name, note, state, name);
+    const { label, certainty, ranked, rule, p_known: known, promise } = answer;
+    const [name, word] = [label ?? ranked[0].label, capital(certainty)];
+    const note = [
+      label === null ? `Most like ${name}.` : "",
+      rule === "guess" ? "More drawings of each would say how sure." : "",
+      label === null ? "" : this.page.advice(),
+    ].join(" ");
+    const state = { new: "unknown", "looks like": "open" }[certainty] ?? "known";
+    this.words(word, label ?? "Unknown", note.trim(), state, name);
+    if (answer === this.answer) return;
     this.progress(1);
-    this.list(answer.ranked);
-    const pValues = answer.ranked
+    this.list(ranked);
+    const pValues = ranked
       .slice(0, ROWS)
       .filter((/** @type {any} */ candidate) => candidate.p_value !== null)
       .map((/** @type {any} */ candidate) => `${candidate.label} ${pValue(candidate.p_value)}`);
-    this.why([`p-value of being known: ${pValue(answer.p_known)}; of names: ${pValues.join(", ")}`, answer.promise]);
-    this.speak(isNew ? `New: unknown.${this.invitation()}` : `${word} ${answer.label}.`);
+    this.why([`p-value of being known: ${pValue(known)}; of names: ${pValues.join(", ")}`, promise]);
+    this.speak(label === null ? `New: unknown.${this.page.invitation()}` : `${word} ${label}.`);
     this.answer = answer;
     const asked = async () => {
       const explanation = await explain();
-      if (explanation && this.answer === answer && !byId("why").hidden) this.explain(explanation);
+      if (explanation && this.answer === answer) this.explain(explanation);
     };
     setTimeout(() => asked().catch(() => {})); // after the answer is there; without the server there are no pictures
   }

@@ -3,19 +3,16 @@ import { Camera } from "./camera.js";
 import { Board, color } from "./canvas.js";
 import { line, mark } from "./lines.js";
 
-/** @typedef {{path: number[][], drawn?: number[][], differences?: number[]}} Shown */
-
-const FAR = 0.3; // of the size of the drawing: the full color
+const FAR = 0.3; // of the size of the drawing: the other color
 
 export class Overlay {
   /** @param {HTMLCanvasElement} canvas */
   constructor(canvas) {
-    /** @type {Shown|null} */
     this.shown = null;
     this.board = new Board(canvas, () => this.paint());
   }
 
-  /** @param {Shown|null} shown A path alone, or what was drawn over it. */
+  /** @param {{path: number[][], drawn?: number[][], differences?: number[]}|null} shown An example, alone or not. */
   show(shown) {
     this.shown = shown;
     this.board.draw();
@@ -28,9 +25,8 @@ export class Overlay {
     const camera = new Camera();
     camera.face([drawn ?? path]);
     camera.fit([...path, ...(drawn ?? [])], width, height);
-    const below = path.map((point) => camera.toScreen(point));
+    const [below, above] = [path, drawn ?? path].map((points) => points.map((point) => camera.toScreen(point)));
     line(context, below, drawn ? { color: color("--gray"), width: 8, alpha: 0.45 } : { color: color("--ink") });
-    const above = (drawn ?? path).map((point) => camera.toScreen(point));
     for (let k = 1; drawn && k < above.length; k += 1) {
       const far = `${color("--predicted")} ${Math.min((100 * differences[k]) / FAR, 100)}%`;
       const mixed = `color-mix(in oklch increasing hue, ${color("--ink")}, ${far})`;
