@@ -19,9 +19,7 @@ _PORTS = click.IntRange(1, 65535)
 
 
 @click.command(short_help="Show, name and move it in the browser.")
-@library_option_of(
-    required=False, words="Folder of the action library; made if there is none.  [default: actions]"
-)
+@library_option_of(required=False, words="Folder of the action library; made if there is none.  [default: actions]")
 @click.option("--recordings", type=click.Path(path_type=Path),
               help="Data set of LeRobot, folder or file whose episodes are shown, named and corrected.")  # fmt: skip
 @click.option("--port", type=_PORTS, help="Port to serve at.  [default: 8420, or any that is free]")

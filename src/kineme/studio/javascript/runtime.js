@@ -2,7 +2,6 @@
 
 import { unpack } from "./arrays.js";
 import { follow } from "./early.js";
-import { explain } from "./explanation.js";
 import { hypotheses } from "./hypotheses.js";
 import { movement } from "./preparation.js";
 import { knownClasses, recognize } from "./recognition.js";
@@ -27,8 +26,8 @@ export function open(text) {
     formulations: header.movements.encodes ? Object.keys(FORMULATIONS) : [header.movements.formulation],
     /** The answer to a movement: times [s], positions of d numbers each. */
     recognize: (times, positions, errorRate) => recognize(all(), movement(times, positions, d), errorRate),
-    /** Why a movement got its answer. */
-    explain: (times, positions, answer) => explain(all(), movement(times, positions, d), answer),
+    /** What recognizes. */
+    recognizer: all,
     /** A function that is given all samples so far, again and again, and says what they begin to be. */
     follow: (options) => follow(beginnings(), options),
     /** Learn a movement. */

@@ -150,7 +150,7 @@ const update = (change) => moved(state.moving?.update(change) ?? "");
 function startDragging() {
   state.drags = true;
   show();
-  canvas.focus();
+  canvas.focus({ preventScroll: true });
 }
 
 /** Take hold of a point of what moves. @param {PointerEvent} event */

@@ -39,14 +39,14 @@ function differs({ largest_difference: most, from, to }) {
 
 /**
  * @typedef {Object} Page
- * @property {(name: string) => number[][]|null} picture The path of a symbol.
+ * @property {(name: string) => number[][]|null} [picture] The path of a symbol.
  * @property {() => string} [advice] What to do with what is known.
  * @property {() => string} [invitation] What to do with what is new.
  */
 
 export class AnswerPanel {
   /** @param {Page} page */
-  constructor({ picture, advice = () => "", invitation = () => "" }) {
+  constructor({ picture = () => null, advice = () => "", invitation = () => "" } = {}) {
     this.page = { picture, advice, invitation };
     this.rows = [...Array(ROWS)].map(() => row("\u00a0"));
     fill(byId("ranks"), ...this.rows.map((line) => line.element));

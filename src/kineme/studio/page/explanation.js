@@ -1,23 +1,24 @@
 // Why a movement got its answer: it over its nearest example and over the runner-up, as `Explanation.to_dict` has it.
 // Paths are those that are compared: centered, of one size if the library says so, and smoothed more than in Python.
 
-import { argmax } from "./arrays.js";
-import { describeMovement } from "./description.js";
-import { compare } from "./recognition.js";
-import { bestRotation } from "./rotation.js";
+import { argmax } from "../javascript/arrays.js";
+import { describeMovement } from "../javascript/description.js";
+import { movement } from "../javascript/preparation.js";
+import { compare } from "../javascript/recognition.js";
+import { bestRotation } from "../javascript/rotation.js";
 
 const NEAR = 0.5; // of the largest difference: the part around it that is named
 
 /** Null where positions are not compared. */
-export function explain(recognizer, movement, answer) {
+export function explain(recognizer, { times, positions }, answer) {
   const { header, arrays, stored } = recognizer;
   const { comparison: how, classes, first } = header;
   const r = how.by_rows.findIndex((row) => row.quantity === "positions" && row.arc_share === 1);
   if (r < 0) return null;
-  const described = describeMovement(movement, how, arrays);
+  const d = how.n_dims;
+  const described = describeMovement(movement(times, positions, d), how, arrays);
   const { average } = compare(recognizer, described);
   const ours = described.rows[r];
-  const d = how.n_dims;
   const n = ours.length / d;
   const axes = [...Array(d).keys()];
   const points = (value) => Array.from({ length: n }, (_, t) => axes.map((k) => value(k, t)));
