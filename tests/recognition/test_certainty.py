@@ -31,12 +31,11 @@ STRENGTH = {"looks like": 0, "probably": 1, "sure": 2}
 def test_the_word_is_that_of_the_confidence_and_never_more_than_a_likeness_by_a_guess(confidence, is_guess, word):
     assert certainty(confidence, is_new=False, is_guess=is_guess) == word
     assert certainty(confidence, is_new=True, is_guess=is_guess) == "new"
-    assert certainty(confidence, is_new=False, is_guess=is_guess, is_over=False) == "looks like"
 
 
-@given(st.tuples(st.floats(0, 1), st.floats(0, 1)), st.booleans(), st.booleans())
-def test_more_confidence_is_never_a_weaker_word(confidences, is_guess, is_over):
-    words = [certainty(one, is_new=False, is_guess=is_guess, is_over=is_over) for one in sorted(confidences)]
+@given(st.tuples(st.floats(0, 1), st.floats(0, 1)), st.booleans())
+def test_more_confidence_is_never_a_weaker_word(confidences, is_guess):
+    words = [certainty(one, is_new=False, is_guess=is_guess) for one in sorted(confidences)]
     assert STRENGTH[words[0]] <= STRENGTH[words[1]]
 
 

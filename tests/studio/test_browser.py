@@ -305,7 +305,7 @@ def test_symbols_are_merged_split_deleted_and_all_of_it_taken_back(opened, studi
     page.keyboard.press("Enter")
     wait_until(page, "document.querySelectorAll('.card-open').length === 3")
     assert "both" in names.all_inner_texts()
-    page.click("text=both")
+    page.click(".card-name >> text=both")
     wait_until(page, "document.querySelectorAll('.member').length === 6")
     assert page.evaluate(LOADED_TWICE) == 12
     other = center(page, ".member >> nth=5")

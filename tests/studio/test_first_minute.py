@@ -45,7 +45,7 @@ def strokes(name):
         "C": arc(0.8, 1.0, 45, 315),
         "G": np.concatenate((arc(0.8, 1.0, 45, 340), [[0.7, 0.0], [0.2, 0.0]])),
         "L": np.array([[0.0, 1.0], [0.0, -1.0], [0.9, -1.0]]),
-        "S": np.concatenate((arc(0.6, 0.5, 30, 265) + [0, 0.5], arc(0.6, 0.5, 85, -150) - [0, 0.5])),
+        "S": np.concatenate((arc(0.6, 0.5, 30, 265) - [0, -0.5], arc(0.6, 0.5, 85, -150) - [0, 0.5])),
         "Z": np.array([[-0.7, 1.0], [0.7, 1.0], [-0.7, -1.0], [0.7, -1.0]]),
     }[name]
     lengths = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))))
@@ -100,7 +100,7 @@ def draw_by_finger(page, movement, on):
         size,
         -size,
     ]
-    points = away + [box["x"] + box["width"] / 2, box["y"] + box["height"] / 2]
+    points = away + np.array([box["x"] + box["width"] / 2, box["y"] + box["height"] / 2])
     touch, now = page.context.new_cdp_session(page), time.time() - 1.5  # a tap that seems to come before is no tap
     for k in np.linspace(0, len(points) - 1, 50).astype(int):
         event = {"type": "touchMove" if k else "touchStart", "timestamp": now + 1.5 * k / len(points)}
@@ -202,10 +202,10 @@ def test_a_second_drawing_by_a_finger_is_a_drawing_until_it_is_dragged(opened, t
     wait_until(page, "kineme.state.drags", seconds=20)
     path = page.evaluate("kineme.state.moving.positions.map((x) => kineme.stage.project(x))")
     box = page.locator("#stage").bounding_box()
-    x, y = np.array(path[-1]) + [box["x"], box["y"]]
+    (x, y), left, top = path[-1], box["x"], box["y"]
     touch = page.context.new_cdp_session(page)
     for kind, at in (("touchStart", 0), ("touchMove", 30), ("touchMove", 60)):
-        touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": x + at, "y": y}]})
+        touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": left + x + at, "y": top + y}]})
     touch.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
     assert page.evaluate("kineme.state.moving.goal") != before
     assert page.evaluate("kineme.state.answer.ranked[0].label") == "C"

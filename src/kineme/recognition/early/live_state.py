@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kineme.movements.trajectories.labels import Label
-from kineme.recognition.answer import Certainty, certainty, in_words
+from kineme.recognition.answer import Certainty, in_words
 from kineme.validation import Array
 
 
@@ -92,9 +92,7 @@ class LiveState(NamedTuple):
         What begins like a known movement may go on otherwise, and what is unlike each one so far may end like one in
         another hand: no more is said before the end, so that the answer to the whole movement contradicts nothing.
         """
-        if not self.ranked or self.unknown > self.ranked[0].confidence:
-            return None
-        return certainty(self.ranked[0].confidence, is_new=False, is_guess=False, is_over=False)
+        return "looks like" if self.ranked and self.unknown <= self.ranked[0].confidence else None
 
     @property
     def probabilities(self) -> dict[Label, float]:
