@@ -1,5 +1,5 @@
 // Why a movement got its answer: it over its nearest example and over the runner-up, as `Explanation.to_dict` has it.
-// Paths are those that are compared: centered, of one size if the library says so, and smoothed more than in Python.
+// Paths are those that are compared: centered, of one size, and smoothed more than in Python.
 
 import { argmax } from "../javascript/arrays.js";
 import { describeMovement } from "../javascript/description.js";

@@ -15,29 +15,17 @@ export function takesDrawings() {
   return dims === 3 && symbols.every((symbol) => !symbol.path || isPlane(symbol.path));
 }
 
-/** @returns {{title: string, text: string}} */
-function invitation() {
-  if (!takesDrawings())
-    return {
-      title: "Movements in space",
-      text:
-        "This library holds movements that a mouse cannot draw. Send samples from a program and see them here, or " +
-        "drop a recording in Recordings.",
-    };
-  return { title: "Draw a movement here", text: "In one stroke, with mouse, pen or finger." };
-}
-
 /** @param {boolean} filled Whether there is a movement on the canvas. */
 export function showInvitation(filled) {
-  const { title, text } = invitation();
+  const [{ symbols }, takes] = [library(), takesDrawings()];
   showLegend(filled);
-  byId("draw-empty-title").textContent = title;
-  byId("draw-empty-text").textContent = text;
-  byId("draw-how").hidden = takesDrawings();
-  if (!takesDrawings()) byId("live-source").open = true;
-  const { symbols } = library();
+  byId("draw-empty-title").textContent = takes ? "Draw a movement here" : "Movements in space";
+  byId("draw-empty-text").textContent = takes
+    ? "In one stroke, with mouse, pen or finger."
+    : "A mouse cannot draw them. Send samples from a program and see them here, or drop a recording in Recordings.";
+  if (!takes) byId("live-source").open = true;
   byId("draw-examples").hidden = byId("first-steps").hidden = symbols.length > 0;
-  byId("known-title").hidden = !symbols.length;
+  byId("known-title").hidden = !symbols.length || !takes;
   fill(byId("known-symbols"), ...symbols.slice(0, SHOWN).map(picture));
 }
 

@@ -52,10 +52,6 @@ function listen(session) {
     const isOurs = event.key === "Escape" && currentView() === "draw";
     if (isOurs && !document.querySelector("dialog[open]")) clear(session);
   });
-  byId("draw-how").addEventListener("click", () => {
-    byId("live-source").scrollIntoView({ block: "start" });
-    /** @type {HTMLElement} */ (byId("live-source").firstElementChild).focus();
-  });
   onLibrary(() => showInvitation(picture.ink.length > 0));
   for (const button of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll("[data-example]")))
     button.addEventListener("click", async () => {

@@ -37,17 +37,10 @@ function differs({ largest_difference: most, from, to }) {
     : `off by up to ${size}, at ${percent(from)} to ${percent(to)}`;
 }
 
-/**
- * @typedef {Object} Page
- * @property {(name: string) => number[][]|null} [picture] The path of a symbol.
- * @property {() => string} [advice] What to do with what is known.
- * @property {() => string} [invitation] What to do with what is new.
- */
-
 export class AnswerPanel {
-  /** @param {Page} page */
-  constructor({ picture = () => null, advice = () => "", invitation = () => "" } = {}) {
-    this.page = { picture, advice, invitation };
+  /** @param {{picture?: (name: string) => number[][]|null, advice?: () => string}} page Paths of symbols; what to do. */
+  constructor({ picture = () => null, advice = () => "" } = {}) {
+    this.page = { picture, advice };
     this.rows = [...Array(ROWS)].map(() => row("\u00a0"));
     fill(byId("ranks"), ...this.rows.map((line) => line.element));
     this.nearest = new Overlay(byId("nearest"));
@@ -68,9 +61,7 @@ export class AnswerPanel {
   }
 
   /**
-   * @param {string} kind
-   * @param {string} word
-   * @param {string} note
+   * @param {string} kind @param {string} word @param {string} note
    * @param {string} state open, doubtful, known or unknown
    * @param {string|null} like The symbol whose picture is beside them.
    */
@@ -177,7 +168,7 @@ export class AnswerPanel {
       .filter((/** @type {any} */ candidate) => candidate.p_value !== null)
       .map((/** @type {any} */ candidate) => `${candidate.label} ${pValue(candidate.p_value)}`);
     this.why([`p-value of being known: ${pValue(known)}; of names: ${pValues.join(", ")}`, promise]);
-    this.speak(label === null ? `New: unknown.${this.page.invitation()}` : `${word} ${label}.`);
+    this.speak(label === null ? "New: unknown." : `${word} ${label}.`);
     this.answer = answer;
     const asked = async () => {
       const explanation = await explain();

@@ -69,7 +69,7 @@ export const breakable = (name) =>
 
 /**
  * Elements by their ids that are more than an HTMLElement.
- * @typedef {Record<"add-obstacle"|"add-span"|"add-via"|"ask-yes"|"clear"|"draw-clear"|"draw-how"|"draw-move"|
+ * @typedef {Record<"add-obstacle"|"add-span"|"add-via"|"ask-yes"|"clear"|"draw-clear"|"draw-move"|
  *     "draw-replay"|"draw-save"|"episodes-before"|"episodes-next"|"export"|"help"|"learn-file"|"learn-spans"|
  *     "merge"|"move-play"|"move-reset"|"naming-learn"|"play"|"play-recording"|"reset"|"robot-draw"|"robot-go"|
  *     "save"|"save-corrections"|"show-unlabeled"|"spot"|"spot-page"|"undo"|"zoom-in"|"zoom-out", HTMLButtonElement>
