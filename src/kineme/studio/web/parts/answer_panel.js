@@ -34,7 +34,7 @@ function differs({ largest_difference: most, from, to }) {
   const size = `${Math.round(100 * most)} % of its size`;
   return most <= ALIKE
     ? `nowhere off by more than ${size}`
-    : `off by up to ${size}, at ${percent(from)} to ${percent(to)}`;
+    : `off by up to ${size}, at ${percent(from)} to ${percent(to)} of the path`;
 }
 
 export class AnswerPanel {
