@@ -175,18 +175,19 @@ def test_the_page_explains_as_python_does(opened, tabs, examples):
     page.goto((examples / "letters.html").as_uri())
     wait_until(page, "window.kineme !== undefined")
     assert page.is_hidden("#ranks")
-    draw(page, strokes("G"), on="#stage")
-    wait_until(page, "!document.getElementById('why-pictures').hidden")
-    assert page.evaluate(PAINTED, "nearest")
-    times, positions = page.evaluate("[kineme.state.drawn.times, kineme.state.drawn.positions]")
-    page.click("#why summary")
-    captions = page.locator("#why-pictures figcaption").all_inner_texts()
-    with kineme.ActionLibrary(examples / "letters", read_only=True) as library:
-        explained = library.recognize(kineme.Trajectory(np.array(times), np.array(positions))).explain()
-    for caption, overlay in zip(captions, (explained.nearest, explained.runner_up), strict=True):
-        assert f": {overlay.label}, {overlay.similarity:.2f} alike" in caption
-        shown = int(caption.split("up to ")[1].split(" %")[0]) / 100
-        assert shown == pytest.approx(overlay.differences.max(), abs=0.04)  # its paths are smoothed more
+    for name in "GSZ":
+        page.keyboard.press("Escape")
+        draw(page, strokes(name), on="#stage")
+        wait_until(page, "!document.getElementById('why-pictures').hidden")
+        assert page.evaluate(PAINTED, "nearest")
+        times, positions = page.evaluate("[kineme.state.drawn.times, kineme.state.drawn.positions]")
+        captions = page.locator("#why-pictures figcaption").all_text_contents()
+        with kineme.ActionLibrary(examples / "letters", read_only=True) as library:
+            explained = library.recognize(kineme.Trajectory(np.array(times), np.array(positions))).explain()
+        for caption, overlay in zip(captions, (explained.nearest, explained.runner_up), strict=True):
+            assert f": {overlay.label}, {overlay.similarity:.2f} alike" in caption
+            shown = int(caption.split("up to ")[1].split(" %")[0]) / 100
+            assert shown == pytest.approx(overlay.differences.max(), abs=0.04)  # its paths are smoothed more
 
 
 def test_a_second_drawing_by_a_finger_is_a_drawing_until_it_is_dragged(opened, tabs, examples):
