@@ -318,3 +318,36 @@ class AnswerOut(BaseModel):
 def recognize(studio: Reads, body: RecognizeRequest) -> dict[str, Any]:
     """Its symbol, or null for unknown; with p-values that are calibrated where there are enough demonstrations."""
     return studio.library.recognize(records.trajectory(body.times, body.positions), body.error_rate).to_dict()
+
+
+class OverlayOut(BaseModel):
+    """An example laid over the movement, see `kineme.recognition.explanation.Overlay`."""
+
+    label: str
+    similarity: float
+    largest_difference: float
+    start: float = Field(validation_alias="from", serialization_alias="from")
+    to: float
+    part: str | None
+    differences: list[float]
+    path: list[list[float]]
+
+
+class WhyOut(BaseModel):
+    """Why a movement got its answer, as `kineme.recognition.explanation.Explanation.to_dict` gives it."""
+
+    answer: str
+    in_words: str
+    by_convolutions: bool
+    columns: list[str]
+    path: list[list[float]]
+    nearest: OverlayOut
+    runner_up: OverlayOut | None
+    shares: dict[str, float]
+
+
+@recognition_router.post("/why", response_model=WhyOut, summary="Explain the answer to a whole movement")
+def explain(studio: Reads, body: RecognizeRequest) -> dict[str, Any]:
+    """The movement over its nearest example and over the runner-up, as `kineme why` draws it."""
+    movement = records.trajectory(body.times, body.positions)
+    return studio.library.recognize(movement, body.error_rate).explain().to_dict()

@@ -1,10 +1,13 @@
 // A movement is drawn on the canvas: its samples go to the picture and to the server.
-import { byId } from "../parts/elements.js";
+import { byId, write } from "../parts/elements.js";
 import { library } from "../parts/library_state.js";
 import { requestAnswer, showAnswer } from "./answers.js";
 import { showLegend, takesDrawings } from "./invitation.js";
 import { canvasHeight } from "./scale.js";
 import { clear, FEWEST_SAMPLES, movementOf } from "./session.js";
+
+const PATIENCE = 1500; // [ms]
+const LATE = "The server takes long. Nothing is lost.";
 
 /** @typedef {import("./session.js").Session} Session */
 
@@ -30,6 +33,8 @@ function begin(session, pointer) {
   Object.assign(session, { drawing: true, pointer, height: canvasHeight() });
   showLegend(true);
   session.panel.words("Drawing", "…", "", "open");
+  const late = () => byId("verdict-kind").textContent === "Drawing" && write(byId("verdict-note"), LATE);
+  if (library().symbols.length) setTimeout(late, PATIENCE);
   return true;
 }
 

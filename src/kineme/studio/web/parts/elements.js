@@ -69,80 +69,18 @@ export const breakable = (name) =>
 
 /**
  * Elements by their ids that are more than an HTMLElement.
- * @typedef {{
- *   "add-obstacle": HTMLButtonElement,
- *   "add-span": HTMLButtonElement,
- *   "add-via": HTMLButtonElement,
- *   "ask-yes": HTMLButtonElement,
- *   "draw-clear": HTMLButtonElement,
- *   "draw-how": HTMLButtonElement,
- *   "draw-move": HTMLButtonElement,
- *   "episodes-before": HTMLButtonElement,
- *   "episodes-next": HTMLButtonElement,
- *   "draw-replay": HTMLButtonElement,
- *   "draw-save": HTMLButtonElement,
- *   "learn-file": HTMLButtonElement,
- *   "learn-spans": HTMLButtonElement,
- *   "move-play": HTMLButtonElement,
- *   "move-reset": HTMLButtonElement,
- *   "naming-learn": HTMLButtonElement,
- *   "play-recording": HTMLButtonElement,
- *   "robot-draw": HTMLButtonElement,
- *   "robot-go": HTMLButtonElement,
- *   "save-corrections": HTMLButtonElement,
- *   "show-unlabeled": HTMLButtonElement,
- *   "spot-page": HTMLButtonElement,
- *   "zoom-in": HTMLButtonElement,
- *   "zoom-out": HTMLButtonElement,
- *   clear: HTMLButtonElement,
- *   export: HTMLButtonElement,
- *   help: HTMLButtonElement,
- *   merge: HTMLButtonElement,
- *   play: HTMLButtonElement,
- *   reset: HTMLButtonElement,
- *   save: HTMLButtonElement,
- *   spot: HTMLButtonElement,
- *   undo: HTMLButtonElement,
- *   "draw-canvas": HTMLCanvasElement,
- *   "move-canvas": HTMLCanvasElement,
- *   "plot-acceleration": HTMLCanvasElement,
- *   "plot-speed": HTMLCanvasElement,
- *   "timeline-canvas": HTMLCanvasElement,
- *   canvas: HTMLCanvasElement,
- *   map: HTMLCanvasElement,
- *   stage: HTMLCanvasElement,
- *   "live-source": HTMLDetailsElement,
- *   "robot-preflight": HTMLDetailsElement,
- *   history: HTMLDetailsElement,
- *   why: HTMLDetailsElement,
- *   ask: HTMLDialogElement,
- *   keys: HTMLDialogElement,
- *   "pick-part": HTMLFieldSetElement,
- *   channels: HTMLFieldSetElement,
- *   formulations: HTMLFieldSetElement,
- *   styles: HTMLFieldSetElement,
- *   "ask-name": HTMLInputElement,
- *   "episodes-from": HTMLInputElement,
- *   "find-pick": HTMLInputElement,
- *   "find-symbol": HTMLInputElement,
- *   "naming-name": HTMLInputElement,
- *   "robot-dragged": HTMLInputElement,
- *   "robot-size": HTMLInputElement,
- *   "robot-slow": HTMLInputElement,
- *   duration: HTMLInputElement,
- *   file: HTMLInputElement,
- *   find: HTMLInputElement,
- *   playhead: HTMLInputElement,
- *   tilt: HTMLInputElement,
- *   time: HTMLInputElement,
- *   turn: HTMLInputElement,
- *   "export-format": HTMLSelectElement,
- *   "robot-arm": HTMLSelectElement,
- *   "robot-what": HTMLSelectElement,
- *   camera: HTMLSelectElement,
- *   formulation: HTMLSelectElement,
- *   tables: HTMLSelectElement,
- *   spans: HTMLTableElement,
- *   video: HTMLVideoElement,
- * }} Elements
+ * @typedef {Record<"add-obstacle"|"add-span"|"add-via"|"ask-yes"|"clear"|"draw-clear"|"draw-move"|
+ *     "draw-replay"|"draw-save"|"episodes-before"|"episodes-next"|"export"|"help"|"learn-file"|"learn-spans"|
+ *     "merge"|"move-play"|"move-reset"|"naming-learn"|"play"|"play-recording"|"reset"|"robot-draw"|"robot-go"|
+ *     "save"|"save-corrections"|"show-unlabeled"|"spot"|"spot-page"|"undo"|"zoom-in"|"zoom-out", HTMLButtonElement>
+ *   & Record<"canvas"|"draw-canvas"|"map"|"move-canvas"|"nearest"|"plot-acceleration"|"plot-speed"|"stage"|
+ *     "timeline-canvas", HTMLCanvasElement>
+ *   & Record<"history"|"live-source"|"robot-preflight"|"why", HTMLDetailsElement>
+ *   & Record<"ask"|"keys", HTMLDialogElement>
+ *   & Record<"channels"|"formulations"|"pick-part"|"styles", HTMLFieldSetElement>
+ *   & Record<"ask-name"|"duration"|"episodes-from"|"file"|"find"|"find-pick"|"find-symbol"|"naming-name"|"playhead"|
+ *     "robot-dragged"|"robot-size"|"robot-slow"|"tilt"|"time"|"turn", HTMLInputElement>
+ *   & Record<"camera"|"export-format"|"formulation"|"robot-arm"|"robot-what"|"tables", HTMLSelectElement>
+ *   & Record<"spans", HTMLTableElement>
+ *   & Record<"video", HTMLVideoElement>} Elements
  */
