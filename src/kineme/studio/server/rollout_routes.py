@@ -64,6 +64,20 @@ def make(studio: Studio, body: RolloutRequest) -> tuple[Generated, list[str]]:
     return _around(learned, options, body.obstacles)
 
 
+def name_of(studio: Studio, what: Subject) -> str:
+    """Return the name of the symbol that moves, or the number of the movement."""
+    symbol = what.symbol or (what.style.symbol if what.style else None)
+    return studio.symbol(symbol).name if symbol else f"movement {what.movement}"
+
+
+def as_file(data: bytes, name: str, ending: str) -> Response:
+    """Answer with a file: letters and digits of its name, whatever alphabet they are of."""
+    plain = "".join(mark if mark.isalnum() or mark in "-_" else "_" for mark in name)[:80] or "movement"
+    ascii_only = plain.encode("ascii", "replace").decode().replace("?", "_")
+    saved_as = f"attachment; filename=\"{ascii_only}{ending}\"; filename*=UTF-8''{quote(plain + ending)}"
+    return Response(data, media_type="application/octet-stream", headers={"Content-Disposition": saved_as})
+
+
 def moving_positions(learned: Learned, movement: Generated) -> Array:
     """Select the positions that can be led elsewhere: all but discrete channels, such as a gripper's."""
     names = list(movement.names.positions)
@@ -298,13 +312,7 @@ def export(studio: Reads, body: ExportRequest) -> Response:
     movement, _ = make(studio, body)
     ending = f".{body.format.lower().lstrip('.')}"
     data = encode_movement(movement.columns, ending, movement.names)
-    symbol = body.what.symbol or (body.what.style.symbol if body.what.style else None)
-    name = studio.symbol(symbol).name if symbol else f"movement {body.what.movement}"
-    # Letters and digits of the name, whatever alphabet they are of.
-    plain = "".join(mark if mark.isalnum() or mark in "-_" else "_" for mark in name)[:80] or "movement"
-    ascii_only = plain.encode("ascii", "replace").decode().replace("?", "_")
-    saved_as = f"attachment; filename=\"{ascii_only}{ending}\"; filename*=UTF-8''{quote(plain + ending)}"
-    return Response(data, media_type="application/octet-stream", headers={"Content-Disposition": saved_as})
+    return as_file(data, name_of(studio, body.what), ending)
 
 
 class RecognizeRequest(records.RequestBody):

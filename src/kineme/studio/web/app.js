@@ -10,6 +10,7 @@ import { startShortcuts } from "./parts/shortcuts.js";
 import { say, tried } from "./parts/toasts.js";
 import { startViews } from "./parts/views.js";
 import { startRecordings } from "./recordings/view.js";
+import { startMirror } from "./robot/mirror.js";
 import { startRobot } from "./robot/view.js";
 
 const AWAY = "The server does not answer. What you draw stays here; trying again.";
@@ -67,5 +68,6 @@ startLibrary();
 startMove();
 startRecordings();
 startRobot();
+startMirror();
 startShortcuts();
 startViews();

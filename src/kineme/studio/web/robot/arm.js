@@ -1,6 +1,6 @@
-// Inside the frame: what the studio sends becomes the data of the viewer and a chart of each joint, and the
-// viewer starts.
-import { byId, make } from "../parts/elements.js";
+// Inside the frame: what the studio sends is shown by the viewer, with a chart of each joint; where the start or the goal
+// was dragged to goes back.
+import { byId, fill, make } from "../parts/elements.js";
 import { svg } from "../parts/svg.js";
 
 const [WIDTH, HEIGHT] = [300, 80];
@@ -48,18 +48,26 @@ function chart(scene, joint, k) {
   );
 }
 
+const viewer = /** @type {any} */ (window).kineme;
+document.body.classList.toggle("mini", location.search === "?mini");
+if (location.search !== "?mini")
+  viewer.moved = (/** @type {string} */ end, /** @type {number[]} */ point) =>
+    parent.postMessage({ end, point }, location.origin);
+
 window.addEventListener("message", (event) => {
-  if (event.origin !== location.origin || event.source !== parent || !event.data?.scene || byId("data")) return;
-  const { scene, joints } = event.data;
-  document.body.append(make("script", { type: "application/json", id: "data" }, JSON.stringify(scene)));
-  byId("charts").append(
+  if (event.origin !== location.origin || event.source !== parent) return;
+  const { scene, joints, posture } = event.data;
+  if (posture) viewer.pose(posture);
+  if (!scene) return;
+  fill(
+    byId("charts"),
     ...scene.joints.map((/** @type {string} */ name, /** @type {number} */ k) =>
       chart(scene, joints?.[k] ?? { name, low: null, high: null }, k),
     ),
   );
-  const viewer = make("script", { src: "/vendor/viewer.js" });
-  if (!matchMedia("(prefers-reduced-motion: reduce)").matches)
-    viewer.addEventListener("load", () => byId("play").click());
-  document.body.append(viewer);
+  viewer.load(scene);
+  const moves = scene.times.length > 1;
+  document.body.classList.toggle("rests", !moves);
+  if (moves && !matchMedia("(prefers-reduced-motion: reduce)").matches) byId("play").click();
 });
 parent.postMessage("ready", location.origin);
