@@ -6,11 +6,11 @@ import { get } from "./parts/api.js";
 import { byId, counted, fill, make } from "./parts/elements.js";
 import { library, onLibrary, refresh } from "./parts/library_state.js";
 import { Live } from "./parts/live.js";
+import { startMirror } from "./parts/mirror.js";
 import { startShortcuts } from "./parts/shortcuts.js";
 import { say, tried } from "./parts/toasts.js";
 import { startViews } from "./parts/views.js";
 import { startRecordings } from "./recordings/view.js";
-import { startMirror } from "./robot/mirror.js";
 import { startRobot } from "./robot/view.js";
 
 const AWAY = "The server does not answer. What you draw stays here; trying again.";

@@ -1,7 +1,7 @@
 // A movement is drawn on the canvas: its samples go to the picture and to the server.
 import { byId } from "../parts/elements.js";
 import { library } from "../parts/library_state.js";
-import { mirror } from "../robot/mirror.js";
+import { mirror } from "../parts/mirror.js";
 import { requestAnswer, showAnswer } from "./answers.js";
 import { showLegend, takesDrawings } from "./invitation.js";
 import { canvasHeight } from "./scale.js";

@@ -1,5 +1,4 @@
-// Inside the frame: what the studio sends is shown by the viewer, with a chart of each joint; where the start or the goal
-// was dragged to goes back.
+// Inside the frame: the viewer shows what the studio sends, with a chart of each joint. Dragged ends go back.
 import { byId, fill, make } from "../parts/elements.js";
 import { svg } from "../parts/svg.js";
 

@@ -1,11 +1,11 @@
 // Robot: an arm executes a movement, and everything that is checked before is shown.
 import { download, get, post } from "../parts/api.js";
+import { openArm } from "../parts/arm_frame.js";
 import { byId, fill, make } from "../parts/elements.js";
 import { library, onLibrary } from "../parts/library_state.js";
 import { say, tried } from "../parts/toasts.js";
 import { currentView, onShow } from "../parts/views.js";
 import { chooseToMove, draggedGoal, toMove } from "../parts/chosen.js";
-import { openArm } from "./frame.js";
 
 const FILES = { yaml: "ROS 2 action goal", mcap: "ROS 2 bag", bag: "ROS 1 bag" };
 const USUAL = 0.5; // size of a movement, of the distance of the tip at rest
@@ -109,11 +109,12 @@ async function plan(again = false) {
   const key = JSON.stringify([body, library().version]);
   if (!body.what.symbol || (key === planned && !again)) return;
   planned = key;
-  byId("robot-save").disabled = true;
+  byId("robot-save").disabled = byId("robot-go").disabled = true;
   byId("robot-verdict").dataset.state = "";
   byId("robot-verdict").textContent = "Planning and checking …";
   const answer = await tried(() => post("/api/robots/move", body));
   if (key !== planned) return; // something else is asked for since then
+  byId("robot-go").disabled = false;
   if (!answer) {
     planned = byId("robot-verdict").textContent = "";
     return;

@@ -1,7 +1,7 @@
 // An arm draws along: its tip goes where the hand is on the canvas, while the hand is there.
-import { get, post } from "../parts/api.js";
-import { byId } from "../parts/elements.js";
-import { openArm } from "./frame.js";
+import { get, post } from "./api.js";
+import { openArm } from "./arm_frame.js";
+import { byId } from "./elements.js";
 
 /** @type {((message: Object) => void)|null} To the frame of the arm; null while there is none. */
 let send = null;

@@ -1,5 +1,5 @@
 // The frame in which an arm is drawn: the scene of three.js and its ids stay in there.
-import { fill, make } from "../parts/elements.js";
+import { fill, make } from "./elements.js";
 
 /**
  * @param {HTMLElement} host
