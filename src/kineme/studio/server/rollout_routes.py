@@ -133,8 +133,11 @@ def _around(learned: Learned, options: MovementOptions, balls: list[Obstacle]) -
     bends: dict[float, Array] = {}
     owners, margins = dict[float, int](), np.full(len(balls), _MARGIN)
     best = movement = attempt(bends)
+    # Around a ball in which a point of the movement lies there is no way: it is said alone.
+    fixed = np.array([best[2][0], best[2][-1], *(point for _, point in options.via)])[:, None, placed]
+    passable = (np.linalg.norm(fixed - centers, axis=2) > radii).all(axis=0)
     for _ in range(_MOST_BENDS):
-        path, depths = movement[2:]
+        path, depths = movement[2], np.where(passable, movement[3], -np.inf)
         if depths.max() <= 0:
             break
         t, ball = (int(k) for k in np.unravel_index(depths.argmax(), depths.shape))
@@ -146,9 +149,9 @@ def _around(learned: Learned, options: MovementOptions, balls: list[Obstacle]) -
         bends[share], owners[share] = point, ball
         try:
             movement = attempt(bends)
-        except SpecificationError:  # a start or a goal that lies in a ball, or more bends than there are weights
+        except SpecificationError:  # more bends than there are weights
             break
-        if movement[3].max() < best[3].max():
+        if movement[3][:, passable].max() < best[3][:, passable].max():
             best = movement
     return best[0], best[1] + [
         f"the movement passes {radius - depth:.3g} from the middle of obstacle {k + 1}, whose radius is {radius:.3g}: "

@@ -1,4 +1,4 @@
-// Formulations and how each is drawn: by its color and by its dashes.
+// Formulations and how each is drawn: by its color and by its dashes. Two have plain words, all are under Advanced.
 import { byId, make } from "../parts/elements.js";
 
 export const FORMULATIONS = [
@@ -17,22 +17,23 @@ export const FORMULATIONS = [
   { name: "original", says: "stretches each axis by its own", key: "third", look: { color: "--goal", dash: [2, 6] } },
 ];
 
-/** @param {(name: string, on: boolean) => void} changed */
+/** @param {(names: string[]) => void} changed */
 export function showFormulations(changed) {
-  for (const formulation of FORMULATIONS) {
-    const box = make("input", {
-      type: "checkbox",
-      checked: formulation === FORMULATIONS[0],
-      on: { change: () => changed(formulation.name, box.checked) },
-    });
-    byId("formulations").append(
-      make(
-        "label",
-        { class: "check" },
-        box,
-        make("span", { class: `key ${formulation.key}` }),
-        make("span", {}, formulation.name, make("span", { class: "soft small says" }, formulation.says)),
-      ),
-    );
-  }
+  const boxes = FORMULATIONS.map(({ name, key, says }, k) => {
+    const box = make("input", { type: "checkbox", value: name, checked: k === 0 });
+    const words = make("span", {}, name, make("span", { class: "soft small says" }, says));
+    byId("formulations").append(make("label", { class: "check" }, box, make("span", { class: `key ${key}` }), words));
+    return box;
+  });
+  const manners = /** @type {NodeListOf<HTMLInputElement>} */ (document.getElementsByName("manner"));
+  const show = () => {
+    const names = boxes.filter((box) => box.checked).map((box) => box.value);
+    for (const manner of manners) manner.checked = names.join() === manner.value;
+    changed(names);
+  };
+  byId("formulations").addEventListener("change", show);
+  byId("manner").addEventListener("change", (event) => {
+    for (const box of boxes) box.checked = box.value === /** @type {HTMLInputElement} */ (event.target).value;
+    show();
+  });
 }

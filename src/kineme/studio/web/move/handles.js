@@ -114,6 +114,7 @@ export class Handles {
     const grip = { handle, button };
     button.addEventListener("pointerdown", (event) => this.grab(grip, event));
     button.addEventListener("keydown", (event) => this.key(grip, event));
+    button.addEventListener("dblclick", () => grip.handle.remove?.());
     byId("handles").append(button);
     return grip;
   }
@@ -161,7 +162,7 @@ export class Handles {
       button.style.setProperty("--y", `${y.toFixed(1)}px`);
       const text = point.map((value) => this.page.text(value)).join(", ");
       button.setAttribute("aria-label", `${handle.name} at ${text}`);
-      button.title = handle.name;
+      button.title = handle.remove ? `${handle.name}; a double click removes it` : handle.name;
     }
   }
 }

@@ -52,7 +52,9 @@ function showLegend(session) {
   fill(
     byId("move-legend"),
     make("li", {}, make("span", { class: "key recorded" }), "recorded"),
-    ...paths.map(({ name, key }) => make("li", {}, make("span", { class: `key ${key}` }), name)),
+    ...paths.map(({ name, key }) =>
+      make("li", {}, make("span", { class: `key ${key}` }), paths.length > 1 ? name : "now"),
+    ),
   );
 }
 

@@ -53,6 +53,10 @@ export function extent(path) {
   return Math.hypot(...spans) || 1;
 }
 
+/** Whether a path runs through an obstacle. @param {Obstacle} obstacle @param {number[][]} path */
+export const isTouched = ({ center, radius }, path) =>
+  path.some((point) => Math.hypot(...center.map((value, k) => value - point[k])) < 0.999 * radius);
+
 /**
  * A coordinate as far as it matters in a movement of a size.
  * @param {number} value @param {number} size @returns {string}

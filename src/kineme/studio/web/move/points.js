@@ -1,5 +1,6 @@
 // The same points as numbers: every coordinate can be typed.
 import { byId, fill, keepingFocus, make } from "../parts/elements.js";
+import { library } from "../parts/library_state.js";
 import { extent, rounded } from "./plan.js";
 
 const AXES = ["x", "y", "z"];
@@ -55,6 +56,9 @@ function row(name, point, short, changed, remove, ...more) {
   );
 }
 
+/** The unit of positions, where the library says one. */
+export const unit = () => library().channels?.find((/** @type {any} */ { kind }) => kind === "position")?.unit ?? "";
+
 /**
  * @param {import("./plan.js").Plan} plan
  * @param {() => void} changed After a number.
@@ -67,57 +71,50 @@ export function showPoints(plan, changed, removed) {
     points.splice(k, 1);
     removed();
   };
-  const via = plan.via.map((via, k) =>
-    row(
+  const via = plan.via.map((via, k) => {
+    const when = (/** @type {number} */ at) => {
+      via.at = Math.min(Math.max(at / 100, 0.01), 0.99);
+      changed();
+    };
+    const title = "When, percent of the duration";
+    const time = rounded(100 * via.at, 100);
+    return row(
       `Via ${k + 1}`,
       via.point,
       short,
       changed,
       drop(plan.via, k),
-      number(
-        `Via ${k + 1} when, percent of the duration`,
-        `via ${k} when`,
-        rounded(100 * via.at, 100),
-        (at) => {
-          via.at = Math.min(Math.max(at / 100, 0.01), 0.99);
-          changed();
-        },
-        { min: "1", max: "99", title: "When, percent of the duration" },
-      ),
-    ),
-  );
-  const obstacles = plan.obstacles.map((obstacle, k) =>
-    row(
+      number(`Via ${k + 1} when, percent of the duration`, `via ${k} when`, time, when, { min: "1", max: "99", title }),
+    );
+  });
+  const obstacles = plan.obstacles.map((obstacle, k) => {
+    const widen = (/** @type {number} */ radius) => {
+      obstacle.radius = Math.abs(radius) || obstacle.radius;
+      changed();
+    };
+    const [label, key, title] = [`Obstacle ${k + 1} radius`, `obstacle ${k} radius`, "Radius"];
+    return row(
       `Obstacle ${k + 1}`,
       obstacle.center,
       short,
       changed,
       drop(plan.obstacles, k),
-      number(
-        `Obstacle ${k + 1} radius`,
-        `obstacle ${k} radius`,
-        short(obstacle.radius),
-        (radius) => {
-          obstacle.radius = Math.abs(radius) || obstacle.radius;
-          changed();
-        },
-        { min: "0", title: "Radius" },
-      ),
-    ),
-  );
-  const extra = via.length || obstacles.length;
-  const heads = [
-    ...plan.start.map((_, k) => AXES[k] ?? String(k + 1)),
-    ...(extra ? [via.length && obstacles.length ? "%, radius" : via.length ? "when %" : "radius"] : []),
-  ];
+      number(label, key, short(obstacle.radius), widen, { min: "0", title }),
+    );
+  });
+  const extra = via.length || obstacles.length ? 1 : 0;
+  const last = via.length ? (obstacles.length ? "%, radius" : "when %") : "radius";
+  const heads = plan.start.map((_, k) => AXES[k] ?? String(k + 1));
+  if (unit()) heads[0] += ` [${unit()}]`;
+  if (extra) heads.push(last);
   const head = make(
     "li",
     { class: "point head", "aria-hidden": "true" },
     make("span", {}),
     make("span", { class: "point-fields" }, ...heads.map((text) => make("span", {}, text))),
   );
-  byId("points").classList.toggle("deep", plan.start.length + (extra ? 1 : 0) > 3);
-  byId("points").style.setProperty("--columns", String(plan.start.length + (extra ? 1 : 0)));
+  byId("points").classList.toggle("deep", plan.start.length + extra > 3);
+  byId("points").style.setProperty("--columns", String(plan.start.length + extra));
   keepingFocus(() =>
     fill(
       byId("points"),

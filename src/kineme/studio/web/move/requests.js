@@ -9,6 +9,7 @@ import { showChange, showStructure } from "./edits.js";
 import { FORMULATIONS } from "./formulations.js";
 import { showPaths } from "./paths.js";
 import { asShown, question } from "./plan.js";
+import { unit } from "./points.js";
 import { movingFormulations } from "./session.js";
 import { Steps } from "./steps.js";
 import { showStyles } from "./styles.js";
@@ -29,6 +30,9 @@ export async function chooseSymbol(session, id) {
   session.camera.face([symbol.path]);
   picture.sketch(symbol.path);
   byId("move-name").textContent = symbol.name;
+  document.querySelectorAll(".per").forEach((per, k) => {
+    per.textContent = unit() && ` [${unit()}/s${k ? "²" : ""}]`;
+  });
   const rollout = await tried(() =>
     server.generate({ what: { symbol: symbol.id }, formulation: FORMULATIONS[0].name }),
   );
@@ -41,7 +45,8 @@ export async function chooseSymbol(session, id) {
   session.plan = picture.plan = plan;
   for (const each of rollouts.values()) each.reset();
   byId("duration").value = "0";
-  byId("formulations").disabled = false;
+  for (const id of ["manner", "formulations"]) byId(/** @type {"manner"} */ (id)).disabled = false;
+  byId("move-reset").disabled = true;
   picture.paths = [];
   picture.fit();
   showStructure(session);
@@ -67,23 +72,24 @@ async function prepare(session) {
  */
 function chooseStyle(session, values, formulation) {
   Object.assign(session.plan, { style: values, styled: formulation });
-  byId("formulations").disabled = values !== null;
+  for (const id of ["manner", "formulations"]) byId(/** @type {"manner"} */ (id)).disabled = values !== null;
   for (const rollouts of session.rollouts.values()) rollouts.primitive = null;
   showChange(session);
   clearTimeout(session.resting);
   session.resting = setTimeout(() => prepare(session), RESTS);
 }
 
-/** @param {Session} session @param {string} name @param {boolean} ticked */
-export async function tickFormulation(session, name, ticked) {
-  if (ticked) session.ticked.add(name);
-  else session.ticked.delete(name);
+/** @param {Session} session @param {string[]} names Of the formulations that move. */
+export async function tickFormulations(session, names) {
+  const added = names.filter((name) => !session.ticked.has(name));
+  session.ticked = new Set(names);
   if (!session.plan) return;
   showPaths(session);
-  if (!ticked) return;
-  const rollouts = session.rollouts.get(name);
-  await rollouts.prepare(session.plan);
-  if (session.plan && movingFormulations(session).includes(name)) rollouts.follow(session.plan);
+  for (const name of added) {
+    const rollouts = session.rollouts.get(name);
+    await rollouts.prepare(session.plan);
+    if (session.plan && movingFormulations(session).includes(name)) rollouts.follow(session.plan);
+  }
 }
 
 /** Save the movement as a file. @param {Session} session */

@@ -3,13 +3,13 @@ import { toMove } from "../parts/chosen.js";
 import { byId, fill, make } from "../parts/elements.js";
 import { startFinding } from "../parts/find.js";
 import { library, onLibrary } from "../parts/library_state.js";
-import { isUndo } from "../parts/shortcuts.js";
+import { isRedo, isUndo } from "../parts/shortcuts.js";
 import { currentView, onShow } from "../parts/views.js";
-import { addObstacle, addVia, showDragging, stretch, undoEdit } from "./edits.js";
+import { addObstacle, addVia, grabPath, showDragging, step, stretch } from "./edits.js";
 import { showFormulations } from "./formulations.js";
 import { play, showPaths } from "./paths.js";
 import { showPick } from "./pick.js";
-import { chooseSymbol, save, tickFormulation } from "./requests.js";
+import { chooseSymbol, save, tickFormulations } from "./requests.js";
 import { createSession } from "./session.js";
 
 /** @typedef {import("./session.js").Session} Session */
@@ -23,15 +23,8 @@ function showExportFormats() {
 /** Hide the parts of the view where no symbol can move, and say so. @param {boolean} empty */
 function showParts(empty) {
   byId("move-empty").hidden = !empty;
-  for (const part of ["pick-part", "move-name", "move-tools", "move-plots", "move-panel"]) byId(part).hidden = empty;
-  for (const control of /** @type {const} */ ([
-    "move-play",
-    "add-via",
-    "add-obstacle",
-    "move-reset",
-    "export",
-    "duration",
-  ]))
+  for (const part of ["pick-part", "move-hint", "move-tools", "move-plots", "move-panel"]) byId(part).hidden = empty;
+  for (const control of /** @type {const} */ (["move-play", "add-via", "add-obstacle", "export", "duration"]))
     byId(control).disabled = empty;
 }
 
@@ -54,7 +47,11 @@ function hearKey(session, event) {
   if (event.key === " " && !target.closest("button, input, select, summary, textarea, dialog")) {
     event.preventDefault();
     play(session);
-  } else if (isUndo(event)) undoEdit(session);
+  } else if (isUndo(event)) step(session, -1);
+  else if (isRedo(event)) {
+    event.preventDefault();
+    step(session, 1);
+  }
 }
 
 /** @param {Session} session */
@@ -62,6 +59,8 @@ function listen(session) {
   byId("move-play").addEventListener("click", () => play(session));
   byId("add-via").addEventListener("click", () => addVia(session));
   byId("add-obstacle").addEventListener("click", () => addObstacle(session));
+  byId("move-undo").addEventListener("click", () => step(session, -1));
+  byId("move-redo").addEventListener("click", () => step(session, 1));
   byId("move-reset").addEventListener("click", () => chooseSymbol(session, session.plan?.symbol));
   byId("export").addEventListener("click", () => save(session));
   byId("duration").addEventListener("input", () => stretch(session));
@@ -73,7 +72,7 @@ function listen(session) {
 }
 
 export function startMove() {
-  const session = createSession({ moved: showPaths, dragged: showDragging });
-  showFormulations((name, ticked) => tickFormulation(session, name, ticked));
+  const session = createSession({ moved: showPaths, dragged: showDragging, grabbed: grabPath });
+  showFormulations((names) => tickFormulations(session, names));
   listen(session);
 }

@@ -7,6 +7,7 @@ const KEYS = [
   ["1 … 5", "Draw, Library, Move, Recordings, Robot"],
   ["← →", "from view to view, where a view's name has the focus"],
   ["Ctrl Z", "undo the last change of the library; in Move, the last change of a point or the duration"],
+  ["Ctrl Shift Z", "in Move, do it again"],
   ["Esc", "clear the drawing"],
   ["Enter", "learn the drawing under the name in the field; on the map, open the symbol"],
   ["Space", "in the drawing area: pen down, pen up; in Move: play; in Recordings and Robot: play and pause"],
@@ -34,13 +35,18 @@ function list() {
   byId("keys").scrollTop = 0; // the focus went to the button at its end
 }
 
-/** Whether a key takes back, other than in a field in which one writes. @param {KeyboardEvent} event */
-export const isUndo = (event) =>
+/** With Ctrl, other than in a field in which one writes. @param {KeyboardEvent} event @param {string} keys */
+const commands = (event, keys) =>
   (event.ctrlKey || event.metaKey) &&
-  !event.shiftKey &&
-  event.key.toLowerCase() === "z" &&
+  keys.split(" ").includes((event.shiftKey ? "Shift+" : "") + event.key.toLowerCase()) &&
   !writes(event.target) &&
   !document.querySelector("dialog[open]");
+
+/** Whether a key takes back. @param {KeyboardEvent} event */
+export const isUndo = (event) => commands(event, "z");
+
+/** Whether a key does again. @param {KeyboardEvent} event */
+export const isRedo = (event) => commands(event, "Shift+z y");
 
 /** @param {KeyboardEvent} event */
 function pressed(event) {
