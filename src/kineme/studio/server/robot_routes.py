@@ -14,7 +14,7 @@ from pydantic import BaseModel, Field
 
 from kineme.errors import KinemeError, SpecificationError
 from kineme.io.writing.write_movement import WRITERS
-from kineme.robots.execution.preflight import Preflight, checks_as_data
+from kineme.robots.execution.preflight import Preflight, checks_as_data, preflight_table
 from kineme.robots.export_files import write_action_goal, write_bag, write_joints
 from kineme.robots.kinematics.descent import InverseKinematics, descend
 from kineme.robots.models.robot import MODELS, Robot, load
@@ -22,7 +22,7 @@ from kineme.robots.planning.generate_at import generate_at
 from kineme.robots.planning.move import move as move_arm
 from kineme.robots.planning.robot_movement import InfeasibleError, RobotMovement
 from kineme.robots.planning.roles import space_of
-from kineme.robots.view.write_view import posture_data, scene_data, shapes_of
+from kineme.robots.view.write_view import charts, posture_data, scene_data, shapes_of
 from kineme.studio.server.records import Number, Point, RequestBody, Text, numbers
 from kineme.studio.server.refusals import in_studio_words
 from kineme.studio.server.rollout_routes import PrimitiveRequest, as_file, learned_as, name_of
@@ -39,7 +39,6 @@ class ArmsOut(BaseModel):
     available: bool
     why: str | None
     robots: list[str]
-    formats: list[str] = Field(description="Endings of files that joints are saved in.")
 
 
 class MoveRequest(PrimitiveRequest):
@@ -84,6 +83,7 @@ class MoveOut(BaseModel):
     passed: bool
     refusal: str | None
     checks: list[CheckOut]
+    table: list[list[str]] = Field(description="The checks in words: check, worst, limit, unit, at [s], result.")
     unchecked: list[str]
     assumed: list[str]
     joints: list[JointOut]
@@ -120,8 +120,8 @@ def robots(studio: Reads) -> dict[str, Any]:
     try:
         load(next(iter(MODELS)))
     except KinemeError as error:
-        return {"available": False, "why": str(error), "robots": [], "formats": []}
-    return {"available": True, "why": None, "robots": list(MODELS), "formats": [*WRITERS, *_ROS]}
+        return {"available": False, "why": str(error), "robots": []}
+    return {"available": True, "why": None, "robots": list(MODELS)}
 
 
 @router.get("/{name}", response_model=MoveOut, summary="An arm at rest")
@@ -139,7 +139,8 @@ def move(studio: Reads, body: MoveRequest) -> dict[str, Any]:
         result = _planned(studio, body, robot)
     except InfeasibleError as error:
         return {**_answer(robot, error.preflight), "refusal": in_studio_words(str(error)), "scene": None}
-    return {**_answer(robot, result.preflight), "refusal": None, "scene": scene_data(result, shapes_of(robot))}
+    scene = {**scene_data(result, shapes_of(robot)), "charts": charts(result)}
+    return {**_answer(robot, result.preflight), "refusal": None, "scene": scene}
 
 
 @router.post(
@@ -220,6 +221,7 @@ def _answer(robot: Robot, preflight: Preflight | None) -> dict[str, Any]:
     return {
         "passed": preflight is not None and preflight.passed,
         "checks": [] if preflight is None else checks_as_data(preflight),
+        "table": [] if preflight is None else [list(row) for row in preflight_table(preflight).rows],
         "unchecked": [] if preflight is None else list(preflight.unchecked),
         "assumed": list(robot.assumed),
         "joints": [{"name": name, "low": low, "high": high} for name, low, high in joints],

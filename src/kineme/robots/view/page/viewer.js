@@ -13,13 +13,22 @@
   let time = 0;
   let last = null; // when the page was drawn last, while it plays
   const api = Object.assign(window, {
-    kineme: { load, show, pose, moved: null, tip: () => view?.tip(), frames: () => view?.frames() },
+    kineme: {
+      load,
+      show,
+      pose,
+      play: () => setPlaying(true),
+      moved: null,
+      tip: () => view?.tip(),
+      frames: () => view?.frames(),
+    },
   }).kineme;
   const view = sceneOrNothing();
 
   /** Show a movement, or an arm at rest. */
   function load(next) {
     data = next;
+    if (data.charts !== undefined) byId("charts").innerHTML = data.charts; // as they are in a page
     times = data.times;
     duration = times[times.length - 1];
     charts = [...document.querySelectorAll(".chart")].map((chart) => ({

@@ -16,10 +16,20 @@ const LONGEST = 4; // times the demonstrated duration; the shortest is as many t
 
 /** @typedef {import("./session.js").Session} Session */
 
+/** @typedef {{changed: () => void, removed: (list: Object[], point: Object) => void}} Page */
+
+/** What hears of points that changed, or went away. @param {Session} session @returns {Page} */
+const pageOf = (session) => ({
+  changed: () => showChange(session),
+  removed: (list, point) => {
+    list.splice(list.indexOf(point), 1);
+    showStructure(session);
+  },
+});
+
 /** Points came or went. @param {Session} session */
 export function showStructure(session) {
-  const page = { changed: () => showChange(session), removed: () => showStructure(session) };
-  session.handles.set(handlesOf(session.plan, session.camera, page));
+  session.handles.set(handlesOf(session.plan, session.camera, pageOf(session)));
   showChange(session);
 }
 
@@ -42,11 +52,7 @@ function showNumbers(session) {
   byId("move-undo").disabled = !steps.has(-1);
   byId("move-redo").disabled = !steps.has(1);
   byId("move-reset").disabled = steps.plans.length < 2;
-  showPoints(
-    session.plan,
-    () => showChange(session),
-    () => showStructure(session),
-  );
+  showPoints(session.plan, pageOf(session));
 }
 
 /** A point is held, or let go. @param {Session} session @param {boolean} dragging */

@@ -139,16 +139,13 @@ export class MovePicture {
     ground(this.board.context, this.camera, low, high, color("--line"));
   }
 
-  /** Where a path is now. @param {any} path */
-  at(path) {
-    const next = path.times.findIndex((/** @type {number} */ t) => t - path.times[0] >= this.time);
-    if (next < 0) return path.positions[path.positions.length - 1];
-    if (next === 0) return path.positions[0];
-    const [before, after] = [path.times[next - 1] - path.times[0], path.times[next] - path.times[0]];
-    const share = (this.time - before) / (after - before);
-    return path.positions[next].map(
-      (/** @type {number} */ value, /** @type {number} */ k) =>
-        path.positions[next - 1][k] + share * (value - path.positions[next - 1][k]),
+  /** Where a path is now; its samples are even in time. @param {any} path */
+  at({ times, positions }) {
+    const last = times.length - 1;
+    const at = Math.min((last * this.time) / (times[last] - times[0]), last);
+    const k = Math.min(Math.floor(at), last - 1);
+    return positions[k].map(
+      (/** @type {number} */ value, /** @type {number} */ axis) => value + (at - k) * (positions[k + 1][axis] - value),
     );
   }
 

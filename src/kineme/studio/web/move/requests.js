@@ -1,12 +1,11 @@
 // What Move asks the server for: the movement of a symbol, its primitives, a file of it.
-import { download } from "../parts/api.js";
 import { chooseToMove } from "../parts/chosen.js";
 import { byId } from "../parts/elements.js";
 import { library, symbolOf } from "../parts/library_state.js";
 import { server } from "../parts/server.js";
-import { say, tried } from "../parts/toasts.js";
+import { save, tried } from "../parts/toasts.js";
 import { showChange, showStructure } from "./edits.js";
-import { FORMULATIONS } from "./formulations.js";
+import { allowFormulations, FORMULATIONS } from "./formulations.js";
 import { showPaths } from "./paths.js";
 import { asShown, question } from "./plan.js";
 import { unit } from "./points.js";
@@ -45,7 +44,7 @@ export async function chooseSymbol(session, id) {
   session.plan = picture.plan = plan;
   for (const each of rollouts.values()) each.reset();
   byId("duration").value = "0";
-  for (const id of ["manner", "formulations"]) byId(/** @type {"manner"} */ (id)).disabled = false;
+  allowFormulations(true);
   byId("move-reset").disabled = true;
   picture.paths = [];
   picture.fit();
@@ -72,7 +71,7 @@ async function prepare(session) {
  */
 function chooseStyle(session, values, formulation) {
   Object.assign(session.plan, { style: values, styled: formulation });
-  for (const id of ["manner", "formulations"]) byId(/** @type {"manner"} */ (id)).disabled = values !== null;
+  allowFormulations(values === null);
   for (const rollouts of session.rollouts.values()) rollouts.primitive = null;
   showChange(session);
   clearTimeout(session.resting);
@@ -93,11 +92,9 @@ export async function tickFormulations(session, names) {
 }
 
 /** Save the movement as a file. @param {Session} session */
-export async function save(session) {
+export function saveMovement(session) {
   if (!session.plan) return;
   const format = byId("export-format").value;
-  const formulation = movingFormulations(session)[0] ?? FORMULATIONS[0].name;
-  const body = { ...question(session.plan, formulation), format };
-  const name = await tried(() => download("/api/export", body, `movement.${format}`));
-  if (name) say(`Saved as ${name}.`);
+  const body = question(session.plan, movingFormulations(session)[0] ?? FORMULATIONS[0].name);
+  save("/api/export", { ...body, format }, `movement.${format}`);
 }

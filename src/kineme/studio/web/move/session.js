@@ -32,7 +32,7 @@ import { Steps } from "./steps.js";
  * @param {Object} page
  * @param {(session: Session) => void} page.moved A path is another one.
  * @param {(session: Session, dragging: boolean) => void} page.dragged A point is held, or let go.
- * @param {(session: Session, place: import("./plan.js").ViaPoint, event: PointerEvent) => void} page.grabbed The path is.
+ * @param {(session: Session, place: import("./plan.js").ViaPoint, event: PointerEvent) => void} page.grabbed
  * @returns {Session}
  */
 export function createSession(page) {

@@ -1,13 +1,12 @@
 // Robot: an arm executes a movement, and everything that is checked before is shown.
-import { download, get, post } from "../parts/api.js";
+import { get, post } from "../parts/api.js";
 import { openArm } from "../parts/arm_frame.js";
 import { byId, fill, make } from "../parts/elements.js";
 import { library, onLibrary } from "../parts/library_state.js";
-import { say, tried } from "../parts/toasts.js";
+import { save, tried } from "../parts/toasts.js";
 import { currentView, onShow } from "../parts/views.js";
 import { chooseToMove, draggedGoal, toMove } from "../parts/chosen.js";
 
-const FILES = { yaml: "ROS 2 action goal", mcap: "ROS 2 bag", bag: "ROS 1 bag" };
 const USUAL = 0.5; // size of a movement, of the distance of the tip at rest
 
 /** @type {any} What the server answered about arms. */
@@ -20,64 +19,43 @@ let scene = null;
 let send = null;
 let planned = ""; // what was asked for last
 
-const TINY = 1e-4; // written with an exponent: no zeros to count
-const written = (/** @type {number} */ value) =>
-  value && Math.abs(value) < TINY ? value.toExponential(1) : String(Number(value.toPrecision(4)));
-const number = (/** @type {number|null|undefined} */ value) =>
-  value === null || value === undefined ? "–" : written(Number(value));
-
-/**
- * A cell of two lines: a table beside the arm has no room for one.
- * @param {"th"|"td"} tag @param {string} first @param {string} second
- */
-const cell = (tag, first, second) =>
-  make(tag, tag === "th" ? { scope: "row" } : {}, first, " ", make("span", { class: "says soft" }, second));
-
-/** @param {any} check */
-function row(check) {
-  const at = check.time === null || check.time === undefined ? "" : `at\u00a0${Number(check.time).toFixed(2)}\u00a0s`;
-  const cells = [
-    cell("th", check.what, check.where ?? ""),
-    cell("td", number(check.worst), at),
-    cell("td", number(check.limit), (check.unit ?? "").replace("^2", "²")),
-  ];
+/** A row of two lines: a table beside the arm has no room for one. @param {string[]} cells */
+function row([check, worst, limit, unit, time, result]) {
+  const cell = (/** @type {string} */ first, second = "") =>
+    make("td", {}, first, " ", make("span", { class: "says soft" }, second));
   return make(
     "tr",
-    { class: check.passed ? null : "failed" },
-    ...cells,
-    make("td", {}, check.passed ? "passed" : "FAILED"),
+    { class: result === "FAILED" ? "failed" : null },
+    make("th", { scope: "row" }, check),
+    ...[cell(worst, `at\u00a0${time}\u00a0s`), cell(limit, unit.replace("^2", "²")), cell(result)],
   );
 }
 
 /** @param {any} answer */
 function showPreflight(answer) {
-  const checks = [...(answer.checks ?? [])].sort((a, b) => Number(a.passed) - Number(b.passed));
-  const failed = checks.filter((check) => !check.passed).length;
-  byId("robot-preflight").hidden = !checks.length;
-  byId("robot-preflight").open = failed > 0;
-  fill(byId("robot-checks"), ...checks.map(row));
-  byId("robot-verdict").dataset.state = answer.passed ? "passed" : "failed";
-  byId("robot-verdict").textContent =
-    answer.refusal ??
-    (answer.passed
-      ? `All ${checks.length} checks passed.`
-      : `${failed} of ${checks.length} checks failed: the arm must not execute this.`);
+  const { table, passed, refusal } = answer;
+  const failed = table.filter((/** @type {string[]} */ cells) => cells[5] === "FAILED");
+  byId("robot-preflight").hidden = !table.length;
+  byId("robot-preflight").open = failed.length > 0;
+  fill(byId("robot-checks"), ...[...new Set([...failed, ...table])].map(row));
+  const verdict = byId("robot-verdict");
+  verdict.dataset.state = passed ? "passed" : "failed";
+  const all = `${table.length} checks`;
+  verdict.textContent =
+    refusal ?? (passed ? `All ${all} passed.` : `${failed.length} of ${all} failed: it must not move.`);
 }
 
 /** @param {any} answer An arm at rest or a movement of it. */
 function showArm(answer) {
   scene = answer.scene;
-  send?.({ scene, joints: answer.joints });
+  send?.({ scene });
   showPlace();
 }
 
 /** The start and the goal in numbers. */
 function showPlace() {
-  for (const input of placeInputs()) {
-    const [end, k] = /** @type {["at"|"goal", number]} */ ([input.dataset.end, Number(input.dataset.axis)]);
-    const point = place[end] ?? (end === "at" ? scene.start : scene.goal);
-    input.value = String(Number(point[k].toFixed(3)));
-  }
+  const values = [...(place.at ?? scene.start), ...(place.goal ?? scene.goal)];
+  for (const [k, input] of placeInputs().entries()) input.value = String(Number(values[k].toFixed(3)));
   byId("robot-free").disabled = !place.at;
 }
 
@@ -136,10 +114,9 @@ async function chooseArm() {
 }
 
 /** Save the joints as a file. */
-async function save() {
+function saveJoints() {
   const format = byId("robot-format").value;
-  const name = await tried(() => download("/api/robots/export", { ...wanted(), format }, `joints.${format}`));
-  if (name) say(`Saved as ${name}.`);
+  save("/api/robots/export", { ...wanted(), format }, `joints.${format}`);
 }
 
 /** Whether a goal was dragged in Move is offered where it was. */
@@ -147,13 +124,9 @@ function offer() {
   byId("robot-dragged").parentElement.hidden = draggedGoal(byId("robot-what").value) === null;
 }
 
-/** Arms and formats of files, once. */
+/** Once. */
 async function offerArms() {
-  const option = (/** @type {string} */ value, text = value) => make("option", { value }, text);
-  fill(byId("robot-arm"), ...arms.robots.map((/** @type {string} */ name) => option(name)));
-  const formats = arms.formats.map((/** @type {string} */ ending) => ending.slice(1));
-  const says = (/** @type {string} */ format) => [format.toUpperCase(), FILES[format]].filter(Boolean).join(", ");
-  fill(byId("robot-format"), ...formats.map((/** @type {string} */ format) => option(format, says(format))));
+  fill(byId("robot-arm"), ...arms.robots.map((/** @type {string} */ value) => make("option", { value }, value)));
   const hear = (/** @type {any} */ { end, point }) => put(end === "start" ? "at" : "goal", point);
   send = await openArm(byId("arm"), "/arm.html", hear);
   await chooseArm();
@@ -176,30 +149,17 @@ async function shown() {
   if (before !== byId("robot-what").value) place = {};
   offer();
   if (!arms) return;
-  byId("robot-empty").hidden = arms.available && movable.length > 0;
+  const none = !movable.length;
+  byId("robot-none").hidden = arms.available;
+  byId("robot-why").textContent = arms.why;
   byId("robot-main").hidden = !arms.available;
-  byId("robot-form").hidden = !movable.length;
-  byId("robot-empty-title").textContent = arms.available ? "Nothing to move yet" : "No arm here yet";
-  byId("robot-why").textContent = arms.why ?? "Draw a movement and give it a name first; then an arm shows it.";
-  byId("robot-draw").hidden = !arms.available;
+  byId("robot-empty").hidden = !arms.available || !none;
+  byId("robot-form").hidden = none;
   if (arms.available && isFirst && !byId("robot-arm").children.length) await offerArms();
   else if (scene) await plan();
 }
 
 export function startRobot() {
-  for (const end of ["at", "goal"])
-    byId("robot-place").append(
-      make("span", { class: "point-name" }, end === "at" ? "Start" : "Goal"),
-      ...["x", "y", "z"].map((axis, k) =>
-        make("input", {
-          type: "number",
-          step: "any",
-          "aria-label": `${end === "at" ? "Start" : "Goal"} ${axis} in meters`,
-          "data-end": end,
-          "data-axis": String(k),
-        }),
-      ),
-    );
   byId("robot-place").addEventListener("change", (event) => {
     const { end } = /** @type {HTMLInputElement} */ (event.target).dataset;
     const inputs = placeInputs().filter((input) => input.dataset.end === end);
@@ -226,7 +186,7 @@ export function startRobot() {
   byId("robot-arm").addEventListener("change", chooseArm);
   for (const id of /** @type {const} */ (["robot-size", "robot-slow", "robot-dragged"]))
     byId(id).addEventListener("change", () => plan());
-  byId("robot-save").addEventListener("click", save);
+  byId("robot-save").addEventListener("click", saveJoints);
   onShow("robot", shown);
   onLibrary(shown);
 }
