@@ -128,7 +128,7 @@ def robots(studio: Reads) -> dict[str, Any]:
 def at_rest(studio: Reads, name: Text) -> dict[str, Any]:
     """What draws it before it has moved."""
     robot = _arm(name)
-    return {**_answer(robot, None), "refusal": None, "scene": posture_data(robot, shapes_of(robot))}
+    return {**_answer(robot, None), "refusal": None, "scene": {**posture_data(robot, shapes_of(robot)), "charts": ""}}
 
 
 @router.post("/move", response_model=MoveOut, summary="What an arm does to execute a movement")

@@ -20,6 +20,7 @@
       play: () => setPlaying(true),
       moved: null,
       tip: () => view?.tip(),
+      at: (end) => view?.at(end),
       frames: () => view?.frames(),
     },
   }).kineme;
@@ -208,13 +209,15 @@
       const begin = position.clone();
       const depth = begin.clone().project(camera).z;
       // The goal of a drawing stays in its plane.
-      const isFlat = held === "goal" && data.wanted.every((point) => Math.abs(point[2] - data.start[2]) < 1e-6);
+      const height = data.start[2];
+      const isFlat =
+        held === "goal" && data.wanted[0] && data.wanted.every((point) => Math.abs(point[2] - height) < 1e-3);
       const go = (now) => {
         const [x, y] = [(2 * (now.clientX - box.left)) / box.width - 1, 1 - (2 * (now.clientY - box.top)) / box.height];
         const place = new T.Vector3(x, y, depth).unproject(camera);
         if (isFlat) {
-          const ray = place.sub(camera.position);
-          const share = (begin.z - camera.position.z) / ray.z;
+          const ray = place.clone().sub(camera.position);
+          const share = (height - camera.position.z) / ray.z;
           if (!(share > 0 && share * ray.length() < 20)) return;
           place.copy(camera.position).addScaledVector(ray, share);
         }
@@ -290,6 +293,7 @@
         shown.arm.updateMatrixWorld(true);
         return shown.arm.links[data.tip].getWorldPosition(new T.Vector3()).toArray();
       },
+      at: (end) => onScreen(shown.ends[end].position),
       frames: () => frames,
     };
   }
