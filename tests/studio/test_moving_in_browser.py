@@ -1,4 +1,4 @@
-"""Move and Robot in Chromium: the path, the goal on the arm, the arm beside the drawing; all that is done can be undone."""
+"""Move and Robot in Chromium: the path is dragged, the goal on the arm too, and an arm draws along."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from browsing import Pages, wait_until
 HANDLES = "document.querySelectorAll('#handles .handle').length"
 MOST_CONTROLS = 20
 #: Controls that can be used and are on the screen.
-CONTROLS = """() => [...document.querySelectorAll("button, input, select, textarea, a[href], summary")].filter((node) => {
+CONTROLS = """() => [...document.querySelectorAll("button, input, select, a[href], summary")].filter((node) => {
   const { top, left, bottom, right, width } = node.getBoundingClientRect();
   return node.checkVisibility({ visibilityProperty: true }) && !node.matches(":disabled") && width > 0
     && bottom > 0 && right > 0 && top < innerHeight && left < innerWidth;
@@ -198,7 +198,9 @@ def test_the_goal_is_dragged_in_space_and_typed(robot):
         page.get_by_label("Start x in meters").fill(str(float(before[0]) + 0.02))
         page.get_by_label("Start x in meters").press("Enter")
     typed = request.value.post_data_json
-    np.testing.assert_allclose(np.subtract(typed["goal"], body["goal"]), np.subtract(typed["at"], body["at"]), atol=1e-3)
+    np.testing.assert_allclose(
+        np.subtract(typed["goal"], body["goal"]), np.subtract(typed["at"], body["at"]), atol=1e-3
+    )
     with page.expect_request("**/api/robots/move") as request:
         page.click("#robot-free")
     assert "goal" not in request.value.post_data_json
@@ -244,5 +246,7 @@ def test_an_arm_draws_along(opened):
     away = "([x, y, z]) => { const tip = kineme.tip(); return Math.hypot(tip[0] - x, tip[1] - y, tip[2] - z) < 2e-3; }"
     wait_until(frame, away, home, seconds=60)
     page.mouse.move(x, y - box["height"] / 4, steps=9)
-    wait_until(frame, f"({away})([{home[0]}, {home[1]}, {home[2] + 0.2 * float(np.linalg.norm(home))}])", seconds=60)  # up is up
+    wait_until(
+        frame, f"({away})([{home[0]}, {home[1]}, {home[2] + 0.2 * float(np.linalg.norm(home))}])", seconds=60
+    )  # up is up
     page.mouse.up()

@@ -22,7 +22,7 @@ from kineme.robots.planning.generate_at import generate_at
 from kineme.robots.planning.move import move as move_arm
 from kineme.robots.planning.robot_movement import InfeasibleError, RobotMovement
 from kineme.robots.planning.roles import space_of
-from kineme.robots.view.write_view import charts, posture_data, scene_data, shapes_of
+from kineme.robots.view.write_view import posture_data, scene_data, shapes_of
 from kineme.studio.server.records import Number, Point, RequestBody, Text, numbers
 from kineme.studio.server.refusals import in_studio_words
 from kineme.studio.server.rollout_routes import PrimitiveRequest, as_file, learned_as, name_of
@@ -128,7 +128,7 @@ def robots(studio: Reads) -> dict[str, Any]:
 def at_rest(studio: Reads, name: Text) -> dict[str, Any]:
     """What draws it before it has moved."""
     robot = _arm(name)
-    return {**_answer(robot, None), "refusal": None, "scene": {**posture_data(robot, shapes_of(robot)), "charts": ""}}
+    return {**_answer(robot, None), "refusal": None, "scene": posture_data(robot, shapes_of(robot))}
 
 
 @router.post("/move", response_model=MoveOut, summary="What an arm does to execute a movement")
@@ -139,8 +139,7 @@ def move(studio: Reads, body: MoveRequest) -> dict[str, Any]:
         result = _planned(studio, body, robot)
     except InfeasibleError as error:
         return {**_answer(robot, error.preflight), "refusal": in_studio_words(str(error)), "scene": None}
-    scene = {**scene_data(result, shapes_of(robot)), "charts": charts(result)}
-    return {**_answer(robot, result.preflight), "refusal": None, "scene": scene}
+    return {**_answer(robot, result.preflight), "refusal": None, "scene": scene_data(result, shapes_of(robot))}
 
 
 @router.post(
@@ -169,7 +168,7 @@ def follow(studio: Reads, body: FollowRequest) -> dict[str, Any]:
         raise SpecificationError(f"expected {robot.n_joints} joints of {robot.name}, got {len(joints)}")
     across, up = np.clip(body.hand, -1.0, 1.0) * _REACH * np.linalg.norm(position)
     joints = np.clip(joints, robot.lower, robot.upper)[None]
-    reached = descend(robot, joints, position + [0.0, across, up], rotation[None], costs, _STEPS)
+    reached = descend(robot, joints, np.add(position, [0.0, across, up]), rotation[None], costs, _STEPS)
     return {"joints": numbers(reached.joints[0]), "distance": float(reached.errors[0])}
 
 

@@ -29,7 +29,6 @@
   /** Show a movement, or an arm at rest. */
   function load(next) {
     data = next;
-    if (data.charts !== undefined) byId("charts").innerHTML = data.charts; // as they are in a page
     times = data.times;
     duration = times[times.length - 1];
     charts = [...document.querySelectorAll(".chart")].map((chart) => ({

@@ -43,7 +43,7 @@ export function startMirror() {
       openArm(byId("mirror-arm"), "/arm.html?mini", () => {}),
       get(`/api/robots/${state.robot}`),
     ]);
-    to({ scene });
+    to({ scene, joints: [] });
     send = to;
   });
 }

@@ -2,7 +2,7 @@
 import { Camera } from "./camera.js";
 
 /** @param {string} tag @param {Record<string, any>} attributes @param {...Node} children @returns {SVGElement} */
-function svg(tag, attributes, ...children) {
+export function svg(tag, attributes, ...children) {
   const element = /** @type {SVGElement} */ (document.createElementNS("http://www.w3.org/2000/svg", tag));
   for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, String(value));
   element.append(...children);

@@ -1,4 +1,33 @@
 // Inside the frame: the viewer shows what the studio sends, and where the start or the goal was dragged to goes back.
+import { byId, fill, make } from "../parts/elements.js";
+import { svg } from "../parts/thumbnails.js";
+
+/** A joint over time between its limits. @param {any} scene @param {any} joint @param {number} k */
+function chart({ times, positions, begins }, { name, low, high }, k) {
+  const values = positions.map((/** @type {number[]} */ row) => row[k]);
+  const limits = [low, high].filter(Number.isFinite);
+  const least = Math.min(...values, ...limits);
+  const room = Math.max(...values, ...limits) - least || 1;
+  const x = (/** @type {number} */ time) => (300 * time) / (times[times.length - 1] || 1);
+  const y = (/** @type {number} */ value) => 75 - (70 * (value - least)) / room;
+  const d = `M${values.map((/** @type {number} */ value, /** @type {number} */ i) => `${x(times[i])} ${y(value)}`).join("L")}`;
+  const picture = svg(
+    "svg",
+    { viewBox: "0 0 300 80", preserveAspectRatio: "none", "aria-hidden": "true" },
+    svg("rect", { class: "approach", width: x(begins), height: 80 }),
+    ...limits.map((limit) => svg("line", { class: "limit", x2: 300, y1: y(limit), y2: y(limit) })),
+    svg("path", { class: "joint", d }),
+    svg("line", { class: "cursor", y2: 80 }),
+  );
+  const title = make("span", { class: "name", title: name }, name);
+  return make(
+    "figure",
+    { class: "chart" },
+    make("figcaption", {}, title, make("output", { "data-unit": "rad" })),
+    picture,
+  );
+}
+
 const viewer = /** @type {any} */ (window).kineme;
 const { classList } = document.body;
 classList.toggle("mini", location.search === "?mini");
@@ -6,10 +35,11 @@ if (location.search !== "?mini")
   viewer.moved = (/** @type {string} */ end, /** @type {number[]} */ point) =>
     parent.postMessage({ end, point }, location.origin);
 
-window.addEventListener("message", ({ origin, source, data: { scene, posture } }) => {
+window.addEventListener("message", ({ origin, source, data: { scene, joints, posture } }) => {
   if (origin !== location.origin || source !== parent) return;
   if (posture) viewer.pose(posture);
   if (!scene) return;
+  fill(byId("charts"), ...joints.map((/** @type {any} */ joint, /** @type {number} */ k) => chart(scene, joint, k)));
   viewer.load(scene);
   classList.toggle("rests", scene.times.length < 2);
   if (scene.times.length > 1 && !matchMedia("(prefers-reduced-motion: reduce)").matches) viewer.play();

@@ -48,7 +48,7 @@ function showPreflight(answer) {
 /** @param {any} answer An arm at rest or a movement of it. */
 function showArm(answer) {
   scene = answer.scene;
-  send?.({ scene });
+  send?.({ scene, joints: answer.joints });
   showPlace();
 }
 
