@@ -10,13 +10,13 @@ function chart({ times, positions, begins }, { name, low, high }, k) {
   const room = Math.max(...values, ...limits) - least || 1;
   const x = (/** @type {number} */ time) => (300 * time) / (times[times.length - 1] || 1);
   const y = (/** @type {number} */ value) => 75 - (70 * (value - least)) / room;
-  const d = `M${values.map((/** @type {number} */ value, /** @type {number} */ i) => `${x(times[i])} ${y(value)}`).join("L")}`;
+  const place = (/** @type {number} */ value, /** @type {number} */ i) => `${x(times[i])} ${y(value)}`;
   const picture = svg(
     "svg",
     { viewBox: "0 0 300 80", preserveAspectRatio: "none", "aria-hidden": "true" },
     svg("rect", { class: "approach", width: x(begins), height: 80 }),
     ...limits.map((limit) => svg("line", { class: "limit", x2: 300, y1: y(limit), y2: y(limit) })),
-    svg("path", { class: "joint", d }),
+    svg("path", { class: "joint", d: `M${values.map(place).join("L")}` }),
     svg("line", { class: "cursor", y2: 80 }),
   );
   const title = make("span", { class: "name", title: name }, name);
