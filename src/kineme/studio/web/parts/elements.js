@@ -69,18 +69,21 @@ export const breakable = (name) =>
 
 /**
  * Elements by their ids that are more than an HTMLElement.
- * @typedef {Record<"add-obstacle"|"add-span"|"add-via"|"ask-yes"|"clear"|"draw-clear"|"draw-move"|
- *     "draw-replay"|"draw-save"|"episodes-before"|"episodes-next"|"export"|"help"|"learn-file"|"learn-spans"|
- *     "merge"|"move-play"|"move-reset"|"naming-learn"|"play"|"play-recording"|"reset"|"robot-draw"|"robot-go"|
- *     "save"|"save-corrections"|"show-unlabeled"|"spot"|"spot-page"|"undo"|"zoom-in"|"zoom-out", HTMLButtonElement>
+ * @typedef {Record<"add-obstacle"|"add-span"|"add-via"|"ask-yes"|"clear"|"draw-clear"|"draw-move"|"draw-replay"|
+ *     "draw-save"|"episodes-before"|"episodes-next"|"export"|"help"|"learn-file"|"learn-spans"|"merge"|
+ *     "move-play"|"move-redo"|"move-reset"|"move-undo"|"naming-learn"|"play"|"play-recording"|"reset"|
+ *     "robot-free"|"robot-go"|"robot-save"|"save"|"save-corrections"|"show-unlabeled"|"spot"|"spot-page"|
+ *     "undo"|"zoom-in"|"zoom-out", HTMLButtonElement>
  *   & Record<"canvas"|"draw-canvas"|"map"|"move-canvas"|"nearest"|"plot-acceleration"|"plot-speed"|"stage"|
  *     "timeline-canvas", HTMLCanvasElement>
- *   & Record<"history"|"live-source"|"robot-preflight"|"why", HTMLDetailsElement>
+ *   & Record<"history"|"live-source"|"mirror"|"move-advanced"|"pick-part"|"robot-preflight"|
+ *     "why", HTMLDetailsElement>
  *   & Record<"ask"|"keys", HTMLDialogElement>
- *   & Record<"channels"|"formulations"|"pick-part"|"styles", HTMLFieldSetElement>
- *   & Record<"ask-name"|"duration"|"episodes-from"|"file"|"find"|"find-pick"|"find-symbol"|"naming-name"|"playhead"|
- *     "robot-dragged"|"robot-size"|"robot-slow"|"tilt"|"time"|"turn", HTMLInputElement>
- *   & Record<"camera"|"export-format"|"formulation"|"robot-arm"|"robot-what"|"tables", HTMLSelectElement>
+ *   & Record<"channels"|"formulations"|"manner"|"styles", HTMLFieldSetElement>
+ *   & Record<"ask-name"|"duration"|"episodes-from"|"file"|"find"|"find-pick"|"find-symbol"|"naming-name"|
+ *     "playhead"|"robot-dragged"|"robot-size"|"robot-slow"|"style-mix"|"tilt"|"time"|"turn", HTMLInputElement>
+ *   & Record<"camera"|"export-format"|"formulation"|"robot-arm"|"robot-format"|"robot-what"|
+ *     "tables", HTMLSelectElement>
  *   & Record<"spans", HTMLTableElement>
  *   & Record<"video", HTMLVideoElement>} Elements
  */

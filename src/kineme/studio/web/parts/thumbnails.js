@@ -1,6 +1,13 @@
 // A movement as a small picture that scales: its path and where it starts.
 import { Camera } from "./camera.js";
-import { svg } from "./svg.js";
+
+/** @param {string} tag @param {Record<string, any>} attributes @param {...Node} children @returns {SVGElement} */
+export function svg(tag, attributes, ...children) {
+  const element = /** @type {SVGElement} */ (document.createElementNS("http://www.w3.org/2000/svg", tag));
+  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, String(value));
+  element.append(...children);
+  return element;
+}
 
 const SIDE = 100;
 

@@ -1,4 +1,5 @@
 // Short messages at the edge: what was done, how to take it back, what went wrong.
+import { download } from "./api.js";
 import { byId, make } from "./elements.js";
 
 const STAYS = 7000; // [ms]
@@ -35,4 +36,10 @@ export async function tried(act) {
     if (error.name !== "AbortError") say(error.message, { failed: true });
     return undefined;
   }
+}
+
+/** Ask for a file, and say under which name it is saved. @param {string} path @param {any} body @param {string} name */
+export async function save(path, body, name) {
+  const saved = await tried(() => download(path, body, name));
+  if (saved) say(`Saved as ${saved}.`);
 }
