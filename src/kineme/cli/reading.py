@@ -119,6 +119,7 @@ layout_options = under(
         "--every", type=click.IntRange(4), metavar="SAMPLES",
         help="Samples of a movement, where a file holds one after the other.",
     ),
+    click.option("--measured-in", metavar="UNIT", help="Unit of the coordinates of which the file says none, as mm."),
     click.option(
         "--join-files", is_flag=True, default=None,
         help="The files of a folder that lie on one clock, as a phone's sensors, are one recording.",
