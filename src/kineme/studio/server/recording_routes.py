@@ -22,6 +22,7 @@ from kineme.io.writing.annotations import WRITERS, Annotation, write_annotations
 from kineme.io.writing.rerun import points_in, recording_scenes, write_rerun
 from kineme.library.annotate import annotate
 from kineme.library.learn import learn_recordings
+from kineme.recognition.answer import certainty
 from kineme.sampling import evenly_spaced
 from kineme.studio.server import records
 from kineme.studio.server.importing import command, reader_options, unclear
@@ -167,6 +168,7 @@ class SpannedOut(RestOut):
     label: str | None
     p: float | None
     confidence: float | None
+    certainty: str | None = Field(None, description="sure, probably, looks like or new; null where nobody said it.")
 
 
 class SpottedOut(BaseModel):
@@ -319,6 +321,7 @@ async def spotted(studio: Reads, request: Request, key: records.RecordingKey, bo
             {
                 **{"begin": each.span[0], "end": each.span[1], "label": each.symbol},
                 **{"p": records.numbers(each.p_value), "confidence": records.numbers(each.confidence)},
+                "certainty": certainty(each.confidence, is_new=each.unknown, is_guess=not report.calibrated),
             }
             for each in report.annotations
         ]

@@ -6,7 +6,7 @@ import { currentView, show, VIEWS } from "./views.js";
 const KEYS = [
   ["1 … 5", "Draw, Library, Move, Recordings, Robot"],
   ["← →", "from view to view, where a view's name has the focus"],
-  ["Ctrl Z", "undo the last change of the library; in Move, the last change of a point or the duration"],
+  ["Ctrl Z", "undo the last change of the library; in Move and Recordings, the last change there"],
   ["Esc", "clear the drawing"],
   ["Enter", "learn the drawing under the name in the field; on the map, open the symbol"],
   ["Space", "in the drawing area: pen down, pen up; in Move: play; in Recordings and Robot: play and pause"],
@@ -14,7 +14,8 @@ const KEYS = [
   ["Shift ← ↑ → ↓", "the same, ten times as far"],
   ["+ −", "in a recording, show less of the time or more"],
   ["↑ ↓", "in a recording, from span to span, and Enter names one; in a list of episodes, from one to the next"],
-  ["Delete", "remove the via point or obstacle in focus"],
+  ["Insert", "add an annotation of a recording at the playhead"],
+  ["Delete", "remove the via point or obstacle in focus, or the annotation that is chosen"],
   ["?", "this list"],
 ];
 
@@ -47,7 +48,7 @@ function pressed(event) {
   if (writes(event.target) || document.querySelector("dialog[open]")) return;
   if (isUndo(event)) {
     event.preventDefault();
-    if (currentView() !== "move") undo();
+    if (!["move", "recordings"].includes(currentView())) undo();
   }
   if (event.ctrlKey || event.metaKey || event.altKey) return;
   if (event.key === "?") list();

@@ -2,6 +2,7 @@
 import { request } from "../parts/api.js";
 import { byId, counted } from "../parts/elements.js";
 import { currentView, show } from "../parts/views.js";
+import { askHow } from "./importing.js";
 
 /**
  * @param {File} file
@@ -27,15 +28,20 @@ async function send(file, signal) {
   }
 }
 
-/** @param {(recording: any, name: string) => void} read */
-export function startDropping(read) {
+/** @param {(recording: any, name: string) => void} read @param {(file: File) => boolean} film Takes a video. */
+export function startDropping(read, film) {
   let sending = new AbortController();
   const take = async (/** @type {FileList|undefined} */ files) => {
     const file = files?.[0];
-    if (!file) return;
+    if (!file || (file.type.startsWith("video/") && film(file))) return;
     sending.abort(); // only the last file is wanted
     sending = new AbortController();
-    const recording = await send(file, sending.signal);
+    let recording = await send(file, sending.signal);
+    if (recording?.unclear) {
+      const clear = await askHow(recording, file.name);
+      if (!clear && !recording.tables.length) byId("drop-state").textContent = `${file.name} was not opened.`;
+      recording = clear ?? (recording.tables.length ? recording : undefined);
+    }
     if (recording) read(recording, file.name);
     if (recording && files.length > 1)
       byId("drop-state").textContent =

@@ -1,14 +1,22 @@
 // What was found, as a table: times and names can be typed, a row can be removed.
 import { byId, fill, keepingFocus, make } from "../parts/elements.js";
 
-export const BY_HAND = { p: null, confidence: null }; // they were of what was found
+export const BY_HAND = { p: null, confidence: null, certainty: null }; // they were of what was found
 
-/** @param {any[]} spans @param {number} chosen @param {{choose: (k: number) => void, changed: () => void}} page */
+/** The p-value of what was found. @param {any} span */
+const said = ({ p = null }) => (p === null ? null : p.toFixed(2));
+
+/**
+ * @param {any[]} spans
+ * @param {number} chosen
+ * @param {{choose: (k: number) => void, changed: () => void, remove: (k: number) => void}} page
+ */
 export function showSpans(spans, chosen, page) {
   const time = (/** @type {any} */ span, /** @type {number} */ k, /** @type {"begin"|"end"} */ which) => {
     const field = make("input", {
       type: "number",
       step: "0.01",
+      disabled: k !== chosen,
       "aria-label": `${which === "begin" ? "Begin" : "End"} of span ${k + 1}`,
       "data-key": `span ${k} ${which}`,
       on: { focus: () => page.choose(k) },
@@ -37,37 +45,38 @@ export function showSpans(spans, chosen, page) {
     });
     return field;
   };
-  const remove = (/** @type {number} */ k) => {
-    spans.splice(k, 1);
-    page.choose(-1);
-    page.changed();
-  };
   const away = (/** @type {number} */ k) =>
     make(
       "button",
       {
         class: "button quiet square",
         type: "button",
+        disabled: k !== chosen,
         "aria-label": `Remove span ${k + 1}`,
-        on: { click: () => remove(k) },
+        on: { click: () => page.remove(k) },
       },
       "×",
     );
   const row = (/** @type {any} */ span, /** @type {number} */ k) =>
     make(
       "tr",
-      { class: k === chosen ? "chosen" : null },
+      { class: k === chosen ? "chosen" : null, on: { click: () => page.choose(k) } },
       make("td", {}, time(span, k, "begin")),
       make("td", {}, time(span, k, "end")),
       make("td", { class: "wide" }, name(span, k)),
-      make("td", {}, span.p === null || span.p === undefined ? "–" : span.p.toFixed(2)),
+      make("td", { title: said(span) && `p-value ${said(span)}` }, (said(span) && span.certainty) || said(span) || "–"),
       make("td", {}, away(k)),
     );
   byId("spans").hidden = !spans.length;
   keepingFocus(() => fill(byId("spans").tBodies[0], ...spans.map(row)));
 }
 
-/** Mark the row of the chosen one. @param {number} chosen */
+/** Mark the row of the chosen one; its times can be typed. @param {number} chosen */
 export function markRow(chosen) {
-  for (const [k, row] of [...byId("spans").tBodies[0].rows].entries()) row.classList.toggle("chosen", k === chosen);
+  for (const [k, row] of [...byId("spans").tBodies[0].rows].entries()) {
+    row.classList.toggle("chosen", k === chosen);
+    /** @type {NodeListOf<HTMLButtonElement>} */
+    const parts = row.querySelectorAll("[type=number], button");
+    for (const part of parts) part.disabled = k !== chosen;
+  }
 }

@@ -3,12 +3,15 @@ import { Board, color } from "../parts/canvas.js";
 import { drag } from "../parts/dragging.js";
 import { byId, make } from "../parts/elements.js";
 import { COLORS } from "../parts/library_state.js";
-import { readableOn } from "../parts/lines.js";
+import { line } from "../parts/lines.js";
+import { flattened } from "../parts/thumbnails.js";
+import { Shapes } from "./shapes.js";
 import { signal } from "./signal.js";
 import { BY_HAND } from "./spans.js";
-import { colorOf } from "./strip.js";
+import { colorOf, lanesOf, paintLanes } from "./strip.js";
 
 const BAND = 40; // height of the spans [px]
+const SHAPE = 72; // height of the shapes above them
 const SIDE = 12;
 const AXIS = 22;
 
@@ -17,6 +20,8 @@ const AXIS = 22;
 /**
  * @typedef {Object} Page
  * @property {(k: number) => void} choose
+ * @property {() => void} add
+ * @property {(k: number) => void} remove
  * @property {() => void} changed By the person.
  * @property {(time: number) => void} seek
  * @property {(event: KeyboardEvent) => void} key For the playhead.
@@ -33,12 +38,16 @@ export class Timeline {
     this.range = [0, 1];
     this.head = 0; // where the playhead is [s]
     this.board = new Board(byId("timeline-canvas"), () => this.paint());
+    this.shapes = new Shapes(64, () => this.board.draw());
+    /** @type {WeakMap<Span, import("./shapes.js").Shape>} The last one of each span. */
+    this.last = new WeakMap();
     this.playhead = make("div", { class: "playhead", "aria-hidden": "true" });
     byId("edges").append(this.playhead);
     this.edges = ["begin", "end"].map((which) => this.edge(/** @type {"begin"|"end"} */ (which)));
     this.board.canvas.addEventListener("pointerdown", (event) => this.grab(event));
     this.board.canvas.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
     this.board.canvas.addEventListener("keydown", (event) => this.key(event));
+    this.board.canvas.addEventListener("dblclick", () => (this.chosen < 0 ? this.page.add() : this.name()));
     this.board.canvas.tabIndex = 0;
   }
 
@@ -62,8 +71,9 @@ export class Timeline {
 
   paint() {
     const { context, height } = this.board;
-    const lane = height - BAND - AXIS - 12;
+    const lane = height - BAND - AXIS - 12 - (this.spans.length ? SHAPE : 0);
     for (const [k, span] of this.spans.entries()) this.paintSpan(span, k);
+    paintLanes(context, this.spans, (time) => this.x(time), [height - BAND - AXIS, BAND - 4], this.chosen);
     const x = this.plot.times.map((/** @type {number} */ time) => this.x(time));
     this.plot.columns.forEach((/** @type {any} */ column, /** @type {number} */ k) => {
       const look = { color: color(column.color ?? COLORS[k % COLORS.length]), width: 1.4 };
@@ -79,22 +89,18 @@ export class Timeline {
     const { context, height } = this.board;
     const [x, w] = [this.x(span.begin), Math.max(this.x(span.end) - this.x(span.begin), 2)];
     const paint = colorOf(span.label);
-    const top = height - BAND - AXIS;
-    Object.assign(context, { fillStyle: paint, strokeStyle: paint, globalAlpha: k === this.chosen ? 0.2 : 0.09 });
-    context.fillRect(x, 0, w, top);
-    context.globalAlpha = span.label === null ? 0.25 : 0.9;
-    context.beginPath();
-    context.roundRect(x + 1, top + 4, Math.max(w - 2, 1), BAND - 8, 6);
-    context.fill();
+    const top = height - BAND - AXIS - SHAPE;
+    Object.assign(context, { fillStyle: paint, globalAlpha: k === this.chosen ? 0.2 : 0.09 });
+    context.fillRect(x, 0, w, top + SHAPE);
     context.globalAlpha = 1;
-    if (k === this.chosen) Object.assign(context, { lineWidth: 3, strokeStyle: color("--text") }).stroke();
-    Object.assign(context, {
-      font: `600 13px ${color("--font")}`,
-      textAlign: "center",
-      fillStyle: span.label === null ? color("--text") : readableOn(paint),
-    });
-    const text = span.label ?? "unknown";
-    if (context.measureText(text).width < w - 10) context.fillText(text, x + w / 2, top + BAND / 2 + 5);
+    const shape = w < 14 || x + w < 0 || x > this.board.width ? undefined : this.shapes.of(span.begin, span.end);
+    if (shape) this.last.set(span, shape); // while an edge is dragged it is the one before
+    const drawn = shape ?? this.last.get(span);
+    if (!drawn?.path.length) return;
+    drawn.flat ??= flattened(drawn.path);
+    const scale = Math.min(w - 2, SHAPE) / 100;
+    const place = ([a, b]) => [x + w / 2 + scale * (a - 50), top + SHAPE / 2 + scale * (b - 50)];
+    line(context, drawn.flat.map(place), { color: paint, width: 2 });
   }
 
   paintAxis() {
@@ -129,7 +135,7 @@ export class Timeline {
     });
     button.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
       const step = { ArrowLeft: -1, ArrowRight: 1, ArrowDown: -1, ArrowUp: 1 }[event.key];
-      if (!step) return;
+      if (!step) return this.key(event);
       event.preventDefault();
       this.moveEdge(
         which,
@@ -189,7 +195,10 @@ export class Timeline {
    */
   grab(event) {
     const at = this.time(event.offsetX);
-    const hit = this.spans.findIndex((span) => span.begin <= at && at <= span.end);
+    const lanes = lanesOf(this.spans);
+    const down = (event.offsetY - this.board.height + BAND + AXIS) / ((BAND - 4) / Math.max(...lanes, 1));
+    const hits = [...this.spans.keys()].filter((k) => this.spans[k].begin <= at && at <= this.spans[k].end);
+    const hit = hits.find((k) => lanes[k] === Math.ceil(down)) ?? hits[0] ?? -1;
     const go = (/** @type {PointerEvent} */ now) =>
       this.pan((-now.movementX / (this.board.width - 2 * SIDE)) * (this.range[1] - this.range[0]));
     if (!drag(this.board.canvas, event, go)) return;
@@ -231,9 +240,15 @@ export class Timeline {
       this.page.choose(
         Math.min(Math.max(this.chosen + (event.key === "ArrowDown" ? 1 : -1), 0), this.spans.length - 1),
       );
-    else if (event.key === "Enter" && this.chosen >= 0)
-      /** @type {HTMLElement} */ (document.querySelector(`[data-key="span ${this.chosen} name"]`))?.focus();
+    else if (event.key === "Enter" && this.chosen >= 0) this.name();
+    else if (event.key === "Delete" && this.chosen >= 0) this.page.remove(this.chosen);
+    else if (event.key === "Insert" || event.key === "n") this.page.add();
     else return this.page.key(event);
     event.preventDefault();
+  }
+
+  /** Let the person name the span that is chosen. */
+  name() {
+    /** @type {HTMLElement} */ (document.querySelector(`[data-key="span ${this.chosen} name"]`))?.focus();
   }
 }

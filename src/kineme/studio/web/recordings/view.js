@@ -1,14 +1,18 @@
 // Recordings: a file, its channels, what was found in it, corrected and learned.
-import { get, post } from "../parts/api.js";
-import { learnSpans } from "../parts/changes.js";
+import { download, get, post } from "../parts/api.js";
+import { learnSpans, undo } from "../parts/changes.js";
 import { byId, counted, fill, make } from "../parts/elements.js";
 import { COLORS, library, onLibrary } from "../parts/library_state.js";
 import { ask } from "../parts/dialogs.js";
+import { isUndo } from "../parts/shortcuts.js";
 import { tried } from "../parts/toasts.js";
+import { currentView } from "../parts/views.js";
 import { startDropping } from "./dropping.js";
 import { Episodes } from "./episodes.js";
 import { columnCount, fitting, mismatch } from "./fitting.js";
+import { askHow } from "./importing.js";
 import { Player } from "./player.js";
+import { ShapeView } from "./shapes.js";
 import { markRow, showSpans } from "./spans.js";
 import { Timeline } from "./timeline.js";
 
@@ -39,17 +43,36 @@ class Recordings {
     this.page = {
       choose: (/** @type {number} */ k) => this.choose(k),
       changed: () => this.corrected(),
+      add: () => this.add(),
+      remove: (/** @type {number} */ k) => this.remove(k),
       seek: (/** @type {number} */ time) => this.player.seek(time),
       key: (/** @type {KeyboardEvent} */ event) => this.player.key(event),
     };
     this.timeline = new Timeline(this.page);
-    this.player = new Player((time) => this.timeline.goTo(time));
+    this.shape = new ShapeView();
+    this.player = new Player((time) => this.goTo(time));
+    /** @type {string[]} What the spans were before each change, and after those that were taken back; last their now. */
+    this.past = [];
+    /** @type {string[]} */
+    this.future = [];
     this.episodes = new Episodes({
       open: (detail) => this.open(detail, nameOf(detail.episode)),
       channels: (detail) => [...chosenOf(detail, detail.tables[0])],
       spotted: (key, spans) => key === this.read?.recording && this.spotted(spans),
     });
-    startDropping((recording, name) => this.open(recording, name));
+    startDropping(
+      (recording, name) => this.open(recording, name),
+      (file) => Boolean(this.read) && this.player.add(file),
+    );
+    byId("undo-span").addEventListener("click", () => this.step(this.past, this.future));
+    byId("redo-span").addEventListener("click", () => this.step(this.future, this.past));
+    document.addEventListener("keydown", (event) => this.key(event));
+    byId("save-spans").addEventListener("click", () => tried(() => this.save()));
+    byId("read-as").addEventListener("click", async () => {
+      const name = byId("recording-name").textContent;
+      const recording = await askHow({ ...this.read, unclear: "" }, name);
+      if (recording) this.open(recording, name);
+    });
     byId("spot").addEventListener("click", () => (this.search ? this.search.abort() : this.spot()));
     byId("add-span").addEventListener("click", () => this.add());
     byId("learn-spans").addEventListener("click", () => this.learn());
@@ -75,6 +98,13 @@ class Recordings {
     byId("recording").hidden = false;
     byId("drop").classList.add("small-drop");
     byId("recording-name").textContent = name;
+    byId("read-as").hidden = !recording.preview;
+    byId("shell").textContent = recording.command;
+    fill(
+      byId("save-format"),
+      ...recording.formats.map((/** @type {any} */ form) => make("option", { value: form.name }, form.text)),
+    );
+    recording.videos ??= [];
     fill(
       byId("tables"),
       ...recording.tables.map((/** @type {any} */ table, /** @type {number} */ k) =>
@@ -125,9 +155,10 @@ class Recordings {
     fill(byId("channels"), make("legend", {}, "Channels"), ...table.channels.map(box));
     this.timeline.spans = table.label === null ? [] : [{ begin: 0, end: table.duration, label: table.label, p: null }];
     if (this.read.episode) this.timeline.spans = this.read.episode.spans;
+    Object.assign(this, { past: [], future: [], now: JSON.stringify(this.timeline.spans) });
     this.columns();
     this.timeline.show(this.shownPlot());
-    this.player.open(table.duration, this.read.videos ?? []);
+    this.player.open(table.duration, this.read.videos);
     this.changed();
   }
 
@@ -155,7 +186,9 @@ class Recordings {
 
   columns() {
     this.timeline.plot = this.shownPlot();
+    for (const { shapes } of [this.timeline, this.shape]) shapes.open(this.read.recording, this.body());
     this.timeline.board.draw();
+    this.shape.board.draw();
     this.allow();
   }
 
@@ -187,18 +220,77 @@ class Recordings {
 
   /** Show what was found. @param {any[]} spans */
   spotted(spans) {
-    this.timeline.spans = spans;
-    if (this.read.episode) Object.assign(this.read.episode, { spans, corrected: false });
-    this.choose(-1);
-    this.changed();
+    this.take(spans);
+    if (this.read.episode) this.read.episode.corrected = false;
+    this.keep();
     const named = spans.filter((span) => span.label !== null).length;
     const advice = spans.length ? " Choose one to drag its edges." : "";
     byId("spans-state").textContent = `${counted(named, "known movement")}, ${spans.length - named} unknown.${advice}`;
   }
 
+  /** Show other spans. @param {any[]} spans */
+  take(spans) {
+    this.timeline.spans = spans;
+    if (this.read.episode) this.read.episode.spans = spans;
+    this.choose(-1);
+    this.changed();
+  }
+
+  /** What is shown now can be taken back. */
+  keep() {
+    const now = JSON.stringify(this.timeline.spans);
+    if (now !== this.now) this.past.push(this.now);
+    if (now !== this.now) this.future = [];
+    this.now = now;
+    this.allow();
+  }
+
+  /** Take back a change, or make it again. @param {string[]} from @param {string[]} to */
+  step(from, to) {
+    if (!from.length) return;
+    to.push(this.now);
+    this.now = from.pop();
+    this.take(JSON.parse(this.now));
+    this.corrected();
+  }
+
+  /** @param {KeyboardEvent} event */
+  key(event) {
+    const [control, letter] = [event.ctrlKey || event.metaKey, event.key.toLowerCase()];
+    if (currentView() !== "recordings") return;
+    if (isUndo(event)) this.past.length ? this.step(this.past, this.future) : undo();
+    else if (control && !event.defaultPrevented && (letter === "y" || (letter === "z" && event.shiftKey)))
+      this.step(this.future, this.past);
+    else return;
+    event.preventDefault();
+  }
+
+  /** The playhead is elsewhere. @param {number} time */
+  goTo(time) {
+    this.timeline.goTo(time);
+    this.shape.goTo(time, this.timeline.spans, this.timeline.extent[1]);
+  }
+
+  /** The spans as a file, in a format of the shell. */
+  save() {
+    const spans = this.timeline.spans.map(({ begin, end, label, p = null, confidence = null }) => ({
+      ...{ begin, end, label, p, confidence },
+    }));
+    const path = `/api/recordings/${encodeURIComponent(this.read.recording)}/annotations`;
+    return download(path, { ...this.body(), spans, format: byId("save-format").value }, "annotations");
+  }
+
+  /** @param {number} k */
+  remove(k) {
+    this.timeline.spans.splice(k, 1);
+    this.choose(-1);
+    this.corrected();
+  }
+
   /** A person has changed what an episode shows: it is kept. */
   corrected() {
     this.changed();
+    this.keep();
     if (!this.read?.episode) return;
     this.read.episode.corrected = true;
     this.episodes.put(this.read.recording, this.timeline.spans, true);
@@ -218,11 +310,20 @@ class Recordings {
     byId("spans-state").textContent = text;
   }
 
-  /** A span in the middle of what is shown; the first one of a short recording is all of it. */
+  /** A span at the playhead, or in the middle of what is shown; the first one of a short recording is all of it. */
   add() {
-    const [from, to] = this.timeline.range;
-    const aside = !this.timeline.spans.length && to - from < SHORT ? 0 : 0.4 * (to - from);
-    this.timeline.spans.push({ begin: from + aside, end: to - aside, label: null, p: null });
+    if (!this.read || library().read_only) return;
+    const { range, spans, head, extent } = this.timeline;
+    const [from, to] = range;
+    const all = !spans.length && to - from < SHORT;
+    const middle = from < head && head < to ? head : (from + to) / 2;
+    const half = (all ? 1 : 0.1) * (to - from);
+    spans.push({
+      begin: Math.max(middle - half, extent[0]),
+      end: Math.min(middle + half, extent[1]),
+      label: null,
+      p: null,
+    });
     this.corrected();
     this.choose(this.timeline.spans.length - 1);
     /** @type {HTMLElement} */ (byId("spans").querySelector("tr:last-child input[type=text]")).focus();
@@ -239,11 +340,15 @@ class Recordings {
   changed() {
     showSpans(this.timeline.spans, this.timeline.chosen, this.page);
     this.timeline.board.draw();
+    this.goTo(this.player.at);
     this.allow();
   }
 
   allow() {
     if (!this.read) return;
+    byId("undo-span").disabled = !this.past.length;
+    byId("redo-span").disabled = !this.future.length;
+    byId("save-part").hidden = !this.timeline.spans.length;
     const table = this.read.tables[Number(byId("tables").value)];
     const names = new Set(this.chosenChannels());
     const wrong = mismatch(
