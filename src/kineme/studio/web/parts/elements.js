@@ -70,18 +70,14 @@ export const breakable = (name) =>
 /**
  * Elements by their ids that are more than an HTMLElement.
  * @typedef {{
- *   "importing-open": HTMLButtonElement,
  *   "read-as": HTMLButtonElement,
  *   "redo-span": HTMLButtonElement,
  *   "save-spans": HTMLButtonElement,
  *   "undo-span": HTMLButtonElement,
  *   shape: HTMLCanvasElement,
  *   importing: HTMLDialogElement,
- *   "importing-rate": HTMLInputElement,
  *   "own-video": HTMLInputElement,
  *   "video-start": HTMLInputElement,
- *   "importing-measured": HTMLSelectElement,
- *   "importing-units": HTMLSelectElement,
  *   "save-format": HTMLSelectElement,
  *   "importing-rows": HTMLTableElement,
  *   "add-obstacle": HTMLButtonElement,
