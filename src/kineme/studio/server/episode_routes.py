@@ -12,7 +12,7 @@ from kineme.errors import KinemeError
 from kineme.studio.server import records
 from kineme.studio.server.importing import command
 from kineme.studio.server.opened import KEY, Lane, Opened, OpenedRecordings
-from kineme.studio.server.recording_routes import FoundSpan, PlotOut, SpannedOut, UploadOut, formats, plot_of, table_of
+from kineme.studio.server.recording_routes import FoundSpan, PlotOut, SpannedOut, UploadOut, plot_of, table_of
 from kineme.studio.server.refusals import MissingError, in_studio_words
 from kineme.studio.server.studio import Reads, Studio, Writes
 
@@ -145,7 +145,7 @@ async def episode(studio: Reads, key: EpisodeKey, width: Width = 1000) -> dict[s
     """Its signals, thinned to a width, its channels and videos; `/api/recordings/{key}` searches and learns it."""
     opened = _opened(studio)
     shown = await studio.reading(_detail, opened, key, width)
-    return shown | {"command": command(opened.name, str(studio.library.folder), {}), "formats": formats()}
+    return shown | {"command": command(opened.name, str(studio.library.folder), {})}
 
 
 @router.get("/{key}/strip", response_model=PlotOut, summary="The signals of an episode as a strip")

@@ -1,4 +1,4 @@
-"""Tables that do not say how they are read: their first rows, guesses at their columns, and the command of the shell."""
+"""Tables that do not say how they are read: their first rows, guesses at their columns, the command of the shell."""
 
 from __future__ import annotations
 
@@ -19,7 +19,6 @@ from kineme.movements.channels.detect import unit_of
 from kineme.movements.tables.columns import choose_roles, counts_samples, is_time
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.time_stamps import unit_by_size, unit_in_head
-from kineme.studio.server.refusals import in_studio_words
 from kineme.validation import MIN_SAMPLES, Array
 
 _BYTES = 2**16  # of a file, from which its table is guessed
@@ -95,14 +94,14 @@ def _runs(values: Array) -> bool:
     return bool((steps > 0).all() and steps.max() <= _EVEN * np.median(steps))
 
 
-def unclear(preview: dict[str, Any] | None, read: Recordings | DataError) -> str:
-    """Say what is not clear about a table that nobody has said anything of; empty where all is."""
+def unclear(preview: dict[str, Any] | None, read: Recordings | str) -> str:
+    """Say what is not clear about a table that was read or refused with some words; empty where all is."""
     if preview is None:
         return ""
     if not preview["named"]:
         return _NO_NAMES
-    if isinstance(read, DataError):
-        return NO_TIME if not any(map(is_time, preview["heads"])) else in_studio_words(str(read)).split("; ")[0] + "."
+    if isinstance(read, str):
+        return read.split("; ")[0] + "." if any(map(is_time, preview["heads"])) else NO_TIME
     rates = (np.diff(read.demonstrations.offsets) - 1) / read.demonstrations.durations
     strange = [rate for rate in rates if not _USUAL[0] <= rate <= _USUAL[1]]
     return f"It would have {strange[0]:.3g} samples a second. Is the unit of time right?" if strange else ""

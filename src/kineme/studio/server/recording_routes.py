@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from shutil import rmtree
 from typing import Annotated, Any
+from urllib.parse import quote
 
 import numpy as np
 from fastapi import APIRouter, Header, Request
@@ -97,13 +97,6 @@ class PreviewOut(BaseModel):
     measured_in: str | None = Field(description="Unit of the coordinates where the file says it.")
 
 
-class FormatOut(BaseModel):
-    """A format of annotations."""
-
-    name: str
-    text: str
-
-
 class UploadOut(BaseModel):
     """The contents of a file; it has no tables where somebody has to say first how it is read."""
 
@@ -114,7 +107,6 @@ class UploadOut(BaseModel):
     preview: PreviewOut | None = Field(None, description="Of a table of text.")
     unclear: str = Field("", description="Why somebody should say how it is read.")
     command: str = Field(description="Of the shell, that finds movements in the file as it was read.")
-    formats: list[FormatOut] = Field(description="In which annotations of it are written.")
 
 
 class ReadRequest(records.RequestBody):
@@ -186,8 +178,8 @@ class SearchedOut(BaseModel):
 
 router = APIRouter(prefix="/api/recordings", tags=["recordings"])
 
-#: Format of annotations that is a file of its own -> what people call it.
-_FORMATS = {"csv": "CSV", "json": "JSON", "elan": "ELAN", "audacity": "Audacity", "rerun": "Rerun"}
+#: Format of annotations that is a file of its own -> its ending.
+_ENDINGS = {name: writer.endings[0] for name, writer in WRITERS.items() if writer.copies is None} | {"rerun": ".rrd"}
 _MOST_POINTS = 1_000_000  # of all shapes that are asked for at once
 _PLOTTED = 1000  # samples of a column, at most
 
@@ -227,31 +219,23 @@ async def _received(
     def act() -> Recordings:
         return uploads.recordings(key, (), work.check) if options is None else uploads.read_as(key, options, work.check)
 
-    read: Recordings | DataError
+    read: Recordings | str
     async with uploads.readers:
         try:
             read = await while_wanted(request, studio.long, work, act)
         except DataError as error:
             if options is not None or uploads.preview(key) is None:
                 raise
-            read = error
-    preview, n = uploads.preview(key), 0 if isinstance(read, DataError) else len(read)
+            read = in_studio_words(str(error))
+    preview, n = uploads.preview(key), 0 if isinstance(read, str) else len(read)
     about = {"recording": key, "tables": [], "plots": [], "problems": [], "preview": preview}
-    if not isinstance(read, DataError):
+    if not isinstance(read, str):
         about["tables"], about["plots"] = ([act(read, k) for k in range(n)] for act in (table_of, plot_of))
         about["problems"] = [in_studio_words(str(problem)) for problem in read.problems]
     return about | {
         "unclear": unclear(preview, read) if options is None else "",
         "command": command(uploads.path(key).name, str(studio.library.folder), uploads.options(key)),
-        "formats": formats(),
     }
-
-
-def formats() -> list[dict[str, str]]:
-    """List the formats in which annotations are written without the recording."""
-    return [
-        {"name": name, "text": text} for name, text in _FORMATS.items() if name != "rerun" or find_spec(name) is not None
-    ]
 
 
 @router.post("/{key}/shapes", response_model=list[ShapeOut], summary="The shapes of stretches of a recording")
@@ -269,7 +253,9 @@ def shapes(studio: Reads, key: records.RecordingKey, body: ShapesRequest) -> lis
     for first, end in zip(times.searchsorted(ends[:, 0]), times.searchsorted(ends[:, 1], "right"), strict=True):
         n = min(body.points, _MOST_POINTS // len(ends))
         shown = first + evenly_spaced(max(end - first, 0), n) if end > first else np.zeros(0, np.intp)
-        drawn.append({"times": times[shown].tolist(), "path": records.thumbnail(points[shown], n) if len(shown) else []})
+        drawn.append(
+            {"times": times[shown].tolist(), "path": records.thumbnail(points[shown], n) if len(shown) else []}
+        )
     return drawn
 
 
@@ -281,8 +267,8 @@ def shapes(studio: Reads, key: records.RecordingKey, body: ShapesRequest) -> lis
 )
 def annotations(studio: Reads, key: records.RecordingKey, body: AnnotationsRequest) -> FileResponse:
     """Write stretches and their names as `kineme annotate` does, in each of its formats that is a file of its own."""
-    if body.format not in (names := [form["name"] for form in formats()]):
-        raise SpecificationError(f"expected one of the formats {', '.join(names)}, got {body.format!r}")
+    if body.format not in _ENDINGS:
+        raise SpecificationError(f"expected one of the formats {', '.join(_ENDINGS)}, got {body.format!r}")
     recording = _one(studio, key, body)
     source, origin = recording.sources[0], float(recording.demonstrations.movements.stamps[0])
     notes = [
@@ -293,13 +279,14 @@ def annotations(studio: Reads, key: records.RecordingKey, body: AnnotationsReque
         for span in sorted(body.spans, key=lambda span: span.begin)
     ]
     folder = studio.uploads.new_folder()
-    ending = ".rrd" if body.format == "rerun" else WRITERS[body.format].endings[0]
-    path = folder / f"{plain_name(f'{source.path} {source.place}'.strip()).replace('.', '_')}-labels{ending}"
+    name = plain_name(f"{source.path} {source.place}".strip()).replace(".", "_")
+    path = folder / f"{name}-labels{_ENDINGS[body.format]}"
     if body.format == "rerun":
         write_rerun(path, recording_scenes(recording, notes))
     else:
         write_annotations(path, notes, [Path(source.path)], body.format)
-    return FileResponse(path, filename=path.name, background=BackgroundTask(rmtree, folder, ignore_errors=True))
+    headers = {"Content-Disposition": f"attachment; filename*=UTF-8''{quote(path.name)}"}
+    return FileResponse(path, headers=headers, background=BackgroundTask(rmtree, folder, ignore_errors=True))
 
 
 @router.post("/{key}/spotted", response_model=SpottedOut, summary="What happens when in a recording")

@@ -95,7 +95,9 @@ class Uploads:
         if read is None:
             read = self._read_apart(path, {**options, "columns": list(chosen)} if chosen else options, check)
             with self._turn:
-                if key in self._files and options == self.options(key):  # of each file it is kept as it is, and in the columns chosen last
+                if key in self._files and options == self.options(
+                    key
+                ):  # of each file it is kept as it is, and in the columns chosen last
                     for old in [which for which in self._read if which[0] == key and which[1] and chosen]:
                         self._read.pop(old)
                     self._read[key, chosen] = read

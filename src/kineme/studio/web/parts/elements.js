@@ -31,6 +31,14 @@ export function make(tag, options = {}, ...children) {
   return element;
 }
 
+/** @param {string} text @param {() => any} act @param {Record<string, any>} options */
+export const button = (text, act, options = {}) =>
+  make("button", { class: "button", type: "button", ...options, on: { click: act } }, text);
+
+/** Offer names to choose from; the values are their numbers. @param {Element} select @param {string[]} names */
+export const offer = (select, names) =>
+  fill(select, ...names.map((name, k) => make("option", { value: String(k) }, name)));
+
 /** Say something else; what stays the same costs no layout. @param {Element} element @param {string} text */
 export function write(element, text) {
   if (element.textContent !== text) element.textContent = text;

@@ -12,49 +12,50 @@ export function askHow({ recording, preview, unclear }, name) {
   const [dialog, table] = [byId("importing"), byId("importing-rows")];
   const form = /** @type {HTMLFormElement} */ (dialog.firstElementChild);
   form.reset();
-  const row = (/** @type {string} */ head, /** @type {any[]} */ cells) =>
+  /** @type {string[]} */
+  const heads = preview.heads;
+  /** @type {(head: string, cells: any[]) => HTMLTableRowElement} */
+  const row = (head, cells) =>
     make("tr", {}, make("th", { scope: "row" }, head), ...cells.map((cell) => make("td", {}, cell)));
-  /** @type {(type: string, key: string, chosen: (head: string) => boolean) => HTMLElement[]} */
-  const boxes = (type, key, chosen) =>
-    preview.heads.map((/** @type {string} */ value, /** @type {number} */ k) =>
-      make("input", {
-        ...{ type, name: key, value, "aria-label": `${value} is ${type === "radio" ? "the time" : "a coordinate"}` },
-        ...{ checked: chosen(value), disabled: !preview.numbers[k] },
-      }),
-    );
-  const none = make("input", { type: "radio", name: "time", value: "", checked: preview.time === null });
+  /** @type {(type: string, name: string, chosen: string[], value: string, k?: number) => HTMLElement} */
+  const box = (type, name, chosen, value, k) => {
+    const disabled = preview.numbers[k] === false;
+    return make("input", {
+      type,
+      name,
+      value,
+      disabled,
+      checked: chosen.includes(value),
+      "aria-label": `${name} ${value}`,
+    });
+  };
+  const time = preview.time ?? "";
   const times = row(
     "Time",
-    boxes("radio", "time", (head) => head === preview.time),
+    heads.map((head, k) => box("radio", "time", [time], head, k)),
   );
-  times.cells[0].append(make("label", { class: "soft" }, " ", none, " none"));
-  fill(table.tHead, row("", preview.heads));
-  fill(
-    table.tBodies[0],
-    times,
-    row(
-      "Coordinates",
-      boxes("checkbox", "columns", (head) => preview.columns.includes(head)),
-    ),
-    ...preview.rows.map((/** @type {string[]} */ cells, /** @type {number} */ k) => row(k ? "" : "First rows", cells)),
-  );
-  for (const key of ["units", "rate"]) form.elements[key].value = preview[key] ?? "";
+  times.cells[0].append(make("label", { class: "soft" }, " ", box("radio", "time", [time], ""), " none"));
+  const columns = heads.map((head, k) => box("checkbox", "columns", preview.columns, head, k));
+  fill(table.tHead, row("", heads));
+  fill(table.tBodies[0], times, row("Coordinates", columns));
+  for (const cells of preview.rows) table.tBodies[0].append(row("", cells));
+  /** @type {any} */
+  const fields = form.elements;
+  for (const key of ["units", "rate"]) fields[key].value = preview[key] ?? "";
+  fields.measured_in.disabled = preview.measured_in !== null; // the file says it
   byId("importing-title").textContent = `How is ${name} read?`;
-  byId("importing-text").textContent = `${unclear} Say which column is what; what is chosen is a guess.`.trim();
+  byId("importing-text").textContent = `${unclear} Say which column is what; what is chosen is a guess.`;
   byId("importing-wrong").textContent = "";
-  byId("importing-measured-part").hidden = preview.measured_in !== null; // the file says it
-  dialog.returnValue = "no";
   if (!dialog.open) dialog.showModal();
   return new Promise((done) => {
     form.onsubmit = async (event) => {
-      if (/** @type {any} */ (event.submitter)?.value !== "yes") return;
+      if (!(/** @type {any} */ (event.submitter).value)) return;
       event.preventDefault();
       const data = new FormData(form);
       const said = Object.fromEntries([...data].filter(([, value]) => value));
-      const body = { ...said, columns: data.getAll("columns") };
       try {
-        done(await post(`/api/recordings/${recording}/read`, body));
-        dialog.close("yes");
+        done(await post(`/api/recordings/${recording}/read`, { ...said, columns: data.getAll("columns") }));
+        dialog.close();
       } catch (error) {
         byId("importing-wrong").textContent = error.message;
       }

@@ -1,5 +1,5 @@
 // The playhead of a recording: played, stepped through, with the video of a camera beside it where there is one.
-import { byId, fill, make, write } from "../parts/elements.js";
+import { byId, offer, write } from "../parts/elements.js";
 
 const STEP = 0.1; // of an arrow key [s]; ten times as much with Shift
 const NEAR = 0.05; // a video that is so near the playhead stays where it is [s]
@@ -26,8 +26,7 @@ export class Player {
       this.follow();
     });
     byId("own-video").addEventListener("change", (/** @type {any} */ event) => {
-      for (const file of event.target.files) this.add(file);
-      event.target.value = "";
+      if (event.target.files.length) this.add(event.target.files[0]);
     });
     byId("camera").addEventListener("change", () => this.show(Number(byId("camera").value)));
     byId("play-recording").addEventListener("click", () => this.toggle());
@@ -38,7 +37,6 @@ export class Player {
   /** Another recording. @param {number} end [s] @param {Video[]} videos */
   open(end, videos) {
     this.pause();
-    for (const video of this.videos) if (video.own && !videos.includes(video)) URL.revokeObjectURL(video.address);
     Object.assign(this, { end, videos });
     byId("playhead").max = String(end);
     this.list(0);
@@ -47,8 +45,6 @@ export class Player {
 
   /** A video of the person's, which stays in the browser. @param {File} file */
   add(file) {
-    const last = this.videos.findIndex(({ own }) => own);
-    if (last >= 0) URL.revokeObjectURL(this.videos.splice(last, 1)[0].address);
     this.videos.push({ camera: file.name, start: 0, codec: null, address: URL.createObjectURL(file), own: true });
     this.list(this.videos.length - 1);
     return true;
@@ -58,7 +54,10 @@ export class Player {
   list(k) {
     byId("video-part").hidden = !this.videos.length;
     byId("camera-part").hidden = this.videos.length < 2;
-    fill(byId("camera"), ...this.videos.map(({ camera }, at) => make("option", { value: String(at) }, camera)));
+    offer(
+      byId("camera"),
+      this.videos.map(({ camera }) => camera),
+    );
     byId("camera").value = String(k);
     this.show(k);
   }
@@ -98,12 +97,7 @@ export class Player {
   }
 
   toggle() {
-    if (this.playing) this.pause();
-    else this.play();
-  }
-
-  play() {
-    if (!this.end) return;
+    if (this.playing || !this.end) return this.pause();
     if (this.at >= this.end) this.seek(0);
     this.playing = true;
     write(byId("play-recording"), "Pause");

@@ -1,7 +1,11 @@
 // What was found, as a table: times and names can be typed, a row can be removed.
-import { byId, fill, keepingFocus, make } from "../parts/elements.js";
+import { button, byId, fill, keepingFocus, make } from "../parts/elements.js";
 
 export const BY_HAND = { p: null, confidence: null, certainty: null }; // they were of what was found
+
+/** What the server is told of spans. @param {any[]} spans */
+export const plain = (spans) =>
+  spans.map(({ begin, end, label, p = null, confidence = null }) => ({ begin, end, label, p, confidence }));
 
 /**
  * @param {any[]} spans
@@ -29,19 +33,9 @@ export function showSpans(spans, chosen, page) {
     };
     const time = { type: "number", step: "0.01", disabled: k !== chosen };
     const p = span.p?.toFixed(2) ?? "–";
-    const away = make(
-      "button",
-      {
-        ...{
-          class: "button quiet square",
-          type: "button",
-          "aria-label": `Remove span ${k + 1}`,
-          disabled: k !== chosen,
-        },
-        on: { click: () => page.remove(k) },
-      },
-      "×",
-    );
+    const away = button("×", () => page.remove(k), {
+      ...{ class: "button quiet square", "aria-label": `Remove span ${k + 1}`, disabled: k !== chosen },
+    });
     return make(
       "tr",
       { class: k === chosen ? "chosen" : null, on: { click: () => page.choose(k) } },

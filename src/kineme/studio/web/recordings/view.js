@@ -1,7 +1,7 @@
 // Recordings: a file, its channels, what was found in it, corrected, played, saved and learned.
 import { download, get, post } from "../parts/api.js";
 import { learnSpans, undo } from "../parts/changes.js";
-import { byId, counted, fill, make } from "../parts/elements.js";
+import { byId, counted, fill, make, offer } from "../parts/elements.js";
 import { COLORS, library, onLibrary } from "../parts/library_state.js";
 import { ask } from "../parts/dialogs.js";
 import { isUndo } from "../parts/shortcuts.js";
@@ -13,7 +13,7 @@ import { columnCount, fitting, mismatch } from "./fitting.js";
 import { askHow } from "./importing.js";
 import { Player } from "./player.js";
 import { ShapeView } from "./shapes.js";
-import { markRow, showSpans } from "./spans.js";
+import { markRow, plain, showSpans } from "./spans.js";
 import { Timeline } from "./timeline.js";
 
 const SHORT = 10; // a recording of one movement [s]
@@ -25,21 +25,8 @@ const ASKED = 400; // how often it is asked how much is searched [ms]
 /**
  * What the server says of a recording.
  * @typedef {{recording: string, tables: Table[], plots: any[], problems: string[], preview: any, command: string,
- *   formats: {name: string, text: string}[], episode?: any, videos?: any[], chosen?: string[]}} Recording
+ *   episode?: any, videos?: any[], chosen?: string[]}} Recording
  */
-
-/**
- * Names of the channels that are chosen at first: of an episode those of the library, or of its first feature.
- * @param {Recording} recording @param {Table} table @returns {Set<string>}
- */
-const chosenOf = ({ chosen }, { channels }) => {
-  /** @type {(names: string[]) => Channel[]} */
-  const named = (names) => channels.filter(({ name }) => names.includes(name));
-  const ours = /** @type {Channel[]} */ (library().channels ?? []).map(({ name }) => name);
-  const own = !chosen ? channels : ours.length && named(ours).length === ours.length ? named(ours) : named(chosen);
-  const fits = !library().symbols.length || !mismatch(own, library());
-  return fitting(chosen && fits ? own : channels, library());
-};
 
 class Recordings {
   constructor() {
@@ -58,7 +45,7 @@ class Recordings {
     this.episodes = new Episodes({
       open: (detail) =>
         this.open(detail, `Episode ${detail.episode.number}: ${detail.episode.task ?? detail.episode.place}`),
-      channels: (detail) => [...chosenOf(detail, detail.tables[0])],
+      channels: ({ tables, chosen }) => [...fitting(tables[0].channels, library(), chosen)],
       spotted: (key, spans) => key === this.read?.recording && this.spotted(spans),
     });
     startDropping(
@@ -97,8 +84,10 @@ class Recordings {
     byId("recording-name").textContent = name;
     byId("read-as").hidden = !recording.preview;
     byId("shell").textContent = recording.command;
-    fill(byId("save-format"), ...recording.formats.map(({ name, text }) => make("option", { value: name }, text)));
-    fill(byId("tables"), ...tables.map((table, k) => make("option", { value: String(k) }, table.name)));
+    offer(
+      byId("tables"),
+      tables.map((table) => table.name),
+    );
     byId("tables-part").hidden = tables.length < 2;
     const labeled = tables.filter((table) => table.label !== null);
     const labels = [...new Set(labeled.map((table) => table.label))].slice(0, 8).join(", ");
@@ -130,7 +119,7 @@ class Recordings {
     const rate = table.rate ? `, ${Math.round(table.rate)} samples a second` : "";
     byId("recording-facts").textContent =
       `${table.duration.toFixed(1)} s, ${counted(table.channels.length, "channel")}${rate}`;
-    const chosen = chosenOf(this.read, table);
+    const chosen = fitting(table.channels, library(), this.read.chosen);
     const boxes = table.channels.map(({ name, kind, unit }, k) => {
       const key = make("span", { class: "key" });
       key.style.borderColor = `var(${COLORS[columnCount(table.channels.slice(0, k)) % COLORS.length]})`;
@@ -266,18 +255,8 @@ class Recordings {
 
   /** The spans as a file, in a format of the shell. */
   save() {
-    const spans = this.timeline.spans.map(({ begin, end, label, p, confidence }) => ({
-      begin,
-      end,
-      label,
-      p,
-      confidence,
-    }));
-    return download(
-      this.path("annotations"),
-      { ...this.body(), spans, format: byId("save-format").value },
-      "annotations",
-    );
+    const asked = { ...this.body(), spans: plain(this.timeline.spans), format: byId("save-format").value };
+    return download(this.path("annotations"), asked, "annotations");
   }
 
   /** @param {number} k */
@@ -377,9 +356,11 @@ class Recordings {
   }
 
   async learn() {
-    const named = this.timeline.spans.filter((span) => span.label !== null);
-    const spans = named.map(({ begin, end, label }) => ({ begin, end, label }));
-    await learnSpans(this.read.recording, { ...this.body(), spans });
+    const spans = this.timeline.spans.filter((span) => span.label !== null);
+    await learnSpans(this.read.recording, {
+      ...this.body(),
+      spans: spans.map(({ begin, end, label }) => ({ begin, end, label })),
+    });
   }
 }
 
