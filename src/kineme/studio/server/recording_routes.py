@@ -138,6 +138,7 @@ class FoundSpan(Span):
 
     p: records.Number | None = None
     confidence: records.Number | None = None
+    certainty: records.Text | None = None
 
 
 class AnnotationsRequest(ChannelChoice):

@@ -26,7 +26,7 @@ async function send(file, signal) {
     if (clear || read.tables.length) return clear ?? read;
     state(`${file.name} was not opened.`);
   } catch (error) {
-    const folder = `${file.name} cannot be sent: expected a file, not a folder. The command kineme learn reads folders.`;
+    const folder = `${file.name} cannot be sent: expected a file. The command kineme learn reads folders.`;
     if (!signal.aborted) state(error.status === undefined ? folder : error.message, true);
   }
 }

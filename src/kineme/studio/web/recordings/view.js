@@ -52,7 +52,7 @@ class Recordings {
       (recording, name) => this.open(recording, name),
       (file) => Boolean(this.read) && this.player.add(file),
     );
-    const acts = {
+    for (const [id, act] of Object.entries({
       spot: () => (this.search ? this.search.abort() : this.spot()),
       "add-span": () => this.add(),
       "undo-span": () => this.step(-1),
@@ -63,8 +63,8 @@ class Recordings {
       "read-as": () => this.readAs(),
       "zoom-in": () => this.timeline.zoom(0.6),
       "zoom-out": () => this.timeline.zoom(1 / 0.6),
-    };
-    for (const [id, act] of Object.entries(acts)) byId(id).addEventListener("click", act);
+    }))
+      byId(id).addEventListener("click", act);
     byId("tables").addEventListener("change", () => this.showTable());
     byId("channels").addEventListener("change", () => this.columns());
     document.addEventListener("keydown", (event) => this.takeBack(event));
