@@ -36,9 +36,9 @@ export function askHow({ recording, preview, unclear }, name) {
   );
   times.cells[0].append(make("label", { class: "soft" }, " ", box("radio", "time", [time], ""), " none"));
   const columns = heads.map((head, k) => box("checkbox", "columns", preview.columns, head, k));
-  fill(table.tHead, row("", heads));
+  fill(table.tHead, row("Column", heads));
   fill(table.tBodies[0], times, row("Coordinates", columns));
-  for (const cells of preview.rows) table.tBodies[0].append(row("", cells));
+  for (const [k, cells] of preview.rows.entries()) table.tBodies[0].append(row(`Row ${k + 1}`, cells));
   /** @type {any} */
   const fields = form.elements;
   for (const key of ["units", "rate"]) fields[key].value = preview[key] ?? "";

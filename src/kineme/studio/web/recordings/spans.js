@@ -31,10 +31,10 @@ export function showSpans(spans, chosen, page) {
       });
       return make("td", { class: isTime ? null : "wide" }, input);
     };
-    const time = { type: "number", step: "0.01", disabled: k !== chosen };
+    const time = { type: "number", step: "0.01", readOnly: k !== chosen };
     const p = span.p?.toFixed(2) ?? "–";
     const away = button("×", () => page.remove(k), {
-      ...{ class: "button quiet square", "aria-label": `Remove span ${k + 1}`, disabled: k !== chosen },
+      ...{ class: "button quiet square", "aria-label": `Remove span ${k + 1}`, hidden: k !== chosen },
     });
     return make(
       "tr",
@@ -54,8 +54,9 @@ export function showSpans(spans, chosen, page) {
 export function markRow(chosen) {
   for (const [k, row] of [...byId("spans").tBodies[0].rows].entries()) {
     row.classList.toggle("chosen", k === chosen);
-    /** @type {NodeListOf<HTMLButtonElement>} */
-    const parts = row.querySelectorAll("[type=number], button");
-    for (const part of parts) part.disabled = k !== chosen;
+    for (const part of row.querySelectorAll("button")) part.hidden = k !== chosen;
+    /** @type {NodeListOf<HTMLInputElement>} */
+    const times = row.querySelectorAll("[type=number]");
+    for (const time of times) time.readOnly = k !== chosen;
   }
 }
