@@ -111,7 +111,9 @@ def test_annotations_are_added_renamed_moved_removed_undone_and_exported_by_the_
     page.click("#spot")
     wait_until(page, f"{SPANS} === 3")
     settle(page)
-    assert [page.inner_text(ROW.format(k, "td:nth-child(4)")) for k in (1, 2, 3)] == ["looks like"] * 3  # three of each are too few to be sure
+    assert [page.inner_text(ROW.format(k, "td:nth-child(4)")) for k in (1, 2, 3)] == [
+        "looks like"
+    ] * 3  # three of each are too few to be sure
     page.locator("#timeline-canvas").focus()
     page.keyboard.press("ArrowDown")
     page.keyboard.press("ArrowDown")

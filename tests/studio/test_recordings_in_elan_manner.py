@@ -19,7 +19,7 @@ from kineme.cli.main import main
 from kineme.errors import SpecificationError
 from kineme.io.reading.recordings import read_recordings
 from kineme.io.writing.annotations import WRITERS, Annotation, write_annotations
-from kineme.studio.server.importing import command, reader_options, table_preview
+from kineme.studio.server.importing import NO_TIME, command, reader_options, table_preview
 
 RATE = 50.0
 T, X = np.arange(120) / RATE, drawing(1, n=120)[1]
@@ -96,6 +96,24 @@ def test_a_choice_that_is_refused_leaves_the_file_as_it_was_read(client):
     shapes = client.post(f"{path}/shapes", json={"spans": [{"begin": 0, "end": 0.5}]}).json()
     assert shapes[0]["times"][-1] == 0.5  # it is read so from now on
     assert client.post("/api/recordings/none/read", json={"columns": ["y"]}).status_code == 404
+
+
+def test_arrays_without_times_are_asked_for_them_too(client):
+    array = io.BytesIO()
+    np.save(array, X)
+    sent = client.post("/api/recordings", content=array.getvalue(), headers={"X-File-Name": "a.npy"}).json()
+    assert (sent["tables"], sent["unclear"]) == ([], NO_TIME)
+    assert sent["preview"]["columns"] == ["x", "y"]
+    assert sent["preview"]["rows"][1] == [f"{value:.6g}" for value in X[1]]
+    path = f"/api/recordings/{sent['recording']}/read"
+    read = client.post(path, json={"rate": RATE, "columns": ["x", "y"]}).json()
+    assert read["tables"][0]["rate"] == pytest.approx(RATE)
+    assert read["command"].endswith("--units 0.02")
+    turned = io.BytesIO()
+    np.save(turned, np.zeros((4, 2, 50)) + np.arange(50))
+    refused = client.post("/api/recordings", content=turned.getvalue(), headers={"X-File-Name": "b.npy"})
+    assert "array.T" not in refused.text
+    assert "turn the array" in refused.text
 
 
 def test_what_is_no_table_is_refused_as_before(client):

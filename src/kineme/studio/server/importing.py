@@ -10,15 +10,18 @@ from typing import Any
 
 import numpy as np
 
-from kineme.errors import DataError
+from kineme.errors import DataError, KinemeError
 from kineme.io.reading.formats import FORMATS
 from kineme.io.reading.merge_files import Recordings
+from kineme.io.reading.recordings import read_recordings
 from kineme.io.tables.dialect import detect_dialect, is_number, split
 from kineme.io.tables.text_table import export_head, lines_of
+from kineme.movements.channels.channel import recorded_names
 from kineme.movements.channels.detect import unit_of
 from kineme.movements.tables.columns import choose_roles, counts_samples, is_time
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.time_stamps import unit_by_size, unit_in_head
+from kineme.movements.trajectories.movements import axis_names
 from kineme.validation import MIN_SAMPLES, Array
 
 _BYTES = 2**16  # of a file, from which its table is guessed
@@ -84,6 +87,21 @@ def table_preview(path: Path) -> dict[str, Any] | None:
     }
 
 
+def array_preview(path: Path) -> dict[str, Any] | None:
+    """Return the same of a file of arrays that lacks nothing but the times of its samples; None of any other."""
+    with suppress(KinemeError):
+        read = read_recordings(path, units=1 / _RATE).demonstrations
+        values, heads = read.positions, axis_names(read.n_dims)
+        if read.channels is not None:
+            values, heads = read.recorded, recorded_names(read.channels)
+        return {
+            **{"heads": list(heads), "columns": list(heads), "numbers": [True] * len(heads), "named": None},
+            "rows": [[f"{value:.6g}" for value in row] for row in values[:_ROWS]],
+            **{"time": None, "units": None, "rate": _RATE, "measured_in": None},
+        }
+    return None
+
+
 def _values(cells: Sequence[str], comma: bool) -> Array:
     return np.array([float(cell.replace(",", ".")) if is_number(cell, comma) else np.nan for cell in cells])
 
@@ -98,7 +116,7 @@ def unclear(preview: dict[str, Any] | None, read: Recordings | str) -> str:
     """Say what is not clear about a table that was read or refused with some words; empty where all is."""
     if preview is None:
         return ""
-    if not preview["named"]:
+    if preview["named"] is False:
         return _NO_NAMES
     if isinstance(read, str):
         return read.split("; ")[0] + "." if any(map(is_time, preview["heads"])) else NO_TIME
@@ -116,7 +134,8 @@ def reader_options(
     measured_in: str | None,
 ) -> dict[str, Any]:
     """Return options of `read_recordings` for a table: its columns, and the unit or the rate [Hz] of its samples."""
-    options: dict[str, Any] = {"columns": list(columns)}
+    is_all = preview["named"] is None and columns == preview["columns"]
+    options: dict[str, Any] = {} if is_all else {"columns": list(columns)}
     if time is not None:
         options |= {"time": time, **({} if units is None else {"units": units})}
     else:

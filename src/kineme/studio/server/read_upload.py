@@ -21,7 +21,7 @@ from kineme.io.records import Problem
 from kineme.movements.channels.channel import channels_from_data, channels_to_data
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import Movements, of_channels
-from kineme.studio.server.importing import table_preview
+from kineme.studio.server.importing import array_preview, table_preview
 
 REFUSED = 3  # exit code
 _ARRAYS = ("offsets", "durations", "stamps")
@@ -86,13 +86,17 @@ def main() -> None:
     path, result, beyond, seconds = Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3]), int(sys.argv[4])
     options = json.load(sys.stdin)
     _limit(beyond, seconds)
+    preview = None
     with suppress(KinemeError, MemoryError):
-        result.with_suffix(".json").write_text(json.dumps(table_preview(path)), encoding="utf-8")
+        preview = table_preview(path)
     try:
         save(read_recordings(path, **options), result)
     except (KinemeError, MemoryError) as error:
         result.write_text(str(error) or "expected a file that fits into memory, got a larger one", encoding="utf-8")
+        preview = preview or array_preview(path)
         sys.exit(REFUSED)
+    finally:
+        result.with_suffix(".json").write_text(json.dumps(preview), encoding="utf-8")
 
 
 if __name__ == "__main__":
