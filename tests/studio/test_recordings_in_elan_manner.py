@@ -137,10 +137,9 @@ def test_a_preview_is_one_of_any_text_or_none(tmp_path_factory, data):
 
 def test_options_and_command():
     preview = {"named": True, "heads": ["time", "x"]}
-    assert reader_options(preview, None, "ms", 25.0, ["x"], None) == {
-        **{"columns": ["x"], "units": 0.04, "exclude": ["time"]}
-    }
-    options = reader_options(preview, "time", None, 25.0, ["x"], "mm")
+    choice = {"time": None, "units": "ms", "rate": 25.0, "columns": ["x"], "measured_in": None}
+    assert reader_options(preview, choice) == {"columns": ["x"], "units": 0.04, "exclude": ["time"]}
+    options = reader_options(preview, choice | {"time": "time", "units": None, "measured_in": "mm"})
     assert options == {"columns": ["x"], "time": "time", "measured_in": "mm"}
     said = command("a b.csv", "actions", options)
     assert said == "kineme annotate 'a b.csv' --library actions --columns x --time time --measured-in mm"

@@ -144,11 +144,11 @@ def write_elan(path: Path, annotations: Sequence[Annotation], source: Path | Non
     for number, (name, text) in enumerate(_DEPENDENT.items(), 1):
         below = SubElement(root, "TIER", LINGUISTIC_TYPE_REF="number", PARENT_REF="symbol", TIER_ID=name)
         for k, annotation in enumerate(annotations, 1):
-            if (value := text(annotation)) == "nan":  # a person named it
+            if (number_text := text(annotation)) == "nan":  # a person named it
                 continue
             ids = {"ANNOTATION_ID": f"a{number * len(annotations) + k}", "ANNOTATION_REF": f"a{k}"}
             referring = SubElement(SubElement(below, "ANNOTATION"), "REF_ANNOTATION", ids)
-            SubElement(referring, "ANNOTATION_VALUE").text = value
+            SubElement(referring, "ANNOTATION_VALUE").text = number_text
     plain = {"GRAPHIC_REFERENCES": "false"}
     SubElement(root, "LINGUISTIC_TYPE", plain, LINGUISTIC_TYPE_ID="symbol", TIME_ALIGNABLE="true")
     by_number = {"CONSTRAINTS": _ASSOCIATION, "LINGUISTIC_TYPE_ID": "number", "TIME_ALIGNABLE": "false"}

@@ -91,9 +91,9 @@ def array_preview(path: Path) -> dict[str, Any] | None:
     """Return the same of a file of arrays that lacks nothing but the times of its samples; None of any other."""
     with suppress(KinemeError):
         read = read_recordings(path, units=1 / _RATE).demonstrations
-        values, heads = read.positions, axis_names(read.n_dims)
-        if read.channels is not None:
-            values, heads = read.recorded, recorded_names(read.channels)
+        channels = read.channels
+        values = read.positions if channels is None else read.recorded
+        heads = axis_names(read.n_dims) if channels is None else tuple(recorded_names(channels))
         return {
             **{"heads": list(heads), "columns": list(heads), "numbers": [True] * len(heads), "named": None},
             "rows": [[f"{value:.6g}" for value in row] for row in values[:_ROWS]],
@@ -125,24 +125,16 @@ def unclear(preview: dict[str, Any] | None, read: Recordings | str) -> str:
     return f"It would have {strange[0]:.3g} samples a second. Is the unit of time right?" if strange else ""
 
 
-def reader_options(
-    preview: dict[str, Any],
-    time: str | None,
-    units: str | None,
-    rate: float | None,
-    columns: Sequence[str],
-    measured_in: str | None,
-) -> dict[str, Any]:
-    """Return options of `read_recordings` for a table: its columns, and the unit or the rate [Hz] of its samples."""
-    is_all = preview["named"] is None and columns == preview["columns"]
-    options: dict[str, Any] = {} if is_all else {"columns": list(columns)}
-    if time is not None:
-        options |= {"time": time, **({} if units is None else {"units": units})}
-    else:
-        options["units"] = 1 / (rate or _RATE)
+def reader_options(preview: dict[str, Any], choice: dict[str, Any]) -> dict[str, Any]:
+    """Return options of `read_recordings` for a file, of choices that are named as the guesses."""
+    is_all = preview["named"] is None and choice["columns"] == preview["columns"]
+    options: dict[str, Any] = {} if is_all else {"columns": choice["columns"]}
+    if choice["time"] is None:
+        options["units"] = 1 / (choice["rate"] or _RATE)
         if preview["named"] and (others := [head for head in preview["heads"] if is_time(head)]):
             options["exclude"] = others
-    return options if measured_in is None else options | {"measured_in": measured_in}
+        choice = choice | {"time": None, "units": None}
+    return options | {name: choice[name] for name in ("time", "units", "measured_in") if choice[name] is not None}
 
 
 def command(file: str, library: str, options: dict[str, Any]) -> str:

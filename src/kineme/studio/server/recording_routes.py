@@ -84,19 +84,6 @@ class TableOut(BaseModel):
     label: str | None = Field(description="What the file says that it shows.")
 
 
-class PreviewOut(BaseModel):
-    """The first rows of a table, and guesses at how it is read."""
-
-    heads: list[str]
-    rows: list[list[str]]
-    numbers: list[bool] = Field(description="Whether a column holds numbers or dates.")
-    time: str | None = Field(description="Column of the times; null where there is none.")
-    units: str | None = Field(description="Of the times.")
-    rate: float = Field(description="Samples a second, where there are no times.")
-    columns: list[str] = Field(description="Coordinates.")
-    measured_in: str | None = Field(description="Unit of the coordinates where the file says it.")
-
-
 class UploadOut(BaseModel):
     """The contents of a file; it has no tables where somebody has to say first how it is read."""
 
@@ -104,7 +91,7 @@ class UploadOut(BaseModel):
     tables: list[TableOut]
     problems: list[str]
     plots: list[PlotOut] = Field(description="One of each table.")
-    preview: PreviewOut | None = Field(None, description="Of a table of text.")
+    preview: dict[str, Any] | None = Field(None, description="First rows, and guesses at how they are read.")
     unclear: str = Field("", description="Why somebody should say how it is read.")
     command: str = Field(description="Of the shell, that finds movements in the file as it was read.")
 
@@ -205,10 +192,10 @@ async def send(
 @router.post("/{key}/read", response_model=UploadOut, summary="Say how a table is read")
 async def read_as(studio: Reads, request: Request, key: records.RecordingKey, body: ReadRequest) -> dict[str, Any]:
     """The file that was sent, with these columns and this unit of time or this rate from now on."""
-    preview = studio.uploads.preview(key)
+    preview = studio.uploads.previews.get(key)
     if preview is None:
         raise MissingError("expected a table of text that was sent, got another recording")
-    return await _received(studio, request, key, reader_options(preview, **body.model_dump()))
+    return await _received(studio, request, key, reader_options(preview, body.model_dump()))
 
 
 async def _received(
@@ -225,17 +212,17 @@ async def _received(
         try:
             read = await while_wanted(request, studio.long, work, act)
         except DataError as error:
-            if options is not None or uploads.preview(key) is None:
+            if options is not None or uploads.previews.get(key) is None:
                 raise
             read = in_studio_words(str(error))
-    preview, n = uploads.preview(key), 0 if isinstance(read, str) else len(read)
-    about = {"recording": key, "tables": [], "plots": [], "problems": [], "preview": preview}
+    preview, n = uploads.previews.get(key), 0 if isinstance(read, str) else len(read)
+    about: dict[str, Any] = {"recording": key, "tables": [], "plots": [], "problems": [], "preview": preview}
     if not isinstance(read, str):
         about["tables"], about["plots"] = ([act(read, k) for k in range(n)] for act in (table_of, plot_of))
         about["problems"] = [in_studio_words(str(problem)) for problem in read.problems]
     return about | {
         "unclear": unclear(preview, read) if options is None else "",
-        "command": command(uploads.path(key).name, str(studio.library.folder), uploads.options(key)),
+        "command": command(uploads.path(key).name, str(studio.library.folder), uploads.options.get(key, {})),
     }
 
 
@@ -266,7 +253,7 @@ def shapes(studio: Reads, key: records.RecordingKey, body: ShapesRequest) -> lis
     response_class=FileResponse,
     responses={200: {"content": {"application/octet-stream": {}}, "description": "The file, with its name."}},
 )
-def annotations(studio: Reads, key: records.RecordingKey, body: AnnotationsRequest) -> FileResponse:
+def export(studio: Reads, key: records.RecordingKey, body: AnnotationsRequest) -> FileResponse:
     """Write stretches and their names as `kineme annotate` does, in each of its formats that is a file of its own."""
     if body.format not in _ENDINGS:
         raise SpecificationError(f"expected one of the formats {', '.join(_ENDINGS)}, got {body.format!r}")

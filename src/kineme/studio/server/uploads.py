@@ -50,8 +50,8 @@ class Uploads:
         self.readers = asyncio.Semaphore(_READERS)
         self._folder = OwnFolder()
         self._files: dict[str, Path] = {}
-        self._options: dict[str, dict[str, Any]] = {}  # how a file is read, where a person said it
-        self._previews: dict[str, dict[str, Any] | None] = {}
+        self.options: dict[str, dict[str, Any]] = {}  # of the reader, where a person chose them for a file
+        self.previews: dict[str, dict[str, Any] | None] = {}  # see `table_preview`
         self._read: dict[tuple[str, tuple[str, ...]], Recordings] = {}  # by the chosen columns
         self._turn = Lock()
 
@@ -80,7 +80,7 @@ class Uploads:
             self._files[key] = path
             for old in list(self._files)[:-_MOST_FILES]:
                 shutil.rmtree(self._files.pop(old).parent, ignore_errors=True)
-                self._options.pop(old, None), self._previews.pop(old, None)
+                self.options.pop(old, None), self.previews.pop(old, None)
                 for which in [which for which in self._read if which[0] == old]:
                     self._read.pop(which)
         return key
@@ -90,14 +90,13 @@ class Uploads:
 
         `check` is called again and again, and raises where nobody waits any more.
         """
-        path, chosen, options = self.path(key), tuple(columns), self.options(key)
+        path, chosen, options = self.path(key), tuple(columns), self.options.get(key, {})
         read = self._read.get((key, chosen))
         if read is None:
             read = self._read_apart(path, {**options, "columns": list(chosen)} if chosen else options, check)
             with self._turn:
-                if key in self._files and options == self.options(
-                    key
-                ):  # of each file it is kept as it is, and in the columns chosen last
+                # Of each file it is kept as it is, and in the columns chosen last.
+                if key in self._files and options == self.options.get(key, {}):
                     for old in [which for which in self._read if which[0] == key and which[1] and chosen]:
                         self._read.pop(old)
                     self._read[key, chosen] = read
@@ -117,20 +116,12 @@ class Uploads:
         """Make an empty folder that is deleted with all others when the studio ends."""
         return Path(mkdtemp(dir=self._folder.path))
 
-    def options(self, key: str) -> dict[str, Any]:
-        """Return the options of the reader that a person chose for a file; by default none."""
-        return self._options.get(key, {})
-
-    def preview(self, key: str) -> dict[str, Any] | None:
-        """Return the first rows of a file that was read, see `table_preview`."""
-        return self._previews.get(key)
-
     def read_as(self, key: str, options: dict[str, Any], check: Callable[[], object] = go_on) -> Recordings:
         """Read a file with options of the reader from now on; where they are refused, it is read as before."""
         read = self._read_apart(self.path(key), options, check)
         with self._turn:
             if key in self._files:
-                self._options[key] = options
+                self.options[key] = options
                 for old in [which for which in self._read if which[0] == key]:
                     self._read.pop(old)
                 self._read[key, ()] = read
@@ -144,7 +135,7 @@ class Uploads:
         try:
             code = _run(command, json.dumps(options), self.seconds, check)
             if (preview := result.with_suffix(".json")).exists():
-                self._previews[path.parent.name] = json.loads(preview.read_text(encoding="utf-8"))
+                self.previews[path.parent.name] = json.loads(preview.read_text(encoding="utf-8"))
             if code == REFUSED:
                 raise DataError(result.read_text(encoding="utf-8").replace(f"{path.parent}/", ""))
             if code:
