@@ -30,7 +30,7 @@ function pressed(event) {
   if (writes(event.target) || document.querySelector("dialog[open]")) return;
   if (isUndo(event)) {
     event.preventDefault();
-    if (currentView() !== "move") undo();
+    if (!["move", "recordings"].includes(currentView())) undo();
   }
   if (event.ctrlKey || event.metaKey || event.altKey) return;
   if (event.key === "?") list();
