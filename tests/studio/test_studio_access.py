@@ -322,7 +322,9 @@ def test_for_reading_only_every_change_is_refused(folder, open_studio):
 
 
 READING = {f"/{path}" for path in ("recognize", "why", "rollout", "primitive", "export", "robots/move", "recordings")}
-READING |= {"/recordings/{key}/spotted", "/episodes/{key}/spans"}
+READING |= {f"/recordings/{{key}}/{act}" for act in ("spotted", "read", "shapes", "annotations")} | {
+    "/episodes/{key}/spans"
+}
 
 
 def test_every_other_route_that_does_not_only_read_is_refused_too(folder, open_studio):

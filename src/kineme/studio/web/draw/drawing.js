@@ -1,6 +1,7 @@
 // A movement is drawn on the canvas: its samples go to the picture and to the server.
 import { byId, write } from "../parts/elements.js";
 import { library } from "../parts/library_state.js";
+import { mirror } from "../parts/mirror.js";
 import { requestAnswer, showAnswer } from "./answers.js";
 import { showLegend, takesDrawings } from "./invitation.js";
 import { canvasHeight } from "./scale.js";
@@ -41,6 +42,7 @@ function begin(session, pointer) {
 /** @param {Session} session @param {number[][]} samples */
 function extend(session, samples) {
   session.picture.ink.push(...samples);
+  mirror(samples[samples.length - 1]);
   session.picture.board.draw();
   if (library().symbols.length) session.sending.push(inLibrary(samples, session.height));
 }

@@ -32,6 +32,7 @@ import { Steps } from "./steps.js";
  * @param {Object} page
  * @param {(session: Session) => void} page.moved A path is another one.
  * @param {(session: Session, dragging: boolean) => void} page.dragged A point is held, or let go.
+ * @param {(session: Session, place: import("./plan.js").ViaPoint, event: PointerEvent) => void} page.grabbed
  * @returns {Session}
  */
 export function createSession(page) {
@@ -49,7 +50,11 @@ export function createSession(page) {
     steps: new Steps(),
     camera,
     handles,
-    picture: new MovePicture(camera, () => handles.place()),
+    picture: new MovePicture(
+      camera,
+      () => handles.place(),
+      (place, event) => session.plan && page.grabbed(session, place, event),
+    ),
     speed: new Plot(byId("plot-speed")),
     acceleration: new Plot(byId("plot-acceleration")),
     ticked: new Set([FORMULATIONS[0].name]),

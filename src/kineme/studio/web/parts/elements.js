@@ -31,6 +31,14 @@ export function make(tag, options = {}, ...children) {
   return element;
 }
 
+/** @param {string} text @param {() => any} act @param {Record<string, any>} options */
+export const button = (text, act, options = {}) =>
+  make("button", { class: "button", type: "button", ...options, on: { click: act } }, text);
+
+/** Offer names to choose from; the values are their numbers. @param {Element} select @param {string[]} names */
+export const offer = (select, names) =>
+  fill(select, ...names.map((name, k) => make("option", { value: String(k) }, name)));
+
 /** Say something else; what stays the same costs no layout. @param {Element} element @param {string} text */
 export function write(element, text) {
   if (element.textContent !== text) element.textContent = text;
@@ -69,18 +77,22 @@ export const breakable = (name) =>
 
 /**
  * Elements by their ids that are more than an HTMLElement.
- * @typedef {Record<"add-obstacle"|"add-span"|"add-via"|"ask-yes"|"clear"|"draw-clear"|"draw-move"|
- *     "draw-replay"|"draw-save"|"episodes-before"|"episodes-next"|"export"|"help"|"learn-file"|"learn-spans"|
- *     "merge"|"move-play"|"move-reset"|"naming-learn"|"play"|"play-recording"|"reset"|"robot-draw"|"robot-go"|
- *     "save"|"save-corrections"|"show-unlabeled"|"spot"|"spot-page"|"undo"|"zoom-in"|"zoom-out", HTMLButtonElement>
- *   & Record<"canvas"|"draw-canvas"|"map"|"move-canvas"|"nearest"|"plot-acceleration"|"plot-speed"|"stage"|
- *     "timeline-canvas", HTMLCanvasElement>
- *   & Record<"history"|"live-source"|"robot-preflight"|"why", HTMLDetailsElement>
- *   & Record<"ask"|"keys", HTMLDialogElement>
- *   & Record<"channels"|"formulations"|"pick-part"|"styles", HTMLFieldSetElement>
- *   & Record<"ask-name"|"duration"|"episodes-from"|"file"|"find"|"find-pick"|"find-symbol"|"naming-name"|"playhead"|
- *     "robot-dragged"|"robot-size"|"robot-slow"|"tilt"|"time"|"turn", HTMLInputElement>
- *   & Record<"camera"|"export-format"|"formulation"|"robot-arm"|"robot-what"|"tables", HTMLSelectElement>
- *   & Record<"spans", HTMLTableElement>
+ * @typedef {Record<"add-obstacle"|"add-span"|"add-via"|"ask-yes"|"clear"|"draw-clear"|"draw-move"|"draw-replay"|
+ *     "draw-save"|"episodes-before"|"episodes-next"|"export"|"help"|"learn-file"|"learn-spans"|"merge"|
+ *     "move-play"|"move-redo"|"move-reset"|"move-undo"|"naming-learn"|"play"|"play-recording"|"read-as"|
+ *     "redo-span"|"reset"|"robot-free"|"robot-go"|"robot-save"|"save"|"save-corrections"|"save-spans"|
+ *     "show-unlabeled"|"spot"|"spot-page"|"undo"|"undo-span"|"zoom-in"|"zoom-out", HTMLButtonElement>
+ *   & Record<"canvas"|"draw-canvas"|"map"|"move-canvas"|"nearest"|"plot-acceleration"|"plot-speed"|"shape"|
+ *     "stage"|"timeline-canvas", HTMLCanvasElement>
+ *   & Record<"history"|"live-source"|"mirror"|"move-advanced"|"pick-part"|"robot-preflight"|
+ *     "why", HTMLDetailsElement>
+ *   & Record<"ask"|"importing"|"keys", HTMLDialogElement>
+ *   & Record<"channels"|"formulations"|"manner"|"styles", HTMLFieldSetElement>
+ *   & Record<"ask-name"|"duration"|"episodes-from"|"file"|"find"|"find-pick"|"find-symbol"|"naming-name"|
+ *     "own-video"|"playhead"|"robot-dragged"|"robot-size"|"robot-slow"|"style-mix"|"tilt"|"time"|"turn"|
+ *     "video-start", HTMLInputElement>
+ *   & Record<"camera"|"export-format"|"formulation"|"robot-arm"|"robot-format"|"robot-what"|"save-format"|
+ *     "tables", HTMLSelectElement>
+ *   & Record<"importing-rows"|"spans", HTMLTableElement>
  *   & Record<"video", HTMLVideoElement>} Elements
  */
