@@ -306,7 +306,7 @@ def test_symbols_are_merged_split_deleted_and_all_of_it_taken_back(opened, studi
     page.keyboard.press("Enter")
     wait_until(page, "document.querySelectorAll('.card-open').length === 3")
     assert "both" in names.all_inner_texts()
-    page.click(".card-name >> text=both")
+    page.click(".card-open >> text=both")
     wait_until(page, "document.querySelectorAll('.member').length === 6")
     assert page.evaluate(LOADED_TWICE) == 12
     other = center(page, ".member >> nth=5")
@@ -316,7 +316,7 @@ def test_symbols_are_merged_split_deleted_and_all_of_it_taken_back(opened, studi
     page.keyboard.type("part")
     page.keyboard.press("Enter")
     wait_until(page, "document.querySelectorAll('.card-open').length === 4")
-    page.click("text=part")
+    page.click(".card-open >> text=part")
     page.get_by_role("button", name="Delete symbol").click()
     page.keyboard.press("Enter")
     wait_until(page, "document.querySelectorAll('.card-open').length === 3")

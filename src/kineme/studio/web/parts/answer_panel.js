@@ -38,7 +38,7 @@ function differs({ largest_difference: most, from, to }) {
 }
 
 export class AnswerPanel {
-  /** @param {{picture?: (name: string) => number[][]|null, advice?: () => string}} page Paths of symbols; what to do. */
+  /** @param {{picture?: (name: string) => number[][]|null, advice?: () => string}} page */
   constructor({ picture = () => null, advice = () => "" } = {}) {
     this.page = { picture, advice };
     this.rows = [...Array(ROWS)].map(() => row("\u00a0"));
