@@ -111,6 +111,8 @@ export const breakable = (name) =>
  *   canvas: HTMLCanvasElement,
  *   map: HTMLCanvasElement,
  *   stage: HTMLCanvasElement,
+ *   "wand-canvas": HTMLCanvasElement,
+ *   "wand-hold": HTMLButtonElement,
  *   "live-source": HTMLDetailsElement,
  *   "robot-preflight": HTMLDetailsElement,
  *   history: HTMLDetailsElement,
