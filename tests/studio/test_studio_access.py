@@ -320,7 +320,7 @@ def test_for_reading_only_every_change_is_refused(folder, open_studio):
     assert client.get("/api/library").json() == before
 
 
-READING = {f"/{path}" for path in ("recognize", "rollout", "primitive", "export", "robots/move", "recordings")}
+READING = {f"/{path}" for path in ("recognize", "rollout", "primitive", "export", "robots/move", "recordings", "wand")}
 READING |= {"/recordings/{key}/spotted", "/episodes/{key}/spans"}
 
 

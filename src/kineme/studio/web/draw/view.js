@@ -8,10 +8,12 @@ import { currentView, show } from "../parts/views.js";
 import { hearAnswer, requestAnswer, showError, showState } from "./answers.js";
 import { hearerOf } from "./drawing.js";
 import { startFollowing } from "./follow.js";
+import { followGamepad } from "./gamepad.js";
+import { handPen } from "./hand.js";
 import { showInvitation } from "./invitation.js";
 import { followKeys } from "./keyboard_pen.js";
-import { describeLiveSource } from "./live_source.js";
 import { startNaming } from "./naming.js";
+import { offerPhone } from "./phone.js";
 import { clear, createSession } from "./session.js";
 
 /** @typedef {import("./session.js").Session} Session */
@@ -72,7 +74,11 @@ export function startDraw(send) {
     learned: (name) => showLearned(session, name),
   });
   listen(session);
-  describeLiveSource(byId("live-source-text"));
+  for (const host of document.querySelectorAll("[data-host]")) host.textContent = location.host;
+  followGamepad(byId("draw-canvas"), hearerOf(session), sources);
+  offerPhone();
+  sources.hand = handPen(session.picture, hearerOf(session));
+  window.addEventListener("kineme-hand", (event) => sources.hand(/** @type {CustomEvent} */ (event).detail));
   return {
     state: (/** @type {any} */ state) => showState(session, state),
     answer: (/** @type {any} */ answer) => hearAnswer(session, answer),

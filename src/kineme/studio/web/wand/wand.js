@@ -7,55 +7,54 @@ import { followPointer } from "../parts/stroke.js";
 const REACH = 1.6; // heights of the canvas for a turn by 1 rad
 const BEAT = 3000; // between messages while nothing moves [ms]
 const MOST = 500; // samples in one message
-const INVITATION = "Draw below with a finger";
-const GONE = "No longer connected. Open Use a phone in the studio and scan the new code.";
 
 const id = crypto.randomUUID();
 const button = byId("wand-hold");
-/** @type {{begin?: boolean, samples?: number[][], finish?: boolean}[]} What the studio is still to be told. */
-const waiting = [];
 /** @type {number[][]} */
 let ink = [];
-let sending = false;
+let sent = 0; // samples of it
+let over = false; // it has ended, and the studio is still to be told
+let busy = false;
 let lost = true;
-const note = (/** @type {string} */ text) => write(byId("wand-note"), text);
-const board = new Board(byId("wand-canvas"), ({ context, height }) =>
-  line(
-    context,
-    ink.map(([, x, y]) => [x * height, (1 - y) * height]),
-    { color: color("--ink"), width: 5 },
-  ),
-);
+/** @type {{time: number, right: number[], up: number[]}|null} The plane that is drawn on, as the button was pressed. */
+let plane = null;
 
-/** @param {{begin?: boolean, samples?: number[][], finish?: boolean}} message */
-async function tell(message) {
-  const last = waiting[waiting.length - 1];
-  if (last && !last.finish && message.samples && last.samples?.length < MOST) last.samples.push(...message.samples);
-  else waiting.push(message);
-  if (sending) return;
-  sending = true;
-  while (waiting.length) {
-    const next = waiting.shift();
-    if (await isHeard(next)) continue;
-    waiting.unshift(next); // once more, when the network is back
-    await new Promise((done) => setTimeout(done, 1000));
-  }
-  sending = false;
+const note = (/** @type {string} */ text) => write(byId("wand-note"), text);
+const board = new Board(byId("wand-canvas"), ({ context, height }) => {
+  const pixels = ink.map(([, x, y]) => [x * height, (1 - y) * height]);
+  line(context, pixels, { color: color("--ink"), width: 5 });
+});
+
+/** Tell the studio what it does not know yet; what comes meanwhile goes with the next message. */
+async function tell() {
+  if (busy) return;
+  busy = true;
+  do {
+    const of = ink;
+    const samples = ink.slice(sent, sent + MOST);
+    const finish = over && sent + samples.length === ink.length;
+    if (!(await isHeard({ id, begin: sent === 0, samples, finish }))) {
+      await new Promise((done) => setTimeout(done, 1000));
+    } else if (of === ink) {
+      sent += samples.length;
+      over &&= !finish;
+    }
+  } while (sent < ink.length || over);
+  busy = false;
 }
 
-/** @param {Object} message @returns {Promise<boolean>} */
+/** @param {Record<string, any>} message */
 async function isHeard(message) {
   const headers = { "Content-Type": "application/json" };
-  const body = JSON.stringify({ id, ...message });
-  const options = { method: "POST", headers, body, signal: AbortSignal.timeout(5000) };
+  const options = { method: "POST", headers, body: JSON.stringify(message), signal: AbortSignal.timeout(5000) };
   const said = await fetch("/api/samples", options).then(
     (response) => response.json(),
     () => null,
   );
-  if (said?.error) note(said.error);
-  else if (said?.label) note(`${said.certainty} ${said.label}`);
-  else if (said?.certainty === "new") note("New. Name it in the studio");
-  else if (!said || lost || "finish" in message) note(said ? INVITATION : GONE);
+  if (!said) note("No longer connected. Open Use a phone in the studio and scan the new code");
+  else if (said.error || said.label) note(said.error ?? `${said.certainty} ${said.label}`);
+  else if (said.certainty === "new") note("New. Name it in the studio");
+  else if (lost || message.finish) note("Draw below with a finger");
   lost = !said;
   return !lost;
 }
@@ -63,68 +62,48 @@ async function isHeard(message) {
 /** @type {import("../parts/stroke.js").Hearer} */
 const hearer = {
   begins: () => {
-    ink = [];
-    tell({ begin: true, samples: [] });
+    [ink, sent, over, plane] = [[], 0, false, null];
     return true;
   },
   goes: (samples) => {
     ink.push(...samples);
     board.draw();
-    tell({ samples: [...samples] });
+    tell();
   },
-  ends: () => tell({ finish: true }),
+  ends: () => {
+    over = true;
+    tell();
+  },
 };
 
-/**
- * Where the upper edge of the phone points, in space: x to the east, y to the north, z up.
- * @param {DeviceOrientationEvent} event Angles as the W3C defines them [degrees].
- */
-function pointing({ alpha, beta }) {
+/** The upper edge of the phone points. @param {DeviceOrientationEvent} event Angles as the W3C defines them. */
+function turned({ alpha, beta, timeStamp }) {
+  if (alpha === null || !button.classList.contains("held")) return;
   const [a, b] = [alpha, beta].map((angle) => (angle * Math.PI) / 180);
-  return [-Math.sin(a) * Math.cos(b), Math.cos(a) * Math.cos(b), Math.sin(b)];
-}
-
-/** @type {{time: number, right: number[], up: number[]}|null} As the button was pressed: the plane that is drawn on. */
-let start = null;
-
-/** @param {DeviceOrientationEvent} event */
-function turned(event) {
-  if (event.alpha === null || !button.classList.contains("held")) return;
-  const [x, y, z] = pointing(event);
-  if (!start) {
-    const flat = Math.hypot(x, y) || 1;
-    const right = [y / flat, -x / flat, 0];
-    start = { time: event.timeStamp, right, up: [(-z * x) / flat, (-z * y) / flat, flat] };
-  }
+  const [x, y, z] = [-Math.sin(a) * Math.cos(b), Math.cos(a) * Math.cos(b), Math.sin(b)]; // east, north, up
+  const flat = Math.hypot(x, y);
+  plane ??= { time: timeStamp, right: [y / flat, -x / flat, 0], up: [(-z * x) / flat, (-z * y) / flat, flat] };
   const along = (/** @type {number[]} */ axis) => REACH * (axis[0] * x + axis[1] * y + axis[2] * z);
   const middle = board.width / board.height / 2;
-  const time = (event.timeStamp - start.time) / 1000;
-  if (!ink.length || time > ink[ink.length - 1][0])
-    hearer.goes([[time, middle + along(start.right), 0.5 + along(start.up)]]);
-}
-
-/** @param {PointerEvent} event */
-function hold(event) {
-  button.setPointerCapture(event.pointerId);
-  start = null;
-  button.classList.add("held");
-  hearer.begins("wand");
+  hearer.goes([[(timeStamp - plane.time) / 1000, middle + along(plane.right), 0.5 + along(plane.up)]]);
 }
 
 async function release() {
-  if (!button.classList.contains("held")) return;
   button.classList.remove("held");
   if (ink.length) return hearer.ends();
-  const ask = /** @type {any} */ (window.DeviceOrientationEvent)?.requestPermission; // of iPhones, and only after a touch
+  const ask = /** @type {any} */ (window.DeviceOrientationEvent)?.requestPermission; // iPhones want it after a touch
   const may = ask && (await ask()) === "granted";
   note(may ? "Now hold the button and move" : "This phone does not tell how it turns. Draw with a finger");
 }
 
 followPointer(byId("wand-canvas"), hearer);
 window.addEventListener("deviceorientation", turned);
-button.addEventListener("pointerdown", hold);
-button.addEventListener("pointerup", release);
-button.addEventListener("pointercancel", release);
+button.addEventListener("pointerdown", (event) => {
+  button.setPointerCapture(event.pointerId);
+  button.classList.add("held");
+  hearer.begins("wand");
+});
+button.addEventListener("lostpointercapture", release);
 button.addEventListener("contextmenu", (event) => event.preventDefault());
-setInterval(() => sending || tell({}), BEAT);
-tell({});
+setInterval(tell, BEAT);
+tell();

@@ -1,0 +1,48 @@
+// A hand that a camera sees: its index finger draws while the thumb touches it.
+import { currentView } from "../parts/views.js";
+
+const [WRIST, THUMB, INDEX, KNUCKLE] = [0, 4, 8, 9]; // among the 21 landmarks of a hand
+const [CLOSED, OPEN] = [0.3, 0.45]; // distance from thumb to index finger, in lengths of the palm
+const PATIENCE = 500; // without landmarks, after which the hand has gone [ms]
+
+/** @typedef {{points: number[][], time: number, aspect: number}} Landmarks As at /api/live; the picture's y points down. */
+
+/**
+ * @param {import("./picture.js").Picture} picture
+ * @param {import("../parts/stroke.js").Hearer} hear
+ * @returns What takes the landmarks of one moment.
+ */
+export function handPen(picture, hear) {
+  const { board } = picture;
+  let down = false;
+  let first = 0;
+  let timer = 0;
+
+  const lift = () => {
+    if (down) hear.ends();
+    down = false;
+  };
+  const leave = () => {
+    lift();
+    picture.hand = null;
+    board.draw();
+  };
+  return (/** @type {Landmarks} */ { points, time, aspect }) => {
+    clearTimeout(timer);
+    if (currentView() !== "draw") return leave();
+    const middle = board.width / board.height / 2;
+    const hand = points.map(([x, y]) => [middle + (x - 0.5) * aspect, 1 - y]);
+    const apart = (/** @type {number} */ a, /** @type {number} */ b) =>
+      Math.hypot(hand[a][0] - hand[b][0], hand[a][1] - hand[b][1]);
+    const pinch = apart(THUMB, INDEX) / apart(WRIST, KNUCKLE);
+    if (pinch > OPEN) lift();
+    if (pinch < CLOSED && !down) {
+      down = hear.begins("hand");
+      first = time;
+    }
+    if (down) hear.goes([[time - first, ...hand[INDEX]]]);
+    picture.hand = hand;
+    board.draw();
+    timer = setTimeout(leave, PATIENCE);
+  };
+}
